@@ -1,0 +1,116 @@
+// The contract between posed and a device. A driver is passive: the daemon owns every thread. It
+// splits in two: a Transport that hands over raw chunks, and a Decoder that turns chunks into
+// frames. A log of the chunks therefore replays through the very decoder that ran live.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "proto/frame/result.hpp"
+#include "proto/frame/sink.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::drivers {
+
+inline constexpr std::size_t kMaxChunk =
+    64 * 1024;  // bytes; a longer one is an error of the transport
+
+// What one read gave.
+struct Chunk {
+  std::span<const std::byte> bytes;  // valid until the next read; empty when nothing was due
+  bool end = false;                  // the source is finished and will never give more
+};
+
+// Where bytes come from. One reader thread uses it after open().
+class Transport {
+ public:
+  Transport() = default;
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
+  virtual ~Transport() = default;
+
+  // Readable when a chunk may be due; the daemon polls it. Valid from open() to destruction.
+  [[nodiscard]] virtual int poll_fd() const noexcept = 0;
+
+  // Starts the source (a file's clock begins to run). Cold.
+  [[nodiscard]] virtual Result<> start(std::int64_t now_ns) = 0;
+
+  // The next chunk, at most one; call again until it is empty. Never blocks. RT-safe but for its
+  // read.
+  [[nodiscard]] virtual Chunk read(std::int64_t now_ns) noexcept = 0;
+};
+
+// Bytes to frames. Pure: no clock, no I/O, no allocation after construction.
+class Decoder {
+ public:
+  Decoder() = default;
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+  virtual ~Decoder() = default;
+
+  // Bytes in any cut; `arrival_ns` is the time of the read. Whatever the bytes are, it neither
+  // crashes nor hangs, and counts what it cannot use. RT-safe.
+  virtual void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept = 0;
+};
+
+// Names and units of a device's sample values.
+struct SampleLayout {
+  std::vector<std::string> names;
+  std::vector<std::string> units;  // "rad", "1", "m"
+};
+
+// Everything a device says about itself before it streams; stored in the log, enough to decode it
+// again.
+struct Description {
+  std::string driver;    // registry name
+  std::string text;      // the device's own header (a BVH's HIERARCHY), decoder's input
+  std::string identity;  // stable name of the device: path, serial number
+  std::shared_ptr<const Skeleton> skeleton;  // null for a device that emits samples only
+  SampleLayout samples;
+  double rate_hz = 0.0;  // nominal; 0 when unknown
+};
+
+// One opened device.
+struct Device {
+  Description description;
+  std::unique_ptr<Transport> transport;
+  std::unique_ptr<Decoder> decoder;
+};
+
+// The options a driver takes from its [stream.<driver>] table; config/ checks them against this
+// list.
+using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
+using Options = std::map<std::string, OptionValue>;
+struct OptionSpec {
+  std::string_view name;
+  OptionValue default_value;  // also fixes the type
+  bool required = false;
+  bool is_path = false;  // relative to the config file
+  std::string_view help;
+};
+
+// One line of the registry.
+struct Driver {
+  std::string_view name;
+  std::string_view summary;
+  std::vector<OptionSpec> options;
+  Result<Device> (*open)(const Options& options);
+  // The decoder alone, from what a log kept of the description's text; replay uses it.
+  Result<std::unique_ptr<Decoder>> (*make_decoder)(const Description& description);
+  // Skeleton, samples and rate again from driver + text + identity.
+  Result<Description> (*describe)(const std::string& text, const std::string& identity);
+};
+
+[[nodiscard]] std::span<const Driver> registry();                // the one list
+[[nodiscard]] const Driver* find_driver(std::string_view name);  // null when unknown
+
+}  // namespace posed::drivers

@@ -1,0 +1,60 @@
+// Predictor: the trained Gaussian process in the form the hot path wants: float32, precomputed
+// weights, tiles that fit the caches, SIMD chosen at run time (AVX2 and AVX-512 give the same
+// bits).
+//
+//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (paper, eq.
+//   4)
+//
+// Missing dimensions are marginalised: the distance runs over the available ones, scaled by D /
+// D_avail.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::gp {
+
+// The trained process, double precision, as a model file holds it.
+struct Trained {
+  Eigen::MatrixXd inputs;   // X [N x D], rad
+  Eigen::MatrixXd weights;  // C^-1 (Y - offset) [N x D_out], rad
+  Eigen::VectorXd offset;   // prior mean [D_out], rad
+  double lambda = 0.0;      // log signal variance
+  double mu = 1.0;          // 1 / length^2 [1/rad^2]
+  double b = 0.0;           // constant kernel
+  double noise = 1e-3;      // sigma^2
+};
+
+class Predictor {
+ public:
+  // Validates shapes and values; precomputes tiles and, with `gate`, what the confidence needs.
+  [[nodiscard]] static Result<Predictor> build(const Trained& trained, bool gate);
+  Predictor(Predictor&&) noexcept;
+  Predictor& operator=(Predictor&&) noexcept;
+  ~Predictor();
+
+  [[nodiscard]] int inputs() const noexcept;   // D
+  [[nodiscard]] int outputs() const noexcept;  // D_out
+
+  // f(q) into out [D_out]. `available` is empty (all) or D flags. RT-safe.
+  void mean(std::span<const float> q, std::span<const std::uint8_t> available,
+            std::span<float> out) const noexcept;
+
+  // The same, and returns the confidence g = 1 - v_E(q) / e^lambda in 0..1 (algorithms 2.4).
+  // RT-safe. Needs build(..., gate = true).
+  [[nodiscard]] float mean_and_confidence(std::span<const float> q,
+                                          std::span<const std::uint8_t> available,
+                                          std::span<float> out) const noexcept;
+
+ private:
+  struct Parts;
+  explicit Predictor(std::unique_ptr<Parts> parts);
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace posed::gp

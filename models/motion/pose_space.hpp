@@ -1,0 +1,67 @@
+// PoseSpace: turns a frame into the vector q that a style model was trained on, and puts a change
+// of q back into the frame. Heading and position of the root are not style: removed before,
+// restored after.
+//
+//   native    rotation vectors [rad] of the source's own joints about the training mean,
+//             q_j = log(Rmean_j^T R_j), R_j' = Rmean_j exp(q_j'); 3 a joint, the root first with
+//             its heading removed
+//   humanoid  the same on the canonical skeleton
+//   cmu43     the first paper's Euler angles [rad] of an Acclaim skeleton (root 3 + 40)
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "proto/frame/frame.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::motion {
+
+inline constexpr int kMaxPoseDims = kMaxChannels;
+
+enum class Space : std::uint8_t { kNative, kCmu43, kHumanoid };
+[[nodiscard]] std::string_view space_name(Space space);
+[[nodiscard]] Result<Space> space_from_name(std::string_view name);
+
+// What a model stores of its space.
+struct PoseSpaceSpec {
+  Space space = Space::kNative;
+  std::vector<std::string>
+      joints;  // source joint names (native, cmu43) or VRM bones (humanoid), q's order
+  std::vector<Eigen::Quaterniond> mean;  // Rmean, one a joint; empty for cmu43
+  int root = 0;                          // index in `joints` of the joint whose heading is removed
+};
+
+// A spec bound to one skeleton. Const and shareable after bind().
+class PoseSpace {
+ public:
+  // Refuses a skeleton that cannot serve the space, naming the missing joints.
+  [[nodiscard]] static Result<PoseSpace> bind(const PoseSpaceSpec& spec, const Skeleton& skeleton);
+
+  [[nodiscard]] int dims() const noexcept;
+  // Which joint of `spec.joints` dimension d belongs to.
+  [[nodiscard]] int joint_of_dim(int d) const noexcept;
+
+  // Turn about +Y that brings the training mean of the root nearest to this frame's root [rad].
+  // RT-safe.
+  [[nodiscard]] double heading_rad(const Frame& frame) const noexcept;
+
+  // q [dims] of `frame` seen from `heading_rad`; available[d] is 0 where the joint was not measured
+  // (q is then 0, the training mean). RT-safe.
+  void to_vector(const Frame& frame, double heading_rad, std::span<float> q,
+                 std::span<std::uint8_t> available) const noexcept;
+
+  // Replaces the pose of `frame` by q + delta in the space's own sense; joints that are not
+  // available and joints outside the space stay as they are; zero delta leaves every bit as it was.
+  // RT-safe.
+  void add(Frame& frame, double heading_rad, std::span<const float> q,
+           std::span<const float> delta) const noexcept;
+};
+
+}  // namespace posed::motion

@@ -1,0 +1,47 @@
+// Clip: a recorded motion as it stands in its file. Channel values keep the file's order; angles
+// are in radians and lengths in metres, so that nothing downstream asks for units.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::clip {
+
+using ChannelMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct Clip {
+  std::string path;
+  std::shared_ptr<const Skeleton> skeleton;
+  double frame_rate_hz = 0.0;
+  ChannelMatrix channels;             // [frames x Skeleton::channels], rad and m
+  std::vector<std::string> warnings;  // one sentence each: read leniently, and how
+  double metres_per_unit = 0.01;      // of the file, kept for writing the same file back
+
+  [[nodiscard]] int frames() const { return static_cast<int>(channels.rows()); }
+  [[nodiscard]] Frame frame(int index) const;  // pose and index-derived device time; no stream
+};
+
+struct ReadOptions {
+  std::filesystem::path asf;   // skeleton of an AMC; empty: NN.asf beside NN_MM.amc
+  double amc_rate_hz = 120.0;  // an AMC carries no rate
+  std::optional<double>
+      metres_per_unit;  // of a BVH; empty: profile, else found from the figure's height
+  std::string profile;  // named skeleton profile; empty: found by joint names
+};
+
+// By extension: .bvh or .amc. Errors name file and line.
+[[nodiscard]] Result<Clip> read_clip(const std::filesystem::path& path,
+                                     const ReadOptions& options = {});
+
+// Writes `clip` as BVH in its own units with its own joint names, hierarchy, channel order and
+// rate. An Acclaim skeleton becomes a BVH with ZYX rotation channels on every joint.
+[[nodiscard]] Result<> write_bvh(const Clip& clip, const std::filesystem::path& path);
+
+}  // namespace posed::clip

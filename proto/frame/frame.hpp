@@ -1,0 +1,72 @@
+// Frame: one pose of one stream at one instant. Sample: the named values of one device at one
+// instant. Both are trivially copyable, have a fixed capacity and hold no pointer, so that they can
+// cross a lock-free ring by value. Coordinates: right-handed, Y up, metres, radians; a person in
+// T-pose faces +Z with the left hand at +X. Rotations take a joint's frame to its parent's frame.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <type_traits>
+
+#include "proto/frame/time.hpp"
+
+namespace posed {
+
+inline constexpr int kMaxJoints = 96;
+inline constexpr int kMaxChannels = 288;  // three a joint
+inline constexpr int kMaxSampleValues = 64;
+inline constexpr int kMaxLabel = 16;  // bytes, closing zero included
+
+using Vec3f = std::array<float, 3>;
+using Quatf = std::array<float, 4>;  // x, y, z, w; unit length
+inline constexpr Quatf kIdentity{0.0F, 0.0F, 0.0F, 1.0F};
+
+enum class Quality : std::uint8_t { kMeasured, kPredicted, kHeld, kStale };
+enum class Source : std::uint8_t { kDevice, kFile, kReplay, kLabels };
+
+// When each step finished with the frame, host time [ns]; kNoTime_ns while it has not.
+struct StageStamps {
+  std::int64_t decoded_ns = kNoTime_ns;
+  std::int64_t styled_ns = kNoTime_ns;
+  std::int64_t published_ns = kNoTime_ns;  // handed to the publisher
+};
+
+// Who and when, common to frames and samples.
+struct Header {
+  std::uint32_t stream = 0;              // index of the stream in the daemon's config
+  std::uint64_t sequence = 0;            // counts the stream's decoded frames from 1; never repeats
+  std::int64_t device_ns = kNoTime_ns;   // the device's own time, where it has one
+  std::int64_t arrival_ns = kNoTime_ns;  // host time, taken right after the read
+  ClockMapping clock;                    // how device time maps to host time, as far as known
+};
+
+struct Frame {
+  Header header;
+  std::uint32_t skeleton = 0;  // Skeleton::id of the source's own skeleton
+  std::uint16_t joint_count = 0;
+  std::uint16_t angle_count = 0;  // rotation channels of the skeleton; 0 when it lists none
+  Quality quality = Quality::kMeasured;
+  Source source = Source::kDevice;
+  std::uint16_t lag_frames = 0;
+  float lag_ms = 0.0F;
+  std::array<char, kMaxLabel> label{};  // recognised or played gesture; empty when none
+  float label_probability = 0.0F;
+  Vec3f root_position_m{};  // the skeleton's root_joint in the world
+  StageStamps stamps;
+  std::bitset<kMaxJoints> valid;  // joint was measured; its rotation is identity otherwise
+  std::array<Quatf, kMaxJoints> rotation_xyzw{};  // [joint], parent-relative
+  std::array<float, kMaxChannels> angle_rad{};    // [rotation channel], in Skeleton::channels order
+};
+static_assert(std::is_trivially_copyable_v<Frame>);
+
+struct Sample {
+  Header header;
+  std::uint16_t value_count = 0;
+  Quality quality = Quality::kMeasured;
+  std::bitset<kMaxSampleValues> valid;
+  std::array<float, kMaxSampleValues> value{};  // units as the device's SampleLayout says
+};
+static_assert(std::is_trivially_copyable_v<Sample>);
+
+}  // namespace posed

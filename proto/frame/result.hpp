@@ -1,0 +1,40 @@
+// Result<T>: how cold code reports failure. A failure is one sentence that tells the user what to
+// do, with the place in the file where there is one. Hot code never uses it (see Outcome in
+// sink.hpp).
+#pragma once
+
+#include <expected>
+#include <string>
+#include <utility>
+
+namespace posed {
+
+// The exit code a command ends with. Clients may rely on the numbers.
+enum class ExitCode : int { kDone = 0, kFailed = 1, kWrongUse = 2 };
+
+struct Error {
+  std::string message;  // one sentence, no trailing newline, says what to do
+  std::string file;     // empty when no file is to blame
+  int line = 0;         // 1-based; 0 when the place is not a line
+  ExitCode exit_code = ExitCode::kFailed;
+
+  // "file:line: message", leaving out what is not known.
+  [[nodiscard]] std::string text() const;
+};
+
+template <typename T = void>
+using Result = std::expected<T, Error>;
+
+// return fail("..."), return fail("...", path, line)
+[[nodiscard]] inline std::unexpected<Error> fail(std::string message, std::string file = {},
+                                                 int line = 0) {
+  return std::unexpected(Error{std::move(message), std::move(file), line, ExitCode::kFailed});
+}
+
+// The same for a mistake in how the program was called or configured (exit code 2).
+[[nodiscard]] inline std::unexpected<Error> misuse(std::string message, std::string file = {},
+                                                   int line = 0) {
+  return std::unexpected(Error{std::move(message), std::move(file), line, ExitCode::kWrongUse});
+}
+
+}  // namespace posed

@@ -1,0 +1,52 @@
+// Sink: where a decoder puts what it made of the bytes, and the named outcomes of decoding.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/frame/frame.hpp"
+
+namespace posed {
+
+// What became of a piece of input. Each is counted per stream and published in `stats`.
+enum class Outcome : std::uint8_t { kOk, kShort, kBadChecksum, kOutOfRange, kForeign, kCount };
+inline constexpr int kOutcomes = static_cast<int>(Outcome::kCount);
+
+// All calls are RT-safe and come from the one thread that feeds the decoder. The decoder fills what
+// it knows (pose, device_ns, quality); the owner of the sink stamps stream, sequence and arrival.
+class Sink {
+ public:
+  Sink() = default;
+  Sink(const Sink&) = delete;
+  Sink& operator=(const Sink&) = delete;
+  virtual ~Sink() = default;
+
+  virtual void frame(Frame& frame) noexcept = 0;
+  virtual void sample(Sample& sample) noexcept = 0;
+  virtual void outcome(Outcome outcome) noexcept = 0;
+};
+
+// Where a pipeline stage puts its frames.
+class Emit {
+ public:
+  Emit() = default;
+  Emit(const Emit&) = delete;
+  Emit& operator=(const Emit&) = delete;
+  virtual ~Emit() = default;
+
+  virtual void frame(const Frame& frame) noexcept = 0;
+};
+
+// One step of the pipeline for one stream. `in` is null on a tick (silence, dropout, label-only
+// stream). A stage knows only frame times and `now_ns`, never a clock. RT-safe; called from one
+// thread.
+class Stage {
+ public:
+  Stage() = default;
+  Stage(const Stage&) = delete;
+  Stage& operator=(const Stage&) = delete;
+  virtual ~Stage() = default;
+
+  virtual void step(const Frame* in, std::int64_t now_ns, Emit& emit) noexcept = 0;
+};
+
+}  // namespace posed

@@ -1,0 +1,31 @@
+// Where tests find things: the source tree, and the real recordings that may or may not be beside
+// it.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace posed::test {
+
+inline std::filesystem::path source_dir() { return POSED_SOURCE_DIR; }
+inline std::filesystem::path golden(const std::string& name) {
+  return source_dir() / "tests/golden" / name;
+}
+
+// ../shared/<relative> when it is there. Tests that need it skip by name:
+//   const auto clip = shared("data/cmu/07_01.amc"); if (!clip) { SKIP_WITHOUT_SHARED(); }
+inline std::optional<std::filesystem::path> shared(const std::string& relative) {
+  auto path = source_dir() / "../shared" / relative;
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  return path;
+}
+
+}  // namespace posed::test
+
+// Says by name what was not run; the count of skipped tests is printed by `./run test`.
+#define SKIP_WITHOUT_SHARED()                                                              \
+  do {                                                                                     \
+    WARN("SKIPPED without ../shared: " << Catch::getResultCapture().getCurrentTestName()); \
+    return;                                                                                \
+  } while (false)
