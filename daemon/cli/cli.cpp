@@ -1,0 +1,38 @@
+#include "daemon/cli/cli.hpp"
+
+#include <array>
+#include <cstdio>
+
+#include <CLI/CLI.hpp>
+
+namespace posed::cli {
+namespace {
+
+using AddCommand = void (*)(CLI::App& app, int& exit_code);
+
+// The order in which `posed --help` lists them.
+constexpr std::array<AddCommand, 0> kCommands{};
+
+}  // namespace
+
+int report(const Error& error) {
+  std::fprintf(stderr, "posed: %s\n", error.text().c_str());
+  return static_cast<int>(error.exit_code);
+}
+
+int main_of(int argc, char** argv) {
+  CLI::App app{"posed: live poses in, another style out", "posed"};
+  app.set_version_flag("--version", "posed 0.1.0");
+  app.require_subcommand(1);
+  int exit_code = 0;
+  for (const AddCommand add : kCommands) add(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const bool asked_for_help = app.exit(error) == 0;
+    return static_cast<int>(asked_for_help ? ExitCode::kDone : ExitCode::kWrongUse);
+  }
+  return exit_code;
+}
+
+}  // namespace posed::cli

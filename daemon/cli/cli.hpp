@@ -1,0 +1,22 @@
+// The command line: one file a command. A command adds a CLI11 subcommand to `app`; its callback
+// does the work and stores the exit code. To add one: write daemon/cli/<name>.cpp, declare it here,
+// list it in cli.cpp.
+#pragma once
+
+#include <string>
+
+#include "proto/frame/result.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace posed::cli {
+
+// Parses and runs; returns the process's exit code (0 done, 1 failed, 2 wrong use).
+[[nodiscard]] int main_of(int argc, char** argv);
+
+// Prints "posed: <sentence>" on stderr and returns the error's exit code.
+[[nodiscard]] int report(const Error& error);
+
+}  // namespace posed::cli

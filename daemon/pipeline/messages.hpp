@@ -1,0 +1,65 @@
+// What crosses between the daemon's threads. Everything is trivially copyable and travels through
+// boost::lockfree::spsc_queue rings by value.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+
+#include "models/style/style_filter.hpp"
+#include "proto/frame/frame.hpp"
+
+namespace posed::pipeline {
+
+// reader -> pipeline -> publisher
+struct Item {
+  enum class Kind : std::uint8_t { kFrame, kRawFrame, kSample, kNotice };
+  Kind kind = Kind::kFrame;
+  union {
+    Frame frame;
+    Sample sample;
+    struct {
+      std::uint32_t stream;
+      std::uint8_t event;  // posed.v1.Event.Kind
+      std::int64_t time_ns;
+      std::uint64_t sequence;
+      double value;
+    } notice;
+  };
+  Item() noexcept : frame{} {}
+};
+static_assert(std::is_trivially_copyable_v<Item>);
+
+// control -> pipeline; takes effect at the next frame boundary of its stream.
+struct Command {
+  enum class Kind : std::uint8_t { kAlpha, kModel, kStop };
+  Kind kind = Kind::kAlpha;
+  std::uint32_t stream = 0;
+  std::uint64_t ticket = 0;  // comes back in the Ack
+  float alpha = 0.0F;
+  const style::BoundModel* model = nullptr;  // ready-made; ownership passes with the message
+  std::array<char, 65> model_hash{};         // SHA-256 hex of the file's bytes, for the log
+};
+
+// pipeline -> control; also how a replaced model returns to be freed by the cold side.
+struct Ack {
+  std::uint64_t ticket = 0;
+  std::uint32_t stream = 0;
+  std::uint64_t sequence = 0;  // first frame that felt it
+  const style::BoundModel* retired = nullptr;
+};
+
+// pipeline -> recorder: every decision that decoding alone cannot repeat. It takes effect just
+// before frame `sequence` of its stream. Order within a stream is the order in the ring.
+struct Decision {
+  enum class Kind : std::uint8_t { kAlpha = 1, kModel = 2, kShed = 3, kTick = 4 };
+  Kind kind = Kind::kAlpha;
+  std::uint32_t stream = 0;
+  std::uint64_t sequence = 0;  // kShed: first sequence skipped
+  std::uint64_t count = 0;     // kShed: how many
+  std::int64_t now_ns = 0;     // kTick
+  float alpha = 0.0F;
+  std::array<char, 65> model_hash{};
+};
+
+}  // namespace posed::pipeline
