@@ -1,0 +1,200 @@
+#include "tests/unit/tidy/source_tree.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <regex>
+#include <sstream>
+
+namespace posed::tidy {
+namespace {
+
+constexpr int kMaxLines = 500;
+constexpr std::size_t kMaxColumns = 100;
+
+// Blanks comments and the insides of string and character literals, keeping every column in place.
+class Blanker {
+ public:
+  std::string line(const std::string& text) {
+    std::string code = text;
+    for (std::size_t i = 0; i < code.size(); ++i) {
+      if (in_block_comment_) {
+        if (code.compare(i, 2, "*/") == 0) {
+          in_block_comment_ = false;
+          code[i + 1] = ' ';
+        }
+        code[i] = ' ';
+      } else if (code.compare(i, 2, "/*") == 0) {
+        in_block_comment_ = true;
+        code[i] = ' ';
+      } else if (code.compare(i, 2, "//") == 0) {
+        std::fill(code.begin() + static_cast<std::ptrdiff_t>(i), code.end(), ' ');
+      } else if (code[i] == '"' || (code[i] == '\'' && !is_digit_separator(code, i))) {
+        i = blank_literal(code, i);
+      }
+    }
+    return code;
+  }
+
+ private:
+  static bool is_digit_separator(const std::string& code, std::size_t i) {
+    return i > 0 && std::isxdigit(static_cast<unsigned char>(code[i - 1])) != 0;
+  }
+  static std::size_t blank_literal(std::string& code, std::size_t start) {
+    const char quote = code[start];
+    std::size_t i = start + 1;
+    for (; i < code.size() && code[i] != quote; ++i) {
+      if (code[i] == '\\' && i + 1 < code.size()) code[i++] = ' ';
+      code[i] = ' ';
+    }
+    return i;
+  }
+
+  bool in_block_comment_ = false;
+};
+
+std::string first_folder(const std::string& path) { return path.substr(0, path.find('/')); }
+
+struct Ban {
+  std::regex pattern;
+  const char* why;
+};
+
+const std::vector<Ban>& hot_bans() {
+  static const std::vector<Ban> bans = [] {
+    std::vector<Ban> list;
+    const auto add = [&list](const char* pattern, const char* why) {
+      list.push_back({std::regex(pattern), why});
+    };
+    add(R"(\bnew\b|\b(m|c|re)alloc\s*\(|\bmake_(unique|shared)\b)", "allocates");
+    add(R"(\.(push_back|emplace_back|emplace|insert|resize|reserve|append)\s*\()", "may allocate");
+    add(R"(\bstd::(string|vector|map|unordered_map|function|ostringstream|to_string)\b\s*[<({ ])",
+        "may allocate");
+    add(R"(\b(MatrixXd|VectorXd|MatrixXf|VectorXf)\s+\w+)", "allocates");
+    add(R"(\b(mutex|lock_guard|unique_lock|scoped_lock|condition_variable)\b)", "locks");
+    add(R"(\b(spdlog::|printf|std::cout|std::cerr|SPDLOG_))", "logs");
+    add(R"(\bthrow\b|\.at\s*\()", "may throw");
+    add(R"(\b(sleep_for|usleep|nanosleep|fopen|ioctl|sendto|recvfrom|zmq_send|getenv)\b)",
+        "calls the system");
+    return list;
+  }();
+  return bans;
+}
+
+// The line on which the body that starts at or after `from` closes; `from` itself when there is no
+// body.
+std::size_t end_of_body(const std::vector<std::string>& code, std::size_t from) {
+  int depth = 0;
+  bool opened = false;
+  for (std::size_t i = from; i < code.size(); ++i) {
+    for (const char c : code[i]) {
+      if (c == '{') {
+        ++depth;
+        opened = true;
+      }
+      if (c == '}') --depth;
+      if (c == ';' && !opened) return from;  // a declaration
+      if (opened && depth <= 0) return i;
+    }
+  }
+  return from;
+}
+
+}  // namespace
+
+SourceFile source_from_text(std::string path, const std::string& text) {
+  SourceFile file;
+  file.path = std::move(path);
+  Blanker blanker;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) {
+    file.code.push_back(blanker.line(line));
+    file.lines.push_back(std::move(line));
+  }
+  return file;
+}
+
+std::vector<SourceFile> read_source_tree(const std::filesystem::path& root) {
+  std::vector<SourceFile> files;
+  for (const char* room : {"proto", "models", "drivers", "daemon", "tests"}) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(root / room)) {
+      const auto extension = entry.path().extension();
+      if (extension != ".hpp" && extension != ".cpp") continue;
+      std::ifstream stream(entry.path());
+      const std::string text{std::istreambuf_iterator<char>(stream), {}};
+      files.push_back(
+          source_from_text(std::filesystem::relative(entry.path(), root).generic_string(), text));
+    }
+  }
+  return files;
+}
+
+std::vector<Finding> check_includes(const SourceFile& file) {
+  static const std::map<std::string, std::string> allowed{
+      {"proto", "proto|posed"},
+      {"models", "proto|posed|models"},
+      {"drivers", "proto|posed|drivers"},
+      {"daemon", "proto|posed|models|drivers|daemon"},
+      {"tests", "proto|posed|models|drivers|daemon|tests"}};
+  const std::regex include("^\\s*#\\s*include\\s*\"([^\"/]+)/?[^\"]*\"");
+  const std::regex permitted("(" + allowed.at(first_folder(file.path)) + ")");
+  std::vector<Finding> findings;
+  for (std::size_t i = 0; i < file.lines.size(); ++i) {
+    std::smatch match;
+    if (!std::regex_search(file.lines[i], match, include)) continue;
+    if (!std::regex_match(match[1].str(), permitted)) {
+      findings.push_back(
+          {file.path, static_cast<int>(i) + 1,
+           "may not include " + match[1].str() + "/ (include from the repository's root)"});
+    }
+  }
+  return findings;
+}
+
+std::vector<Finding> check_sizes(const SourceFile& file) {
+  std::vector<Finding> findings;
+  if (file.lines.size() > kMaxLines) {
+    findings.push_back({file.path, kMaxLines, "has more than 500 lines: split it"});
+  }
+  // Spelled in halves so that this file does not find itself.
+  const std::regex mark(std::string("\\b(TO") + "DO|FIX" + "ME|XX" + "X)\\b");
+  for (std::size_t i = 0; i < file.lines.size(); ++i) {
+    const int line = static_cast<int>(i) + 1;
+    if (file.lines[i].size() > kMaxColumns)
+      findings.push_back({file.path, line, "over 100 columns"});
+    if (std::regex_search(file.lines[i], mark))
+      findings.push_back({file.path, line, "left-over mark"});
+  }
+  return findings;
+}
+
+std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies) {
+  std::vector<Finding> findings;
+  for (std::size_t i = 0; i < file.lines.size(); ++i) {
+    if (file.lines[i].find("RT-safe") == std::string::npos) continue;
+    if (file.lines[i].find("//") == std::string::npos) continue;
+    // The comment may go on; the function starts at the first line with code.
+    std::size_t start = i;
+    while (start < file.code.size() &&
+           file.code[start].find_first_not_of(' ') == std::string::npos) {
+      ++start;
+    }
+    if (start == file.code.size()) break;
+    const std::size_t end = end_of_body(file.code, start);
+    if (end == start && file.code[start].find('{') == std::string::npos) continue;
+    ++bodies;
+    for (std::size_t line = start; line <= end; ++line) {
+      for (const Ban& ban : hot_bans()) {
+        if (std::regex_search(file.code[line], ban.pattern)) {
+          findings.push_back({file.path, static_cast<int>(line) + 1,
+                              std::string(ban.why) + " in a function marked RT-safe"});
+        }
+      }
+    }
+  }
+  return findings;
+}
+
+}  // namespace posed::tidy

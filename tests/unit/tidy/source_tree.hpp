@@ -1,0 +1,36 @@
+// The source tree as the tidy test sees it: files as lines of text, comments and strings blanked
+// out.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace posed::tidy {
+
+struct SourceFile {
+  std::string path;                // relative to the source directory, with '/'
+  std::vector<std::string> lines;  // as written
+  std::vector<std::string> code;   // comments and literals replaced by blanks
+};
+
+struct Finding {
+  std::string path;
+  int line = 0;
+  std::string what;
+};
+
+// Every .hpp and .cpp of the rooms (proto, models, drivers, daemon, tests).
+[[nodiscard]] std::vector<SourceFile> read_source_tree(const std::filesystem::path& root);
+[[nodiscard]] SourceFile source_from_text(std::string path, const std::string& text);
+
+// Rooms may include only what the dependency law allows.
+[[nodiscard]] std::vector<Finding> check_includes(const SourceFile& file);
+// At most 500 lines a file, 100 columns a line, no left-over marks.
+[[nodiscard]] std::vector<Finding> check_sizes(const SourceFile& file);
+// Bodies of functions marked RT-safe neither allocate, lock, log, throw nor call the system.
+// `bodies` counts the ones that were found, so that a test can tell that the check looked at
+// something.
+[[nodiscard]] std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies);
+
+}  // namespace posed::tidy

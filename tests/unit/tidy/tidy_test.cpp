@@ -1,0 +1,96 @@
+// The house rules as a test. Each check is first shown to fail on a bad example.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <sstream>
+
+#include "tests/support/shared.hpp"
+#include "tests/unit/tidy/source_tree.hpp"
+
+namespace {
+
+using posed::tidy::Finding;
+using posed::tidy::SourceFile;
+
+const std::vector<SourceFile>& tree() {
+  static const auto files = posed::tidy::read_source_tree(posed::test::source_dir());
+  return files;
+}
+
+std::string listed(const std::vector<Finding>& findings) {
+  std::ostringstream text;
+  for (const Finding& f : findings) text << f.path << ':' << f.line << ": " << f.what << '\n';
+  return text.str();
+}
+
+template <typename Check>
+std::string findings_of(const Check& check) {
+  std::vector<Finding> all;
+  for (const SourceFile& file : tree()) {
+    const auto found = check(file);
+    all.insert(all.end(), found.begin(), found.end());
+  }
+  return listed(all);
+}
+
+}  // namespace
+
+TEST_CASE("rooms include only what the dependency law allows", "[tidy]") {
+  const auto bad = posed::tidy::source_from_text(
+      "models/a.cpp", "#include \"proto/frame/frame.hpp\"\n#include \"drivers/driver.hpp\"\n");
+  REQUIRE(listed(posed::tidy::check_includes(bad)).find("models/a.cpp:2") == 0);
+  REQUIRE(tree().size() > 20);
+  CHECK(findings_of(posed::tidy::check_includes) == "");
+}
+
+TEST_CASE("files and lines are short and finished", "[tidy]") {
+  const auto bad = posed::tidy::source_from_text(
+      "a.cpp", std::string(101, 'x') + "\n// TO" + "DO later\n" + std::string(600, '\n'));
+  REQUIRE(posed::tidy::check_sizes(bad).size() == 3);
+  CHECK(findings_of(posed::tidy::check_sizes) == "");
+}
+
+TEST_CASE("functions marked RT-safe neither allocate, lock, log, throw nor call the system",
+          "[tidy]") {
+  const auto bad = posed::tidy::source_from_text("daemon/a.cpp",
+                                                 "// RT-safe.\nvoid f() {\n  v.push_back(1);\n"
+                                                 "  throw 1;\n  spdlog::info(\"x\");\n}\n"
+                                                 "void cold() { throw 2; }\n");
+  int bodies = 0;
+  REQUIRE(posed::tidy::check_hot_code(bad, bodies).size() == 3);
+  REQUIRE(bodies == 1);
+  bodies = 0;
+  CHECK(findings_of([&bodies](const SourceFile& file) {
+          return posed::tidy::check_hot_code(file, bodies);
+        }) == "");
+  CHECK(bodies >= 10);
+}
+
+TEST_CASE("every header is included by somebody", "[tidy]") {
+  std::set<std::string> included;
+  for (const SourceFile& file : tree()) {
+    for (const std::string& line : file.lines) {
+      const auto open = line.find('"');
+      if (line.find("#include") == 0 && open != std::string::npos) {
+        included.insert(line.substr(open + 1, line.rfind('"') - open - 1));
+      }
+    }
+  }
+  std::string orphans;
+  for (const SourceFile& file : tree()) {
+    if (file.path.ends_with(".hpp") && !included.contains(file.path)) orphans += file.path + "\n";
+  }
+  CHECK(orphans == "");
+}
+
+TEST_CASE("every room says what lives there", "[tidy]") {
+  for (const char* room : {"proto", "models", "drivers", "daemon", "tests", "config"}) {
+    INFO(room);
+    std::ifstream readme(posed::test::source_dir() / room / "README.md");
+    const std::string text{std::istreambuf_iterator<char>(readme), {}};
+    CHECK(text.size() > 200);
+  }
+}
