@@ -13,22 +13,10 @@
 #include <memory>
 #include <span>
 
-#include <Eigen/Core>
-
+#include "models/gp/trained.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::gp {
-
-// The trained process, double precision, as a model file holds it.
-struct Trained {
-  Eigen::MatrixXd inputs;   // X [N x D], rad
-  Eigen::MatrixXd weights;  // C^-1 (Y - offset) [N x D_out], rad
-  Eigen::VectorXd offset;   // prior mean [D_out], rad
-  double lambda = 0.0;      // log signal variance
-  double mu = 1.0;          // 1 / length^2 [1/rad^2]
-  double b = 0.0;           // constant kernel
-  double noise = 1e-3;      // sigma^2
-};
 
 class Predictor {
  public:

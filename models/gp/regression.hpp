@@ -1,0 +1,61 @@
+// Gaussian process regression with the paper's kernel (eq. 4) and one set of kernel values for all
+// outputs: the covariance is factorised once (algorithms 2.1). Double precision, cold, thread-safe.
+//
+//   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b,   C = K + sigma^2 I
+#pragma once
+
+#include <Eigen/Core>
+
+#include "models/gp/scg.hpp"
+#include "models/gp/trained.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::gp {
+
+// The kernel's values as the optimiser sees them. log_b = -infinity is b = 0.
+struct Hyper {
+  double lambda = 0.0;
+  double log_mu = 0.0;
+  double log_b = 0.0;
+  double log_noise = 0.0;
+
+  [[nodiscard]] Eigen::Vector4d vector() const { return {lambda, log_mu, log_b, log_noise}; }
+  [[nodiscard]] static Hyper of(const Eigen::Vector4d& h) { return {h[0], h[1], h[2], h[3]}; }
+};
+
+// Summed over the outputs; the gradient is by lambda, log mu, log b, log sigma^2. Where C is not
+// positive definite the log likelihood is minus infinity and the gradient zero.
+struct Evidence {
+  double log_likelihood = 0.0;
+  Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
+};
+
+// E = exp(lambda - mu d^2 / 2) between the rows of `a` and `b` [a.rows x b.rows]: the kernel
+// without its constant.
+[[nodiscard]] Eigen::MatrixXd rbf(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double lambda,
+                                  double mu);
+
+// X [N x D] inputs, Y [N x D_out] outputs less their prior mean.
+[[nodiscard]] Evidence log_marginal(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                                    const Hyper& hyper);
+
+// SCG on -log L from `start`; log parameters are kept within +-30. The result's x is the Hyper's
+// vector, its value -log L.
+[[nodiscard]] ScgResult maximise_evidence(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                                          const Hyper& start, const ScgOptions& options = {});
+
+// Weights C^-1 (Y - offset) for Y [N x D_out]. Fails when shapes differ, a value is not finite, or
+// C is not positive definite.
+[[nodiscard]] Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                                  const Eigen::VectorXd& offset, const Hyper& hyper);
+
+struct Posterior {
+  Eigen::MatrixXd mean;          // [Q x D_out], offset included
+  Eigen::VectorXd variance;      // of f [Q], without noise: e^lambda + b - k'C^-1 k
+  Eigen::VectorXd variance_rbf;  // the same for the RBF part alone: e^lambda - E'(E_xx + s2 I)^-1 E
+};
+
+// At the rows of `queries` [Q x D]. The reference that the float32 predictor is measured against.
+[[nodiscard]] Posterior posterior(const Trained& process, const Eigen::MatrixXd& queries);
+
+}  // namespace posed::gp

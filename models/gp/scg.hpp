@@ -1,0 +1,39 @@
+// Scaled conjugate gradients (Moller 1993) with NETLAB's constants: the paper's optimiser. Cold.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace posed::gp {
+
+struct ScgOptions {
+  int max_iterations = 100;
+  double tolerance_x = 1e-8;  // stop when no parameter moved more than this ...
+  double tolerance_f = 1e-8;  // ... and the value changed by less than this
+};
+
+struct ScgStep {
+  double value;       // after the iteration: of the accepted point
+  double scale;       // Moller's lambda, the trust put in the quadratic model
+  double comparison;  // how far the model foretold the change; negative: step refused
+  Eigen::VectorXd x;  // the accepted point
+};
+
+struct ScgResult {
+  Eigen::VectorXd x;
+  double value = 0.0;
+  bool converged = false;      // by tolerance or a zero gradient; else the iterations ran out
+  std::vector<ScgStep> trace;  // one an iteration
+};
+
+// Minimises `value`, whose derivative is `gradient`, from `start`. A value that is not finite is a
+// refused step, so a function may answer infinity wherever it is not defined; it must be finite at
+// `start`.
+[[nodiscard]] ScgResult scg_minimise(
+    const std::function<double(const Eigen::VectorXd&)>& value,
+    const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& gradient,
+    const Eigen::VectorXd& start, const ScgOptions& options = {});
+
+}  // namespace posed::gp

@@ -1,0 +1,22 @@
+// Trained: a Gaussian process with the paper's kernel after learning, double precision, as a model
+// file holds it.
+//
+//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (paper, eq.
+//   4)
+#pragma once
+
+#include <Eigen/Core>
+
+namespace posed::gp {
+
+struct Trained {
+  Eigen::MatrixXd inputs;   // X [N x D], rad
+  Eigen::MatrixXd weights;  // C^-1 (Y - offset) [N x D_out], rad
+  Eigen::VectorXd offset;   // prior mean [D_out], rad
+  double lambda = 0.0;      // log signal variance
+  double mu = 1.0;          // 1 / length^2 [1/rad^2]
+  double b = 0.0;           // constant kernel
+  double noise = 1e-3;      // sigma^2
+};
+
+}  // namespace posed::gp
