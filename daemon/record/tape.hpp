@@ -1,5 +1,6 @@
-// Tape: the recorder as the hot threads see it. Both calls copy into a ring and return; the
-// recorder thread drains on its own timer, so recording costs the hot path no system call.
+// Tape: the recorder as the daemon's other threads see it. The calls of the hot threads copy into a
+// ring and return; the recorder thread drains on its own timer, so recording costs the hot path no
+// system call.
 #pragma once
 
 #include <cstddef>
@@ -19,12 +20,24 @@ class Tape {
   Tape& operator=(const Tape&) = delete;
   virtual ~Tape() = default;
 
-  // Reader thread, before decoding. A full ring is counted and becomes a gap row and an event.
-  // RT-safe.
+  // Reader thread, before decoding. `next_sequence` is the number that the first frame decoded from
+  // this chunk will get: replay finds its place again after a gap. A full ring is counted and
+  // becomes a gap row and an event. RT-safe.
   virtual void chunk(std::uint32_t stream, Direction direction, std::int64_t arrival_ns,
-                     std::span<const std::byte> bytes) noexcept = 0;
+                     std::uint64_t next_sequence, std::span<const std::byte> bytes) noexcept = 0;
+
   // Pipeline thread. RT-safe.
   virtual void decision(const pipeline::Decision& decision) noexcept = 0;
+
+  // Publisher thread, in pipeline order: `bytes` is a serialized posed.v1.Frame without stage
+  // stamps. Only called when wants_published(), which never changes. RT-safe.
+  [[nodiscard]] virtual bool wants_published() const noexcept = 0;
+  virtual void published(std::uint32_t stream, std::uint64_t sequence, bool raw,
+                         std::span<const std::byte> bytes) noexcept = 0;
+
+  // Control thread, before the command that names it: a model file's bytes, kept under their
+  // SHA-256. Cold: allocates and locks.
+  virtual void keep_model(std::span<const std::byte> bytes) = 0;
 };
 
 }  // namespace posed::record
