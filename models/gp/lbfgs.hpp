@@ -1,0 +1,32 @@
+// Limited-memory BFGS (Nocedal and Wright, algorithms 7.4, 7.5, 3.5 and 3.6): minimises a smooth
+// function of a few hundred variables. The caller scales the variables so that each is of order
+// one. Cold.
+#pragma once
+
+#include <functional>
+
+#include <Eigen/Core>
+
+namespace posed::gp {
+
+// Returns f(x) and fills its gradient. A value that is not finite rejects the trial step.
+using Objective = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd& gradient)>;
+
+struct LbfgsOptions {
+  int max_iterations = 100;
+  int memory = 30;
+  double relative_change = 1e-10;  // stop when one step lowers f by less, relative to |f|
+  double max_gradient = 1e-3;      // or when no gradient component is larger
+};
+
+struct LbfgsResult {
+  Eigen::VectorXd x;
+  double value = 0.0;
+  int iterations = 0;
+  int evaluations = 0;
+};
+
+[[nodiscard]] LbfgsResult lbfgs_minimise(const Objective& objective, Eigen::VectorXd x0,
+                                         const LbfgsOptions& options);
+
+}  // namespace posed::gp

@@ -1,0 +1,261 @@
+#include "models/style/mgpm.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kLogGammaSd = 1.5;
+constexpr double kLogNoiseMean = -4.0;
+constexpr double kLogNoiseSd = 3.0;
+
+// phi(theta) = [a_0, a_n cos n theta, a_n sin n theta] and its derivatives, a row per frame.
+struct Basis {
+  MatrixXd value, d_theta, d_gamma;
+};
+
+Basis basis_at(const VectorXd& theta, const CircularKernel& kernel) {
+  const auto harmonics = static_cast<int>(kernel.a.size()) - 1;
+  Basis basis;
+  for (MatrixXd* m : {&basis.value, &basis.d_theta, &basis.d_gamma}) {
+    m->resize(theta.size(), 2 * harmonics + 1);
+  }
+  basis.value.col(0).setConstant(kernel.a[0]);
+  basis.d_theta.col(0).setZero();
+  basis.d_gamma.col(0).setConstant(kernel.da[0]);
+  for (int n = 1; n <= harmonics; ++n) {
+    const Eigen::ArrayXd c = (n * theta.array()).cos();
+    const Eigen::ArrayXd s = (n * theta.array()).sin();
+    basis.value.col(n) = kernel.a[n] * c;
+    basis.value.col(harmonics + n) = kernel.a[n] * s;
+    basis.d_theta.col(n) = -n * kernel.a[n] * s;
+    basis.d_theta.col(harmonics + n) = n * kernel.a[n] * c;
+    basis.d_gamma.col(n) = kernel.da[n] * c;
+    basis.d_gamma.col(harmonics + n) = kernel.da[n] * s;
+  }
+  return basis;
+}
+
+// One clip's share. The style point is constant within a clip, so all products with
+// Phi = xi (x) phi split into products with the clip's phi alone: blocks of 2H+1 instead of
+// q (2H+1) columns.
+struct ClipBlock {
+  int first = 0, frames = 0, subject = 0;
+  VectorXd time;  // 0, 1, 2, ...
+  Basis basis;
+  MatrixXd gram;     // phi' phi
+  MatrixXd moments;  // phi' y
+};
+
+std::vector<ClipBlock> clip_blocks(const MgpmData& data, const MgpmParams& p,
+                                   const CircularKernel& kernel) {
+  std::vector<ClipBlock> blocks(data.clip_frames.size());
+  int first = 0;
+  for (int m = 0; m < data.clips(); ++m) {
+    ClipBlock& b = blocks[m];
+    b.first = first;
+    b.frames = data.clip_frames[m];
+    b.subject = data.clip_subject[m];
+    b.time = VectorXd::LinSpaced(b.frames, 0.0, b.frames - 1.0);
+    b.basis = basis_at((p.theta0[m] + p.dtheta[m] * b.time.array()).matrix(), kernel);
+    b.gram.noalias() = b.basis.value.transpose() * b.basis.value;
+    b.moments.noalias() = b.basis.value.transpose() * data.y.middleRows(first, b.frames);
+    first += b.frames;
+  }
+  return blocks;
+}
+
+// A = Phi' Phi + noise I and Phi' Y, factorised and solved.
+struct Solved {
+  Eigen::LLT<MatrixXd> llt;
+  MatrixXd weights;  // M = A^-1 Phi' Y  [P x D]
+};
+
+Solved solve(const std::vector<ClipBlock>& blocks, const MgpmParams& p, int width, int channels) {
+  const auto q = static_cast<int>(p.xi.cols());
+  MatrixXd a = MatrixXd::Zero(q * width, q * width);
+  MatrixXd rhs = MatrixXd::Zero(q * width, channels);
+  for (const ClipBlock& b : blocks) {
+    for (int k = 0; k < q; ++k) {
+      const double xi_k = p.xi(b.subject, k);
+      rhs.middleRows(k * width, width) += xi_k * b.moments;
+      for (int l = 0; l <= k; ++l) {
+        a.block(k * width, l * width, width, width) += xi_k * p.xi(b.subject, l) * b.gram;
+      }
+    }
+  }
+  a.diagonal().array() += std::exp(p.log_noise);
+  Solved solved{Eigen::LLT<MatrixXd>(a), {}};  // reads the lower triangle only
+  solved.weights = solved.llt.solve(rhs);
+  return solved;
+}
+
+// sum_k xi_k M_k: the clip's own regression weights [width x D].
+MatrixXd clip_weights(const MatrixXd& weights, const MgpmParams& p, int subject, int width) {
+  MatrixXd sum = MatrixXd::Zero(width, weights.cols());
+  for (int k = 0; k < p.xi.cols(); ++k) {
+    sum += p.xi(subject, k) * weights.middleRows(k * width, width);
+  }
+  return sum;
+}
+
+MgpmParams zero_like(const MgpmParams& p) {
+  MgpmParams zero;
+  zero.xi = MatrixXd::Zero(p.xi.rows(), p.xi.cols());
+  zero.theta0 = VectorXd::Zero(p.theta0.size());
+  zero.dtheta = VectorXd::Zero(p.dtheta.size());
+  return zero;
+}
+
+// d nlp / d Phi = D Phi A^-1 - beta E W^2 M' (algorithms.md 1.3), chained to xi, theta and gamma.
+void add_clip_gradient(const ClipBlock& b, int m, const MatrixXd& residual, const Solved& solved,
+                       const MatrixXd& a_inverse, const VectorXd& w_squared, const MgpmParams& p,
+                       MgpmParams& gradient) {
+  const auto width = static_cast<int>(b.gram.rows());
+  const auto q = static_cast<int>(p.xi.cols());
+  const double channels = static_cast<double>(residual.cols());
+  const double beta = std::exp(-p.log_noise);
+  // phi' E W^2 and, per style dimension k, sum_l xi_l A^-1_kl.
+  const MatrixXd weighted = residual * w_squared.asDiagonal();
+  const MatrixXd phi_residual = b.basis.value.transpose() * weighted;
+  MatrixXd spread = MatrixXd::Zero(width, width);  // sum_kl xi_k xi_l A^-1_kl
+  for (int k = 0; k < q; ++k) {
+    MatrixXd row = MatrixXd::Zero(width, width);
+    for (int l = 0; l < q; ++l) {
+      row += p.xi(b.subject, l) * a_inverse.block(k * width, l * width, width, width);
+    }
+    spread += p.xi(b.subject, k) * row;
+    const double through_a = channels * row.cwiseProduct(b.gram).sum();
+    const double through_fit =
+        beta * phi_residual.cwiseProduct(solved.weights.middleRows(k * width, width)).sum();
+    gradient.xi(b.subject, k) += through_a - through_fit;
+  }
+  MatrixXd d_phi = channels * (b.basis.value * spread);
+  d_phi.noalias() -=
+      beta * weighted * clip_weights(solved.weights, p, b.subject, width).transpose();
+  const VectorXd d_theta = d_phi.cwiseProduct(b.basis.d_theta).rowwise().sum();
+  gradient.theta0[m] += d_theta.sum();
+  gradient.dtheta[m] += d_theta.dot(b.time);
+  gradient.log_gamma += std::exp(p.log_gamma) * d_phi.cwiseProduct(b.basis.d_gamma).sum();
+}
+
+double square(double x) { return x * x; }
+
+void add_prior(const MgpmPrior& prior, const MgpmParams& p, MgpmValue& value) {
+  value.nlp += mgpm_prior_nlp(prior, p);
+  value.gradient.xi += p.xi;
+  if (prior.dtheta_mean.size() > 0) {
+    const Eigen::ArrayXd sd = prior.dtheta_relative_sd * prior.dtheta_mean.array();
+    value.gradient.dtheta.array() += (p.dtheta - prior.dtheta_mean).array() / sd.square();
+  }
+  value.gradient.log_gamma += p.log_gamma / square(kLogGammaSd);
+  value.gradient.log_noise += (p.log_noise - kLogNoiseMean) / square(kLogNoiseSd);
+}
+
+}  // namespace
+
+int MgpmData::subjects() const {
+  return clip_subject.empty() ? 0 : 1 + *std::max_element(clip_subject.begin(), clip_subject.end());
+}
+
+CircularKernel circular_kernel(double gamma, int harmonics) {
+  // e^-g I_n(g) by Miller's downward recurrence I_{n-1} = I_{n+1} + (2n/g) I_n, normalised with
+  // e^g = I_0 + 2 sum I_n. Starting well above both the order and g makes the start irrelevant.
+  const int start = harmonics + 20 + static_cast<int>(2.0 * gamma);
+  VectorXd bessel = VectorXd::Zero(start + 2);
+  bessel[start] = 1e-300;
+  double sum = 0.0;
+  for (int n = start; n >= 1; --n) {
+    bessel[n - 1] = bessel[n + 1] + 2.0 * n / gamma * bessel[n];
+    sum += 2.0 * bessel[n];
+    if (bessel[n - 1] > 1e200) {  // before it overflows
+      bessel.tail(start + 2 - (n - 1)) *= 1e-200;
+      sum *= 1e-200;
+    }
+  }
+  bessel /= sum + bessel[0];
+  CircularKernel kernel{VectorXd(harmonics + 1), VectorXd(harmonics + 1)};
+  for (int n = 0; n <= harmonics; ++n) {
+    const double c = n == 0 ? bessel[0] : 2.0 * bessel[n];
+    const double dc =
+        n == 0 ? bessel[1] - bessel[0] : bessel[n - 1] + bessel[n + 1] - 2.0 * bessel[n];
+    kernel.a[n] = std::sqrt(std::max(c, 1e-300));
+    kernel.da[n] = 0.5 * dc / kernel.a[n];
+  }
+  return kernel;
+}
+
+double mgpm_prior_nlp(const MgpmPrior& prior, const MgpmParams& p) {
+  double nlp = 0.5 * p.xi.squaredNorm();
+  if (prior.dtheta_mean.size() > 0) {
+    nlp += 0.5 * ((p.dtheta - prior.dtheta_mean).array() /
+                  (prior.dtheta_relative_sd * prior.dtheta_mean.array()))
+                     .square()
+                     .sum();
+  }
+  return nlp + 0.5 * square(p.log_gamma / kLogGammaSd) +
+         0.5 * square((p.log_noise - kLogNoiseMean) / kLogNoiseSd);
+}
+
+MgpmValue mgpm_evaluate(const MgpmData& data, const MgpmParams& p, const MgpmPrior* prior,
+                        const VectorXd* scale, int harmonics) {
+  const auto frames = static_cast<double>(data.y.rows());
+  const auto channels = static_cast<int>(data.y.cols());
+  const int width = 2 * harmonics + 1;
+  const double rank = static_cast<double>(p.xi.cols()) * width;
+  const double noise = std::exp(p.log_noise);
+  const std::vector<ClipBlock> blocks =
+      clip_blocks(data, p, circular_kernel(std::exp(p.log_gamma), harmonics));
+  const Solved solved = solve(blocks, p, width, channels);
+
+  MatrixXd residual = data.y;  // E = Y - Phi M; K^-1 Y = E / noise
+  for (const ClipBlock& b : blocks) {
+    residual.middleRows(b.first, b.frames).noalias() -=
+        b.basis.value * clip_weights(solved.weights, p, b.subject, width);
+  }
+  const VectorXd quadratic = data.y.cwiseProduct(residual).colwise().sum() / noise;
+  MgpmValue value;
+  value.scale = scale != nullptr ? *scale : (frames / quadratic.array()).sqrt().matrix();
+  const VectorXd w_squared = value.scale.array().square();
+  const double log_det =
+      (frames - rank) * p.log_noise + 2.0 * solved.llt.matrixLLT().diagonal().array().log().sum();
+  value.nlp = 0.5 * frames * channels * std::log(2.0 * std::numbers::pi) +
+              0.5 * channels * log_det - frames * value.scale.array().log().sum() +
+              0.5 * w_squared.dot(quadratic);
+
+  value.gradient = zero_like(p);
+  const MatrixXd a_inverse =
+      solved.llt.solve(MatrixXd::Identity(solved.weights.rows(), solved.weights.rows()));
+  for (int m = 0; m < data.clips(); ++m) {
+    add_clip_gradient(blocks[m], m, residual.middleRows(blocks[m].first, blocks[m].frames), solved,
+                      a_inverse, w_squared, p, value.gradient);
+  }
+  // tr K^-1 = (N - P) / noise + tr A^-1.
+  const double trace = (frames - rank) / noise + a_inverse.trace();
+  const double fit = w_squared.dot(residual.colwise().squaredNorm().transpose()) / square(noise);
+  value.gradient.log_noise += 0.5 * noise * (channels * trace - fit);
+  if (prior != nullptr) add_prior(*prior, p, value);
+  return value;
+}
+
+MatrixXd mgpm_cycle(const MgpmData& data, const MgpmParams& p, const VectorXd& xi,
+                    const VectorXd& theta, int harmonics) {
+  const int width = 2 * harmonics + 1;
+  const CircularKernel kernel = circular_kernel(std::exp(p.log_gamma), harmonics);
+  const Solved solved =
+      solve(clip_blocks(data, p, kernel), p, width, static_cast<int>(data.y.cols()));
+  MatrixXd weights = MatrixXd::Zero(width, data.y.cols());
+  for (int k = 0; k < xi.size(); ++k) {
+    weights += xi[k] * solved.weights.middleRows(k * width, width);
+  }
+  return basis_at(theta, kernel).value * weights;
+}
+
+}  // namespace posed::style

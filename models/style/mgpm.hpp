@@ -1,0 +1,72 @@
+// MGPM: the multifactor Gaussian process model of the style paper (section 2.1). It gives each
+// subject a style point, each clip a phase and a stride frequency, and puts the average cycles of
+// all of them in common phase.
+//
+//   theta_i = theta0_m + t dtheta_m
+//   cov(y_id, y_jd) = w_d^-2 (xi_i . xi_j exp(-gamma (1 - cos(theta_i - theta_j))) + noise [i = j])
+//
+// The circular kernel has an exact Fourier series, so the covariance has finite rank and every
+// figure below costs O(N) (algorithms.md 1.3); the only approximation is the number of harmonics
+// kept. Cold, double precision, no I/O, thread-safe (no shared state).
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace posed::style {
+
+// What is learnt from. Rows of `y` are the frames of clip 0, clip 1, ... in order.
+struct MgpmData {
+  Eigen::MatrixXd y;              // [N x D], channel means removed, no constant channel
+  std::vector<int> clip_frames;   // [M], sums to N
+  std::vector<int> clip_subject;  // [M], 0..S-1, each subject has a clip
+
+  [[nodiscard]] int clips() const { return static_cast<int>(clip_frames.size()); }
+  [[nodiscard]] int subjects() const;
+};
+
+struct MgpmParams {
+  Eigen::MatrixXd xi;      // style points [S x q]
+  Eigen::VectorXd theta0;  // phase of each clip's first frame [M], rad
+  Eigen::VectorXd dtheta;  // phase per frame [M], rad
+  double log_gamma = 0.0;  // content kernel
+  double log_noise = 0.0;  // 1 / beta of the paper
+};
+
+// Weak priors of algorithms.md 1.2; the paper gives none. They hold the period near its first guess
+// and fix the scale of xi, which the likelihood leaves free.
+struct MgpmPrior {
+  Eigen::VectorXd dtheta_mean;  // [M]; empty: no prior on the stride frequency
+  double dtheta_relative_sd = 0.1;
+};
+
+struct MgpmValue {
+  double nlp = 0.0;       // negative log posterior
+  MgpmParams gradient;    // of nlp
+  Eigen::VectorXd scale;  // w [D]
+};
+
+// The negative log posterior and its gradient at `params`. `scale` fixes w; null profiles it out
+// in closed form. `prior` may be null. `harmonics` = 10 is enough up to gamma = 4 (truncation below
+// 3e-7).
+[[nodiscard]] MgpmValue mgpm_evaluate(const MgpmData& data, const MgpmParams& params,
+                                      const MgpmPrior* prior, const Eigen::VectorXd* scale,
+                                      int harmonics);
+
+// The prior's part alone.
+[[nodiscard]] double mgpm_prior_nlp(const MgpmPrior& prior, const MgpmParams& params);
+
+// a_n >= 0 with exp(-gamma (1 - cos d)) = sum_n a_n^2 cos(n d), n = 0..harmonics, and da_n/dgamma.
+struct CircularKernel {
+  Eigen::VectorXd a, da;
+};
+[[nodiscard]] CircularKernel circular_kernel(double gamma, int harmonics);
+
+// The mean cycle of an imagined subject with style `xi` at phases `theta` (rows) [T x D]; the GP
+// mean, linear in xi (algorithms.md 1.7).
+[[nodiscard]] Eigen::MatrixXd mgpm_cycle(const MgpmData& data, const MgpmParams& params,
+                                         const Eigen::VectorXd& xi, const Eigen::VectorXd& theta,
+                                         int harmonics);
+
+}  // namespace posed::style
