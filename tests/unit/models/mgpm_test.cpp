@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "models/gp/lbfgs.hpp"
-#include "models/style/mgpm.hpp"
+#include "models/style/mgpm_train.hpp"
 #include "tests/support/shared.hpp"
 
 namespace {
@@ -113,6 +113,47 @@ TEST_CASE("The MGPM mean cycle agrees with the fixture", "[mgpm]") {
   for (int t = 0; t < cycle.rows(); ++t) {
     check_close(cycle.row(t).transpose(), vector_of(f["predict"]["cycle"][t]), 1e-7);
   }
+}
+
+TEST_CASE("MGPM training reaches the fixture's optimum from every start", "[mgpm]") {
+  using posed::style::MgpmStart;
+  const json f = fixture();
+  const MgpmData data = data_of(f);
+  const MgpmParams params = params_of(vector_of(f["p"]), 3, f["q"], data.clips());
+  const auto fits = mgpm_train(data, params.theta0, params.dtheta,
+                               {.style_dims = 2,
+                                .starts = {MgpmStart::kSvd, MgpmStart::kRandom, MgpmStart::kRandom},
+                                .seed = 1,
+                                .progress = {}});
+  REQUIRE(fits.has_value());
+  REQUIRE(fits->size() == 3);
+  const double want = f["trained"]["final_nlp"][0];
+  for (const auto& fit : *fits) CHECK(fit.nlp == Approx(want).margin(1e-3));
+  const auto again =
+      mgpm_train(data, params.theta0, params.dtheta,
+                 {.style_dims = 2, .starts = {MgpmStart::kRandom}, .seed = 9, .progress = {}});
+  const auto same =
+      mgpm_train(data, params.theta0, params.dtheta,
+                 {.style_dims = 2, .starts = {MgpmStart::kRandom}, .seed = 9, .progress = {}});
+  CHECK(again->front().params.xi == same->front().params.xi);
+}
+
+TEST_CASE("MGPM training runs with fewer subjects than style dimensions, and stops when asked",
+          "[mgpm]") {
+  const json f = fixture();
+  MgpmData data = data_of(f);
+  data.clip_frames.resize(2);
+  data.clip_subject.resize(2);
+  data.y.conservativeResize(data.clip_frames[0] + data.clip_frames[1], Eigen::NoChange);
+  data.y.rowwise() -= Eigen::RowVectorXd(data.y.colwise().mean());
+  const MgpmParams params = params_of(vector_of(f["p"]), 3, f["q"], 4);
+  const auto fits = mgpm_train(data, params.theta0.head(2), params.dtheta.head(2), {});
+  REQUIRE(fits.has_value());
+  CHECK(fits->front().params.xi.cols() == 2);
+  CHECK(std::isfinite(fits->front().nlp));
+  posed::style::MgpmOptions options;
+  options.progress = [](double) { return false; };
+  CHECK_FALSE(mgpm_train(data, params.theta0.head(2), params.dtheta.head(2), options).has_value());
 }
 
 TEST_CASE("L-BFGS finds the minimum of Rosenbrock's valley in twenty dimensions", "[lbfgs]") {

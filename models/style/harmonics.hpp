@@ -1,0 +1,43 @@
+// Harmonic regression of periodic motion: the basis [1, cos n theta, sin n theta], cycles by least
+// squares on it, and the stride frequency of a leg signal. Cold.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace posed::style {
+
+// theta0 + t dtheta for t = 0 .. frames-1.
+[[nodiscard]] Eigen::VectorXd clip_phase(double theta0, double dtheta, int frames);
+
+// The grid 2 pi t / frames, t = 0 .. frames-1, of one cycle.
+[[nodiscard]] Eigen::VectorXd cycle_phases(int frames);
+
+// Rows [1, cos theta .. cos H theta, sin theta .. sin H theta].
+[[nodiscard]] Eigen::MatrixXd harmonic_basis(const Eigen::VectorXd& theta, int harmonics);
+
+// Least-squares coefficients [2H+1 x D] of `y` (a row a phase), with a tiny ridge so that few
+// frames cannot make them run away.
+[[nodiscard]] Eigen::MatrixXd fit_harmonics(const Eigen::VectorXd& theta, const Eigen::MatrixXd& y,
+                                            int harmonics);
+
+// Phase of the first harmonic of `signal` under the phases `theta`: signal ~ A cos(theta - phase).
+[[nodiscard]] double first_harmonic_phase(const Eigen::VectorXd& theta,
+                                          const Eigen::VectorXd& signal);
+
+struct Stride {
+  double theta0 = 0.0;  // phase of the first frame: signal ~ A cos(theta0 + t dtheta)
+  double dtheta = 0.0;  // rad per frame
+  double score = 0.0;   // relative residual of the fit, plus the penalty; 0 is a perfect stride
+};
+
+// The stride frequency of a leg signal sampled at `rate_hz`: the best of the periods 0.6 to 1.7 s
+// (and no longer than the signal) by three harmonics, with a penalty on a weak first harmonic,
+// which keeps two strides from being taken for one (style-science 0.1). Needs has_stride().
+[[nodiscard]] Stride find_stride(const Eigen::VectorXd& signal, double rate_hz);
+
+// Whether `frames` at `rate_hz` can hold a stride at all.
+[[nodiscard]] bool has_stride(int frames, double rate_hz);
+inline constexpr double kShortestStride_s = 0.6;
+inline constexpr double kLongestStride_s = 1.7;
+
+}  // namespace posed::style
