@@ -40,6 +40,10 @@ struct ReadOptions {
 [[nodiscard]] Result<Clip> read_clip(const std::filesystem::path& path,
                                      const ReadOptions& options = {});
 
+// The same motion with Z, Y, X rotation channels on every joint (Z outermost), in centimetres, so
+// that a rotation that an Acclaim joint's few degrees of freedom could not make can be written.
+[[nodiscard]] Clip with_zyx_channels(const Clip& clip);
+
 // Writes `clip` as BVH in its own units with its own joint names, hierarchy, channel order and
 // rate. An Acclaim skeleton becomes a BVH with ZYX rotation channels on every joint.
 [[nodiscard]] Result<> write_bvh(const Clip& clip, const std::filesystem::path& path);

@@ -20,10 +20,9 @@
 #include "proto/frame/frame.hpp"
 #include "proto/frame/humanoid.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/frame/rotation.hpp"
 
 namespace posed {
-
-enum class Axis : std::uint8_t { kX, kY, kZ };
 
 struct Channel {
   std::uint16_t joint = 0;
@@ -47,9 +46,12 @@ struct Joint {
 };
 
 struct Skeleton {
-  std::string name;               // profile or file it came from, for people
-  std::vector<Joint> joints;      // at most kMaxJoints
-  std::vector<Channel> channels;  // in the source's order; the first listed is outermost
+  std::string name;           // profile or file it came from, for people
+  std::vector<Joint> joints;  // at most kMaxJoints
+  // Joint by joint; within a joint the first listed rotation is outermost. A BVH's own order; an
+  // Acclaim joint's dof reversed, because there the last is outermost. Position channels replace
+  // the joint's offset.
+  std::vector<Channel> channels;
   int root_joint = 0;    // the joint whose world position a Frame carries (the hips, as a rule)
   std::uint32_t id = 0;  // CRC-32 of the content; set by finish()
 
@@ -65,6 +67,10 @@ struct Skeleton {
 // root position, validity, angles, counts and skeleton id. RT-safe.
 void pose_from_channels(const Skeleton& skeleton, std::span<const double> values,
                         Frame& frame) noexcept;
+
+// L of one joint from the channel values of the whole frame, in double. RT-safe.
+[[nodiscard]] Eigen::Quaterniond local_rotation(const Skeleton& skeleton, int joint,
+                                                std::span<const double> values) noexcept;
 
 // The three Euler angles [rad] of `rotation` in the joint's own channel order (first listed
 // outermost), the turn nearest to `near_rad`. For fewer than three axes the closest the joint can

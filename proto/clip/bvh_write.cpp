@@ -1,0 +1,140 @@
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <numbers>
+
+#include "proto/clip/clip.hpp"
+
+namespace posed::clip {
+namespace {
+
+constexpr double kDegreesPerRad = 180.0 / std::numbers::pi;
+
+// Fixed notation, as readers in the wild expect; nine digits keep an angle to 1e-6 deg through any
+// number of round trips.
+void append(std::string& out, double value) {
+  std::array<char, 512> buffer{};
+  const auto [end, error] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
+                                          std::chars_format::fixed, 9);
+  std::string_view text(buffer.data(), static_cast<std::size_t>(end - buffer.data()));
+  if (error != std::errc()) text = "0";
+  while (text.ends_with('0')) text.remove_suffix(1);
+  if (text.ends_with('.')) text.remove_suffix(1);
+  out += text == "-0" || text.empty() ? "0" : text;
+}
+
+class Writer {
+ public:
+  explicit Writer(const Clip& clip) : clip_(clip), skeleton_(*clip.skeleton) {}
+
+  [[nodiscard]] std::string header() {
+    out_ = "HIERARCHY\n";
+    joint(0, 0);
+    out_ += "MOTION\nFrames: " + std::to_string(clip_.frames()) + "\nFrame Time: ";
+    append(out_, 1.0 / clip_.frame_rate_hz);
+    out_ += "\n";
+    return std::move(out_);
+  }
+
+  [[nodiscard]] std::string row(int index) const {
+    std::string line;
+    for (std::size_t c = 0; c < skeleton_.channels.size(); ++c) {
+      const double value = clip_.channels(index, static_cast<Eigen::Index>(c));
+      if (c > 0) line += ' ';
+      append(line, skeleton_.channels[c].translation ? value / clip_.metres_per_unit
+                                                     : value * kDegreesPerRad);
+    }
+    return line + "\n";
+  }
+
+ private:
+  void indent(int depth) { out_.append(static_cast<std::size_t>(depth), '\t'); }
+
+  void offset(const Eigen::Vector3d& value_m, int depth) {
+    indent(depth);
+    out_ += "OFFSET";
+    for (int i = 0; i < 3; ++i) {
+      out_ += ' ';
+      append(out_, value_m[i] / clip_.metres_per_unit);
+    }
+    out_ += '\n';
+  }
+
+  void channels(int index, int depth) {
+    std::string names;
+    int count = 0;
+    for (const Channel& channel : skeleton_.channels) {
+      if (channel.joint != index) continue;
+      names += ' ';
+      names += "XYZ"[static_cast<std::size_t>(channel.axis)];
+      names += channel.translation ? "position" : "rotation";
+      ++count;
+    }
+    indent(depth);
+    out_ += "CHANNELS " + std::to_string(count) + names + "\n";
+  }
+
+  void joint(int index, int depth) {
+    const Joint& joint_here = skeleton_.joints[index];
+    indent(depth);
+    out_ += (index == 0 ? "ROOT " : "JOINT ") + joint_here.name + "\n";
+    indent(depth);
+    out_ += "{\n";
+    offset(joint_here.offset_m, depth + 1);
+    channels(index, depth + 1);
+    for (int child = index + 1; child < std::ssize(skeleton_.joints); ++child) {
+      if (skeleton_.joints[child].parent == index) joint(child, depth + 1);
+    }
+    if (joint_here.end_site_m) {
+      indent(depth + 1);
+      out_ += "End Site\n";
+      indent(depth + 1);
+      out_ += "{\n";
+      offset(*joint_here.end_site_m, depth + 2);
+      indent(depth + 1);
+      out_ += "}\n";
+    }
+    indent(depth);
+    out_ += "}\n";
+  }
+
+  const Clip& clip_;
+  const Skeleton& skeleton_;
+  std::string out_;
+};
+
+bool is_acclaim(const Skeleton& skeleton) {
+  for (const Joint& joint : skeleton.joints) {
+    if (!joint.channel_frame.isApprox(Eigen::Quaterniond::Identity())) return true;
+  }
+  return false;
+}
+
+std::string why() { return std::strerror(errno); }
+
+}  // namespace
+
+Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
+  if (is_acclaim(*clip.skeleton)) return write_bvh(with_zyx_channels(clip), path);
+  // Beside the target first: a full disk leaves no half-written clip behind under its name.
+  const std::filesystem::path part = path.string() + ".part";
+  std::ofstream file(part, std::ios::binary | std::ios::trunc);
+  if (!file) return fail("cannot be written: " + why(), path.string());
+  Writer writer(clip);
+  file << writer.header();
+  for (int i = 0; i < clip.frames() && file; ++i) file << writer.row(i);
+  file.close();
+  std::error_code error;
+  if (!file) {
+    const std::string reason = why();
+    std::filesystem::remove(part, error);
+    return fail("could not be written to its end: " + reason, path.string());
+  }
+  std::filesystem::rename(part, path, error);
+  if (error) return fail("cannot be written: " + error.message(), path.string());
+  return {};
+}
+
+}  // namespace posed::clip

@@ -1,0 +1,55 @@
+// FrameParser: one frame's text, as it stands in a clip, to channel values. The readers and the
+// file driver's decoder share it, so a recorded log decodes exactly as the clip does.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::clip {
+
+enum class FrameFault : std::uint8_t {
+  kNone,
+  kNotANumber,    // a word that is no finite, plausible number
+  kTooFew,        // values missing
+  kTooMany,       // values left over
+  kUnknownBone,   // AMC: a name the skeleton does not have
+  kRepeatedBone,  // AMC
+  kMissingBone,   // AMC: a bone with channels does not appear
+  kNoNumber       // AMC: the block does not begin with a frame number
+};
+
+struct FrameOutcome {
+  FrameFault fault = FrameFault::kNone;
+  std::string_view where;    // the word or bone to blame; into the text or the parser
+  std::size_t expected = 0;  // values wanted and found, for too few and too many
+  std::size_t found = 0;
+  std::int64_t number = 0;  // AMC: the frame's number
+  [[nodiscard]] bool ok() const noexcept { return fault == FrameFault::kNone; }
+  // One sentence for people. Cold.
+  [[nodiscard]] std::string sentence() const;
+};
+
+class FrameParser {
+ public:
+  // A BVH motion line: the values of all channels, in order, degrees and file units.
+  [[nodiscard]] static FrameParser bvh(const Skeleton& skeleton, double metres_per_unit);
+
+  // Values parse() writes: the skeleton's channels.
+  [[nodiscard]] std::size_t channels() const noexcept { return scale_.size(); }
+
+  // `text` to `values` [channels(), rad and m]; they are unspecified unless the outcome is ok.
+  // Leading and trailing white space does not matter. RT-safe.
+  [[nodiscard]] FrameOutcome parse(std::string_view text, std::span<double> values) const noexcept;
+
+ private:
+  std::vector<double> scale_;  // [channel], file value to rad or m
+};
+
+}  // namespace posed::clip

@@ -1,0 +1,145 @@
+#include "proto/clip/text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+namespace posed::clip {
+namespace {
+
+constexpr std::uintmax_t kMaxFile = 2'000'000'000;  // bytes
+
+// from_chars gives no value for a number a double cannot hold; one too small is as good as zero.
+bool underflows(std::string_view word) noexcept {
+  const std::size_t exponent = word.find_first_of("eE");
+  return exponent != std::string_view::npos && exponent + 1 < word.size() &&
+         word[exponent + 1] == '-';
+}
+
+}  // namespace
+
+std::optional<double> parse_number(std::string_view word) noexcept {
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (end != word.data() + word.size()) return std::nullopt;
+  if (error == std::errc::result_out_of_range && underflows(word)) return 0.0;
+  if (error != std::errc() || !std::isfinite(value) || std::abs(value) > kMaxValue) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+std::string_view trim(std::string_view text) noexcept {
+  while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::string lower(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return out;
+}
+
+std::string_view next_word(std::string_view& text) noexcept {
+  std::size_t begin = 0;
+  while (begin < text.size() && is_space(text[begin])) ++begin;
+  std::size_t end = begin;
+  while (end < text.size() && !is_space(text[end])) ++end;
+  const std::string_view word = text.substr(begin, end - begin);
+  text.remove_prefix(end);
+  return word;
+}
+
+std::string_view next_line(std::string_view& text) noexcept {
+  const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(end);
+  if (text.starts_with("\r\n")) {
+    text.remove_prefix(2);
+  } else if (!text.empty()) {
+    text.remove_prefix(1);
+  }
+  return line;
+}
+
+void Cursor::skip_space() {
+  while (!text_.empty() && is_space(text_.front())) {
+    const bool ends_line =
+        text_.front() == '\n' || (text_.front() == '\r' && !text_.starts_with("\r\n"));
+    if (ends_line) ++next_line_;
+    text_.remove_prefix(1);
+  }
+}
+
+std::string_view Cursor::peek() {
+  skip_space();
+  std::string_view rest = text_;
+  const std::string_view word = next_word(rest);
+  const std::size_t brace = word.find_first_of("{}");
+  return word.substr(0, brace == 0 ? 1 : brace);
+}
+
+std::string_view Cursor::word() {
+  const std::string_view word = peek();
+  line_ = next_line_;
+  text_.remove_prefix(word.size());
+  return word;
+}
+
+std::string_view Cursor::name() {
+  line_ = next_line_;
+  const std::string_view name = text_.substr(0, text_.find_first_of("{}\r\n"));
+  text_.remove_prefix(name.size());
+  return trim(name);
+}
+
+std::string_view Cursor::rest() {
+  line_ = next_line_;
+  const bool last = text_.find_first_of("\r\n") == std::string_view::npos;
+  const std::string_view line = next_line(text_);
+  if (!last) ++next_line_;
+  return trim(line);
+}
+
+Result<std::string> load_text(const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    return fail("this is a folder; name a clip in it", path.string());
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail(std::string("cannot be opened: ") + std::strerror(errno), path.string());
+  const auto size = std::filesystem::file_size(path, error);
+  if (!error && size > kMaxFile) return fail("is larger than 2 GB; cut it", path.string());
+  std::string text;
+  if (!error) text.reserve(size);
+  std::array<char, 65536> block{};
+  while (file.read(block.data(), block.size()) || file.gcount() > 0) {
+    text.append(block.data(), static_cast<std::size_t>(file.gcount()));
+    if (text.size() > kMaxFile) return fail("is larger than 2 GB; cut it", path.string());
+  }
+  if (file.bad()) return fail("cannot be read to its end", path.string());
+  return text;
+}
+
+std::string_view without_bom(std::string_view text) noexcept {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  return text;
+}
+
+std::string in_quotes(std::string_view word) {
+  std::string out = "'";
+  for (const char c : word.substr(0, 40)) out.push_back(c >= ' ' && c <= '~' ? c : '?');
+  if (word.size() > 40) out += "...";
+  return out + "'";
+}
+
+}  // namespace posed::clip

@@ -1,0 +1,22 @@
+// Units of length that a BVH does not name.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::clip {
+
+inline constexpr double kCmuUnit_m = 0.0254 / 0.45;  // an Acclaim file's `length 0.45`: inch / 0.45
+
+// Metres per unit that make the figure's standing height nearest to 1.7 m, of metre, centimetre,
+// and inch / 0.45; says in `warnings` that it is a guess. Offsets of `skeleton` are in file units.
+// The height is the sum of bone lengths from the lowest to the highest leaf, so it does not depend
+// on the pose in which the OFFSETs were written.
+[[nodiscard]] double guess_unit(const Skeleton& skeleton, std::vector<std::string>& warnings);
+
+// Offsets and end sites times `metres_per_unit`.
+void scale_lengths(Skeleton& skeleton, double metres_per_unit);
+
+}  // namespace posed::clip

@@ -1,0 +1,112 @@
+// Rotations, the few forms that posed needs of them: Frame's plain quaternions to Eigen and back,
+// rotation vectors, swing and twist, elementary and minimal rotations.
+// Everything here is a pure function, RT-safe, in float or double as its argument is.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include <Eigen/Geometry>
+
+#include "proto/frame/frame.hpp"
+
+namespace posed {
+
+enum class Axis : std::uint8_t { kX, kY, kZ };
+
+[[nodiscard]] inline Eigen::Quaternionf to_eigen(const Quatf& q) noexcept {
+  return {q[3], q[0], q[1], q[2]};
+}
+
+// The same in double, made unit length again: a float quaternion is short of it by up to 1e-7.
+[[nodiscard]] inline Eigen::Quaterniond to_eigen_double(const Quatf& q) noexcept {
+  return to_eigen(q).cast<double>().normalized();
+}
+
+template <typename T>
+[[nodiscard]] Quatf from_eigen(const Eigen::Quaternion<T>& q) noexcept {
+  return {static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()),
+          static_cast<float>(q.w())};
+}
+
+// Rotation vector (axis times angle [rad]) of the shorter way round, |v| <= pi.
+template <typename T>
+[[nodiscard]] Eigen::Matrix<T, 3, 1> rotation_log(const Eigen::Quaternion<T>& q) noexcept {
+  const T sign = q.w() < T(0) ? T(-1) : T(1);
+  const Eigen::Matrix<T, 3, 1> v = q.vec() * sign;
+  const T sine = v.norm();
+  if (sine < T(1e-6)) return v * T(2);  // angle / sin(angle / 2) is 2 to the last bit down here
+  return v * (T(2) * std::atan2(sine, q.w() * sign) / sine);
+}
+
+template <typename T>
+[[nodiscard]] Eigen::Quaternion<T> rotation_exp(const Eigen::Matrix<T, 3, 1>& v) noexcept {
+  const T angle = v.norm();
+  // sin(angle / 2) / angle; the series is exact to the last bit for the small angles it serves
+  const T scale = angle < T(1e-3) ? T(0.5) - angle * angle / T(48) : std::sin(angle / T(2)) / angle;
+  return {std::cos(angle / T(2)), v.x() * scale, v.y() * scale, v.z() * scale};
+}
+
+template <typename T>
+struct SwingTwist {
+  Eigen::Quaternion<T> swing;  // turns `axis` the shortest way
+  Eigen::Quaternion<T> twist;  // turns about `axis`
+};
+
+// q = swing * twist about the unit vector `axis`. A half turn that leaves the twist undetermined
+// has identity for twist.
+template <typename T>
+[[nodiscard]] SwingTwist<T> swing_twist(const Eigen::Quaternion<T>& q,
+                                        const Eigen::Matrix<T, 3, 1>& axis) noexcept {
+  const T along = q.vec().dot(axis);
+  const T norm = std::hypot(q.w(), along);
+  if (norm < T(1e-9)) return {q, Eigen::Quaternion<T>::Identity()};
+  const Eigen::Matrix<T, 3, 1> v = axis * (along / norm);
+  const Eigen::Quaternion<T> twist(q.w() / norm, v.x(), v.y(), v.z());
+  return {q * twist.conjugate(), twist};
+}
+
+// Angle of the twist about the unit vector `axis`, in (-pi, pi].
+template <typename T>
+[[nodiscard]] T twist_angle_rad(const Eigen::Quaternion<T>& q,
+                                const Eigen::Matrix<T, 3, 1>& axis) noexcept {
+  const T half = std::atan2(q.vec().dot(axis), q.w());
+  constexpr T kPi = std::numbers::pi_v<T>;
+  if (half > kPi / T(2)) return T(2) * (half - kPi);
+  if (half <= -kPi / T(2)) return T(2) * (half + kPi);
+  return T(2) * half;
+}
+
+[[nodiscard]] inline Eigen::Vector3d unit(Axis axis) noexcept {
+  return Eigen::Vector3d::Unit(static_cast<int>(axis));
+}
+
+// Turn about one axis. A product of them in listed order has its first factor outermost.
+[[nodiscard]] inline Eigen::Quaterniond axis_rotation(Axis axis, double angle_rad) noexcept {
+  const Eigen::Vector3d v = unit(axis) * std::sin(angle_rad / 2);
+  return {std::cos(angle_rad / 2), v.x(), v.y(), v.z()};
+}
+
+// The smallest rotation that turns `from` onto `to`; identity when either has no length.
+[[nodiscard]] inline Eigen::Quaterniond minimal_rotation(const Eigen::Vector3d& from,
+                                                         const Eigen::Vector3d& to) noexcept {
+  if (from.norm() < 1e-12 || to.norm() < 1e-12) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond::FromTwoVectors(from, to);
+}
+
+// Angle between two rotations [rad], 0 to pi; accurate for small angles, unlike acos of the dot.
+[[nodiscard]] inline double angle_between_rad(const Eigen::Quaterniond& a,
+                                              const Eigen::Quaterniond& b) noexcept {
+  const Eigen::Quaterniond d = a.conjugate() * b;
+  return 2.0 * std::atan2(d.vec().norm(), std::abs(d.w()));
+}
+
+// `angle_rad` moved by whole turns to within half a turn of `near_rad`.
+[[nodiscard]] inline double unwrap_near(double angle_rad, double near_rad) noexcept {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  return angle_rad - kTurn * std::round((angle_rad - near_rad) / kTurn);
+}
+
+}  // namespace posed

@@ -1,0 +1,165 @@
+#include <catch2/catch.hpp>
+
+#include <unistd.h>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "proto/clip/bvh.hpp"
+#include "proto/clip/clip.hpp"
+#include "tests/support/shared.hpp"
+
+namespace posed::clip {
+namespace {
+
+const std::string kHeader =
+    "HIERARCHY\n"
+    "ROOT Hips\n"
+    "{\n"
+    "  OFFSET 0 0 0\n"
+    "  CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n"
+    "  JOINT Left Arm:upper\n"
+    "  {\n"
+    "    OFFSET 0 80 0\n"
+    "    CHANNELS 3 Zrotation Xrotation Yrotation\n"
+    "    End Site\n"
+    "    {\n"
+    "      OFFSET 0 90 0\n"
+    "    }\n"
+    "  }\n"
+    "}\n"
+    "MOTION\n";
+const std::string kTwoFrames =
+    "Frames: 2\nFrame Time: .0083333\n"
+    "0 100 0 0 0 0 90 0 0\n"
+    "1 100 2e1 0 90 0 0 0 90";
+
+std::string swap(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+void check_error(const std::string& text, const std::string& expected) {
+  const auto clip = parse_bvh(text, "x.bvh");
+  REQUIRE_FALSE(clip.has_value());
+  INFO(clip.error().text());
+  CHECK(clip.error().text().starts_with(expected));
+}
+
+}  // namespace
+
+TEST_CASE("a BVH gives names, offsets, channels, rate and values") {
+  const auto clip = parse_bvh(kHeader + kTwoFrames, "x.bvh");
+  REQUIRE(clip.has_value());
+  REQUIRE(clip->skeleton->joints.size() == 2);
+  CHECK(clip->skeleton->joints[1].name == "Left Arm:upper");
+  CHECK(clip->skeleton->joints[1].offset_m.y() == Approx(0.8));
+  CHECK(clip->skeleton->joints[1].end_site_m->y() == Approx(0.9));
+  CHECK(clip->frame_rate_hz == 120.0);
+  CHECK(clip->frames() == 2);
+  CHECK(clip->channels(1, 2) == Approx(0.2));
+  CHECK(clip->channels(1, 4) == Approx(std::numbers::pi / 2));
+  const Frame frame = clip->frame(1);
+  CHECK(frame.root_position_m[2] == Approx(0.2));
+  CHECK(frame.rotation_xyzw[0][1] == Approx(std::sqrt(0.5)));
+  CHECK(frame.angle_count == 6);
+  CHECK(frame.valid.count() == 2);
+  CHECK(frame.header.device_ns == 8333333);
+}
+
+TEST_CASE("a BVH is read leniently where the pose is not in doubt") {
+  std::string text = "\xEF\xBB\xBF" + swap(kHeader, "Left Arm:upper\n  {", "Left Arm:upper {");
+  text += "\n\n  " + swap(kTwoFrames, "Frames: 2", "Frames : 4000000000") + "  \n\n";
+  std::string crlf;
+  for (const char c : text)
+    crlf += c == '\n' ? std::string("\r\n") : std::string(1, c == ' ' ? '\t' : c);
+  crlf = swap(crlf, "Left\tArm", "Left Arm");
+  const auto clip = parse_bvh(crlf, "x.bvh");
+  if (!clip) FAIL(clip.error().text());
+  CHECK(clip->frames() == 2);
+  CHECK(clip->skeleton->joints[1].name == "Left Arm:upper");
+  bool told = false;
+  for (const std::string& warning : clip->warnings)
+    told |= warning.find("'4000000000'") != std::string::npos;
+  CHECK(told);
+}
+
+TEST_CASE("a BVH that would give a wrong pose is refused with its line") {
+  const std::string good = kHeader + kTwoFrames;
+  check_error("", "x.bvh:1: does not begin with HIERARCHY");
+  check_error("SQLite format 3", "x.bvh:1: does not begin with HIERARCHY");
+  check_error(kHeader.substr(0, 60), "x.bvh:5:");
+  check_error(kHeader.substr(0, kHeader.size() - 7), "x.bvh:16: has no MOTION");
+  check_error(kHeader, "x.bvh:17: 'Frames: <count>'");
+  check_error(kHeader + "Frames: 0\nFrame Time: 0.01\n", "x.bvh:19: has no frames");
+  check_error(swap(good, ".0083333", "0"), "x.bvh:18: Frame Time '0'");
+  check_error(swap(good, ".0083333", "-1"), "x.bvh:18: Frame Time '-1'");
+  check_error(swap(good, ".0083333", "11"), "x.bvh:18: Frame Time '11'");
+  check_error(swap(good, ".0083333", "nan"), "x.bvh:18: Frame Time 'nan'");
+  check_error(swap(good, "0 100 0 0", "0 nan 0 0"), "x.bvh:19: frame 1: 'nan' is not a number");
+  check_error(swap(good, "2e1", "inf"), "x.bvh:20: frame 2: 'inf' is not a number");
+  check_error(swap(good, "2e1", "2,1"), "x.bvh:20: frame 2: '2,1' is not a number");
+  check_error(swap(good, "2e1", "2e300"), "x.bvh:20: frame 2: '2e300' is not a number");
+  check_error(swap(good, "2e1 ", ""), "x.bvh:20: frame 2: the frame has 8 values");
+  check_error(swap(good, "2e1", "2 1"), "x.bvh:20: frame 2: the frame has 10 values or more");
+  check_error(swap(good, "Xposition", "Wposition"), "x.bvh:5: unknown channel 'Wposition'");
+  check_error(swap(good, "Xposition", "Yposition"), "x.bvh:5: channel 'Yposition' twice");
+  check_error(swap(good, "CHANNELS 6", "CHANNELS 5"), "x.bvh:5: joint 'Hips' lists more channels");
+  check_error(swap(good, "CHANNELS 6", "CHANNELS 7"), "x.bvh:5: CHANNELS of joint 'Hips'");
+  check_error(swap(good, "Left Arm:upper", "Hips"), "x.bvh:6: a second joint is named 'Hips'");
+  check_error(swap(good, "    OFFSET 0 80 0\n", ""),
+              "x.bvh:13: joint 'Left Arm:upper' has no OFFSET");
+  check_error(swap(good, "OFFSET 0 80 0", "OFFSET 0 nan 0"), "x.bvh:8: OFFSET of joint 'Left Arm");
+  check_error(swap(good, "    CHANNELS 3 Zrotation Xrotation Yrotation\n", ""),
+              "x.bvh:13: joint 'Left Arm:upper' has no CHANNELS");
+  check_error(swap(good, "  }\n}\nMOTION", "  }\nMOTION"),
+              "x.bvh:15: the file ends, or its MOTION");
+  check_error(swap(good, "}\nMOTION", "}\n}\nMOTION"), "x.bvh:16: has a closing brace too many");
+  check_error(swap(good, "}\nMOTION", "}\nROOT b {}\nMOTION"), "x.bvh:16: has a second ROOT");
+}
+
+TEST_CASE("joints nested too deep or too many are refused") {
+  std::string deep = "HIERARCHY\nROOT j\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n";
+  for (int i = 0; i < 200; ++i) {
+    deep += "JOINT j" + std::to_string(i) + "\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n";
+  }
+  check_error(deep, "x.bvh:386: joints are nested deeper than 96");
+  std::string wide = "HIERARCHY\nROOT j\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n";
+  for (int i = 0; i < 200; ++i) {
+    wide += "JOINT j" + std::to_string(i) + "\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\n";
+  }
+  check_error(wide, "x.bvh:481: has more than 96 joints");
+}
+
+TEST_CASE("a written BVH reads back the same") {
+  const auto first = parse_bvh(kHeader + kTwoFrames, "x.bvh");
+  REQUIRE(first.has_value());
+  const auto path =
+      std::filesystem::temp_directory_path() / ("posed_bvh_" + std::to_string(::getpid()) + ".bvh");
+  REQUIRE(write_bvh(*first, path).has_value());
+  const auto again = read_clip(path);
+  std::filesystem::remove(path);
+  REQUIRE(again.has_value());
+  CHECK(again->skeleton->id == first->skeleton->id);
+  CHECK(again->frame_rate_hz == first->frame_rate_hz);
+  CHECK((again->channels - first->channels).cwiseAbs().maxCoeff() < 1e-10);
+}
+
+TEST_CASE("the real recordings are read") {
+  const auto cmu = test::shared("data/cmu/07_01.bvh");
+  const auto bandai = test::shared("data/styles/dataset-2_walk_feminine_001.bvh");
+  if (!cmu || !bandai) {
+    SKIP_WITHOUT_SHARED();
+  }
+  const auto walk = read_clip(*cmu);
+  REQUIRE(walk.has_value());
+  CHECK(walk->frames() == 317);
+  CHECK(walk->skeleton->joints.size() == 31);
+  CHECK(walk->frame_rate_hz == 120.0);
+  const auto acted = read_clip(*bandai);
+  REQUIRE(acted.has_value());
+  CHECK(acted->frame_rate_hz == 30.0);
+  CHECK(acted->skeleton->joints[acted->skeleton->root_joint].name == "Hips");
+  CHECK(acted->frame(0).root_position_m[1] == Approx(0.895634));
+}
+
+}  // namespace posed::clip
