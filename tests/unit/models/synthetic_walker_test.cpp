@@ -1,0 +1,38 @@
+#include <catch2/catch.hpp>
+
+#include <cmath>
+
+#include "models/motion/synthetic_walker.hpp"
+
+using posed::motion::make_walker;
+using posed::motion::WalkerFamily;
+
+TEST_CASE("a synthetic walker is the same every time and differs between people and families",
+          "[walker]") {
+  const auto first = make_walker({.family = WalkerFamily::kMarch, .person = 3});
+  const auto again = make_walker({.family = WalkerFamily::kMarch, .person = 3});
+  const auto other = make_walker({.family = WalkerFamily::kMarch, .person = 4});
+  const auto sway = make_walker({.family = WalkerFamily::kSway, .person = 3});
+  REQUIRE(first);
+  REQUIRE(again);
+  REQUIRE(other);
+  REQUIRE(sway);
+  CHECK(first->frames() == 180);
+  CHECK(first->channels == again->channels);
+  const auto rms_deg = [](const posed::clip::Clip& a, const posed::clip::Clip& b) {
+    const auto n = a.channels.cols() - 3;
+    return 57.29578 *
+           std::sqrt((a.channels.rightCols(n) - b.channels.rightCols(n)).array().square().mean());
+  };
+  CHECK(rms_deg(*first, *other) > 1.0);
+  CHECK(rms_deg(*first, *sway) > 4.0);
+}
+
+TEST_CASE("a synthetic walker has the legs that the phase is found by", "[walker]") {
+  const auto walk = make_walker({});
+  REQUIRE(walk);
+  CHECK(walk->skeleton->joint_of(posed::Bone::kHips) == 0);
+  CHECK(walk->skeleton->joint_of(posed::Bone::kLeftUpperLeg) > 0);
+  CHECK(walk->skeleton->joint_of(posed::Bone::kRightUpperLeg) > 0);
+  CHECK(walk->skeleton->joint_of(posed::Bone::kLeftHand) > 0);
+}
