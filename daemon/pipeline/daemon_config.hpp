@@ -1,0 +1,51 @@
+// What the daemon is to do, checked and complete: filled from TOML by the config reader, by hand in
+// tests and benchmarks, from the log in replay. Every default of the product stands here and
+// nowhere else.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/driver.hpp"
+#include "models/style/style_filter.hpp"
+
+namespace posed::pipeline {
+
+struct StyleConfig {
+  std::filesystem::path model;  // the model file
+  style::FilterOptions filter;
+};
+
+struct StreamConfig {
+  std::string name;            // [a-z0-9_-]{1,32}, unique
+  std::string driver;          // registry name
+  drivers::Options options;    // of the driver's own table, complete with its defaults
+  bool publish_raw = false;    // the unstyled input too, as <name>-raw
+  double stale_after_s = 0.5;  // silence after which the stream is called stale
+  std::optional<StyleConfig> style;
+};
+
+// Who may connect from outside; empty when CURVE is off.
+struct AllowedClient {
+  std::string name;
+  std::string public_key;  // Z85, 40 characters
+  bool may_control = false;
+};
+struct SecurityConfig {
+  std::filesystem::path server_key;  // NAME.key; empty: no CURVE
+  std::vector<AllowedClient> clients;
+  bool insecure = false;  // bind beyond loopback without CURVE
+};
+
+struct DaemonConfig {
+  std::string publish_endpoint = "tcp://127.0.0.1:5570";
+  std::string control_endpoint = "tcp://127.0.0.1:5571";
+  bool realtime = true;  // ask for SCHED_FIFO and mlockall; refusal is a warning
+  SecurityConfig security;
+  std::vector<StreamConfig> streams;
+  std::string text;  // the TOML it came from, kept in the device log
+};
+
+}  // namespace posed::pipeline
