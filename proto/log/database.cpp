@@ -1,0 +1,167 @@
+#include "proto/log/database.hpp"
+
+#include <cstring>
+
+#include <sqlite3.h>
+
+namespace posed::log {
+namespace {
+
+constexpr int kMaxValue = 256 * 1024 * 1024;  // bytes; a log's largest value is a model file
+
+// One sentence for what SQLite refused, telling what to do where we know it.
+std::unexpected<Error> failure(sqlite3* handle, const std::string& file) {
+  const int code = handle == nullptr ? SQLITE_NOMEM : sqlite3_errcode(handle);
+  const int place = handle == nullptr ? 0 : sqlite3_system_errno(handle);
+  const std::string why = place != 0 ? std::strerror(place) : sqlite3_errstr(code);
+  switch (code) {
+    case SQLITE_NOTADB:
+      return fail("not a device log (not an SQLite file)", file);
+    case SQLITE_CORRUPT:
+      return fail("the log is damaged or cut short; `sqlite3 FILE .recover` may save what is left",
+                  file);
+    case SQLITE_FULL:
+      return fail("no room left on the disk", file);
+    case SQLITE_CANTOPEN:
+      return fail("cannot be opened: " + why, file);
+    case SQLITE_IOERR:
+      return fail("reading or writing failed: " + why, file);
+    case SQLITE_READONLY:
+      return fail("may only be read; give it, and its folder, write permission", file);
+    case SQLITE_BUSY:
+      return fail("in use by another process", file);
+    default:
+      return fail(handle == nullptr ? why : sqlite3_errmsg(handle), file);
+  }
+}
+
+}  // namespace
+
+Statement::Statement(sqlite3_stmt* statement, std::string file)
+    : statement_(statement), file_(std::move(file)) {}
+
+void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+Statement& Statement::bind(std::int64_t value) {
+  sqlite3_bind_int64(statement_.get(), next_parameter_++, value);
+  return *this;
+}
+
+Statement& Statement::bind(double value) {
+  sqlite3_bind_double(statement_.get(), next_parameter_++, value);
+  return *this;
+}
+
+Statement& Statement::bind(std::string_view text) {
+  const char* data = text.empty() ? "" : text.data();  // a null pointer would bind NULL
+  sqlite3_bind_text64(statement_.get(), next_parameter_++, data, text.size(), SQLITE_STATIC,
+                      SQLITE_UTF8);
+  return *this;
+}
+
+Statement& Statement::bind(std::span<const std::byte> bytes) {
+  const void* data = bytes.empty() ? static_cast<const void*>("") : bytes.data();
+  sqlite3_bind_blob64(statement_.get(), next_parameter_++, data, bytes.size(), SQLITE_STATIC);
+  return *this;
+}
+
+Result<bool> Statement::step() {
+  if (done_) return false;
+  switch (sqlite3_step(statement_.get())) {
+    case SQLITE_ROW:
+      return true;
+    case SQLITE_DONE:
+      done_ = true;
+      return false;
+    default:
+      return failure(sqlite3_db_handle(statement_.get()), file_);
+  }
+}
+
+Result<> Statement::execute() {
+  auto row = step();
+  reset();
+  if (!row) return std::unexpected(std::move(row.error()));
+  return {};
+}
+
+void Statement::reset() {
+  sqlite3_reset(statement_.get());
+  next_parameter_ = 1;
+  done_ = false;
+}
+
+std::int64_t Statement::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+double Statement::real(int column) const { return sqlite3_column_double(statement_.get(), column); }
+
+std::string_view Statement::text(int column) const {
+  const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
+  if (data == nullptr) return {};
+  return {data, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+std::span<const std::byte> Statement::bytes(int column) const {
+  const auto* data = static_cast<const std::byte*>(sqlite3_column_blob(statement_.get(), column));
+  if (data == nullptr) return {};
+  return {data, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+void Database::Close::operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
+
+Result<Database> Database::open(const std::filesystem::path& path, Mode mode) {
+  const int flags = mode == Mode::kCreate      ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
+                    : mode == Mode::kReadWrite ? SQLITE_OPEN_READWRITE
+                                               : SQLITE_OPEN_READONLY;
+  sqlite3* handle = nullptr;
+  const int code = sqlite3_open_v2(path.c_str(), &handle, flags | SQLITE_OPEN_NOMUTEX, nullptr);
+  Database database(handle, path.string());
+  if (code != SQLITE_OK) return failure(handle, path.string());
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxValue);
+  // A log may come from a stranger: nothing in its schema gets to run.
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  return database;
+}
+
+Result<> Database::run(const char* sql) {
+  if (sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK) {
+    return failure(handle_.get(), file_);
+  }
+  return {};
+}
+
+Result<Statement> Database::prepare(std::string_view sql) {
+  sqlite3_stmt* statement = nullptr;
+  if (sqlite3_prepare_v3(handle_.get(), sql.data(), static_cast<int>(sql.size()),
+                         SQLITE_PREPARE_PERSISTENT, &statement, nullptr) != SQLITE_OK) {
+    return failure(handle_.get(), file_);
+  }
+  return Statement(statement, file_);
+}
+
+Result<std::string> Database::value(std::string_view sql) {
+  auto statement = prepare(sql);
+  if (!statement) return std::unexpected(std::move(statement.error()));
+  const auto row = statement->step();
+  if (!row) return std::unexpected(row.error());
+  return std::string(*row ? statement->text(0) : std::string_view{});
+}
+
+std::int64_t Database::last_insert_id() const { return sqlite3_last_insert_rowid(handle_.get()); }
+
+void Database::set_patience_ms(int patience_ms) {
+  sqlite3_busy_timeout(handle_.get(), patience_ms);
+}
+
+void Database::rollback() {
+  // Fails when SQLite has already rolled back by itself, which is just as well.
+  if (sqlite3_get_autocommit(handle_.get()) == 0) {
+    sqlite3_exec(handle_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
+  }
+}
+
+}  // namespace posed::log

@@ -1,0 +1,70 @@
+// Reader of a device log: what the writer wrote, in order, from a file that may be damaged, cut
+// short or foreign. One thread; cold.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/frame/result.hpp"
+#include "proto/log/rows.hpp"
+
+namespace posed::log {
+
+class Database;
+
+class Reader {
+ public:
+  // Opens, folds in the -wal that a crash left, and checks the whole file. A file that is no log,
+  // of a newer posed, or damaged is refused with one sentence. A log that is being recorded may be
+  // read as far as it is committed.
+  [[nodiscard]] static Result<Reader> open(const std::filesystem::path& path);
+
+  Reader(Reader&&) noexcept;
+  Reader& operator=(Reader&&) noexcept;
+  ~Reader();
+
+  [[nodiscard]] const std::map<std::string, std::string>& meta() const;
+  [[nodiscard]] const std::vector<StreamRow>& streams() const;  // by id
+
+  // The bytes kept under a hash; an error when there are none or they do not match it.
+  [[nodiscard]] Result<std::vector<std::byte>> blob(std::string_view sha256) const;
+
+  // The next chunk of all streams in log order; nothing after the last. Its bytes are valid until
+  // the next call.
+  [[nodiscard]] Result<std::optional<ChunkRow>> next_chunk();
+
+  [[nodiscard]] Result<std::vector<DecisionRow>> decisions(std::uint32_t stream) const;
+  [[nodiscard]] Result<std::vector<GapRow>> gaps() const;
+
+  // The published frames of one stream, raw or styled, in pipeline order. Must not outlive the
+  // reader.
+  class Frames {
+   public:
+    Frames(Frames&&) noexcept;
+    Frames& operator=(Frames&&) noexcept;
+    ~Frames();
+    // Nothing after the last; the bytes are valid until the next call.
+    [[nodiscard]] Result<std::optional<FrameRow>> next();
+
+   private:
+    friend class Reader;
+    struct State;
+    explicit Frames(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+  };
+  [[nodiscard]] Result<Frames> frames(std::uint32_t stream, bool raw) const;
+  [[nodiscard]] Result<bool> has_frames() const;
+
+ private:
+  struct State;
+  explicit Reader(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace posed::log

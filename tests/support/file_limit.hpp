@@ -1,0 +1,31 @@
+// A disk that is full as far as this process can tell: no file may grow beyond `bytes` while it
+// lives.
+#pragma once
+
+#include <csignal>
+
+#include <sys/resource.h>
+
+namespace posed::test {
+
+class FileLimit {
+ public:
+  explicit FileLimit(rlim_t bytes) {
+    signal_before_ = std::signal(SIGXFSZ, SIG_IGN);  // writes then fail with EFBIG
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  FileLimit(const FileLimit&) = delete;
+  FileLimit& operator=(const FileLimit&) = delete;
+  ~FileLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, signal_before_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*signal_before_)(int) = nullptr;
+};
+
+}  // namespace posed::test
