@@ -29,7 +29,11 @@ class Predictor {
   [[nodiscard]] int inputs() const noexcept;   // D
   [[nodiscard]] int outputs() const noexcept;  // D_out
 
-  // f(q) into out [D_out]. `available` is empty (all) or D flags. RT-safe.
+  // What f tends to far from all training poses: offset + b sum w [D_out]. RT-safe.
+  [[nodiscard]] std::span<const float> constant() const noexcept;
+
+  // f(q) into out [D_out]; constant() where nothing is available. q must be finite; its missing
+  // values are not read. `available` is empty (all) or D flags. RT-safe.
   void mean(std::span<const float> q, std::span<const std::uint8_t> available,
             std::span<float> out) const noexcept;
 

@@ -1,0 +1,59 @@
+// The predictor's inner loops, compiled once per instruction set by Highway. All are RT-safe.
+//
+// Memory is one stream, read front to back. A tile is up to 64 training points:
+//
+//   X [dims][width]        one row a dimension, one column a point
+//   A [width][padded]      one row a point: its weights, padded with zeros to 16 floats
+//
+// A triangle L (for |L k|^2) is cut in blocks of 16 rows; block b holds columns 0 .. 16 b + 15,
+// each 16 floats tall.
+//
+// Every sum has one fixed order that does not depend on the vector's length: distances by
+// dimension, outputs in two partial sums by point parity, triangle rows in four by column. With
+// fused multiply-adds AVX2 and AVX-512 therefore give the same bits.
+#pragma once
+
+#include <cstdint>
+
+namespace posed::gp::kernel {
+
+inline constexpr int kTile = 64;      // points in a full tile
+inline constexpr int kLanes = 16;     // floats: rows and blocks are padded to this
+inline constexpr int kMaxDims = 288;  // inputs and outputs
+inline constexpr int kMaxGate = 256;  // points the confidence may use
+
+[[nodiscard]] constexpr int padded(int n) noexcept { return (n + kLanes - 1) / kLanes * kLanes; }
+[[nodiscard]] constexpr int triangle_floats(int rows) noexcept {
+  const int blocks = padded(rows) / kLanes;
+  return kLanes * kLanes * blocks * (blocks + 1) / 2;
+}
+
+// A query. With dimensions missing, `present` lists the `present_count` available ones; null: all.
+struct Query {
+  const float* q;
+  const std::uint16_t* present;
+  int present_count;
+  float exponent;  // -mu log2(e) / 2, times dims / present_count
+};
+
+struct Tiles {
+  const float* data;  // 64-byte aligned
+  int points;         // padded to 16
+  int dims;
+  int outputs_padded;
+};
+
+// sum_i k_i A_i into out [outputs_padded], where k_i = exp2(exponent * |q - x_i|^2). The first
+// `keep` (at most kMaxGate) k_i are left in k [padded(keep) rounded up to a tile].
+void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) noexcept;
+
+// |L k|^2 over `rows` (a multiple of 16).
+[[nodiscard]] float triangle_norm2(const float* triangle, int rows, const float* k) noexcept;
+
+// out = 2^x for x <= 0, exactly 0 below -125. count: a multiple of 16. For tests.
+void exp2_of(const float* x, int count, float* out) noexcept;
+
+// Bit of the Highway target in use.
+[[nodiscard]] std::int64_t target() noexcept;
+
+}  // namespace posed::gp::kernel
