@@ -6,10 +6,12 @@
 //             q_j = log(Rmean_j^T R_j), R_j' = Rmean_j exp(q_j'); 3 a joint, the root first with
 //             its heading removed
 //   humanoid  the same on the canonical skeleton
-//   cmu43     the first paper's Euler angles [rad] of an Acclaim skeleton (root 3 + 40)
+//   cmu43     the first paper's Euler angles [rad] of an Acclaim skeleton (root 3 + 40), by the
+//             joints' names in an ASF or in the BVH files made from it
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -38,6 +40,13 @@ struct PoseSpaceSpec {
   int root = 0;                          // index in `joints` of the joint whose heading is removed
 };
 
+// The spec of `space` on `skeleton`, with identity for every mean: the joints a model trained on
+// such clips should have. Names what is missing.
+[[nodiscard]] Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton);
+
+// How many dimensions q has in this spec.
+[[nodiscard]] int space_dims(const PoseSpaceSpec& spec);
+
 // A spec bound to one skeleton. Const and shareable after bind().
 class PoseSpace {
  public:
@@ -57,11 +66,42 @@ class PoseSpace {
   void to_vector(const Frame& frame, double heading_rad, std::span<float> q,
                  std::span<std::uint8_t> available) const noexcept;
 
-  // Replaces the pose of `frame` by q + delta in the space's own sense; joints that are not
-  // available and joints outside the space stay as they are; zero delta leaves every bit as it was.
-  // RT-safe.
+  // Replaces the pose of `frame` by q + delta in the space's own sense, channel angles included;
+  // joints that are not available and joints outside the space stay as they are; zero delta leaves
+  // every bit as it was. RT-safe.
   void add(Frame& frame, double heading_rad, std::span<const float> q,
            std::span<const float> delta) const noexcept;
+
+ private:
+  // One joint of the space. The rotation that q describes is
+  //   V = mean^-1 [Ry(-heading) for the root] before (product of `chain`) L after
+  // `before` and `after` carry the T frames (humanoid) or the Acclaim axes (cmu43).
+  struct Item {
+    int joint = 0;      // L is this joint's rotation in the frame
+    int first_dim = 0;  // of q
+    int dims = 3;
+    std::uint8_t axes = 7;  // cmu43: bit x = 1, y = 2, z = 4 of the listed degrees of freedom
+    int chain_begin = 0, chain_end = 0;  // of chain_: joints between V's base and `joint`
+    int first_angle = 0, angles = 0;     // of Frame::angle_rad
+    Eigen::Quaterniond before = Eigen::Quaterniond::Identity();
+    Eigen::Quaterniond after = Eigen::Quaterniond::Identity();
+    Eigen::Quaterniond mean = Eigen::Quaterniond::Identity();
+  };
+
+  PoseSpace() = default;
+  [[nodiscard]] bool measured(const Item& item, const Frame& frame) const noexcept;
+  [[nodiscard]] Eigen::Quaterniond base(const Item& item, const Frame& frame,
+                                        double heading_rad) const noexcept;
+  [[nodiscard]] Eigen::Quaterniond changed(const Item& item, const Eigen::Quaterniond& rotation,
+                                           const float* q, const float* delta) const noexcept;
+  void set_rotation(const Item& item, const Eigen::Quaterniond& local, Frame& frame) const noexcept;
+
+  std::shared_ptr<const Skeleton> skeleton_;
+  std::vector<Item> items_;
+  std::vector<int> chain_;
+  std::vector<int> joint_of_dim_;
+  int root_ = 0;
+  bool euler_ = false;
 };
 
 }  // namespace posed::motion

@@ -1,0 +1,201 @@
+#include "models/motion/motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "models/motion/low_pass.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::motion {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kShortestChord_m = 0.5;
+constexpr double kSameRate = 1e-3;  // relative
+
+bool finite(const Frame& frame) {
+  for (const float v : frame.root_position_m) {
+    if (!std::isfinite(v)) return false;
+  }
+  for (int j = 0; j < frame.joint_count; ++j) {
+    for (const float v : frame.rotation_xyzw[j]) {
+      if (!std::isfinite(v)) return false;
+    }
+  }
+  return true;
+}
+
+Quaterniond rotation(const Frame& frame, int joint) {
+  return to_eigen_double(frame.rotation_xyzw[joint]);
+}
+
+Quaterniond world_rotation(const Skeleton& skeleton, const Frame& frame, int joint) {
+  Quaterniond world = Quaterniond::Identity();
+  for (int j = joint; j >= 0; j = skeleton.joints[j].parent) world = rotation(frame, j) * world;
+  return world;
+}
+
+// Joint rotations as columns of quaternion components whose signs never jump, then the root: what
+// may be filtered component by component.
+MatrixXd to_columns(const Motion& motion) {
+  const int joints = motion.frames.front().joint_count;
+  MatrixXd columns(motion.size(), 4 * joints + 3);
+  for (int t = 0; t < motion.size(); ++t) {
+    const Frame& frame = motion.frames[t];
+    for (int j = 0; j < joints; ++j) {
+      Eigen::Vector4d q = rotation(frame, j).coeffs();
+      if (t > 0 && q.dot(columns.block<1, 4>(t - 1, 4 * j)) < 0.0) q = -q;
+      columns.block<1, 4>(t, 4 * j) = q;
+    }
+    for (int i = 0; i < 3; ++i) columns(t, 4 * joints + i) = frame.root_position_m[i];
+  }
+  return columns;
+}
+
+// The frame at `position` (in frames) of `columns`: slerp between neighbours.
+void fill_frame(const MatrixXd& columns, double position, Frame& frame) {
+  const auto last = static_cast<int>(columns.rows()) - 1;
+  const int low = std::clamp(static_cast<int>(position), 0, last);
+  const int high = std::min(low + 1, last);
+  const double part = std::clamp(position - low, 0.0, 1.0);
+  const int joints = frame.joint_count;
+  for (int j = 0; j < joints; ++j) {
+    const Quaterniond a(Eigen::Vector4d(columns.block<1, 4>(low, 4 * j).normalized()));
+    const Quaterniond b(Eigen::Vector4d(columns.block<1, 4>(high, 4 * j).normalized()));
+    frame.rotation_xyzw[j] = from_eigen(a.slerp(part, b));
+  }
+  for (int i = 0; i < 3; ++i) {
+    const double value =
+        (1.0 - part) * columns(low, 4 * joints + i) + part * columns(high, 4 * joints + i);
+    frame.root_position_m[i] = static_cast<float>(value);
+  }
+}
+
+}  // namespace
+
+Result<Motion> motion_of(const clip::Clip& clip) {
+  if (clip.frames() == 0)
+    return fail("the clip has no frames; record at least one stride", clip.path);
+  if (!(clip.frame_rate_hz > 0.0)) return fail("the clip has no frame rate", clip.path);
+  Motion motion{clip.skeleton, clip.frame_rate_hz, {}};
+  motion.frames.reserve(clip.frames());
+  for (int t = 0; t < clip.frames(); ++t) {
+    motion.frames.push_back(clip.frame(t));
+    if (!finite(motion.frames.back())) {
+      return fail("frame " + std::to_string(t + 1) +
+                      " holds a value that is not a number; mend or "
+                      "cut the clip",
+                  clip.path);
+    }
+  }
+  return motion;
+}
+
+Motion resample(const Motion& motion, double rate_hz) {
+  if (motion.size() < 2 || std::abs(motion.rate_hz / rate_hz - 1.0) < kSameRate) return motion;
+  MatrixXd columns = to_columns(motion);
+  const double step = motion.rate_hz / rate_hz;
+  if (step > 1.0) {
+    columns = low_pass_zero_phase(columns, 2.0 * (rate_hz / 3.0) / motion.rate_hz);
+  }
+  // A rate such as 119.88 is 120 to within the clock: whole steps stay whole.
+  const double whole = std::round(step);
+  const double exact = std::abs(step - whole) < kSameRate * step ? whole : step;
+  Motion out{motion.skeleton, rate_hz, {}};
+  const auto count = static_cast<int>(std::floor((motion.size() - 1) / exact + 1e-9)) + 1;
+  for (int k = 0; k < count; ++k) {
+    Frame frame = motion.frames[std::min(motion.size() - 1, static_cast<int>(k * exact + 0.5))];
+    fill_frame(columns, k * exact, frame);
+    frame.angle_count = 0;  // not resampled; nothing here reads them
+    out.frames.push_back(frame);
+  }
+  return out;
+}
+
+double walk_heading_rad(const Motion& motion) {
+  const Skeleton& skeleton = *motion.skeleton;
+  const auto& first = motion.frames.front().root_position_m;
+  const auto& last = motion.frames.back().root_position_m;
+  const double dx = static_cast<double>(last[0]) - first[0];
+  const double dz = static_cast<double>(last[2]) - first[2];
+  if (std::hypot(dx, dz) >= kShortestChord_m) return std::atan2(dx, dz);
+  const Quaterniond T_inverse = skeleton.joints[skeleton.root_joint].T_world_joint.conjugate();
+  Vector3d forward = Vector3d::Zero();
+  for (const Frame& frame : motion.frames) {
+    forward += world_rotation(skeleton, frame, skeleton.root_joint) * T_inverse * Vector3d::UnitZ();
+  }
+  return std::atan2(forward.x(), forward.z());
+}
+
+MatrixXd root_positions_m(const Motion& motion, double heading_rad) {
+  const Quaterniond turn = axis_rotation(Axis::kY, -heading_rad);
+  MatrixXd positions(motion.size(), 3);
+  for (int t = 0; t < motion.size(); ++t) {
+    const auto& p = motion.frames[t].root_position_m;
+    positions.row(t) = (turn * Vector3d(p[0], p[1], p[2])).transpose();
+  }
+  return positions;
+}
+
+Result<MatrixXd> pose_vectors(const Motion& motion, const PoseSpace& space, double heading_rad) {
+  const int dims = space.dims();
+  MatrixXd q(motion.size(), dims);
+  std::vector<float> row(dims);
+  std::vector<std::uint8_t> available(dims);
+  for (int t = 0; t < motion.size(); ++t) {
+    space.to_vector(motion.frames[t], heading_rad, row, available);
+    q.row(t) = Eigen::Map<const Eigen::RowVectorXf>(row.data(), dims).cast<double>();
+    if (t == 0) continue;
+    const double jump = (q.row(t) - q.row(t - 1)).lpNorm<Eigen::Infinity>();
+    if (jump > std::numbers::pi) {
+      return fail(
+          "frame " + std::to_string(t + 1) +
+          " turns a joint over by more than half a turn at once; cut the clip there or, for "
+          "Euler angles (cmu43), use --pose-space native");
+    }
+  }
+  return q;
+}
+
+std::optional<VectorXd> leg_signal(const Motion& motion) {
+  const Skeleton& skeleton = *motion.skeleton;
+  const int left = skeleton.joint_of(Bone::kLeftUpperLeg);
+  const int right = skeleton.joint_of(Bone::kRightUpperLeg);
+  if (left < 0 || right < 0) return std::nullopt;
+  // The thigh points down in T-pose; how far forward it points in the pelvis is its flexion.
+  const auto flexion = [&](const Frame& frame, int joint) {
+    const int parent = skeleton.joints[joint].parent;
+    const Quaterniond T_parent =
+        parent < 0 ? Quaterniond::Identity() : skeleton.joints[parent].T_world_joint;
+    const Quaterniond canonical =
+        T_parent * rotation(frame, joint) * skeleton.joints[joint].T_world_joint.conjugate();
+    const Vector3d thigh = canonical * -Vector3d::UnitY();
+    return std::atan2(thigh.z(), -thigh.y());
+  };
+  VectorXd signal(motion.size());
+  for (int t = 0; t < motion.size(); ++t) {
+    signal[t] = flexion(motion.frames[t], right) - flexion(motion.frames[t], left);
+  }
+  return signal;
+}
+
+MatrixXd time_derivative(const MatrixXd& values, double rate_hz) {
+  const auto last = static_cast<int>(values.rows()) - 1;
+  MatrixXd rate = MatrixXd::Zero(values.rows(), values.cols());
+  if (last < 1) return rate;
+  rate.row(0) = values.row(1) - values.row(0);
+  rate.row(last) = values.row(last) - values.row(last - 1);
+  if (last > 1) {
+    rate.middleRows(1, last - 1) = 0.5 * (values.bottomRows(last - 1) - values.topRows(last - 1));
+  }
+  return rate * rate_hz;
+}
+
+}  // namespace posed::motion

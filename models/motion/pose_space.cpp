@@ -1,0 +1,267 @@
+#include "models/motion/pose_space.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "models/motion/cmu43.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::motion {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+bool turns(const Skeleton& skeleton, int joint) {
+  return std::ranges::any_of(skeleton.channels, [joint](const Channel& channel) {
+    return channel.joint == joint && !channel.translation;
+  });
+}
+
+bool below(const Skeleton& skeleton, int joint, int ancestor) {
+  for (int j = joint; j >= 0; j = skeleton.joints[j].parent) {
+    if (j == ancestor) return true;
+  }
+  return false;
+}
+
+// Acclaim joints turn in frames of their own; a BVH made from them keeps the names of one list.
+bool is_acclaim(const Skeleton& skeleton) {
+  const int arm = skeleton.joint_index("lhumerus");
+  return arm >= 0 && std::abs(skeleton.joints[arm].channel_frame.w()) < 0.99;
+}
+
+int find_joint(const PoseSpaceSpec& spec, std::size_t i, const Skeleton& skeleton) {
+  const std::string& name = spec.joints[i];
+  if (spec.space == Space::kHumanoid) {
+    const auto bone = bone_from_name(name);
+    return bone ? skeleton.joint_of(*bone) : -1;
+  }
+  if (spec.space == Space::kCmu43) {
+    return skeleton.joint_index(is_acclaim(skeleton) ? kCmu43[i].asf : kCmu43[i].bvh);
+  }
+  return skeleton.joint_index(name);
+}
+
+std::unexpected<Error> missing_joints(const PoseSpaceSpec& spec,
+                                      const std::vector<std::string>& missing,
+                                      const Skeleton& skeleton) {
+  std::string names;
+  for (const std::string& name : missing) names += (names.empty() ? "" : ", ") + name;
+  return fail("skeleton '" + skeleton.name + "' cannot serve pose space " +
+              std::string(space_name(spec.space)) + ": it has no joint " + names +
+              "; use a source of the kind the model was trained on, or train with --pose-space "
+              "humanoid");
+}
+
+Result<> check_spec(const PoseSpaceSpec& spec) {
+  const bool means_fit =
+      spec.space == Space::kCmu43 ? spec.mean.empty() : spec.mean.size() == spec.joints.size();
+  const bool joints_fit =
+      spec.space == Space::kCmu43 ? spec.joints.size() == kCmu43.size() : !spec.joints.empty();
+  const bool root_fits = spec.root >= 0 && spec.root < static_cast<int>(spec.joints.size());
+  if (means_fit && joints_fit && root_fits && space_dims(spec) <= kMaxPoseDims) return {};
+  return fail("the pose space " + std::string(space_name(spec.space)) +
+              " does not fit its joints; train the model again");
+}
+
+}  // namespace
+
+std::string_view space_name(Space space) {
+  switch (space) {
+    case Space::kCmu43:
+      return "cmu43";
+    case Space::kHumanoid:
+      return "humanoid";
+    case Space::kNative:
+      break;
+  }
+  return "native";
+}
+
+Result<Space> space_from_name(std::string_view name) {
+  for (const Space space : {Space::kNative, Space::kCmu43, Space::kHumanoid}) {
+    if (name == space_name(space)) return space;
+  }
+  return misuse("no pose space is called '" + std::string(name) +
+                "'; choose native, cmu43 or humanoid");
+}
+
+int space_dims(const PoseSpaceSpec& spec) {
+  return spec.space == Space::kCmu43 ? 43 : 3 * static_cast<int>(spec.joints.size());
+}
+
+Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton) {
+  PoseSpaceSpec spec;
+  spec.space = space;
+  if (space == Space::kCmu43) {
+    for (const Cmu43Joint& joint : kCmu43) spec.joints.emplace_back(joint.asf);
+  } else {
+    for (int j = 0; j < static_cast<int>(skeleton.joints.size()); ++j) {
+      const Joint& joint = skeleton.joints[j];
+      if (!below(skeleton, j, skeleton.root_joint) || !turns(skeleton, j)) continue;
+      if (space == Space::kNative) spec.joints.push_back(joint.name);
+      if (space == Space::kHumanoid && joint.bone) spec.joints.emplace_back(bone_name(*joint.bone));
+    }
+    spec.mean.assign(spec.joints.size(), Quaterniond::Identity());
+  }
+  auto bound = PoseSpace::bind(spec, skeleton);
+  if (!bound) return std::unexpected(bound.error());
+  return spec;
+}
+
+Result<PoseSpace> PoseSpace::bind(const PoseSpaceSpec& spec, const Skeleton& skeleton) {
+  if (auto checked = check_spec(spec); !checked) return std::unexpected(checked.error());
+  PoseSpace space;
+  space.skeleton_ = std::make_shared<const Skeleton>(skeleton);
+  space.root_ = spec.root;
+  space.euler_ = spec.space == Space::kCmu43;
+  std::vector<std::string> missing;
+  std::vector<int> joints;
+  for (std::size_t i = 0; i < spec.joints.size(); ++i) {
+    joints.push_back(find_joint(spec, i, skeleton));
+    if (joints.back() < 0) missing.push_back(spec.joints[i]);
+  }
+  if (!missing.empty()) return missing_joints(spec, missing, skeleton);
+
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    Item item;
+    item.joint = joints[i];
+    item.first_dim = static_cast<int>(space.joint_of_dim_.size());
+    // The root is seen from the world, a humanoid bone from the next bone of the space above it, so
+    // that a rig with a joint more in between still shows the same bone rotations.
+    const bool is_root = static_cast<int>(i) == spec.root;
+    item.chain_begin = static_cast<int>(space.chain_.size());
+    int parent = skeleton.joints[item.joint].parent;
+    if (is_root || spec.space == Space::kHumanoid) {
+      while (parent >= 0 && (is_root || std::ranges::find(joints, parent) == joints.end())) {
+        space.chain_.insert(space.chain_.begin() + item.chain_begin, parent);
+        parent = skeleton.joints[parent].parent;
+      }
+    }
+    item.chain_end = static_cast<int>(space.chain_.size());
+    if (spec.space == Space::kHumanoid) {
+      if (parent >= 0) item.before = skeleton.joints[parent].T_world_joint;
+      item.after = skeleton.joints[item.joint].T_world_joint.conjugate();
+    }
+    if (space.euler_) {
+      item.axes = kCmu43[i].axes;
+      item.dims = std::popcount(static_cast<unsigned>(item.axes));
+      item.after = cmu43_axis_frame(kCmu43[i]);
+      item.before = item.after.conjugate();
+    } else {
+      item.mean = spec.mean[i];
+    }
+    for (int c = 0, angle = 0; c < static_cast<int>(skeleton.channels.size()); ++c) {
+      if (skeleton.channels[c].translation) continue;
+      if (skeleton.channels[c].joint == item.joint && item.angles++ == 0) item.first_angle = angle;
+      ++angle;
+    }
+    space.joint_of_dim_.insert(space.joint_of_dim_.end(), item.dims, static_cast<int>(i));
+    space.items_.push_back(item);
+  }
+  return space;
+}
+
+int PoseSpace::dims() const noexcept { return static_cast<int>(joint_of_dim_.size()); }
+int PoseSpace::joint_of_dim(int d) const noexcept { return joint_of_dim_[d]; }
+
+// RT-safe
+bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {
+  bool all = item.joint < frame.joint_count && frame.valid[item.joint];
+  for (int i = item.chain_begin; i < item.chain_end; ++i) all = all && frame.valid[chain_[i]];
+  return all;
+}
+
+// All that stands before L in V, without the mean. RT-safe
+Quaterniond PoseSpace::base(const Item& item, const Frame& frame,
+                            double heading_rad) const noexcept {
+  Quaterniond rotation = item.before;
+  if (&item == &items_[root_]) rotation = axis_rotation(Axis::kY, -heading_rad) * rotation;
+  for (int i = item.chain_begin; i < item.chain_end; ++i) {
+    rotation = rotation * to_eigen_double(frame.rotation_xyzw[chain_[i]]);
+  }
+  return rotation;
+}
+
+// RT-safe
+double PoseSpace::heading_rad(const Frame& frame) const noexcept {
+  const Item& root = items_[root_];
+  const Quaterniond now =
+      base(root, frame, 0.0) * to_eigen_double(frame.rotation_xyzw[root.joint]) * root.after;
+  // Ry(psi) mean is nearest to `now` where the dot product of the two quaternions is largest.
+  return twist_angle_rad(Quaterniond(now * root.mean.conjugate()), unit(Axis::kY));
+}
+
+// RT-safe
+void PoseSpace::to_vector(const Frame& frame, double heading_rad, std::span<float> q,
+                          std::span<std::uint8_t> available) const noexcept {
+  for (const Item& item : items_) {
+    const bool here = measured(item, frame);
+    Vector3d value = Vector3d::Zero();
+    if (here) {
+      const Quaterniond rotation = item.mean.conjugate() * base(item, frame, heading_rad) *
+                                   to_eigen_double(frame.rotation_xyzw[item.joint]) * item.after;
+      value = euler_ ? euler_xyz_rad(rotation) : rotation_log(rotation);
+    }
+    int d = item.first_dim;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (((item.axes >> axis) & 1) == 0) continue;
+      q[d] = static_cast<float>(value[axis]);
+      available[d] = here ? 1 : 0;
+      ++d;
+    }
+  }
+}
+
+// V after the change; `rotation` is V as the frame has it. RT-safe
+Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rotation, const float* q,
+                               const float* delta) const noexcept {
+  // A joint may turn about an axis that the space does not list (cmu43): that angle stays.
+  Vector3d now = euler_ ? euler_xyz_rad(rotation) : Vector3d::Zero();
+  Vector3d change = Vector3d::Zero();
+  for (int axis = 0, d = 0; axis < 3; ++axis) {
+    if (((item.axes >> axis) & 1) == 0) continue;
+    now[axis] = q[d];
+    change[axis] = delta[d];
+    ++d;
+  }
+  if (!euler_) return rotation_exp(Vector3d(now + change));
+  if (std::abs(now.y()) + std::abs(change.y()) < kMaxMiddleAngle_rad) {
+    return rotation_from_euler_xyz(now + change);
+  }
+  return rotation_exp(euler_change_as_vector(now, change)) * rotation_from_euler_xyz(now);
+}
+
+// RT-safe
+void PoseSpace::set_rotation(const Item& item, const Quaterniond& local,
+                             Frame& frame) const noexcept {
+  frame.rotation_xyzw[item.joint] = from_eigen(local.normalized());
+  if (frame.angle_count == 0) return;
+  std::array<double, 3> near_rad{};
+  for (int i = 0; i < item.angles; ++i) near_rad[i] = frame.angle_rad[item.first_angle + i];
+  const auto angles = channels_from_rotation(*skeleton_, item.joint, local, near_rad);
+  for (int i = 0; i < item.angles; ++i) {
+    frame.angle_rad[item.first_angle + i] = static_cast<float>(angles[i]);
+  }
+}
+
+// RT-safe
+void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
+                    std::span<const float> delta) const noexcept {
+  for (const Item& item : items_) {
+    const auto change = delta.subspan(item.first_dim, item.dims);
+    const bool moves = std::ranges::any_of(change, [](float d) { return d != 0.0F; });
+    if (!moves || !measured(item, frame)) continue;
+    const Quaterniond to_base = item.mean.conjugate() * base(item, frame, heading_rad);
+    const Quaterniond now = to_base * to_eigen_double(frame.rotation_xyzw[item.joint]) * item.after;
+    const Quaterniond local = to_base.conjugate() *
+                              changed(item, now, &q[item.first_dim], change.data()) *
+                              item.after.conjugate();
+    set_rotation(item, local, frame);
+  }
+}
+
+}  // namespace posed::motion

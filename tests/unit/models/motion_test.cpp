@@ -1,0 +1,136 @@
+// Resampling, heading, leg signal: what learning sees of a clip.
+#include "models/motion/motion.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <numbers>
+
+#include "models/motion/low_pass.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/harmonics.hpp"
+#include "proto/frame/rotation.hpp"
+
+using namespace posed;
+using namespace posed::motion;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+Motion walker(double rate_hz, double noise_deg = 0.0) {
+  auto clip = make_walker({.seconds = 5.0, .rate_hz = rate_hz, .noise_deg = noise_deg});
+  REQUIRE(clip.has_value());
+  auto motion = motion_of(*clip);
+  REQUIRE(motion.has_value());
+  return std::move(*motion);
+}
+
+// The whole walk turned about +Y.
+Motion turned(Motion motion, double heading_rad) {
+  const Eigen::Quaterniond turn = axis_rotation(Axis::kY, heading_rad);
+  for (Frame& frame : motion.frames) {
+    frame.rotation_xyzw[0] = from_eigen(turn * to_eigen_double(frame.rotation_xyzw[0]));
+    const auto& p = frame.root_position_m;
+    const Eigen::Vector3d at = turn * Eigen::Vector3d(p[0], p[1], p[2]);
+    for (int i = 0; i < 3; ++i) frame.root_position_m[i] = static_cast<float>(at[i]);
+  }
+  return motion;
+}
+
+double worst_angle_rad(const Motion& a, const Motion& b) {
+  double worst = 0.0;
+  REQUIRE(a.size() == b.size());
+  for (int t = 0; t < a.size(); ++t) {
+    for (int j = 0; j < a.frames[t].joint_count; ++j) {
+      worst = std::max(worst, angle_between_rad(to_eigen_double(a.frames[t].rotation_xyzw[j]),
+                                                to_eigen_double(b.frames[t].rotation_xyzw[j])));
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("The zero-phase low-pass agrees with scipy's filtfilt", "[motion]") {
+  const VectorXd t = VectorXd::LinSpaced(40, 0.0, 39.0);
+  const VectorXd x =
+      (0.3 * t.array()).sin() + 0.3 * (2.1 * t.array()).cos() + 0.01 * t.array().square();
+  const VectorXd y = low_pass_zero_phase(x, 10.0 / 60.0);
+  const std::array<std::pair<int, double>, 6> want{{{0, 0.287889228819409}, {1, 0.506666717469726}, {7, 1.3025526040923}, {20, 3.71531653966889}, {38, 13.7804199865137}, {39, 14.7046470531559}}};
+  for (const auto& [frame, value] : want) CHECK(y[frame] == Approx(value).epsilon(1e-10));
+  CHECK(low_pass_zero_phase(x.head(1), 0.3) == x.head(1));
+  CHECK(low_pass_zero_phase(VectorXd::Constant(5, 2.0), 0.3).isConstant(2.0, 1e-12));
+}
+
+TEST_CASE("Resampling keeps the walk: same rate untouched, 120 to 30 and 30 to 120 close",
+          "[motion]") {
+  const Motion at_30 = walker(30.0);
+  const Motion at_120 = walker(120.0);
+  CHECK(worst_angle_rad(resample(at_30, 30.0), at_30) == 0.0);
+  const Motion down = resample(at_120, 30.0);
+  CHECK(down.size() == at_30.size());
+  CHECK(worst_angle_rad(down, at_30) < 0.01);
+  const Motion up = resample(at_30, 120.0);
+  CHECK(up.rate_hz == 120.0);
+  Motion cut = at_120;
+  cut.frames.resize(up.frames.size());
+  CHECK(worst_angle_rad(up, cut) < 0.02);
+  CHECK(resample(walker(100.0), 30.0).size() == 150);
+}
+
+TEST_CASE("The heading is the chord's, or the pelvis's where there is no chord", "[motion]") {
+  for (const double heading_rad : {0.0, 1.2, -2.9}) {
+    Motion walk = turned(walker(30.0), heading_rad);
+    CHECK(std::remainder(walk_heading_rad(walk) - heading_rad, 2 * kPi) ==
+          Approx(0.0).margin(0.02));
+    for (Frame& frame : walk.frames) frame.root_position_m = {0.0F, 0.9F, 0.0F};
+    CHECK(std::remainder(walk_heading_rad(walk) - heading_rad, 2 * kPi) ==
+          Approx(0.0).margin(0.1));
+  }
+  const auto moved = root_positions_m(turned(walker(30.0), 1.0), 1.0);
+  CHECK(std::abs(moved(149, 0) - moved(0, 0)) < 0.1);
+  CHECK(moved(149, 2) - moved(0, 2) > 3.0);
+}
+
+TEST_CASE("The leg signal has the stride's period and the right leg forward at its peak",
+          "[motion]") {
+  const Motion walk = walker(30.0);
+  const auto signal = leg_signal(walk);
+  REQUIRE(signal.has_value());
+  CHECK(signal->maxCoeff() > 0.6);  // radians: thighs swing by 27 degrees each way
+  const auto stride = style::find_stride(*signal, 30.0);
+  CHECK(2 * kPi / stride.dtheta > 0.85 * 30.0 * 0.95);
+  CHECK(2 * kPi / stride.dtheta < 30.0 / 0.85 * 1.05);
+  int peak = 0;
+  signal->maxCoeff(&peak);
+  // Where the right foot is ahead of the left one by forward kinematics of the thigh alone.
+  const auto thigh = [&](const char* name) {
+    const int j = walk.skeleton->joint_index(name);
+    const auto& frame = walk.frames[peak];
+    return (to_eigen_double(frame.rotation_xyzw[j]) * -Eigen::Vector3d::UnitY()).z();
+  };
+  CHECK(thigh("RightUpperLeg") > thigh("LeftUpperLeg") + 0.4);
+}
+
+TEST_CASE("A derivative is exact on a parabola, and a single frame has none", "[motion]") {
+  const VectorXd t = VectorXd::LinSpaced(10, 0.0, 9.0) / 30.0;
+  const VectorXd rate = time_derivative(t.array().square().matrix(), 30.0);
+  CHECK((rate - 2.0 * t).segment(1, 8).norm() < 1e-12);
+  CHECK(time_derivative(t.head(1), 30.0)(0, 0) == 0.0);
+}
+
+TEST_CASE("A clip that cannot be learnt from is refused with its frame", "[motion]") {
+  auto clip = make_walker({.seconds = 1.0});
+  REQUIRE(clip.has_value());
+  auto broken = *clip;
+  broken.channels(4, 7) = std::nan("");
+  const auto refused = motion_of(broken);
+  REQUIRE_FALSE(refused.has_value());
+  CHECK(refused.error().message.find("frame 5") != std::string::npos);
+  broken.channels.resize(0, clip->channels.cols());
+  CHECK_FALSE(motion_of(broken).has_value());
+  clip->frame_rate_hz = 0.0;
+  CHECK_FALSE(motion_of(*clip).has_value());
+}
