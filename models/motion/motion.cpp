@@ -20,18 +20,6 @@ using Eigen::VectorXd;
 constexpr double kShortestChord_m = 0.5;
 constexpr double kSameRate = 1e-3;  // relative
 
-bool finite(const Frame& frame) {
-  for (const float v : frame.root_position_m) {
-    if (!std::isfinite(v)) return false;
-  }
-  for (int j = 0; j < frame.joint_count; ++j) {
-    for (const float v : frame.rotation_xyzw[j]) {
-      if (!std::isfinite(v)) return false;
-    }
-  }
-  return true;
-}
-
 Quaterniond rotation(const Frame& frame, int joint) {
   return to_eigen_double(frame.rotation_xyzw[joint]);
 }
@@ -87,13 +75,13 @@ Result<Motion> motion_of(const clip::Clip& clip) {
   Motion motion{clip.skeleton, clip.frame_rate_hz, {}};
   motion.frames.reserve(clip.frames());
   for (int t = 0; t < clip.frames(); ++t) {
-    motion.frames.push_back(clip.frame(t));
-    if (!finite(motion.frames.back())) {
+    if (!clip.channels.row(t).allFinite()) {
       return fail("frame " + std::to_string(t + 1) +
                       " holds a value that is not a number; mend or "
                       "cut the clip",
                   clip.path);
     }
+    motion.frames.push_back(clip.frame(t));
   }
   return motion;
 }

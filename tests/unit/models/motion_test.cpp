@@ -58,7 +58,12 @@ TEST_CASE("The zero-phase low-pass agrees with scipy's filtfilt", "[motion]") {
   const VectorXd x =
       (0.3 * t.array()).sin() + 0.3 * (2.1 * t.array()).cos() + 0.01 * t.array().square();
   const VectorXd y = low_pass_zero_phase(x, 10.0 / 60.0);
-  const std::array<std::pair<int, double>, 6> want{{{0, 0.287889228819409}, {1, 0.506666717469726}, {7, 1.3025526040923}, {20, 3.71531653966889}, {38, 13.7804199865137}, {39, 14.7046470531559}}};
+  const std::array<std::pair<int, double>, 6> want{{{0, 0.287889228819409},
+                                                    {1, 0.506666717469726},
+                                                    {7, 1.3025526040923},
+                                                    {20, 3.71531653966889},
+                                                    {38, 13.7804199865137},
+                                                    {39, 14.7046470531559}}};
   for (const auto& [frame, value] : want) CHECK(y[frame] == Approx(value).epsilon(1e-10));
   CHECK(low_pass_zero_phase(x.head(1), 0.3) == x.head(1));
   CHECK(low_pass_zero_phase(VectorXd::Constant(5, 2.0), 0.3).isConstant(2.0, 1e-12));
@@ -86,32 +91,11 @@ TEST_CASE("The heading is the chord's, or the pelvis's where there is no chord",
     CHECK(std::remainder(walk_heading_rad(walk) - heading_rad, 2 * kPi) ==
           Approx(0.0).margin(0.02));
     for (Frame& frame : walk.frames) frame.root_position_m = {0.0F, 0.9F, 0.0F};
-    CHECK(std::remainder(walk_heading_rad(walk) - heading_rad, 2 * kPi) ==
-          Approx(0.0).margin(0.1));
+    CHECK(std::remainder(walk_heading_rad(walk) - heading_rad, 2 * kPi) == Approx(0.0).margin(0.1));
   }
   const auto moved = root_positions_m(turned(walker(30.0), 1.0), 1.0);
   CHECK(std::abs(moved(149, 0) - moved(0, 0)) < 0.1);
   CHECK(moved(149, 2) - moved(0, 2) > 3.0);
-}
-
-TEST_CASE("The leg signal has the stride's period and the right leg forward at its peak",
-          "[motion]") {
-  const Motion walk = walker(30.0);
-  const auto signal = leg_signal(walk);
-  REQUIRE(signal.has_value());
-  CHECK(signal->maxCoeff() > 0.6);  // radians: thighs swing by 27 degrees each way
-  const auto stride = style::find_stride(*signal, 30.0);
-  CHECK(2 * kPi / stride.dtheta > 0.85 * 30.0 * 0.95);
-  CHECK(2 * kPi / stride.dtheta < 30.0 / 0.85 * 1.05);
-  int peak = 0;
-  signal->maxCoeff(&peak);
-  // Where the right foot is ahead of the left one by forward kinematics of the thigh alone.
-  const auto thigh = [&](const char* name) {
-    const int j = walk.skeleton->joint_index(name);
-    const auto& frame = walk.frames[peak];
-    return (to_eigen_double(frame.rotation_xyzw[j]) * -Eigen::Vector3d::UnitY()).z();
-  };
-  CHECK(thigh("RightUpperLeg") > thigh("LeftUpperLeg") + 0.4);
 }
 
 TEST_CASE("A derivative is exact on a parabola, and a single frame has none", "[motion]") {
