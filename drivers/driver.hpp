@@ -37,8 +37,17 @@ class Transport {
   Transport& operator=(const Transport&) = delete;
   virtual ~Transport() = default;
 
-  // Readable when a chunk may be due; the daemon polls it. Valid from open() to destruction.
+  // Readable when a chunk may be due; the daemon polls it. Valid from open() to destruction. -1 for
+  // a source that goes by time alone.
   [[nodiscard]] virtual int poll_fd() const noexcept = 0;
+
+  // Host time of the next chunk of a source that goes by time (files, replay); kNoTime_ns for one
+  // that its descriptor announces. RT-safe.
+  [[nodiscard]] virtual std::int64_t next_due_ns() const noexcept { return kNoTime_ns; }
+
+  // Whether the source would rather wait than lose frames (a file played as fast as possible): it
+  // is read only when the pipeline has caught up.
+  [[nodiscard]] virtual bool patient() const noexcept { return false; }
 
   // Starts the source (a file's clock begins to run). Cold.
   [[nodiscard]] virtual Result<> start(std::int64_t now_ns) = 0;

@@ -1,0 +1,39 @@
+// What the hot threads count about one stream, for `stats`. Relaxed atomics: each is written by one
+// thread and read by any.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "proto/frame/sink.hpp"
+
+namespace posed::pipeline {
+
+enum class StreamState : std::uint8_t { kWaiting, kLive, kStale, kEnded };
+
+struct alignas(64) ReaderCounters {
+  std::atomic<std::uint64_t> newest{0};   // sequence of the last frame that went into the ring
+  std::atomic<std::uint64_t> dropped{0};  // frames and samples that found it full
+  std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
+};
+
+struct alignas(64) PipelineCounters {
+  std::atomic<std::uint64_t> consumed{0};  // sequence of the last frame taken from the ring
+  std::atomic<std::uint64_t> shed{0};      // frames skipped because newer ones waited
+  std::atomic<std::uint64_t> dropped{0};   // items that found the publisher's ring full
+  std::atomic<StreamState> state{StreamState::kWaiting};
+  std::atomic<float> alpha{0.0F};
+};
+
+struct StreamCounters {
+  ReaderCounters reader;
+  PipelineCounters pipeline;
+};
+
+// Adds one; the counter has only this writer. RT-safe.
+inline void count(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
+  counter.store(counter.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
+}
+
+}  // namespace posed::pipeline

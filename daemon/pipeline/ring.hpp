@@ -1,0 +1,49 @@
+// Ring: a bounded queue between one producer and one consumer thread, sized at start. Nothing
+// blocks; a full ring refuses. The consumer looks at an element in place.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <boost/lockfree/spsc_queue.hpp>
+
+namespace posed::pipeline {
+
+// How deep a ring must be: half a second of everything that may come, and room for bursts.
+inline constexpr double kRingDepth_s = 0.5;
+[[nodiscard]] inline std::size_t ring_slots(double items_per_s) {
+  return static_cast<std::size_t>(std::ceil(std::max(items_per_s * kRingDepth_s, 64.0)));
+}
+
+template <typename T>
+class Ring {
+ public:
+  // Touches all of its memory, so that no page is missing when it matters.
+  explicit Ring(std::size_t slots) : queue_(slots) {
+    const T blank{};
+    while (queue_.push(blank)) {
+    }
+    queue_.reset();
+  }
+
+  // Producer. False when full. RT-safe.
+  [[nodiscard]] bool push(const T& item) noexcept { return queue_.push(item); }
+  // Producer. RT-safe.
+  [[nodiscard]] bool has_room() const noexcept { return queue_.write_available() > 0; }
+
+  // Consumer: hands the oldest element to `use(T&)` in place, then frees its slot. False when
+  // empty. RT-safe if `use` is.
+  template <typename Use>
+  [[nodiscard]] bool consume(Use&& use) noexcept {
+    return queue_.consume_one(std::forward<Use>(use)) > 0;
+  }
+  // Consumer. RT-safe.
+  [[nodiscard]] bool empty() const noexcept { return queue_.read_available() == 0; }
+
+ private:
+  boost::lockfree::spsc_queue<T> queue_;
+};
+
+}  // namespace posed::pipeline

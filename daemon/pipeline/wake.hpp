@@ -1,0 +1,67 @@
+// How one thread waits: a Wake (eventfd) that other threads ring, and a Poller (epoll) that waits
+// for it and for devices until a deadline. One Wake per consuming thread.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::pipeline {
+
+class Wake {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Wake>> open();
+  ~Wake();
+  Wake(const Wake&) = delete;
+  Wake& operator=(const Wake&) = delete;
+
+  // Any thread, after it has put something where the consumer looks. Writes to the eventfd only
+  // when the consumer sleeps. RT-safe but for that one write.
+  void ring() noexcept;
+
+  // The consumer, before its last look at its rings: from here on ring() writes.
+  void going_to_sleep() noexcept { asleep_.exchange(true, std::memory_order_acq_rel); }
+  // The consumer, back from its wait.
+  void awake() noexcept { asleep_.store(false, std::memory_order_relaxed); }
+
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+
+ private:
+  explicit Wake(int fd) noexcept : fd_(fd) {}
+  int fd_;
+  std::atomic<bool> asleep_{false};
+};
+
+inline constexpr std::int64_t kForever_ns = std::numeric_limits<std::int64_t>::max();
+
+class Poller {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Poller>> open();
+  ~Poller();
+  Poller(const Poller&) = delete;
+  Poller& operator=(const Poller&) = delete;
+
+  // A Wake: edge-triggered, so that it never needs to be read.
+  [[nodiscard]] Result<> add(const Wake& wake);
+  // A device's descriptor: level-triggered; `key` comes back from wait().
+  [[nodiscard]] Result<> add(int fd, std::uint32_t key);
+  // A device that has ended: its descriptor would stay readable for ever.
+  void remove(int fd) noexcept;
+
+  // Sleeps until something is ready or for `timeout_ns`; returns the keys of the ready devices
+  // (the Wake has none), valid until the next wait. One system call, RT-safe but for it.
+  [[nodiscard]] std::span<const std::uint32_t> wait(std::int64_t timeout_ns) noexcept;
+
+ private:
+  explicit Poller(int fd) noexcept : fd_(fd) {}
+  static constexpr int kMaxReady = 64;
+  int fd_;
+  std::array<std::uint32_t, kMaxReady> ready_{};
+};
+
+}  // namespace posed::pipeline

@@ -1,0 +1,67 @@
+// Worker: the pipeline thread. It takes what the reader decoded, runs each stream's engine, applies
+// commands at frame boundaries, ticks silent streams, sheds what came too late, and hands the rest
+// to the publisher.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/ring.hpp"
+#include "daemon/pipeline/stream_engine.hpp"
+#include "daemon/pipeline/wake.hpp"
+#include "daemon/record/tape.hpp"
+
+namespace posed::pipeline {
+
+// The rings and wakes around the worker; all of them outlive it.
+struct WorkerPorts {
+  Ring<Item>* in = nullptr;
+  Ring<Item>* out = nullptr;
+  Ring<Command>* commands = nullptr;
+  Ring<Ack>* acks = nullptr;
+  Wake* wake = nullptr;       // its own
+  Wake* publisher = nullptr;  // rung when there is something in `out`
+  Wake* control = nullptr;    // rung when there is something in `acks`; may be null
+  record::Tape* tape = nullptr;
+  Clock clock = nullptr;
+};
+
+class Worker {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Worker>> open(const WorkerPorts& ports);
+  ~Worker();
+
+  // Streams are numbered in the order of adding. `rate_hz` is nominal, 0 when unknown. Cold, before
+  // run().
+  void add(const EngineOptions& options, double rate_hz, StreamCounters& counters);
+
+  // Runs until stop(), then once more over what is waiting. The calling thread becomes the
+  // pipeline thread.
+  void run() noexcept;
+  void stop() noexcept;  // any thread
+
+  // After run() has returned.
+  [[nodiscard]] const StreamEngine& engine(std::uint32_t stream) const;
+
+ private:
+  struct Lane;
+  Worker(const WorkerPorts& ports, std::unique_ptr<Poller> poller);
+  void drain() noexcept;
+  void take(const Item& item) noexcept;
+  void tick(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool idle() const noexcept;
+
+  WorkerPorts ports_;
+  std::unique_ptr<Poller> poller_;
+  std::vector<std::unique_ptr<Lane>> lanes_;
+  std::atomic<bool> stop_{false};
+};
+
+// How many frames of one stream may wait before the oldest are skipped: 50 ms of them, at least 3.
+[[nodiscard]] std::uint64_t shed_depth(double rate_hz) noexcept;
+
+}  // namespace posed::pipeline
