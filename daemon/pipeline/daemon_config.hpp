@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/control/security.hpp"
 #include "drivers/driver.hpp"
 #include "models/style/style_filter.hpp"
 
@@ -27,21 +28,17 @@ struct StreamConfig {
   std::optional<StyleConfig> style;
 };
 
-// Who may connect from outside; empty when CURVE is off.
-struct AllowedClient {
-  std::string name;
-  std::string public_key;  // Z85, 40 characters
-  bool may_control = false;
-};
+// Who may connect; CURVE is off when there is no server key.
 struct SecurityConfig {
   std::filesystem::path server_key;  // NAME.key; empty: no CURVE
-  std::vector<AllowedClient> clients;
-  bool insecure = false;  // bind beyond loopback without CURVE
+  std::vector<control::AllowedClient> clients;
 };
 
 struct DaemonConfig {
   std::string publish_endpoint = "tcp://127.0.0.1:5570";
+  bool publish_insecure = false;  // bind beyond loopback without CURVE
   std::string control_endpoint = "tcp://127.0.0.1:5571";
+  bool control_insecure = false;
   bool realtime = true;  // ask for SCHED_FIFO and mlockall; refusal is a warning
   SecurityConfig security;
   std::vector<StreamConfig> streams;

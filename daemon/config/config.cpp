@@ -1,0 +1,291 @@
+#include "daemon/config/config.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/config/toml_reader.hpp"
+#include "daemon/control/keys.hpp"
+
+namespace posed::config {
+namespace {
+
+using pipeline::DaemonConfig;
+using pipeline::SecurityConfig;
+using pipeline::StreamConfig;
+
+constexpr Range kAlpha{-2.0, 2.0};
+constexpr Range kAlphaSlew{0.01, 1000.0};
+constexpr Range kGateFallback{0.0, 1.0};
+constexpr Range kStaleAfter{0.01, 3600.0};
+constexpr Range kAnyNumber{std::numeric_limits<double>::lowest(),
+                           std::numeric_limits<double>::max()};
+constexpr std::string_view kRawSuffix = "-raw";
+constexpr std::uintmax_t kLargestConfig = 1024 * 1024;  // bytes
+
+// Everything that reads the file's tables needs to know where the file is.
+class Reader {
+ public:
+  Reader(std::filesystem::path folder, Drivers drivers, Findings& findings)
+      : folder_(std::move(folder)), drivers_(drivers), findings_(findings) {}
+
+  void read(const toml::table& root, DaemonConfig& config);
+
+ private:
+  void read_endpoint(TableReader& root, const char* table, std::string& endpoint, bool& insecure,
+                     bool secured);
+  void read_security(TableReader table, SecurityConfig& security);
+  void read_client(TableReader table, std::vector<control::AllowedClient>& clients);
+  void read_stream(TableReader table, StreamConfig& stream);
+  void read_options(TableReader& stream_table, const drivers::Driver& driver,
+                    drivers::Options& options);
+  void read_option(TableReader& table, const drivers::OptionSpec& spec,
+                   drivers::OptionValue& value);
+  void read_style(TableReader table, pipeline::StyleConfig& style);
+  void check_names(const std::vector<StreamConfig>& streams, const std::vector<int>& lines);
+
+  [[nodiscard]] std::filesystem::path resolve(const std::string& path) const {
+    return path.empty() ? std::filesystem::path{} : folder_ / path;
+  }
+
+  std::filesystem::path folder_;
+  Drivers drivers_;
+  Findings& findings_;
+};
+
+void Reader::read(const toml::table& root_table, DaemonConfig& config) {
+  TableReader root(root_table, "", findings_);
+  root.read("realtime", config.realtime);
+  if (auto table = root.table("security")) read_security(*table, config.security);
+  const bool secured = !config.security.server_key.empty();
+  read_endpoint(root, "publish", config.publish_endpoint, config.publish_insecure, secured);
+  read_endpoint(root, "control", config.control_endpoint, config.control_insecure, secured);
+  if (config.publish_endpoint == config.control_endpoint &&
+      !config.publish_endpoint.ends_with(":*")) {
+    root.blame("control", "publish and control cannot share the endpoint " +
+                              config.control_endpoint + "; give control another port");
+  }
+  std::vector<int> lines;
+  for (TableReader& table : root.tables("stream")) {
+    lines.push_back(table.line());
+    read_stream(table, config.streams.emplace_back());
+  }
+  if (!root_table.contains("stream")) {
+    findings_.blame(0, "there is no stream; add a [[stream]] table with a name and a driver");
+  }
+  check_names(config.streams, lines);
+  root.finish();
+}
+
+void Reader::read_endpoint(TableReader& root, const char* name, std::string& endpoint,
+                           bool& insecure, bool secured) {
+  auto table = root.table(name);
+  if (!table) return;
+  table->read("endpoint", endpoint);
+  table->read("insecure", insecure);
+  table->finish();
+  if (!endpoint.starts_with("tcp://") && !endpoint.starts_with("ipc://")) {
+    table->blame("endpoint", fmt::format("'{}' is no endpoint; it reads like tcp://127.0.0.1:5570,"
+                                         " or ipc:///run/posed.sock",
+                                         endpoint));
+  } else if (!control::is_loopback(endpoint) && !secured && !insecure) {
+    table->blame("endpoint",
+                 fmt::format("{} can be reached from other machines by anyone; add a server_key in"
+                             " [security], or say insecure = true in [{}]",
+                             endpoint, name));
+  }
+}
+
+void Reader::read_security(TableReader table, SecurityConfig& security) {
+  std::string key_file;
+  table.read("server_key", key_file);
+  security.server_key = resolve(key_file);
+  if (!key_file.empty()) {
+    if (auto key = control::read_secret_key(security.server_key); !key) {
+      table.blame("server_key", key.error().text());
+    }
+  }
+  for (TableReader& client : table.tables("client")) read_client(client, security.clients);
+  if (key_file.empty() && !security.clients.empty()) {
+    table.blame("client",
+                "clients are listed but there is no server_key, so anyone could connect;"
+                " make one with `posed keygen server` and name server.key here");
+  }
+  table.finish();
+}
+
+void Reader::read_client(TableReader table, std::vector<control::AllowedClient>& clients) {
+  control::AllowedClient client;
+  std::string key;
+  std::vector<std::string> rights{"subscribe"};
+  table.require("name", client.name);
+  table.require("public_key", key);
+  table.read("rights", rights);
+  table.finish();
+  client.may_subscribe = std::ranges::find(rights, "subscribe") != rights.end();
+  client.may_control = std::ranges::find(rights, "control") != rights.end();
+  for (const std::string& right : rights) {
+    if (right == "subscribe" || right == "control") continue;
+    table.blame("rights", "there are two rights, \"subscribe\" and \"control\"");
+  }
+  if (control::is_key(key)) {
+    client.public_z85 = key;
+  } else if (!key.empty()) {
+    auto read = control::read_public_key(resolve(key));
+    if (read) client.public_z85 = *read;
+    if (!read) table.blame("public_key", read.error().text());
+  }
+  for (const control::AllowedClient& other : clients) {
+    if (other.name == client.name) {
+      table.blame("name", fmt::format("two clients are named '{}'", client.name));
+    } else if (other.public_z85 == client.public_z85 && !client.public_z85.empty()) {
+      table.blame("public_key",
+                  fmt::format("'{}' and '{}' have the same key; make each its own with `posed"
+                              " keygen`",
+                              other.name, client.name));
+    }
+  }
+  clients.push_back(std::move(client));
+}
+
+void Reader::read_stream(TableReader table, StreamConfig& stream) {
+  table.require("name", stream.name);
+  table.require("driver", stream.driver);
+  table.read("publish_raw", stream.publish_raw);
+  table.read("stale_after_s", stream.stale_after_s, kStaleAfter);
+  if (auto style = table.table("style")) read_style(*style, stream.style.emplace());
+  if (!stream.name.empty() && !is_stream_name(stream.name)) {
+    table.blame("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
+  }
+  const auto driver = std::ranges::find(drivers_, stream.driver, &drivers::Driver::name);
+  if (driver != drivers_.end()) {
+    read_options(table, *driver, stream.options);
+  } else if (!stream.driver.empty()) {
+    std::set<std::string> names;
+    for (const drivers::Driver& known : drivers_) names.emplace(known.name);
+    table.blame("driver", fmt::format("there is no driver of this name; the nearest is '{}'"
+                                      " (`posed devices` lists them)",
+                                      nearest(stream.driver, names)));
+    for (const std::string& name : names) (void)table.table(name);  // the one mistake is told
+  }
+  table.finish();
+}
+
+void Reader::read_options(TableReader& stream_table, const drivers::Driver& driver,
+                          drivers::Options& options) {
+  const std::string name(driver.name);
+  auto table = stream_table.table(name);
+  for (const drivers::OptionSpec& spec : driver.options) {
+    const std::string key(spec.name);
+    drivers::OptionValue value = spec.default_value;
+    if (table) read_option(*table, spec, value);
+    if (spec.required && !(table && table->has(key))) {
+      findings_.blame(table ? table->line() : stream_table.line(),
+                      fmt::format("stream.{}.{} is missing: {}", name, key, spec.help));
+    }
+    options[key] = std::move(value);
+  }
+  if (table) table->finish();
+}
+
+void Reader::read_option(TableReader& table, const drivers::OptionSpec& spec,
+                         drivers::OptionValue& value) {
+  const std::string key(spec.name);
+  if (auto* flag = std::get_if<bool>(&value)) table.read(key.c_str(), *flag);
+  if (auto* integer = std::get_if<std::int64_t>(&value)) table.read(key.c_str(), *integer);
+  if (auto* number = std::get_if<double>(&value)) table.read(key.c_str(), *number, kAnyNumber);
+  if (auto* text = std::get_if<std::string>(&value)) {
+    table.read(key.c_str(), *text);
+    if (spec.is_path) *text = resolve(*text).string();
+  }
+}
+
+void Reader::read_style(TableReader table, pipeline::StyleConfig& style) {
+  std::string model;
+  table.require("model", model);
+  style.model = resolve(model);
+  table.read("alpha", style.filter.alpha, kAlpha);
+  table.read("alpha_slew_per_s", style.filter.alpha_slew_per_s, kAlphaSlew);
+  table.read("gate", style.filter.gate);
+  table.read("gate_fallback", style.filter.gate_fallback, kGateFallback);
+  table.read("calibrate", style.filter.calibrate);
+  table.finish();
+}
+
+void Reader::check_names(const std::vector<StreamConfig>& streams, const std::vector<int>& lines) {
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    const std::string raw = streams[i].name + std::string(kRawSuffix);
+    if (streams[i].publish_raw && is_stream_name(streams[i].name) && !is_stream_name(raw)) {
+      findings_.blame(lines[i], fmt::format("'{}' is longer than 32 letters; shorten the name or"
+                                            " leave out publish_raw",
+                                            raw));
+    }
+    for (std::size_t j = 0; j < streams.size(); ++j) {
+      if (j < i && streams[j].name == streams[i].name && !streams[i].name.empty()) {
+        findings_.blame(lines[i], fmt::format("a second stream is named '{}' (the first stands in"
+                                              " line {}); every stream has its own name",
+                                              streams[i].name, lines[j]));
+      }
+      if (streams[i].publish_raw && streams[j].name == raw) {
+        findings_.blame(lines[j], fmt::format("'{}' is the name under which the raw input of '{}'"
+                                              " is published; choose another",
+                                              raw, streams[i].name));
+      }
+    }
+  }
+}
+
+Result<std::string> read_text(const std::filesystem::path& path) {
+  std::error_code none;
+  const auto size = std::filesystem::file_size(path, none);
+  if (none) return misuse("cannot read the config: " + none.message(), path);
+  if (size > kLargestConfig) return misuse("is larger than 1 MB: that is no config", path);
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file) return misuse("cannot read the config", path);
+  return std::move(text).str();
+}
+
+}  // namespace
+
+bool is_stream_name(std::string_view name) {
+  return !name.empty() && name.size() <= 32 &&
+         name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string_view::npos;
+}
+
+Reading read_config(const std::string& text, const std::filesystem::path& path, Drivers drivers) {
+  Reading reading;
+  Findings findings{path.string(), {}, {}};
+  reading.config.text = text;
+  try {
+    const toml::table root = toml::parse(std::string_view(text), path.string());
+    Reader(path.parent_path(), drivers, findings).read(root, reading.config);
+  } catch (const toml::parse_error& error) {
+    findings.blame(static_cast<int>(error.source().begin.line),
+                   "not TOML: " + std::string(error.description()));
+  }
+  reading.errors = std::move(findings.errors);
+  reading.known = std::move(findings.known);
+  std::ranges::stable_sort(reading.errors, {}, &Error::line);
+  return reading;
+}
+
+Reading read_config_file(const std::filesystem::path& path, Drivers drivers) {
+  auto text = read_text(path);
+  if (text) return read_config(*text, path, drivers);
+  Reading reading;
+  reading.errors.push_back(text.error());
+  return reading;
+}
+
+Result<pipeline::DaemonConfig> load_config(const std::filesystem::path& path, Drivers drivers) {
+  Reading reading = read_config_file(path, drivers);
+  if (!reading.errors.empty()) return std::unexpected(reading.errors.front());
+  return std::move(reading.config);
+}
+
+}  // namespace posed::config
