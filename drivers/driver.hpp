@@ -26,7 +26,7 @@ inline constexpr std::size_t kMaxChunk =
 // What one read gave.
 struct Chunk {
   std::span<const std::byte> bytes;  // valid until the next read; empty when nothing was due
-  bool end = false;                  // the source is finished and will never give more
+  bool end = false;  // comes alone, after the last bytes: the source will never give more
 };
 
 // Where bytes come from. One reader thread uses it after open().

@@ -1,0 +1,22 @@
+// The one list of all drivers. A new device is one line here.
+#include <algorithm>
+#include <array>
+
+#include "drivers/driver.hpp"
+#include "drivers/template/template.hpp"
+
+namespace posed::drivers {
+
+std::span<const Driver> registry() {
+  static const std::array drivers{
+      template_driver(),
+  };
+  return drivers;
+}
+
+const Driver* find_driver(std::string_view name) {
+  const auto at = std::ranges::find(registry(), name, &Driver::name);
+  return at == registry().end() ? nullptr : &*at;
+}
+
+}  // namespace posed::drivers

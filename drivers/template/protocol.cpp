@@ -1,0 +1,66 @@
+#include "drivers/template/protocol.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+
+namespace posed::drivers::bend {
+namespace {
+
+constexpr int kMinBend = -2000;
+constexpr int kMaxBend = 12000;
+constexpr int kMaxBattery = 100;
+constexpr double kUnit_rad = 0.01 * std::numbers::pi / 180.0;
+constexpr std::string_view kGreeting = "BEND1 rate=";
+
+std::byte checksum(std::span<const std::byte, kPacketBytes> bytes) noexcept {
+  unsigned sum = 0;
+  for (const std::byte byte : bytes.first(kPacketBytes - 1)) sum += std::to_integer<unsigned>(byte);
+  return static_cast<std::byte>(sum & 0xFF);
+}
+
+}  // namespace
+
+// RT-safe.
+Outcome decode_packet(std::span<const std::byte, kPacketBytes> bytes, Packet& packet) noexcept {
+  if (bytes[0] != kStart) return Outcome::kForeign;
+  if (bytes[kPacketBytes - 1] != checksum(bytes)) return Outcome::kBadChecksum;
+  const auto bend = static_cast<std::int16_t>(std::to_integer<int>(bytes[2]) |
+                                              std::to_integer<int>(bytes[3]) << 8);
+  const int battery = std::to_integer<int>(bytes[4]);
+  packet.count = std::to_integer<std::uint8_t>(bytes[1]);
+  if (bend < kMinBend || bend > kMaxBend || battery > kMaxBattery) return Outcome::kOutOfRange;
+  packet.bend_rad = static_cast<float>(bend * kUnit_rad);
+  packet.battery = static_cast<float>(battery) / kMaxBattery;
+  return Outcome::kOk;
+}
+
+std::array<std::byte, kPacketBytes> encode_packet(const Packet& packet) noexcept {
+  const auto bend = static_cast<unsigned>(std::lround(packet.bend_rad / kUnit_rad));
+  const auto battery = static_cast<unsigned>(std::lround(packet.battery * kMaxBattery));
+  std::array<std::byte, kPacketBytes> bytes{
+      kStart, std::byte{packet.count}, static_cast<std::byte>(bend & 0xFF),
+      static_cast<std::byte>(bend >> 8 & 0xFF), static_cast<std::byte>(battery & 0xFF)};
+  bytes[kPacketBytes - 1] = checksum(bytes);
+  return bytes;
+}
+
+std::string greeting(double rate_hz) {
+  std::array<char, 32> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), rate_hz).ptr;
+  return std::string(kGreeting) + std::string(digits.data(), end);
+}
+
+Result<double> parse_greeting(const std::string& text, const std::string& identity) {
+  double rate_hz = 0.0;
+  if (text.starts_with(kGreeting)) {
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data() + kGreeting.size(), end, rate_hz);
+    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= 1e6) return rate_hz;
+  }
+  return fail("does not greet as a bend sensor ('BEND1 rate=100'); is it another device?",
+              identity);
+}
+
+}  // namespace posed::drivers::bend

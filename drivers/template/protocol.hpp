@@ -1,0 +1,49 @@
+// The bytes of the template device, a bend sensor on one finger, invented for posed. No I/O here:
+// what is drawn below is all there is to know, and tests build packets with the same functions.
+//
+// On connecting it says who it is, in one line of text:  BEND1 rate=100
+// Then one packet of six bytes at each period:
+//
+//      0        1        2   3        4         5
+//   +--------+--------+--------+---------+----------+
+//   |  0xA5  | count  |  bend  | battery | checksum |
+//   +--------+--------+--------+---------+----------+
+//    count     u8, one more each packet, wraps from 255 to 0
+//    bend      i16 LE [0.01 degree], -2000 (stretched back) to 12000 (fist)
+//    battery   u8 [percent], 0 to 100
+//    checksum  u8, sum of bytes 0 to 4 modulo 256
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "proto/frame/result.hpp"
+#include "proto/frame/sink.hpp"
+
+namespace posed::drivers::bend {
+
+inline constexpr std::size_t kPacketBytes = 6;
+inline constexpr std::byte kStart{0xA5};
+
+struct Packet {
+  std::uint8_t count = 0;
+  float bend_rad = 0.0F;
+  float battery = 0.0F;  // 0 to 1
+};
+
+// kOk fills `packet`; kForeign when the first byte is no start, kBadChecksum, kOutOfRange. RT-safe.
+[[nodiscard]] Outcome decode_packet(std::span<const std::byte, kPacketBytes> bytes,
+                                    Packet& packet) noexcept;
+
+// What the device would send. Values beyond the sensor's range are the device's mistake, so they
+// may be encoded.
+[[nodiscard]] std::array<std::byte, kPacketBytes> encode_packet(const Packet& packet) noexcept;
+
+// The greeting and the rate [Hz] in it.
+[[nodiscard]] std::string greeting(double rate_hz);
+[[nodiscard]] Result<double> parse_greeting(const std::string& text, const std::string& identity);
+
+}  // namespace posed::drivers::bend

@@ -1,0 +1,63 @@
+// ReplayTransport: plays what was recorded of a device, at the times it came.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "drivers/driver.hpp"
+#include "drivers/transport/chunks.hpp"
+#include "drivers/transport/timer.hpp"
+
+namespace posed::drivers {
+
+// The chunks of one stream in log order.
+class Recording {
+ public:
+  void add(std::int64_t arrival_ns, std::span<const std::byte> bytes) {
+    chunks_.add(bytes);
+    arrival_ns_.push_back(arrival_ns);
+  }
+  [[nodiscard]] std::size_t count() const noexcept { return chunks_.count(); }
+  [[nodiscard]] std::span<const std::byte> bytes(std::size_t i) const noexcept {
+    return chunks_[i];
+  }
+  [[nodiscard]] std::int64_t arrival_ns(std::size_t i) const noexcept { return arrival_ns_[i]; }
+
+ private:
+  Chunks chunks_;
+  std::vector<std::int64_t> arrival_ns_;  // [chunk]
+};
+
+// A chunk is due (arrival - origin) / speed after start(). Several streams of one log share an
+// origin, the log's first arrival, and so keep their places among each other.
+class ReplayTransport final : public Transport {
+ public:
+  // `speed` 1 is the recorded pace, 0 as fast as possible. A recording may be empty: it ends at
+  // once. A chunk longer than kMaxChunk or a speed that is no factor is an error.
+  [[nodiscard]] static Result<std::unique_ptr<Transport>> open(Recording recording,
+                                                               std::int64_t origin_ns,
+                                                               double speed);
+
+  [[nodiscard]] int poll_fd() const noexcept override { return timer_.fd(); }
+  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  // Ends with an empty chunk after the last. Where it has to wait it sets the timer, which is a
+  // system call; all else is RT-safe.
+  [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+
+ private:
+  ReplayTransport(Recording recording, std::int64_t origin_ns, double speed)
+      : recording_(std::move(recording)), origin_ns_(origin_ns), speed_(speed) {}
+  [[nodiscard]] std::int64_t due_ns(std::size_t chunk) const noexcept;
+
+  Timer timer_;
+  Recording recording_;
+  std::int64_t origin_ns_;
+  double speed_;
+  std::int64_t start_ns_ = 0;
+  std::size_t next_ = 0;
+  bool gave_ = false;  // unpaced: the last read gave a chunk
+};
+
+}  // namespace posed::drivers

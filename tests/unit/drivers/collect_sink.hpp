@@ -1,0 +1,68 @@
+// A sink that keeps what a decoder made. Room is reserved, so that keeping does not allocate.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "proto/frame/sink.hpp"
+
+namespace posed::test {
+
+class CollectSink final : public Sink {
+ public:
+  explicit CollectSink(std::size_t room = 4096) {
+    frames.reserve(room);
+    samples.reserve(room);
+  }
+  void frame(Frame& frame) noexcept override { frames.push_back(frame); }
+  void sample(Sample& sample) noexcept override { samples.push_back(sample); }
+  void outcome(Outcome outcome) noexcept override { ++outcomes[static_cast<std::size_t>(outcome)]; }
+
+  [[nodiscard]] int count(Outcome outcome) const {
+    return outcomes[static_cast<std::size_t>(outcome)];
+  }
+  void clear() {
+    frames.clear();
+    samples.clear();
+    outcomes.fill(0);
+  }
+
+  std::vector<Frame> frames;
+  std::vector<Sample> samples;
+  std::array<int, kOutcomes> outcomes{};
+};
+
+// The poses agree to the last bit, whatever their times are.
+inline bool same_pose(const Frame& a, const Frame& b) {
+  return a.skeleton == b.skeleton && a.joint_count == b.joint_count &&
+         a.angle_count == b.angle_count && a.valid == b.valid && a.quality == b.quality &&
+         a.source == b.source && a.root_position_m == b.root_position_m &&
+         a.rotation_xyzw == b.rotation_xyzw && a.angle_rad == b.angle_rad;
+}
+
+inline bool same_values(const Sample& a, const Sample& b) {
+  return a.value_count == b.value_count && a.valid == b.valid && a.value == b.value;
+}
+
+// Everything called valid is a number, and every valid rotation has unit length.
+inline bool is_sound(const Frame& frame) {
+  for (std::size_t j = 0; j < frame.joint_count; ++j) {
+    double squared = 0.0;
+    for (const float x : frame.rotation_xyzw[j]) squared += static_cast<double>(x) * x;
+    if (!(std::abs(squared - 1.0) < 1e-5)) return false;
+  }
+  for (const float x : frame.root_position_m) {
+    if (!std::isfinite(x)) return false;
+  }
+  return frame.joint_count <= kMaxJoints && frame.angle_count <= kMaxChannels;
+}
+
+inline bool is_sound(const Sample& sample) {
+  for (std::size_t i = 0; i < sample.value_count; ++i) {
+    if (sample.valid[i] && !std::isfinite(sample.value[i])) return false;
+  }
+  return sample.value_count <= kMaxSampleValues;
+}
+
+}  // namespace posed::test

@@ -1,0 +1,168 @@
+// The transports that play recordings: schedule, order, loop, end.
+#include <catch2/catch.hpp>
+
+#include <poll.h>
+
+#include <chrono>
+#include <cstring>
+#include <string>
+
+#include "drivers/transport/file.hpp"
+#include "drivers/transport/replay.hpp"
+
+namespace posed::drivers {
+namespace {
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+bool readable(const Transport& transport, int timeout_ms) {
+  pollfd fd{.fd = transport.poll_fd(), .events = POLLIN, .revents = 0};
+  return ::poll(&fd, 1, timeout_ms) == 1;
+}
+
+std::string text_of(const Chunk& chunk) {
+  return {reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()};
+}
+
+Chunks letters(const std::string& all) {
+  Chunks chunks;
+  for (const char& letter : all) chunks.add(std::string_view(&letter, 1));
+  return chunks;
+}
+
+struct Played {
+  std::string text;
+  std::vector<std::int64_t> at_ns;
+  bool ended = false;
+};
+
+// As the daemon's reader does: wait, then read until nothing more is due.
+Played play(Transport& transport, std::size_t most) {
+  Played played;
+  while (!played.ended && played.text.size() < most && readable(transport, 2000)) {
+    for (;;) {
+      const Chunk chunk = transport.read(now_ns());
+      played.ended = chunk.end;
+      if (chunk.bytes.empty()) break;
+      played.text += text_of(chunk);
+      played.at_ns.push_back(now_ns());
+    }
+  }
+  return played;
+}
+
+std::unique_ptr<Transport> must(Result<std::unique_ptr<Transport>> transport) {
+  if (!transport) FAIL(transport.error().text());
+  REQUIRE((*transport)->start(now_ns()));
+  return std::move(*transport);
+}
+
+Recording recording(const std::vector<std::pair<std::int64_t, std::string>>& chunks) {
+  Recording out;
+  for (const auto& [arrival_ns, text] : chunks) out.add(arrival_ns, std::as_bytes(std::span(text)));
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a file plays in order, once, and says that it ended") {
+  for (const double pace : {0.0, 1.0, 3.0}) {
+    const auto transport = must(
+        FileTransport::open(letters("abcdef"), {.rate_hz = 2000, .pace = pace, .loop = false}));
+    const Played played = play(*transport, 100);
+    CHECK(played.text == "abcdef");
+    CHECK(played.ended);
+    CHECK(transport->read(now_ns()).end);
+  }
+}
+
+TEST_CASE("a looped file begins again and never ends") {
+  for (const double pace : {0.0, 1.0}) {
+    const auto transport =
+        must(FileTransport::open(letters("abc"), {.rate_hz = 5000, .pace = pace}));
+    const Played played = play(*transport, 20);
+    CHECK_FALSE(played.ended);
+    CHECK(played.text.substr(0, 20) == "abcabcabcabcabcabcab");
+  }
+}
+
+TEST_CASE("no frame comes before its time, and what was late does not delay the rest") {
+  constexpr double kRate_hz = 500;
+  auto transport = FileTransport::open(letters("abcdefghij"), {.rate_hz = kRate_hz});
+  REQUIRE(transport);
+  const std::int64_t start_ns = now_ns();
+  REQUIRE((*transport)->start(start_ns));
+  const Played early = play(**transport, 5);
+  for (std::size_t i = 0; i < early.at_ns.size(); ++i) {
+    CHECK(early.at_ns[i] - start_ns >= static_cast<std::int64_t>(static_cast<double>(i) * 2e6));
+  }
+  // The reader is busy for ten frames; all of them are due at once.
+  const std::size_t taken = early.text.size();
+  const std::int64_t busy_until_ns = now_ns() + 20'000'000;
+  while (now_ns() < busy_until_ns) continue;
+  std::size_t caught_up = 0;
+  while (!(*transport)->read(now_ns()).bytes.empty()) ++caught_up;
+  const auto due = static_cast<std::size_t>((now_ns() - start_ns) / 2'000'000 + 1);
+  CHECK(taken + caught_up <= due);
+  CHECK(caught_up >= 9);
+}
+
+TEST_CASE("an unpaced file lets other devices have their turn") {
+  const auto transport = must(FileTransport::open(letters("ab"), {.rate_hz = 100, .pace = 0}));
+  for (int i = 0; i < 10; ++i) {
+    REQUIRE(readable(*transport, 0));
+    CHECK_FALSE(transport->read(0).bytes.empty());
+    CHECK(transport->read(0).bytes.empty());
+  }
+}
+
+TEST_CASE("a file that cannot be played is refused with a reason") {
+  const auto reason = [](Chunks chunks, const Playback& playback) {
+    const auto transport = FileTransport::open(std::move(chunks), playback);
+    return transport ? std::string() : transport.error().text();
+  };
+  CHECK(reason({}, {.rate_hz = 100}) == "there is nothing to play");
+  CHECK(reason(letters("a"), {}).starts_with("the frame rate"));
+  for (const double pace : {-1.0, 1e9, 1e-9, std::numeric_limits<double>::infinity(),
+                            std::numeric_limits<double>::quiet_NaN()}) {
+    CHECK(reason(letters("a"), {.rate_hz = 100, .pace = pace}).starts_with("pace should be"));
+  }
+  Chunks large;
+  large.add(std::string(kMaxChunk + 1, 'x'));
+  CHECK(reason(std::move(large), {.rate_hz = 100}).starts_with("frame 1 is longer"));
+}
+
+TEST_CASE("a recording replays with its own gaps, faster, or at once") {
+  const std::vector<std::pair<std::int64_t, std::string>> chunks{
+      {1'000'000'000, "a"}, {1'004'000'000, "b"}, {1'004'000'000, "c"}, {1'020'000'000, "d"}};
+  for (const double speed : {1.0, 4.0}) {
+    const std::int64_t start_ns = now_ns();
+    const auto transport = must(ReplayTransport::open(recording(chunks), 1'000'000'000, speed));
+    const Played played = play(*transport, 100);
+    CHECK(played.text == "abcd");
+    CHECK(played.ended);
+    REQUIRE(played.at_ns.size() == 4);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto after_ns = static_cast<double>(chunks[i].first - 1'000'000'000) / speed;
+      CHECK(static_cast<double>(played.at_ns[i] - start_ns) >= after_ns);
+    }
+  }
+  const auto transport = must(ReplayTransport::open(recording(chunks), 1'000'000'000, 0));
+  CHECK(play(*transport, 100).text == "abcd");
+}
+
+TEST_CASE("a recording's odd arrival times neither stop nor crash its replay") {
+  constexpr auto kMin = std::numeric_limits<std::int64_t>::min();
+  const auto transport =
+      must(ReplayTransport::open(recording({{kMin, "a"}, {5, "b"}, {3, "c"}, {-7, "d"}}), 5, 1));
+  CHECK(play(*transport, 100).text == "abcd");
+  CHECK(must(ReplayTransport::open({}, 0, 1))->read(0).end);
+  CHECK_FALSE(ReplayTransport::open({}, 0, -1).has_value());
+  CHECK_FALSE(ReplayTransport::open({}, 0, std::numeric_limits<double>::quiet_NaN()).has_value());
+}
+
+}  // namespace posed::drivers
