@@ -11,7 +11,7 @@ namespace {
 using AddCommand = void (*)(CLI::App& app, int& exit_code);
 
 // The order in which `posed --help` lists them.
-constexpr std::array<AddCommand, 0> kCommands{};
+constexpr std::array<AddCommand, 1> kCommands{add_bench};
 
 }  // namespace
 

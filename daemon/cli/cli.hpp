@@ -19,4 +19,7 @@ namespace posed::cli {
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.
 [[nodiscard]] int report(const Error& error);
 
+void add_bench(CLI::App& app, int& exit_code);
+void add_bench_predict(CLI::App& bench, int& exit_code);
+
 }  // namespace posed::cli

@@ -82,8 +82,8 @@ struct Predictor::Parts {
   float exponent = 0.0F;
   int gate_rows = 0;
   std::array<float, kMaxDims> constant{};
-  hwy::AlignedFreeUniquePtr<float[]> tiles;
-  hwy::AlignedFreeUniquePtr<float[]> triangle;
+  const float* triangle = nullptr;
+  hwy::AlignedFreeUniquePtr<float[]> data;  // the tiles, then the triangle: one stream to read
 
   // k is only written where the gate asks for it. Returns false when no dimension is available.
   bool sum(std::span<const float> q, std::span<const std::uint8_t> available, int keep, float* k,
@@ -105,18 +105,20 @@ Result<Predictor> Predictor::build(const Trained& trained, bool gate) {
   parts->exponent = static_cast<float>(-0.5 * trained.mu * std::numbers::log2e);
   std::vector<int> order(static_cast<std::size_t>(points));
   std::iota(order.begin(), order.end(), 0);
+  std::vector<float> triangle;
   if (gate) {
     Confidence confidence = confidence_of(trained, kMaxGate);
     order = std::move(confidence.order);
+    triangle = std::move(confidence.triangle);
     parts->gate_rows = confidence.rows;
-    parts->triangle = hwy::AllocateAligned<float>(confidence.triangle.size());
-    std::copy(confidence.triangle.begin(), confidence.triangle.end(), parts->triangle.get());
   }
   const int outputs_padded = padded(parts->outputs);
-  parts->tiles =
-      hwy::AllocateAligned<float>(static_cast<std::size_t>(parts->points) *
-                                  static_cast<std::size_t>(parts->dims + outputs_padded));
-  lay_out(trained, order, parts->points, outputs_padded, parts->tiles.get());
+  const auto tile_floats = static_cast<std::size_t>(parts->points) *
+                           static_cast<std::size_t>(parts->dims + outputs_padded);
+  parts->data = hwy::AllocateAligned<float>(tile_floats + triangle.size());
+  lay_out(trained, order, parts->points, outputs_padded, parts->data.get());
+  std::ranges::copy(triangle, parts->data.get() + tile_floats);
+  parts->triangle = parts->data.get() + tile_floats;
   // k = e^lambda exp(.) + b: e^lambda went into the weights, b sum w is a constant.
   const Eigen::VectorXd constant =
       trained.offset + trained.b * trained.weights.colwise().sum().transpose();
@@ -150,7 +152,7 @@ bool Predictor::Parts::sum(std::span<const float> q, std::span<const std::uint8_
     }
   }
   alignas(64) std::array<float, kMaxDims> raw;
-  kernel::weighted_sum({tiles.get(), points, dims, padded(outputs)}, query, keep, k, raw.data());
+  kernel::weighted_sum({data.get(), points, dims, padded(outputs)}, query, keep, k, raw.data());
   for (int o = 0; o < outputs; ++o) out[o] = constant[o] + raw[o];
   return true;
 }
@@ -170,7 +172,7 @@ float Predictor::mean_and_confidence(std::span<const float> q,
     std::ranges::copy(constant(), out.begin());
     return 0.0F;
   }
-  const float g = kernel::triangle_norm2(parts_->triangle.get(), parts_->gate_rows, k.data());
+  const float g = kernel::triangle_norm2(parts_->triangle, parts_->gate_rows, k.data());
   return std::clamp(g, 0.0F, 1.0F);
 }
 
