@@ -22,7 +22,7 @@ int report(const Error& error) {
 
 int main_of(int argc, char** argv) {
   CLI::App app{"posed: live poses in, another style out", "posed"};
-  app.set_version_flag("--version", "posed 0.1.0");
+  app.set_version_flag("--version", "posed " POSED_VERSION);
   app.require_subcommand(1);
   int exit_code = 0;
   for (const AddCommand add : kCommands) add(app, exit_code);

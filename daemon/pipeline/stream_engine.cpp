@@ -77,6 +77,11 @@ std::int64_t StreamEngine::next_tick_ns() const noexcept {
 bool StreamEngine::tick(std::int64_t now_ns, EngineOut& out) noexcept {
   const std::int64_t due_ns = next_tick_ns();
   if (due_ns == kNoTime_ns || now_ns < due_ns) return false;
+  tick_now(now_ns, out);
+  return true;
+}
+
+void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
   out.decision({.kind = Decision::Kind::kTick,
                 .stream = options_.stream,
                 .sequence = last_sequence_ + 1,
@@ -91,7 +96,6 @@ bool StreamEngine::tick(std::int64_t now_ns, EngineOut& out) noexcept {
     pose_.frame.quality = Quality::kStale;
     out.item(pose_);
   }
-  return true;
 }
 
 Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {

@@ -48,6 +48,8 @@ class StreamEngine final : private Emit {
   // stream turns stale, and the last pose goes out once a second with quality stale, under its own
   // old sequence and times. Returns whether anything happened; only then is a decision emitted.
   bool tick(std::int64_t now_ns, EngineOut& out) noexcept;
+  // The tick itself, for replay: the live run has decided that it was due.
+  void tick_now(std::int64_t now_ns, EngineOut& out) noexcept;
   // When the next tick is due; kNoTime_ns while none is.
   [[nodiscard]] std::int64_t next_tick_ns() const noexcept;
 

@@ -11,6 +11,14 @@ std::uint64_t shed_depth(double rate_hz) noexcept {
   return static_cast<std::uint64_t>(std::max(3.0, std::ceil(rate_hz * 0.05)));
 }
 
+namespace {
+
+bool is_pose(const Item& item) noexcept {
+  return item.kind == Item::Kind::kFrame || item.kind == Item::Kind::kRawFrame;
+}
+
+}  // namespace
+
 // One stream: its engine, and where that engine's output goes.
 struct Worker::Lane final : EngineOut {
   Lane(const EngineOptions& options, double rate_hz, StreamCounters& stream_counters,
@@ -20,7 +28,11 @@ struct Worker::Lane final : EngineOut {
   void item(const Item& item) noexcept override {
     outgoing = item;
     if (outgoing.kind == Item::Kind::kFrame) outgoing.frame.stamps.styled_ns = ports.clock();
-    if (!ports.out->push(outgoing)) return count(counters.pipeline.dropped);
+    if (!ports.out->push(outgoing)) {
+      if (ports.tape != nullptr && is_pose(outgoing))
+        ports.tape->unpublished(outgoing.frame.header.stream);
+      return count(counters.pipeline.dropped);
+    }
     ports.publisher->ring();
   }
 

@@ -34,6 +34,8 @@ class Tape {
   [[nodiscard]] virtual bool wants_published() const noexcept = 0;
   virtual void published(std::uint32_t stream, std::uint64_t sequence, bool raw,
                          std::span<const std::byte> bytes) noexcept = 0;
+  // Pipeline thread: a frame found the publisher's ring full and was not published. RT-safe.
+  virtual void unpublished(std::uint32_t stream) noexcept = 0;
 
   // Control thread, before the command that names it: a model file's bytes, kept under their
   // SHA-256. Cold: allocates and locks.

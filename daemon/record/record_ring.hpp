@@ -1,0 +1,71 @@
+// A lock-free ring of records {header, bytes} of any length between one producer and one consumer.
+// A record that does not fit is refused whole. Memory is touched when it is made, so that the
+// producer never meets a page fault.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <boost/lockfree/spsc_queue.hpp>
+
+namespace posed::record {
+
+// Header: trivially copyable, with a member `bytes` that holds the length of what follows it.
+template <typename Header>
+class RecordRing {
+  static_assert(std::is_trivially_copyable_v<Header>);
+
+ public:
+  explicit RecordRing(std::size_t capacity_bytes) : ring_(capacity_bytes) {
+    const std::vector<std::byte> zeros(capacity_bytes);
+    ring_.push(zeros.data(), zeros.size());
+    ring_.reset();
+  }
+
+  // Producer. False: full, nothing was written. RT-safe.
+  [[nodiscard]] bool push(const Header& header, std::span<const std::byte> bytes) noexcept {
+    if (ring_.write_available() < sizeof(Header) + bytes.size()) return false;
+    std::array<std::byte, sizeof(Header)> image;
+    std::memcpy(image.data(), &header, sizeof(Header));
+    ring_.push(image.data(), image.size());
+    ring_.push(bytes.data(), bytes.size());
+    return true;
+  }
+
+  // Consumer: calls each(header, bytes) for what is there now, not for what comes meanwhile; the
+  // bytes are valid during the call.
+  template <typename Each>
+  void drain(Each&& each) {
+    std::size_t budget = ring_.read_available();
+    while (budget >= sizeof(Header) || header_ready_) {
+      if (!header_ready_) {
+        std::array<std::byte, sizeof(Header)> image;
+        ring_.pop(image.data(), image.size());
+        std::memcpy(&header_, image.data(), sizeof(Header));
+        header_ready_ = true;
+        budget -= sizeof(Header);
+      }
+      // Header and bytes are two pushes: the second may still be under way.
+      if (budget < header_.bytes) return;
+      scratch_.resize(header_.bytes);
+      ring_.pop(scratch_.data(), scratch_.size());
+      budget -= header_.bytes;
+      header_ready_ = false;
+      each(std::as_const(header_), std::span<const std::byte>(scratch_));
+    }
+  }
+
+ private:
+  boost::lockfree::spsc_queue<std::byte> ring_;
+  // The consumer's.
+  Header header_{};
+  bool header_ready_ = false;
+  std::vector<std::byte> scratch_;
+};
+
+}  // namespace posed::record

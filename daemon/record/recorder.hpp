@@ -1,0 +1,73 @@
+// Recorder: the thread that writes the device log. It wakes by its own timer, so the hot threads
+// only ever touch the rings behind tape(). Cold.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/record/scribe.hpp"
+#include "daemon/record/tape.hpp"
+#include "daemon/record/tape_rings.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
+#include "proto/log/rows.hpp"
+
+namespace posed::record {
+
+// One stream as it stands before its first chunk.
+struct RecordedStream {
+  log::StreamRow row;            // id and model are filled in here: its place, its model's hash
+  double rate_hz = 0.0;          // sizes the rings; 0: unknown
+  std::vector<std::byte> model;  // the bytes of the model file it begins with; may be empty
+};
+
+struct RecorderOptions {
+  std::filesystem::path file;
+  bool overwrite = false;
+  bool frames = false;      // keep what is published, too
+  std::string config_text;  // the daemon's whole config, for people
+  Clock clock = nullptr;    // CLOCK_MONOTONIC
+  // Called from the recorder thread.
+  std::function<void(const Notice&)> tell = [](const Notice&) {};
+};
+
+class Recorder {
+ public:
+  // Makes the log and starts the thread. Stream ids are places in `streams`.
+  [[nodiscard]] static Result<std::unique_ptr<Recorder>> open(RecorderOptions options,
+                                                              std::vector<RecordedStream> streams);
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+  ~Recorder();
+
+  [[nodiscard]] Tape& tape() noexcept { return rings_; }
+
+  // Stops the thread, writes the rest and leaves one file. Call once, after every thread that uses
+  // tape() has ended.
+  [[nodiscard]] Result<> finish();
+
+  // Any thread.
+  [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return scribe_.lost_chunks(); }
+  [[nodiscard]] std::uint64_t errors() const noexcept { return scribe_.errors(); }
+  [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }
+
+ private:
+  Recorder(RecorderOptions options, const std::vector<RecordedStream>& streams, log::Writer writer);
+  void run(const std::stop_token& stop);
+
+  RecorderOptions options_;
+  TapeRings rings_;
+  Scribe scribe_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::jthread thread_;  // last: uses all the others
+};
+
+}  // namespace posed::record
