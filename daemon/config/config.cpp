@@ -8,6 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/toml_reader.hpp"
+#include "daemon/config/words.hpp"
 #include "daemon/control/keys.hpp"
 
 namespace posed::config {

@@ -1,30 +1,15 @@
 #include "daemon/config/toml_reader.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/config/words.hpp"
+
 namespace posed::config {
 namespace {
-
-// Levenshtein, one row at a time.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
 
 // What a key's last letters say about its unit, so that a wrong value is told the right one.
 std::string unit_of(std::string_view key) {
@@ -64,25 +49,7 @@ const char* kind_of(const toml::node& node) {
 
 int line_of_node(const toml::node& node) { return static_cast<int>(node.source().begin.line); }
 
-// Keys come from the file: what a terminal would obey is not printed.
-std::string printable(std::string_view text) {
-  constexpr std::size_t kLongest = 60;
-  std::string out(text.substr(0, kLongest));
-  for (char& c : out) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  }
-  return text.size() > kLongest ? out + "..." : out;
-}
-
 }  // namespace
-
-std::string nearest(std::string_view word, const std::set<std::string>& known) {
-  constexpr std::size_t kLongest = 64;  // longer words are near to nothing, and cost n^2
-  const std::string_view start = word.substr(0, kLongest);
-  const auto best = std::ranges::min_element(
-      known, {}, [&](const std::string& candidate) { return edit_distance(start, candidate); });
-  return best == known.end() ? std::string{} : *best;
-}
 
 void Findings::blame(int line, std::string message) {
   errors.push_back({std::move(message), file, line, ExitCode::kWrongUse});

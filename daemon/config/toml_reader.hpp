@@ -16,9 +16,6 @@
 
 namespace posed::config {
 
-// The words nearest to `word` by edit distance; empty when `known` is.
-[[nodiscard]] std::string nearest(std::string_view word, const std::set<std::string>& known);
-
 // What the reading of one file found out.
 struct Findings {
   std::string file;

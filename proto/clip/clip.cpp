@@ -1,9 +1,6 @@
 #include "proto/clip/clip.hpp"
 
-#include <cmath>
-
-#include "proto/clip/bvh.hpp"
-#include "proto/clip/text.hpp"
+#include "proto/clip/files.hpp"
 
 namespace posed::clip {
 
@@ -18,13 +15,11 @@ Frame Clip::frame(int index) const {
 }
 
 Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& options) {
-  const std::string extension = lower(path.extension().string());
-  if (extension != ".bvh") {
-    return fail("is no clip posed can read; a clip ends in .bvh or .amc", path.string());
-  }
-  auto text = load_text(path);
-  if (!text) return std::unexpected(text.error());
-  return parse_bvh(*text, path.string(), options);
+  const auto files = load_files(path, options);
+  if (!files) return std::unexpected(files.error());
+  auto draft = draft_of(*files, options);
+  if (!draft) return std::unexpected(draft.error());
+  return clip_of(std::move(*draft), files->name);
 }
 
 }  // namespace posed::clip

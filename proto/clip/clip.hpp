@@ -29,11 +29,11 @@ struct Clip {
 };
 
 struct ReadOptions {
-  std::filesystem::path asf;   // skeleton of an AMC; empty: NN.asf beside NN_MM.amc
-  double amc_rate_hz = 120.0;  // an AMC carries no rate
-  std::optional<double>
-      metres_per_unit;  // of a BVH; empty: profile, else found from the figure's height
-  std::string profile;  // named skeleton profile; empty: found by joint names
+  std::filesystem::path asf{};  // skeleton of an AMC; empty: NN.asf beside NN_MM.amc
+  double amc_rate_hz = 120.0;   // an AMC carries no rate
+  // Of a BVH; empty: the profile's, else found from the figure's height.
+  std::optional<double> metres_per_unit{};
+  std::string profile{};  // named skeleton profile; empty: found by joint names
 };
 
 // By extension: .bvh or .amc. Errors name file and line.

@@ -1,5 +1,8 @@
 #include "proto/clip/frame_text.hpp"
 
+#include <algorithm>
+#include <bitset>
+#include <charconv>
 #include <numbers>
 
 #include "proto/clip/text.hpp"
@@ -9,8 +12,16 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-std::string counted(std::size_t count, std::string_view what) {
-  return std::to_string(count) + " " + std::string(what) + (count == 1 ? "" : "s");
+std::string counted(std::size_t count) {
+  return std::to_string(count) + (count == 1 ? " value" : " values");
+}
+
+std::vector<double> scales(const Skeleton& skeleton, double metres_per_unit, double radians) {
+  std::vector<double> scale;
+  for (const Channel& channel : skeleton.channels) {
+    scale.push_back(channel.translation ? metres_per_unit : radians);
+  }
+  return scale;
 }
 
 }  // namespace
@@ -23,37 +34,51 @@ std::string FrameOutcome::sentence() const {
       return in_quotes(where) + " is not a number a pose can have";
     case FrameFault::kTooFew:
     case FrameFault::kTooMany:
-      return (where.empty() ? std::string("the frame") : in_quotes(where)) + " has " +
-             counted(found, "value") + (fault == FrameFault::kTooMany ? " or more" : "") +
-             ", but its channels need " + std::to_string(expected) +
-             "; the file is damaged or cut off here";
+      return (where.empty() ? std::string("the frame") : "bone " + in_quotes(where)) + " has " +
+             counted(found) + (fault == FrameFault::kTooMany ? " or more" : "") +
+             " where its channels need " + std::to_string(expected) +
+             "; the file is damaged or cut off here, or belongs to another skeleton";
     case FrameFault::kUnknownBone:
       return "the skeleton has no bone " + in_quotes(where) +
-             " with channels; is this the right skeleton for the clip?";
+             "; is this the right skeleton for the clip?";
     case FrameFault::kRepeatedBone:
-      return "bone " + in_quotes(where) + " appears twice in this frame";
+      return "bone " + in_quotes(where) + " appears twice in the frame";
     case FrameFault::kMissingBone:
       return "bone " + in_quotes(where) +
-             " is missing from this frame; the file is damaged or cut off";
+             " is missing from the frame; the file is damaged or cut off here, or belongs to "
+             "another skeleton";
     case FrameFault::kNoNumber:
-      return in_quotes(where) + " stands where a frame number should";
+      return in_quotes(where) + " stands where a frame's number should";
   }
   return {};
 }
 
 FrameParser FrameParser::bvh(const Skeleton& skeleton, double metres_per_unit) {
   FrameParser parser;
-  for (const Channel& channel : skeleton.channels) {
-    parser.scale_.push_back(channel.translation ? metres_per_unit : kDegree);
-  }
+  parser.scale_ = scales(skeleton, metres_per_unit, kDegree);
+  return parser;
+}
+
+FrameParser FrameParser::amc(const Acclaim& acclaim, bool degrees) {
+  FrameParser parser;
+  parser.scale_ = scales(acclaim.skeleton, acclaim.metres_per_unit, degrees ? kDegree : 1.0);
+  parser.bones_ = acclaim.bones;
+  std::ranges::sort(parser.bones_, {}, &AcclaimBone::name);
   return parser;
 }
 
 FrameOutcome FrameParser::parse(std::string_view text, std::span<double> values) const noexcept {
+  return bones_.empty() ? parse_line(text, values) : parse_block(text, values);
+}
+
+FrameOutcome FrameParser::parse_line(std::string_view text,
+                                     std::span<double> values) const noexcept {
   FrameOutcome outcome;
-  outcome.expected = scale_.size();
+  const char* const begin = text.data();
+  outcome.expected = std::min(scale_.size(), values.size());
   for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) {
-    if (outcome.found == scale_.size() || outcome.found == values.size()) {
+    outcome.offset = static_cast<std::size_t>(word.data() - begin);
+    if (outcome.found == outcome.expected) {
       outcome.fault = FrameFault::kTooMany;
       ++outcome.found;
       return outcome;
@@ -68,6 +93,63 @@ FrameOutcome FrameParser::parse(std::string_view text, std::span<double> values)
     ++outcome.found;
   }
   if (outcome.found < scale_.size()) outcome.fault = FrameFault::kTooFew;
+  return outcome;
+}
+
+int FrameParser::find_bone(std::string_view name) const noexcept {
+  const auto at = std::ranges::lower_bound(
+      bones_, name, {}, [](const AcclaimBone& bone) { return std::string_view(bone.name); });
+  return at != bones_.end() && at->name == name ? static_cast<int>(at - bones_.begin()) : -1;
+}
+
+FrameOutcome FrameParser::parse_block(std::string_view text,
+                                      std::span<double> values) const noexcept {
+  FrameOutcome outcome;
+  const char* const begin = text.data();
+  const auto blame = [&](FrameFault fault, std::string_view where, std::string_view word) {
+    outcome.fault = fault;
+    outcome.where = where;
+    outcome.offset = static_cast<std::size_t>(word.data() - begin);
+    return outcome;
+  };
+  std::string_view word = next_word(text);
+  const auto number = std::from_chars(word.data(), word.data() + word.size(), outcome.number);
+  if (word.empty() || number.ec != std::errc() || number.ptr != word.data() + word.size()) {
+    return blame(FrameFault::kNoNumber, word, word);
+  }
+  if (values.size() < scale_.size()) return blame(FrameFault::kTooMany, {}, word);
+  std::bitset<kMaxJoints> seen;
+  word = next_word(text);
+  while (!word.empty()) {
+    const int index = find_bone(word);
+    if (index < 0) return blame(FrameFault::kUnknownBone, word, word);
+    const AcclaimBone& bone = bones_[index];
+    if (seen[index]) return blame(FrameFault::kRepeatedBone, word, word);
+    seen[index] = true;
+    outcome.expected = bone.channels.size();
+    outcome.found = 0;
+    const std::string_view name = word;
+    for (word = next_word(text); !word.empty(); word = next_word(text)) {
+      const auto value = parse_number(word);
+      if (!value && find_bone(word) >= 0) break;
+      if (!value) {
+        const bool ends = outcome.found == outcome.expected;
+        return blame(ends ? FrameFault::kUnknownBone : FrameFault::kNotANumber, word, word);
+      }
+      if (outcome.found < outcome.expected) {
+        const int channel = bone.channels[outcome.found];
+        values[channel] = *value * scale_[channel];
+      }
+      ++outcome.found;
+    }
+    if (outcome.found < outcome.expected) return blame(FrameFault::kTooFew, bone.name, name);
+    if (outcome.found > outcome.expected) return blame(FrameFault::kTooMany, bone.name, name);
+  }
+  for (std::size_t i = 0; i < bones_.size(); ++i) {
+    if (!seen[i] && !bones_[i].channels.empty()) {
+      return blame(FrameFault::kMissingBone, bones_[i].name, {begin, 0});
+    }
+  }
   return outcome;
 }
 

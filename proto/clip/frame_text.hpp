@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/frame/result.hpp"
+#include "proto/clip/acclaim.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::clip {
@@ -28,9 +28,11 @@ enum class FrameFault : std::uint8_t {
 struct FrameOutcome {
   FrameFault fault = FrameFault::kNone;
   std::string_view where;    // the word or bone to blame; into the text or the parser
+  std::size_t offset = 0;    // of the fault in the text
   std::size_t expected = 0;  // values wanted and found, for too few and too many
   std::size_t found = 0;
   std::int64_t number = 0;  // AMC: the frame's number
+
   [[nodiscard]] bool ok() const noexcept { return fault == FrameFault::kNone; }
   // One sentence for people. Cold.
   [[nodiscard]] std::string sentence() const;
@@ -41,15 +43,26 @@ class FrameParser {
   // A BVH motion line: the values of all channels, in order, degrees and file units.
   [[nodiscard]] static FrameParser bvh(const Skeleton& skeleton, double metres_per_unit);
 
+  // An AMC block: the frame's number, then a bone's name and its values for each bone.
+  [[nodiscard]] static FrameParser amc(const Acclaim& acclaim, bool degrees);
+
   // Values parse() writes: the skeleton's channels.
   [[nodiscard]] std::size_t channels() const noexcept { return scale_.size(); }
 
+  // Frames carry a number of their own (AMC).
+  [[nodiscard]] bool numbered() const noexcept { return !bones_.empty(); }
+
   // `text` to `values` [channels(), rad and m]; they are unspecified unless the outcome is ok.
-  // Leading and trailing white space does not matter. RT-safe.
+  // White space and line ends do not matter. RT-safe.
   [[nodiscard]] FrameOutcome parse(std::string_view text, std::span<double> values) const noexcept;
 
  private:
-  std::vector<double> scale_;  // [channel], file value to rad or m
+  FrameOutcome parse_line(std::string_view text, std::span<double> values) const noexcept;
+  FrameOutcome parse_block(std::string_view text, std::span<double> values) const noexcept;
+  [[nodiscard]] int find_bone(std::string_view name) const noexcept;
+
+  std::vector<double> scale_;       // [channel], file value to rad or m
+  std::vector<AcclaimBone> bones_;  // sorted by name; empty for a BVH
 };
 
 }  // namespace posed::clip

@@ -1,0 +1,120 @@
+#include "daemon/control/control_server.hpp"
+
+#include <array>
+
+#include <unistd.h>
+
+#include "posed/v1/control.pb.h"
+
+namespace posed::control {
+namespace {
+
+constexpr int kRequestsWaiting = 16;         // per client; more wait at the client
+constexpr int kLastWords_ms = 500;           // for the answer to `stop` to leave
+constexpr int kRequestsARound = 16;          // then acknowledgements get their turn
+constexpr std::size_t kLongestEnvelope = 4;  // parts before the request
+
+Result<> set_limits(void* router) {
+  for (const auto& [option, value] : {std::pair{ZMQ_RCVHWM, kRequestsWaiting},
+                                      {ZMQ_SNDHWM, kRequestsWaiting},
+                                      {ZMQ_LINGER, kLastWords_ms},
+                                      {ZMQ_ROUTER_HANDOVER, 1}}) {
+    if (auto set = set_option(router, option, value); !set) return set;
+  }
+  const std::int64_t largest = kLargestModel + kLargestRequest;
+  return set_option(router, ZMQ_MAXMSGSIZE,
+                    {reinterpret_cast<const char*>(&largest), sizeof largest});
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
+                                                            const std::string& endpoint,
+                                                            const ControlPorts& ports,
+                                                            RequestHandler& handler) {
+  auto router = open_socket(context, ZMQ_ROUTER);
+  if (!router) return std::unexpected(router.error());
+  if (auto set = set_limits(router->get()); !set) return std::unexpected(set.error());
+  if (ports.gatekeeper != nullptr) {
+    if (auto set = secure_server(router->get(), Domain::kControl, ports.secret_z85); !set) {
+      return std::unexpected(set.error());
+    }
+  }
+  auto bound = bind_socket(router->get(), endpoint);
+  if (!bound) return std::unexpected(bound.error());
+  return std::unique_ptr<ControlServer>(
+      new ControlServer(std::move(*router), std::move(*bound), ports, handler));
+}
+
+ControlServer::ControlServer(Socket router, std::string endpoint, const ControlPorts& ports,
+                             RequestHandler& handler)
+    : router_(std::move(router)),
+      endpoint_(std::move(endpoint)),
+      ports_(ports),
+      handler_(handler),
+      thread_([this] { serve(); }) {}
+
+ControlServer::~ControlServer() {
+  stop_.store(true, std::memory_order_release);
+  ports_.wake->ring();
+  thread_.join();
+}
+
+void ControlServer::serve() {
+  while (!stop_.load(std::memory_order_acquire)) {
+    bool busy = false;
+    for (int i = 0; i < kRequestsARound && take_request(); ++i) busy = true;
+    while (take_ack()) busy = true;
+    if (!busy) sleep();
+  }
+}
+
+void ControlServer::sleep() {
+  ports_.wake->going_to_sleep();
+  if (ports_.acks->empty() && !stop_.load(std::memory_order_acquire)) {
+    std::array<zmq_pollitem_t, 2> wait{
+        {{router_.get(), 0, ZMQ_POLLIN, 0}, {nullptr, ports_.wake->fd(), ZMQ_POLLIN, 0}}};
+    zmq_poll(wait.data(), static_cast<int>(wait.size()), -1);
+    std::uint64_t rung = 0;
+    [[maybe_unused]] const ssize_t cleared = read(ports_.wake->fd(), &rung, sizeof rung);
+  }
+  ports_.wake->awake();
+}
+
+bool ControlServer::take_request() {
+  Message part;
+  if (!part.receive(router_.get())) return false;
+  Asker envelope;
+  while (part.more()) {
+    if (envelope.size() <= kLongestEnvelope) envelope.emplace_back(part.text());
+    if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
+  }
+  if (envelope.size() > kLongestEnvelope) return true;  // no client of ours; it gets no answer
+  if (ports_.gatekeeper != nullptr &&
+      !ports_.gatekeeper->allows(part.property("User-Id"), Domain::kControl)) {
+    v1::ControlReply reply;
+    reply.set_error("your key may no longer control this daemon");
+    send({std::move(envelope), reply.SerializeAsString()});
+    return true;
+  }
+  if (auto answer = handler_.handle(std::move(envelope), part.bytes())) send(*answer);
+  return true;
+}
+
+bool ControlServer::take_ack() {
+  std::optional<Answer> answer;
+  const bool taken =
+      ports_.acks->consume([&](const pipeline::Ack& ack) { answer = handler_.acknowledge(ack); });
+  if (answer) send(*answer);
+  return taken;
+}
+
+// A ROUTER drops what a slow or departed client does not take.
+void ControlServer::send(const Answer& answer) {
+  for (const std::string& part : answer.to) {
+    if (!send_part(router_.get(), part, true)) return;
+  }
+  (void)send_part(router_.get(), answer.bytes, false);
+}
+
+}  // namespace posed::control

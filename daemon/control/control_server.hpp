@@ -1,0 +1,57 @@
+// ControlServer: the ROUTER socket and the cold thread behind it. One request a message; whatever
+// parts stand before the last one come back before the reply, so that a client may number its
+// requests. Nothing a client does, or leaves undone, makes anyone wait.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "daemon/control/gatekeeper.hpp"
+#include "daemon/control/request_handler.hpp"
+#include "daemon/control/zmq_handle.hpp"
+#include "daemon/pipeline/ring.hpp"
+#include "daemon/pipeline/wake.hpp"
+
+namespace posed::control {
+
+// All of it outlives the server.
+struct ControlPorts {
+  pipeline::Ring<pipeline::Ack>* acks = nullptr;  // this thread consumes
+  pipeline::Wake* wake = nullptr;                 // rung when there is something in `acks`
+  const Gatekeeper* gatekeeper = nullptr;         // null: no CURVE
+  std::string secret_z85;                         // the server's key, with a gatekeeper
+};
+
+class ControlServer {
+ public:
+  // Binds and starts the thread. Only the thread touches `handler` until the destructor returns.
+  [[nodiscard]] static Result<std::unique_ptr<ControlServer>> start(void* context,
+                                                                    const std::string& endpoint,
+                                                                    const ControlPorts& ports,
+                                                                    RequestHandler& handler);
+  ~ControlServer();
+  ControlServer(const ControlServer&) = delete;
+  ControlServer& operator=(const ControlServer&) = delete;
+
+  [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  // really bound
+
+ private:
+  ControlServer(Socket router, std::string endpoint, const ControlPorts& ports,
+                RequestHandler& handler);
+  void serve();
+  void sleep();
+  [[nodiscard]] bool take_request();
+  [[nodiscard]] bool take_ack();
+  void send(const Answer& answer);
+
+  Socket router_;
+  std::string endpoint_;
+  ControlPorts ports_;
+  RequestHandler& handler_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace posed::control

@@ -1,0 +1,99 @@
+// RequestHandler: what a control message means. No socket, no thread: bytes of strangers in,
+// replies out; the control thread and the fuzz target drive the same object.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/messages.hpp"
+#include "models/style/style_filter.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::v1 {
+class ControlReply;
+class ControlRequest;
+class Stats;
+}  // namespace posed::v1
+
+namespace posed::control {
+
+inline constexpr std::size_t kLargestModel = 64 * 1024 * 1024;  // bytes of a model file
+inline constexpr std::size_t kLargestRequest = 64 * 1024;       // bytes of any other request
+inline constexpr std::size_t kMostUnderWay = 64;  // commands sent to the pipeline, not acknowledged
+
+// A stream as control sees it.
+struct ControlledStream {
+  std::string name;
+  bool publishes_raw = false;
+  std::shared_ptr<const Skeleton> skeleton;   // models are bound to it; null: samples only
+  std::optional<style::FilterOptions> style;  // the style stage is there when this is
+  // What the stage runs with. The cold side owns every model; the pipeline only borrows.
+  std::unique_ptr<const style::BoundModel> model;
+};
+
+// What the handler asks of the rest of the daemon; every call comes from the control thread.
+class Helm {
+ public:
+  Helm() = default;
+  Helm(const Helm&) = delete;
+  Helm& operator=(const Helm&) = delete;
+  virtual ~Helm() = default;
+
+  // Puts the command into the pipeline's ring; false when it is full.
+  [[nodiscard]] virtual bool send(const pipeline::Command& command) = 0;
+  // Keeps a model's file for the log, before the command that names its hash.
+  virtual void keep_model(std::span<const std::byte> bytes) = 0;
+  // A model has taken effect: `stats` should name it.
+  virtual void model_in_use(std::uint32_t stream, const std::string& name) = 0;
+  virtual void fill(v1::Stats& stats) = 0;
+  virtual void stop() = 0;  // begin to end the daemon; returns at once
+};
+
+// Who asked: opaque to the handler, handed back with the reply.
+using Asker = std::vector<std::string>;
+struct Answer {
+  Asker to;
+  std::string bytes;  // a serialized posed.v1.ControlReply
+};
+
+class RequestHandler {
+ public:
+  // `helm` outlives the handler. Destroy it after the pipeline thread has ended: it owns the models
+  // in use.
+  RequestHandler(std::vector<ControlledStream> streams, Helm& helm);
+  ~RequestHandler();
+  RequestHandler(const RequestHandler&) = delete;
+  RequestHandler& operator=(const RequestHandler&) = delete;
+
+  // One request. The answer comes at once, or with acknowledge() when the pipeline has to act
+  // first. Whatever the bytes are: an answer with a sentence, never a crash.
+  [[nodiscard]] std::optional<Answer> handle(Asker asker, std::span<const std::byte> bytes);
+
+  // The pipeline has applied a command. Frees the model that it replaced.
+  [[nodiscard]] std::optional<Answer> acknowledge(const pipeline::Ack& ack);
+
+ private:
+  struct UnderWay {
+    Asker asker;
+    std::unique_ptr<const style::BoundModel> model;  // null for an alpha
+  };
+  // Nothing when the command is under way.
+  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, Asker& asker);
+  [[nodiscard]] Result<> set_model(const v1::ControlRequest& request, Asker& asker);
+  [[nodiscard]] Result<std::uint32_t> styled_stream(const std::string& name) const;
+  [[nodiscard]] Result<> send(pipeline::Command command, UnderWay under_way);
+
+  std::vector<ControlledStream> streams_;
+  Helm& helm_;
+  std::map<std::uint64_t, UnderWay> under_way_;  // by ticket
+  std::uint64_t last_ticket_ = 0;
+};
+
+}  // namespace posed::control

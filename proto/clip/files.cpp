@@ -1,0 +1,46 @@
+#include "proto/clip/files.hpp"
+
+#include "proto/clip/text.hpp"
+
+namespace posed::clip {
+namespace {
+
+// NN.asf beside NN_MM.amc.
+std::filesystem::path asf_beside(const std::filesystem::path& amc) {
+  const std::string stem = amc.stem().string();
+  return amc.parent_path() / (stem.substr(0, stem.find('_')) + ".asf");
+}
+
+}  // namespace
+
+Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOptions& options) {
+  ClipFiles files;
+  files.name = path.string();
+  const std::string extension = lower(path.extension().string());
+  files.is_amc = extension == ".amc";
+  if (!files.is_amc && extension != ".bvh") {
+    return fail("is no clip posed can read; a clip ends in .bvh or .amc", files.name);
+  }
+  auto text = load_text(path);
+  if (!text) return std::unexpected(text.error());
+  files.text = std::move(*text);
+  if (!files.is_amc) return files;
+
+  const std::filesystem::path asf = options.asf.empty() ? asf_beside(path) : options.asf;
+  if (options.asf.empty() && !std::filesystem::exists(asf)) {
+    return fail("needs its skeleton: " + asf.string() + " is not there; name it with --skeleton",
+                files.name);
+  }
+  files.asf_name = asf.string();
+  auto skeleton = load_text(asf);
+  if (!skeleton) return std::unexpected(skeleton.error());
+  files.asf = std::move(*skeleton);
+  return files;
+}
+
+Result<Draft> draft_of(const ClipFiles& files, const ReadOptions& options) {
+  return files.is_amc ? draft_amc(files.text, files.name, files.asf, files.asf_name, options)
+                      : draft_bvh(files.text, files.name, options);
+}
+
+}  // namespace posed::clip

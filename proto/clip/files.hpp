@@ -1,0 +1,26 @@
+// The files that make up one clip, as text; private to proto/clip.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "proto/clip/reader.hpp"
+
+namespace posed::clip {
+
+struct ClipFiles {
+  std::string name;  // of the clip, for errors
+  std::string text;  // of the .bvh or .amc
+  bool is_amc = false;
+  std::string asf_name;  // AMC only
+  std::string asf;
+};
+
+// By extension: .bvh or .amc, the latter with its skeleton.
+[[nodiscard]] Result<ClipFiles> load_files(const std::filesystem::path& path,
+                                           const ReadOptions& options);
+
+// Views in the result point into `files`.
+[[nodiscard]] Result<Draft> draft_of(const ClipFiles& files, const ReadOptions& options);
+
+}  // namespace posed::clip

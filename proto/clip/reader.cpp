@@ -1,0 +1,92 @@
+#include "proto/clip/reader.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "proto/clip/text.hpp"
+
+namespace posed::clip {
+namespace {
+
+constexpr double kSameLength_m = 0.001;
+
+// [frames x channels]; grows with what was really read, whatever a header promised.
+Result<std::vector<double>> read_rows(const Draft& draft, const std::string& name) {
+  std::vector<double> values;
+  std::vector<double> row(draft.parser.channels());
+  std::optional<std::int64_t> before;
+  for (std::size_t i = 0; i < draft.frames.size(); ++i) {
+    const FrameSpan& span = draft.frames[i];
+    const FrameOutcome outcome = draft.parser.parse(span.text, row);
+    if (!outcome.ok()) {
+      const auto lines = std::ranges::count(span.text.substr(0, outcome.offset), '\n');
+      return fail("frame " + std::to_string(i + 1) + ": " + outcome.sentence(), name,
+                  span.line + static_cast<int>(lines));
+    }
+    if (draft.parser.numbered() && before && outcome.number != *before + 1) {
+      return fail("frame " + std::to_string(outcome.number) + " follows frame " +
+                      std::to_string(*before) + "; frames are missing or out of order",
+                  name, span.line);
+    }
+    before = outcome.number;
+    values.insert(values.end(), row.begin(), row.end());
+  }
+  return values;
+}
+
+bool varies(const ChannelMatrix& channels, std::size_t c) {
+  const auto column = channels.col(static_cast<Eigen::Index>(c));
+  return column.maxCoeff() - column.minCoeff() > kSameLength_m;
+}
+
+// The joint whose position is the figure's: the first, from the root on, that the clip moves.
+int find_root_joint(const Skeleton& skeleton, const ChannelMatrix& channels) {
+  for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
+    if (skeleton.channels[c].translation && varies(channels, c)) return skeleton.channels[c].joint;
+  }
+  return 0;
+}
+
+// Position channels of a joint below the root joint replace its OFFSET; a bone keeps its length, so
+// they are constant and become the offset. One that moves is told.
+void settle_offsets(Clip& clip, Skeleton& skeleton) {
+  int told = -1;
+  for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
+    const Channel& channel = skeleton.channels[c];
+    if (!channel.translation || channel.joint <= skeleton.root_joint) continue;
+    Joint& joint = skeleton.joints[channel.joint];
+    const double first_m = clip.channels(0, static_cast<Eigen::Index>(c));
+    double& offset_m = joint.offset_m[static_cast<int>(channel.axis)];
+    if (std::abs(first_m - offset_m) > 0.1 * kSameLength_m) offset_m = first_m;
+    if (channel.joint != told && varies(clip.channels, c)) {
+      told = channel.joint;
+      clip.warnings.push_back("joint '" + joint.name +
+                              "' changes its distance from its parent; posed keeps that of the "
+                              "first frame");
+    }
+  }
+}
+
+}  // namespace
+
+Result<Clip> clip_of(Draft draft, const std::string& name, std::optional<int> root_joint) {
+  if (draft.frames.empty()) return fail("has no frames, so there is nothing to play", name);
+  const auto values = read_rows(draft, name);
+  if (!values) return std::unexpected(values.error());
+  Clip clip;
+  clip.path = name;
+  clip.frame_rate_hz = draft.frame_rate_hz;
+  clip.metres_per_unit = draft.metres_per_unit;
+  clip.warnings = std::move(draft.warnings);
+  clip.channels = Eigen::Map<const ChannelMatrix>(
+      values->data(), std::ssize(draft.frames), static_cast<Eigen::Index>(draft.parser.channels()));
+
+  auto skeleton = std::make_shared<Skeleton>(std::move(draft.skeleton));
+  clip.skeleton = skeleton;
+  skeleton->root_joint = root_joint ? *root_joint : find_root_joint(*skeleton, clip.channels);
+  settle_offsets(clip, *skeleton);
+  if (auto ok = skeleton->finish(); !ok) return fail(ok.error().message, name);
+  return clip;
+}
+
+}  // namespace posed::clip

@@ -1,0 +1,42 @@
+// The steps that all clip readers share, from a file's text to a Clip; private to proto/clip.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/clip/clip.hpp"
+#include "proto/clip/frame_text.hpp"
+
+namespace posed::clip {
+
+// One frame as it stands in the file.
+struct FrameSpan {
+  std::string_view text;
+  int line = 0;  // of its first word
+};
+
+// A clip whose header has been read: what it takes to read the frames.
+struct Draft {
+  Skeleton skeleton;  // metres; not finished
+  FrameParser parser;
+  double frame_rate_hz = 0.0;
+  double metres_per_unit = 1.0;
+  std::string_view header;  // everything before the first frame
+  std::vector<FrameSpan> frames;
+  std::vector<std::string> warnings;
+};
+
+[[nodiscard]] Result<Draft> draft_bvh(std::string_view text, const std::string& name,
+                                      const ReadOptions& options);
+[[nodiscard]] Result<Draft> draft_amc(std::string_view amc, const std::string& amc_name,
+                                      std::string_view asf, const std::string& asf_name,
+                                      const ReadOptions& options);
+
+// Reads the frames and completes the skeleton. `root_joint` is known where the draft holds only the
+// first frame of a clip (a log's device description); else it is found by what moves.
+[[nodiscard]] Result<Clip> clip_of(Draft draft, const std::string& name,
+                                   std::optional<int> root_joint = std::nullopt);
+
+}  // namespace posed::clip

@@ -1,0 +1,111 @@
+#include "proto/clip/text_clip.hpp"
+
+#include <array>
+#include <charconv>
+#include <map>
+
+#include "proto/clip/files.hpp"
+#include "proto/clip/text.hpp"
+
+namespace posed::clip {
+namespace {
+
+// The first line of a description, "posed-clip bvh key=value ...": what the header's text does not
+// say. Its names are parts of the log format.
+constexpr std::string_view kMagic = "posed-clip";
+
+std::string exact(double value) {
+  std::array<char, 64> buffer{};
+  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
+}
+
+std::string describe(const ClipFiles& files, const Draft& draft, const Clip& clip,
+                     const std::string& profile) {
+  std::string out(kMagic);
+  out += files.is_amc ? " amc" : " bvh";
+  out += " rate_hz=" + exact(clip.frame_rate_hz);
+  out += " metres_per_unit=" + exact(clip.metres_per_unit);
+  out += " root_joint=" + std::to_string(clip.skeleton->root_joint);
+  out += " asf_bytes=" + std::to_string(files.asf.size());
+  out += profile.empty() ? "" : " profile=" + profile;
+  out += '\n' + files.asf;
+  out.append(draft.header).append(draft.frames.front().text);
+  return out;
+}
+
+using Facts = std::map<std::string, std::string, std::less<>>;
+
+// A whole number or, for those that are read as such, any; nothing when it is missing or bad.
+std::optional<double> fact(const Facts& facts, std::string_view key) {
+  const auto at = facts.find(key);
+  return at == facts.end() ? std::nullopt : parse_number(at->second);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<const TextClip>> open_text_clip(const std::filesystem::path& path,
+                                                       const ReadOptions& options) {
+  auto files = load_files(path, options);
+  if (!files) return std::unexpected(files.error());
+  const auto draft = draft_of(*files, options);
+  if (!draft) return std::unexpected(draft.error());
+  auto clip = clip_of(*draft, files->name);
+  if (!clip) return std::unexpected(clip.error());
+
+  auto out = std::make_unique<TextClip>();
+  out->format = {
+      .skeleton = clip->skeleton, .frame_rate_hz = clip->frame_rate_hz, .parser = draft->parser};
+  out->description = describe(*files, *draft, *clip, options.profile);
+  out->warnings = std::move(clip->warnings);
+  // The views move with the text: same offsets in its new place.
+  const char* const before = files->text.data();
+  out->text = std::move(files->text);
+  for (const FrameSpan& frame : draft->frames) {
+    out->frames.push_back({out->text.data() + (frame.text.data() - before), frame.text.size()});
+  }
+  return out;
+}
+
+Result<ClipFormat> parse_description(std::string_view description, const std::string& name) {
+  std::string_view body = description;
+  std::string_view line = next_line(body);
+  const std::string_view magic = next_word(line);
+  const std::string_view kind = next_word(line);
+  if (magic != kMagic || (kind != "bvh" && kind != "amc")) {
+    return fail("is no description of a clip", name);
+  }
+  Facts facts;
+  for (std::string_view word = next_word(line); !word.empty(); word = next_word(line)) {
+    const std::size_t equals = std::min(word.find('='), word.size() - 1);
+    facts.emplace(word.substr(0, equals), word.substr(equals + 1));
+  }
+  const auto rate_hz = fact(facts, "rate_hz");
+  const auto metres = fact(facts, "metres_per_unit");
+  const auto root = fact(facts, "root_joint");
+  const auto asf_bytes = fact(facts, "asf_bytes");
+  if (!rate_hz || !metres || !root || !asf_bytes || !(*asf_bytes >= 0.0) ||
+      *asf_bytes > static_cast<double>(body.size()) || !(*root >= 0.0 && *root < kMaxJoints)) {
+    return fail("the description of the clip is damaged", name, 1);
+  }
+  ClipFiles files;
+  files.name = name;
+  files.asf_name = name;
+  files.is_amc = kind == "amc";
+  files.asf = body.substr(0, static_cast<std::size_t>(*asf_bytes));
+  files.text = body.substr(files.asf.size());
+  ReadOptions options;
+  options.amc_rate_hz = *rate_hz;
+  options.metres_per_unit = *metres;
+  if (const auto at = facts.find("profile"); at != facts.end()) options.profile = at->second;
+  auto draft = draft_of(files, options);
+  if (!draft) return std::unexpected(draft.error());
+  ClipFormat format;
+  format.parser = draft->parser;
+  format.frame_rate_hz = *rate_hz;
+  auto clip = clip_of(std::move(*draft), name, static_cast<int>(*root));
+  if (!clip) return std::unexpected(clip.error());
+  format.skeleton = clip->skeleton;
+  return format;
+}
+
+}  // namespace posed::clip
