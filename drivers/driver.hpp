@@ -93,6 +93,7 @@ struct Device {
   Description description;
   std::unique_ptr<Transport> transport;
   std::unique_ptr<Decoder> decoder;
+  std::vector<std::string> warnings;  // one sentence each, for the user: opened, but look at this
 };
 
 // The options a driver takes from its [stream.<driver>] table; config/ checks them against this

@@ -3,12 +3,14 @@
 #include <array>
 
 #include "drivers/driver.hpp"
+#include "drivers/file/file.hpp"
 #include "drivers/template/template.hpp"
 
 namespace posed::drivers {
 
 std::span<const Driver> registry() {
   static const std::array drivers{
+      file_driver(),
       template_driver(),
   };
   return drivers;

@@ -11,14 +11,7 @@ namespace {
 using AddCommand = void (*)(CLI::App& app, int& exit_code);
 
 // The order in which `posed --help` lists them.
-constexpr auto kCommands = std::to_array<AddCommand>({
-    add_ctl,
-    add_monitor,
-    add_top,
-    add_keygen,
-    add_completion,
-    add_bench,
-});
+constexpr std::array<AddCommand, 1> kCommands{add_bench};
 
 }  // namespace
 

@@ -74,7 +74,10 @@ Result<Device> open(const Options& given) {
   if (!transport) return std::unexpected(transport.error());
   auto decoder = make_decoder(*description);
   if (!decoder) return std::unexpected(decoder.error());
-  return Device{std::move(*description), std::move(*transport), std::move(*decoder)};
+  return Device{.description = std::move(*description),
+                .transport = std::move(*transport),
+                .decoder = std::move(*decoder),
+                .warnings = {}};
 }
 
 }  // namespace

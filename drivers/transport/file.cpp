@@ -2,20 +2,18 @@
 
 #include <cmath>
 
-#include "proto/frame/time.hpp"
-
 namespace posed::drivers {
 namespace {
 
 constexpr double kMinPeriod_ns = 1'000.0;
 constexpr double kMaxPeriod_ns = 3'600e9;
 
-Result<std::int64_t> period_of(const Playback& playback) {
+Result<double> period_of(const Playback& playback) {
   if (!(playback.rate_hz > 0.0)) return misuse("the frame rate should be more than 0 Hz");
-  if (playback.pace == 0.0) return 0;
+  if (playback.pace == 0.0) return 0.0;
   const double period_ns = 1e9 / (playback.rate_hz * playback.pace);
   if (playback.pace > 0.0 && period_ns >= kMinPeriod_ns && period_ns <= kMaxPeriod_ns) {
-    return std::llround(period_ns);
+    return period_ns;
   }
   return misuse(
       "pace should be 1 for the clip's own speed, 0 for as fast as possible, or a factor that "
@@ -35,38 +33,25 @@ Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks, const Play
                   std::to_string(kMaxChunk) + " bytes, so it cannot be played");
     }
   }
-  auto transport = std::unique_ptr<FileTransport>(
+  return std::unique_ptr<Transport>(
       new FileTransport(std::move(chunks), *period_ns, playback.loop));
-  if (auto ok = transport->timer_.open(); !ok) return std::unexpected(ok.error());
-  return transport;
 }
 
 Result<> FileTransport::start(std::int64_t now_ns) {
-  // A timer that fell due and is never read stays readable: the daemon asks again at once.
-  timer_.every(now_ns, period_ns_);
+  start_ns_ = now_ns;
   return {};
 }
 
 // RT-safe.
-bool FileTransport::take_due() noexcept {
-  if (period_ns_ == 0) {
-    gave_ = !gave_;  // one chunk a wake-up, so that other devices get their turn
-    return gave_;
-  }
-  if (due_ == 0) due_ = timer_.expirations();
-  if (due_ == 0) return false;
-  --due_;
-  return true;
+std::int64_t FileTransport::next_due_ns() const noexcept {
+  return start_ns_ + std::llround(static_cast<double>(given_) * period_ns_);
 }
 
 // RT-safe.
-Chunk FileTransport::read(std::int64_t /*now_ns*/) noexcept {
-  if (next_ == chunks_.count()) {
-    if (!loop_) return {.bytes = {}, .end = true};
-    next_ = 0;
-  }
-  if (!take_due()) return {};
-  return {.bytes = chunks_[next_++], .end = false};
+Chunk FileTransport::read(std::int64_t now_ns) noexcept {
+  if (!loop_ && given_ == chunks_.count()) return {.bytes = {}, .end = true};
+  if (now_ns < next_due_ns()) return {};
+  return {.bytes = chunks_[given_++ % chunks_.count()], .end = false};
 }
 
 }  // namespace posed::drivers

@@ -21,35 +21,27 @@ Result<std::unique_ptr<Transport>> ReplayTransport::open(Recording recording,
                   std::to_string(kMaxChunk) + " bytes; the log is damaged");
     }
   }
-  auto transport =
-      std::unique_ptr<ReplayTransport>(new ReplayTransport(std::move(recording), origin_ns, speed));
-  if (auto ok = transport->timer_.open(); !ok) return std::unexpected(ok.error());
-  return transport;
+  return std::unique_ptr<Transport>(new ReplayTransport(std::move(recording), origin_ns, speed));
 }
 
 Result<> ReplayTransport::start(std::int64_t now_ns) {
   start_ns_ = now_ns;
-  timer_.at(now_ns);
   return {};
 }
 
 // RT-safe.
-std::int64_t ReplayTransport::due_ns(std::size_t chunk) const noexcept {
+std::int64_t ReplayTransport::next_due_ns() const noexcept {
+  if (speed_ == 0.0 || next_ == recording_.count()) return start_ns_;
   const double waited_ns =
-      (static_cast<double>(recording_.arrival_ns(chunk)) - static_cast<double>(origin_ns_)) /
+      (static_cast<double>(recording_.arrival_ns(next_)) - static_cast<double>(origin_ns_)) /
       speed_;
   return start_ns_ + static_cast<std::int64_t>(std::clamp(waited_ns, 0.0, kLongest_ns));
 }
 
+// RT-safe.
 Chunk ReplayTransport::read(std::int64_t now_ns) noexcept {
   if (next_ == recording_.count()) return {.bytes = {}, .end = true};
-  if (speed_ == 0.0) {
-    gave_ = !gave_;  // one chunk a wake-up, so that other devices get their turn
-    if (!gave_) return {};
-  } else if (const std::int64_t due = due_ns(next_); now_ns < due) {
-    timer_.at(due);
-    return {};
-  }
+  if (now_ns < next_due_ns()) return {};
   return {.bytes = recording_.bytes(next_++), .end = false};
 }
 

@@ -8,7 +8,6 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/chunks.hpp"
-#include "drivers/transport/timer.hpp"
 
 namespace posed::drivers {
 
@@ -40,24 +39,22 @@ class ReplayTransport final : public Transport {
                                                                std::int64_t origin_ns,
                                                                double speed);
 
-  [[nodiscard]] int poll_fd() const noexcept override { return timer_.fd(); }
+  [[nodiscard]] int poll_fd() const noexcept override { return -1; }
+  [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
+  [[nodiscard]] bool patient() const noexcept override { return speed_ == 0.0; }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
-  // Ends with an empty chunk after the last. Where it has to wait it sets the timer, which is a
-  // system call; all else is RT-safe.
+  // Ends with an empty chunk after the last. RT-safe: no system call at all.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 
  private:
   ReplayTransport(Recording recording, std::int64_t origin_ns, double speed)
       : recording_(std::move(recording)), origin_ns_(origin_ns), speed_(speed) {}
-  [[nodiscard]] std::int64_t due_ns(std::size_t chunk) const noexcept;
 
-  Timer timer_;
   Recording recording_;
   std::int64_t origin_ns_;
   double speed_;
   std::int64_t start_ns_ = 0;
   std::size_t next_ = 0;
-  bool gave_ = false;  // unpaced: the last read gave a chunk
 };
 
 }  // namespace posed::drivers

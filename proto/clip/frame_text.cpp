@@ -64,6 +64,8 @@ FrameParser FrameParser::amc(const Acclaim& acclaim, bool degrees) {
   parser.scale_ = scales(acclaim.skeleton, acclaim.metres_per_unit, degrees ? kDegree : 1.0);
   parser.bones_ = acclaim.bones;
   std::ranges::sort(parser.bones_, {}, &AcclaimBone::name);
+  parser.lines_ += static_cast<std::size_t>(std::ranges::count_if(
+      parser.bones_, [](const AcclaimBone& bone) { return !bone.channels.empty(); }));
   return parser;
 }
 

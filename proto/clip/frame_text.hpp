@@ -52,6 +52,10 @@ class FrameParser {
   // Frames carry a number of their own (AMC).
   [[nodiscard]] bool numbered() const noexcept { return !bones_.empty(); }
 
+  // Lines that a frame's text has at least: one; for an AMC its number and a line for each bone
+  // with channels.
+  [[nodiscard]] std::size_t lines() const noexcept { return lines_; }
+
   // `text` to `values` [channels(), rad and m]; they are unspecified unless the outcome is ok.
   // White space and line ends do not matter. RT-safe.
   [[nodiscard]] FrameOutcome parse(std::string_view text, std::span<double> values) const noexcept;
@@ -63,6 +67,7 @@ class FrameParser {
 
   std::vector<double> scale_;       // [channel], file value to rad or m
   std::vector<AcclaimBone> bones_;  // sorted by name; empty for a BVH
+  std::size_t lines_ = 1;
 };
 
 }  // namespace posed::clip

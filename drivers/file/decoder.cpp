@@ -1,0 +1,129 @@
+#include "drivers/file/decoder.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "proto/clip/text.hpp"
+#include "proto/frame/time.hpp"
+
+namespace posed::drivers {
+namespace {
+
+// Words that are numbers, but none a pose can have (nan, inf, 1e300), are the device's mistake;
+// other words are another device's. RT-safe.
+Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
+  switch (parsed.fault) {
+    case clip::FrameFault::kNone:
+      return Outcome::kOk;
+    case clip::FrameFault::kTooFew:
+    case clip::FrameFault::kMissingBone:
+      return Outcome::kShort;
+    case clip::FrameFault::kNotANumber: {
+      double value = 0.0;
+      const char* const end = parsed.where.data() + parsed.where.size();
+      return std::from_chars(parsed.where.data(), end, value).ptr == end ? Outcome::kOutOfRange
+                                                                         : Outcome::kForeign;
+    }
+    default:
+      return Outcome::kForeign;
+  }
+}
+
+// RT-safe.
+bool is_frame_number(std::string_view line) noexcept {
+  return std::ranges::all_of(line, [](char c) { return c >= '0' && c <= '9'; });
+}
+
+}  // namespace
+
+ClipDecoder::ClipDecoder(clip::ClipFormat format)
+    : format_(std::move(format)), values_(format_.parser.channels()), text_(kMaxChunk) {}
+
+// RT-safe.
+void ClipDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                       Sink& sink) noexcept {
+  for (const std::byte byte : bytes) {
+    const char c = static_cast<char>(byte);
+    if (c == '\n' || c == '\r') {
+      end_line(sink);
+    } else if (size_ + 1 < text_.size()) {
+      text_[size_++] = c;  // the last place is kept for the line's end
+    } else if (!skipping_) {
+      skipping_ = true;
+      drop_frame(Outcome::kForeign, sink);
+    }
+  }
+}
+
+// RT-safe.
+void ClipDecoder::end_line(Sink& sink) noexcept {
+  const std::string_view line = clip::trim({text_.data() + line_begin_, size_ - line_begin_});
+  if (skipping_ || line.empty() || line.front() == '#') {
+    skipping_ = false;
+    size_ = line_begin_;
+    return;
+  }
+  text_[size_++] = '\n';
+  if (!format_.parser.numbered()) {
+    finish_frame(sink);
+    return;
+  }
+  if (is_frame_number(line)) {
+    begin_block(line, sink);
+    return;
+  }
+  if (lines_ == 0) {  // between two blocks
+    sink.outcome(Outcome::kForeign);
+    size_ = 0;
+    return;
+  }
+  line_begin_ = size_;
+  // A block has no end mark. It is whole once every bone is there, so that a frame need not wait
+  // for the next one to begin.
+  if (++lines_ >= format_.parser.lines()) finish_frame(sink);
+}
+
+// RT-safe.
+void ClipDecoder::begin_block(std::string_view line, Sink& sink) noexcept {
+  const char* const begin = line.data();
+  const std::size_t length = line.size();
+  if (lines_ > 0) drop_frame(Outcome::kShort, sink);
+  std::copy(begin, begin + length, text_.begin());
+  text_[length] = '\n';
+  size_ = line_begin_ = length + 1;
+  lines_ = 1;
+}
+
+// RT-safe.
+void ClipDecoder::finish_frame(Sink& sink) noexcept {
+  const clip::FrameOutcome parsed = format_.parser.parse({text_.data(), size_}, values_);
+  const Outcome outcome = outcome_of(parsed);
+  // A bone may be spread over two lines; garbage without an end is not waited for.
+  if (outcome == Outcome::kShort && lines_ > 0 && lines_ < 2 * format_.parser.lines()) return;
+  if (outcome != Outcome::kOk) {
+    drop_frame(outcome, sink);
+    return;
+  }
+  Frame frame;
+  frame.header.device_ns = next_time_ns();
+  frame.source = Source::kFile;
+  pose_from_channels(*format_.skeleton, values_, frame);
+  size_ = line_begin_ = lines_ = 0;
+  sink.outcome(Outcome::kOk);
+  sink.frame(frame);
+}
+
+// RT-safe.
+void ClipDecoder::drop_frame(Outcome outcome, Sink& sink) noexcept {
+  size_ = line_begin_ = lines_ = 0;
+  (void)next_time_ns();
+  sink.outcome(outcome);
+}
+
+// RT-safe.
+std::int64_t ClipDecoder::next_time_ns() noexcept {
+  return nanoseconds(static_cast<double>(frames_++) / format_.frame_rate_hz);
+}
+
+}  // namespace posed::drivers

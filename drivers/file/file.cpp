@@ -1,0 +1,101 @@
+#include "drivers/file/file.hpp"
+
+#include "drivers/file/decoder.hpp"
+#include "drivers/options.hpp"
+#include "drivers/transport/file.hpp"
+#include "proto/clip/text_clip.hpp"
+
+namespace posed::drivers {
+namespace {
+
+Result<Description> describe(const std::string& text, const std::string& identity) {
+  auto format = clip::parse_description(text, identity);
+  if (!format) return std::unexpected(format.error());
+  return Description{.driver = "file",
+                     .text = text,
+                     .identity = identity,
+                     .skeleton = std::move(format->skeleton),
+                     .samples = {},
+                     .rate_hz = format->frame_rate_hz};
+}
+
+Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
+  auto format = clip::parse_description(description.text, description.identity);
+  if (!format) return std::unexpected(format.error());
+  return std::make_unique<ClipDecoder>(std::move(*format));
+}
+
+// One chunk a frame, ended as a line is ended, so that the decoder knows it for whole.
+Chunks frames_of(const clip::TextClip& clip) {
+  Chunks chunks;
+  for (const std::string_view frame : clip.frames) {
+    chunks.add(frame.ends_with('\n') ? std::string(frame) : std::string(frame) + '\n');
+  }
+  return chunks;
+}
+
+Result<Device> open(const Options& given) {
+  const auto options = complete_options(file_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const std::string path = option<std::string>(*options, "path");
+  const clip::ReadOptions read{.asf = option<std::string>(*options, "skeleton"),
+                               .amc_rate_hz = option<double>(*options, "rate_hz"),
+                               .metres_per_unit = std::nullopt,
+                               .profile = option<std::string>(*options, "profile")};
+  const auto clip = clip::open_text_clip(path, read);
+  if (!clip) return std::unexpected(clip.error());
+  auto description = describe((*clip)->description, path);
+  if (!description) return std::unexpected(description.error());
+  auto transport = FileTransport::open(frames_of(**clip), {.rate_hz = description->rate_hz,
+                                                           .pace = option<double>(*options, "pace"),
+                                                           .loop = option<bool>(*options, "loop")});
+  if (!transport) {
+    Error error = transport.error();
+    error.file = path;
+    return std::unexpected(std::move(error));
+  }
+  auto decoder = make_decoder(*description);
+  if (!decoder) return std::unexpected(decoder.error());
+  return Device{.description = std::move(*description),
+                .transport = std::move(*transport),
+                .decoder = std::move(*decoder),
+                .warnings = (*clip)->warnings};
+}
+
+std::vector<OptionSpec> options() {
+  return {
+      {.name = "path",
+       .default_value = std::string(),
+       .required = true,
+       .is_path = true,
+       .help = "the clip, a .bvh or an .amc"},
+      {.name = "skeleton",
+       .default_value = std::string(),
+       .is_path = true,
+       .help = "the .asf of an .amc; left out, NN.asf beside NN_MM.amc"},
+      {.name = "loop", .default_value = true, .help = "begin again after the last frame"},
+      {.name = "pace",
+       .default_value = 1.0,
+       .help = "factor on the clip's own speed; 0 is as fast as possible"},
+      {.name = "rate_hz",
+       .default_value = 120.0,
+       .help = "frames a second of an .amc, which does not say"},
+      {.name = "profile",
+       .default_value = std::string(),
+       .help = "skeleton profile; left out, found by the joints' names"},
+  };
+}
+
+}  // namespace
+
+const Driver& file_driver() {
+  static const Driver driver{.name = "file",
+                             .summary = "a BVH or AMC clip, played by its own clock",
+                             .options = options(),
+                             .open = open,
+                             .make_decoder = make_decoder,
+                             .describe = describe};
+  return driver;
+}
+
+}  // namespace posed::drivers

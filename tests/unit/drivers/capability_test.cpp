@@ -1,0 +1,295 @@
+// What every driver in the registry must hold, run on a specimen of each.
+#include <catch2/catch.hpp>
+
+#include <random>
+#include <set>
+
+#include "tests/unit/drivers/allocations.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/specimens.hpp"
+
+namespace posed::drivers {
+namespace {
+
+using test::Bytes;
+using test::CollectSink;
+using test::Specimen;
+
+std::unique_ptr<Decoder> new_decoder(const Description& description) {
+  auto decoder = find_driver(description.driver)->make_decoder(description);
+  if (!decoder) FAIL(decoder.error().text());
+  return std::move(*decoder);
+}
+
+Bytes joined(const std::vector<Bytes>& chunks) {
+  Bytes all;
+  for (const Bytes& chunk : chunks) all.insert(all.end(), chunk.begin(), chunk.end());
+  return all;
+}
+
+// `bytes` cut at random into pieces of up to `longest` bytes, as a serial port would.
+void feed_in_pieces(Decoder& decoder, std::span<const std::byte> bytes, std::size_t longest,
+                    std::mt19937& random, Sink& sink) {
+  while (!bytes.empty()) {
+    const std::size_t length = std::min(bytes.size(), 1 + random() % longest);
+    decoder.feed(bytes.first(length), 0, sink);
+    bytes = bytes.subspan(length);
+  }
+}
+
+void check_same(const CollectSink& got, const CollectSink& expected) {
+  CHECK(got.outcomes == expected.outcomes);
+  REQUIRE(got.frames.size() == expected.frames.size());
+  REQUIRE(got.samples.size() == expected.samples.size());
+  for (std::size_t i = 0; i < got.frames.size(); ++i) {
+    CHECK(test::same_pose(got.frames[i], expected.frames[i]));
+    CHECK(got.frames[i].header.device_ns == expected.frames[i].header.device_ns);
+  }
+  for (std::size_t i = 0; i < got.samples.size(); ++i) {
+    CHECK(test::same_values(got.samples[i], expected.samples[i]));
+    CHECK(got.samples[i].header.device_ns == expected.samples[i].header.device_ns);
+  }
+}
+
+void check_sound(const CollectSink& sink) {
+  bool sound = true;
+  std::int64_t before_ns = kNoTime_ns;
+  for (const Frame& frame : sink.frames) {
+    sound = sound && test::is_sound(frame) && frame.header.device_ns > before_ns;
+    before_ns = frame.header.device_ns;
+  }
+  for (const Sample& sample : sink.samples) sound = sound && test::is_sound(sample);
+  CHECK(sound);
+}
+
+}  // namespace
+
+TEST_CASE("every driver of the registry has a specimen, a summary and help for its options") {
+  std::set<std::string_view> names;
+  for (const Driver& driver : registry()) {
+    INFO(driver.name);
+    CHECK(names.insert(driver.name).second);
+    CHECK(find_driver(driver.name) == &driver);
+    CHECK_FALSE(driver.summary.empty());
+    for (const OptionSpec& option : driver.options) CHECK_FALSE(option.help.empty());
+    CHECK(std::ranges::count(test::specimens(), driver.name, &Specimen::driver) > 0);
+  }
+  CHECK(find_driver("no such driver") == nullptr);
+}
+
+TEST_CASE("a chunk is decoded at once, whole, and every loop is like the one before") {
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    const auto chunks = test::read_chunks(*device.transport, 3 * specimen.loop_chunks);
+    CollectSink sink;
+    for (std::size_t i = 0; i < chunks.size(); ++i) {
+      device.decoder->feed(chunks[i], 0, sink);
+      CHECK(sink.frames.size() == (i + 1) * specimen.chunk_frames);
+      CHECK(sink.samples.size() == (i + 1) * specimen.chunk_samples);
+    }
+    CHECK(sink.count(Outcome::kOk) == static_cast<int>(chunks.size()));
+    check_sound(sink);
+    const std::size_t loop = specimen.loop_chunks * specimen.chunk_frames;
+    for (std::size_t i = loop; i < sink.frames.size(); ++i) {
+      CHECK(test::same_pose(sink.frames[i], sink.frames[i - loop]));
+      const auto step_ns = sink.frames[i].header.device_ns - sink.frames[i - 1].header.device_ns;
+      CHECK(seconds(step_ns) == Approx(1.0 / device.description.rate_hz).margin(2e-9));
+    }
+    const std::size_t round = specimen.loop_chunks * specimen.chunk_samples;
+    for (std::size_t i = round; i < sink.samples.size(); ++i) {
+      CHECK(test::same_values(sink.samples[i], sink.samples[i - round]));
+    }
+  }
+}
+
+TEST_CASE("frames and samples are what the description announces") {
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    CollectSink sink;
+    for (const Bytes& chunk : test::read_chunks(*device.transport, specimen.loop_chunks)) {
+      device.decoder->feed(chunk, 0, sink);
+    }
+    const Description& description = device.description;
+    CHECK(description.driver == specimen.driver);
+    CHECK(description.samples.names.size() == description.samples.units.size());
+    for (const Frame& frame : sink.frames) {
+      REQUIRE(description.skeleton != nullptr);
+      CHECK(frame.skeleton == description.skeleton->id);
+      CHECK(frame.joint_count == description.skeleton->joints.size());
+    }
+    for (const Sample& sample : sink.samples) {
+      CHECK(sample.value_count == description.samples.names.size());
+    }
+  }
+}
+
+TEST_CASE("any cut of the bytes gives the same frames") {
+  std::mt19937 random(7);
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    const Bytes bytes = joined(test::read_chunks(*device.transport, 2 * specimen.loop_chunks));
+    CollectSink whole;
+    device.decoder->feed(bytes, 0, whole);
+    CHECK(whole.frames.size() == 2 * specimen.loop_chunks * specimen.chunk_frames);
+    for (const std::size_t longest : {1U, 2U, 7U, 100U, 1000U}) {
+      CollectSink cut;
+      feed_in_pieces(*new_decoder(device.description), bytes, longest, random, cut);
+      check_same(cut, whole);
+    }
+  }
+}
+
+TEST_CASE("a log's text and identity build the same device again") {
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    const Description& live = device.description;
+    const auto again = find_driver(live.driver)->describe(live.text, live.identity);
+    if (!again) FAIL(again.error().text());
+    CHECK(again->driver == live.driver);
+    CHECK(again->text == live.text);
+    CHECK(again->identity == live.identity);
+    CHECK(again->rate_hz == live.rate_hz);
+    CHECK(again->samples.names == live.samples.names);
+    CHECK(again->samples.units == live.samples.units);
+    REQUIRE((again->skeleton == nullptr) == (live.skeleton == nullptr));
+    if (live.skeleton) {
+      CHECK(again->skeleton->id == live.skeleton->id);
+      CHECK(again->skeleton->root_joint == live.skeleton->root_joint);
+    }
+    CollectSink here;
+    CollectSink there;
+    const auto decoder = new_decoder(*again);
+    for (const Bytes& chunk : test::read_chunks(*device.transport, specimen.loop_chunks)) {
+      device.decoder->feed(chunk, 0, here);
+      decoder->feed(chunk, 0, there);
+    }
+    check_same(there, here);
+  }
+}
+
+TEST_CASE("a damaged description is refused in a sentence, never a crash") {
+  std::mt19937 random(11);
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    const Device device = test::open_device(specimen);
+    const Driver& driver = *find_driver(specimen.driver);
+    CHECK_FALSE(driver.describe("", "x"));
+    CHECK_FALSE(driver.describe("foreign", "x"));
+    for (int i = 0; i < 500; ++i) {
+      std::string text =
+          device.description.text.substr(0, random() % device.description.text.size());
+      for (int flips = 0; flips < i % 3 && !text.empty(); ++flips) {
+        text[random() % text.size()] = static_cast<char>(random());
+      }
+      const auto description = driver.describe(text, "x");
+      if (description) continue;  // what is missing or changed may not matter
+      CHECK_FALSE(description.error().message.empty());
+      CHECK(description.error().message.find('\n') == std::string::npos);
+    }
+  }
+}
+
+TEST_CASE("garbage and flipped bytes are counted, never a crash or a pose that is none") {
+  std::mt19937 random(13);
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    const Bytes good = joined(test::read_chunks(*device.transport, specimen.loop_chunks));
+    for (int round = 0; round < 200; ++round) {
+      const auto decoder = new_decoder(device.description);
+      CollectSink sink(100'000);
+      Bytes bad = good;
+      for (int flips = 0; flips <= round % 20; ++flips) {
+        bad[random() % bad.size()] = static_cast<std::byte>(random());
+      }
+      feed_in_pieces(*decoder, bad, 300, random, sink);
+      Bytes noise(random() % 3000);
+      for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
+      feed_in_pieces(*decoder, noise, 300, random, sink);
+      check_sound(sink);
+      // It finds its way back: of two more loops the second is decoded in full.
+      feed_in_pieces(*decoder, good, 300, random, sink);
+      sink.clear();
+      feed_in_pieces(*decoder, good, 300, random, sink);
+      CHECK(sink.frames.size() == specimen.loop_chunks * specimen.chunk_frames);
+    }
+  }
+}
+
+TEST_CASE("input without an end is given up, and the stream goes on after it") {
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    CollectSink sink(100'000);
+    const Bytes endless(3 * kMaxChunk, std::byte{'7'});
+    device.decoder->feed(endless, 0, sink);
+    CHECK(sink.frames.empty());
+    int counted = 0;
+    for (const int count : sink.outcomes) counted += count;
+    CHECK(counted >= 1);
+    CHECK(counted < 10);
+    sink.clear();
+    const auto chunks = test::read_chunks(*device.transport, specimen.loop_chunks);
+    for (const Bytes& chunk : chunks) device.decoder->feed(chunk, 0, sink);
+    CHECK(sink.frames.size() + 1 >= chunks.size() * specimen.chunk_frames);
+  }
+}
+
+TEST_CASE("feeding takes nothing from the heap, whatever the bytes are") {
+  const std::uint64_t start = test::allocations();
+  int* volatile seen = new int(1);  // volatile: the compiler may not leave it out
+  delete seen;
+  REQUIRE(test::allocations() > start);  // the counter counts
+  std::mt19937 random(17);
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    Bytes bytes = joined(test::read_chunks(*device.transport, specimen.loop_chunks));
+    Bytes bad = bytes;
+    for (int flips = 0; flips < 20; ++flips) bad[random() % bad.size()] ^= std::byte{0x55};
+    CollectSink sink;
+    const std::uint64_t before = test::allocations();
+    device.decoder->feed(bytes, 0, sink);
+    device.decoder->feed(bad, 0, sink);
+    device.decoder->feed(bytes, 0, sink);
+    CHECK(test::allocations() == before);
+    CHECK_FALSE(sink.frames.empty());
+  }
+}
+
+TEST_CASE("reading takes nothing from the heap") {
+  for (const Specimen& specimen : test::specimens()) {
+    INFO(specimen.name);
+    Device device = test::open_device(specimen);
+    (void)test::read_chunks(*device.transport, 1);
+    const std::uint64_t before = test::allocations();
+    std::size_t bytes = 0;
+    for (int i = 0; i < 1000; ++i) bytes += device.transport->read(0).bytes.size();
+    CHECK(test::allocations() == before);
+  }
+}
+
+TEST_CASE("wrong options are refused in a sentence that names them") {
+  for (const Driver& driver : registry()) {
+    INFO(driver.name);
+    const auto unknown = driver.open({{"no_such_option", true}});
+    REQUIRE_FALSE(unknown);
+    CHECK(unknown.error().message.find("no_such_option") != std::string::npos);
+    CHECK(unknown.error().exit_code == ExitCode::kWrongUse);
+    for (const OptionSpec& option : driver.options) {
+      const bool is_bool = std::holds_alternative<bool>(option.default_value);
+      const OptionValue wrong = is_bool ? OptionValue(std::string("x")) : OptionValue(true);
+      Options options{{"path", std::string("x")}};
+      options[std::string(option.name)] = wrong;
+      const auto device = driver.open(options);
+      REQUIRE_FALSE(device);
+      CHECK(device.error().exit_code == ExitCode::kWrongUse);
+    }
+  }
+}
+
+}  // namespace posed::drivers

@@ -1,0 +1,169 @@
+#include "tests/unit/drivers/specimens.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <unistd.h>
+
+#include <fstream>
+
+namespace posed::test {
+namespace {
+
+struct ScratchFolder {
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("posed-drivers-" + std::to_string(::getpid()));
+  ScratchFolder() { std::filesystem::create_directories(path); }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path, ignored);
+  }
+};
+
+std::vector<Specimen> make_specimens() {
+  const auto bvh = scratch_file("small.bvh", small_bvh());
+  const auto amc = scratch_file("01_02.amc", small_amc());
+  const auto asf = scratch_file("small.asf", small_asf());
+  return {
+      {.name = "file, bvh",
+       .driver = "file",
+       .options = {{"path", bvh.string()}, {"pace", 0.0}},
+       .loop_chunks = 5,
+       .chunk_frames = 1},
+      {.name = "file, amc",
+       .driver = "file",
+       .options = {{"path", amc.string()}, {"skeleton", asf.string()}, {"pace", 0.0}},
+       .loop_chunks = 5,
+       .chunk_frames = 1},
+      {.name = "template",
+       .driver = "template",
+       .options = {},
+       .loop_chunks = 256,
+       .chunk_frames = 1,
+       .chunk_samples = 1},
+  };
+}
+
+}  // namespace
+
+const std::vector<Specimen>& specimens() {
+  static const std::vector<Specimen> all = make_specimens();
+  return all;
+}
+
+drivers::Device open_device(const Specimen& specimen) {
+  const drivers::Driver* driver = drivers::find_driver(specimen.driver);
+  REQUIRE(driver != nullptr);
+  auto device = driver->open(specimen.options);
+  if (!device) FAIL(device.error().text());
+  return std::move(*device);
+}
+
+std::vector<Bytes> read_chunks(drivers::Transport& transport, std::size_t count) {
+  REQUIRE(transport.start(0));
+  std::vector<Bytes> chunks;
+  while (chunks.size() < count) {
+    const drivers::Chunk chunk = transport.read(transport.next_due_ns());
+    REQUIRE_FALSE(chunk.end);
+    REQUIRE_FALSE(chunk.bytes.empty());
+    chunks.emplace_back(chunk.bytes.begin(), chunk.bytes.end());
+  }
+  return chunks;
+}
+
+std::filesystem::path scratch_file(const std::string& name, const std::string& text) {
+  static const ScratchFolder folder;
+  const auto path = folder.path / name;
+  std::ofstream(path, std::ios::binary) << text;
+  return path;
+}
+
+std::string small_bvh() {
+  return "HIERARCHY\n"
+         "ROOT Reference\n"
+         "{\n"
+         "  OFFSET 0 0 0\n"
+         "  CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n"
+         "  JOINT Hips\n"
+         "  {\n"
+         "    OFFSET 0 90 0\n"
+         "    CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
+         "    JOINT Head\n"
+         "    {\n"
+         "      OFFSET 0 60 0\n"
+         "      CHANNELS 3 Zrotation Xrotation Yrotation\n"
+         "      End Site\n"
+         "      {\n"
+         "        OFFSET 0 20 0\n"
+         "      }\n"
+         "    }\n"
+         "  }\n"
+         "}\n"
+         "MOTION\n"
+         "Frames: 5\n"
+         "Frame Time: 0.0083333\n"
+         "0 0 0 0 0 0 1 95 0 10 -20 30 1.5 2.5 3.5\n"
+         "0 0 0 0 0 0 1 95 2 11 -21 31 1.6 2.4 3.4\n"
+         "0 0 0 0 0 0 1 95 4 12 -22 32 1.7 2.3 3.3\n"
+         "0 0 0 0 0 0 1 95 6 13 -23 33 1.8 2.2 3.2\n"
+         "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
+}
+
+std::string small_asf() {
+  return ":version 1.10\n"
+         ":name small\n"
+         ":units\n"
+         "  mass 1.0\n"
+         "  length 0.45\n"
+         "  angle deg\n"
+         ":root\n"
+         "  order TX TY TZ RX RY RZ\n"
+         "  axis XYZ\n"
+         "  position 0 0 0\n"
+         "  orientation 0 0 0\n"
+         ":bonedata\n"
+         "  begin\n"
+         "    id 1\n"
+         "    name lhipjoint\n"
+         "    direction 0.6 -0.8 0\n"
+         "    length 2\n"
+         "    axis 0 0 0 XYZ\n"
+         "  end\n"
+         "  begin\n"
+         "    id 2\n"
+         "    name lfemur\n"
+         "    direction 0 -1 0\n"
+         "    length 7\n"
+         "    axis 0 0 20 XYZ\n"
+         "    dof rx ry rz\n"
+         "    limits (-160.0 20.0)\n"
+         "           (-70.0 70.0)\n"
+         "           (-60.0 70.0)\n"
+         "  end\n"
+         "  begin\n"
+         "    id 3\n"
+         "    name ltibia\n"
+         "    direction 0 -1 0\n"
+         "    length 7\n"
+         "    axis 0 0 20 XYZ\n"
+         "    dof rx\n"
+         "    limits (-10.0 170.0)\n"
+         "  end\n"
+         ":hierarchy\n"
+         "  begin\n"
+         "    root lhipjoint\n"
+         "    lhipjoint lfemur\n"
+         "    lfemur ltibia\n"
+         "  end\n";
+}
+
+std::string small_amc() {
+  std::string text = "#!OML:ASF small\n:FULLY-SPECIFIED\n:DEGREES\n";
+  for (int i = 1; i <= 5; ++i) {
+    const std::string n = std::to_string(i);
+    text += n + "\nroot 1." + n + " 15 " + n + " 5 4 " + n + "\nlfemur 10." + n +
+            " -5 6\nltibia 2" + n + "\n";
+  }
+  return text;
+}
+
+}  // namespace posed::test

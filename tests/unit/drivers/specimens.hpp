@@ -1,0 +1,38 @@
+// One opened device of each kind that posed drives: what the tests of tests/unit/drivers run on. A
+// new driver adds its specimen here and is then held to all that drivers promise.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/driver.hpp"
+
+namespace posed::test {
+
+using Bytes = std::vector<std::byte>;
+
+struct Specimen {
+  std::string name;
+  std::string driver;
+  drivers::Options options;      // of a looped stream
+  std::size_t loop_chunks = 0;   // after which the input repeats
+  std::size_t chunk_frames = 0;  // a chunk gives
+  std::size_t chunk_samples = 0;
+};
+
+// Makes the clips they play in a folder of its own, removed at exit.
+[[nodiscard]] const std::vector<Specimen>& specimens();
+
+[[nodiscard]] drivers::Device open_device(const Specimen& specimen);
+[[nodiscard]] std::vector<Bytes> read_chunks(drivers::Transport& transport, std::size_t count);
+
+// A file of this text in that folder.
+[[nodiscard]] std::filesystem::path scratch_file(const std::string& name, const std::string& text);
+
+// Small clips, whole: five frames each.
+[[nodiscard]] std::string small_bvh();
+[[nodiscard]] std::string small_asf();
+[[nodiscard]] std::string small_amc();
+
+}  // namespace posed::test
