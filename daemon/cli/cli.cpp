@@ -11,7 +11,14 @@ namespace {
 using AddCommand = void (*)(CLI::App& app, int& exit_code);
 
 // The order in which `posed --help` lists them.
-constexpr std::array<AddCommand, 1> kCommands{add_bench};
+constexpr auto kCommands = std::to_array<AddCommand>({
+    add_ctl,
+    add_monitor,
+    add_top,
+    add_keygen,
+    add_completion,
+    add_bench,
+});
 
 }  // namespace
 

@@ -19,6 +19,11 @@ namespace posed::cli {
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.
 [[nodiscard]] int report(const Error& error);
 
+void add_ctl(CLI::App& app, int& exit_code);
+void add_monitor(CLI::App& app, int& exit_code);
+void add_top(CLI::App& app, int& exit_code);
+void add_keygen(CLI::App& app, int& exit_code);
+void add_completion(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_bench_predict(CLI::App& bench, int& exit_code);
 

@@ -154,11 +154,6 @@ Result<PoseSpace> PoseSpace::bind(const PoseSpaceSpec& spec, const Skeleton& ske
     } else {
       item.mean = spec.mean[i];
     }
-    for (int c = 0, angle = 0; c < static_cast<int>(skeleton.channels.size()); ++c) {
-      if (skeleton.channels[c].translation) continue;
-      if (skeleton.channels[c].joint == item.joint && item.angles++ == 0) item.first_angle = angle;
-      ++angle;
-    }
     space.joint_of_dim_.insert(space.joint_of_dim_.end(), item.dims, static_cast<int>(i));
     space.items_.push_back(item);
   }
@@ -184,6 +179,11 @@ Quaterniond PoseSpace::base(const Item& item, const Frame& frame,
     rotation = rotation * to_eigen_double(frame.rotation_xyzw[chain_[i]]);
   }
   return rotation;
+}
+
+// RT-safe
+bool PoseSpace::has_heading(const Frame& frame) const noexcept {
+  return measured(items_[root_], frame);
 }
 
 // RT-safe
@@ -236,19 +236,6 @@ Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rotation, co
 }
 
 // RT-safe
-void PoseSpace::set_rotation(const Item& item, const Quaterniond& local,
-                             Frame& frame) const noexcept {
-  frame.rotation_xyzw[item.joint] = from_eigen(local.normalized());
-  if (frame.angle_count == 0) return;
-  std::array<double, 3> near_rad{};
-  for (int i = 0; i < item.angles; ++i) near_rad[i] = frame.angle_rad[item.first_angle + i];
-  const auto angles = channels_from_rotation(*skeleton_, item.joint, local, near_rad);
-  for (int i = 0; i < item.angles; ++i) {
-    frame.angle_rad[item.first_angle + i] = static_cast<float>(angles[i]);
-  }
-}
-
-// RT-safe
 void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
                     std::span<const float> delta) const noexcept {
   for (const Item& item : items_) {
@@ -260,7 +247,7 @@ void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
     const Quaterniond local = to_base.conjugate() *
                               changed(item, now, &q[item.first_dim], change.data()) *
                               item.after.conjugate();
-    set_rotation(item, local, frame);
+    set_rotation(*skeleton_, item.joint, local, frame);
   }
 }
 

@@ -53,6 +53,7 @@ class PoseSpace {
   // Refuses a skeleton that cannot serve the space, naming the missing joints.
   [[nodiscard]] static Result<PoseSpace> bind(const PoseSpaceSpec& spec, const Skeleton& skeleton);
 
+  [[nodiscard]] const Skeleton& skeleton() const noexcept { return *skeleton_; }
   [[nodiscard]] int dims() const noexcept;
   // Which joint of `spec.joints` dimension d belongs to.
   [[nodiscard]] int joint_of_dim(int d) const noexcept;
@@ -60,6 +61,9 @@ class PoseSpace {
   // Turn about +Y that brings the training mean of the root nearest to this frame's root [rad].
   // RT-safe.
   [[nodiscard]] double heading_rad(const Frame& frame) const noexcept;
+
+  // False where this frame did not measure the root: heading_rad() then says nothing. RT-safe.
+  [[nodiscard]] bool has_heading(const Frame& frame) const noexcept;
 
   // q [dims] of `frame` seen from `heading_rad`; available[d] is 0 where the joint was not measured
   // (q is then 0, the training mean). RT-safe.
@@ -82,7 +86,6 @@ class PoseSpace {
     int dims = 3;
     std::uint8_t axes = 7;  // cmu43: bit x = 1, y = 2, z = 4 of the listed degrees of freedom
     int chain_begin = 0, chain_end = 0;  // of chain_: joints between V's base and `joint`
-    int first_angle = 0, angles = 0;     // of Frame::angle_rad
     Eigen::Quaterniond before = Eigen::Quaterniond::Identity();
     Eigen::Quaterniond after = Eigen::Quaterniond::Identity();
     Eigen::Quaterniond mean = Eigen::Quaterniond::Identity();
@@ -94,7 +97,6 @@ class PoseSpace {
                                         double heading_rad) const noexcept;
   [[nodiscard]] Eigen::Quaterniond changed(const Item& item, const Eigen::Quaterniond& rotation,
                                            const float* q, const float* delta) const noexcept;
-  void set_rotation(const Item& item, const Eigen::Quaterniond& local, Frame& frame) const noexcept;
 
   std::shared_ptr<const Skeleton> skeleton_;
   std::vector<Item> items_;

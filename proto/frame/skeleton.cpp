@@ -276,4 +276,19 @@ std::array<double, 3> channels_from_rotation(const Skeleton& skeleton, int joint
   return {};
 }
 
+void set_rotation(const Skeleton& skeleton, int joint, const Eigen::Quaterniond& rotation,
+                  Frame& frame) noexcept {
+  frame.rotation_xyzw[static_cast<std::size_t>(joint)] = from_eigen(rotation.normalized());
+  if (frame.angle_count == 0) return;
+  const auto turns = [](const Channel& channel) { return !channel.translation; };
+  const std::span<const Channel> channels = channels_of(skeleton, joint);
+  float* const angles =
+      frame.angle_rad.data() + std::count_if(skeleton.channels.data(), channels.data(), turns);
+  const auto count = static_cast<std::size_t>(std::ranges::count_if(channels, turns));
+  std::array<double, 3> near_rad{};
+  std::copy_n(angles, count, near_rad.begin());
+  const auto turned = channels_from_rotation(skeleton, joint, rotation, near_rad);
+  for (std::size_t i = 0; i < count; ++i) angles[i] = static_cast<float>(turned[i]);
+}
+
 }  // namespace posed

@@ -74,9 +74,14 @@ void pose_from_channels(const Skeleton& skeleton, std::span<const double> values
 
 // The three Euler angles [rad] of `rotation` in the joint's own channel order (first listed
 // outermost), the turn nearest to `near_rad`. For fewer than three axes the closest the joint can
-// do.
+// do. RT-safe.
 [[nodiscard]] std::array<double, 3> channels_from_rotation(const Skeleton& skeleton, int joint,
                                                            const Eigen::Quaterniond& rotation,
                                                            const std::array<double, 3>& near_rad);
+
+// Turns one joint of the frame anew: its rotation and, where the frame carries angles, the nearest
+// values of its channels. RT-safe.
+void set_rotation(const Skeleton& skeleton, int joint, const Eigen::Quaterniond& rotation,
+                  Frame& frame) noexcept;
 
 }  // namespace posed

@@ -1,0 +1,155 @@
+#include "daemon/cli/client.hpp"
+
+#include <array>
+#include <csignal>
+#include <cstring>
+
+#include <CLI/CLI.hpp>
+
+namespace posed::cli {
+namespace {
+
+using control::Domain;
+
+// A client never shows old poses: what it does not take in time waits nowhere for long.
+constexpr int kMessagesWaiting = 16;
+constexpr int kReceiveBuffer = 8 * 1024;  // bytes
+
+constexpr const char* kMonitorEndpoint = "inproc://posed.connection";
+constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
+                        ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
+                        ZMQ_EVENT_DISCONNECTED;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+// The first part of a monitor's message: event and value (zmq_socket_monitor).
+std::uint16_t read_event(void* monitor) {
+  control::Message part;
+  if (!part.receive(monitor)) return 0;
+  std::uint16_t event = 0;
+  if (part.text().size() >= sizeof event) std::memcpy(&event, part.text().data(), sizeof event);
+  while (part.more() && part.receive(monitor, 0)) {
+  }
+  return event;
+}
+
+Result<control::Socket> watch(void* context, void* socket) {
+  if (zmq_socket_monitor(socket, kMonitorEndpoint, kEvents) != 0) {
+    return fail(std::string("cannot watch the connection: ") + zmq_strerror(zmq_errno()));
+  }
+  auto monitor = control::open_socket(context, ZMQ_PAIR);
+  if (!monitor) return monitor;
+  if (auto done = control::connect_socket(monitor->get(), kMonitorEndpoint); !done) {
+    return std::unexpected(done.error());
+  }
+  return monitor;
+}
+
+}  // namespace
+
+void add_client_options(CLI::App& command, ClientOptions& options, const char* endpoint) {
+  options.endpoint = endpoint;
+  command.add_option("--connect", options.endpoint, "The daemon's endpoint")
+      ->capture_default_str()
+      ->type_name("ENDPOINT");
+  auto* key = command.add_option("--key", options.key, "Own secret key (NAME.key)");
+  auto* server =
+      command.add_option("--server-key", options.server_key, "The daemon's public key (NAME.pub)");
+  key->type_name("FILE")->needs(server);
+  server->type_name("FILE")->needs(key);
+}
+
+Result<Connection> Connection::open(const ClientOptions& options, int type) {
+  auto context = control::open_context();
+  if (!context) return std::unexpected(context.error());
+  auto socket = control::open_socket(context->get(), type);
+  if (!socket) return std::unexpected(socket.error());
+  if (!options.key.empty()) {
+    auto secured = control::secure_client(socket->get(), options.key, options.server_key);
+    if (!secured) return std::unexpected(secured.error());
+  }
+  if (type == ZMQ_SUB) {
+    for (const auto& set : {control::set_option(socket->get(), ZMQ_RCVHWM, kMessagesWaiting),
+                            control::set_option(socket->get(), ZMQ_RCVBUF, kReceiveBuffer)}) {
+      if (!set) return std::unexpected(set.error());
+    }
+  }
+  auto monitor = watch(context->get(), socket->get());
+  if (!monitor) return std::unexpected(monitor.error());
+  if (auto done = control::connect_socket(socket->get(), options.endpoint); !done) {
+    return std::unexpected(done.error());
+  }
+  return Connection(options, type == ZMQ_SUB ? Domain::kPublish : Domain::kControl,
+                    std::move(*context), std::move(*socket), std::move(*monitor));
+}
+
+Connection::Connection(ClientOptions options, Domain domain, control::Context context,
+                       control::Socket socket, control::Socket monitor)
+    : options_(std::move(options)),
+      domain_(domain),
+      context_(std::move(context)),
+      socket_(std::move(socket)),
+      monitor_(std::move(monitor)) {}
+
+bool Connection::wait(std::chrono::milliseconds timeout) {
+  zmq_pollitem_t item{socket_.get(), 0, ZMQ_POLLIN, 0};
+  return zmq_poll(&item, 1, timeout.count()) > 0;
+}
+
+std::optional<Error> Connection::refusal() {
+  const bool keyless = options_.key.empty();
+  const std::string& where = options_.endpoint;
+  while (const std::uint16_t event = read_event(monitor_.get())) {
+    switch (event) {
+      case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
+        established_ = true;
+        break;
+      case ZMQ_EVENT_DISCONNECTED:
+        established_ = false;
+        break;
+      case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
+        return fail("the daemon at " + where +
+                    " refuses this key: it is not on its list, or may not " +
+                    (domain_ == Domain::kPublish ? "subscribe" : "control"))
+            .error();
+      case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
+        return fail(keyless ? "the daemon at " + where +
+                                  " wants a key; give --key NAME.key --server-key SERVER.pub"
+                            : "the daemon at " + where +
+                                  " does not use keys, or is no posed; leave out --key")
+            .error();
+      case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+        if (!keyless) {
+          return fail("the daemon at " + where + " hangs up: --server-key " +
+                      options_.server_key.string() + " is not its key, or it just ended")
+              .error();
+        }
+        break;
+      default:
+        break;
+    }
+  }
+  return std::nullopt;
+}
+
+Error Connection::no_answer() const {
+  if (established_) {
+    return fail("the daemon at " + options_.endpoint +
+                " does not answer; is this its control endpoint?")
+        .error();
+  }
+  return fail("nobody answers at " + options_.endpoint +
+              "; is `posed run` going, and is this its endpoint?")
+      .error();
+}
+
+Interrupt::Interrupt() {
+  struct sigaction action{};
+  action.sa_handler = [](int) { interrupted = 1; };  // no SA_RESTART: it ends a wait
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+bool Interrupt::came() { return interrupted != 0; }
+
+}  // namespace posed::cli

@@ -1,0 +1,150 @@
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/client.hpp"
+#include "daemon/cli/json.hpp"
+#include "daemon/cli/live_view.hpp"
+#include "daemon/control/request_handler.hpp"
+#include "posed/v1/control.pb.h"
+
+namespace posed::cli {
+namespace {
+
+constexpr std::chrono::milliseconds kLookAround{100};  // for signals and refusals
+
+struct CtlOptions {
+  ClientOptions client;
+  double timeout_s = 5.0;
+  bool json = false;
+  std::string stream, parameter;
+  float value = 0.0F;
+  std::filesystem::path model;
+};
+
+Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest& request) {
+  using Clock = std::chrono::steady_clock;
+  const Interrupt interrupt;
+  auto connection = Connection::open(options.client, ZMQ_DEALER);
+  if (!connection) return std::unexpected(connection.error());
+  if (!control::send_part(connection->socket(), request.SerializeAsString(), false)) {
+    return fail("the request cannot be sent");
+  }
+  const auto end = Clock::now() + std::chrono::duration<double>(options.timeout_s);
+  while (Clock::now() < end && !Interrupt::came()) {
+    if (auto refused = connection->refusal()) return std::unexpected(*refused);
+    if (!connection->wait(kLookAround)) continue;
+    control::Message message;
+    if (!message.receive(connection->socket())) continue;
+    v1::ControlReply reply;
+    const auto bytes = message.bytes();
+    if (message.more() || !reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+      return fail(options.client.endpoint + " does not answer like a posed daemon");
+    }
+    return reply;
+  }
+  if (Interrupt::came()) return fail("interrupted; the request may still take effect");
+  return std::unexpected(connection->no_answer());
+}
+
+// Asks, and prints the answer: JSON, or what `tell` makes of it.
+template <typename Tell>
+int ask_and_tell(const CtlOptions& options, const v1::ControlRequest& request, Tell&& tell) {
+  const auto reply = ask(options, request);
+  if (!reply) return report(reply.error());
+  if (options.json) (void)print_json(*reply);
+  if (!reply->ok()) return report(Error{reply->error(), {}, 0, ExitCode::kFailed});
+  if (!options.json) tell(*reply);
+  return 0;
+}
+
+void tell_effect(const v1::ControlReply& reply) {
+  std::printf("%s: in effect from frame %llu\n", reply.stream().c_str(),
+              static_cast<unsigned long long>(reply.sequence()));
+}
+
+int set_parameter(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_set_alpha()->set_stream(options.stream);
+  request.mutable_set_alpha()->set_alpha(options.value);
+  return ask_and_tell(options, request, tell_effect);
+}
+
+int send_model(const CtlOptions& options) {
+  std::error_code none;
+  const auto size = std::filesystem::file_size(options.model, none);
+  if (none) return report(fail("cannot read the model: " + none.message(), options.model).error());
+  if (size > control::kLargestModel) {
+    return report(fail("is larger than 64 MB: no daemon takes it", options.model).error());
+  }
+  std::string bytes(size, '\0');
+  std::ifstream file(options.model, std::ios::binary);
+  if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
+    return report(fail("cannot read the model", options.model).error());
+  }
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_set_model();
+  wanted.set_stream(options.stream);
+  wanted.set_model(std::move(bytes));
+  wanted.set_name(options.model.filename().string());
+  return ask_and_tell(options, request, tell_effect);
+}
+
+int show_status(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_status();
+  return ask_and_tell(options, request, [&](const v1::ControlReply& reply) {
+    LiveViewOptions view{.title = "posed " + options.client.endpoint, .height = 0};
+    for (const std::string& line : live_view(reply.status(), view)) std::puts(line.c_str());
+  });
+}
+
+int stop_daemon(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_stop();
+  return ask_and_tell(options, request,
+                      [](const v1::ControlReply&) { std::puts("the daemon is ending"); });
+}
+
+}  // namespace
+
+void add_ctl(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("ctl", "Change or stop a running daemon");
+  auto options = std::make_shared<CtlOptions>();
+  command->require_subcommand(1)->fallthrough();
+  add_client_options(*command, options->client, "tcp://127.0.0.1:5571");
+  command->add_option("--timeout", options->timeout_s, "Seconds to wait for the answer")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "The answer as proto3 JSON (posed.v1.ControlReply)");
+  command->footer(R"(Examples:
+  posed ctl set walker alpha 0.5            # half the style; alpha slides there, -2 to 2
+  posed ctl model walker march.style        # another style, from the next frame on
+  posed ctl status
+  posed ctl --connect tcp://stage:5571 --key me.key --server-key stage.pub stop)");
+  const auto add = [&](const char* name, const char* help, int (*run)(const CtlOptions&)) {
+    CLI::App* action = command->add_subcommand(name, help);
+    action->callback([options, run, &exit_code] { exit_code = run(*options); });
+    return action;
+  };
+  CLI::App* set = add("set", "Change a stream's parameter", set_parameter);
+  set->add_option("stream", options->stream, "The stream")->required();
+  set->add_option("parameter", options->parameter, "alpha: how much style, -2 to 2")
+      ->required()
+      ->check(CLI::IsMember({"alpha"}));
+  set->add_option("value", options->value, "The new value")->required();
+  CLI::App* model = add("model", "Give a stream another style model", send_model);
+  model->add_option("stream", options->stream, "The stream")->required();
+  model->add_option("model", options->model, "The model file (M.style)")->required();
+  add("status", "Print the daemon's state once", show_status);
+  add("stop", "End the daemon cleanly", stop_daemon);
+}
+
+}  // namespace posed::cli

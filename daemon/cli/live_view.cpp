@@ -1,0 +1,109 @@
+#include "daemon/cli/live_view.hpp"
+
+#include <algorithm>
+#include <cstdint>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/config/words.hpp"
+#include "posed/v1/posed.pb.h"
+
+namespace posed::cli {
+namespace {
+
+constexpr int kLeastWidth = 80;
+constexpr const char* kRed = "\x1b[31m";
+constexpr const char* kYellow = "\x1b[33m";
+constexpr const char* kDim = "\x1b[2m";
+constexpr const char* kBold = "\x1b[1m";
+constexpr const char* kPlain = "\x1b[0m";
+
+// Cut or padded to exactly `width` columns (names are ASCII).
+std::string fit(const std::string& text, int width) {
+  const auto columns = static_cast<std::size_t>(width);
+  if (text.size() > columns) return text.substr(0, columns - 1) + "~";
+  return fmt::format("{:<{}}", text, width);
+}
+
+// A count in at most 5 characters.
+std::string short_count(std::uint64_t count) {
+  if (count < 100'000) return std::to_string(count);
+  if (count < 10'000'000) return fmt::format("{}k", count / 1000);
+  return fmt::format("{}M", count / 1'000'000);
+}
+
+std::string stage(const v1::Percentiles& percentiles) {
+  return short_duration(percentiles.p50_us()) + "/" + short_duration(percentiles.p99_us());
+}
+
+// How long the daemon has been on this machine's clock is not known; its own numbers are.
+std::string head(const v1::Stats& stats, const std::string& title) {
+  std::string line = fmt::format("{}   {} stream{}   cpu {:.1f} %   rss {:.1f} MB", title,
+                                 stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
+                                 stats.cpu_percent(), static_cast<double>(stats.rss_bytes()) / 1e6);
+  if (!stats.recorder_file().empty()) {
+    line += fmt::format("   rec {} lost {} errors {}", stats.recorder_file(),
+                        stats.recorder_lost_chunks(), stats.recorder_errors());
+  }
+  return line;
+}
+
+std::string row(const v1::StreamStats& stream, int model_width) {
+  return fmt::format("{} {} {:>6.1f} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}",
+                     fit(stream.stream(), 12), fit(stream.state(), 7), stream.rate_hz(),
+                     short_count(stream.dropped()), short_count(stream.shed()),
+                     stage(stream.decode()), stage(stream.style()), stage(stream.publish()),
+                     stream.alpha(), fit(config::printable(stream.model()), model_width));
+}
+
+const char* colour_of(const v1::StreamStats& stream) {
+  if (stream.dropped() > 0 || stream.shed() > 0) return kRed;
+  if (stream.state() == "stale" || stream.state() == "waiting") return kYellow;
+  return stream.state() == "ended" ? kDim : "";
+}
+
+}  // namespace
+
+std::string short_duration(double microseconds) {
+  if (microseconds < 999.5) return fmt::format("{:.0f}", microseconds);
+  if (microseconds < 9'950) return fmt::format("{:.1f}m", microseconds * 1e-3);
+  if (microseconds < 999'500) return fmt::format("{:.0f}m", microseconds * 1e-3);
+  return fmt::format("{:.0f}s", std::min(microseconds * 1e-6, 999.0));
+}
+
+std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {
+  const int width = std::max(options.width, kLeastWidth);
+  const auto paint = [&](const char* colour, std::string text) {
+    return options.colour && *colour != 0 ? colour + text + kPlain : text;
+  };
+  const std::string names =
+      fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} ", fit("STREAM", 12),
+                  fit("STATE", 7), "HZ", "DROP", "SHED", "DECODE", "STYLE", "PUBLISH", "ALPHA");
+  const int model_width = std::max(1, width - static_cast<int>(names.size()));
+  std::vector<std::string> lines{
+      paint(kBold, fit(head(stats, options.title), width)),
+      paint(kDim, fit(names + fit("MODEL", model_width), width)),
+  };
+  // Streams first; what does not fit is at least counted.
+  const int room = options.height == 0 ? stats.stream_size() : options.height - 3;
+  const int shown = stats.stream_size() <= room ? stats.stream_size() : std::max(0, room - 1);
+  for (int i = 0; i < shown; ++i) {
+    lines.push_back(paint(colour_of(stats.stream(i)), row(stats.stream(i), model_width)));
+  }
+  if (shown < stats.stream_size()) {
+    lines.push_back(fmt::format("... and {} more", stats.stream_size() - shown));
+  }
+  lines.push_back(
+      paint(kDim, fit("stage times: p50/p99 in us (m: ms), publish counts from arrival", width)));
+  const std::size_t left =
+      options.height == 0
+          ? options.notes.size()
+          : static_cast<std::size_t>(std::max(0, options.height - static_cast<int>(lines.size())));
+  const std::size_t first = options.notes.size() - std::min(left, options.notes.size());
+  for (std::size_t i = first; i < options.notes.size(); ++i) {
+    lines.push_back(fit(options.notes[i], width));
+  }
+  return lines;
+}
+
+}  // namespace posed::cli
