@@ -29,7 +29,7 @@ std::string fit(const std::string& text, int width) {
 std::string short_count(std::uint64_t count) {
   if (count < 100'000) return std::to_string(count);
   if (count < 10'000'000) return fmt::format("{}k", count / 1000);
-  return fmt::format("{}M", count / 1'000'000);
+  return fmt::format("{}M", std::min<std::uint64_t>(count / 1'000'000, 9999));
 }
 
 std::string stage(const v1::Percentiles& percentiles) {
@@ -49,11 +49,11 @@ std::string head(const v1::Stats& stats, const std::string& title) {
 }
 
 std::string row(const v1::StreamStats& stream, int model_width) {
-  return fmt::format("{} {} {:>6.1f} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}",
-                     fit(stream.stream(), 12), fit(stream.state(), 7), stream.rate_hz(),
-                     short_count(stream.dropped()), short_count(stream.shed()),
-                     stage(stream.decode()), stage(stream.style()), stage(stream.publish()),
-                     stream.alpha(), fit(config::printable(stream.model()), model_width));
+  return fmt::format(
+      "{} {} {:>6.1f} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}", fit(stream.stream(), 12),
+      fit(stream.state(), 7), std::min(stream.rate_hz(), 9999.9F), short_count(stream.dropped()),
+      short_count(stream.shed()), stage(stream.decode()), stage(stream.style()),
+      stage(stream.publish()), stream.alpha(), fit(config::printable(stream.model()), model_width));
 }
 
 const char* colour_of(const v1::StreamStats& stream) {

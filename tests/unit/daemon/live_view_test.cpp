@@ -1,0 +1,96 @@
+#include "daemon/cli/live_view.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "daemon/cli/json.hpp"
+#include "posed/v1/posed.pb.h"
+
+namespace posed::cli {
+namespace {
+
+v1::Stats stats_of(int streams) {
+  v1::Stats stats;
+  stats.set_cpu_percent(12.34F);
+  stats.set_rss_bytes(45'600'000);
+  for (int i = 0; i < streams; ++i) {
+    auto& stream = *stats.add_stream();
+    stream.set_stream("walker" + std::to_string(i));
+    stream.set_state("live");
+    stream.set_rate_hz(120.0F);
+    stream.set_alpha(-0.5F);
+    stream.set_model("march-to-sway.style");
+    stream.mutable_style()->set_p50_us(31.4F);
+    stream.mutable_style()->set_p99_us(1234.0F);
+  }
+  return stats;
+}
+
+TEST_CASE("the live view fits 80 x 24 whatever the daemon says") {
+  v1::Stats stats = stats_of(32);
+  auto& wild = *stats.mutable_stream(0);
+  wild.set_stream(std::string(32, 'x'));
+  wild.set_model("\x1b[2Jevil");
+  wild.set_rate_hz(1e9F);
+  wild.set_dropped(123'456'789'012);
+  wild.set_shed(99'999);
+  wild.mutable_publish()->set_p99_us(3e12F);
+  LiveViewOptions options{.title = "posed tcp://127.0.0.1:5570"};
+  options.notes.assign(40, "walker0 something happened");
+  for (const int height : {24, 10, 3, 1}) {
+    options.height = height;
+    const auto lines = live_view(stats, options);
+    CHECK(lines.size() <= static_cast<std::size_t>(std::max(height, 4)));
+    for (const std::string& line : lines) {
+      INFO(line);
+      CHECK(line.size() <= 80);
+      CHECK(line.find('\x1b') == std::string::npos);
+    }
+  }
+}
+
+TEST_CASE("the live view shows what matters of each stream") {
+  const auto lines = live_view(stats_of(2), {.title = "posed", .width = 100});
+  REQUIRE(lines.size() == 5);
+  CHECK(lines[0].find("2 streams   cpu 12.3 %   rss 45.6 MB") != std::string::npos);
+  CHECK(lines[3].find("walker1") == 0);
+  CHECK(lines[3].find("120.0") != std::string::npos);
+  CHECK(lines[3].find("31/1.2m") != std::string::npos);
+  CHECK(lines[3].find("-0.50 march-to-sway.style") != std::string::npos);
+}
+
+TEST_CASE("streams that do not fit are counted, notes fill what is left") {
+  LiveViewOptions options{.title = "posed", .height = 10};
+  const auto many = live_view(stats_of(32), options);
+  CHECK(many.size() == 10);
+  CHECK(many[8] == "... and 26 more");
+  options.notes = {"old", "new"};
+  const auto few = live_view(stats_of(6), options);
+  CHECK(few.size() == 10);
+  CHECK(few.back().starts_with("new"));
+}
+
+TEST_CASE("durations are short") {
+  CHECK(short_duration(0.0) == "0");
+  CHECK(short_duration(31.4) == "31");
+  CHECK(short_duration(999.6) == "1.0m");
+  CHECK(short_duration(9'960.0) == "10m");
+  CHECK(short_duration(2.6e6) == "3s");
+  CHECK(short_duration(1e18) == "999s");
+}
+
+TEST_CASE("JSON is canonical proto3, with every plain field") {
+  v1::Frame frame;
+  frame.set_stream("walker");
+  frame.set_sequence(7);
+  frame.add_rotation_xyzw(1.0F);
+  const std::string json = to_json(frame);
+  CHECK(json.find("\"sequence\":\"7\"") != std::string::npos);
+  CHECK(json.find("\"rotationXyzw\":[1]") != std::string::npos);
+  CHECK(json.find("\"quality\":\"QUALITY_MEASURED\"") != std::string::npos);
+  CHECK(json.find("\"lagFrames\":0") != std::string::npos);
+  CHECK(json.find("deviceNs") == std::string::npos);
+  CHECK(json.find('\n') == std::string::npos);
+}
+
+}  // namespace
+}  // namespace posed::cli
