@@ -129,6 +129,7 @@ Result<Predictor> Predictor::build(const Trained& trained, bool gate) {
 
 int Predictor::inputs() const noexcept { return parts_->dims; }
 int Predictor::outputs() const noexcept { return parts_->outputs; }
+bool Predictor::has_confidence() const noexcept { return parts_->gate_rows > 0; }
 std::span<const float> Predictor::constant() const noexcept {
   return {parts_->constant.data(), static_cast<std::size_t>(parts_->outputs)};
 }

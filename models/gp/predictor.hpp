@@ -26,8 +26,9 @@ class Predictor {
   Predictor& operator=(Predictor&&) noexcept;
   ~Predictor();
 
-  [[nodiscard]] int inputs() const noexcept;   // D
-  [[nodiscard]] int outputs() const noexcept;  // D_out
+  [[nodiscard]] int inputs() const noexcept;           // D
+  [[nodiscard]] int outputs() const noexcept;          // D_out
+  [[nodiscard]] bool has_confidence() const noexcept;  // built with `gate`
 
   // What f tends to far from all training poses: offset + b sum w [D_out]. RT-safe.
   [[nodiscard]] std::span<const float> constant() const noexcept;

@@ -1,0 +1,50 @@
+// Heading: which way the walker goes, as the style filter sees it: the pelvis' own direction with
+// the sway of the stride smoothed out (algorithms 2.7).
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "proto/frame/rotation.hpp"
+
+namespace posed::style {
+
+// A low-pass on the circle, first order. RT-safe.
+class Heading {
+ public:
+  static constexpr double kTau_s = 1.0;
+  // A turn of the pelvis within one frame that no body makes: the source jumped.
+  static constexpr double kJump_rad = std::numbers::pi / 4;
+
+  // Takes the direction measured `dt_s` after the last one. True when the walker was put elsewhere
+  // and the low-pass began anew.
+  bool update(double measured_rad, double dt_s) noexcept {
+    const double moved = posed::unwrap_near(measured_rad - last_measured_rad_, 0.0);
+    const double behind = posed::unwrap_near(measured_rad - value_rad_, 0.0);
+    const bool jumped = started_ && std::abs(moved) > kJump_rad && std::abs(behind) > kJump_rad;
+    last_measured_rad_ = measured_rad;
+    if (!started_ || jumped) {
+      started_ = true;
+      value_rad_ = measured_rad;
+      return jumped;
+    }
+    value_rad_ = posed::unwrap_near(value_rad_ + behind * -std::expm1(-dt_s / kTau_s), 0.0);
+    return false;
+  }
+
+  // As if it had been `value_rad` for long.
+  void settle(double value_rad, double measured_rad) noexcept {
+    started_ = true;
+    value_rad_ = value_rad;
+    last_measured_rad_ = measured_rad;
+  }
+
+  [[nodiscard]] double value_rad() const noexcept { return value_rad_; }
+
+ private:
+  double value_rad_ = 0.0;
+  double last_measured_rad_ = 0.0;
+  bool started_ = false;
+};
+
+}  // namespace posed::style

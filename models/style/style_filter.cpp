@@ -1,0 +1,248 @@
+#include "models/style/style_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+#include <utility>
+
+#include "proto/frame/rotation.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kMaxStep_s = 0.1;
+constexpr double kGateTau_s = 0.2;
+constexpr double kCalibrationTau_s = 10.0;
+constexpr float kCalibrationMax_rad = 20.0F * std::numbers::pi_v<float> / 180.0F;
+constexpr double kNoTurn_rad = 1e-6;  // what single precision cannot tell from none
+constexpr float kInputSpread = 3.0F;  // standard deviations of the training inputs
+
+double smoothing(double dt_s, double tau_s) { return -std::expm1(-dt_s / tau_s); }
+
+bool usable(const Quatf& q) noexcept {
+  const float norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+  return norm2 > 1e-6F && norm2 < 1e6F;  // false for what is not finite
+}
+
+// A joint that holds no rotation is no measurement, whatever its flag says. RT-safe.
+void drop_broken_joints(Frame& frame) noexcept {
+  for (std::size_t j = 0; j < frame.joint_count; ++j) {
+    if (usable(frame.rotation_xyzw[j])) continue;
+    frame.valid[j] = false;
+    frame.rotation_xyzw[j] = kIdentity;
+  }
+}
+
+Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
+  const bool process_fits =
+      model.process.inputs.cols() == dims && model.process.weights.cols() == dims;
+  const auto fits = [dims](const Eigen::VectorXd& v) {
+    return v.size() == 0 || (v.size() == dims && v.allFinite());
+  };
+  const bool spread =
+      (model.limit_rad.array() >= 0.0).all() && (model.input_sd.array() >= 0.0).all();
+  if (process_fits && spread && fits(model.limit_rad) && fits(model.input_mean) &&
+      fits(model.input_sd)) {
+    return {};
+  }
+  return fail("the model's process, limits and input range do not fit the " + std::to_string(dims) +
+                  " dimensions of its pose space: train it again",
+              name);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
+                                                     const Skeleton& skeleton,
+                                                     const FilterOptions& options,
+                                                     std::string name) {
+  auto space = motion::PoseSpace::bind(model.space, skeleton);
+  if (!space) {
+    Error error = space.error();
+    if (error.file.empty()) error.file = name;
+    return std::unexpected(std::move(error));
+  }
+  if (auto fits = check_fit(model, space->dims(), name); !fits) {
+    return std::unexpected(fits.error());
+  }
+  auto predictor = gp::Predictor::build(model.process, options.gate);
+  if (!predictor) {
+    Error error = predictor.error();
+    error.file = name;
+    return std::unexpected(std::move(error));
+  }
+  return std::make_unique<const BoundModel>(
+      BoundModel{std::move(*space), std::move(*predictor), model.limit_rad.cast<float>(),
+                 model.input_mean.cast<float>(), model.input_sd.cast<float>(), std::move(name)});
+}
+
+StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept
+    : model_(model), options_(options) {
+  options_.alpha_slew_per_s = std::clamp(options.alpha_slew_per_s, 1e-3, 1e6);
+  set_alpha(static_cast<float>(options.alpha));
+}
+
+// RT-safe
+void StyleFilter::set_alpha(float alpha) noexcept {
+  if (!std::isfinite(alpha)) return;
+  alpha_target_ = std::clamp(static_cast<double>(alpha), -kMaxAlpha, kMaxAlpha);
+}
+
+// RT-safe
+const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
+  discontinuity_ = true;
+  return std::exchange(model_, model);
+}
+
+float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
+
+void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
+  alpha_ = alpha_target_;
+  const bool has_heading = model_ != nullptr && model_->space.has_heading(frame);
+  heading_.settle(heading_rad, has_heading ? model_->space.heading_rad(frame) : heading_rad);
+}
+
+// Since the last frame, by the device's clock where there is one. RT-safe
+double StyleFilter::elapsed_s(const Frame& frame) noexcept {
+  const Header& header = frame.header;
+  const std::int64_t now_ns = header.device_ns != kNoTime_ns ? header.device_ns : header.arrival_ns;
+  const std::int64_t before_ns = std::exchange(last_ns_, now_ns);
+  if (before_ns == kNoTime_ns || now_ns == kNoTime_ns || now_ns <= before_ns) return 0.0;
+  // Unsigned: two times may be further apart than a signed difference can say.
+  const auto gap_ns = static_cast<std::uint64_t>(now_ns) - static_cast<std::uint64_t>(before_ns);
+  return std::min(static_cast<double>(gap_ns) * 1e-9, kMaxStep_s);
+}
+
+// RT-safe
+void StyleFilter::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) noexcept {
+  if (in == nullptr) return;
+  Frame frame = *in;
+  drop_broken_joints(frame);
+  const double dt_s = elapsed_s(frame);
+  const double slew = options_.alpha_slew_per_s * dt_s;
+  alpha_ += std::clamp(alpha_target_ - alpha_, -slew, slew);
+  blend_weight_ = std::max(0.0, blend_weight_ - slew);
+  const bool served = model_ != nullptr && frame.skeleton == model_->space.skeleton().id;
+  if (served) {
+    style(frame, dt_s);
+  } else {
+    last_joints_ = 0;  // the pose itself is another body's: nothing to blend from
+  }
+  emit.frame(frame);
+}
+
+// RT-safe
+void StyleFilter::style(Frame& frame, double dt_s) noexcept {
+  const motion::PoseSpace& space = model_->space;
+  if (space.has_heading(frame) && heading_.update(space.heading_rad(frame), dt_s)) {
+    discontinuity_ = true;
+  }
+  if (discontinuity_) {
+    gate_ = -1.0F;
+    offset_.fill(0.0F);
+  }
+  const Rotations in = frame.rotation_xyzw;
+  if (alpha_ != 0.0) {
+    Dims q;
+    Dims delta;
+    Flags available;
+    const auto dims = static_cast<std::size_t>(space.dims());
+    space.to_vector(frame, heading_.value_rad(), {q.data(), dims}, {available.data(), dims});
+    answer(q, available, dt_s, delta);
+    space.add(frame, heading_.value_rad(), {q.data(), dims}, {delta.data(), dims});
+  }
+  if (std::exchange(discontinuity_, false)) begin_blend(in, frame, dt_s);
+  blend(frame);
+  last_joints_ = frame.joint_count;
+  last_in_ = in;
+  last_out_ = frame.rotation_xyzw;
+}
+
+// a f(q), gated and clamped. RT-safe
+void StyleFilter::answer(const Dims& q, const Flags& available, double dt_s, Dims& delta) noexcept {
+  const gp::Predictor& predictor = model_->predictor;
+  const auto dims = static_cast<std::size_t>(predictor.inputs());
+  Dims clipped;
+  const bool clips = options_.calibrate || options_.gate;
+  if (clips) kernel_input(q, available, dt_s, clipped);
+  const std::span<const float> input((clips ? clipped : q).data(), dims);
+  const std::span<const std::uint8_t> flags(available.data(), dims);
+  const std::span<float> out(delta.data(), dims);
+  if (options_.gate && predictor.has_confidence()) {
+    const float g = smoothed_gate(predictor.mean_and_confidence(input, flags, out), dt_s);
+    const float rest = (1.0F - g) * static_cast<float>(options_.gate_fallback);
+    for (std::size_t d = 0; d < dims; ++d) out[d] = g * out[d] + rest * predictor.constant()[d];
+  } else {
+    predictor.mean(input, flags, out);
+  }
+  const Eigen::VectorXf& limit = model_->limit_rad;
+  for (std::size_t d = 0; d < dims; ++d) {
+    if (limit.size() > 0) out[d] = std::clamp(out[d], -limit[d], limit[d]);
+    out[d] *= static_cast<float>(alpha_);
+  }
+}
+
+// RT-safe
+float StyleFilter::smoothed_gate(float confidence, double dt_s) noexcept {
+  if (gate_ < 0.0F) gate_ = confidence;
+  gate_ += static_cast<float>(smoothing(dt_s, kGateTau_s)) * (confidence - gate_);
+  return gate_;
+}
+
+// What the kernel sees: less the walker's own mean offset where that is asked for, and within the
+// range of the training poses (algorithms 2.3, 5.3). RT-safe
+void StyleFilter::kernel_input(const Dims& q, const Flags& available, double dt_s,
+                               Dims& input) noexcept {
+  const Eigen::VectorXf& mean = model_->input_mean;
+  const Eigen::VectorXf& sd = model_->input_sd;
+  const auto dims = static_cast<std::size_t>(model_->predictor.inputs());
+  const auto rate = static_cast<float>(smoothing(dt_s, kCalibrationTau_s));
+  for (std::size_t d = 0; d < dims; ++d) {
+    input[d] = q[d];
+    if (mean.size() == 0) continue;
+    if (options_.calibrate) {
+      if (available[d] != 0) offset_[d] += rate * (q[d] - mean[d] - offset_[d]);
+      input[d] -= std::clamp(offset_[d], -kCalibrationMax_rad, kCalibrationMax_rad);
+    }
+    if (sd.size() == 0) continue;
+    const float reach = kInputSpread * sd[d];
+    input[d] = std::clamp(input[d], mean[d] - reach, mean[d] + reach);
+  }
+}
+
+// Per joint c = log(D_new^T D_old), so that R_styled exp(c) is what the old answer would have made
+// of this frame. RT-safe
+void StyleFilter::begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept {
+  const int joints = std::min<int>(last_joints_, styled.joint_count);
+  blend_weight_ = joints > 0 ? std::max(0.0, 1.0 - options_.alpha_slew_per_s * dt_s) : 0.0;
+  blend_from_.fill({});
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joints); ++j) {
+    const Quaterniond new_delta =
+        to_eigen_double(in[j]).conjugate() * to_eigen_double(styled.rotation_xyzw[j]);
+    const Quaterniond old_delta =
+        to_eigen_double(last_in_[j]).conjugate() * to_eigen_double(last_out_[j]);
+    const Vector3d c = rotation_log(Quaterniond(new_delta.conjugate() * old_delta));
+    if (c.norm() < kNoTurn_rad) continue;
+    for (int i = 0; i < 3; ++i)
+      blend_from_[j][static_cast<std::size_t>(i)] = static_cast<float>(c[i]);
+  }
+}
+
+// RT-safe
+void StyleFilter::blend(Frame& styled) const noexcept {
+  if (blend_weight_ <= 0.0) return;
+  for (std::size_t j = 0; j < styled.joint_count; ++j) {
+    const Vec3f& c = blend_from_[j];
+    if (!styled.valid[j] || (c[0] == 0.0F && c[1] == 0.0F && c[2] == 0.0F)) continue;
+    const Vector3d turn = blend_weight_ * Vector3d(c[0], c[1], c[2]);
+    const Quaterniond rotation = to_eigen_double(styled.rotation_xyzw[j]) * rotation_exp(turn);
+    set_rotation(model_->space.skeleton(), static_cast<int>(j), rotation, styled);
+  }
+}
+
+}  // namespace posed::style
