@@ -55,7 +55,10 @@ Result<Draft> draft_amc(std::string_view amc, const std::string& amc_name, std::
   if (!(options.amc_rate_hz > 0.1 && options.amc_rate_hz <= 100'000.0)) {
     return misuse("the frame rate of an AMC should be more than 0.1 and at most 100000 Hz");
   }
+  const auto profile = find_profile(acclaim->skeleton, options.profile);
+  if (!profile) return std::unexpected(profile.error());
   Draft draft;
+  draft.profile = *profile;
   bool degrees = acclaim->degrees;
   if (auto ok = split(without_bom(amc), amc_name, draft, degrees); !ok) {
     return std::unexpected(ok.error());

@@ -5,15 +5,31 @@
 #include "proto/clip/units.hpp"
 
 namespace posed::clip {
+namespace {
+
+double unit_of(const Skeleton& skeleton, const ReadOptions& options, const Profile* profile,
+               std::vector<std::string>& warnings) {
+  if (options.metres_per_unit) return *options.metres_per_unit;
+  if (profile != nullptr && profile->metres_per_unit) {
+    if (is_a_person(skeleton, *profile->metres_per_unit)) return *profile->metres_per_unit;
+    warnings.push_back("has the joints of profile '" + profile->name +
+                       "' but not its unit of length");
+  }
+  return guess_unit(skeleton, warnings);
+}
+
+}  // namespace
 
 Result<Draft> draft_bvh(std::string_view text, const std::string& name,
                         const ReadOptions& options) {
   text = without_bom(text);
   auto header = parse_bvh_header(text, name);
   if (!header) return std::unexpected(header.error());
+  const auto profile = find_profile(header->skeleton, options.profile);
+  if (!profile) return std::unexpected(profile.error());
   Draft draft;
-  draft.metres_per_unit = options.metres_per_unit ? *options.metres_per_unit
-                                                  : guess_unit(header->skeleton, draft.warnings);
+  draft.profile = *profile;
+  draft.metres_per_unit = unit_of(header->skeleton, options, *profile, draft.warnings);
   draft.skeleton = std::move(header->skeleton);
   scale_lengths(draft.skeleton, draft.metres_per_unit);
   draft.skeleton.name = std::filesystem::path(name).stem().string();

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "proto/clip/standing.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/frame/bone_names.hpp"
 
 namespace posed::clip {
 namespace {
@@ -67,9 +69,36 @@ void settle_offsets(Clip& clip, Skeleton& skeleton) {
   }
 }
 
+// Bones, root joint, offsets and T frames, which need each other in this order.
+Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const Hints& hints) {
+  if (profile == nullptr) {
+    name_bones(skeleton);
+  } else if (auto ok = name_bones(*profile, skeleton); !ok) {
+    return ok;
+  }
+  const int hips = skeleton.joint_of(Bone::kHips);
+  skeleton.root_joint = hints.root_joint ? *hints.root_joint
+                        : hips >= 0      ? hips
+                                         : find_root_joint(skeleton, clip.channels);
+  settle_offsets(clip, skeleton);
+  if (profile != nullptr) {
+    set_T_frames(skeleton, known_T(*profile, skeleton));
+  } else if (zero_pose_is_T(skeleton)) {
+    set_T_frames(skeleton);
+  } else if (!hints.T.empty()) {
+    set_T_frames(skeleton, hints.T);
+  } else {
+    set_T_frames(skeleton, T_frames_from_standing(skeleton, standing_rotations(clip)));
+    clip.warnings.emplace_back(
+        "the zero pose is no T-pose and no skeleton profile fits; the T-pose is taken from the "
+        "mean pose of the clip, which should walk or stand");
+  }
+  return skeleton.finish();
+}
+
 }  // namespace
 
-Result<Clip> clip_of(Draft draft, const std::string& name, std::optional<int> root_joint) {
+Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   if (draft.frames.empty()) return fail("has no frames, so there is nothing to play", name);
   const auto values = read_rows(draft, name);
   if (!values) return std::unexpected(values.error());
@@ -83,9 +112,9 @@ Result<Clip> clip_of(Draft draft, const std::string& name, std::optional<int> ro
 
   auto skeleton = std::make_shared<Skeleton>(std::move(draft.skeleton));
   clip.skeleton = skeleton;
-  skeleton->root_joint = root_joint ? *root_joint : find_root_joint(*skeleton, clip.channels);
-  settle_offsets(clip, *skeleton);
-  if (auto ok = skeleton->finish(); !ok) return fail(ok.error().message, name);
+  if (auto ok = complete(clip, *skeleton, draft.profile, hints); !ok) {
+    return fail(ok.error().message, name);
+  }
   return clip;
 }
 

@@ -8,6 +8,7 @@
 
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frame_text.hpp"
+#include "proto/frame/profile.hpp"
 
 namespace posed::clip {
 
@@ -20,6 +21,7 @@ struct FrameSpan {
 // A clip whose header has been read: what it takes to read the frames.
 struct Draft {
   Skeleton skeleton;  // metres; not finished
+  const Profile* profile = nullptr;
   FrameParser parser;
   double frame_rate_hz = 0.0;
   double metres_per_unit = 1.0;
@@ -34,9 +36,14 @@ struct Draft {
                                       std::string_view asf, const std::string& asf_name,
                                       const ReadOptions& options);
 
-// Reads the frames and completes the skeleton. `root_joint` is known where the draft holds only the
-// first frame of a clip (a log's device description); else it is found by what moves.
-[[nodiscard]] Result<Clip> clip_of(Draft draft, const std::string& name,
-                                   std::optional<int> root_joint = std::nullopt);
+// What is found by looking at all frames, where only the first is at hand (a log's device
+// description).
+struct Hints {
+  std::optional<int> root_joint;
+  KnownT T;
+};
+
+// Reads the frames and completes the skeleton.
+[[nodiscard]] Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints = {});
 
 }  // namespace posed::clip

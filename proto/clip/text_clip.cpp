@@ -21,13 +21,19 @@ std::string exact(double value) {
 
 std::string describe(const ClipFiles& files, const Draft& draft, const Clip& clip,
                      const std::string& profile) {
+  const Skeleton& skeleton = *clip.skeleton;
   std::string out(kMagic);
   out += files.is_amc ? " amc" : " bvh";
   out += " rate_hz=" + exact(clip.frame_rate_hz);
   out += " metres_per_unit=" + exact(clip.metres_per_unit);
-  out += " root_joint=" + std::to_string(clip.skeleton->root_joint);
+  out += " root_joint=" + std::to_string(skeleton.root_joint);
   out += " asf_bytes=" + std::to_string(files.asf.size());
   out += profile.empty() ? "" : " profile=" + profile;
+  // Only the whole clip could say it; the others follow from the header.
+  if (draft.profile == nullptr && !zero_pose_is_T(skeleton)) {
+    out += " T=";
+    for (const Joint& joint : skeleton.joints) out += axes_text(joint.T_world_joint);
+  }
   out += '\n' + files.asf;
   out.append(draft.header).append(draft.frames.front().text);
   return out;
@@ -102,7 +108,13 @@ Result<ClipFormat> parse_description(std::string_view description, const std::st
   ClipFormat format;
   format.parser = draft->parser;
   format.frame_rate_hz = *rate_hz;
-  auto clip = clip_of(std::move(*draft), name, static_cast<int>(*root));
+  Hints hints{.root_joint = static_cast<int>(*root), .T = {}};
+  if (const auto at = facts.find("T"); at != facts.end()) {
+    for (std::size_t i = 0; i + 6 <= at->second.size(); i += 6) {
+      hints.T.push_back(axes_from_text(std::string_view(at->second).substr(i, 6)));
+    }
+  }
+  auto clip = clip_of(std::move(*draft), name, hints);
   if (!clip) return std::unexpected(clip.error());
   format.skeleton = clip->skeleton;
   return format;

@@ -71,6 +71,11 @@ double guess_unit(const Skeleton& skeleton, std::vector<std::string>& warnings) 
   return best->metres;
 }
 
+bool is_a_person(const Skeleton& skeleton, double metres_per_unit) {
+  const double height_m = longest_way(skeleton) * metres_per_unit;
+  return height_m > 0.8 && height_m < 2.6;
+}
+
 void scale_lengths(Skeleton& skeleton, double metres_per_unit) {
   for (Joint& joint : skeleton.joints) {
     joint.offset_m *= metres_per_unit;

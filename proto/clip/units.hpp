@@ -16,6 +16,9 @@ inline constexpr double kCmuUnit_m = 0.0254 / 0.45;  // an Acclaim file's `lengt
 // on the pose in which the OFFSETs were written.
 [[nodiscard]] double guess_unit(const Skeleton& skeleton, std::vector<std::string>& warnings);
 
+// In this unit the figure is between 0.8 and 2.6 m high.
+[[nodiscard]] bool is_a_person(const Skeleton& skeleton, double metres_per_unit);
+
 // Offsets and end sites times `metres_per_unit`.
 void scale_lengths(Skeleton& skeleton, double metres_per_unit);
 

@@ -6,6 +6,9 @@
 
 #include <zlib.h>
 
+#include "proto/frame/bone_names.hpp"
+#include "proto/frame/t_pose.hpp"
+
 namespace posed {
 namespace {
 
@@ -201,6 +204,10 @@ int Skeleton::joint_of(Bone bone) const {
 Result<> Skeleton::finish() {
   if (auto ok = check_joints(*this); !ok) return ok;
   if (auto ok = check_channels(*this); !ok) return ok;
+  if (std::ranges::none_of(joints, [](const Joint& j) { return j.bone.has_value(); })) {
+    name_bones(*this);
+    set_T_frames(*this);
+  }
   id = content_id(*this);
   return {};
 }

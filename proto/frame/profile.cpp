@@ -1,0 +1,173 @@
+#include "proto/frame/profile.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+#include <toml++/toml.h>
+
+#include "proto/frame/profile_texts.hpp"
+
+namespace posed {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+// Reads one profile; remembers the first mistake.
+class ProfileReader {
+ public:
+  explicit ProfileReader(const std::string& name) : name_(name) {}
+
+  Result<Profile> read(const toml::table& table) {
+    for (const auto& [key, node] : table) entry(key.str(), node);
+    if (profile_.name.empty()) blame(table, "a profile needs a name");
+    if (profile_.bones.empty()) blame(table, "a profile needs its [bones]");
+    if (error_) return std::unexpected(*error_);
+    return std::move(profile_);
+  }
+
+ private:
+  void blame(const toml::node& node, std::string message) {
+    if (error_) return;
+    error_ = Error{std::move(message), name_, static_cast<int>(node.source().begin.line)};
+  }
+
+  void entry(std::string_view key, const toml::node& node) {
+    if (key == "name") {
+      profile_.name = node.value_or("");
+    } else if (key == "note") {
+      if (!node.is_string()) blame(node, "note is a text");
+    } else if (key == "metres_per_unit") {
+      profile_.metres_per_unit = node.value<double>();
+      if (!profile_.metres_per_unit || !(*profile_.metres_per_unit > 0)) {
+        blame(node, "metres_per_unit is a length in metres");
+      }
+    } else if (key == "match" && node.is_array()) {
+      for (const toml::node& joint : *node.as_array()) {
+        profile_.match.push_back(joint.value_or(""));
+      }
+    } else if ((key == "along" || key == "bones" || key == "T") && node.is_table()) {
+      for (const auto& [joint, value] : *node.as_table()) pair(key, joint.str(), value);
+    } else {
+      blame(node, "'" + std::string(key) + "' is not known in a profile, or of another type");
+    }
+  }
+
+  void pair(std::string_view table, std::string_view key, const toml::node& value) {
+    const std::string text = value.value_or("");
+    if (table == "along") {
+      profile_.along.emplace(key, text);
+    } else if (table == "bones") {  // canonical bone = "joint"
+      const auto bone = bone_from_name(key);
+      if (!bone) return blame(value, "'" + std::string(key) + "' is no canonical bone");
+      if (!profile_.bones.emplace(text, *bone).second) {
+        blame(value, "joint '" + text + "' is given to two bones");
+      }
+    } else if (value.is_array()) {
+      const auto T = from_angles(*value.as_array());
+      if (!T) return blame(value, "T as angles is three numbers [deg]: x, y, z, as Acclaim's axis");
+      profile_.T.emplace(key, *T);
+    } else {
+      const auto T = axes_from_text(text);
+      if (!T) return blame(value, "T says where x, y and z point, for example \"+y-x+z\"");
+      profile_.T.emplace(key, *T);
+    }
+  }
+
+  static std::optional<Eigen::Quaterniond> from_angles(const toml::array& angles) {
+    Eigen::Quaterniond T = Eigen::Quaterniond::Identity();
+    if (angles.size() != 3) return std::nullopt;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto angle_deg = angles[i].value<double>();
+      if (!angle_deg || !std::isfinite(*angle_deg)) return std::nullopt;
+      T = axis_rotation(static_cast<Axis>(i), *angle_deg * kDegree) * T;  // x is innermost
+    }
+    return T;
+  }
+
+  const std::string& name_;
+  Profile profile_;
+  std::optional<Error> error_;
+};
+
+bool points_along(const Joint& joint, std::string_view axis) {
+  if (axis.size() != 2 || axis[1] < 'x' || axis[1] > 'z') return false;
+  const double sign = axis[0] == '-' ? -1.0 : 1.0;
+  return sign * joint.offset_m[axis[1] - 'x'] > 0.9 * joint.offset_m.norm();
+}
+
+bool matches(const Profile& profile, const Skeleton& skeleton) {
+  const auto has = [&skeleton](const std::string& joint) {
+    return skeleton.joint_index(joint) >= 0;
+  };
+  if (profile.match.empty() || !std::ranges::all_of(profile.match, has)) return false;
+  return std::ranges::all_of(profile.along, [&skeleton](const auto& entry) {
+    const int joint = skeleton.joint_index(entry.first);
+    return joint >= 0 && points_along(skeleton.joints[joint], entry.second);
+  });
+}
+
+}  // namespace
+
+Result<Profile> parse_profile(std::string_view text, const std::string& name) {
+  try {
+    return ProfileReader(name).read(toml::parse(text, name));
+  } catch (const toml::parse_error& error) {
+    return fail(std::string(error.description()), name,
+                static_cast<int>(error.source().begin.line));
+  }
+}
+
+std::span<const Profile> profiles() {
+  static const std::vector<Profile> all = [] {
+    std::vector<Profile> read;
+    for (const ProfileText& text : profile_texts()) {
+      auto profile = parse_profile(text.toml, std::string(text.file));
+      if (!profile) {  // our own bug: the program was built with it
+        std::fprintf(stderr, "posed: %s\n", profile.error().text().c_str());
+        std::abort();
+      }
+      read.push_back(std::move(*profile));
+    }
+    return read;
+  }();
+  return all;
+}
+
+Result<const Profile*> find_profile(const Skeleton& skeleton, const std::string& name) {
+  std::string known;
+  for (const Profile& profile : profiles()) {
+    if (name.empty() ? matches(profile, skeleton) : profile.name == name) return &profile;
+    known += (known.empty() ? "" : ", ") + profile.name;
+  }
+  if (name.empty()) return nullptr;
+  return misuse("there is no skeleton profile '" + name + "'; there are " + known);
+}
+
+Result<> name_bones(const Profile& profile, Skeleton& skeleton) {
+  std::string missing;
+  for (const auto& [joint, bone] : profile.bones) {
+    const int index = skeleton.joint_index(joint);
+    if (index < 0) {
+      missing += (missing.empty() ? "" : ", ") + joint;
+    } else {
+      skeleton.joints[index].bone = bone;
+    }
+  }
+  if (!missing.empty()) {
+    return fail("the skeleton is not of profile '" + profile.name + "': it has no joint " +
+                missing);
+  }
+  return {};
+}
+
+KnownT known_T(const Profile& profile, const Skeleton& skeleton) {
+  KnownT known(skeleton.joints.size());
+  for (const auto& [joint, T] : profile.T) {
+    if (const int index = skeleton.joint_index(joint); index >= 0) known[index] = T;
+  }
+  return known;
+}
+
+}  // namespace posed
