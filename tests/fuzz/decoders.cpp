@@ -1,0 +1,103 @@
+// Every decoder of the registry on any bytes in any cut, and the description that a log hands back.
+// The first byte picks what is tried, the second how the rest is cut.
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "drivers/driver.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
+
+namespace {
+
+using posed::test::CollectSink;
+
+constexpr std::string_view kBvh =
+    "posed-clip bvh rate_hz=100 metres_per_unit=0.01 root_joint=0 asf_bytes=0\n"
+    "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation "
+    "Yrotation Xrotation\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n"
+    "MOTION\nFrames: 1\nFrame Time: 0.01\n0 1 0 0 0 0";
+constexpr std::string_view kAsf =
+    ":version 1.10\n:units\nlength 0.45\nangle deg\n:root\norder TX TY TZ RX RY RZ\naxis XYZ\n"
+    "position 0 0 0\norientation 0 0 0\n:bonedata\nbegin\nid 1\nname b\ndirection 1 0 0\n"
+    "length 5\naxis 0 0 20 XYZ\ndof rx ry\nend\n:hierarchy\nbegin\nroot b\nend\n";
+
+std::string amc_description() {
+  return "posed-clip amc rate_hz=120 metres_per_unit=0.056 root_joint=0 asf_bytes=" +
+         std::to_string(kAsf.size()) + "\n" + std::string(kAsf) + "1\nroot 0 1 0 0 0 0\nb 1 2\n";
+}
+
+void demand(bool holds) {
+  if (!holds) std::abort();
+}
+
+std::unique_ptr<posed::drivers::Decoder> decoder_of(const char* driver, const std::string& text) {
+  const posed::drivers::Driver* found = posed::drivers::find_driver(driver);
+  demand(found != nullptr);
+  const auto description = found->describe(text, "fuzz");
+  if (!description) return nullptr;
+  auto decoder = found->make_decoder(*description);
+  demand(decoder.has_value());
+  return std::move(*decoder);
+}
+
+void check(const CollectSink& sink) {
+  std::int64_t before_ns = posed::kNoTime_ns;
+  for (const posed::Frame& frame : sink.frames) {
+    demand(posed::test::is_sound(frame) && frame.header.device_ns > before_ns);
+    before_ns = frame.header.device_ns;
+  }
+  for (const posed::Sample& sample : sink.samples) demand(posed::test::is_sound(sample));
+}
+
+void try_bytes(const char* driver, const std::string& text, std::size_t piece,
+               std::span<const std::byte> bytes) {
+  const auto decoder = decoder_of(driver, text);
+  const auto whole_decoder = decoder_of(driver, text);
+  demand(decoder != nullptr);
+  CollectSink whole(0);
+  whole_decoder->feed(bytes, 0, whole);
+  check(whole);
+  CollectSink cut(0);
+  while (!bytes.empty()) {
+    const std::size_t length = std::min(piece, bytes.size());
+    decoder->feed(bytes.first(length), 0, cut);
+    bytes = bytes.subspan(length);
+  }
+  demand(cut.outcomes == whole.outcomes && cut.frames.size() == whole.frames.size() &&
+         cut.samples.size() == whole.samples.size());
+  for (std::size_t i = 0; i < cut.frames.size(); ++i) {
+    demand(posed::test::same_pose(cut.frames[i], whole.frames[i]));
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < 2) return 0;
+  const std::span bytes = std::as_bytes(std::span(data + 2, size - 2));
+  const std::size_t piece = 1U + data[1];
+  const std::string text(reinterpret_cast<const char*>(data + 2), size - 2);
+  switch (data[0] % 5) {
+    case 0:
+      try_bytes("file", std::string(kBvh), piece, bytes);
+      break;
+    case 1:
+      try_bytes("file", amc_description(), piece, bytes);
+      break;
+    case 2:
+      try_bytes("template", "BEND1 rate=100", piece, bytes);
+      break;
+    case 3:
+      (void)decoder_of("template", text);
+      break;
+    default:
+      if (const auto decoder = decoder_of("file", text)) {
+        CollectSink sink(0);
+        decoder->feed(bytes, 0, sink);
+        check(sink);
+      }
+  }
+  return 0;
+}

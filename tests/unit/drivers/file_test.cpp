@@ -1,0 +1,220 @@
+// The file driver: what it plays is what the clip says, and what it answers to bad clips and bytes.
+#include <catch2/catch.hpp>
+
+#include <span>
+#include <string>
+
+#include "proto/clip/clip.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/specimens.hpp"
+
+namespace posed::drivers {
+namespace {
+
+using test::CollectSink;
+
+Result<Device> open_file(const std::filesystem::path& path, Options options = {}) {
+  options["path"] = path.string();
+  options.try_emplace("pace", 0.0);
+  return find_driver("file")->open(options);
+}
+
+Device must_open(const std::filesystem::path& path, const Options& options = {}) {
+  auto device = open_file(path, options);
+  if (!device) FAIL(device.error().text());
+  return std::move(*device);
+}
+
+Device small_amc_device() {
+  return must_open(test::scratch_file("small.amc", test::small_amc()),
+                   {{"skeleton", test::scratch_file("small.asf", test::small_asf()).string()}});
+}
+
+std::string swap(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+void feed(Device& device, const std::string& text, Sink& sink) {
+  device.decoder->feed(std::as_bytes(std::span(text)), 0, sink);
+}
+
+// Plays the clip once and compares every frame with the clip as it is read offline.
+void check_plays_like_clip(const std::filesystem::path& path, const Options& options,
+                           const clip::ReadOptions& read) {
+  INFO(path);
+  const auto clip = clip::read_clip(path, read);
+  if (!clip) FAIL(clip.error().text());
+  Options once = options;
+  once["loop"] = false;
+  Device device = must_open(path, once);
+  CHECK(device.description.skeleton->id == clip->skeleton->id);
+  CHECK(device.description.rate_hz == clip->frame_rate_hz);
+  REQUIRE(device.transport->start(0));
+  CollectSink sink(static_cast<std::size_t>(clip->frames()) + 1);
+  for (;;) {
+    const Chunk chunk = device.transport->read(0);
+    if (chunk.end) break;
+    device.decoder->feed(chunk.bytes, 0, sink);
+  }
+  REQUIRE(static_cast<int>(sink.frames.size()) == clip->frames());
+  int different = 0;
+  for (int i = 0; i < clip->frames(); ++i) {
+    const Frame expected = clip->frame(i);
+    const bool same =
+        test::same_pose(sink.frames[static_cast<std::size_t>(i)], expected) &&
+        sink.frames[static_cast<std::size_t>(i)].header.device_ns == expected.header.device_ns;
+    different += same ? 0 : 1;
+  }
+  CHECK(different == 0);
+}
+
+}  // namespace
+
+TEST_CASE("a clip played live is the clip read offline, to the last bit") {
+  check_plays_like_clip(test::scratch_file("small.bvh", test::small_bvh()), {}, {});
+  const auto asf = test::scratch_file("small.asf", test::small_asf());
+  const auto amc = test::scratch_file("small.amc", test::small_amc());
+  check_plays_like_clip(amc, {{"skeleton", asf.string()}, {"rate_hz", 60.0}},
+                        {.asf = asf, .amc_rate_hz = 60.0});
+}
+
+TEST_CASE("a real walk played live is the walk read offline, to the last bit") {
+  const auto amc = test::shared("data/cmu/07_01.amc");
+  const auto bvh = test::shared("data/cmu/07_01.bvh");
+  if (!amc || !bvh) SKIP_WITHOUT_SHARED();
+  check_plays_like_clip(*amc, {}, {});
+  check_plays_like_clip(*bvh, {}, {});
+}
+
+TEST_CASE("other line ends, a byte order mark and blank lines change nothing") {
+  CollectSink expected;
+  Device plain = must_open(test::scratch_file("small.bvh", test::small_bvh()));
+  for (const auto& chunk : test::read_chunks(*plain.transport, 5)) {
+    plain.decoder->feed(chunk, 0, expected);
+  }
+  for (const std::string& end : {std::string("\r\n"), std::string("\r"), std::string("\n\n \n")}) {
+    std::string text = "\xEF\xBB\xBF";
+    for (const char c : test::small_bvh()) text += c == '\n' ? end : std::string(1, c);
+    Device device = must_open(test::scratch_file("other.bvh", text));
+    CollectSink sink;
+    for (const auto& chunk : test::read_chunks(*device.transport, 5)) {
+      device.decoder->feed(chunk, 0, sink);
+    }
+    CHECK(device.description.skeleton->id == plain.description.skeleton->id);
+    REQUIRE(sink.frames.size() == 5);
+    for (std::size_t i = 0; i < 5; ++i) {
+      CHECK(test::same_pose(sink.frames[i], expected.frames[i]));
+    }
+  }
+}
+
+TEST_CASE("a clip that cannot be played is refused in one sentence with its place") {
+  const std::string bvh = test::small_bvh();
+  const std::string last = "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
+  struct Case {
+    std::string file;
+    std::string text;
+    std::string expected;  // after the file's path
+  };
+  const std::vector<Case> cases{
+      {"empty.bvh", "", ":1: does not begin with HIERARCHY"},
+      {"foreign.bvh", "#!/bin/sh\necho\n", ":1: does not begin with HIERARCHY"},
+      {"cut_header.bvh", bvh.substr(0, 200), ":"},
+      {"no_frames.bvh", bvh.substr(0, bvh.find("0 0 0 0 0 0 1 95")), ": has no frames"},
+      {"cut_frame.bvh", bvh.substr(0, bvh.size() - 12), ":28: frame 5: the frame has 12 values"},
+      {"nan.bvh", swap(bvh, last, swap(last, "-24", "nan")),
+       ":28: frame 5: 'nan' is not a number a pose can have"},
+      {"infinite.bvh", swap(bvh, last, swap(last, "-24", "inf")),
+       ":28: frame 5: 'inf' is not a number a pose can have"},
+      {"letters.bvh", swap(bvh, last, "hello\n"), ":28: frame 5: 'hello'"},
+      {"clip.fbx", bvh, ": is no clip posed can read"},
+  };
+  for (const Case& bad : cases) {
+    const auto path = test::scratch_file(bad.file, bad.text);
+    const auto device = open_file(path);
+    INFO(bad.file);
+    REQUIRE_FALSE(device);
+    INFO(device.error().text());
+    CHECK(device.error().text().starts_with(path.string() + bad.expected));
+    CHECK(device.error().text().find('\n') == std::string::npos);
+    CHECK(device.error().exit_code == ExitCode::kFailed);
+  }
+  for (const std::string& path : {std::string("/nowhere/walk.bvh"), std::string("/tmp/.bvh/")}) {
+    const auto device = open_file(path);
+    REQUIRE_FALSE(device);
+    CHECK(device.error().text().starts_with(path));
+  }
+}
+
+TEST_CASE("an AMC without its skeleton, or with another's, is refused by name") {
+  const auto asf = test::scratch_file("small.asf", test::small_asf());
+  const auto lonely = open_file(test::scratch_file("77_01.amc", test::small_amc()));
+  REQUIRE_FALSE(lonely);
+  CHECK(lonely.error().text().find("77.asf") != std::string::npos);
+  const auto foreign = test::scratch_file("x.amc", swap(test::small_amc(), "ltibia", "tail"));
+  const auto device = open_file(foreign, {{"skeleton", asf.string()}});
+  REQUIRE_FALSE(device);
+  CHECK(device.error().text().starts_with(foreign.string() + ":7: "));
+  const auto cut = test::scratch_file("cut.amc", test::small_amc().substr(0, 170));
+  const auto cut_device = open_file(cut, {{"skeleton", asf.string()}});
+  REQUIRE_FALSE(cut_device);
+  CHECK(cut_device.error().text().starts_with(cut.string() + ":"));
+}
+
+TEST_CASE("a frame that no pose has is counted, and the clip's clock goes on") {
+  Device device = must_open(test::scratch_file("small.bvh", test::small_bvh()));
+  const std::string good = "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
+  CollectSink sink;
+  for (const std::string& line :
+       {good, swap(good, "-24", "nan"), swap(good, "-24", "-inf"), swap(good, "-24", "1e300"),
+        std::string("1 2 3\n"), swap(good, "3.1", "3.1 4.1"), swap(good, "-24", "x"), good}) {
+    feed(device, line, sink);
+  }
+  CHECK(sink.count(Outcome::kOk) == 2);
+  CHECK(sink.count(Outcome::kOutOfRange) == 3);
+  CHECK(sink.count(Outcome::kShort) == 1);
+  CHECK(sink.count(Outcome::kForeign) == 2);
+  REQUIRE(sink.frames.size() == 2);
+  CHECK(test::same_pose(sink.frames[0], sink.frames[1]));
+  CHECK(sink.frames[1].header.device_ns == nanoseconds(7.0 / 120.0));
+}
+
+TEST_CASE("an AMC frame is whole with its last bone, not with the next frame's number") {
+  Device device = small_amc_device();
+  CollectSink sink;
+  feed(device, "1\nroot 1 2 3 4 5 6\nlfemur 1 2 3\n", sink);
+  CHECK(sink.frames.empty());
+  feed(device, "ltibia 7\n", sink);
+  CHECK(sink.frames.size() == 1);
+  // Bones in another order, a bone over two lines, a comment and no bone too many.
+  feed(device, "2\nltibia 7\n# note\nlfemur 1\n2 3\nroot 1 2 3 4 5 6\n", sink);
+  REQUIRE(sink.frames.size() == 2);
+  CHECK(test::same_pose(sink.frames[0], sink.frames[1]));
+  CHECK(sink.count(Outcome::kOk) == 2);
+}
+
+TEST_CASE("an AMC frame with a bone missing is short, and the next one is good") {
+  Device device = small_amc_device();
+  CollectSink sink;
+  feed(device, "1\nroot 1 2 3 4 5 6\nltibia 7\n2\nroot 1 2 3 4 5 6\nlfemur 1 2 3\nltibia 7\n",
+       sink);
+  CHECK(sink.count(Outcome::kShort) == 1);
+  CHECK(sink.frames.size() == 1);
+  CHECK(sink.frames[0].header.device_ns == nanoseconds(1.0 / 120.0));
+  feed(device, "3\nroot 1 2 3 4 nan 6\nlfemur 1 2 3\nltibia 7\n", sink);
+  CHECK(sink.count(Outcome::kOutOfRange) == 1);
+}
+
+TEST_CASE("what a clip leaves in doubt is told as a warning") {
+  const Device device = must_open(
+      test::scratch_file("warn.bvh", swap(test::small_bvh(), "Frames: 5", "Frames: 500")));
+  REQUIRE_FALSE(device.warnings.empty());
+  bool told = false;
+  for (const std::string& warning : device.warnings) {
+    told = told || warning.find("500") != std::string::npos;
+  }
+  CHECK(told);
+}
+
+}  // namespace posed::drivers

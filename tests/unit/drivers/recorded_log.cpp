@@ -1,0 +1,159 @@
+#include "tests/unit/drivers/recorded_log.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+
+#include "tests/unit/drivers/collect_sink.hpp"
+
+namespace posed::test {
+namespace {
+
+constexpr double kTolerance = 1e-5;  // radians or metres, as for all committed goldens
+
+std::vector<std::byte> hex_bytes(std::istream& words) {
+  std::vector<std::byte> bytes;
+  for (unsigned value = 0; words >> std::hex >> value;) {
+    bytes.push_back(static_cast<std::byte>(value));
+  }
+  return bytes;
+}
+
+std::string rest_of(std::istream& words) {
+  std::string rest;
+  if (words.peek() == ' ') words.get();
+  std::getline(words, rest);
+  return rest;
+}
+
+void add_numbers(std::string& line, std::span<const float> values) {
+  for (const float value : values) {
+    std::array<char, 32> text{};
+    (void)std::snprintf(text.data(), text.size(), " %.7f", static_cast<double>(value));
+    line += text.data();
+  }
+}
+
+std::string line_of(const Frame& frame) {
+  std::string line = "frame " + std::to_string(frame.header.device_ns) + " root";
+  add_numbers(line, frame.root_position_m);
+  for (std::size_t j = 0; j < frame.joint_count; ++j) {
+    line += frame.valid[j] ? " joint" : " missing";
+    add_numbers(line, frame.rotation_xyzw[j]);
+  }
+  return line + '\n';
+}
+
+std::string line_of(const Sample& sample) {
+  std::string line = "sample " + std::to_string(sample.header.device_ns);
+  for (std::size_t i = 0; i < sample.value_count; ++i) {
+    line += sample.valid[i] ? " value" : " missing";
+    add_numbers(line, {&sample.value[i], 1});
+  }
+  return line + '\n';
+}
+
+bool same_word(const std::string& a, const std::string& b) {
+  if (a == b) return true;
+  char* end_a = nullptr;
+  char* end_b = nullptr;
+  const double x = std::strtod(a.c_str(), &end_a);
+  const double y = std::strtod(b.c_str(), &end_b);
+  const bool numbers = !a.empty() && !b.empty() && *end_a == '\0' && *end_b == '\0';
+  return numbers && std::abs(x - y) <= kTolerance;
+}
+
+bool same_line(const std::string& a, const std::string& b) {
+  std::istringstream words_a(a);
+  std::istringstream words_b(b);
+  std::string word_a;
+  std::string word_b;
+  for (;;) {
+    const bool more_a = static_cast<bool>(words_a >> word_a);
+    const bool more_b = static_cast<bool>(words_b >> word_b);
+    if (!more_a || !more_b) return more_a == more_b;
+    if (!same_word(word_a, word_b)) return false;
+  }
+}
+
+}  // namespace
+
+RecordedLog read_recorded_log(const std::filesystem::path& path) {
+  RecordedLog log;
+  std::ifstream file(path);
+  bool first_text = true;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream words(line);
+    std::string key;
+    words >> key;
+    if (key == "driver") {
+      log.driver = rest_of(words);
+    } else if (key == "identity") {
+      log.identity = rest_of(words);
+    } else if (key == "text") {
+      log.text += (first_text ? "" : "\n") + rest_of(words);
+      first_text = false;
+    } else {
+      INFO(path << ": " << line);
+      std::int64_t arrival_ns = 0;
+      std::string form;
+      REQUIRE(key == "at");
+      REQUIRE(words >> arrival_ns >> form);
+      REQUIRE((form == "hex" || form == "line"));
+      if (form == "hex") {
+        log.chunks.emplace_back(arrival_ns, hex_bytes(words));
+        continue;
+      }
+      const std::string text = rest_of(words) + '\n';
+      const auto bytes = std::as_bytes(std::span(text));
+      log.chunks.emplace_back(arrival_ns, std::vector(bytes.begin(), bytes.end()));
+    }
+  }
+  return log;
+}
+
+std::string decoded_lines(const RecordedLog& log) {
+  const drivers::Driver* driver = drivers::find_driver(log.driver);
+  REQUIRE(driver != nullptr);
+  const auto description = driver->describe(log.text, log.identity);
+  if (!description) FAIL(description.error().text());
+  const auto decoder = driver->make_decoder(*description);
+  REQUIRE(decoder);
+  CollectSink sink;
+  std::string lines;
+  for (const auto& [arrival_ns, bytes] : log.chunks) {
+    (*decoder)->feed(bytes, arrival_ns, sink);
+    for (const Frame& frame : sink.frames) lines += line_of(frame);
+    for (const Sample& sample : sink.samples) lines += line_of(sample);
+    sink.frames.clear();
+    sink.samples.clear();
+  }
+  lines += "outcomes ok " + std::to_string(sink.count(Outcome::kOk)) + " short " +
+           std::to_string(sink.count(Outcome::kShort)) + " bad_checksum " +
+           std::to_string(sink.count(Outcome::kBadChecksum)) + " out_of_range " +
+           std::to_string(sink.count(Outcome::kOutOfRange)) + " foreign " +
+           std::to_string(sink.count(Outcome::kForeign)) + '\n';
+  return lines;
+}
+
+std::string first_difference(const std::string& got, const std::string& expected) {
+  std::istringstream lines_a(got);
+  std::istringstream lines_b(expected);
+  std::string a;
+  std::string b;
+  for (int number = 1;; ++number) {
+    const bool more_a = static_cast<bool>(std::getline(lines_a, a));
+    const bool more_b = static_cast<bool>(std::getline(lines_b, b));
+    if (!more_a && !more_b) return {};
+    if (more_a != more_b || !same_line(a, b)) {
+      return "line " + std::to_string(number) + ": got '" + (more_a ? a : "the end") +
+             "', expected '" + (more_b ? b : "the end") + "'";
+    }
+  }
+}
+
+}  // namespace posed::test

@@ -1,0 +1,37 @@
+// A recorded device log as text, and what its driver makes of it: the pair of files that each
+// device brings (tests/golden/devices/NAME.log and NAME.chk).
+//
+//   # what was recorded, of which device, when, by whom
+//   driver template
+//   identity left index finger
+//   text BEND1 rate=100           a line of the description; repeated, they are joined by line ends
+//   at 1000000 hex a5 00 34       a chunk that came at this time [ns], as bytes
+//   at 2000000 line 0 0 0 90      the same as text, with its line end
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/driver.hpp"
+
+namespace posed::test {
+
+struct RecordedLog {
+  std::string driver;
+  std::string identity;
+  std::string text;
+  std::vector<std::pair<std::int64_t, std::vector<std::byte>>> chunks;
+};
+
+[[nodiscard]] RecordedLog read_recorded_log(const std::filesystem::path& path);
+
+// One line for each frame and sample, and one that counts outcomes.
+[[nodiscard]] std::string decoded_lines(const RecordedLog& log);
+
+// The first line in which two such texts differ by more than 1e-5 in a number or at all in a word;
+// empty when they agree.
+[[nodiscard]] std::string first_difference(const std::string& got, const std::string& expected);
+
+}  // namespace posed::test

@@ -1,0 +1,45 @@
+// Every device's recorded log gives the output that stands beside it.
+#include "tests/unit/drivers/recorded_log.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "tests/support/shared.hpp"
+
+namespace posed::test {
+
+TEST_CASE("recorded device logs decode to the output that stands beside them") {
+  // A change that is meant: UPDATE_EXPECTED=1 unit_drivers writes it; the commit says why.
+  const bool update = std::getenv("UPDATE_EXPECTED") != nullptr;
+  std::set<std::string> seen;
+  for (const auto& entry : std::filesystem::directory_iterator(golden("devices"))) {
+    if (entry.path().extension() != ".log") continue;
+    INFO(entry.path().filename());
+    auto expected_path = entry.path();
+    expected_path.replace_extension(".chk");
+    const RecordedLog log = read_recorded_log(entry.path());
+    seen.insert(log.driver);
+    const std::string got = decoded_lines(log);
+    if (update) std::ofstream(expected_path) << got;
+    std::ifstream file(expected_path);
+    const std::string expected{std::istreambuf_iterator<char>(file), {}};
+    CHECK(first_difference(got, expected) == "");
+  }
+  for (const drivers::Driver& driver : drivers::registry()) {
+    INFO(driver.name << " has no recorded log");
+    CHECK(seen.contains(std::string(driver.name)));
+  }
+}
+
+TEST_CASE("a difference in a recorded log's output is told by line") {
+  CHECK(first_difference("a 1.0\nb 2", "a 1.000001\nb 2").empty());
+  CHECK(first_difference("a 1\nb 2", "a 1\nb 2.1") == "line 2: got 'b 2', expected 'b 2.1'");
+  CHECK(first_difference("a 1", "a 1\nb 2") == "line 2: got 'the end', expected 'b 2'");
+  CHECK(first_difference("a 1 2", "a 1") == "line 1: got 'a 1 2', expected 'a 1'");
+}
+
+}  // namespace posed::test
