@@ -1,0 +1,119 @@
+#include "models/style/apply.hpp"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+
+#include "models/style/heading.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::style {
+namespace {
+
+constexpr int kProgressEvery = 1000;  // frames
+
+// Keeps what the stage emits.
+class Catch final : public Emit {
+ public:
+  void frame(const Frame& frame) noexcept override { frame_ = frame; }
+  [[nodiscard]] const Frame& get() const { return frame_; }
+
+ private:
+  Frame frame_;
+};
+
+Result<> check_clip(const clip::Clip& clip) {
+  if (clip.frames() == 0) return fail("has no frames to style", clip.path);
+  if (!(clip.frame_rate_hz > 0.0)) return fail("has no frame rate", clip.path);
+  for (int i = 0; i < clip.frames(); ++i) {
+    if (clip.channels.row(i).allFinite()) continue;
+    return fail("frame " + std::to_string(i + 1) + " holds a value that is not a number",
+                clip.path);
+  }
+  return {};
+}
+
+// The heading that has settled by the first frame: the low-pass run from the end of the clip to
+// its start, so that it knows the way the walk is about to go.
+double settled_heading_rad(const clip::Clip& clip, const motion::PoseSpace& space) {
+  Heading heading;
+  for (int i = clip.frames() - 1; i >= 0; --i) {
+    const Frame frame = clip.frame(i);
+    if (!space.has_heading(frame)) continue;
+    heading.update(space.heading_rad(frame), 1.0 / clip.frame_rate_hz);
+  }
+  return heading.value_rad();
+}
+
+// Puts the rotations that the style changed into the channels of a clip.
+class ChannelWriter {
+ public:
+  explicit ChannelWriter(clip::Clip& clip) : clip_(clip) {}
+
+  void write(int row, int joint, const Quatf& rotation) {
+    const Skeleton& skeleton = *clip_.skeleton;
+    const int near_row = std::max(row - 1, 0);
+    std::array<Eigen::Index, 3> column{};
+    std::array<double, 3> near_rad{};
+    std::size_t count = 0;
+    for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
+      if (skeleton.channels[c].joint != joint || skeleton.channels[c].translation) continue;
+      column[count] = static_cast<Eigen::Index>(c);
+      near_rad[count] = clip_.channels(near_row, column[count]);
+      ++count;
+    }
+    const auto angles =
+        channels_from_rotation(skeleton, joint, to_eigen_double(rotation), near_rad);
+    for (std::size_t i = 0; i < count; ++i) clip_.channels(row, column[i]) = angles[i];
+  }
+
+ private:
+  clip::Clip& clip_;
+};
+
+bool is_acclaim(const Skeleton& skeleton) {
+  return std::ranges::any_of(skeleton.joints, [](const Joint& joint) {
+    return !joint.channel_frame.isApprox(Eigen::Quaterniond::Identity());
+  });
+}
+
+}  // namespace
+
+Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
+                              const clip::Clip& clip, const ApplyOptions& options) {
+  if (auto sound = check_clip(clip); !sound) return std::unexpected(sound.error());
+  const auto bound = bind_model(model, *clip.skeleton, options.filter, model_name);
+  if (!bound) return std::unexpected(bound.error());
+  const BoundModel& ready = **bound;
+  StyleFilter filter(&ready, options.filter);
+  if (!options.cold) filter.settle(clip.frame(0), settled_heading_rad(clip, ready.space));
+
+  Applied applied{.clip = is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip};
+  ChannelWriter writer(applied.clip);
+  std::bitset<kMaxJoints> changed;
+  double sum = 0.0;
+  Catch out;
+  for (int i = 0; i < clip.frames(); ++i) {
+    const Frame in = clip.frame(i);
+    filter.step(&in, in.header.device_ns, out);
+    for (std::size_t j = 0; j < in.joint_count; ++j) {
+      const Quatf& styled = out.get().rotation_xyzw[j];
+      if (styled == in.rotation_xyzw[j]) continue;
+      changed.set(j);
+      writer.write(i, static_cast<int>(j), styled);
+      const double angle_rad =
+          angle_between_rad(to_eigen_double(in.rotation_xyzw[j]), to_eigen_double(styled));
+      sum += angle_rad * angle_rad;
+      applied.max_change_rad = std::max(applied.max_change_rad, angle_rad);
+    }
+    if (options.progress && i % kProgressEvery == 0 && !options.progress(i, clip.frames())) {
+      return fail("stopped before its end", clip.path);
+    }
+  }
+  applied.joints_changed = static_cast<int>(changed.count());
+  const auto terms = static_cast<double>(changed.count()) * clip.frames();
+  applied.rms_change_rad = terms > 0.0 ? std::sqrt(sum / terms) : 0.0;
+  return applied;
+}
+
+}  // namespace posed::style
