@@ -4,7 +4,7 @@
 #include <random>
 #include <set>
 
-#include "tests/unit/drivers/allocations.hpp"
+#include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/specimens.hpp"
 

@@ -14,6 +14,7 @@
 #include "models/gp/kernel.hpp"
 #include "models/gp/made_up.hpp"
 #include "models/gp/regression.hpp"
+#include "tests/support/allocations.hpp"
 
 using namespace posed;
 
@@ -61,14 +62,14 @@ Eigen::VectorXd exact_confidence(const gp::Trained& process, const Eigen::Matrix
 TEST_CASE("the float32 mean is within 1e-3 degree of the double one", "[gp][predictor]") {
   const AnyIsa restore;
   for (const auto& [poses, dims] : {std::pair{200, 43},
-                                   {1000, 43},
-                                   {1000, 63},
-                                   {28, 43},
-                                   {333, 288},
-                                   {1, 3},
-                                   {17, 5},
-                                   {64, 16},
-                                   {65, 17}}) {
+                                    {1000, 43},
+                                    {1000, 63},
+                                    {28, 43},
+                                    {333, 288},
+                                    {1, 3},
+                                    {17, 5},
+                                    {64, 16},
+                                    {65, 17}}) {
     const gp::MadeUp made = gp::made_up(poses, dims);
     const auto expected = gp::posterior(made.process, made.queries).mean;
     const auto predictor = gp::Predictor::build(made.process, true);
@@ -207,6 +208,20 @@ TEST_CASE("the kernel's exponential is right to an ulp and reaches exactly zero"
   gp::kernel::exp2_of(extreme.data(), 16, extreme.data());
   CHECK(extreme[0] == 0.0F);
   CHECK(extreme[1] == 0.0F);
+}
+
+TEST_CASE("a prediction takes nothing from the heap", "[gp][predictor]") {
+  const gp::MadeUp made = gp::made_up(300, 43);
+  const auto predictor = gp::Predictor::build(made.process, true).value();
+  const std::vector<float> q = floats(made.queries.row(0));
+  std::vector<std::uint8_t> available(43, 1);
+  available[5] = 0;
+  std::vector<float> out(43);
+  const std::uint64_t before = test::allocations();
+  predictor.mean(q, {}, out);
+  predictor.mean(q, available, out);
+  static_cast<void>(predictor.mean_and_confidence(q, {}, out));
+  CHECK(test::allocations() == before);
 }
 
 TEST_CASE("a broken process is refused with a sentence", "[gp][predictor]") {

@@ -6,6 +6,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/allocations.hpp"
 #include "tests/unit/models/toy_style.hpp"
 
 using namespace posed;
@@ -269,6 +270,28 @@ TEST_CASE("a thousand swaps and alpha changes never step above the slew", "[styl
   INFO("largest step " << largest << " rad, bound " << bound_rad);
   CHECK(largest <= bound_rad);
   CHECK(largest > 0.0);
+}
+
+TEST_CASE("the filter takes nothing from the heap", "[style]") {
+  style::FilterOptions options;
+  options.gate = true;
+  options.calibrate = true;
+  const auto a = bound(1, options);
+  const auto b = bound(2, options);
+  style::StyleFilter filter(a.get(), options);
+  const clip::Clip walk = toy_walk(60);
+  Last last;
+  std::uint64_t taken = 0;
+  for (int i = 0; i < walk.frames(); ++i) {
+    Frame in = walk.frame(i);
+    if (i % 7 == 0) in.rotation_xyzw[2][0] = std::nanf("");
+    const std::uint64_t before = test::allocations();
+    if (i % 20 == 10) static_cast<void>(filter.set_model(i % 40 == 10 ? b.get() : a.get()));
+    filter.set_alpha(static_cast<float>(i % 3));
+    filter.step(&in, 0, last);
+    taken += test::allocations() - before;
+  }
+  CHECK(taken == 0);
 }
 
 TEST_CASE("a swap ends in the new model's own answer", "[style]") {

@@ -1,4 +1,4 @@
-#include "tests/unit/drivers/allocations.hpp"
+#include "tests/support/allocations.hpp"
 
 #include <cstddef>
 
