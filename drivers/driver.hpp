@@ -49,6 +49,9 @@ class Transport {
   // is read only when the pipeline has caught up.
   [[nodiscard]] virtual bool patient() const noexcept { return false; }
 
+  // Chunks a second to be expected of a source that goes by time; 0 where only the device knows.
+  [[nodiscard]] virtual double rate_hz() const noexcept { return 0.0; }
+
   // Starts the source (a file's clock begins to run). Cold.
   [[nodiscard]] virtual Result<> start(std::int64_t now_ns) = 0;
 

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdio>
 
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
 namespace posed::cli {
@@ -28,6 +30,7 @@ int report(const Error& error) {
 }
 
 int main_of(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("posed"));
   CLI::App app{"posed: live poses in, another style out", "posed"};
   app.set_version_flag("--version", "posed " POSED_VERSION);
   app.require_subcommand(1);

@@ -19,6 +19,7 @@ namespace posed::cli {
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.
 [[nodiscard]] int report(const Error& error);
 
+void add_run(CLI::App& app, int& exit_code);
 void add_ctl(CLI::App& app, int& exit_code);
 void add_monitor(CLI::App& app, int& exit_code);
 void add_top(CLI::App& app, int& exit_code);

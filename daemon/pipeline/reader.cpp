@@ -36,11 +36,7 @@ class Reader::Source final : public Sink {
 
   // Reads and decodes one chunk; false when none was due.
   bool read_one() noexcept {
-    drivers::Chunk chunk;
-    {
-      const AllowedCall the_read;
-      chunk = transport().read(ports_.clock());
-    }
+    const drivers::Chunk chunk = read();
     arrival_ns_ = ports_.clock();
     if (!chunk.bytes.empty()) {
       if (ports_.tape != nullptr) {
@@ -80,6 +76,13 @@ class Reader::Source final : public Sink {
   }
 
  private:
+  // A source that goes by time alone has nothing to ask the system.
+  drivers::Chunk read() noexcept {
+    if (transport().poll_fd() < 0) return transport().read(ports_.clock());
+    const AllowedCall the_read;
+    return transport().read(ports_.clock());
+  }
+
   // The end must be heard: without room it is tried again at the next read.
   void end() noexcept {
     item_.kind = Item::Kind::kNotice;

@@ -26,6 +26,9 @@ class FileTransport final : public Transport {
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
   [[nodiscard]] bool patient() const noexcept override { return period_ns_ == 0.0; }
+  [[nodiscard]] double rate_hz() const noexcept override {
+    return patient() ? 0.0 : 1e9 / period_ns_;
+  }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   // Ends with an empty chunk after the last. RT-safe: no system call at all.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;

@@ -1,0 +1,52 @@
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/serve.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/pipeline/daemon.hpp"
+
+namespace posed::cli {
+namespace {
+
+struct RunOptions {
+  std::string config;
+  ServeOptions serve;
+};
+
+Result<> run(const RunOptions& options) {
+  auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  block_end_signals();
+  auto daemon = pipeline::Daemon::open(*config);
+  if (!daemon) return std::unexpected(daemon.error());
+  if (auto started = (*daemon)->start(); !started) return started;
+  print_ready(**daemon);
+  serve(**daemon, options.serve);
+  return {};
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("run", "Stream as a config says, until stopped");
+  auto options = std::make_shared<RunOptions>();
+  command->add_option("--config", options->config, "The daemon's config, TOML")->required();
+  command->add_option("--seconds", options->serve.seconds, "End after this long");
+  command->add_flag("--until-end", options->serve.until_end, "End when every source has ended");
+  command->footer(
+      "Once ready it prints one line of JSON on stdout with the endpoints really bound. SIGINT "
+      "and\n"
+      "SIGTERM end it cleanly. Examples:\n"
+      "  posed run --config config/demo.toml\n"
+      "  posed run --config mine.toml --until-end     # for clips with loop = false\n"
+      "  posed monitor --count 10                     # in another terminal: see the poses");
+  command->callback([options, &exit_code] {
+    const auto done = run(*options);
+    exit_code = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace posed::cli

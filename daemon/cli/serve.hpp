@@ -1,0 +1,25 @@
+// What the commands that serve (`run`, `record`, `demo`) share: being ready, and ending.
+#pragma once
+
+#include <optional>
+
+#include "daemon/pipeline/daemon.hpp"
+
+namespace posed::cli {
+
+// Blocks SIGINT and SIGTERM in this thread and all that it starts from now on, so that only
+// serve() hears them. Call before Daemon::start().
+void block_end_signals();
+
+// Prints the one JSON line that says where the daemon is to be found.
+void print_ready(const pipeline::Daemon& daemon);
+
+struct ServeOptions {
+  bool until_end = false;         // also end when every source has
+  std::optional<double> seconds;  // also end after this long
+};
+
+// Waits for SIGINT, SIGTERM, a control message or what the options say, then stops the daemon.
+void serve(pipeline::Daemon& daemon, const ServeOptions& options);
+
+}  // namespace posed::cli

@@ -1,0 +1,319 @@
+#include "daemon/pipeline/daemon.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <thread>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/control/control_server.hpp"
+#include "daemon/control/gatekeeper.hpp"
+#include "daemon/control/keys.hpp"
+#include "daemon/pipeline/reader.hpp"
+#include "daemon/pipeline/realtime.hpp"
+#include "daemon/pipeline/worker.hpp"
+#include "daemon/publish/publisher.hpp"
+
+namespace posed::pipeline {
+namespace {
+
+constexpr double kUnknownRate_hz = 1000.0;  // what rings must hold when a device does not say
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
+}
+
+// Says which stream an error is about.
+std::unexpected<Error> of_stream(const std::string& name, Error error) {
+  error.message = "stream '" + name + "': " + error.message;
+  return std::unexpected(std::move(error));
+}
+
+Result<std::string> load_bytes(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  if (!file) return fail("cannot read this file", path);
+  return bytes;
+}
+
+Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config) {
+  const drivers::Driver* driver = drivers::find_driver(config.driver);
+  if (driver == nullptr) return misuse("there is no driver '" + config.driver + "'");
+  auto device = driver->open(config.options);
+  if (!device) return std::unexpected(device.error());
+  auto stream = std::make_unique<OpenStream>();
+  stream->config = config;
+  stream->device = std::move(*device);
+  if (!config.style) return stream;
+  auto bytes = load_bytes(config.style->model);
+  if (!bytes) return std::unexpected(bytes.error());
+  stream->model_file = std::move(*bytes);
+  return stream;
+}
+
+// The style model of a stream, bound to its skeleton; null without a style stage.
+Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream) {
+  if (!stream.config.style) return nullptr;
+  if (!stream.device.description.skeleton) {
+    return misuse("driver '" + stream.config.driver + "' gives no poses, so it cannot be styled");
+  }
+  const std::filesystem::path& path = stream.config.style->model;
+  const auto model = style::parse_model(std::as_bytes(std::span(stream.model_file)), path);
+  if (!model) return std::unexpected(model.error());
+  return style::bind_model(*model, *stream.device.description.skeleton, stream.config.style->filter,
+                           path.filename());
+}
+
+double rate_of(const OpenStream& stream) {
+  for (const double rate_hz :
+       {stream.device.transport->rate_hz(), stream.device.description.rate_hz}) {
+    if (rate_hz > 0.0) return rate_hz;
+  }
+  return kUnknownRate_hz;
+}
+
+}  // namespace
+
+// Members stand in the order in which they are made; what uses another comes after it.
+class Daemon::Parts final : public control::Helm {
+ public:
+  explicit Parts(const DaemonConfig& daemon_config) : config(daemon_config) {}
+  ~Parts() override { halt(); }
+
+  Result<> open();
+  Result<> start(DaemonHooks wanted);
+  void halt() noexcept;
+
+  // Helm, for the control thread.
+  bool send(const Command& command) override {
+    const bool sent = commands->push(command);
+    pipeline_wake->ring();
+    return sent;
+  }
+  void keep_model(std::span<const std::byte> bytes) override {
+    if (hooks.tape != nullptr) hooks.tape->keep_model(bytes);
+  }
+  void model_in_use(std::uint32_t stream, const std::string& name) override {
+    publisher->set_model_name(stream, name);
+  }
+  void fill(v1::Stats& stats) override { stats = publisher->stats(); }
+  void stop() override { stop_asked.store(true); }
+
+  DaemonConfig config;
+  DaemonHooks hooks;
+  std::vector<std::unique_ptr<OpenStream>> streams;
+  std::atomic<bool> stop_asked{false};
+
+  control::Context context;
+  std::unique_ptr<control::Gatekeeper> gatekeeper;
+  std::string secret_z85;
+  std::unique_ptr<Wake> pipeline_wake, publisher_wake, control_wake;
+  std::unique_ptr<Ring<Item>> decoded, finished;
+  std::unique_ptr<Ring<Command>> commands;
+  std::unique_ptr<Ring<Ack>> acks;
+  std::unique_ptr<control::RequestHandler> handler;  // owns the models
+  std::unique_ptr<publish::Publisher> publisher;
+  std::unique_ptr<Worker> worker;
+  std::unique_ptr<Reader> reader;
+  std::unique_ptr<control::ControlServer> control;
+  std::thread publisher_thread, worker_thread, reader_thread;
+
+ private:
+  Result<> open_sockets();
+  Result<> open_engines();
+  Result<> start_threads();
+};
+
+Result<> Daemon::Parts::open() {
+  for (const StreamConfig& stream_config : config.streams) {
+    auto stream = open_stream(stream_config);
+    if (!stream) return of_stream(stream_config.name, stream.error());
+    for (const std::string& warning : (*stream)->device.warnings) {
+      spdlog::warn("{}: {}", stream_config.name, warning);
+    }
+    streams.push_back(std::move(*stream));
+  }
+  double frames_per_s = 0.0;
+  for (const auto& stream : streams) frames_per_s += rate_of(*stream);
+  decoded = std::make_unique<Ring<Item>>(ring_slots(frames_per_s));
+  finished = std::make_unique<Ring<Item>>(ring_slots(2.0 * frames_per_s));  // raw and styled
+  commands = std::make_unique<Ring<Command>>(control::kMostUnderWay);
+  acks = std::make_unique<Ring<Ack>>(control::kMostUnderWay);
+  for (auto* wake : {&pipeline_wake, &publisher_wake, &control_wake}) {
+    auto opened = Wake::open();
+    if (!opened) return std::unexpected(opened.error());
+    *wake = std::move(*opened);
+  }
+  return {};
+}
+
+Result<> Daemon::Parts::start(DaemonHooks wanted) {
+  hooks = std::move(wanted);
+  if (auto opened = open_sockets(); !opened) return opened;
+  if (auto opened = open_engines(); !opened) return opened;
+  return start_threads();
+}
+
+Result<> Daemon::Parts::open_sockets() {
+  auto opened = control::open_context();
+  if (!opened) return std::unexpected(opened.error());
+  context = std::move(*opened);
+  if (!config.security.server_key.empty()) {
+    auto keys = control::read_secret_key(config.security.server_key);
+    if (!keys) return std::unexpected(keys.error());
+    secret_z85 = keys->secret_z85;
+    auto keeper =
+        control::Gatekeeper::start(context.get(), control::AccessList(config.security.clients));
+    if (!keeper) return std::unexpected(keeper.error());
+    gatekeeper = std::move(*keeper);
+  }
+  std::vector<publish::StreamInfo> infos;
+  for (const auto& stream : streams) {
+    const auto& style = stream->config.style;
+    infos.push_back({.name = stream->config.name,
+                     .description = stream->device.description,
+                     .rate_hz = rate_of(*stream),
+                     .raw = stream->config.publish_raw,
+                     .model = style ? style->model.filename().string() : std::string(),
+                     .counters = &stream->counters});
+  }
+  publish::PublisherOptions options{.context = context.get(),
+                                    .endpoint = config.publish_endpoint,
+                                    .secure = {},
+                                    .more_stats = hooks.more_stats,
+                                    .tape = hooks.tape,
+                                    .clock = monotonic_ns};
+  if (gatekeeper) {
+    options.secure = [this](void* socket) {
+      return control::secure_server(socket, control::Domain::kPublish, secret_z85);
+    };
+  }
+  auto bound =
+      publish::Publisher::open(std::move(options), std::move(infos), *finished, *publisher_wake);
+  if (!bound) return std::unexpected(bound.error());
+  publisher = std::move(*bound);
+  return {};
+}
+
+Result<> Daemon::Parts::open_engines() {
+  auto opened_worker = Worker::open({.in = decoded.get(),
+                                     .out = finished.get(),
+                                     .commands = commands.get(),
+                                     .acks = acks.get(),
+                                     .wake = pipeline_wake.get(),
+                                     .publisher = publisher_wake.get(),
+                                     .control = control_wake.get(),
+                                     .tape = hooks.tape,
+                                     .clock = monotonic_ns});
+  if (!opened_worker) return std::unexpected(opened_worker.error());
+  worker = std::move(*opened_worker);
+  auto opened_reader = Reader::open({.out = decoded.get(),
+                                     .pipeline = pipeline_wake.get(),
+                                     .tape = hooks.tape,
+                                     .clock = monotonic_ns});
+  if (!opened_reader) return std::unexpected(opened_reader.error());
+  reader = std::move(*opened_reader);
+  std::vector<control::ControlledStream> controlled;
+  for (std::uint32_t i = 0; i < streams.size(); ++i) {
+    OpenStream& stream = *streams[i];
+    auto model = bind_style(stream);
+    if (!model) return of_stream(stream.config.name, model.error());
+    EngineOptions engine{.stream = i,
+                         .stale_after_ns = nanoseconds(stream.config.stale_after_s),
+                         .publish_raw = stream.config.publish_raw,
+                         .style = std::nullopt,
+                         .model = model->get()};
+    if (stream.config.style) engine.style = stream.config.style->filter;
+    worker->add(engine, rate_of(stream), stream.counters);
+    if (auto added = reader->add(stream.device, stream.counters); !added) return added;
+    controlled.push_back({.name = stream.config.name,
+                          .publishes_raw = stream.config.publish_raw,
+                          .skeleton = stream.device.description.skeleton,
+                          .style = engine.style,
+                          .model = std::move(*model)});
+  }
+  handler = std::make_unique<control::RequestHandler>(std::move(controlled), *this);
+  return {};
+}
+
+Result<> Daemon::Parts::start_threads() {
+  auto server = control::ControlServer::start(context.get(), config.control_endpoint,
+                                              {.acks = acks.get(),
+                                               .wake = control_wake.get(),
+                                               .gatekeeper = gatekeeper.get(),
+                                               .secret_z85 = secret_z85},
+                                              *handler);
+  if (!server) return std::unexpected(server.error());
+  control = std::move(*server);
+  const bool fifo = config.realtime && ask_for_realtime();
+  publisher_thread = std::thread([this, fifo] {
+    enter_hot_thread("posed-publish", fifo ? kPublisherPriority : 0);
+    publisher->run();
+  });
+  worker_thread = std::thread([this, fifo] {
+    enter_hot_thread("posed-pipeline", fifo ? kPipelinePriority : 0);
+    if (hooks.hot_thread) hooks.hot_thread("pipeline");
+    worker->run();
+  });
+  for (const auto& stream : streams) {
+    if (auto started = stream->device.transport->start(monotonic_ns()); !started) {
+      return of_stream(stream->config.name, started.error());
+    }
+  }
+  reader_thread = std::thread([this, fifo] {
+    enter_hot_thread("posed-reader", fifo ? kReaderPriority : 0);
+    if (hooks.hot_thread) hooks.hot_thread("reader");
+    reader->run();
+  });
+  return {};
+}
+
+// From the devices to the clients, so that each thread still finds what the one before it made.
+void Daemon::Parts::halt() noexcept {
+  if (reader) reader->stop();
+  if (reader_thread.joinable()) reader_thread.join();
+  if (worker) worker->stop();
+  if (worker_thread.joinable()) worker_thread.join();
+  control.reset();
+  if (publisher) publisher->stop();
+  if (publisher_thread.joinable()) publisher_thread.join();
+}
+
+Daemon::Daemon(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Daemon::~Daemon() = default;
+
+Result<std::unique_ptr<Daemon>> Daemon::open(const DaemonConfig& config) {
+  auto parts = std::make_unique<Parts>(config);
+  if (auto opened = parts->open(); !opened) return std::unexpected(opened.error());
+  return std::unique_ptr<Daemon>(new Daemon(std::move(parts)));
+}
+
+std::span<const std::unique_ptr<OpenStream>> Daemon::streams() const noexcept {
+  return parts_->streams;
+}
+Result<> Daemon::start(DaemonHooks hooks) { return parts_->start(std::move(hooks)); }
+void Daemon::stop() noexcept { parts_->halt(); }
+const std::string& Daemon::publish_endpoint() const noexcept {
+  return parts_->publisher->endpoint();
+}
+const std::string& Daemon::control_endpoint() const noexcept { return parts_->control->endpoint(); }
+bool Daemon::asked_to_stop() const noexcept { return parts_->stop_asked.load(); }
+v1::Stats Daemon::stats() const { return parts_->publisher->stats(); }
+
+bool Daemon::all_ended() const noexcept {
+  return std::ranges::all_of(parts_->streams, [](const auto& stream) {
+    return stream->counters.pipeline.state.load() == StreamState::kEnded;
+  });
+}
+
+void Daemon::post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text) {
+  parts_->publisher->post_event(stream, kind, text);
+}
+
+}  // namespace posed::pipeline

@@ -1,0 +1,66 @@
+// Daemon: the composition of everything that `run`, `record`, `demo` and the tests start: devices,
+// threads, rings, sockets. Open it (devices and models are loaded, sockets bound), start it, stop
+// it. Cold, one owner thread.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/daemon_config.hpp"
+#include "daemon/record/tape.hpp"
+#include "drivers/driver.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/frame/result.hpp"
+
+namespace posed::pipeline {
+
+// A stream whose device is open and whose model is loaded.
+struct OpenStream {
+  StreamConfig config;
+  drivers::Device device;
+  std::string model_file;  // the bytes of the style model's file; empty without a style stage
+  StreamCounters counters;
+};
+
+// What the daemon may be given when it starts; all of it outlives the daemon's stop().
+struct DaemonHooks {
+  record::Tape* tape = nullptr;                      // null: nothing is recorded
+  std::function<void(v1::Stats&)> more_stats;        // what the recorder knows; may be empty
+  std::function<void(const char* name)> hot_thread;  // first thing on a hot thread; may be empty
+};
+
+class Daemon {
+ public:
+  // Opens devices and models and binds the sockets. Errors name the stream.
+  [[nodiscard]] static Result<std::unique_ptr<Daemon>> open(const DaemonConfig& config);
+  ~Daemon();  // stops first
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  // In the order of the config; the index is the stream number everywhere.
+  [[nodiscard]] std::span<const std::unique_ptr<OpenStream>> streams() const noexcept;
+
+  // Starts the threads and the devices. Call once.
+  [[nodiscard]] Result<> start(DaemonHooks hooks = {});
+  // Ends the threads: what was read is still decoded and published. May be called again.
+  void stop() noexcept;
+
+  // Valid after start(), from any thread.
+  [[nodiscard]] const std::string& publish_endpoint() const noexcept;  // really bound
+  [[nodiscard]] const std::string& control_endpoint() const noexcept;  // really bound
+  [[nodiscard]] bool asked_to_stop() const noexcept;                   // by a control message
+  [[nodiscard]] bool all_ended() const noexcept;  // every source is finished and published
+  [[nodiscard]] v1::Stats stats() const;          // of the last second
+  void post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text);
+
+ private:
+  class Parts;
+  explicit Daemon(std::unique_ptr<Parts> parts);
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace posed::pipeline

@@ -1,0 +1,41 @@
+// Our words to the wire's (proto/wire/posed/v1/posed.proto). The message for frames is reused:
+// packed arrays in place, never cleared, so that encoding a frame allocates nothing.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "drivers/driver.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/frame/frame.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::publish {
+
+// One published stream's frame message. One thread; RT-safe after the first frame.
+class FrameEncoder {
+ public:
+  explicit FrameEncoder(const std::string& stream) { message_.set_stream(stream); }
+
+  // The frame without stage stamps, as logs keep it; valid until the next call.
+  [[nodiscard]] const v1::Frame& encode(const Frame& frame);
+  // Adds the stage stamps that are known to what encode() made.
+  [[nodiscard]] const v1::Frame& stamp(const StageStamps& stamps);
+
+ private:
+  v1::Frame message_;
+};
+
+class SampleEncoder {
+ public:
+  SampleEncoder(const std::string& stream, const drivers::SampleLayout& layout);
+  [[nodiscard]] const v1::Sample& encode(const Sample& sample);
+
+ private:
+  v1::Sample message_;
+};
+
+[[nodiscard]] v1::Skeleton skeleton_message(const std::string& stream, const Skeleton& skeleton,
+                                            double rate_hz);
+
+}  // namespace posed::publish

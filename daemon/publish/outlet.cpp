@@ -1,0 +1,66 @@
+#include "daemon/publish/outlet.hpp"
+
+#include <array>
+
+namespace posed::publish {
+namespace {
+
+v1::Percentiles percentiles(LatencyHistogram& histogram) {
+  v1::Percentiles message;
+  message.set_p50_us(static_cast<float>(histogram.percentile_us(0.5)));
+  message.set_p99_us(static_cast<float>(histogram.percentile_us(0.99)));
+  message.set_max_us(static_cast<float>(histogram.max_us()));
+  histogram.clear();
+  return message;
+}
+
+constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "ended"};
+
+}  // namespace
+
+Channel::Channel(const std::string& name, const StreamInfo& info)
+    : pose_topic("pose/" + name),
+      skeleton_topic("skeleton/" + name),
+      sensor_topic("sensor/" + name),
+      event_topic("event/" + name),
+      frames(name),
+      samples(name, info.description.samples) {
+  if (info.description.skeleton) {
+    skeleton = skeleton_message(name, *info.description.skeleton, info.rate_hz);
+  }
+}
+
+Outlet::Outlet(StreamInfo stream_info) : info(std::move(stream_info)), styled(info.name, info) {
+  if (info.raw) raw.emplace(info.name + "-raw", info);
+}
+
+void Outlet::measure(const Frame& frame, const StageStamps& stamps) noexcept {
+  if (frame.quality == Quality::kStale) return;
+  const std::int64_t arrival_ns = frame.header.arrival_ns;
+  decode.add(stamps.decoded_ns - arrival_ns);
+  style.add(stamps.styled_ns - stamps.decoded_ns);
+  publish.add(stamps.published_ns - arrival_ns);
+}
+
+void Outlet::report(v1::StreamStats& stats, double seconds_since) {
+  const auto& reader = info.counters->reader;
+  const auto& pipeline = info.counters->pipeline;
+  stats.set_stream(info.name);
+  stats.set_driver(info.description.driver);
+  stats.set_state(kStateNames[static_cast<std::size_t>(pipeline.state.load())]);
+  stats.set_frames(frames);
+  stats.set_samples(samples);
+  stats.set_rate_hz(static_cast<float>(static_cast<double>(frames - frames_reported) /
+                                       std::max(seconds_since, 1e-3)));
+  frames_reported = frames;
+  stats.set_dropped(reader.dropped.load() + pipeline.dropped.load());
+  stats.set_shed(pipeline.shed.load());
+  for (const auto& outcome : reader.outcome) stats.add_outcome(outcome.load());
+  *stats.mutable_decode() = percentiles(decode);
+  *stats.mutable_style() = percentiles(style);
+  *stats.mutable_publish() = percentiles(publish);
+  stats.set_alpha(pipeline.alpha.load());
+  stats.set_model(info.model);
+}
+
+}  // namespace posed::publish

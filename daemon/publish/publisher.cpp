@@ -1,0 +1,318 @@
+#include "daemon/publish/publisher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "daemon/publish/outlet.hpp"
+
+namespace posed::publish {
+namespace {
+
+constexpr double kQueueDepth_s = 0.25;
+constexpr int kMinQueue = 16;
+constexpr int kSendBuffer = 8 * 1024;  // bytes; the kernel's default alone hides seconds of poses
+
+std::int64_t clock_ns(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
+}
+
+std::uint64_t resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::uint64_t size = 0;
+  std::uint64_t resident = 0;
+  statm >> size >> resident;
+  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+// What the pipeline's notices say to people.
+std::string sentence(const pipeline::Item& item) {
+  const auto& notice = item.notice;
+  switch (notice.event) {
+    case v1::Event::KIND_STARTED:
+      return "the first data came";
+    case v1::Event::KIND_STALE:
+      return fmt::format("nothing came for {:.2f} s", notice.value);
+    case v1::Event::KIND_RECOVERED:
+      return "data comes again";
+    case v1::Event::KIND_ENDED:
+      return fmt::format("the source has ended after {} frames", notice.sequence);
+    case v1::Event::KIND_CONTROL:
+      return fmt::format("control takes effect at frame {}", notice.sequence);
+    case v1::Event::KIND_SHED:
+      return fmt::format("{:.0f} frames from {} on were skipped: newer ones waited", notice.value,
+                         notice.sequence);
+    default:
+      return {};
+  }
+}
+
+}  // namespace
+
+// What other threads asked for or want to know. Cold: never touched by the hot threads.
+struct Publisher::Told {
+  struct Posted {
+    std::uint32_t stream;
+    v1::Event::Kind kind;
+    std::string text;
+  };
+  mutable std::mutex mutex;
+  std::vector<Posted> events;
+  std::vector<std::pair<std::uint32_t, std::string>> models;
+  bool rebind = false;
+  v1::Stats stats;
+  std::atomic<bool> asked{false};  // one of events, models, rebind is new
+
+  // The publisher thread's own, of the last report.
+  std::int64_t reported_ns = 0;
+  std::int64_t cpu_ns = 0;
+};
+
+int send_high_water_mark(double messages_per_s) {
+  return std::max(kMinQueue, static_cast<int>(std::ceil(messages_per_s * kQueueDepth_s)));
+}
+
+Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
+                                                   std::vector<StreamInfo> streams,
+                                                   pipeline::Ring<pipeline::Item>& in,
+                                                   pipeline::Wake& wake) {
+  auto socket = control::open_socket(options.context, ZMQ_XPUB);
+  if (!socket) return std::unexpected(socket.error());
+  double messages_per_s = 0.0;
+  for (const StreamInfo& stream : streams) messages_per_s += stream.rate_hz * (stream.raw ? 2 : 1);
+  const std::pair<int, int> settings[] = {{ZMQ_XPUB_VERBOSE, 1},
+                                          {ZMQ_SNDHWM, send_high_water_mark(messages_per_s)},
+                                          {ZMQ_SNDBUF, kSendBuffer}};
+  for (const auto& [option, value] : settings) {
+    if (auto set = control::set_option(socket->get(), option, value); !set) {
+      return std::unexpected(set.error());
+    }
+  }
+  if (options.secure) {
+    if (auto secured = options.secure(socket->get()); !secured) {
+      return std::unexpected(secured.error());
+    }
+  }
+  auto endpoint = control::bind_socket(socket->get(), options.endpoint);
+  if (!endpoint) return std::unexpected(endpoint.error());
+  return std::unique_ptr<Publisher>(new Publisher(std::move(options), std::move(streams), in, wake,
+                                                  std::move(*socket), std::move(*endpoint)));
+}
+
+Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
+                     pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake,
+                     control::Socket socket, std::string endpoint)
+    : options_(std::move(options)),
+      in_(in),
+      wake_(wake),
+      socket_(std::move(socket)),
+      endpoint_(std::move(endpoint)),
+      told_(std::make_unique<Told>()) {
+  for (StreamInfo& stream : streams) {
+    outlets_.push_back(std::make_unique<Outlet>(std::move(stream)));
+  }
+}
+
+Publisher::~Publisher() = default;
+
+const std::string& Publisher::endpoint() const noexcept { return endpoint_; }
+
+void Publisher::run() {
+  auto poller = pipeline::Poller::open();
+  int socket_fd = -1;
+  std::size_t size = sizeof socket_fd;
+  zmq_getsockopt(socket_.get(), ZMQ_FD, &socket_fd, &size);
+  if (!poller || !(*poller)->add(wake_) || !(*poller)->add(socket_fd, 0)) {
+    spdlog::critical("the publisher cannot wait for frames; nothing is published");
+    return;
+  }
+  told_->reported_ns = options_.clock();
+  told_->cpu_ns = clock_ns(CLOCK_PROCESS_CPUTIME_ID);
+  const auto drain = [this] {
+    while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
+    }
+  };
+  while (!stop_.load(std::memory_order_acquire)) {
+    drain();
+    hear_subscriptions();
+    do_what_was_asked();
+    const std::int64_t now_ns = options_.clock();
+    const std::int64_t report_ns = told_->reported_ns + kNanosPerSecond;
+    if (now_ns >= report_ns) every_second(now_ns);
+    wake_.going_to_sleep();
+    if (in_.empty() && !told_->asked.load() && !stop_.load(std::memory_order_acquire)) {
+      static_cast<void>((*poller)->wait(
+          std::max<std::int64_t>(told_->reported_ns + kNanosPerSecond - options_.clock(), 0)));
+    }
+    wake_.awake();
+  }
+  drain();
+  every_second(options_.clock());
+}
+
+void Publisher::stop() noexcept {
+  stop_.store(true, std::memory_order_release);
+  wake_.ring();
+}
+
+void Publisher::send(std::string_view topic, const google::protobuf::MessageLite& message) {
+  zmq_msg_t body;
+  const std::size_t size = message.ByteSizeLong();
+  if (zmq_msg_init_size(&body, size) != 0) return;  // out of memory: this message is lost
+  message.SerializeWithCachedSizesToArray(static_cast<std::uint8_t*>(zmq_msg_data(&body)));
+  if (!control::send_part(socket_.get(), topic, true) ||
+      zmq_msg_send(&body, socket_.get(), ZMQ_DONTWAIT) < 0) {
+    zmq_msg_close(&body);
+  }
+}
+
+void Publisher::take(const pipeline::Item& item) {
+  using Kind = pipeline::Item::Kind;
+  switch (item.kind) {
+    case Kind::kFrame:
+    case Kind::kRawFrame:
+      take_frame(item.frame, item.kind == Kind::kRawFrame);
+      break;
+    case Kind::kSample: {
+      Outlet& outlet = *outlets_[item.sample.header.stream];
+      ++outlet.samples;
+      send(outlet.styled.sensor_topic, outlet.styled.samples.encode(item.sample));
+      break;
+    }
+    case Kind::kNotice:
+      send_event(item.notice.stream, static_cast<v1::Event::Kind>(item.notice.event),
+                 item.notice.time_ns, item.notice.sequence, sentence(item));
+      break;
+  }
+}
+
+void Publisher::take_frame(const Frame& frame, bool raw) {
+  const std::uint32_t stream = frame.header.stream;
+  Outlet& outlet = *outlets_[stream];
+  Channel& channel = raw ? *outlet.raw : outlet.styled;
+  const v1::Frame& bare = channel.frames.encode(frame);
+  if (options_.tape != nullptr && options_.tape->wants_published()) {
+    bare.SerializeToString(&scratch_);
+    options_.tape->published(stream, frame.header.sequence, raw,
+                             std::as_bytes(std::span(scratch_)));
+  }
+  StageStamps stamps = frame.stamps;
+  stamps.published_ns = options_.clock();
+  send(channel.pose_topic, channel.frames.stamp(stamps));
+  if (raw) return;
+  ++outlet.frames;
+  outlet.measure(frame, stamps);
+}
+
+void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
+                           std::uint64_t sequence, const std::string& text) {
+  v1::Event event;
+  event.set_stream(outlets_[stream]->info.name);
+  event.set_kind(kind);
+  event.set_time_ns(time_ns);
+  event.set_sequence(sequence);
+  event.set_text(text);
+  const bool bad = kind == v1::Event::KIND_STALE || kind == v1::Event::KIND_SHED ||
+                   kind >= v1::Event::KIND_RECORDING_GAP;
+  spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "{}: {}", event.stream(), text);
+  send(outlets_[stream]->styled.event_topic, event);
+}
+
+// A subscription message is one byte, 1 for coming and 0 for going, then the topic's beginning.
+void Publisher::hear_subscriptions() {
+  control::Message message;
+  while (message.receive(socket_.get())) {
+    const std::string_view text = message.text();
+    if (text.empty() || text.front() != 1) continue;
+    for (const auto& outlet : outlets_) send_skeletons(*outlet, text.substr(1));
+  }
+}
+
+// To everyone who subscribes to topics that begin with `prefix`.
+void Publisher::send_skeletons(const Outlet& outlet, std::string_view prefix) {
+  const auto send_one = [&](const Channel& channel) {
+    if (channel.skeleton && channel.skeleton_topic.starts_with(prefix)) {
+      send(channel.skeleton_topic, *channel.skeleton);
+    }
+  };
+  send_one(outlet.styled);
+  if (outlet.raw) send_one(*outlet.raw);
+}
+
+void Publisher::every_second(std::int64_t now_ns) {
+  const double since_s = seconds(now_ns - told_->reported_ns);
+  const std::int64_t cpu_ns = clock_ns(CLOCK_PROCESS_CPUTIME_ID);
+  v1::Stats stats;
+  stats.set_time_ns(now_ns);
+  stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC));
+  stats.set_rss_bytes(resident_bytes());
+  stats.set_cpu_percent(
+      static_cast<float>(100.0 * seconds(cpu_ns - told_->cpu_ns) / std::max(since_s, 1e-3)));
+  for (const auto& outlet : outlets_) {
+    outlet->report(*stats.add_stream(), since_s);
+    send_skeletons(*outlet, {});
+  }
+  if (options_.more_stats) options_.more_stats(stats);
+  told_->reported_ns = now_ns;
+  told_->cpu_ns = cpu_ns;
+  send("stats", stats);
+  const std::scoped_lock lock(told_->mutex);
+  told_->stats = std::move(stats);
+}
+
+void Publisher::do_what_was_asked() {
+  if (!told_->asked.exchange(false)) return;
+  std::vector<Told::Posted> events;
+  bool rebind = false;
+  {
+    const std::scoped_lock lock(told_->mutex);
+    events.swap(told_->events);
+    for (auto& [stream, name] : told_->models) outlets_[stream]->info.model = std::move(name);
+    told_->models.clear();
+    rebind = std::exchange(told_->rebind, false);
+  }
+  for (const Told::Posted& event : events) {
+    send_event(event.stream, event.kind, options_.clock(), 0, event.text);
+  }
+  if (!rebind) return;
+  if (auto again = control::rebind_socket(socket_.get(), endpoint_); !again) {
+    spdlog::error("{}", again.error().text());
+  }
+}
+
+template <typename Change>
+void Publisher::ask(Change&& change) {
+  {
+    const std::scoped_lock lock(told_->mutex);
+    change(*told_);
+  }
+  told_->asked.store(true);
+  wake_.ring();
+}
+
+void Publisher::set_model_name(std::uint32_t stream, std::string name) {
+  ask([&](Told& told) { told.models.emplace_back(stream, std::move(name)); });
+}
+
+void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {
+  ask([&](Told& told) { told.events.push_back({stream, kind, std::move(text)}); });
+}
+
+void Publisher::rebind() {
+  ask([](Told& told) { told.rebind = true; });
+}
+
+v1::Stats Publisher::stats() const {
+  const std::scoped_lock lock(told_->mutex);
+  return told_->stats;
+}
+
+}  // namespace posed::publish

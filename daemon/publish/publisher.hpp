@@ -1,0 +1,102 @@
+// Publisher: the one thread that turns what the pipeline made into messages and sends them on a
+// ZeroMQ XPUB socket. Topics: pose/<stream>, skeleton/<stream> (on each subscription and every
+// second), sensor/<stream>, event/<stream>, stats (every second). A slow subscriber costs the
+// others nothing: its queue is a quarter of a second deep and what does not fit is dropped for it
+// alone.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "daemon/control/zmq_handle.hpp"
+#include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/ring.hpp"
+#include "daemon/pipeline/wake.hpp"
+#include "daemon/record/tape.hpp"
+#include "drivers/driver.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/frame/result.hpp"
+
+namespace posed::publish {
+
+struct StreamInfo {
+  std::string name;
+  drivers::Description description;
+  double rate_hz = 0.0;  // at which frames are to be expected; 0 unknown
+  bool raw = false;      // the unstyled input goes out as <name>-raw
+  std::string model;     // the style model's name at the start
+  const pipeline::StreamCounters* counters = nullptr;
+};
+
+struct PublisherOptions {
+  void* context = nullptr;  // ZeroMQ's; outlives the publisher
+  std::string endpoint;
+  std::function<Result<>(void* socket)> secure;  // before bind; may be empty
+  std::function<void(v1::Stats&)> more_stats;    // adds what others know (recorder); may be empty
+  record::Tape* tape = nullptr;                  // null: nothing is recorded
+  Clock clock = nullptr;
+};
+
+// A message queue a quarter of a second deep, for all streams together.
+[[nodiscard]] int send_high_water_mark(double messages_per_s);
+
+struct Outlet;
+
+class Publisher {
+ public:
+  // Binds. `in` and `wake` outlive the publisher.
+  [[nodiscard]] static Result<std::unique_ptr<Publisher>> open(PublisherOptions options,
+                                                               std::vector<StreamInfo> streams,
+                                                               pipeline::Ring<pipeline::Item>& in,
+                                                               pipeline::Wake& wake);
+  ~Publisher();
+
+  [[nodiscard]] const std::string& endpoint() const noexcept;  // really bound
+
+  // Runs until stop(), then once more over what is waiting. The calling thread becomes the
+  // publisher thread.
+  void run();
+
+  // The rest is for any other thread; cold.
+  void stop() noexcept;
+  void set_model_name(std::uint32_t stream, std::string name);
+  // Says something a person should know on event/<stream>.
+  void post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text);
+  // Cuts all subscribers off and lets them in again through the gatekeeper (a key was withdrawn).
+  void rebind();
+  [[nodiscard]] v1::Stats stats() const;  // as last published
+
+ private:
+  struct Told;
+  Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
+            pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake, control::Socket socket,
+            std::string endpoint);
+  void take(const pipeline::Item& item);
+  void take_frame(const Frame& frame, bool raw);
+  void send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
+                  std::uint64_t sequence, const std::string& text);
+  void send_skeletons(const Outlet& outlet, std::string_view prefix);
+  void hear_subscriptions();
+  void every_second(std::int64_t now_ns);
+  void do_what_was_asked();
+  template <typename Change>
+  void ask(Change&& change);
+  void send(std::string_view topic, const google::protobuf::MessageLite& message);
+
+  PublisherOptions options_;
+  pipeline::Ring<pipeline::Item>& in_;
+  pipeline::Wake& wake_;
+  control::Socket socket_;
+  std::string endpoint_;
+  std::vector<std::unique_ptr<Outlet>> outlets_;
+  std::unique_ptr<Told> told_;
+  std::string scratch_;
+  std::atomic<bool> stop_{false};
+};
+
+}  // namespace posed::publish
