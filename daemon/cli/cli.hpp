@@ -20,6 +20,8 @@ namespace posed::cli {
 [[nodiscard]] int report(const Error& error);
 
 void add_run(CLI::App& app, int& exit_code);
+void add_record(CLI::App& app, int& exit_code);
+void add_replay(CLI::App& app, int& exit_code);
 void add_ctl(CLI::App& app, int& exit_code);
 void add_monitor(CLI::App& app, int& exit_code);
 void add_top(CLI::App& app, int& exit_code);

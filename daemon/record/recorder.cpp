@@ -60,6 +60,7 @@ std::map<std::string, std::string> meta_of(const RecorderOptions& options) {
           {"created_utc", utc_text(utc_ns / kNanosPerSecond)},
           {"created_monotonic_ns", std::to_string(monotonic_ns)},
           {"monotonic_to_utc_ns", std::to_string(utc_ns - monotonic_ns)},
+          {"publish_endpoint", options.publish_endpoint},
           {"config", options.config_text}};
 }
 

@@ -31,9 +31,10 @@ struct RecordedStream {
 struct RecorderOptions {
   std::filesystem::path file;
   bool overwrite = false;
-  bool frames = false;      // keep what is published, too
-  std::string config_text;  // the daemon's whole config, for people
-  Clock clock = nullptr;    // CLOCK_MONOTONIC
+  bool frames = false;           // keep what is published, too
+  std::string config_text;       // the daemon's whole config, for people
+  std::string publish_endpoint;  // where it published; replay does, too
+  Clock clock = nullptr;         // CLOCK_MONOTONIC
   // Called from the recorder thread.
   std::function<void(const Notice&)> tell = [](const Notice&) {};
 };

@@ -1,0 +1,134 @@
+// `posed record`: `run` with the recorder on the tape.
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/serve.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/pipeline/clock.hpp"
+#include "daemon/pipeline/daemon.hpp"
+#include "daemon/record/recorder.hpp"
+#include "daemon/record/stream_settings.hpp"
+
+namespace posed::cli {
+namespace {
+
+struct RecordOptions {
+  std::string config;
+  std::string out;
+  bool frames = false;
+  bool force = false;
+  ServeOptions serve;
+};
+
+record::RecordedStream recorded(const pipeline::OpenStream& stream) {
+  const auto& description = stream.device.description;
+  const auto& config = stream.config;
+  record::StreamSettings settings{.publish_raw = config.publish_raw,
+                                  .stale_after_s = config.stale_after_s,
+                                  .rate_hz = description.rate_hz,
+                                  .style = std::nullopt,
+                                  .model_name = {}};
+  if (config.style) {
+    settings.style = config.style->filter;
+    settings.model_name = config.style->model.filename().string();
+  }
+  const auto model = std::as_bytes(std::span(stream.model_file));
+  return {.row = {.id = 0,
+                  .name = config.name,
+                  .driver = description.driver,
+                  .text = description.text,
+                  .identity = description.identity,
+                  .config = record::to_json(settings),
+                  .model = {}},
+          .rate_hz = description.rate_hz,
+          .model = {model.begin(), model.end()}};
+}
+
+// Tells what the recorder noticed on event/<stream>: a gap on its own stream, an error on all.
+void tell(pipeline::Daemon& daemon, const record::Notice& notice) {
+  if (notice.kind == record::Notice::Kind::kGap) {
+    daemon.post_event(notice.stream, v1::Event::KIND_RECORDING_GAP, notice.text);
+    return;
+  }
+  for (std::uint32_t id = 0; id < daemon.streams().size(); ++id) {
+    daemon.post_event(id, v1::Event::KIND_RECORDING_ERROR, notice.text);
+  }
+}
+
+Result<> record(const RecordOptions& options) {
+  auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  block_end_signals();
+  auto opened = pipeline::Daemon::open(*config);
+  if (!opened) return std::unexpected(opened.error());
+  pipeline::Daemon& daemon = **opened;
+  std::vector<record::RecordedStream> streams;
+  for (const auto& stream : daemon.streams()) streams.push_back(recorded(*stream));
+  auto started = std::make_shared<std::atomic<bool>>(false);
+  record::RecorderOptions recorder_options{
+      .file = options.out,
+      .overwrite = options.force,
+      .frames = options.frames,
+      .config_text = config->text,
+      .publish_endpoint = config->publish_endpoint,
+      .clock = pipeline::monotonic_ns,
+      .tell = [&daemon, started](const record::Notice& notice) {
+        if (*started) tell(daemon, notice);
+      }};
+  auto recorder = record::Recorder::open(std::move(recorder_options), std::move(streams));
+  if (!recorder) return std::unexpected(recorder.error());
+  pipeline::DaemonHooks hooks;
+  hooks.tape = &(*recorder)->tape();
+  hooks.more_stats = [&recorder](v1::Stats& stats) {
+    stats.set_recorder_lost_chunks((*recorder)->lost_chunks());
+    stats.set_recorder_errors((*recorder)->errors());
+    stats.set_recorder_file((*recorder)->file().string());
+  };
+  if (auto done = daemon.start(std::move(hooks)); !done) {
+    daemon.stop();
+    static_cast<void>((*recorder)->finish());
+    std::error_code ignored;
+    std::filesystem::remove(options.out, ignored);  // nothing was recorded
+    return done;
+  }
+  *started = true;
+  print_ready(daemon);
+  serve(daemon, options.serve);
+  auto finished = (*recorder)->finish();
+  const std::uint64_t lost = (*recorder)->lost_chunks();
+  if (lost > 0)
+    spdlog::warn("{}: {} chunks are missing; its gap rows say where", options.out, lost);
+  return finished;
+}
+
+}  // namespace
+
+void add_record(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("record", "Stream like `run` and keep a device log");
+  auto options = std::make_shared<RecordOptions>();
+  command->add_option("--config", options->config, "The daemon's config, TOML")->required();
+  command->add_option("--out", options->out, "The log to write, by habit NAME.plog")->required();
+  command->add_flag("--frames", options->frames, "Keep the published frames, too (for --expect)");
+  command->add_flag("--force", options->force, "Replace the log if it is there already");
+  command->add_option("--seconds", options->serve.seconds, "End after this long");
+  command->add_flag("--until-end", options->serve.until_end, "End when every source has ended");
+  command->footer(
+      "The log is one SQLite file: what each device sent, and every decision that decoding cannot\n"
+      "repeat. kill -9 or a power cut costs at most the last 0.5 s. A full disk stops recording,\n"
+      "not streaming; recording goes on when there is room. Examples:\n"
+      "  posed record --config mine.toml --out take1.plog --frames\n"
+      "  posed replay take1.plog --speed max --out FRAMES.bin --expect\n"
+      "  sqlite3 take1.plog 'SELECT name, driver FROM stream'");
+  command->callback([options, &exit_code] {
+    const auto done = record(*options);
+    exit_code = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,247 @@
+// `posed replay`: a log's run again, from the log alone.
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/publish/encode.hpp"
+#include "daemon/record/broadcast.hpp"
+#include "daemon/record/expectation.hpp"
+#include "daemon/record/frame_file.hpp"
+#include "daemon/record/replay.hpp"
+#include "models/gp/isa.hpp"
+#include "proto/log/reader.hpp"
+
+namespace posed::cli {
+namespace {
+
+struct ReplayOptions {
+  std::string log;
+  std::string speed = "1";
+  std::string out;
+  std::string endpoint;
+  std::string isa;
+  bool publish = false;
+  bool expect = false;
+  bool json = false;
+};
+
+volatile std::sig_atomic_t g_interrupted = 0;
+void interrupt(int) { g_interrupted = 1; }
+
+// Waits until a chunk is due; false when the user has had enough.
+class Pacer {
+ public:
+  explicit Pacer(double speed) : speed_(speed) {}  // 0: as fast as possible
+
+  bool operator()(std::int64_t arrival_ns) {
+    if (speed_ == 0.0) return g_interrupted == 0;
+    if (!origin_ns_) origin_ns_ = arrival_ns;
+    const std::chrono::duration<double> after(seconds(arrival_ns - *origin_ns_) / speed_);
+    while (g_interrupted == 0 && Clock::now() - start_ < after) {
+      std::this_thread::sleep_for(std::min<std::chrono::duration<double>>(
+          after - (Clock::now() - start_), std::chrono::milliseconds(50)));
+    }
+    return g_interrupted == 0;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double speed_;
+  Clock::time_point start_ = Clock::now();
+  std::optional<std::int64_t> origin_ns_;
+};
+
+// Where the frames of a replay go: the file, the comparison, the network.
+class Outputs {
+ public:
+  Outputs(const record::Replay& replay, std::size_t streams) : replay_(replay) {
+    for (std::uint32_t id = 0; id < streams; ++id) {
+      const std::string& name = replay.stream(id).name;
+      encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(name + "-raw")});
+    }
+  }
+
+  void take(const pipeline::Item& item) {
+    if (broadcast) broadcast->add(item);
+    const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
+    if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
+    ++frames;
+    const std::uint32_t stream = item.frame.header.stream;
+    const v1::Frame& frame = encoders_[stream][raw].encode(item.frame);
+    if (file) file->add(frame);
+    if (!expectation || difference) return;
+    auto same = expectation->compare(stream, raw, frame, replay_.broken_at(stream));
+    if (!same) difference = same.error();
+  }
+
+  // After the last frame.
+  Result<> finish() {
+    if (file) {
+      if (auto closed = file->close(); !closed) return closed;
+    }
+    for (std::uint32_t id = 0; expectation && !difference && id < encoders_.size(); ++id) {
+      auto same = expectation->finish(id, replay_.broken_at(id));
+      if (!same) difference = same.error();
+    }
+    if (difference) return std::unexpected(*difference);
+    return {};
+  }
+
+  std::optional<record::FrameFile> file;
+  std::optional<record::Expectation> expectation;
+  std::unique_ptr<record::Broadcast> broadcast;
+  std::optional<Error> difference;
+  std::uint64_t frames = 0;
+
+ private:
+  const record::Replay& replay_;
+  std::vector<std::array<publish::FrameEncoder, 2>> encoders_;  // styled, raw
+};
+
+Result<double> speed_of(const std::string& text) {
+  if (text == "max") return 0.0;
+  char* end = nullptr;
+  const double speed = std::strtod(text.c_str(), &end);
+  if (*end == '\0' && speed > 0.0 && speed <= 1000.0) return speed;
+  return misuse("--speed is a factor such as 1, or max, not '" + text + "'");
+}
+
+// Bits are promised on one instruction set: by default the log's own.
+Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
+  const auto meta = reader.meta().find("isa");
+  const std::string recorded = meta == reader.meta().end() ? "auto" : meta->second;
+  if (!options.isa.empty()) {
+    if (auto set = gp::set_isa(options.isa); !set) return set;
+  } else if (!gp::set_isa(recorded)) {
+    if (auto set = gp::set_isa("auto"); !set) return set;
+  }
+  if (recorded != "auto" && recorded != gp::isa_name()) {
+    spdlog::warn("recorded on {}, replayed on {}: the last bits may differ", recorded,
+                 gp::isa_name());
+  }
+  return {};
+}
+
+void warn_of_gaps(const log::Reader& reader) {
+  constexpr std::array<const char*, 3> kNames{"chunks", "decisions", "published frames"};
+  const auto gaps = reader.gaps();
+  if (!gaps) return;  // open() has read them already
+  for (const log::GapRow& gap : *gaps) {
+    const auto kind = std::min<std::size_t>(static_cast<std::size_t>(gap.kind), 2);
+    spdlog::warn("stream {}: the log lacks {} {} after chunk {}", reader.streams()[gap.stream].name,
+                 gap.lost, kNames[kind], gap.after_chunk);
+  }
+}
+
+void print_summary(const ReplayOptions& options, const Outputs& outputs) {
+  nlohmann::ordered_json line{{"frames", outputs.frames}, {"isa", gp::isa_name()}};
+  if (outputs.expectation) {
+    const auto& counts = outputs.expectation->counts();
+    line["compared"] = counts.compared;
+    line["lost"] = counts.lost;
+    line["after_gap"] = counts.after_gap;
+    line["past_end"] = counts.past_end;
+    if (counts.lost + counts.after_gap + counts.past_end > 0) {
+      spdlog::warn("not compared: {} frames that the log lacks, {} after a gap, {} past its end",
+                   counts.lost, counts.after_gap, counts.past_end);
+    }
+    spdlog::info("{} frames are as published, bit for bit", counts.compared);
+  }
+  if (options.json) {
+    std::printf("%s\n", line.dump().c_str());
+  } else {
+    spdlog::info("{} frames replayed on {}", outputs.frames, gp::isa_name());
+  }
+}
+
+Result<> open_outputs(const ReplayOptions& options, const log::Reader& reader,
+                      const record::Replay& replay, Outputs& outputs) {
+  if (options.expect) {
+    auto expectation = record::Expectation::open(reader, options.log);
+    if (!expectation) return std::unexpected(expectation.error());
+    outputs.expectation = std::move(*expectation);
+  }
+  if (!options.out.empty()) {
+    auto file = record::FrameFile::create(options.out);
+    if (!file) return std::unexpected(file.error());
+    outputs.file = std::move(*file);
+  }
+  if (!options.publish) return {};
+  const auto meta = reader.meta().find("publish_endpoint");
+  std::string endpoint = meta == reader.meta().end() ? "" : meta->second;
+  if (!options.endpoint.empty()) endpoint = options.endpoint;
+  auto broadcast = record::Broadcast::open(endpoint, replay, reader.streams().size());
+  if (!broadcast) return std::unexpected(broadcast.error());
+  outputs.broadcast = std::move(*broadcast);
+  const nlohmann::ordered_json ready{{"ready", true}, {"publish", outputs.broadcast->endpoint()}};
+  std::printf("%s\n", ready.dump().c_str());
+  std::fflush(stdout);
+  return {};
+}
+
+Result<> replay(const ReplayOptions& options) {
+  const auto speed = speed_of(options.speed);
+  if (!speed) return std::unexpected(speed.error());
+  auto reader = log::Reader::open(options.log);
+  if (!reader) return std::unexpected(reader.error());
+  if (auto chosen = choose_isa(options, *reader); !chosen) return chosen;
+  auto opened = record::Replay::open(*reader, options.log);
+  if (!opened) return std::unexpected(opened.error());
+  record::Replay& replay = **opened;
+  warn_of_gaps(*reader);
+  Outputs outputs(replay, reader->streams().size());
+  if (auto done = open_outputs(options, *reader, replay, outputs); !done) return done;
+  std::signal(SIGINT, interrupt);
+  std::signal(SIGTERM, interrupt);
+  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, Pacer(*speed));
+  if (!done) return done;
+  if (g_interrupted != 0) {
+    spdlog::info("interrupted: nothing after frame {} was compared", outputs.frames);
+    return {};
+  }
+  done = outputs.finish();
+  if (done) print_summary(options, outputs);
+  return done;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("replay", "Compute a device log's frames again");
+  auto options = std::make_shared<ReplayOptions>();
+  command->add_option("log", options->log, "The device log")->required();
+  command->add_option("--speed", options->speed, "1: as it came; max: as fast as possible")
+      ->capture_default_str();
+  command->add_flag("--publish", options->publish, "Publish where the recorded run did");
+  command->add_option("--endpoint", options->endpoint, "Publish there instead");
+  command->add_option("--out", options->out, "Write FRAMES.bin: {u32 length, posed.v1.Frame}...");
+  command->add_flag("--expect", options->expect, "Compare with the frames in the log, bit for bit");
+  command->add_option("--isa", options->isa, "portable, avx2 or avx512; default: the log's own");
+  command->add_flag("--json", options->json, "Print the counts as JSON");
+  command->footer(
+      "Nothing but the log is needed: it holds what the devices sent, the models, the settings "
+      "and\n"
+      "every decision. The same log gives the same bits on one instruction set. --expect ends "
+      "with\n"
+      "1 and names stream, sequence and field of the first difference. Examples:\n"
+      "  posed replay take1.plog --speed max --expect\n"
+      "  posed replay take1.plog --speed max --out FRAMES.bin\n"
+      "  posed replay take1.plog --publish     # and watch it: posed monitor");
+  command->callback([options, &exit_code] {
+    const auto done = replay(*options);
+    exit_code = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace posed::cli
