@@ -28,16 +28,13 @@ class [[nodiscard]] HotSection {
   HotSection& operator=(const HotSection&) = delete;
 };
 
-// Around the one system call that the law allows.
+// Around the one system call that the law allows: the read, the wait or the eventfd write.
 class [[nodiscard]] AllowedCall {
  public:
-  AllowedCall() noexcept : before_(hot_marks.no_syscalls) { hot_marks.no_syscalls = 0; }
-  ~AllowedCall() { hot_marks.no_syscalls = before_; }
+  AllowedCall() noexcept { hot_marks.no_syscalls = 0; }
+  ~AllowedCall() { hot_marks.no_syscalls = hot_marks.law; }
   AllowedCall(const AllowedCall&) = delete;
   AllowedCall& operator=(const AllowedCall&) = delete;
-
- private:
-  std::uint8_t before_;
 };
 
 }  // namespace posed::pipeline

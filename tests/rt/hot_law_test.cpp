@@ -1,0 +1,133 @@
+// The hot law holds on the real reader and pipeline threads; and each way of breaking it, put into
+// those threads on purpose, is found.
+#include <spdlog/spdlog.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#include <catch2/catch.hpp>
+
+#include <mutex>
+
+#include "proto/clip/clip.hpp"
+#include "tests/rt/law.hpp"
+#include "tests/rt/rig.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/toy_style.hpp"
+
+namespace posed::rt {
+namespace {
+
+using pipeline::Command;
+
+// A tape that keeps the law itself; the recorder's has tests of its own.
+class CountingTape final : public record::Tape {
+ public:
+  void chunk(std::uint32_t, record::Direction, std::int64_t, std::uint64_t,
+             std::span<const std::byte>) noexcept override {
+    ++chunks;
+  }
+  void decision(const pipeline::Decision&) noexcept override { ++decisions; }
+  [[nodiscard]] bool wants_published() const noexcept override { return false; }
+  void published(std::uint32_t, std::uint64_t, bool, std::span<const std::byte>) noexcept override {
+  }
+  void unpublished(std::uint32_t) noexcept override {}
+  void keep_model(std::span<const std::byte>) override {}
+  std::atomic<int> chunks{0}, decisions{0};
+};
+
+drivers::Device open_device(const char* driver, const drivers::Options& options) {
+  return drivers::find_driver(driver)->open(options).value();
+}
+
+// Breaks the law once, at the fifth chunk.
+class BreakingDecoder final : public drivers::Decoder {
+ public:
+  BreakingDecoder(std::unique_ptr<drivers::Decoder> inner, std::function<void()> breach)
+      : inner_(std::move(inner)), breach_(std::move(breach)) {}
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override {
+    if (++chunks_ == 5) breach_();
+    inner_->feed(bytes, arrival_ns, sink);
+  }
+
+ private:
+  std::unique_ptr<drivers::Decoder> inner_;
+  std::function<void()> breach_;
+  int chunks_ = 0;
+};
+
+void check_no_breach() {
+  for (int b = 0; b < static_cast<int>(Breach::kCount); ++b) {
+    INFO(kBreachNames[static_cast<std::size_t>(b)] << ", last system call " << last_system_call());
+    CHECK(breaches(static_cast<Breach>(b)) == 0);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("reader and pipeline keep the hot law", "[rt]") {
+  watch_log();
+  const test::TempFolder folder;
+  const auto path = folder.path() / "toy.bvh";
+  REQUIRE(clip::write_bvh(test::toy_walk(120, 120.0), path));
+  CountingTape tape;
+  std::vector<drivers::Device> devices;
+  devices.push_back(open_device("file", {{"path", path.string()}}));
+  devices.push_back(open_device("template", {}));
+  // Once through at 20 times its speed: ends, and is silent before that is noticed.
+  devices.push_back(open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}}));
+  const Skeleton& skeleton = *devices[0].description.skeleton;
+  const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
+  const auto second = style::bind_model(test::toy_model(2), skeleton, {}, "second").value();
+  Rig rig(std::move(devices), {first.get(), nullptr, first.get()}, &tape);
+  forget_breaches();
+  rig.start();
+  REQUIRE(rig.take_frames(200) == 200);
+  rig.command({.kind = Command::Kind::kAlpha, .stream = 0, .ticket = 1, .alpha = 0.5F});
+  rig.command({.kind = Command::Kind::kModel, .stream = 0, .ticket = 2, .model = second.get()});
+  REQUIRE(rig.take_frames(200) == 200);
+  CHECK(rig.take_acks() == 2);
+  CHECK(tape.chunks > 0);
+  CHECK(tape.decisions >= 2);
+  if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
+  check_no_breach();
+}
+
+TEST_CASE("each way of breaking the hot law is found", "[rt]") {
+  watch_log();
+  struct Way {
+    Breach breach;
+    std::function<void()> commit;
+  };
+  static std::mutex mutex;
+  const std::vector<Way> ways{
+      {Breach::kAllocation, [] { delete new volatile int(1); }},
+      {Breach::kLock, [] { const std::scoped_lock lock(mutex); }},
+      {Breach::kLog, [] { spdlog::info("hot"); }},
+      {Breach::kThrow,
+       [] {
+         try {
+           throw 1;
+         } catch (int) {
+         }
+       }},
+      {Breach::kSystemCall, [] { syscall(SYS_getppid); }},
+  };
+  for (const Way& way : ways) {
+    INFO(kBreachNames[static_cast<std::size_t>(way.breach)]);
+    std::vector<drivers::Device> devices;
+    devices.push_back(open_device("template", {{"rate_hz", 500.0}}));
+    devices[0].decoder =
+        std::make_unique<BreakingDecoder>(std::move(devices[0].decoder), way.commit);
+    Rig rig(std::move(devices), {nullptr}, nullptr);
+    forget_breaches();
+    rig.start();
+    REQUIRE(rig.take_frames(20) == 20);
+    if (way.breach == Breach::kSystemCall && !rig.system_calls_watched()) {
+      WARN("SKIPPED: this kernel has no syscall user dispatch");
+      continue;
+    }
+    CHECK(breaches(way.breach) >= 1);
+  }
+}
+
+}  // namespace posed::rt

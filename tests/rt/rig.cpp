@@ -1,0 +1,96 @@
+#include "tests/rt/rig.hpp"
+
+#include <chrono>
+#include <ctime>
+
+#include "tests/rt/law.hpp"
+
+namespace posed::rt {
+namespace {
+
+std::int64_t clock_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
+}
+
+}  // namespace
+
+Rig::Rig(std::vector<drivers::Device> devices, std::vector<const style::BoundModel*> models,
+         record::Tape* tape)
+    : devices_(std::move(devices)),
+      pipeline_wake_(pipeline::Wake::open().value()),
+      publisher_wake_(pipeline::Wake::open().value()) {
+  worker_ = pipeline::Worker::open({.in = &decoded_,
+                                    .out = &finished_,
+                                    .commands = &commands_,
+                                    .acks = &acks_,
+                                    .wake = pipeline_wake_.get(),
+                                    .publisher = publisher_wake_.get(),
+                                    .tape = tape,
+                                    .clock = clock_ns})
+                .value();
+  reader_ =
+      pipeline::Reader::open(
+          {.out = &decoded_, .pipeline = pipeline_wake_.get(), .tape = tape, .clock = clock_ns})
+          .value();
+  for (std::uint32_t i = 0; i < devices_.size(); ++i) {
+    counters_.push_back(std::make_unique<pipeline::StreamCounters>());
+    pipeline::EngineOptions options{.stream = i,
+                                    .stale_after_ns = 50'000'000,
+                                    .publish_raw = true,
+                                    .style = std::nullopt,
+                                    .model = models[i]};
+    if (models[i] != nullptr) options.style.emplace();
+    worker_->add(options, devices_[i].description.rate_hz, *counters_.back());
+    reader_->add(devices_[i], *counters_.back()).value();
+  }
+}
+
+Rig::~Rig() {
+  reader_->stop();
+  if (reader_thread_.joinable()) reader_thread_.join();
+  worker_->stop();
+  if (worker_thread_.joinable()) worker_thread_.join();
+}
+
+void Rig::start() {
+  for (auto& device : devices_) device.transport->start(clock_ns()).value();
+  worker_thread_ = std::thread([this] {
+    if (watch_system_calls()) ++watched_;
+    worker_->run();
+  });
+  reader_thread_ = std::thread([this] {
+    if (watch_system_calls()) ++watched_;
+    reader_->run();
+  });
+}
+
+int Rig::take_frames(int frames) {
+  int came = 0;
+  const std::int64_t until_ns = clock_ns() + 10 * kNanosPerSecond;
+  while (came < frames && clock_ns() < until_ns) {
+    const bool any = finished_.consume([&](const pipeline::Item& item) {
+      if (item.kind == pipeline::Item::Kind::kFrame) ++came;
+    });
+    if (any) continue;
+    // Asleep, so that the pipeline thread has to ring.
+    publisher_wake_->going_to_sleep();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return came;
+}
+
+void Rig::command(const pipeline::Command& command) {
+  while (!commands_.push(command)) std::this_thread::yield();
+  pipeline_wake_->ring();
+}
+
+int Rig::take_acks() {
+  int count = 0;
+  while (acks_.consume([&](const pipeline::Ack&) { ++count; })) {
+  }
+  return count;
+}
+
+}  // namespace posed::rt

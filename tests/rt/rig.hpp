@@ -1,0 +1,47 @@
+// The real reader and pipeline threads on real clips, as the daemon runs them, with the hot law
+// watched on both.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "daemon/pipeline/reader.hpp"
+#include "daemon/pipeline/worker.hpp"
+#include "models/style/style_filter.hpp"
+
+namespace posed::rt {
+
+class Rig {
+ public:
+  // `devices` become streams in their order; each with `model` where there is one for it.
+  Rig(std::vector<drivers::Device> devices, std::vector<const style::BoundModel*> models,
+      record::Tape* tape);
+  ~Rig();  // stops both threads
+
+  void start();
+  // Takes items from the pipeline until `frames` styled frames have come; returns how many came
+  // before ten seconds were over.
+  int take_frames(int frames);
+  // Puts a command where control would.
+  void command(const pipeline::Command& command);
+  // Acknowledgements that have come.
+  [[nodiscard]] int take_acks();
+  [[nodiscard]] bool system_calls_watched() const noexcept { return watched_.load() == 2; }
+
+ private:
+  std::vector<drivers::Device> devices_;
+  std::vector<std::unique_ptr<pipeline::StreamCounters>> counters_;
+  pipeline::Ring<pipeline::Item> decoded_{1024};
+  pipeline::Ring<pipeline::Item> finished_{1024};
+  pipeline::Ring<pipeline::Command> commands_{16};
+  pipeline::Ring<pipeline::Ack> acks_{16};
+  std::unique_ptr<pipeline::Wake> pipeline_wake_, publisher_wake_;
+  std::unique_ptr<pipeline::Worker> worker_;
+  std::unique_ptr<pipeline::Reader> reader_;
+  std::atomic<int> watched_{0};
+  std::thread worker_thread_, reader_thread_;
+};
+
+}  // namespace posed::rt
