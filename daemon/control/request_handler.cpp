@@ -92,7 +92,7 @@ Result<std::uint32_t> RequestHandler::styled_stream(const std::string& name) con
   return fail(fmt::format("there is no stream '{}'; there is: {}", config::printable(name), names));
 }
 
-Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, Asker& asker) {
+Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, const Asker& asker) {
   const auto& wanted = request.set_alpha();
   const auto stream = styled_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
@@ -100,10 +100,10 @@ Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, Asker& ask
     return fail(fmt::format("alpha {} is out of range; it goes from -2 to 2", wanted.alpha()));
   }
   Command command{.kind = Command::Kind::kAlpha, .stream = *stream, .alpha = wanted.alpha()};
-  return send(command, {std::move(asker), nullptr});
+  return send(command, {asker, nullptr});
 }
 
-Result<> RequestHandler::set_model(const v1::ControlRequest& request, Asker& asker) {
+Result<> RequestHandler::set_model(const v1::ControlRequest& request, const Asker& asker) {
   const auto& wanted = request.set_model();
   const auto index = styled_stream(wanted.stream());
   if (!index) return std::unexpected(index.error());
@@ -121,7 +121,7 @@ Result<> RequestHandler::set_model(const v1::ControlRequest& request, Asker& ask
   std::copy_n(hash.begin(), std::min(hash.size(), command.model_hash.size() - 1),
               command.model_hash.begin());
   helm_.keep_model(bytes);
-  return send(command, {std::move(asker), std::move(*bound)});
+  return send(command, {asker, std::move(*bound)});
 }
 
 Result<> RequestHandler::send(Command command, UnderWay under_way) {

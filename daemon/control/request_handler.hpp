@@ -85,8 +85,8 @@ class RequestHandler {
     std::unique_ptr<const style::BoundModel> model;  // null for an alpha
   };
   // Nothing when the command is under way.
-  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, Asker& asker);
-  [[nodiscard]] Result<> set_model(const v1::ControlRequest& request, Asker& asker);
+  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> set_model(const v1::ControlRequest& request, const Asker& asker);
   [[nodiscard]] Result<std::uint32_t> styled_stream(const std::string& name) const;
   [[nodiscard]] Result<> send(pipeline::Command command, UnderWay under_way);
 
