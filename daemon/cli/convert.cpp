@@ -1,0 +1,90 @@
+// posed convert: a clip in one format to a clip in another.
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/text.hpp"
+
+namespace posed::cli {
+namespace {
+
+struct Convert {
+  std::string in;
+  std::string out;
+  clip::ReadOptions read;
+  double metres_per_unit = 0.0;  // 0: not given
+  bool json = false;
+};
+
+Result<> check_paths(const Convert& convert) {
+  if (clip::lower(std::filesystem::path(convert.out).extension().string()) != ".bvh") {
+    return misuse("can write .bvh only; name OUT so", convert.out);
+  }
+  std::error_code error;
+  if (std::filesystem::equivalent(convert.in, convert.out, error)) {
+    return misuse("is the file to read; name another OUT, so that nothing is lost", convert.out);
+  }
+  return {};
+}
+
+int run(Convert& convert) {
+  if (auto ok = check_paths(convert); !ok) return report(ok.error());
+  if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
+  const auto clip = clip::read_clip(convert.in, convert.read);
+  if (!clip) return report(clip.error());
+  for (const std::string& warning : clip->warnings) {
+    std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());
+  }
+  if (auto ok = clip::write_bvh(*clip, convert.out); !ok) return report(ok.error());
+  if (!convert.json) {
+    std::fprintf(stderr, "posed: wrote %s: %d frames at %g Hz, %zu joints\n", convert.out.c_str(),
+                 clip->frames(), clip->frame_rate_hz, clip->skeleton->joints.size());
+    return static_cast<int>(ExitCode::kDone);
+  }
+  const nlohmann::json summary{{"in", convert.in},
+                               {"out", convert.out},
+                               {"frames", clip->frames()},
+                               {"rate_hz", clip->frame_rate_hz},
+                               {"joints", clip->skeleton->joints.size()},
+                               {"metres_per_unit", clip->metres_per_unit},
+                               {"warnings", clip->warnings}};
+  // Names may hold any bytes; what is no UTF-8 is replaced rather than thrown at.
+  std::printf("%s\n",
+              summary.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  return static_cast<int>(ExitCode::kDone);
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("convert", "Write a clip in another format");
+  auto convert = std::make_shared<Convert>();
+  command->add_option("IN", convert->in, "Clip to read: .bvh or .amc")->required();
+  command->add_option("--out", convert->out, "Clip to write: .bvh")->required();
+  command->add_option("--skeleton", convert->read.asf,
+                      "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
+  command->add_option("--rate", convert->read.amc_rate_hz, "Frames a second of an AMC")
+      ->capture_default_str();
+  command
+      ->add_option("--metres-per-unit", convert->metres_per_unit,
+                   "Unit of a BVH (default: the profile's, else by the figure's height)")
+      ->check(CLI::Range(1e-6, 1e6));
+  command->add_option("--profile", convert->read.profile,
+                      "Skeleton profile (default: found by the joints' names)");
+  command->add_flag("--json", convert->json, "Print a summary as JSON on stdout");
+  command->footer(
+      "A BVH keeps its names, hierarchy, channel order and unit. An AMC becomes a BVH in\n"
+      "centimetres with Z, Y, X rotations on every joint.\n\n"
+      "Examples:\n"
+      "  posed convert 07_01.amc --out walk.bvh\n"
+      "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh");
+  command->callback([convert, &exit_code] { exit_code = run(*convert); });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,36 @@
+// What must hold of every clip that a reader accepts.
+#pragma once
+
+#include <cmath>
+#include <cstdlib>
+
+#include "proto/clip/clip.hpp"
+
+namespace posed::test {
+
+inline void check(bool holds) {
+  if (!holds) std::abort();
+}
+
+inline void check_clip(const clip::Clip& clip) {
+  const Skeleton& skeleton = *clip.skeleton;
+  check(clip.frames() > 0 && clip.frame_rate_hz > 0.0);
+  check(static_cast<std::size_t>(clip.channels.cols()) == skeleton.channels.size());
+  check(clip.channels.allFinite());
+  for (const Joint& joint : skeleton.joints) {
+    check(joint.offset_m.allFinite());
+    check(std::abs(joint.T_world_joint.norm() - 1.0) < 1e-6);
+  }
+  const Frame frame = clip.frame(clip.frames() - 1);
+  check(frame.joint_count == skeleton.joints.size());
+  for (int j = 0; j < frame.joint_count; ++j) {
+    float norm = 0.0F;
+    for (const float value : frame.rotation_xyzw[static_cast<std::size_t>(j)])
+      norm += value * value;
+    check(std::abs(norm - 1.0F) < 1e-4F);
+  }
+  for (const float value : frame.root_position_m) check(std::isfinite(value));
+  (void)clip::with_zyx_channels(clip);
+}
+
+}  // namespace posed::test
