@@ -2,10 +2,6 @@
 
 #include <cstddef>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#include <sanitizer/allocator_interface.h>
-#endif
-
 namespace {
 
 thread_local std::uint64_t count = 0;
@@ -15,7 +11,10 @@ thread_local std::uint64_t count = 0;
 std::uint64_t posed::test::allocations() noexcept { return count; }
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// A sanitizer brings a heap of its own and tells of each call.
+// A sanitizer brings a heap of its own and tells of each call. gcc 12 comes without the header that
+// declares it.
+extern "C" int __sanitizer_install_malloc_and_free_hooks(  // NOLINT(bugprone-reserved-identifier)
+    void (*allocated)(const volatile void*, std::size_t), void (*freed)(const volatile void*));
 namespace {
 const int kHooked = __sanitizer_install_malloc_and_free_hooks(
     [](const volatile void*, std::size_t) { ++count; }, [](const volatile void*) {});
