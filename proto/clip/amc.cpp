@@ -14,25 +14,21 @@ bool is_frame_number(std::string_view line) {
 // Cuts `amc` into its header and the frames' blocks, and notes what the header says of angles.
 Result<> split(std::string_view amc, const std::string& name, Draft& draft, bool& degrees) {
   std::string_view rest = amc;
-  const char* frame = nullptr;  // where the open block begins
+  std::optional<std::size_t> frame;  // where the open block begins
   int frame_line = 0;
-  const auto close = [&](const char* end) {
-    if (frame == nullptr) return;
-    draft.frames.push_back(
-        {.text = {frame, static_cast<std::size_t>(end - frame)}, .line = frame_line});
+  const auto close = [&](std::size_t end) {
+    if (frame)
+      draft.frames.push_back({.text = amc.substr(*frame, end - *frame), .line = frame_line});
   };
-  draft.header = amc;
   for (int number = 1; !rest.empty(); ++number) {
-    const char* const begin = rest.data();
+    const std::size_t begin = amc.size() - rest.size();
     const std::string_view line = trim(next_line(rest));
     if (is_frame_number(line)) {
-      if (frame == nullptr) {
-        draft.header = {amc.data(), static_cast<std::size_t>(begin - amc.data())};
-      }
       close(begin);
+      if (!frame) draft.header = amc.substr(0, begin);
       frame = begin;
       frame_line = number;
-    } else if (frame == nullptr) {
+    } else if (!frame) {
       const std::string word = lower(line);
       if (word == ":degrees") degrees = true;
       if (word == ":radians") degrees = false;
@@ -42,7 +38,7 @@ Result<> split(std::string_view amc, const std::string& name, Draft& draft, bool
       }
     }
   }
-  close(amc.data() + amc.size());
+  close(amc.size());
   return {};
 }
 

@@ -82,13 +82,13 @@ Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const 
                                          : find_root_joint(skeleton, clip.channels);
   settle_offsets(clip, skeleton);
   if (profile != nullptr) {
-    set_T_frames(skeleton, known_T(*profile, skeleton));
-  } else if (zero_pose_is_T(skeleton)) {
-    set_T_frames(skeleton);
+    set_t_frames(skeleton, known_t(*profile, skeleton));
+  } else if (zero_pose_is_t(skeleton)) {
+    set_t_frames(skeleton);
   } else if (!hints.T.empty()) {
-    set_T_frames(skeleton, hints.T);
+    set_t_frames(skeleton, hints.T);
   } else {
-    set_T_frames(skeleton, T_frames_from_standing(skeleton, standing_rotations(clip)));
+    set_t_frames(skeleton, t_frames_from_standing(skeleton, standing_rotations(clip)));
     clip.warnings.emplace_back(
         "the zero pose is no T-pose and no skeleton profile fits; the T-pose is taken from the "
         "mean pose of the clip, which should walk or stand");

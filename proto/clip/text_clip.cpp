@@ -30,7 +30,7 @@ std::string describe(const ClipFiles& files, const Draft& draft, const Clip& cli
   out += " asf_bytes=" + std::to_string(files.asf.size());
   out += profile.empty() ? "" : " profile=" + profile;
   // Only the whole clip could say it; the others follow from the header.
-  if (draft.profile == nullptr && !zero_pose_is_T(skeleton)) {
+  if (draft.profile == nullptr && !zero_pose_is_t(skeleton)) {
     out += " T=";
     for (const Joint& joint : skeleton.joints) out += axes_text(joint.T_world_joint);
   }

@@ -173,6 +173,7 @@ void name_trunk(Skeleton& skeleton, const std::vector<int>& trunk) {
 
 void name_bones(Skeleton& skeleton) {
   std::vector<Name> names;
+  names.reserve(skeleton.joints.size());
   for (const Joint& joint : skeleton.joints) names.push_back(split_name(joint.name));
   const bool has_collars =
       std::ranges::any_of(names, [](const Name& name) { return name.part == "collar"; });

@@ -162,7 +162,7 @@ Result<> name_bones(const Profile& profile, Skeleton& skeleton) {
   return {};
 }
 
-KnownT known_T(const Profile& profile, const Skeleton& skeleton) {
+KnownT known_t(const Profile& profile, const Skeleton& skeleton) {
   KnownT known(skeleton.joints.size());
   for (const auto& [joint, T] : profile.T) {
     if (const int index = skeleton.joint_index(joint); index >= 0) known[index] = T;

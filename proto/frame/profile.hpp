@@ -39,7 +39,7 @@ struct Profile {
 // Sets the bones as the profile says. An error names its joints that are missing. Cold.
 [[nodiscard]] Result<> name_bones(const Profile& profile, Skeleton& skeleton);
 
-// The T frames that the profile gives, for set_T_frames(). Cold.
-[[nodiscard]] KnownT known_T(const Profile& profile, const Skeleton& skeleton);
+// The T frames that the profile gives, for set_t_frames(). Cold.
+[[nodiscard]] KnownT known_t(const Profile& profile, const Skeleton& skeleton);
 
 }  // namespace posed

@@ -206,7 +206,7 @@ Result<> Skeleton::finish() {
   if (auto ok = check_channels(*this); !ok) return ok;
   if (std::ranges::none_of(joints, [](const Joint& j) { return j.bone.has_value(); })) {
     name_bones(*this);
-    set_T_frames(*this);
+    set_t_frames(*this);
   }
   id = content_id(*this);
   return {};

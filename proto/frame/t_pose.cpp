@@ -32,7 +32,7 @@ Part part_of(Bone bone) {
 }
 
 // Where the bone points in T.
-Eigen::Vector3d T_direction(Bone bone) {
+Eigen::Vector3d t_direction(Bone bone) {
   switch (part_of(bone)) {
     case Part::kTrunk:
       return Eigen::Vector3d::UnitY();
@@ -133,7 +133,7 @@ Eigen::Quaterniond snapped(const Eigen::Quaterniond& q) {
 
 }  // namespace
 
-void set_T_frames(Skeleton& skeleton, const KnownT& known) {
+void set_t_frames(Skeleton& skeleton, const KnownT& known) {
   for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
     Joint& joint = skeleton.joints[j];
     const Eigen::Quaterniond T_parent = joint.parent < 0
@@ -146,27 +146,27 @@ void set_T_frames(Skeleton& skeleton, const KnownT& known) {
     }
     if (!joint.bone || part_of(*joint.bone) == Part::kThumb) continue;
     const Eigen::Vector3d direction = T_parent * rest_direction(skeleton, j);
-    const Eigen::Vector3d axis = T_direction(*joint.bone);
+    const Eigen::Vector3d axis = t_direction(*joint.bone);
     const bool upright = angle_rad(direction, axis) < 45 * kDegree;
     if (part_of(*joint.bone) == Part::kTrunk && upright) continue;
     joint.T_world_joint = (minimal_rotation(direction, axis) * T_parent).normalized();
   }
 }
 
-bool zero_pose_is_T(const Skeleton& skeleton) {
+bool zero_pose_is_t(const Skeleton& skeleton) {
   for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
     const auto& bone = skeleton.joints[j].bone;
     if (!bone || part_of(*bone) == Part::kThumb) continue;
     const Eigen::Vector3d direction = rest_direction(skeleton, j);
     const double limit_rad = (part_of(*bone) == Part::kFoot ? 80 : 45) * kDegree;
-    if (direction.norm() > kShort_m && angle_rad(direction, T_direction(*bone)) > limit_rad) {
+    if (direction.norm() > kShort_m && angle_rad(direction, t_direction(*bone)) > limit_rad) {
       return false;
     }
   }
   return true;
 }
 
-KnownT T_frames_from_standing(const Skeleton& skeleton,
+KnownT t_frames_from_standing(const Skeleton& skeleton,
                               std::span<const Eigen::Quaterniond> standing) {
   KnownT known(skeleton.joints.size());
   Eigen::Quaterniond T_parent = Eigen::Quaterniond::Identity();
@@ -176,7 +176,7 @@ KnownT T_frames_from_standing(const Skeleton& skeleton,
     known[j] = T_parent;
     if (!joint.bone || part_of(*joint.bone) == Part::kThumb) continue;
     const Eigen::Vector3d direction = rest_direction(skeleton, j);
-    const Eigen::Vector3d axis = T_direction(*joint.bone);
+    const Eigen::Vector3d axis = t_direction(*joint.bone);
     if (direction.norm() < kShort_m) continue;
     const bool lies_right = angle_rad(T_parent * direction, axis) < 20 * kDegree;
     if (lies_right && follows_parent(*joint.bone)) continue;

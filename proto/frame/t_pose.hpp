@@ -19,16 +19,16 @@ using KnownT = std::vector<std::optional<Eigen::Quaterniond>>;  // [joint]
 // The rule for a zero pose near T: a limb's T is its parent's, turned the smallest way that lays
 // the bone along its canonical axis. The trunk, the thumbs and joints that are no bone keep their
 // parent's T: the curve of a back is the person's, no pose. Cold.
-void set_T_frames(Skeleton& skeleton, const KnownT& known = {});
+void set_t_frames(Skeleton& skeleton, const KnownT& known = {});
 
 // Every limb of the zero pose lies within 45 degrees of its canonical axis (feet: 80).
-[[nodiscard]] bool zero_pose_is_T(const Skeleton& skeleton);
+[[nodiscard]] bool zero_pose_is_t(const Skeleton& skeleton);
 
 // The rule where the zero pose says nothing: `standing` are the joints' mean global rotations while
 // the figure stands or walks, heading removed [joint]. Each bone's is turned the smallest way onto
 // its axis and then snapped to the nearest of the 24 rotations that map axes to axes; forearms,
 // hands and fingers that lie right in their parent's T take that.
-[[nodiscard]] KnownT T_frames_from_standing(const Skeleton& skeleton,
+[[nodiscard]] KnownT t_frames_from_standing(const Skeleton& skeleton,
                                             std::span<const Eigen::Quaterniond> standing);
 
 // A rotation that maps axes to axes, written as where x, y and z go: "+y-x+z". Parsing refuses what

@@ -59,14 +59,14 @@ Eigen::Quaterniond local(const Frame& frame, int joint) {
   return to_eigen_double(frame.rotation_xyzw[static_cast<std::size_t>(joint)]);
 }
 
-Eigen::Quaterniond parent_T(const Skeleton& skeleton, int joint) {
+Eigen::Quaterniond t_of_parent(const Skeleton& skeleton, int joint) {
   const int parent = skeleton.joints[joint].parent;
   return parent < 0 ? Eigen::Quaterniond::Identity() : skeleton.joints[parent].T_world_joint;
 }
 
 // Lc = T_parent L T_joint^-1.
 Eigen::Quaterniond canonical(const Skeleton& skeleton, const Frame& frame, int joint) {
-  return parent_T(skeleton, joint) * local(frame, joint) *
+  return t_of_parent(skeleton, joint) * local(frame, joint) *
          skeleton.joints[joint].T_world_joint.conjugate();
 }
 

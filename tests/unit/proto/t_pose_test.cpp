@@ -138,8 +138,8 @@ TEST_CASE("the rule for folded zero poses finds the shipped frames of the Bandai
     CHECK(clip->metres_per_unit == 0.01);
     CHECK(clip->warnings.empty());
     const Skeleton& skeleton = *clip->skeleton;
-    CHECK_FALSE(zero_pose_is_T(skeleton));
-    const KnownT found = T_frames_from_standing(skeleton, clip::standing_rotations(*clip));
+    CHECK_FALSE(zero_pose_is_t(skeleton));
+    const KnownT found = t_frames_from_standing(skeleton, clip::standing_rotations(*clip));
     for (std::size_t j = 1; j < skeleton.joints.size(); ++j) {
       INFO(name << " " << skeleton.joints[j].name);
       CHECK(axes_text(*found[j]) == axes_text(skeleton.joints[j].T_world_joint));
