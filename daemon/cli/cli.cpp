@@ -15,6 +15,7 @@ using AddCommand = void (*)(CLI::App& app, int& exit_code);
 // The order in which `posed --help` lists them.
 constexpr auto kCommands = std::to_array<AddCommand>({
     add_convert,
+    add_train,
     add_ctl,
     add_monitor,
     add_top,

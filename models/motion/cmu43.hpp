@@ -8,6 +8,8 @@
 
 #include <Eigen/Geometry>
 
+#include "models/motion/pose_space.hpp"
+
 namespace posed::motion {
 
 struct Cmu43Joint {
@@ -17,7 +19,7 @@ struct Cmu43Joint {
   std::array<double, 3> axis_deg;  // of the .asf's `axis x y z XYZ` line
 };
 
-inline constexpr std::array<Cmu43Joint, 19> kCmu43{{
+inline constexpr std::array<Cmu43Joint, kCmu43Joints> kCmu43{{
     {"root", "Hips", 7, {0, 0, 0}},
     {"lowerback", "LowerBack", 7, {0, 0, 0}},
     {"upperback", "Spine", 7, {0, 0, 0}},

@@ -132,7 +132,7 @@ MatrixXd root_positions_m(const Motion& motion, double heading_rad) {
   return positions;
 }
 
-Result<MatrixXd> pose_vectors(const Motion& motion, const PoseSpace& space, double heading_rad) {
+MatrixXd pose_vectors(const Motion& motion, const PoseSpace& space, double heading_rad) {
   const int dims = space.dims();
   MatrixXd q(motion.size(), dims);
   std::vector<float> row(dims);
@@ -140,14 +140,6 @@ Result<MatrixXd> pose_vectors(const Motion& motion, const PoseSpace& space, doub
   for (int t = 0; t < motion.size(); ++t) {
     space.to_vector(motion.frames[t], heading_rad, row, available);
     q.row(t) = Eigen::Map<const Eigen::RowVectorXf>(row.data(), dims).cast<double>();
-    if (t == 0) continue;
-    const double jump = (q.row(t) - q.row(t - 1)).lpNorm<Eigen::Infinity>();
-    if (jump > std::numbers::pi) {
-      return fail(
-          "frame " + std::to_string(t + 1) +
-          " turns a joint over by more than half a turn at once; cut the clip there or, for "
-          "Euler angles (cmu43), use --pose-space native");
-    }
   }
   return q;
 }

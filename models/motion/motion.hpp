@@ -37,9 +37,9 @@ struct Motion {
 // Root positions [frames x 3], m, seen from `heading_rad`.
 [[nodiscard]] Eigen::MatrixXd root_positions_m(const Motion& motion, double heading_rad);
 
-// q of every frame [frames x dims], rad. Refuses Euler angles that turn over (cmu43).
-[[nodiscard]] Result<Eigen::MatrixXd> pose_vectors(const Motion& motion, const PoseSpace& space,
-                                                   double heading_rad);
+// q of every frame [frames x dims], rad.
+[[nodiscard]] Eigen::MatrixXd pose_vectors(const Motion& motion, const PoseSpace& space,
+                                           double heading_rad);
 
 // Right minus left flexion of the thigh [rad], forward positive, a value a frame. Nothing when the
 // skeleton names no upper legs.

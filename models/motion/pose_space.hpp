@@ -26,6 +26,7 @@
 namespace posed::motion {
 
 inline constexpr int kMaxPoseDims = kMaxChannels;
+inline constexpr int kCmu43Joints = 19;
 
 enum class Space : std::uint8_t { kNative, kCmu43, kHumanoid };
 [[nodiscard]] std::string_view space_name(Space space);

@@ -1,0 +1,34 @@
+// The experiment file of `posed train style`: which clips show which group, person and motion.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "models/style/train.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::cli {
+
+struct ExperimentClip {
+  std::filesystem::path file;  // made absolute by the experiment file's folder
+  std::string group, subject, motion;
+  int line = 0;  // of its [[clip]] header
+};
+
+struct Experiment {
+  std::string target;
+  double rate_hz = 30.0;
+  motion::Space space = motion::Space::kNative;
+  style::TrainMode mode = style::TrainMode::kDefault;
+  std::filesystem::path asf;  // skeleton of all AMC clips; empty: beside each
+  std::vector<ExperimentClip> clips;
+};
+
+// Errors name file and line; an unknown key names the nearest known one.
+[[nodiscard]] Result<Experiment> read_experiment(const std::filesystem::path& path);
+
+// Reads the clips themselves.
+[[nodiscard]] Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment);
+
+}  // namespace posed::cli

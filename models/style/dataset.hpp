@@ -1,0 +1,81 @@
+// Dataset: clips brought to one rate, one pose space and one phase: what a style model is learnt
+// from. Cold.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "models/motion/pose_space.hpp"
+#include "models/style/mgpm_train.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::style {
+
+struct TrainingClip {
+  clip::Clip clip;
+  std::string group;    // "masculine"
+  std::string subject;  // who; the same name in two groups is two styles of one person
+  std::string motion;   // "walk"
+};
+
+// Told what is being done and how far that is, 0..1; returning false stops the training.
+using StepProgress = std::function<bool(std::string_view step, double fraction)>;
+
+struct DatasetOptions {
+  motion::Space space = motion::Space::kNative;
+  double rate_hz = 30.0;
+  std::uint64_t seed = 0;
+  std::vector<MgpmStart> starts{MgpmStart::kSvd, MgpmStart::kRandom};
+  StepProgress progress;
+};
+
+struct AlignedClip {
+  std::string file, group, motion;
+  int subject = 0;                    // index into Dataset::subjects
+  Eigen::MatrixXd q;                  // [T x D], rad
+  Eigen::MatrixXd state;              // y = (v, q, dq/dt) [T x 3 + 2D], the paper's 89 for cmu43
+  Eigen::VectorXd leg;                // the stride's reference signal [T]
+  bool has_legs = false;              // else `leg` is the first principal component of q
+  double theta0 = 0.0, dtheta = 0.0;  // phase of the first frame, phase per frame
+
+  [[nodiscard]] Eigen::VectorXd phase() const;
+};
+
+// One person in one group and one motion: one style point.
+struct Subject {
+  std::string name, group, motion;
+  Eigen::VectorXd xi;
+};
+
+struct Dataset {
+  motion::PoseSpaceSpec spec;
+  double rate_hz = 30.0;
+  std::vector<std::string> motions;  // in order of appearance
+  std::vector<AlignedClip> clips;
+  std::vector<Subject> subjects;
+  std::vector<MgpmFit> fits;     // the best fit of each motion, in the order of `motions`
+  std::vector<MgpmData> states;  // what each was fitted to
+  // Which columns of `state` each fit saw (the others never move), and their means.
+  std::vector<std::vector<int>> live_columns;
+  std::vector<Eigen::VectorXd> column_means;
+
+  [[nodiscard]] int dims() const { return motion::space_dims(spec); }
+  [[nodiscard]] std::vector<int> clips_of(const std::string& motion) const;
+};
+
+// Reads poses and strides, without phases of a common origin yet: theta0 is each clip's own leg
+// phase. The training mean of the pose space is over the clips of every group but `target`.
+[[nodiscard]] Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
+                                           const std::string& target,
+                                           const DatasetOptions& options);
+
+// Phases by the MGPM, a motion at a time; then each clip turned so that its leg signal peaks at
+// phase 0 (style-science 0.2).
+[[nodiscard]] Result<> align(Dataset& dataset, const DatasetOptions& options);
+
+}  // namespace posed::style

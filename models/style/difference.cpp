@@ -1,0 +1,89 @@
+#include "models/style/difference.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "models/style/harmonics.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct Grid {
+  MatrixXd inputs, outputs;  // [kGridFrames * pairings x D]
+  VectorXd offset;           // [D]
+};
+
+Grid grid_of(const std::vector<Pairing>& pairings) {
+  const MatrixXd basis = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const auto dims = pairings.front().input.cols();
+  const auto rows = static_cast<Eigen::Index>(pairings.size()) * kGridFrames;
+  Grid grid{MatrixXd(rows, dims), MatrixXd(rows, dims), VectorXd::Zero(dims)};
+  int counted = 0;
+  for (Eigen::Index i = 0; i < std::ssize(pairings); ++i) {
+    const Pairing& pairing = pairings[static_cast<std::size_t>(i)];
+    grid.inputs.middleRows(i * kGridFrames, kGridFrames) = basis * pairing.input;
+    grid.outputs.middleRows(i * kGridFrames, kGridFrames) = basis * pairing.delta;
+    if (pairing.prior) {
+      grid.offset += pairing.delta.row(0).transpose();
+      ++counted;
+    }
+  }
+  if (counted > 0) grid.offset /= counted;
+  return grid;
+}
+
+}  // namespace
+
+std::vector<double> candidate_lengths_rad(int dims) {
+  std::vector<double> lengths;
+  for (const double length_deg : {30.0, 50.0, 75.0, 100.0}) {
+    lengths.push_back(length_deg * std::numbers::pi / 180.0 * std::sqrt(dims / 63.0));
+  }
+  return lengths;
+}
+
+Result<gp::Trained> fit_difference(const std::vector<Pairing>& pairings, double length_rad,
+                                   double noise) {
+  const Grid grid = grid_of(pairings);
+  // The signal variance does not move the mean (noise is relative to it); it is what the residual
+  // shows, so that the process's variance means something.
+  const MatrixXd residual = grid.outputs.rowwise() - grid.offset.transpose();
+  const double variance =
+      std::max(1e-12, residual.squaredNorm() / static_cast<double>(residual.size()));
+  return gp::fit(grid.inputs, grid.outputs, grid.offset,
+                 {.lambda = std::log(variance),
+                  .log_mu = -2.0 * std::log(length_rad),
+                  .log_b = -std::numeric_limits<double>::infinity(),
+                  .log_noise = std::log(noise * variance)});
+}
+
+FoldError fold_error(const Fold& fold, double length_rad, double noise) {
+  const auto process = fit_difference(fold.train, length_rad, noise);
+  const double truth = fold.truth.squaredNorm();
+  if (!process) return {std::numeric_limits<double>::infinity(), truth};
+  return {(gp::posterior(*process, fold.q).mean - fold.truth).squaredNorm(), truth};
+}
+
+double choose_length_rad(const std::vector<Fold>& folds, const std::vector<double>& candidates_rad,
+                         double noise, double fallback_rad) {
+  double best = std::numeric_limits<double>::infinity();
+  double chosen = fallback_rad;
+  for (const double length_rad : candidates_rad) {
+    double error = 0.0;
+    for (const Fold& fold : folds) {
+      // Each fold counts alike, whatever its clip's length.
+      error += fold_error(fold, length_rad, noise).error / static_cast<double>(fold.q.rows());
+    }
+    if (!folds.empty() && error < best) {
+      best = error;
+      chosen = length_rad;
+    }
+  }
+  return chosen;
+}
+
+}  // namespace posed::style

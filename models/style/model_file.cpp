@@ -1,0 +1,270 @@
+// The model file: 8 bytes POSEDMDL, u32 version, u64 payload length, u32 CRC-32 of the payload (all
+// little-endian), then posed.v1.ModelFile. Nothing of the bytes is believed before it is checked.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include <zlib.h>
+
+#include "models/style/style_model.hpp"
+#include "posed/v1/model.pb.h"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::string_view kMagic = "POSEDMDL";
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kHeaderBytes = 24;
+constexpr int kMaxInputs = 20'000;
+constexpr double kMaxNumber = 1e30;  // what the hot path's floats can still hold and multiply
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+template <typename T>
+void put(std::string& out, T value) {
+  for (std::size_t i = 0; i < sizeof(T); ++i) {
+    out.push_back(static_cast<char>((value >> (8 * i)) & 0xFF));
+  }
+}
+
+template <typename T>
+T get(std::span<const std::byte> bytes) {
+  T value = 0;
+  for (std::size_t i = 0; i < sizeof(T); ++i) {
+    value |= static_cast<T>(std::to_integer<T>(bytes[i]) << (8 * i));
+  }
+  return value;
+}
+
+std::uint32_t crc_of(const void* data, std::size_t size) {
+  return static_cast<std::uint32_t>(
+      crc32_z(crc32_z(0, nullptr, 0), static_cast<const Bytef*>(data), size));
+}
+
+// Collects the first thing that is wrong, so that the reading below stays one straight line.
+class Reader {
+ public:
+  void want(bool condition, const char* what) {
+    if (!condition && wrong_.empty()) wrong_ = what;
+  }
+  [[nodiscard]] bool sound() const { return wrong_.empty(); }
+  [[nodiscard]] const std::string& wrong() const { return wrong_; }
+
+  VectorXd vector(const google::protobuf::RepeatedField<double>& list, int size, const char* what) {
+    want(list.size() == size, what);
+    if (!sound()) return {};
+    VectorXd v = Eigen::Map<const VectorXd>(list.data(), size);
+    want(is_number(v), what);
+    return v;
+  }
+
+  MatrixXd matrix(const v1::Matrix& m, int columns, const char* what) {
+    const bool shaped = m.rows() >= 1 && m.rows() <= kMaxInputs &&
+                        m.columns() == static_cast<std::uint32_t>(columns) &&
+                        static_cast<std::int64_t>(m.rows()) * m.columns() == m.value_size();
+    want(shaped, what);
+    if (!sound()) return {};
+    MatrixXd out = Eigen::Map<const RowMajor>(m.value().data(), m.rows(), columns);
+    want(is_number(out), what);
+    return out;
+  }
+
+  double number(double value, double low, double high, const char* what) {
+    want(value >= low && value <= high, what);  // false for NaN
+    return value;
+  }
+
+ private:
+  template <typename M>
+  static bool is_number(const M& m) {
+    return (m.array().abs() <= kMaxNumber).all();  // false for NaN
+  }
+  std::string wrong_;
+};
+
+motion::PoseSpaceSpec read_space(const v1::PoseSpace& from, Reader& reader) {
+  motion::PoseSpaceSpec spec;
+  const auto space = motion::space_from_name(from.name());
+  reader.want(space.has_value(), "the name of the pose space");
+  if (space) spec.space = *space;
+  spec.joints.assign(from.joint().begin(), from.joint().end());
+  reader.want(!spec.joints.empty() && spec.joints.size() <= kMaxJoints, "the number of joints");
+  reader.want(
+      std::set<std::string>(spec.joints.begin(), spec.joints.end()).size() == spec.joints.size(),
+      "the joints' names");
+  reader.want(from.root() < spec.joints.size(), "the root joint");
+  spec.root = static_cast<int>(from.root());
+  const auto means = spec.space == motion::Space::kCmu43 ? 0 : static_cast<int>(spec.joints.size());
+  const VectorXd mean = reader.vector(from.mean_xyzw(), 4 * means, "the mean rotations");
+  for (int j = 0; j < means && reader.sound(); ++j) {
+    const Eigen::Quaterniond q(mean[4 * j + 3], mean[4 * j], mean[4 * j + 1], mean[4 * j + 2]);
+    reader.want(std::abs(q.norm() - 1.0) < 1e-6, "a mean rotation, which is no unit quaternion");
+    spec.mean.push_back(q);
+  }
+  const bool is_cmu = spec.space == motion::Space::kCmu43;
+  reader.want(!is_cmu || spec.joints.size() == motion::kCmu43Joints, "the joints of cmu43");
+  return spec;
+}
+
+gp::Trained read_process(const v1::GaussianProcess& from, int dims, Reader& reader) {
+  gp::Trained process;
+  process.inputs = reader.matrix(from.inputs(), dims, "the inputs' shape or values");
+  process.weights = reader.matrix(from.weights(), dims, "the weights' shape or values");
+  reader.want(process.inputs.rows() == process.weights.rows(), "the number of weights");
+  process.offset = reader.vector(from.offset(), dims, "the prior mean");
+  process.lambda = reader.number(from.lambda(), -60.0, 60.0, "lambda");
+  process.mu = reader.number(from.mu(), 1e-12, 1e12, "mu");
+  process.b = reader.number(from.b(), 0.0, kMaxNumber, "b");
+  process.noise = reader.number(from.noise(), 0.0, kMaxNumber, "the noise");
+  return process;
+}
+
+StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
+  StyleModel model;
+  model.space = read_space(from.space(), reader);
+  const int dims = motion::space_dims(model.space);
+  model.process = read_process(from.process(), dims, reader);
+  model.limit_rad = reader.vector(from.limit_rad(), dims, "the limits");
+  model.input_mean = reader.vector(from.input_mean(), dims, "the inputs' mean");
+  model.input_sd = reader.vector(from.input_sd(), dims, "the inputs' deviation");
+  if (reader.sound()) {
+    reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
+    reader.want((model.input_sd.array() >= 0.0).all(), "a deviation below zero");
+  }
+  model.rate_hz = reader.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
+  model.from = from.from();
+  model.to = from.to();
+  model.report_json = from.report_json();
+  return model;
+}
+
+void write_matrix(const MatrixXd& m, v1::Matrix& out) {
+  out.set_rows(static_cast<std::uint32_t>(m.rows()));
+  out.set_columns(static_cast<std::uint32_t>(m.cols()));
+  const RowMajor rows = m;
+  out.mutable_value()->Add(rows.data(), rows.data() + rows.size());
+}
+
+void write_vector(const VectorXd& v, google::protobuf::RepeatedField<double>& out) {
+  out.Add(v.data(), v.data() + v.size());
+}
+
+}  // namespace
+
+Result<StyleModel> parse_model(std::span<const std::byte> bytes, const std::string& name) {
+  if (bytes.size() < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
+    return fail("this is not a posed model; make one with `posed train style`", name);
+  }
+  const auto version = get<std::uint32_t>(bytes.subspan(8));
+  if (version != kVersion) {
+    return fail("the model has version " + std::to_string(version) + ", this posed reads version " +
+                    std::to_string(kVersion) + "; train it again",
+                name);
+  }
+  const auto length = get<std::uint64_t>(bytes.subspan(12));
+  const auto payload = bytes.subspan(kHeaderBytes);
+  if (length != payload.size()) {
+    return fail("the model is cut short or has something after it: " + std::to_string(length) +
+                    " bytes promised, " + std::to_string(payload.size()) + " there; copy it again",
+                name);
+  }
+  if (get<std::uint32_t>(bytes.subspan(20)) != crc_of(payload.data(), payload.size())) {
+    return fail("the model's checksum does not fit its bytes; copy it again", name);
+  }
+  v1::ModelFile file;
+  if (payload.size() > INT32_MAX ||
+      !file.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) {
+    return fail("the model's payload cannot be read; train it again", name);
+  }
+  if (!file.has_style()) return fail("the model is not a style model", name);
+  Reader reader;
+  StyleModel model = read_model(file.style(), reader);
+  if (!reader.sound()) {
+    return fail("the model is not sound: " + reader.wrong() + "; train it again", name);
+  }
+  return model;
+}
+
+Result<StyleModel> load_model(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return fail("this is a folder, not a model file", path.string());
+  }
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) return fail("the model cannot be opened; check the path", path.string());
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (stream.bad()) return fail("the model cannot be read", path.string());
+  return parse_model(std::as_bytes(std::span(text)), path.string());
+}
+
+std::string serialize_model(const StyleModel& model) {
+  v1::ModelFile file;
+  file.set_posed_version("0.1.0");
+  v1::StyleModel& style = *file.mutable_style();
+  v1::PoseSpace& space = *style.mutable_space();
+  space.set_name(std::string(motion::space_name(model.space.space)));
+  for (const std::string& joint : model.space.joints) space.add_joint(joint);
+  for (const Eigen::Quaterniond& q : model.space.mean) {
+    for (const double value : {q.x(), q.y(), q.z(), q.w()}) space.add_mean_xyzw(value);
+  }
+  space.set_root(static_cast<std::uint32_t>(model.space.root));
+  v1::GaussianProcess& process = *style.mutable_process();
+  write_matrix(model.process.inputs, *process.mutable_inputs());
+  write_matrix(model.process.weights, *process.mutable_weights());
+  write_vector(model.process.offset, *process.mutable_offset());
+  process.set_lambda(model.process.lambda);
+  process.set_mu(model.process.mu);
+  process.set_b(model.process.b);
+  process.set_noise(model.process.noise);
+  write_vector(model.limit_rad, *style.mutable_limit_rad());
+  write_vector(model.input_mean, *style.mutable_input_mean());
+  write_vector(model.input_sd, *style.mutable_input_sd());
+  style.set_rate_hz(model.rate_hz);
+  style.set_from(model.from);
+  style.set_to(model.to);
+  style.set_report_json(model.report_json);
+
+  const std::string payload = file.SerializeAsString();
+  std::string out(kMagic);
+  put<std::uint32_t>(out, kVersion);
+  put<std::uint64_t>(out, payload.size());
+  put<std::uint32_t>(out, crc_of(payload.data(), payload.size()));
+  return out + payload;
+}
+
+Result<> save_model(const StyleModel& model, const std::filesystem::path& path) {
+  // Written beside its place and then moved there: whoever opens the file sees all of it or none.
+  const std::filesystem::path part = path.string() + ".part";
+  {
+    std::ofstream stream(part, std::ios::binary | std::ios::trunc);
+    const std::string bytes = serialize_model(model);
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    stream.close();
+    if (!stream) {
+      std::error_code ignored;
+      std::filesystem::remove(part, ignored);
+      return fail("the model cannot be written; check the folder and the disk's free space",
+                  path.string());
+    }
+  }
+  std::error_code error;
+  std::filesystem::rename(part, path, error);
+  if (error) {
+    std::error_code ignored;
+    std::filesystem::remove(part, ignored);
+    return fail("the model cannot be put in its place: " + error.message(), path.string());
+  }
+  return {};
+}
+
+}  // namespace posed::style

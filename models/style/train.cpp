@@ -1,0 +1,272 @@
+#include "models/style/train.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "models/style/harmonics.hpp"
+#include "models/style/pairings.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+constexpr double kLimitFactor = 1.5;      // of the largest difference in training
+constexpr double kMeanCycleNoise = 1e-3;  // a group of one: its cycle is an average already
+constexpr double kPersonNoise = 0.1;      // several people: their cycles scatter about the group's
+
+struct Learnt {
+  gp::Trained process;
+  MatrixXd differences;  // all that was taught [N x D]
+  json kernel;
+};
+
+// Clips of a motion that lacks the target or a source teach nothing; every group must teach.
+Result<> check_groups(const std::vector<TrainingClip>& clips, const std::string& target) {
+  std::set<std::pair<std::string, std::string>> there;  // (motion, group)
+  for (const TrainingClip& clip : clips) there.emplace(clip.motion, clip.group);
+  const auto has = [&](const std::string& motion, bool of_target) {
+    return std::ranges::any_of(there, [&](const auto& entry) {
+      return entry.first == motion && (entry.second == target) == of_target;
+    });
+  };
+  for (const TrainingClip& clip : clips) {
+    if (clip.group.empty()) {
+      return fail("the clip is in no group; say which style it shows", clip.clip.path);
+    }
+    if (!has(clip.motion, true)) {
+      return fail("motion " + clip.motion + " has no clip of the target group '" + target +
+                      "'; add one or leave this clip out",
+                  clip.clip.path);
+    }
+    if (!has(clip.motion, false)) {
+      return fail("motion " + clip.motion + " has clips of the target group '" + target +
+                      "' only; add a clip of another group to learn the difference from",
+                  clip.clip.path);
+    }
+  }
+  return {};
+}
+
+std::string first_source_of(const Dataset& dataset, const std::string& target) {
+  for (const AlignedClip& clip : dataset.clips) {
+    if (clip.group != target) return clip.group;
+  }
+  return {};
+}
+
+int cycle_frames(const Dataset& dataset, const std::string& motion) {
+  double sum = 0.0;
+  const auto members = dataset.clips_of(motion);
+  for (const int c : members) sum += dataset.clips[c].dtheta;
+  return static_cast<int>(
+      std::lround(2.0 * std::numbers::pi * static_cast<double>(members.size()) / sum));
+}
+
+bool several_subjects(const Dataset& dataset, const std::string& target) {
+  std::set<std::pair<std::string, std::string>> seen;
+  return std::ranges::any_of(dataset.subjects, [&](const Subject& s) {
+    return s.group != target && !seen.emplace(s.motion, s.group).second;
+  });
+}
+
+Result<Learnt> learn_default(const Dataset& dataset, const std::string& target) {
+  const std::string first = first_source_of(dataset, target);
+  const auto pairings = make_pairings(dataset, subject_cycles(dataset), target, first);
+  const double noise = several_subjects(dataset, target) ? kPersonNoise : kMeanCycleNoise;
+  const auto folds = make_folds(dataset, target, first);
+  const auto candidates = candidate_lengths_rad(dataset.dims());
+  const bool is_union = dataset.motions.size() > 1 || pairings.size() > 2;
+  const double length_rad =
+      choose_length_rad(folds, candidates, noise, candidates[is_union ? 2 : 1]);
+  auto process = fit_difference(pairings, length_rad, noise);
+  if (!process) return std::unexpected(process.error());
+  Learnt learnt{std::move(*process), {}, {}};
+  const MatrixXd basis = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  learnt.differences.resize(learnt.process.inputs.rows(), dataset.dims());
+  for (Eigen::Index i = 0; i < std::ssize(pairings); ++i) {
+    learnt.differences.middleRows(i * kGridFrames, kGridFrames) =
+        basis * pairings[static_cast<std::size_t>(i)].delta;
+  }
+  learnt.kernel["length_chosen_by"] = folds.empty() ? "default" : "leave-out";
+  return learnt;
+}
+
+// The MGPM mean cycle of a group (the mean of its subjects' style points), columns of q only.
+MatrixXd mgpm_group_cycle(const Dataset& dataset, std::size_t motion, const std::string& group,
+                          const VectorXd& phase) {
+  const MgpmFit& fit = dataset.fits[motion];
+  VectorXd xi = VectorXd::Zero(fit.params.xi.cols());
+  int count = 0;
+  for (const Subject& s : dataset.subjects) {
+    if (s.motion != dataset.motions[motion] || s.group != group) continue;
+    xi += s.xi;
+    ++count;
+  }
+  if (count == 0) return {};
+  const MatrixXd live =
+      mgpm_cycle(dataset.states[motion], fit.params, xi / count, phase, fit.harmonics);
+  MatrixXd all = dataset.column_means[motion].transpose().replicate(phase.size(), 1);
+  all(Eigen::all, dataset.live_columns[motion]) += live;
+  return all.middleCols(3, dataset.dims());
+}
+
+// Where the search for the kernel values starts: the data's own size, 50 degrees, little noise.
+gp::Hyper paper_start(const MatrixXd& Y) {
+  constexpr double kLength_rad = 50.0 * std::numbers::pi / 180.0;
+  const Eigen::RowVectorXd mean = Y.colwise().mean();
+  const double variance = (Y.rowwise() - mean).squaredNorm() / static_cast<double>(Y.size());
+  const double constant = mean.squaredNorm() / static_cast<double>(mean.size());
+  return {.lambda = std::log(std::max(variance, 1e-9)),
+          .log_mu = -2.0 * std::log(kLength_rad),
+          .log_b = std::log(std::max(constant, 1e-9)),
+          .log_noise = std::log(1e-2 * std::max(variance, 1e-9))};
+}
+
+// The paper: mean source cycle -> difference of the mean cycles, kernel values by evidence.
+Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
+  std::set<std::string> sources;
+  for (const Subject& s : dataset.subjects) {
+    if (s.group != target) sources.insert(s.group);
+  }
+  MatrixXd X(0, dataset.dims());
+  MatrixXd Y(0, dataset.dims());
+  for (std::size_t m = 0; m < dataset.motions.size(); ++m) {
+    const VectorXd phase = cycle_phases(cycle_frames(dataset, dataset.motions[m]));
+    const MatrixXd goal = mgpm_group_cycle(dataset, m, target, phase);
+    for (const std::string& group : sources) {
+      const MatrixXd cycle = mgpm_group_cycle(dataset, m, group, phase);
+      if (cycle.size() == 0) continue;
+      X.conservativeResize(X.rows() + cycle.rows(), Eigen::NoChange);
+      Y.conservativeResize(X.rows(), Eigen::NoChange);
+      X.bottomRows(cycle.rows()) = cycle;
+      Y.bottomRows(cycle.rows()) = goal - cycle;
+    }
+  }
+  const gp::ScgResult best = gp::maximise_evidence(X, Y, paper_start(Y), {.max_iterations = 300});
+  auto process = gp::fit(X, Y, VectorXd::Zero(dataset.dims()), gp::Hyper::of(best.x));
+  if (!process) return std::unexpected(process.error());
+  return Learnt{std::move(*process), Y, {{"length_chosen_by", "evidence"}}};
+}
+
+json report_of(const Dataset& dataset, const Learnt& learnt) {
+  json report;
+  report["subjects"] = json::array();
+  for (const Subject& s : dataset.subjects) {
+    report["subjects"].push_back({{"name", s.name},
+                                  {"group", s.group},
+                                  {"motion", s.motion},
+                                  {"xi", std::vector<double>(s.xi.begin(), s.xi.end())}});
+  }
+  report["clips"] = json::array();
+  for (const AlignedClip& clip : dataset.clips) {
+    report["clips"].push_back({{"file", clip.file},
+                               {"group", clip.group},
+                               {"motion", clip.motion},
+                               {"frames", clip.q.rows()},
+                               {"period_frames", 2.0 * std::numbers::pi / clip.dtheta},
+                               {"theta0", clip.theta0}});
+  }
+  for (std::size_t m = 0; m < dataset.motions.size(); ++m) {
+    const std::string& motion = dataset.motions[m];
+    const MgpmFit& fit = dataset.fits[m];
+    report["cycle_frames"][motion] = cycle_frames(dataset, motion);
+    report["mgpm"][motion] = {{"gamma", std::exp(fit.params.log_gamma)},
+                              {"noise", std::exp(fit.params.log_noise)},
+                              {"log_posterior", -fit.nlp}};
+    report["log_likelihood"]["mgpm"][motion] = -(fit.nlp - mgpm_prior_nlp(fit.prior, fit.params));
+  }
+  const gp::Trained& p = learnt.process;
+  const MatrixXd residual = learnt.differences.rowwise() - p.offset.transpose();
+  const gp::Hyper hyper{p.lambda, std::log(p.mu), std::log(p.b), std::log(p.noise)};
+  report["kernel"] = learnt.kernel;
+  report["kernel"]["lambda"] = p.lambda;
+  report["kernel"]["mu"] = p.mu;
+  report["kernel"]["b"] = p.b;
+  report["kernel"]["length_deg"] = 180.0 / std::numbers::pi / std::sqrt(p.mu);
+  report["noise"] = p.noise;
+  report["log_likelihood"]["gp"] = gp::log_marginal(p.inputs, residual, hyper).log_likelihood;
+  report["pose_space"] = motion::space_name(dataset.spec.space);
+  report["dims"] = dataset.dims();
+  report["rate_hz"] = dataset.rate_hz;
+  report["training_points"] = p.inputs.rows();
+  return report;
+}
+
+void set_input_statistics(const Dataset& dataset, StyleModel& model) {
+  VectorXd sum = VectorXd::Zero(dataset.dims());
+  VectorXd squares = sum;
+  double frames = 0.0;
+  for (const AlignedClip& clip : dataset.clips) {
+    if (clip.group == model.to) continue;
+    sum += clip.q.colwise().sum().transpose();
+    squares += clip.q.colwise().squaredNorm().transpose();
+    frames += static_cast<double>(clip.q.rows());
+  }
+  model.input_mean = sum / frames;
+  model.input_sd = (squares / frames - model.input_mean.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
+}
+
+std::string joined_sources(const Dataset& dataset, const std::string& target) {
+  std::vector<std::string> names;
+  for (const Subject& s : dataset.subjects) {
+    if (s.group != target && std::ranges::find(names, s.group) == names.end()) {
+      names.push_back(s.group);
+    }
+  }
+  std::string joined;
+  for (const std::string& name : names) joined += (joined.empty() ? "" : "+") + name;
+  return joined;
+}
+
+}  // namespace
+
+Result<TrainMode> mode_from_name(std::string_view name) {
+  if (name == "default") return TrainMode::kDefault;
+  if (name == "paper") return TrainMode::kPaper;
+  return misuse("no training mode is called '" + std::string(name) + "'; choose default or paper");
+}
+
+Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
+                               const TrainOptions& options) {
+  const auto tell = [&](const char* step, double fraction) {
+    return !options.dataset.progress || options.dataset.progress(step, fraction);
+  };
+  const auto stopped = [] { return fail("training was stopped before it was done"); };
+  if (auto checked = check_groups(clips, options.target); !checked) {
+    return std::unexpected(checked.error());
+  }
+  if (!tell("reading poses", 0.0)) return stopped();
+  auto dataset = make_dataset(clips, options.target, options.dataset);
+  if (!dataset) return std::unexpected(dataset.error());
+  if (!tell("aligning phases", 0.0)) return stopped();
+  if (auto aligned = align(*dataset, options.dataset); !aligned) {
+    return std::unexpected(aligned.error());
+  }
+  if (!tell("learning the difference", 0.0)) return stopped();
+  auto learnt = options.mode == TrainMode::kPaper ? learn_paper(*dataset, options.target)
+                                                  : learn_default(*dataset, options.target);
+  if (!learnt) return std::unexpected(learnt.error());
+
+  StyleModel model;
+  model.to = options.target;
+  model.from = joined_sources(*dataset, options.target);
+  model.rate_hz = dataset->rate_hz;
+  model.report_json = report_of(*dataset, *learnt).dump();
+  model.limit_rad = kLimitFactor * learnt->differences.cwiseAbs().colwise().maxCoeff().transpose();
+  set_input_statistics(*dataset, model);
+  model.space = std::move(dataset->spec);
+  model.process = std::move(learnt->process);
+  tell("learning the difference", 1.0);
+  return model;
+}
+
+}  // namespace posed::style

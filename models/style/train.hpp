@@ -1,0 +1,30 @@
+// Training: clips in, a StyleModel out. Cold; no clock, no printing: progress goes to a callback.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "models/style/dataset.hpp"
+#include "models/style/style_model.hpp"
+
+namespace posed::style {
+
+enum class TrainMode : std::uint8_t {
+  kDefault,  // per-clip harmonic cycles, mean difference + GP on the residual, length by leave-out
+  kPaper,    // MGPM mean cycles, the paper's kernel, evidence maximised by SCG
+};
+
+[[nodiscard]] Result<TrainMode> mode_from_name(std::string_view name);
+
+struct TrainOptions {
+  std::string target;  // the group whose style is learnt; every other group is a source
+  TrainMode mode = TrainMode::kDefault;
+  DatasetOptions dataset;
+};
+
+// Refuses clips that cannot be learnt from with one sentence naming the clip. The report (what
+// `train --json` prints, less the seconds) is in the model.
+[[nodiscard]] Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
+                                             const TrainOptions& options);
+
+}  // namespace posed::style

@@ -1,0 +1,42 @@
+// parse_model on any bytes. The header's checksum would stop nearly all of them at the door, so
+// each input is also tried as the payload of a right header.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <string>
+
+#include <zlib.h>
+
+#include "models/style/style_model.hpp"
+
+namespace {
+
+template <typename T>
+void put(std::string& out, T value) {
+  for (std::size_t i = 0; i < sizeof(T); ++i) {
+    out.push_back(static_cast<char>((value >> (8 * i)) & 0xFF));
+  }
+}
+
+void try_bytes(const std::string& bytes) {
+  const auto model = posed::style::parse_model(std::as_bytes(std::span(bytes)), "fuzz");
+  if (!model) return;
+  // What is accepted can be written, and reads back as the same bytes again.
+  const std::string written = posed::style::serialize_model(*model);
+  const auto again = posed::style::parse_model(std::as_bytes(std::span(written)), "fuzz");
+  if (!again || posed::style::serialize_model(*again) != written) std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string input(reinterpret_cast<const char*>(data), size);
+  try_bytes(input);
+  std::string framed = "POSEDMDL";
+  put<std::uint32_t>(framed, 1);
+  put<std::uint64_t>(framed, size);
+  put<std::uint32_t>(framed, static_cast<std::uint32_t>(crc32_z(0, data, size)));
+  try_bytes(framed + input);
+  return 0;
+}

@@ -1,0 +1,117 @@
+// The model file: there and back, and a clear refusal of everything that is not one.
+#include <catch2/catch.hpp>
+
+#include <cstring>
+#include <fstream>
+#include <limits>
+
+#include "models/style/style_model.hpp"
+
+using namespace posed;
+using namespace posed::style;
+
+namespace {
+
+StyleModel small_model() {
+  StyleModel model;
+  model.space.joints = {"Hips", "Spine"};
+  model.space.mean = {Eigen::Quaterniond::Identity(), Eigen::Quaterniond(0.8, 0.6, 0.0, 0.0)};
+  model.process.inputs = Eigen::MatrixXd::Random(5, 6);
+  model.process.weights = Eigen::MatrixXd::Random(5, 6);
+  model.process.offset = Eigen::VectorXd::Random(6);
+  model.limit_rad = model.input_sd = Eigen::VectorXd::Constant(6, 0.2);
+  model.input_mean = Eigen::VectorXd::Zero(6);
+  model.from = "masculine";
+  model.to = "feminine";
+  model.report_json = "{}";
+  return model;
+}
+
+Result<StyleModel> parse(const std::string& bytes) {
+  return parse_model(std::as_bytes(std::span(bytes)), "test.style");
+}
+
+void refused(const StyleModel& model, const std::string& why) {
+  const auto parsed = parse(serialize_model(model));
+  REQUIRE_FALSE(parsed.has_value());
+  CHECK(parsed.error().message.find(why) != std::string::npos);
+  CHECK(parsed.error().file == "test.style");
+}
+
+}  // namespace
+
+TEST_CASE("A model reads back as it was written", "[model_file]") {
+  const StyleModel model = small_model();
+  const auto parsed = parse(serialize_model(model));
+  REQUIRE(parsed.has_value());
+  CHECK(parsed->process.inputs == model.process.inputs);
+  CHECK(parsed->process.weights == model.process.weights);
+  CHECK(parsed->space.joints == model.space.joints);
+  CHECK(parsed->space.mean[1].coeffs() == model.space.mean[1].coeffs());
+  CHECK(parsed->to == "feminine");
+  CHECK(serialize_model(*parsed) == serialize_model(model));
+}
+
+TEST_CASE("A model is saved whole or not at all", "[model_file]") {
+  const auto folder = std::filesystem::temp_directory_path() / "posed_model_file_test";
+  std::filesystem::create_directories(folder);
+  const auto path = folder / "a.style";
+  REQUIRE(save_model(small_model(), path).has_value());
+  CHECK(load_model(path).has_value());
+  CHECK_FALSE(std::filesystem::exists(path.string() + ".part"));
+  CHECK_FALSE(save_model(small_model(), folder / "no" / "a.style").has_value());
+  CHECK_FALSE(load_model(folder).has_value());
+  CHECK_FALSE(load_model(folder / "none.style").has_value());
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("Truncated, corrupted and foreign files are refused", "[model_file]") {
+  const std::string good = serialize_model(small_model());
+  for (std::size_t size = 0; size < good.size(); ++size) {
+    CHECK_FALSE(parse(good.substr(0, size)).has_value());
+  }
+  for (std::size_t at = 0; at < good.size(); at += 3) {
+    std::string bad = good;
+    bad[at] = static_cast<char>(bad[at] ^ 0x10);
+    CHECK_FALSE(parse(bad).has_value());
+  }
+  CHECK_FALSE(parse(good + "x").has_value());
+  CHECK(parse("HIERARCHY\nROOT Hips\n{\n}\n").error().message.find("not a posed model") !=
+        std::string::npos);
+}
+
+TEST_CASE("A model whose parts do not fit is refused by name", "[model_file]") {
+  auto model = small_model();
+  model.process.weights = Eigen::MatrixXd::Random(4, 6);
+  refused(model, "number of weights");
+  model = small_model();
+  model.process.inputs = Eigen::MatrixXd::Random(5, 5);
+  refused(model, "inputs' shape");
+  model = small_model();
+  model.process.weights(2, 3) = std::numeric_limits<double>::quiet_NaN();
+  refused(model, "weights' shape or values");
+  model = small_model();
+  model.space.mean[0].coeffs() *= 1.5;
+  refused(model, "unit quaternion");
+  model = small_model();
+  model.space.mean.pop_back();
+  refused(model, "mean rotations");
+  model = small_model();
+  model.space.root = 7;
+  refused(model, "root joint");
+  model = small_model();
+  model.space.joints[1] = "Hips";
+  refused(model, "joints' names");
+  model = small_model();
+  model.limit_rad[3] = -1.0;
+  refused(model, "limit below zero");
+  model = small_model();
+  model.process.mu = -1.0;
+  refused(model, "mu");
+  model = small_model();
+  model.rate_hz = std::numeric_limits<double>::infinity();
+  refused(model, "frame rate");
+  model = small_model();
+  model.space.joints.assign(97, "");
+  refused(model, "number of joints");
+}
