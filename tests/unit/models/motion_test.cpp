@@ -98,6 +98,26 @@ TEST_CASE("The heading is the chord's, or the pelvis's where there is no chord",
   CHECK(moved(149, 2) - moved(0, 2) > 3.0);
 }
 
+TEST_CASE("The leg signal has the stride's period and the right leg forward at its peak",
+          "[motion]") {
+  const Motion walk = walker(30.0);
+  const auto signal = leg_signal(walk);
+  REQUIRE(signal.has_value());
+  CHECK(signal->maxCoeff() > 0.6);  // radians: thighs swing by 27 degrees each way
+  const auto stride = style::find_stride(*signal, 30.0);
+  CHECK(2 * kPi / stride.dtheta > 0.85 * 30.0 * 0.95);
+  CHECK(2 * kPi / stride.dtheta < 30.0 / 0.85 * 1.05);
+  int peak = 0;
+  signal->maxCoeff(&peak);
+  // Where the right foot is ahead of the left one by forward kinematics of the thigh alone.
+  const auto thigh = [&](const char* name) {
+    const int j = walk.skeleton->joint_index(name);
+    const auto& frame = walk.frames[peak];
+    return (to_eigen_double(frame.rotation_xyzw[j]) * -Eigen::Vector3d::UnitY()).z();
+  };
+  CHECK(thigh("RightUpperLeg") > thigh("LeftUpperLeg") + 0.4);
+}
+
 TEST_CASE("A derivative is exact on a parabola, and a single frame has none", "[motion]") {
   const VectorXd t = VectorXd::LinSpaced(10, 0.0, 9.0) / 30.0;
   const VectorXd rate = time_derivative(t.array().square().matrix(), 30.0);

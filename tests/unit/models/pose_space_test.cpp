@@ -60,7 +60,7 @@ Vectors vector_of(const PoseSpace& space, const Frame& frame, double heading_rad
 
 TEST_CASE("Adding a change moves q by just that, in every space", "[pose_space]") {
   const Motion walk = walker();
-  for (const Space which : {Space::kNative}) {
+  for (const Space which : {Space::kNative, Space::kHumanoid}) {
     auto spec = describe_space(which, *walk.skeleton);
     REQUIRE(spec.has_value());
     for (std::size_t i = 0; i < spec->mean.size(); ++i) {
@@ -113,7 +113,7 @@ TEST_CASE("A zero change and a missing joint leave every bit", "[pose_space]") {
 
 TEST_CASE("Heading is found and taken out: a turned walker has the same q", "[pose_space]") {
   const Motion walk = walker();
-  for (const Space which : {Space::kNative}) {
+  for (const Space which : {Space::kNative, Space::kHumanoid}) {
     const auto spec = describe_space(which, *walk.skeleton);
     const auto space = PoseSpace::bind(*spec, *walk.skeleton);
     Frame frame = walk.frames[7];
