@@ -24,7 +24,7 @@ Eigen::MatrixXd poses(const std::filesystem::path& path) {
   const auto motion = motion::resample(motion::motion_of(*clip).value(), 60.0);
   const auto spec = motion::describe_space(motion::Space::kCmu43, *motion.skeleton).value();
   const auto space = motion::PoseSpace::bind(spec, *motion.skeleton).value();
-  return motion::pose_vectors(motion, space, motion::walk_heading_rad(motion)).value();
+  return motion::pose_vectors(motion, space, motion::walk_heading_rad(motion));
 }
 
 Eigen::MatrixXd stacked(const std::vector<Eigen::MatrixXd>& blocks) {
