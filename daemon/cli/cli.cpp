@@ -14,8 +14,12 @@ using AddCommand = void (*)(CLI::App& app, int& exit_code);
 
 // The order in which `posed --help` lists them.
 constexpr auto kCommands = std::to_array<AddCommand>({
-    add_convert,
+    add_demo,
+    add_run,
+    add_record,
+    add_replay,
     add_train,
+    add_convert,
     add_ctl,
     add_monitor,
     add_top,

@@ -19,6 +19,7 @@ namespace posed::cli {
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.
 [[nodiscard]] int report(const Error& error);
 
+void add_demo(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_record(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);

@@ -8,6 +8,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/experiment.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/cli/train.hpp"
 #include "models/style/train.hpp"
 
 namespace posed::cli {
@@ -94,31 +95,34 @@ double overall(std::string_view step, double fraction) {
 Result<json> train(const Options& options) {
   auto experiment = experiment_of(options);
   if (!experiment) return std::unexpected(experiment.error());
-  ProgressBar bar;
-  if (!bar.show("reading clips", 0.0)) return fail("stopped");
-  auto clips = load_clips(*experiment);
-  if (!clips) return std::unexpected(clips.error());
-  style::TrainOptions train_options;
-  train_options.target = experiment->target;
-  train_options.mode = experiment->mode;
-  train_options.dataset.space = experiment->space;
-  train_options.dataset.rate_hz = experiment->rate_hz;
-  train_options.dataset.seed = options.seed;
-  train_options.dataset.progress = [&bar](std::string_view step, double fraction) {
-    return bar.show(step, overall(step, fraction));
-  };
-  auto model = style::train_style(*clips, train_options);
-  if (!model) return std::unexpected(model.error());
-  if (auto saved = style::save_model(*model, options.out); !saved) {
-    return std::unexpected(saved.error());
-  }
-  json report = json::parse(model->report_json);
-  report["seconds"] = bar.elapsed_s();
-  report["out"] = options.out;
-  return report;
+  return train_and_save(*experiment, options.seed, options.out);
 }
 
 }  // namespace
+
+Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
+                            const std::filesystem::path& out) {
+  ProgressBar bar;
+  if (!bar.show("reading clips", 0.0)) return fail("stopped");
+  auto clips = load_clips(experiment);
+  if (!clips) return std::unexpected(clips.error());
+  style::TrainOptions options;
+  options.target = experiment.target;
+  options.mode = experiment.mode;
+  options.dataset.space = experiment.space;
+  options.dataset.rate_hz = experiment.rate_hz;
+  options.dataset.seed = seed;
+  options.dataset.progress = [&bar](std::string_view step, double fraction) {
+    return bar.show(step, overall(step, fraction));
+  };
+  auto model = style::train_style(*clips, options);
+  if (!model) return std::unexpected(model.error());
+  if (auto saved = style::save_model(*model, out); !saved) return std::unexpected(saved.error());
+  json report = json::parse(model->report_json);
+  report["seconds"] = bar.elapsed_s();
+  report["out"] = out.string();
+  return report;
+}
 
 void add_train(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("train", "Learn a model from clips");

@@ -1,0 +1,216 @@
+// The demo: makes two families of walkers, learns the style between them, streams a walker it has
+// not seen through the daemon and watches it as any client would, over ZeroMQ.
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+#include <zmq.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/client.hpp"
+#include "daemon/cli/demo_clips.hpp"
+#include "daemon/cli/live_view.hpp"
+#include "daemon/cli/train.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/pipeline/daemon.hpp"
+
+namespace posed::cli {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds kLookAround{50};
+constexpr double kRedrawEvery_s = 0.5;
+constexpr double kPlainLinesEvery_s = 5.0;
+constexpr double kFirstFrameWithin_s = 10.0;
+
+struct DemoOptions {
+  std::filesystem::path config = "config/demo.toml";
+  std::filesystem::path prepare;  // only make clips and model there
+  std::optional<double> seconds;
+};
+
+// Angle between two rotations [deg].
+double turn_deg(const float* a, const float* b) {
+  double dot = 0.0;
+  for (int k = 0; k < 4; ++k) dot += static_cast<double>(a[k]) * static_cast<double>(b[k]);
+  return 2.0 * std::acos(std::min(1.0, std::abs(dot))) * 57.295779513;
+}
+
+// What the demo sees as a client: raw and styled frames of the same instant, compared.
+class Watcher {
+ public:
+  void take(const std::string& topic, const void* body, std::size_t size) {
+    if (!frame_.ParseFromArray(body, static_cast<int>(size))) return;
+    if (topic.ends_with("-raw")) {
+      raw_[frame_.sequence()].assign(frame_.rotation_xyzw().begin(), frame_.rotation_xyzw().end());
+      while (raw_.size() > kKept) raw_.erase(raw_.begin());
+      return;
+    }
+    ++styled_;
+    gaps_ += last_ != 0 && frame_.sequence() > last_ ? frame_.sequence() - last_ - 1 : 0;
+    last_ = frame_.sequence();
+    compare();
+  }
+
+  [[nodiscard]] std::uint64_t styled() const { return styled_; }
+  [[nodiscard]] std::uint64_t gaps() const { return gaps_; }
+  [[nodiscard]] double change_deg() const { return change_deg_; }
+
+ private:
+  static constexpr std::size_t kKept = 64;
+
+  void compare() {
+    const auto found = raw_.find(frame_.sequence());
+    if (found == raw_.end()) return;
+    const std::vector<float>& raw = found->second;
+    if (static_cast<int>(raw.size()) != frame_.rotation_xyzw_size() || raw.empty()) return;
+    double sum = 0.0;
+    for (std::size_t j = 0; j + 3 < raw.size(); j += 4) {
+      const double turn = turn_deg(&raw[j], frame_.rotation_xyzw().data() + j);
+      sum += turn * turn;
+    }
+    change_deg_ = std::sqrt(sum / (static_cast<double>(raw.size()) / 4.0));
+  }
+
+  v1::Frame frame_;
+  std::map<std::uint64_t, std::vector<float>> raw_;
+  std::uint64_t styled_ = 0, gaps_ = 0, last_ = 0;
+  double change_deg_ = 0.0;
+};
+
+Result<> prepare(const std::filesystem::path& folder) {
+  std::fprintf(stderr, "1/3 making two families of synthetic walkers in %s\n", folder.c_str());
+  const auto clips = make_demo_clips(folder);
+  if (!clips) return std::unexpected(clips.error());
+  std::fprintf(stderr, "2/3 learning the style march -> sway from %zu clips\n",
+               clips->from.size() + clips->to.size());
+  Experiment experiment;
+  experiment.target = "sway";
+  for (const auto& file : clips->from) {
+    experiment.clips.push_back({file, "march", file.stem().string(), "walk", 0});
+  }
+  for (const auto& file : clips->to) {
+    experiment.clips.push_back({file, "sway", file.stem().string(), "walk", 0});
+  }
+  const auto report = train_and_save(experiment, 0, folder / kDemoModel);
+  if (!report) return std::unexpected(report.error());
+  return {};
+}
+
+// Takes every message that waits.
+void drain(Connection& connection, Watcher& watcher) {
+  control::Message topic, body;
+  while (topic.receive(connection.socket()) && topic.more() &&
+         body.receive(connection.socket(), 0)) {
+    watcher.take(std::string(topic.text()), body.bytes().data(), body.bytes().size());
+  }
+}
+
+double seconds_since(SteadyClock::time_point then) {
+  return std::chrono::duration<double>(SteadyClock::now() - then).count();
+}
+
+// Shows the running daemon until Ctrl-C or `seconds` after the first frame.
+Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watcher& watcher) {
+  ClientOptions client;
+  client.endpoint = daemon.publish_endpoint();
+  auto connection = Connection::open(client, ZMQ_SUB);
+  if (!connection) return std::unexpected(connection.error());
+  if (auto set = control::set_option(connection->socket(), ZMQ_SUBSCRIBE, "pose/"); !set)
+    return set;
+  const LiveScreen screen;
+  LiveViewOptions view{.title = "posed demo " + daemon.publish_endpoint()};
+  const auto start = SteadyClock::now();
+  std::optional<SteadyClock::time_point> first_frame;
+  SteadyClock::time_point drawn{};
+  while (!Interrupt::came() && !screen.quit_pressed() && !daemon.asked_to_stop()) {
+    if (connection->wait(kLookAround)) drain(*connection, watcher);
+    if (!first_frame && watcher.styled() > 0) first_frame = SteadyClock::now();
+    if (first_frame && options.seconds && seconds_since(*first_frame) >= *options.seconds) break;
+    if (!first_frame && seconds_since(start) > kFirstFrameWithin_s) {
+      return fail("no styled frame arrived within 10 s; the log above says why");
+    }
+    if (seconds_since(drawn) < (screen.is_terminal() ? kRedrawEvery_s : kPlainLinesEvery_s))
+      continue;
+    const bool first_drawing = drawn == SteadyClock::time_point{};
+    drawn = SteadyClock::now();
+    screen.measure(view);
+    view.notes = {
+        fmt::format("received {} styled frames, {} missing; {:.1f} deg rms from the raw pose",
+                    watcher.styled(), watcher.gaps(), watcher.change_deg())};
+    if (screen.is_terminal() || first_drawing) {
+      view.notes.insert(
+          view.notes.end(),
+          {"in another terminal: build/release/posed monitor",
+           "            or: build/release/posed ctl set walker alpha 0.5", "Ctrl-C ends the demo"});
+    }
+    screen.draw(live_view(daemon.stats(), view));
+  }
+  return {};
+}
+
+Result<> stream(const DemoOptions& options) {
+  auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  const Interrupt interrupt;
+  auto daemon = pipeline::Daemon::open(*config);
+  if (!daemon) return std::unexpected(daemon.error());
+  if (auto started = (*daemon)->start(); !started) return started;
+  std::fprintf(stderr, "3/3 streaming %s (not learnt from) on %s\n", kDemoWalker,
+               (*daemon)->publish_endpoint().c_str());
+  Watcher watcher;
+  const auto watched = watch(**daemon, options, watcher);
+  const v1::Stats stats = (*daemon)->stats();
+  (*daemon)->stop();
+  if (!watched) return watched;
+  std::printf(
+      "\nreceived %llu styled frames over ZeroMQ, %llu missing; last pose %.1f deg rms from raw\n",
+      static_cast<unsigned long long>(watcher.styled()),
+      static_cast<unsigned long long>(watcher.gaps()), watcher.change_deg());
+  for (const v1::StreamStats& s : stats.stream()) {
+    std::printf(
+        "%s: %.1f frames/s, arrival to ZeroMQ p50 %.0f us, p99 %.0f us, dropped %llu, shed %llu\n",
+        s.stream().c_str(), static_cast<double>(s.rate_hz()),
+        static_cast<double>(s.publish().p50_us()), static_cast<double>(s.publish().p99_us()),
+        static_cast<unsigned long long>(s.dropped()), static_cast<unsigned long long>(s.shed()));
+  }
+  return {};
+}
+
+Result<> demo(const DemoOptions& options) {
+  if (!options.prepare.empty()) return prepare(options.prepare);
+  // The clips and the model lie where the demo's config looks for them.
+  const auto folder = std::filesystem::absolute(options.config).parent_path() / "../build/demo";
+  if (auto prepared = prepare(folder.lexically_normal()); !prepared) return prepared;
+  return stream(options);
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("demo", "Learn a style from synthetic walkers and stream a new one");
+  const auto options = std::make_shared<DemoOptions>();
+  command->add_option("--config", options->config, "What to stream")->capture_default_str();
+  command->add_option("--prepare", options->prepare,
+                      "Only make the clips and the model in this folder");
+  command->add_option("--seconds", options->seconds, "End so long after the first frame")
+      ->check(CLI::PositiveNumber);
+  command->footer(R"(Examples:
+  posed demo                      # from the source folder, after ./run build
+  posed demo --seconds 10
+  posed demo --prepare build/demo # what ./run build does)");
+  command->callback([options, &exit_code] {
+    if (auto done = demo(*options); !done) exit_code = report(done.error());
+  });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,20 @@
+// Training with a progress bar: what `train style` and the demo share.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "daemon/cli/experiment.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::cli {
+
+// Reads the experiment's clips, learns, writes the model to `out` and returns the report that
+// `train --json` prints. Draws progress on stderr; Ctrl-C ends it with an error and no file.
+[[nodiscard]] Result<nlohmann::json> train_and_save(const Experiment& experiment,
+                                                    std::uint64_t seed,
+                                                    const std::filesystem::path& out);
+
+}  // namespace posed::cli
