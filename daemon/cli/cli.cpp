@@ -19,6 +19,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_record,
     add_replay,
     add_train,
+    add_apply,
     add_convert,
     add_ctl,
     add_monitor,
