@@ -1,0 +1,202 @@
+// The recorder and replay as a user meets them: the real binary, stopped, overtaken and killed.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include <sched.h>
+#include <time.h>
+
+#include <nlohmann/json.hpp>
+
+#include "models/style/style_model.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/log/reader.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/toy_style.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+struct Outcome {
+  int code;
+  std::string out, err;
+};
+
+Outcome posed(std::vector<std::string> arguments) {
+  Process process(std::move(arguments));
+  const std::string out = process.rest();
+  const auto code = process.exit_code();
+  REQUIRE(code);
+  return {*code, out, process.errors()};
+}
+
+// Two walkers with a style, and everything `posed record` needs for them.
+class Stage {
+ public:
+  Stage() {
+    REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
+    REQUIRE(style::save_model(toy_model(1), folder.path() / "one.style"));
+    REQUIRE(style::save_model(toy_model(2), folder.path() / "two.style"));
+    std::string config =
+        "realtime = false\n[publish]\nendpoint = \"tcp://127.0.0.1:*\"\n"
+        "[control]\nendpoint = \"tcp://127.0.0.1:*\"\n";
+    for (const char* name : {"walker", "other"}) {
+      config += std::string("[[stream]]\nname = \"") + name +
+                "\"\ndriver = \"file\"\npublish_raw = true\n"
+                "[stream.file]\npath = \"walk.bvh\"\n[stream.style]\nmodel = \"one.style\"\n";
+    }
+    folder.write("posed.toml", config);
+  }
+
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return (folder.path() / name).string();
+  }
+
+  // Starts `posed record` and waits until it is ready.
+  void record() {
+    daemon.emplace(std::vector<std::string>{"record", "--config", path("posed.toml"), "--out",
+                                            path("take.plog"), "--frames"});
+    const auto line = daemon->line();
+    INFO(daemon->errors());
+    REQUIRE(line);
+    control = json::parse(*line).at("control");
+  }
+
+  void ctl(std::vector<std::string> what) const {
+    what.insert(what.begin(), {"ctl", "--connect", control});
+    const Outcome outcome = posed(std::move(what));
+    INFO(outcome.err);
+    CHECK(outcome.code == 0);
+  }
+
+  // The reader and the pipeline share one processor and the pipeline gets what is left: after a
+  // stop, the reader decodes all that is due before the pipeline sees the first of it.
+  void hold_back_pipeline(bool hold) const {
+    const auto tasks = "/proc/" + std::to_string(daemon->pid()) + "/task";
+    for (const auto& task : std::filesystem::directory_iterator(tasks)) {
+      std::string name;
+      std::ifstream(task.path() / "comm") >> name;
+      const auto id = static_cast<pid_t>(std::stol(task.path().filename().string()));
+      if (name != "posed-reader" && name != "posed-pipeline") continue;
+      cpu_set_t cpus;
+      CPU_ZERO(&cpus);
+      CPU_SET(0, &cpus);
+      sched_setaffinity(id, sizeof cpus, &cpus);
+      const sched_param none{};
+      if (name == "posed-pipeline") {
+        REQUIRE(sched_setscheduler(id, hold ? SCHED_IDLE : SCHED_OTHER, &none) == 0);
+      }
+    }
+  }
+
+  [[nodiscard]] std::set<int> decisions() const {
+    std::set<int> kinds;
+    const auto reader = log::Reader::open(path("take.plog"));
+    REQUIRE(reader);
+    for (std::uint32_t id = 0; id < 2; ++id) {
+      const auto rows = reader->decisions(id);
+      REQUIRE(rows);
+      for (const auto& row : *rows) kinds.insert(row.kind);
+    }
+    return kinds;
+  }
+
+  TempFolder folder;
+  std::optional<Process> daemon;
+  std::string control;
+};
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.bin as published") {
+  Stage stage;
+  stage.record();
+  stage.ctl({"set", "walker", "alpha", "-0.5"});
+  stage.ctl({"model", "other", stage.path("two.style")});
+  stage.hold_back_pipeline(true);
+  for (int i = 0; i < 10 && !stage.decisions().contains(3); ++i) {
+    stage.daemon->send(SIGSTOP);
+    std::this_thread::sleep_for(700ms);
+    stage.daemon->send(SIGCONT);
+    std::this_thread::sleep_for(800ms);  // a log may be read while it is written
+  }
+  stage.hold_back_pipeline(false);
+  stage.ctl({"set", "other", "alpha", "0.25"});
+  std::this_thread::sleep_for(300ms);
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+  for (const int kind : {1, 2, 3}) CHECK(stage.decisions().contains(kind));
+
+  const std::string log = stage.path("take.plog");
+  for (const char* name : {"one.bin", "two.bin"}) {
+    const Outcome replay =
+        posed({"replay", log, "--speed", "max", "--out", stage.path(name), "--expect", "--json"});
+    INFO(replay.err);
+    REQUIRE(replay.code == 0);
+    const json counts = json::parse(replay.out);
+    CHECK(counts.at("compared") == counts.at("frames"));
+    CHECK(counts.at("compared") > 400);
+  }
+  CHECK(!bytes_of(stage.path("one.bin")).empty());
+  CHECK(bytes_of(stage.path("one.bin")) == bytes_of(stage.path("two.bin")));
+}
+
+TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
+  std::vector<double> lost_s;
+  for (const auto life : {900ms, 1050ms, 1200ms}) {
+    Stage stage;
+    stage.record();
+    std::this_thread::sleep_for(life);
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    stage.daemon->send(SIGKILL);
+    CHECK(stage.daemon->exit_code() == 128 + SIGKILL);
+    const Outcome replay =
+        posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect", "--json"});
+    INFO(replay.err);
+    REQUIRE(replay.code == 0);
+    CHECK(json::parse(replay.out).at("compared") > 20);
+    auto reader = log::Reader::open(stage.path("take.plog"));
+    REQUIRE(reader);
+    std::int64_t last_ns = 0;
+    for (auto chunk = reader->next_chunk(); chunk && *chunk; chunk = reader->next_chunk()) {
+      last_ns = (*chunk)->arrival_ns;
+    }
+    lost_s.push_back(seconds(now.tv_sec * kNanosPerSecond + now.tv_nsec - last_ns));
+  }
+  // The middle one: a busy machine may hold up one of three.
+  std::sort(lost_s.begin(), lost_s.end());
+  CHECK(lost_s[1] <= 0.5);
+}
+
+TEST_CASE("record and replay refuse what they must with one sentence") {
+  Stage stage;
+  stage.folder.write("take.plog", "not a log, but somebody's");
+  const Outcome kept =
+      posed({"record", "--config", stage.path("posed.toml"), "--out", stage.path("take.plog")});
+  CHECK(kept.code == 1);
+  CHECK(kept.err.find("take.plog: exists already") != std::string::npos);
+  const Outcome foreign = posed({"replay", stage.path("take.plog")});
+  CHECK(foreign.code == 1);
+  CHECK(foreign.err.find("take.plog: not a device log") != std::string::npos);
+  CHECK(posed({"replay", stage.path("none.plog")}).code == 1);
+  CHECK(posed({"replay", stage.path("take.plog"), "--speed", "fast"}).code == 2);
+  const Outcome nowhere =
+      posed({"record", "--config", stage.path("posed.toml"), "--out", stage.path("no/take.plog")});
+  CHECK(nowhere.code == 1);
+  CHECK(nowhere.err.find("cannot be opened") != std::string::npos);
+}
+
+}  // namespace posed::test

@@ -1,0 +1,117 @@
+// The real binary as a child process: its lines, its exit code, and never a child left behind.
+#pragma once
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::test {
+
+class Process {
+ public:
+  // Starts `posed` with these arguments; stdin is empty.
+  explicit Process(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), POSED_BINARY);
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    int out[2];
+    if (pipe2(out, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+    const std::string log = (folder_.path() / "stderr").string();
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_adddup2(&actions, out[1], 1);
+    posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT, 0600);
+    const int failed = posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    close(out[1]);
+    out_ = out[0];
+    if (failed != 0) throw std::runtime_error("cannot start " + arguments[0]);
+  }
+  ~Process() {
+    if (!exit_code_) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+    close(out_);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  // The next line of stdout; nullopt at its end or when none came in time.
+  std::optional<std::string> line(std::chrono::milliseconds within = kPatience) {
+    const auto end = std::chrono::steady_clock::now() + within;
+    while (true) {
+      if (const auto at = text_.find('\n'); at != std::string::npos) {
+        std::string line = text_.substr(0, at);
+        text_.erase(0, at + 1);
+        return line;
+      }
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+          end - std::chrono::steady_clock::now());
+      pollfd wait{out_, POLLIN, 0};
+      if (left.count() <= 0 || poll(&wait, 1, static_cast<int>(left.count())) <= 0) return {};
+      char buffer[65536];
+      const ssize_t size = read(out_, buffer, sizeof buffer);
+      if (size <= 0) return {};
+      text_.append(buffer, static_cast<std::size_t>(size));
+    }
+  }
+  // All that stdout still says until its end.
+  std::string rest() {
+    std::string all;
+    while (const auto next = line()) all += *next + "\n";
+    return all;
+  }
+
+  void send(int signal) const { kill(pid_, signal); }
+  [[nodiscard]] pid_t pid() const { return pid_; }
+
+  // The exit code (128 + signal when killed); nullopt when it still runs then.
+  std::optional<int> exit_code(std::chrono::milliseconds within = kPatience) {
+    const auto end = std::chrono::steady_clock::now() + within;
+    while (!exit_code_) {
+      int status = 0;
+      if (waitpid(pid_, &status, WNOHANG) == pid_) {
+        exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+      } else if (std::chrono::steady_clock::now() > end) {
+        return std::nullopt;
+      } else {
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+    }
+    return exit_code_;
+  }
+
+  // What stderr has said so far.
+  [[nodiscard]] std::string errors() const {
+    std::ifstream file(folder_.path() / "stderr");
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+ private:
+  static constexpr std::chrono::seconds kPatience{30};  // for sanitizers on a busy machine
+
+  TempFolder folder_;
+  pid_t pid_ = -1;
+  int out_ = -1;
+  std::string text_;
+  std::optional<int> exit_code_;
+};
+
+}  // namespace posed::test

@@ -1,0 +1,192 @@
+// Replay: the same log gives the same bits, those of the live run; and what a log lacks or hides is
+// said.
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <cstdlib>
+#include <set>
+
+#include <sqlite3.h>
+
+#include "daemon/publish/encode.hpp"
+#include "daemon/record/expectation.hpp"
+#include "daemon/record/frame_file.hpp"
+#include "daemon/record/replay.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/unit/daemon/staged_run.hpp"
+
+using namespace posed;
+using namespace posed::test;
+
+namespace {
+
+struct Replayed {
+  std::vector<std::string> frames;  // serialized, in pipeline order
+  std::optional<Error> difference;
+  record::Expectation::Counts counts;
+};
+
+Replayed replay(const std::filesystem::path& path, bool expect = true) {
+  Replayed result;
+  auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  auto opened = record::Replay::open(*reader, path.string());
+  if (!opened) {
+    result.difference = opened.error();
+    return result;
+  }
+  record::Replay& replay = **opened;
+  std::optional<record::Expectation> expectation;
+  if (expect) expectation = record::Expectation::open(*reader, path.string()).value();
+  std::vector<publish::FrameEncoder> encoders;
+  for (const char* name : {"a", "a-raw", "b", "b-raw"}) encoders.emplace_back(name);
+  const auto keep = [&](const Result<>& same) {
+    if (!same && !result.difference) result.difference = same.error();
+  };
+  const auto done = replay.run(
+      [&](const pipeline::Item& item) {
+        const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
+        if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
+        const std::uint32_t stream = item.frame.header.stream;
+        const v1::Frame& frame = encoders[2 * stream + (raw ? 1 : 0)].encode(item.frame);
+        result.frames.push_back(frame.SerializeAsString());
+        if (expect) keep(expectation->compare(stream, raw, frame, replay.broken_at(stream)));
+      },
+      [](std::int64_t) { return true; });
+  REQUIRE(done);
+  for (std::uint32_t id = 0; expect && id < 2; ++id) {
+    keep(expectation->finish(id, replay.broken_at(id)));
+  }
+  if (expect) result.counts = expectation->counts();
+  return result;
+}
+
+void run_sql(const std::filesystem::path& path, const std::string& sql) {
+  sqlite3* handle = nullptr;
+  REQUIRE(sqlite3_open(path.c_str(), &handle) == SQLITE_OK);
+  REQUIRE(sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(handle);
+}
+
+std::string difference_after(const std::string& sql) {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  write_staged_log(path, 60);
+  run_sql(path, sql);
+  const Replayed result = replay(path);
+  REQUIRE(result.difference);
+  CHECK(result.difference->file == path.string());
+  return result.difference->message;
+}
+
+bool has(const std::string& text, const std::string& part) {
+  INFO(text);
+  return text.find(part) != std::string::npos;
+}
+
+double furthest(const google::protobuf::RepeatedField<float>& a,
+                const google::protobuf::RepeatedField<float>& b) {
+  REQUIRE(a.size() == b.size());
+  double most = 0.0;
+  for (int i = 0; i < a.size(); ++i) most = std::max(most, std::abs(double{a[i]} - double{b[i]}));
+  return most;
+}
+
+}  // namespace
+
+TEST_CASE("two replays give the same bits, and those of the live run", "[replay]") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  write_staged_log(path, 120);
+  auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  std::set<int> kinds;
+  for (std::uint32_t id = 0; id < 2; ++id) {
+    const auto decisions = reader->decisions(id);
+    REQUIRE(decisions);
+    for (const auto& decision : *decisions) kinds.insert(decision.kind);
+  }
+  CHECK(kinds == std::set<int>{1, 2, 3, 4});
+  const Replayed first = replay(path);
+  INFO((first.difference ? first.difference->text() : ""));
+  CHECK(!first.difference);
+  CHECK(first.counts.compared == first.frames.size());
+  CHECK(first.counts.lost + first.counts.after_gap + first.counts.past_end == 0);
+  // Raw and styled of two streams, less what was shed, and the held poses of the ticks.
+  CHECK(first.frames.size() == 4 * 120 - 2 * 5 + 4);
+  CHECK(replay(path, false).frames == first.frames);
+}
+
+TEST_CASE("the first difference is named by stream, sequence and field", "[replay]") {
+  // An alpha that was not there: the pose parts from the live one at the next frame.
+  CHECK(has(difference_after("UPDATE decision SET alpha=0.75 WHERE kind=1"),
+            "stream a, sequence 11, rotation_xyzw["));
+  CHECK(has(difference_after("DELETE FROM decision WHERE kind=3"),
+            "stream a-raw, sequence 42, replayed, but not published live"));
+  CHECK(has(difference_after("DELETE FROM decision WHERE kind=4 AND stream=1"),
+            "stream b, sequence 30, published live, but not replayed"));
+  CHECK(has(difference_after("DELETE FROM chunk WHERE id > 170 AND stream=1"),
+            "published live, but not replayed"));
+}
+
+TEST_CASE("a log that makes no sense is refused before anything is replayed", "[replay]") {
+  CHECK(has(difference_after("UPDATE decision SET kind=9 WHERE kind=1"), "makes no sense"));
+  CHECK(has(difference_after("UPDATE decision SET alpha=1e300 WHERE kind=1"), "makes no sense"));
+  CHECK(has(difference_after("UPDATE stream SET driver='no such'"), "which this posed does not"));
+  CHECK(has(difference_after("UPDATE stream SET config='{}'"), "settings"));
+  CHECK(has(difference_after("UPDATE stream SET config=replace(config,'0.5','1e99')"), "sense"));
+  CHECK(has(difference_after("DELETE FROM blob"), "lacks the file with SHA-256"));
+  CHECK(has(difference_after("UPDATE blob SET bytes=x'00'"), "does not match its hash"));
+}
+
+TEST_CASE("what a log lacks is counted, and nothing after it is compared", "[replay]") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  write_staged_log(path, 60);
+  // Chunks of stream 0 lost in the middle, as an overflow would leave it.
+  run_sql(path,
+          "INSERT INTO gap(stream,kind,after_chunk,lost,time_ns)"
+          " SELECT 0, 0, max(id), 3, 0 FROM chunk WHERE stream=0 AND next_sequence=20;"
+          "DELETE FROM chunk WHERE stream=0 AND next_sequence IN (21,22,23);"
+          "INSERT INTO gap(stream,kind,after_chunk,lost,time_ns) VALUES(1,2,0,1,0);"
+          "DELETE FROM frame WHERE stream=1 AND raw=0 AND sequence=7;");
+  const Replayed result = replay(path);
+  INFO((result.difference ? result.difference->text() : ""));
+  CHECK(!result.difference);
+  CHECK(result.counts.lost == 1);
+  CHECK(result.counts.after_gap > 0);
+  CHECK(result.counts.past_end == 0);
+}
+
+// tests/golden/replay/staged.plog: 30 frames of the staged run, recorded with --frames. Made by
+// this test with POSED_MAKE_GOLDEN set; a new one needs its reason in the commit message.
+TEST_CASE("the golden log's frames come again on any machine", "[replay]") {
+  const auto path = golden("replay/staged.plog");
+  if (std::getenv("POSED_MAKE_GOLDEN") != nullptr) {
+    std::filesystem::create_directories(path.parent_path());
+    std::filesystem::remove(path);
+    write_staged_log(path, 30);
+  }
+  const TempFolder dir;  // opening a log may write to it
+  const auto copy = dir.path() / "staged.plog";
+  std::filesystem::copy_file(path, copy);
+  const Replayed result = replay(copy, false);
+  auto reader = log::Reader::open(copy);
+  REQUIRE(reader);
+  std::array<std::optional<log::Reader::Frames>, 4> live;
+  for (std::uint32_t i = 0; i < 4; ++i) live[i] = reader->frames(i / 2, i % 2 == 1).value();
+  for (const std::string& bytes : result.frames) {
+    v1::Frame frame, expected;
+    REQUIRE(frame.ParseFromString(bytes));
+    const bool raw = frame.stream().ends_with("-raw");
+    const auto row = live[(frame.stream()[0] == 'b' ? 2 : 0) + (raw ? 1 : 0)]->next().value();
+    REQUIRE(row);
+    REQUIRE(expected.ParseFromArray(row->bytes.data(), static_cast<int>(row->bytes.size())));
+    CHECK(frame.sequence() == expected.sequence());
+    CHECK(frame.quality() == expected.quality());
+    CHECK(furthest(frame.rotation_xyzw(), expected.rotation_xyzw()) < 0.5e-5);  // 1e-5 rad
+    CHECK(furthest(frame.angle_rad(), expected.angle_rad()) < 1e-5);
+    CHECK(furthest(frame.root_position_m(), expected.root_position_m()) < 1e-6);
+  }
+  CHECK(result.frames.size() == 4 * 30 - 2 * 5 + 4);
+}

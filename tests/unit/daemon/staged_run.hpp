@@ -1,0 +1,188 @@
+// A live run without threads, clocks or luck: two streams through the real decoders, engines and
+// recorder, with every decision a pipeline can take: an alpha change, a model swap, a shed, ticks.
+#pragma once
+
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/pipeline/stream_engine.hpp"
+#include "daemon/publish/encode.hpp"
+#include "daemon/record/recorder.hpp"
+#include "daemon/record/stream_settings.hpp"
+#include "drivers/driver.hpp"
+#include "models/style/style_model.hpp"
+#include "proto/log/digest.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/toy_style.hpp"
+
+namespace posed::test {
+
+// One stream of the run, from chunk to published frame.
+class StagedStream final : public Sink, private pipeline::EngineOut {
+ public:
+  StagedStream(std::uint32_t id, std::string name, drivers::Device device, std::string model_bytes)
+      : id_(id),
+        name_(std::move(name)),
+        device_(std::move(device)),
+        model_bytes_(std::move(model_bytes)),
+        styled_(name_),
+        raw_(name_ + "-raw") {
+    settings_.publish_raw = true;
+    settings_.rate_hz = device_.description.rate_hz;
+    settings_.style.emplace();
+    model_ = bind(model_bytes_);
+    engine_.emplace(pipeline::EngineOptions{
+        .stream = id, .publish_raw = true, .style = settings_.style, .model = model_.get()});
+  }
+
+  [[nodiscard]] record::RecordedStream recorded() const {
+    const auto bytes = std::as_bytes(std::span(model_bytes_));
+    const drivers::Description& description = device_.description;
+    return {.row = {.id = id_,
+                    .name = name_,
+                    .driver = description.driver,
+                    .text = description.text,
+                    .identity = "toy.bvh",
+                    .config = record::to_json(settings_),
+                    .model = {}},
+            .rate_hz = description.rate_hz,
+            .model = {bytes.begin(), bytes.end()}};
+  }
+
+  void set_tape(record::Tape& tape) { tape_ = &tape; }
+
+  // The line of a clip, or a piece of it. A dropped chunk is decoded, but never reaches the engine.
+  void feed(const std::string& line, std::int64_t arrival_ns, bool shed = false) {
+    arrival_ns_ = arrival_ns;
+    shed_ = shed;
+    const auto bytes = std::as_bytes(std::span(line));
+    tape_->chunk(id_, record::Direction::kFromDevice, arrival_ns, frames_ + 1, bytes);
+    device_.decoder->feed(bytes, arrival_ns, *this);
+  }
+
+  void tick(std::int64_t now_ns) { CHECK(engine_->tick(now_ns, *this)); }
+
+  void set_alpha(float alpha) {
+    static_cast<void>(engine_->apply(
+        {.kind = pipeline::Command::Kind::kAlpha, .stream = id_, .alpha = alpha}, *this));
+  }
+
+  void set_model(const std::string& bytes) {
+    swapped_.push_back(bind(bytes));
+    pipeline::Command command{
+        .kind = pipeline::Command::Kind::kModel, .stream = id_, .model = swapped_.back().get()};
+    const auto view = std::as_bytes(std::span(bytes));
+    const std::string hash = log::sha256_hex(view);
+    hash.copy(command.model_hash.data(), hash.size());
+    tape_->keep_model(view);
+    static_cast<void>(engine_->apply(command, *this));
+  }
+
+ private:
+  using Model = std::unique_ptr<const style::BoundModel>;
+  [[nodiscard]] Model bind(const std::string& bytes) const {
+    const auto model = style::parse_model(std::as_bytes(std::span(bytes)), "toy.style");
+    REQUIRE(model);
+    return style::bind_model(*model, *device_.description.skeleton, *settings_.style, "toy")
+        .value();
+  }
+
+  void frame(Frame& frame) noexcept override {
+    frame.header.stream = id_;
+    frame.header.sequence = ++frames_;
+    frame.header.arrival_ns = arrival_ns_;
+    if (!shed_) engine_->on_frame(frame, *this);
+  }
+  void sample(Sample&) noexcept override {}
+  void outcome(Outcome) noexcept override {}
+
+  void item(const pipeline::Item& item) noexcept override {
+    const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
+    if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
+    const std::string bytes = (raw ? raw_ : styled_).encode(item.frame).SerializeAsString();
+    tape_->published(id_, item.frame.header.sequence, raw, std::as_bytes(std::span(bytes)));
+  }
+  void decision(const pipeline::Decision& decision) noexcept override { tape_->decision(decision); }
+
+  std::uint32_t id_;
+  std::string name_;
+  drivers::Device device_;
+  std::string model_bytes_;
+  record::StreamSettings settings_;
+  publish::FrameEncoder styled_, raw_;
+  Model model_;
+  std::vector<Model> swapped_;
+  std::optional<pipeline::StreamEngine> engine_;
+  record::Tape* tape_ = nullptr;
+  std::uint64_t frames_ = 0;
+  std::int64_t arrival_ns_ = 0;
+  bool shed_ = false;
+};
+
+// The motion lines of a clip, each with its end of line.
+inline std::vector<std::string> motion_lines(const std::filesystem::path& bvh) {
+  std::ifstream file(bvh);
+  std::vector<std::string> lines;
+  bool motion = false;
+  for (std::string line; std::getline(file, line);) {
+    if (motion) lines.push_back(line + "\n");
+    motion = motion || line.starts_with("Frame Time");
+  }
+  return lines;
+}
+
+// Writes the log of the staged run: `frames` of each stream, 60 Hz.
+inline void write_staged_log(const std::filesystem::path& path, std::size_t frames) {
+  const TempFolder dir;
+  const auto bvh = dir.path() / "toy.bvh";
+  REQUIRE(clip::write_bvh(toy_walk(static_cast<int>(frames), 60.0, 0.4), bvh));
+  const auto lines = motion_lines(bvh);
+  REQUIRE(lines.size() == frames);
+  const std::string one = style::serialize_model(toy_model(1));
+  const std::string two = style::serialize_model(toy_model(2));
+  std::vector<std::unique_ptr<StagedStream>> streams;
+  std::vector<record::RecordedStream> rows;
+  for (std::uint32_t id = 0; id < 2; ++id) {
+    auto device = drivers::find_driver("file")->open({{"path", bvh.string()}});
+    REQUIRE(device);
+    streams.push_back(
+        std::make_unique<StagedStream>(id, id == 0 ? "a" : "b", std::move(*device), one));
+    rows.push_back(streams.back()->recorded());
+  }
+  record::RecorderOptions options;
+  options.file = path;
+  options.frames = true;
+  options.clock = []() noexcept -> std::int64_t { return 1'000'000'000; };
+  auto recorder = record::Recorder::open(std::move(options), std::move(rows));
+  REQUIRE(recorder);
+  for (const auto& stream : streams) stream->set_tape((*recorder)->tape());
+  std::int64_t now_ns = 5'000'000'000;
+  for (std::size_t i = 0; i < frames; ++i) {
+    now_ns += 16'666'667;
+    if (i == frames / 6) streams[0]->set_alpha(-0.5F);
+    if (i == frames / 4) streams[1]->set_model(two);
+    if (i == frames / 2) {
+      streams[0]->set_model(one);  // a model that replaces itself
+      now_ns += 700'000'000;
+      for (const auto& stream : streams) stream->tick(now_ns);
+      now_ns += 1'100'000'000;
+      streams[1]->tick(now_ns);
+    }
+    const bool shed = i > 2 * frames / 3 && i < 2 * frames / 3 + 6;
+    streams[0]->feed(lines[i], now_ns, shed);
+    // The other stream's lines come cut in two, and a foreign piece among them.
+    const std::size_t half = lines[i].size() / 2;
+    streams[1]->feed(lines[i].substr(0, half), now_ns);
+    streams[1]->feed(lines[i].substr(half), now_ns + 1000);
+    if (i % 10 == 3) streams[1]->feed("not a number\n", now_ns + 2000);
+  }
+  streams[0]->tick(now_ns + 600'000'000);
+  REQUIRE((*recorder)->finish());
+}
+
+}  // namespace posed::test
