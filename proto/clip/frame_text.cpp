@@ -18,6 +18,7 @@ std::string counted(std::size_t count) {
 
 std::vector<double> scales(const Skeleton& skeleton, double metres_per_unit, double radians) {
   std::vector<double> scale;
+  scale.reserve(skeleton.channels.size());
   for (const Channel& channel : skeleton.channels) {
     scale.push_back(channel.translation ? metres_per_unit : radians);
   }
@@ -107,11 +108,11 @@ int FrameParser::find_bone(std::string_view name) const noexcept {
 FrameOutcome FrameParser::parse_block(std::string_view text,
                                       std::span<double> values) const noexcept {
   FrameOutcome outcome;
-  const char* const begin = text.data();
+  const std::string_view whole = text;
   const auto blame = [&](FrameFault fault, std::string_view where, std::string_view word) {
     outcome.fault = fault;
     outcome.where = where;
-    outcome.offset = static_cast<std::size_t>(word.data() - begin);
+    outcome.offset = static_cast<std::size_t>(word.data() - whole.data());
     return outcome;
   };
   std::string_view word = next_word(text);
@@ -149,7 +150,7 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
   }
   for (std::size_t i = 0; i < bones_.size(); ++i) {
     if (!seen[i] && !bones_[i].channels.empty()) {
-      return blame(FrameFault::kMissingBone, bones_[i].name, {begin, 0});
+      return blame(FrameFault::kMissingBone, bones_[i].name, whole.substr(0, 0));
     }
   }
   return outcome;
