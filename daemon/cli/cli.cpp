@@ -21,6 +21,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_train,
     add_apply,
     add_convert,
+    add_eval,
     add_ctl,
     add_monitor,
     add_top,

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+
 #include "models/motion/low_pass.hpp"
 #include "proto/frame/rotation.hpp"
 
@@ -142,6 +144,29 @@ MatrixXd pose_vectors(const Motion& motion, const PoseSpace& space, double headi
     q.row(t) = Eigen::Map<const Eigen::RowVectorXf>(row.data(), dims).cast<double>();
   }
   return q;
+}
+
+// The mean rotation of each joint: the eigenvector of the summed outer products of quaternions.
+Result<> set_mean_rotations(std::span<const Motion* const> motions, PoseSpaceSpec& spec) {
+  if (spec.mean.empty()) return {};
+  std::vector<Eigen::Matrix4d> sums(spec.mean.size(), Eigen::Matrix4d::Zero());
+  for (const Motion* motion : motions) {
+    const auto space = PoseSpace::bind(spec, *motion->skeleton);
+    if (!space) return std::unexpected(space.error());
+    const MatrixXd q = pose_vectors(*motion, *space, walk_heading_rad(*motion));
+    for (int j = 0; j < std::ssize(spec.mean); ++j) {
+      for (int t = 0; t < q.rows(); ++t) {
+        const Vector3d v = q.block<1, 3>(t, 3 * j).transpose();
+        const Eigen::Vector4d c = (spec.mean[j] * rotation_exp(v)).coeffs();
+        sums[j] += c * c.transpose() / static_cast<double>(q.rows());
+      }
+    }
+  }
+  for (std::size_t j = 0; j < spec.mean.size(); ++j) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sums[j]);
+    spec.mean[j] = Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3))).normalized();
+  }
+  return {};
 }
 
 std::optional<VectorXd> leg_signal(const Motion& motion) {

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -40,6 +41,11 @@ struct Motion {
 // q of every frame [frames x dims], rad.
 [[nodiscard]] Eigen::MatrixXd pose_vectors(const Motion& motion, const PoseSpace& space,
                                            double heading_rad);
+
+// Sets the means of `spec` to the mean rotations over these motions, each counting alike. cmu43 has
+// none. Refuses a skeleton that cannot serve the space.
+[[nodiscard]] Result<> set_mean_rotations(std::span<const Motion* const> motions,
+                                          PoseSpaceSpec& spec);
 
 // Right minus left flexion of the thigh [rad], forward positive, a value a frame. Nothing when the
 // skeleton names no upper legs.

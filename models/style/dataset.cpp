@@ -9,13 +9,11 @@
 
 #include "models/motion/motion.hpp"
 #include "models/style/harmonics.hpp"
-#include "proto/frame/rotation.hpp"
 
 namespace posed::style {
 namespace {
 
 using Eigen::MatrixXd;
-using Eigen::Quaterniond;
 using Eigen::VectorXd;
 
 constexpr double kStill = 1e-6;            // deviation below which a column says nothing
@@ -93,30 +91,6 @@ Result<> check_turns(const MatrixXd& q, const std::string& path) {
               "(cmu43), use --pose-space native",
           path);
     }
-  }
-  return {};
-}
-
-// The mean rotation of each joint: the eigenvector of the summed outer products of quaternions.
-Result<> set_means(const std::vector<Source>& sources, const std::string& target,
-                   motion::PoseSpaceSpec& spec) {
-  if (spec.mean.empty()) return {};
-  std::vector<Eigen::Matrix4d> sums(spec.mean.size(), Eigen::Matrix4d::Zero());
-  for (const Source& source : sources) {
-    if (source.clip->group == target) continue;
-    const auto q = vectors(spec, source);
-    if (!q) return std::unexpected(q.error());
-    for (std::size_t j = 0; j < spec.mean.size(); ++j) {
-      for (int t = 0; t < q->rows(); ++t) {
-        const Eigen::Vector3d v = q->block<1, 3>(t, 3 * static_cast<int>(j)).transpose();
-        const Eigen::Vector4d c = rotation_exp(v).coeffs();
-        sums[j] += c * c.transpose() / static_cast<double>(q->rows());
-      }
-    }
-  }
-  for (std::size_t j = 0; j < spec.mean.size(); ++j) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sums[j]);
-    spec.mean[j] = Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3))).normalized();
   }
   return {};
 }
@@ -264,7 +238,11 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips, const std::
   auto spec = motion::describe_space(options.space, *sources->front().motion.skeleton);
   if (!spec) return std::unexpected(in_clip(spec.error(), sources->front().clip->clip.path));
   dataset.spec = std::move(*spec);
-  if (auto set = set_means(*sources, target, dataset.spec); !set) {
+  std::vector<const motion::Motion*> taught;  // the chart is about what the filter will see
+  for (const Source& source : *sources) {
+    if (source.clip->group != target) taught.push_back(&source.motion);
+  }
+  if (auto set = motion::set_mean_rotations(taught, dataset.spec); !set) {
     return std::unexpected(set.error());
   }
   for (const Source& source : *sources) {

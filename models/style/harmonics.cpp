@@ -20,6 +20,7 @@ constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr int kStrideHarmonics = 3;
 constexpr double kFirstHarmonicPenalty = 0.2;
 constexpr int kFrequencies = 400;
+constexpr int kFineSteps = 20;
 
 }  // namespace
 
@@ -67,8 +68,7 @@ Stride find_stride(const VectorXd& signal, double rate_hz) {
   const double power = std::max(centred.squaredNorm(), 1e-300);
   Stride best;
   best.score = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kFrequencies; ++i) {
-    const double dtheta = slowest + (fastest - slowest) * i / (kFrequencies - 1.0);
+  const auto try_rate = [&](double dtheta) {
     const MatrixXd z = harmonic_basis(clip_phase(0.0, dtheta, frames), kStrideHarmonics);
     const VectorXd c = z.colPivHouseholderQr().solve(centred);
     const double first = c[1] * c[1] + c[1 + kStrideHarmonics] * c[1 + kStrideHarmonics];
@@ -78,7 +78,12 @@ Stride find_stride(const VectorXd& signal, double rate_hz) {
     if (score < best.score) {
       best = {std::atan2(-c[1 + kStrideHarmonics], c[1]), dtheta, score};
     }
-  }
+  };
+  const double step = (fastest - slowest) / (kFrequencies - 1.0);
+  for (int i = 0; i < kFrequencies; ++i) try_rate(slowest + step * i);
+  // Between the grid's points: a long clip at a slightly wrong rate ends far out of phase.
+  const double coarse = best.dtheta;
+  for (int i = -kFineSteps; i <= kFineSteps; ++i) try_rate(coarse + step * i / kFineSteps);
   return best;
 }
 

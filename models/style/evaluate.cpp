@@ -1,0 +1,99 @@
+#include "models/style/evaluate.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "models/motion/motion.hpp"
+#include "models/style/difference.hpp"
+#include "models/style/harmonics.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+constexpr int kRootDims = 3;  // the root is the first joint of the native space
+
+double rms(const MatrixXd& m) {
+  return std::sqrt(m.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, m.size())));
+}
+
+// A clip as its joints' rotation vectors and their phases.
+struct View {
+  MatrixXd q;
+  VectorXd phase;
+  double period_s = 0.0;
+
+  [[nodiscard]] MatrixXd coefficients() const { return fit_harmonics(phase, q, kCycleHarmonics); }
+};
+
+Result<View> view_of(const motion::Motion& motion, const motion::PoseSpaceSpec& spec,
+                     const std::string& path) {
+  const auto space = motion::PoseSpace::bind(spec, *motion.skeleton);
+  if (!space) return fail(space.error().message, path);
+  const auto leg = motion::leg_signal(motion);
+  if (!leg) return fail("the skeleton names no upper legs to find the stride by", path);
+  if (!has_stride(motion.size(), motion.rate_hz)) {
+    return fail("the clip is too short for one stride (0.6 s)", path);
+  }
+  const Stride stride = find_stride(*leg, motion.rate_hz);
+  View view;
+  const MatrixXd all = motion::pose_vectors(motion, *space, motion::walk_heading_rad(motion));
+  view.q = all.rightCols(all.cols() - kRootDims);
+  view.phase = clip_phase(stride.theta0, stride.dtheta, motion.size());
+  view.period_s = 2.0 * std::numbers::pi / stride.dtheta / motion.rate_hz;
+  return view;
+}
+
+double jerk(const MatrixXd& q) {
+  const auto rows = q.rows() - 3;
+  if (rows < 1) return 0.0;
+  return rms(q.bottomRows(rows) - 3.0 * q.middleRows(2, rows) + 3.0 * q.middleRows(1, rows) -
+             q.topRows(rows));
+}
+
+}  // namespace
+
+Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
+                                  const clip::Clip& target) {
+  const auto target_motion = motion::motion_of(target);
+  if (!target_motion) return std::unexpected(target_motion.error());
+  auto spec = motion::describe_space(motion::Space::kNative, *target.skeleton);
+  if (!spec) return std::unexpected(spec.error());
+  const motion::Motion* of_target[] = {&*target_motion};
+  if (auto set = motion::set_mean_rotations(of_target, *spec); !set) {
+    return std::unexpected(set.error());
+  }
+  const auto goal = view_of(*target_motion, *spec, target.path);
+  if (!goal) return std::unexpected(goal.error());
+  const auto source_motion = motion::motion_of(source);
+  if (!source_motion) return std::unexpected(source_motion.error());
+  const auto before = view_of(*source_motion, *spec, source.path);
+  if (!before) return std::unexpected(before.error());
+  const auto styled_motion = motion::motion_of(styled);
+  if (!styled_motion) return std::unexpected(styled_motion.error());
+  const auto after = view_of(*styled_motion, *spec, styled.path);
+  if (!after) return std::unexpected(after.error());
+
+  const MatrixXd grid = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const MatrixXd goal_coefficients = goal->coefficients();
+  const MatrixXd goal_cycle = grid * goal_coefficients;
+  const auto at = [&](const View& view) {
+    return MatrixXd(harmonic_basis(view.phase, kCycleHarmonics) * goal_coefficients);
+  };
+  StyleScore score;
+  const double apart = rms(grid * before->coefficients() - goal_cycle);
+  score.cycle_ratio = rms(grid * after->coefficients() - goal_cycle) / apart;
+  score.ratio = rms(after->q - at(*after)) / rms(before->q - at(*before));
+  score.jerk_ratio = jerk(after->q) / jerk(before->q);
+  score.moved_rms_deg = kDegrees * rms(after->q - before->q);
+  score.source_rms_deg = kDegrees * apart;
+  score.source_period_s = before->period_s;
+  score.target_period_s = goal->period_s;
+  return score;
+}
+
+}  // namespace posed::style
