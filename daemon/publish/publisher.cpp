@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <utility>
 
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "daemon/publish/outlet.hpp"
+#include "daemon/publish/process.hpp"
 
 namespace posed::publish {
 namespace {
@@ -23,14 +21,6 @@ std::int64_t clock_ns(clockid_t clock) {
   timespec now{};
   clock_gettime(clock, &now);
   return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
-
-std::uint64_t resident_bytes() {
-  std::ifstream statm("/proc/self/statm");
-  std::uint64_t size = 0;
-  std::uint64_t resident = 0;
-  statm >> size >> resident;
-  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
 // What the pipeline's notices say to people.
@@ -80,6 +70,12 @@ int send_high_water_mark(double messages_per_s) {
   return std::max(kMinQueue, static_cast<int>(std::ceil(messages_per_s * kQueueDepth_s)));
 }
 
+Result<> set_queue_options(void* socket, double messages_per_s) {
+  const int depth = send_high_water_mark(messages_per_s);
+  if (auto set = control::set_option(socket, ZMQ_SNDHWM, depth); !set) return set;
+  return control::set_option(socket, ZMQ_SNDBUF, kSendBuffer);
+}
+
 Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
                                                    std::vector<StreamInfo> streams,
                                                    pipeline::Ring<pipeline::Item>& in,
@@ -88,13 +84,11 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
   if (!socket) return std::unexpected(socket.error());
   double messages_per_s = 0.0;
   for (const StreamInfo& stream : streams) messages_per_s += stream.rate_hz * (stream.raw ? 2 : 1);
-  const std::pair<int, int> settings[] = {{ZMQ_XPUB_VERBOSE, 1},
-                                          {ZMQ_SNDHWM, send_high_water_mark(messages_per_s)},
-                                          {ZMQ_SNDBUF, kSendBuffer}};
-  for (const auto& [option, value] : settings) {
-    if (auto set = control::set_option(socket->get(), option, value); !set) {
-      return std::unexpected(set.error());
-    }
+  if (auto set = set_queue_options(socket->get(), messages_per_s); !set) {
+    return std::unexpected(set.error());
+  }
+  if (auto set = control::set_option(socket->get(), ZMQ_XPUB_VERBOSE, 1); !set) {
+    return std::unexpected(set.error());
   }
   if (options.secure) {
     if (auto secured = options.secure(socket->get()); !secured) {
@@ -135,7 +129,7 @@ void Publisher::run() {
     return;
   }
   told_->reported_ns = options_.clock();
-  told_->cpu_ns = clock_ns(CLOCK_PROCESS_CPUTIME_ID);
+  told_->cpu_ns = cpu_time_ns();
   const auto drain = [this] {
     while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
     }
@@ -249,7 +243,7 @@ void Publisher::send_skeletons(const Outlet& outlet, std::string_view prefix) {
 
 void Publisher::every_second(std::int64_t now_ns) {
   const double since_s = seconds(now_ns - told_->reported_ns);
-  const std::int64_t cpu_ns = clock_ns(CLOCK_PROCESS_CPUTIME_ID);
+  const std::int64_t cpu_ns = cpu_time_ns();
   v1::Stats stats;
   stats.set_time_ns(now_ns);
   stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC));

@@ -44,6 +44,8 @@ struct PublisherOptions {
 
 // A message queue a quarter of a second deep, for all streams together.
 [[nodiscard]] int send_high_water_mark(double messages_per_s);
+// That depth, and a small kernel buffer behind it. Before bind.
+[[nodiscard]] Result<> set_queue_options(void* socket, double messages_per_s);
 
 struct Outlet;
 
