@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -249,6 +250,7 @@ void watch(const pipeline::Daemon& daemon, const Turns& turns, int seconds, Watc
 }
 
 Result<Watched> measure(const HopOptions& options) {
+  spdlog::set_level(spdlog::level::err);  // the figures are the message
   auto subscriber = HopSubscriber::fork();
   if (!subscriber) return std::unexpected(subscriber.error());
   const WorkFolder folder;
@@ -274,8 +276,10 @@ Result<Watched> measure(const HopOptions& options) {
   Watched watched;
   watched.pressure_before_percent = cpu_pressure("avg10=");
   const double pressure_us = cpu_pressure("total=");
+  const std::int64_t begun_ns = now_ns();
   watch(**daemon, turns, options.seconds, watched);
-  watched.pressure_percent = (cpu_pressure("total=") - pressure_us) / (options.seconds * 1e4);
+  watched.pressure_percent =
+      (cpu_pressure("total=") - pressure_us) / (seconds(now_ns() - begun_ns) * 1e4);
   (*daemon)->stop();
   auto arrivals = (*subscriber)->finish();
   if (!arrivals) return std::unexpected(arrivals.error());
