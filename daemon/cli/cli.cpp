@@ -16,6 +16,7 @@ using AddCommand = void (*)(CLI::App& app, int& exit_code);
 constexpr auto kCommands = std::to_array<AddCommand>({
     add_demo,
     add_run,
+    add_check,
     add_record,
     add_replay,
     add_train,

@@ -126,6 +126,7 @@ void add_record(CLI::App& app, int& exit_code) {
       "  posed replay take1.plog --speed max --out FRAMES.bin --expect\n"
       "  sqlite3 take1.plog 'SELECT name, driver FROM stream'");
   command->callback([options, &exit_code] {
+    options->serve.config = options->config;
     const auto done = record(*options);
     exit_code = done ? 0 : report(done.error());
   });

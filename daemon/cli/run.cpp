@@ -44,6 +44,7 @@ void add_run(CLI::App& app, int& exit_code) {
       "  posed run --config mine.toml --until-end     # for clips with loop = false\n"
       "  posed monitor --count 10                     # in another terminal: see the poses");
   command->callback([options, &exit_code] {
+    options->serve.config = options->config;
     const auto done = run(*options);
     exit_code = done ? 0 : report(done.error());
   });

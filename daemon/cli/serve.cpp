@@ -7,6 +7,8 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "daemon/config/config.hpp"
+
 namespace posed::cli {
 namespace {
 
@@ -15,7 +17,22 @@ sigset_t end_signals() {
   sigemptyset(&set);
   sigaddset(&set, SIGINT);
   sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGHUP);
   return set;
+}
+
+// Whether there was a list to read again; a config that is wrong leaves the old list in force.
+bool read_clients_again(pipeline::Daemon& daemon, const std::string& path) {
+  if (path.empty()) return false;
+  const auto config = config::load_config(path, drivers::registry());
+  if (!config) {
+    spdlog::error("the client list stays as it was: {}", config.error().text());
+    return true;
+  }
+  if (config->security.server_key.empty()) return false;
+  daemon.allow(config->security.clients);
+  spdlog::info("{} clients may connect now", config->security.clients.size());
+  return true;
 }
 
 }  // namespace
@@ -42,6 +59,7 @@ void serve(pipeline::Daemon& daemon, const ServeOptions& options) {
   const timespec look_every{.tv_sec = 0, .tv_nsec = 50'000'000};
   while (true) {
     if (const int signal = sigtimedwait(&set, nullptr, &look_every); signal > 0) {
+      if (signal == SIGHUP && read_clients_again(daemon, options.config)) continue;
       spdlog::info("{}: ending", signal == SIGINT ? "interrupted" : "terminated");
       break;
     }

@@ -2,12 +2,13 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "daemon/pipeline/daemon.hpp"
 
 namespace posed::cli {
 
-// Blocks SIGINT and SIGTERM in this thread and all that it starts from now on, so that only
+// Blocks SIGINT, SIGTERM and SIGHUP in this thread and all that it starts from now on, so that only
 // serve() hears them. Call before Daemon::start().
 void block_end_signals();
 
@@ -17,9 +18,12 @@ void print_ready(const pipeline::Daemon& daemon);
 struct ServeOptions {
   bool until_end = false;         // also end when every source has
   std::optional<double> seconds;  // also end after this long
+  std::string config;             // the file whose client list SIGHUP reads again; may be empty
 };
 
 // Waits for SIGINT, SIGTERM, a control message or what the options say, then stops the daemon.
+// SIGHUP reads the client list again where keys are used; elsewhere it is a closed terminal and
+// ends.
 void serve(pipeline::Daemon& daemon, const ServeOptions& options);
 
 }  // namespace posed::cli

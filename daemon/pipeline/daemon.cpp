@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <ctime>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <thread>
 
@@ -27,47 +25,6 @@ std::int64_t monotonic_ns() noexcept {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
   return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
-
-// Says which stream an error is about.
-std::unexpected<Error> of_stream(const std::string& name, Error error) {
-  error.message = "stream '" + name + "': " + error.message;
-  return std::unexpected(std::move(error));
-}
-
-Result<std::string> load_bytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!file) return fail("cannot read this file", path);
-  return bytes;
-}
-
-Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config) {
-  const drivers::Driver* driver = drivers::find_driver(config.driver);
-  if (driver == nullptr) return misuse("there is no driver '" + config.driver + "'");
-  auto device = driver->open(config.options);
-  if (!device) return std::unexpected(device.error());
-  auto stream = std::make_unique<OpenStream>();
-  stream->config = config;
-  stream->device = std::move(*device);
-  if (!config.style) return stream;
-  auto bytes = load_bytes(config.style->model);
-  if (!bytes) return std::unexpected(bytes.error());
-  stream->model_file = std::move(*bytes);
-  return stream;
-}
-
-// The style model of a stream, bound to its skeleton; null without a style stage.
-Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream) {
-  if (!stream.config.style) return nullptr;
-  if (!stream.device.description.skeleton) {
-    return misuse("driver '" + stream.config.driver + "' gives no poses, so it cannot be styled");
-  }
-  const std::filesystem::path& path = stream.config.style->model;
-  const auto model = style::parse_model(std::as_bytes(std::span(stream.model_file)), path);
-  if (!model) return std::unexpected(model.error());
-  return style::bind_model(*model, *stream.device.description.skeleton, stream.config.style->filter,
-                           path.filename());
 }
 
 double rate_of(const OpenStream& stream) {
@@ -133,7 +90,7 @@ class Daemon::Parts final : public control::Helm {
 Result<> Daemon::Parts::open() {
   for (const StreamConfig& stream_config : config.streams) {
     auto stream = open_stream(stream_config);
-    if (!stream) return of_stream(stream_config.name, stream.error());
+    if (!stream) return std::unexpected(stream.error());
     for (const std::string& warning : (*stream)->device.warnings) {
       spdlog::warn("{}: {}", stream_config.name, warning);
     }
@@ -223,7 +180,7 @@ Result<> Daemon::Parts::open_engines() {
   for (std::uint32_t i = 0; i < streams.size(); ++i) {
     OpenStream& stream = *streams[i];
     auto model = bind_style(stream);
-    if (!model) return of_stream(stream.config.name, model.error());
+    if (!model) return std::unexpected(model.error());
     EngineOptions engine{.stream = i,
                          .stale_after_ns = nanoseconds(stream.config.stale_after_s),
                          .publish_raw = stream.config.publish_raw,
@@ -310,6 +267,12 @@ bool Daemon::all_ended() const noexcept {
   return std::ranges::all_of(parts_->streams, [](const auto& stream) {
     return stream->counters.pipeline.state.load() == StreamState::kEnded;
   });
+}
+
+void Daemon::allow(const std::vector<control::AllowedClient>& clients) {
+  if (!parts_->gatekeeper) return;
+  const auto change = parts_->gatekeeper->replace(control::AccessList(clients));
+  if (change.publisher_must_rebind) parts_->publisher->rebind();
 }
 
 void Daemon::post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text) {

@@ -9,22 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/daemon_config.hpp"
+#include "daemon/pipeline/open_stream.hpp"
 #include "daemon/record/tape.hpp"
 #include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
 
 namespace posed::pipeline {
-
-// A stream whose device is open and whose model is loaded.
-struct OpenStream {
-  StreamConfig config;
-  drivers::Device device;
-  std::string model_file;  // the bytes of the style model's file; empty without a style stage
-  StreamCounters counters;
-};
 
 // What the daemon may be given when it starts; all of it outlives the daemon's stop().
 struct DaemonHooks {
@@ -55,6 +47,8 @@ class Daemon {
   [[nodiscard]] bool asked_to_stop() const noexcept;                   // by a control message
   [[nodiscard]] bool all_ended() const noexcept;  // every source is finished and published
   [[nodiscard]] v1::Stats stats() const;          // of the last second
+  // Who may connect from now on; those who lost a right are cut off. Nothing without CURVE.
+  void allow(const std::vector<control::AllowedClient>& clients);
   void post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text);
 
  private:

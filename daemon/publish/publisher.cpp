@@ -130,6 +130,7 @@ void Publisher::run() {
   }
   told_->reported_ns = options_.clock();
   told_->cpu_ns = cpu_time_ns();
+  every_second(told_->reported_ns);  // who asks for the status at once is told the streams
   const auto drain = [this] {
     while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
     }

@@ -1,0 +1,31 @@
+// A stream with its device open and its model at hand: what `run` starts from and `check` tries.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/daemon_config.hpp"
+#include "drivers/driver.hpp"
+#include "models/style/style_filter.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::pipeline {
+
+struct OpenStream {
+  StreamConfig config;
+  drivers::Device device;
+  std::string model_file;  // the bytes of the style model's file; empty without a style stage
+  StreamCounters counters;
+};
+
+// Opens the device and reads the model's file. Errors name the stream. Cold.
+[[nodiscard]] Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config);
+
+// The style model, bound to the stream's skeleton; null without a style stage. Cold.
+[[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream);
+
+// Says which stream an error is about.
+[[nodiscard]] std::unexpected<Error> of_stream(const std::string& name, Error error);
+
+}  // namespace posed::pipeline

@@ -1,0 +1,204 @@
+// The clients against a running daemon: what they print, how they end, what they are refused.
+#include "tests/e2e/served.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+
+struct Outcome {
+  int code;
+  std::string out, err;
+};
+
+Outcome posed(std::vector<std::string> arguments) {
+  Process process(std::move(arguments));
+  const std::string out = process.rest();
+  const auto code = process.exit_code();
+  REQUIRE(code);
+  return {*code, out, process.errors()};
+}
+
+TEST_CASE("ctl changes a running daemon and says from which frame on") {
+  Served served;
+  served.start();
+  const auto ctl = [&](std::vector<std::string> what) {
+    what.insert(what.begin(), {"ctl", "--connect", served.control});
+    return posed(std::move(what));
+  };
+  const auto set = ctl({"set", "walker", "alpha", "-0.5"});
+  INFO(set.err);
+  CHECK(set.code == 0);
+  CHECK(set.out.starts_with("walker: in effect from frame "));
+
+  const auto model = ctl({"--json", "model", "walker", served.path("two.style")});
+  INFO(model.err);
+  CHECK(model.code == 0);
+  CHECK(json::parse(model.out).at("ok") == true);
+
+  CHECK(has(ctl({"status"}).out, "walker"));
+  const auto raw = ctl({"set", "walker-raw", "alpha", "1"});
+  CHECK(raw.code == 1);
+  CHECK(has(raw.err, "before the style"));
+  const auto foreign = ctl({"model", "walker", served.path("walk.bvh")});
+  CHECK(foreign.code == 1);
+  CHECK(has(foreign.err, "walk.bvh"));
+  CHECK(ctl({"set", "walker", "alpha", "fast"}).code == 2);
+  CHECK(ctl({"set", "walker", "beta", "1"}).code == 2);
+  CHECK(ctl({"model", "walker", served.path("none.style")}).code == 1);
+
+  CHECK(ctl({"stop"}).code == 0);
+  CHECK(served.daemon->exit_code() == 0);
+}
+
+TEST_CASE("monitor and top show the daemon, to people and to scripts") {
+  Served served;
+  served.start();
+  const auto frames = posed(
+      {"monitor", "--connect", served.publish, "--stream", "walker", "--json", "--count", "5"});
+  REQUIRE(frames.code == 0);
+  std::istringstream lines(frames.out);
+  std::uint64_t last = 0;
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    const auto frame = json::parse(line);
+    CHECK(frame.at("stream") == "walker");  // never walker-raw
+    const std::uint64_t sequence = std::stoull(frame.at("sequence").get<std::string>());
+    CHECK(sequence > last);
+    last = sequence;
+    CHECK(frame.at("rotationXyzw").size() == 20);
+  }
+  CHECK(count == 5);
+
+  const auto people = posed({"monitor", "--connect", served.publish, "--count", "2"});
+  CHECK(people.code == 0);
+  CHECK(has(people.out, "measured"));
+  CHECK(has(people.out, "root"));
+
+  const auto top = posed({"top", "--connect", served.publish, "--count", "2"});
+  CHECK(top.code == 0);
+  CHECK(has(top.out, "STREAM"));
+  CHECK(has(top.out, "walker"));
+  CHECK(top.out.find('\x1b') == std::string::npos);  // no terminal, no colours
+
+  Process endless({"monitor", "--connect", served.publish});
+  REQUIRE(endless.line());
+  endless.send(SIGINT);
+  CHECK(endless.exit_code() == 0);
+  served.daemon->send(SIGINT);
+  CHECK(served.daemon->exit_code() == 0);
+}
+
+TEST_CASE("completion is made from the commands there are") {
+  const auto bash = posed({"completion", "bash"});
+  CHECK(bash.code == 0);
+  CHECK(has(bash.out, "'posed ctl') words='set model status stop --help --connect"));
+  CHECK(has(posed({"completion", "zsh"}).out, "#compdef posed"));
+  CHECK(has(posed({"completion", "fish"}).out, "-l 'connect'"));
+  CHECK(posed({"completion", "tcsh"}).code == 2);
+}
+
+TEST_CASE("nobody there is one sentence") {
+  const auto ctl = posed({"ctl", "--connect", "tcp://127.0.0.1:9", "--timeout", "0.3", "status"});
+  CHECK(ctl.code == 1);
+  CHECK(has(ctl.err, "posed: nobody answers at tcp://127.0.0.1:9"));
+  const auto wrong = posed({"ctl", "--connect", "nonsense", "status"});
+  CHECK(wrong.code == 2);
+  CHECK(has(wrong.err, "an endpoint reads like"));
+}
+
+TEST_CASE("a busy port is one sentence, exit 1") {
+  Served served;
+  served.start();
+  Served second;
+  second.write_config("");
+  std::ifstream file(second.path("posed.toml"));
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  text.replace(text.find("tcp://127.0.0.1:*"), 17, served.publish);
+  second.folder.write("posed.toml", text);
+  const auto busy = posed({"run", "--config", second.path("posed.toml")});
+  CHECK(busy.code == 1);
+  CHECK(has(busy.err, served.publish + " is in use"));
+}
+
+TEST_CASE("check tells what a config would run, or all that is wrong with it") {
+  Served served;
+  const auto good = posed({"check", "--config", served.path("posed.toml"), "--json"});
+  INFO(good.err);
+  REQUIRE(good.code == 0);
+  const auto told = json::parse(good.out);
+  CHECK(told.at("ok") == true);
+  CHECK(told.at("streams").at(0).at("name") == "walker");
+  CHECK(told.at("streams").at(0).at("joints") == 5);
+  CHECK(told.at("streams").at(0).at("model") == "one.style");
+  CHECK(posed({"check", "--config", served.path("posed.toml")}).code == 0);
+
+  const auto bad = served.folder.write("bad.toml", "strem = 1\nrealtime = 2\n");
+  const auto all = posed({"check", "--config", bad.string()});
+  CHECK(all.code == 2);
+  CHECK(has(all.err, "bad.toml:1: unknown key 'strem'; the nearest known one here is 'stream'"));
+  CHECK(has(all.err, "bad.toml:2: realtime must be true or false"));
+  const auto as_json = posed({"check", "--config", bad.string(), "--json"});
+  CHECK(json::parse(as_json.out).at("errors").size() == 3);  // and that there is no stream
+  CHECK(posed({"check", "--config", served.path("none.toml")}).code == 2);
+
+  std::filesystem::remove(served.folder.path() / "one.style");
+  const auto gone = posed({"check", "--config", served.path("posed.toml")});
+  CHECK(gone.code == 1);
+  CHECK(has(gone.err, "one.style"));
+}
+
+TEST_CASE("strangers get in nowhere, and a withdrawn key is cut off") {
+  Served served;
+  for (const char* name : {"server", "viewer", "director", "stranger", "other"}) {
+    REQUIRE(posed({"keygen", name, "--out", served.folder.path().string()}).code == 0);
+  }
+  const std::string server = "[security]\nserver_key = \"server.key\"\n";
+  const std::string director =
+      "[[security.client]]\nname = \"director\"\npublic_key = \"director.pub\"\n"
+      "rights = [\"subscribe\", \"control\"]\n";
+  const std::string viewer =
+      "[[security.client]]\nname = \"viewer\"\npublic_key = \"viewer.pub\"\n";
+  served.write_config(server + director + viewer);
+  served.start();
+  const auto as = [&](const std::string& key, std::vector<std::string> what,
+                      const std::string& server_key = "server") {
+    const std::string where = what[0] == "ctl" ? served.control : served.publish;
+    what.insert(what.end(), {"--connect", where, "--key", served.path(key + ".key"), "--server-key",
+                             served.path(server_key + ".pub")});
+    return what;
+  };
+  CHECK(posed(as("viewer", {"monitor", "--count", "3"})).code == 0);
+  CHECK(posed(as("director", {"ctl", "set", "walker", "alpha", "0.2"})).code == 0);
+
+  const auto reaching = posed(as("viewer", {"ctl", "status"}));
+  CHECK(reaching.code == 1);
+  CHECK(has(reaching.err, "refuses this key: it is not on its list, or may not control"));
+  const auto stranger = posed(as("stranger", {"monitor", "--count", "1"}));
+  CHECK(stranger.code == 1);
+  CHECK(has(stranger.err, "refuses this key"));
+  const auto keyless = posed({"monitor", "--connect", served.publish, "--count", "1"});
+  CHECK(keyless.code == 1);
+  CHECK(has(keyless.err, "wants a key"));
+  const auto misled = posed(as("viewer", {"monitor", "--count", "1"}, "other"));
+  CHECK(misled.code == 1);
+  CHECK(has(misled.err, "is not its key"));
+
+  Process connected(as("viewer", {"monitor"}));
+  Process other(as("director", {"monitor"}));
+  REQUIRE(connected.line());
+  REQUIRE(other.line());
+  served.write_config(server + director);
+  served.daemon->send(SIGHUP);
+  INFO(served.daemon->errors());
+  CHECK(connected.exit_code() == 1);
+  CHECK(has(connected.errors(), "refuses this key"));
+  while (other.line(std::chrono::milliseconds(0))) {  // what it had before
+  }
+  CHECK(other.line());  // reconnected by itself
+  served.daemon->send(SIGTERM);
+  CHECK(served.daemon->exit_code() == 0);
+}
+
+}  // namespace
+}  // namespace posed::test
