@@ -11,6 +11,15 @@
 
 namespace posed::pipeline {
 
+// Something that happened to a stream, on its way to event/<stream>.
+struct Notice {
+  std::uint32_t stream;
+  std::uint8_t event;  // posed.v1.Event.Kind
+  std::int64_t time_ns;
+  std::uint64_t sequence;
+  double value;
+};
+
 // reader -> pipeline -> publisher
 struct Item {
   enum class Kind : std::uint8_t { kFrame, kRawFrame, kSample, kNotice };
@@ -18,13 +27,7 @@ struct Item {
   union {
     Frame frame;
     Sample sample;
-    struct {
-      std::uint32_t stream;
-      std::uint8_t event;  // posed.v1.Event.Kind
-      std::int64_t time_ns;
-      std::uint64_t sequence;
-      double value;
-    } notice;
+    Notice notice;
   };
   Item() noexcept : frame{} {}
 };
