@@ -4,7 +4,6 @@
 
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -19,6 +18,7 @@
 #include "daemon/cli/hop_report.hpp"
 #include "daemon/cli/hop_subscriber.hpp"
 #include "daemon/control/zmq_handle.hpp"
+#include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/daemon.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/publish/process.hpp"
@@ -47,12 +47,6 @@ struct HopOptions {
   bool gate = false;
   bool json = false;
 };
-
-std::int64_t now_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
 
 // A field of the line `some` of the CPU's pressure: "avg10=" [percent] or "total=" [us since boot];
 // negative where the kernel does not say.
@@ -220,7 +214,7 @@ std::string sample_body(const pipeline::OpenStream& stream) {
   const Skeleton& skeleton = *stream.device.description.skeleton;
   Frame frame;
   pose_from_channels(skeleton, std::vector<double>(skeleton.channels.size(), 0.1), frame);
-  frame.header.sequence = frame.header.arrival_ns = now_ns();
+  frame.header.sequence = frame.header.arrival_ns = pipeline::monotonic_ns();
   frame.header.device_ns = frame.header.arrival_ns;
   publish::FrameEncoder encoder(stream.config.name);
   static_cast<void>(encoder.encode(frame));
@@ -234,7 +228,7 @@ void watch(const pipeline::Daemon& daemon, const Turns& turns, int seconds, Watc
   std::int64_t before_ns = publish::cpu_time_ns();
   for (int second = 0; second < seconds; ++second) {
     const std::int64_t until_ns = turns.start_ns + (second + 1) * kNanosPerSecond;
-    std::this_thread::sleep_for(std::chrono::nanoseconds(until_ns - now_ns()));
+    std::this_thread::sleep_for(std::chrono::nanoseconds(until_ns - pipeline::monotonic_ns()));
     const std::int64_t cpu_ns = publish::cpu_time_ns();
     if (second % 2 == 0) pipeline_cpu_ns += cpu_ns - before_ns;
     before_ns = cpu_ns;
@@ -270,16 +264,16 @@ Result<Watched> measure(const HopOptions& options) {
     device.transport = std::make_unique<LaterTransport>(
         std::move(device.transport), nanoseconds(place++ / (kRate_hz * options.streams)));
   }
-  turns.start_ns = now_ns() + kNanosPerSecond / 2;
+  turns.start_ns = pipeline::monotonic_ns() + kNanosPerSecond / 2;
   if (auto started = (*daemon)->start(); !started) return std::unexpected(started.error());
   (*subscriber)->begin((*daemon)->publish_endpoint(), (*hop)->endpoint());
   Watched watched;
   watched.pressure_before_percent = cpu_pressure("avg10=");
   const double pressure_us = cpu_pressure("total=");
-  const std::int64_t begun_ns = now_ns();
+  const std::int64_t begun_ns = pipeline::monotonic_ns();
   watch(**daemon, turns, options.seconds, watched);
   watched.pressure_percent =
-      (cpu_pressure("total=") - pressure_us) / (seconds(now_ns() - begun_ns) * 1e4);
+      (cpu_pressure("total=") - pressure_us) / (seconds(pipeline::monotonic_ns() - begun_ns) * 1e4);
   (*daemon)->stop();
   auto arrivals = (*subscriber)->finish();
   if (!arrivals) return std::unexpected(arrivals.error());

@@ -6,24 +6,17 @@
 
 #include <array>
 #include <cstring>
-#include <ctime>
 #include <map>
 
 #include "daemon/control/zmq_handle.hpp"
+#include "daemon/pipeline/clock.hpp"
 #include "posed/v1/posed.pb.h"
-#include "proto/frame/time.hpp"
 
 namespace posed::cli {
 namespace {
 
 constexpr int kPoll_ms = 50;
 constexpr std::size_t kRoom = 1 << 20;  // messages for which room is made beforehand
-
-std::int64_t now_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
 
 std::string read_line(int fd) {
   std::string line;
@@ -64,7 +57,7 @@ class Noter {
     if (!topic.receive(socket)) return false;
     control::Message body;
     if (!body.receive(socket, 0)) return false;
-    const std::int64_t came_ns = now_ns();
+    const std::int64_t came_ns = pipeline::monotonic_ns();
     if (topic.text().starts_with("bare/")) {
       std::int64_t arrival_ns = 0;
       std::memcpy(&arrival_ns, body.bytes().data(), sizeof arrival_ns);

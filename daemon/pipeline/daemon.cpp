@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <ctime>
 #include <optional>
 #include <thread>
 
@@ -11,6 +10,7 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/keys.hpp"
+#include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/realtime.hpp"
 #include "daemon/pipeline/worker.hpp"
@@ -20,12 +20,6 @@ namespace posed::pipeline {
 namespace {
 
 constexpr double kUnknownRate_hz = 1000.0;  // what rings must hold when a device does not say
-
-std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
 
 double rate_of(const OpenStream& stream) {
   for (const double rate_hz :

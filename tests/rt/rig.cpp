@@ -1,21 +1,11 @@
 #include "tests/rt/rig.hpp"
 
 #include <chrono>
-#include <ctime>
 
+#include "daemon/pipeline/clock.hpp"
 #include "tests/rt/law.hpp"
 
 namespace posed::rt {
-namespace {
-
-std::int64_t clock_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
-
-}  // namespace
-
 Rig::Rig(std::vector<drivers::Device> devices, std::vector<const style::BoundModel*> models,
          record::Tape* tape)
     : devices_(std::move(devices)),
@@ -28,12 +18,13 @@ Rig::Rig(std::vector<drivers::Device> devices, std::vector<const style::BoundMod
                                     .wake = pipeline_wake_.get(),
                                     .publisher = publisher_wake_.get(),
                                     .tape = tape,
-                                    .clock = clock_ns})
+                                    .clock = pipeline::monotonic_ns})
                 .value();
-  reader_ =
-      pipeline::Reader::open(
-          {.out = &decoded_, .pipeline = pipeline_wake_.get(), .tape = tape, .clock = clock_ns})
-          .value();
+  reader_ = pipeline::Reader::open({.out = &decoded_,
+                                    .pipeline = pipeline_wake_.get(),
+                                    .tape = tape,
+                                    .clock = pipeline::monotonic_ns})
+                .value();
   for (std::uint32_t i = 0; i < devices_.size(); ++i) {
     counters_.push_back(std::make_unique<pipeline::StreamCounters>());
     pipeline::EngineOptions options{.stream = i,
@@ -55,7 +46,7 @@ Rig::~Rig() {
 }
 
 void Rig::start() {
-  for (auto& device : devices_) device.transport->start(clock_ns()).value();
+  for (auto& device : devices_) device.transport->start(pipeline::monotonic_ns()).value();
   worker_thread_ = std::thread([this] {
     if (watch_system_calls()) ++watched_;
     worker_->run();
@@ -68,8 +59,8 @@ void Rig::start() {
 
 int Rig::take_frames(int frames) {
   int came = 0;
-  const std::int64_t until_ns = clock_ns() + 10 * kNanosPerSecond;
-  while (came < frames && clock_ns() < until_ns) {
+  const std::int64_t until_ns = pipeline::monotonic_ns() + 10 * kNanosPerSecond;
+  while (came < frames && pipeline::monotonic_ns() < until_ns) {
     const bool any = finished_.consume([&](const pipeline::Item& item) {
       if (item.kind == pipeline::Item::Kind::kFrame) ++came;
     });

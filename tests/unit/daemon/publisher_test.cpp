@@ -1,0 +1,154 @@
+#include <catch2/catch.hpp>
+
+#include <map>
+#include <thread>
+
+#include "daemon/pipeline/clock.hpp"
+#include "daemon/publish/publisher.hpp"
+#include "tests/unit/models/toy_style.hpp"
+
+namespace posed::publish {
+namespace {
+
+using pipeline::Item;
+
+// A publisher of one stream on a free port, its thread, and a subscriber to everything.
+class Rig {
+ public:
+  Rig() {
+    StreamInfo info;
+    info.name = "toy";
+    info.description.driver = "file";
+    info.description.skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
+    info.description.samples = {.names = {"bend"}, .units = {"rad"}};
+    info.rate_hz = 100.0;
+    info.raw = true;
+    info.counters = &counters;
+    PublisherOptions options;
+    options.context = context.get();
+    options.endpoint = "tcp://127.0.0.1:*";
+    options.clock = pipeline::monotonic_ns;
+    publisher = Publisher::open(std::move(options), {std::move(info)}, ring, *wake).value();
+    subscriber = control::open_socket(context.get(), ZMQ_SUB).value();
+    REQUIRE(control::set_option(subscriber.get(), ZMQ_SUBSCRIBE, std::string_view()));
+    REQUIRE(control::set_option(subscriber.get(), ZMQ_RCVTIMEO, 20));
+    REQUIRE(control::connect_socket(subscriber.get(), publisher->endpoint()));
+    thread = std::thread([this] { publisher->run(); });
+  }
+  ~Rig() {
+    publisher->stop();
+    thread.join();
+  }
+
+  void put(const Item& item) {
+    REQUIRE(ring.push(item));
+    wake->ring();
+  }
+  // Takes messages until `topic` has come `count` times; false after ten seconds.
+  bool receive(const std::string& topic, int count) {
+    const std::int64_t until_ns = pipeline::monotonic_ns() + 10 * kNanosPerSecond;
+    while (seen[topic] < count && pipeline::monotonic_ns() < until_ns) {
+      control::Message name;
+      control::Message body;
+      if (!name.receive(subscriber.get(), 0) || !body.receive(subscriber.get(), 0)) continue;
+      ++seen[std::string(name.text())];
+      bodies[std::string(name.text())] = std::string(body.text());
+    }
+    return seen[topic] >= count;
+  }
+
+  pipeline::StreamCounters counters;
+  pipeline::Ring<Item> ring{64};
+  std::unique_ptr<pipeline::Wake> wake = pipeline::Wake::open().value();
+  control::Context context = control::open_context().value();
+  std::unique_ptr<Publisher> publisher;
+  control::Socket subscriber;
+  std::thread thread;
+  std::map<std::string, int> seen;
+  std::map<std::string, std::string> bodies;
+};
+
+Item frame_item(std::uint64_t sequence) {
+  Item item;
+  item.frame = test::toy_walk(3).frame(1);
+  item.frame.header.sequence = sequence;
+  item.frame.header.arrival_ns = 1000;
+  item.frame.header.device_ns = 500;
+  return item;
+}
+
+}  // namespace
+
+TEST_CASE("each kind of item goes out under its topic") {
+  Rig rig;
+  REQUIRE(rig.receive("skeleton/toy", 1));  // answers the subscription
+  REQUIRE(rig.receive("skeleton/toy-raw", 1));
+  Item item = frame_item(41);
+  rig.put(item);
+  item.kind = Item::Kind::kRawFrame;
+  rig.put(item);
+  Item sample;
+  sample.kind = Item::Kind::kSample;
+  sample.sample = {};
+  sample.sample.header.sequence = 5;
+  sample.sample.value_count = 1;
+  sample.sample.value[0] = 0.25F;
+  sample.sample.valid[0] = true;
+  rig.put(sample);
+  Item notice;
+  notice.kind = Item::Kind::kNotice;
+  notice.notice = {0, v1::Event::KIND_STALE, 77, 41, 0.5};
+  rig.put(notice);
+  rig.publisher->post_event(0, v1::Event::KIND_WARNING, "look here");
+  rig.publisher->set_model_name(0, "other.style");
+  REQUIRE(rig.receive("event/toy", 2));
+  REQUIRE(rig.receive("pose/toy-raw", 1));
+  REQUIRE(rig.receive("stats", 2));
+
+  v1::Frame frame;
+  REQUIRE(frame.ParseFromString(rig.bodies["pose/toy"]));
+  CHECK(frame.stream() == "toy");
+  CHECK(frame.sequence() == 41);
+  CHECK(frame.device_ns() == 500);
+  CHECK(frame.arrival_ns() == 1000);
+  CHECK(frame.rotation_xyzw_size() == 20);
+  CHECK(frame.angle_rad_size() == 15);
+  CHECK(frame.validity() == std::string(5, '\1'));
+  CHECK(frame.published_ns() > 0);
+  CHECK_FALSE(frame.has_styled_ns());
+  v1::Sample bend;
+  REQUIRE(bend.ParseFromString(rig.bodies["sensor/toy"]));
+  CHECK(bend.name(0) == "bend");
+  CHECK(bend.value(0) == 0.25F);
+  v1::Skeleton skeleton;
+  REQUIRE(skeleton.ParseFromString(rig.bodies["skeleton/toy"]));
+  CHECK(skeleton.joint_name_size() == 5);
+  CHECK(skeleton.id() == frame.skeleton_id());
+  CHECK(skeleton.channel_axis() == "zxyzxyzxyzxyzxy");
+  v1::Event event;
+  REQUIRE(event.ParseFromString(rig.bodies["event/toy"]));
+  CHECK(event.stream() == "toy");
+  v1::Stats stats;
+  REQUIRE(stats.ParseFromString(rig.bodies["stats"]));
+  REQUIRE(stats.stream_size() == 1);
+  CHECK(stats.stream(0).frames() == 1);
+  CHECK(stats.stream(0).samples() == 1);
+  CHECK(stats.stream(0).model() == "other.style");
+  CHECK(stats.stream(0).state() == "waiting");
+  CHECK(stats.monotonic_to_utc_ns() > 0);
+  CHECK(stats.rss_bytes() > 0);
+}
+
+TEST_CASE("a busy port is one sentence that names it") {
+  Rig rig;
+  pipeline::Ring<Item> ring(64);
+  PublisherOptions options;
+  options.context = rig.context.get();
+  options.endpoint = rig.publisher->endpoint();
+  options.clock = pipeline::monotonic_ns;
+  const auto second = Publisher::open(std::move(options), {}, ring, *rig.wake);
+  REQUIRE_FALSE(second);
+  CHECK(second.error().message.find(rig.publisher->endpoint()) != std::string::npos);
+}
+
+}  // namespace posed::publish
