@@ -15,7 +15,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr int kRootDims = 3;  // the root is the first joint of the native space
+constexpr int kRootDims = 3;           // the root is the first joint of the native space
+constexpr double kNothing_rad = 1e-6;  // what float poses can differ by
 
 double rms(const MatrixXd& m) {
   return std::sqrt(m.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, m.size())));
@@ -86,9 +87,19 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
   };
   StyleScore score;
   const double apart = rms(grid * before->coefficients() - goal_cycle);
+  const double source_jerk = jerk(before->q);
+  if (!(source_jerk > 0.0)) {
+    return fail("the source does not move; give a clip of a walk", source.path);
+  }
+  if (apart < kNothing_rad) {
+    return fail(
+        "the target walks as the source does already, so nothing can be measured; "
+        "give a target in another style",
+        target.path);
+  }
   score.cycle_ratio = rms(grid * after->coefficients() - goal_cycle) / apart;
   score.ratio = rms(after->q - at(*after)) / rms(before->q - at(*before));
-  score.jerk_ratio = jerk(after->q) / jerk(before->q);
+  score.jerk_ratio = jerk(after->q) / source_jerk;
   score.moved_rms_deg = kDegrees * rms(after->q - before->q);
   score.source_rms_deg = kDegrees * apart;
   score.source_period_s = before->period_s;

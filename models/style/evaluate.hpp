@@ -18,7 +18,8 @@ struct StyleScore {
 };
 
 // `styled` is `source` after the filter: same skeleton names, rate and frames. Phases come from
-// each clip's own thigh difference. Errors name the clip.
+// each clip's own thigh difference. Errors name the clip; a source that stands still or walks as
+// the target does is one, because the ratios divide by what lies between them.
 [[nodiscard]] Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
                                                 const clip::Clip& target);
 

@@ -1,0 +1,44 @@
+// The score of a styled walk where it is known beforehand, and where there is none.
+#include "models/style/evaluate.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "models/motion/synthetic_walker.hpp"
+
+using namespace posed;
+using motion::make_walker;
+using motion::WalkerFamily;
+
+TEST_CASE("a walk left alone scores one, the target's own walk scores zero", "[style][evaluate]") {
+  const auto march = make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
+  const auto sway = make_walker({.family = WalkerFamily::kSway, .person = 1}).value();
+  const auto alone = style::evaluate_style(march, march, sway);
+  REQUIRE(alone);
+  CHECK(alone->cycle_ratio == 1.0);
+  CHECK(alone->ratio == 1.0);
+  CHECK(alone->jerk_ratio == 1.0);
+  CHECK(alone->moved_rms_deg == 0.0);
+  const auto reached = style::evaluate_style(march, sway, sway);
+  REQUIRE(reached);
+  CHECK(reached->cycle_ratio == Approx(0.0).margin(1e-9));
+  CHECK(reached->moved_rms_deg > 1.0);
+}
+
+TEST_CASE("a target that is the source itself, or a source that stands still, has no score",
+          "[style][evaluate]") {
+  auto march = make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
+  const auto sway = make_walker({.family = WalkerFamily::kSway, .person = 1}).value();
+  march.path = "march.bvh";
+  const auto same = style::evaluate_style(march, sway, march);
+  REQUIRE_FALSE(same);
+  CHECK(same.error().message.find("walks as the source does already") != std::string::npos);
+  CHECK(same.error().file == "march.bvh");
+
+  auto still = march;
+  still.path = "still.bvh";
+  still.channels.rowwise() = march.channels.row(0).eval();
+  const auto held = style::evaluate_style(still, still, sway);
+  REQUIRE_FALSE(held);
+  CHECK(held.error().message.find("does not move") != std::string::npos);
+  CHECK(held.error().file == "still.bvh");
+}
