@@ -47,9 +47,11 @@ model = "one.style"
     return (folder.path() / name).string();
   }
 
-  // Starts `posed run` and waits until it is ready.
-  void start() {
-    daemon.emplace(std::vector<std::string>{"run", "--config", path("posed.toml")});
+  // Starts `posed run` with these options, too, and waits until it is ready.
+  void start(const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments{"run", "--config", path("posed.toml")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    daemon.emplace(std::move(arguments));
     const auto line = daemon->line();
     INFO(daemon->errors());
     REQUIRE(line);
