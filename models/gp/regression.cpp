@@ -61,15 +61,25 @@ Evidence log_marginal(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y, const 
 }
 
 ScgResult maximise_evidence(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y, const Hyper& start,
-                            const ScgOptions& options) {
+                            double min_noise, const ScgOptions& options) {
+  const auto raised = [&](const Eigen::VectorXd& h) {
+    Hyper hyper = Hyper::of(h);
+    hyper.log_noise = std::log(min_noise + std::exp(hyper.log_noise));
+    return hyper;
+  };
   const auto value = [&](const Eigen::VectorXd& h) {
     if (!(h.lpNorm<Eigen::Infinity>() <= kLogBound)) return std::numeric_limits<double>::infinity();
-    return -log_marginal(X, Y, Hyper::of(h)).log_likelihood;
+    return -log_marginal(X, Y, raised(h)).log_likelihood;
   };
   const auto gradient = [&](const Eigen::VectorXd& h) -> Eigen::VectorXd {
-    return -log_marginal(X, Y, Hyper::of(h)).gradient;
+    const Hyper hyper = raised(h);
+    Eigen::Vector4d by_raised = -log_marginal(X, Y, hyper).gradient;
+    by_raised[3] *= std::exp(h[3] - hyper.log_noise);  // d log(min + e^s) / ds
+    return by_raised;
   };
-  return scg_minimise(value, gradient, start.vector(), options);
+  ScgResult result = scg_minimise(value, gradient, start.vector(), options);
+  result.x = raised(result.x).vector();
+  return result;
 }
 
 Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,

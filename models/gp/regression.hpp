@@ -39,10 +39,13 @@ struct Evidence {
 [[nodiscard]] Evidence log_marginal(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                     const Hyper& hyper);
 
-// SCG on -log L from `start`; log parameters are kept within +-30. The result's x is the Hyper's
-// vector, its value -log L.
+// SCG on -log L from `start`; log parameters are kept within +-30. The noise is min_noise +
+// exp(log noise), as in NETLAB: outputs that a smooth map explains to the last digit would else
+// drive it to nothing, and the weights to sizes whose sum no float holds. The result's x is the
+// Hyper's vector, min_noise included, its value -log L.
 [[nodiscard]] ScgResult maximise_evidence(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
-                                          const Hyper& start, const ScgOptions& options = {});
+                                          const Hyper& start, double min_noise,
+                                          const ScgOptions& options = {});
 
 // Weights C^-1 (Y - offset) for Y [N x D_out]. Fails when shapes differ, a value is not finite, or
 // C is not positive definite.

@@ -169,7 +169,7 @@ MgpmData stack_states(Dataset& dataset, const std::vector<int>& members,
     if (std::sqrt(all.col(d).squaredNorm() / frames) > kStill) live.push_back(d);
   }
   data.y = all(Eigen::all, live);
-  dataset.column_means.push_back(mean(live).transpose());
+  dataset.column_means.push_back(mean.transpose());
   dataset.live_columns.push_back(std::move(live));
   return data;
 }

@@ -60,7 +60,7 @@ struct Dataset {
   std::vector<Subject> subjects;
   std::vector<MgpmFit> fits;     // the best fit of each motion, in the order of `motions`
   std::vector<MgpmData> states;  // what each was fitted to
-  // Which columns of `state` each fit saw (the others never move), and their means.
+  // Which columns of `state` each fit saw (the others never move), and the means of all columns.
   std::vector<std::vector<int>> live_columns;
   std::vector<Eigen::VectorXd> column_means;
 

@@ -32,7 +32,7 @@ TEST_CASE("SCG walks the fixture's path on the evidence of a Gaussian process", 
   options.max_iterations = 200;
   const auto result =
       gp::maximise_evidence(test::matrix(golden["X"]), test::matrix(golden["Y"]),
-                            gp::Hyper::of(test::vector(expected["start"])), options);
+                            gp::Hyper::of(test::vector(expected["start"])), 0.0, options);
   REQUIRE(result.trace.size() >= 20);
   for (std::size_t i = 0; i < 20; ++i) {
     INFO("iteration " << i);
