@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdio>
 
+#include <google/protobuf/stubs/logging.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
@@ -40,6 +41,8 @@ int report(const Error& error) {
 
 int main_of(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("posed"));
+  // Bytes of strangers are refused in our own words; protobuf would write a line for each.
+  google::protobuf::SetLogHandler(nullptr);
   CLI::App app{"posed: live poses in, another style out", "posed"};
   app.set_version_flag("--version", "posed " POSED_VERSION);
   app.require_subcommand(1);

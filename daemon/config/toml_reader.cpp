@@ -52,7 +52,7 @@ int line_of_node(const toml::node& node) { return static_cast<int>(node.source()
 }  // namespace
 
 void Findings::blame(int line, std::string message) {
-  errors.push_back({std::move(message), file, line, ExitCode::kWrongUse});
+  errors.push_back({without_controls(std::move(message)), file, line, ExitCode::kWrongUse});
 }
 
 TableReader::TableReader(const toml::table& table, std::string path, Findings& findings)

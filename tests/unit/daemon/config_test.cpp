@@ -258,7 +258,7 @@ TEST_CASE("a config that is not there or no text is one sentence") {
   CHECK_FALSE(load_config(folder.path(), drivers));
   for (const std::string& text :
        {std::string("\xff\xfe\0x", 4), std::string(100000, '['), std::string("a=\"\x1b[2J"),
-        std::string("[[stream]]\n\"\x1b[2J\" = 1\n")}) {
+        std::string("a = tr\x1b\n"), std::string("[[stream]]\n\"\x1b[2J\" = 1\n")}) {
     const auto reading = load_config(folder.write("bad.toml", text), drivers);
     REQUIRE_FALSE(reading);
     CHECK(reading.error().text().find('\x1b') == std::string::npos);
