@@ -19,7 +19,6 @@ namespace posed::cli {
 namespace {
 
 struct RecordOptions {
-  std::string config;
   std::string out;
   bool frames = false;
   bool force = false;
@@ -62,7 +61,7 @@ void tell(pipeline::Daemon& daemon, const record::Notice& notice) {
 }
 
 Result<> record(const RecordOptions& options) {
-  auto config = config::load_config(options.config, drivers::registry());
+  auto config = config::load_config(options.serve.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
   block_end_signals();
   auto opened = pipeline::Daemon::open(*config);
@@ -112,12 +111,10 @@ Result<> record(const RecordOptions& options) {
 void add_record(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("record", "Stream like `run` and keep a device log");
   auto options = std::make_shared<RecordOptions>();
-  command->add_option("--config", options->config, "The daemon's config, TOML")->required();
+  add_serve_options(*command, options->serve);
   command->add_option("--out", options->out, "The log to write, by habit NAME.plog")->required();
   command->add_flag("--frames", options->frames, "Keep the published frames, too (for --expect)");
   command->add_flag("--force", options->force, "Replace the log if it is there already");
-  command->add_option("--seconds", options->serve.seconds, "End after this long");
-  command->add_flag("--until-end", options->serve.until_end, "End when every source has ended");
   command->footer(
       "The log is one SQLite file: what each device sent, and every decision that decoding cannot\n"
       "repeat. kill -9 or a power cut costs at most the last 0.5 s. A full disk stops recording,\n"
@@ -126,7 +123,6 @@ void add_record(CLI::App& app, int& exit_code) {
       "  posed replay take1.plog --speed max --out FRAMES.bin --expect\n"
       "  sqlite3 take1.plog 'SELECT name, driver FROM stream'");
   command->callback([options, &exit_code] {
-    options->serve.config = options->config;
     const auto done = record(*options);
     exit_code = done ? 0 : report(done.error());
   });

@@ -1,5 +1,4 @@
 #include <memory>
-#include <string>
 
 #include <CLI/CLI.hpp>
 
@@ -11,12 +10,7 @@
 namespace posed::cli {
 namespace {
 
-struct RunOptions {
-  std::string config;
-  ServeOptions serve;
-};
-
-Result<> run(const RunOptions& options) {
+Result<> run(const ServeOptions& options) {
   auto config = config::load_config(options.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
   block_end_signals();
@@ -24,7 +18,7 @@ Result<> run(const RunOptions& options) {
   if (!daemon) return std::unexpected(daemon.error());
   if (auto started = (*daemon)->start(); !started) return started;
   print_ready(**daemon);
-  serve(**daemon, options.serve);
+  serve(**daemon, options);
   return {};
 }
 
@@ -32,10 +26,8 @@ Result<> run(const RunOptions& options) {
 
 void add_run(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("run", "Stream as a config says, until stopped");
-  auto options = std::make_shared<RunOptions>();
-  command->add_option("--config", options->config, "The daemon's config, TOML")->required();
-  command->add_option("--seconds", options->serve.seconds, "End after this long");
-  command->add_flag("--until-end", options->serve.until_end, "End when every source has ended");
+  auto options = std::make_shared<ServeOptions>();
+  add_serve_options(*command, *options);
   command->footer(
       "Once ready it prints one line of JSON on stdout with the endpoints really bound. SIGINT "
       "and\n"
@@ -44,7 +36,6 @@ void add_run(CLI::App& app, int& exit_code) {
       "  posed run --config mine.toml --until-end     # for clips with loop = false\n"
       "  posed monitor --count 10                     # in another terminal: see the poses");
   command->callback([options, &exit_code] {
-    options->serve.config = options->config;
     const auto done = run(*options);
     exit_code = done ? 0 : report(done.error());
   });

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
@@ -36,6 +37,12 @@ bool read_clients_again(pipeline::Daemon& daemon, const std::string& path) {
 }
 
 }  // namespace
+
+void add_serve_options(CLI::App& command, ServeOptions& options) {
+  command.add_option("--config", options.config, "The daemon's config, TOML")->required();
+  command.add_option("--seconds", options.seconds, "End after this long");
+  command.add_flag("--until-end", options.until_end, "End when every source has ended");
+}
 
 void block_end_signals() {
   const sigset_t set = end_signals();

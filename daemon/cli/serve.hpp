@@ -6,6 +6,10 @@
 
 #include "daemon/pipeline/daemon.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace posed::cli {
 
 // Blocks SIGINT, SIGTERM and SIGHUP in this thread and all that it starts from now on, so that only
@@ -18,8 +22,11 @@ void print_ready(const pipeline::Daemon& daemon);
 struct ServeOptions {
   bool until_end = false;         // also end when every source has
   std::optional<double> seconds;  // also end after this long
-  std::string config;             // the file whose client list SIGHUP reads again; may be empty
+  std::string config;             // the TOML file; SIGHUP reads its client list again; may be empty
 };
+
+// --config (required), --seconds and --until-end.
+void add_serve_options(CLI::App& command, ServeOptions& options);
 
 // Waits for SIGINT, SIGTERM, a control message or what the options say, then stops the daemon.
 // SIGHUP reads the client list again where keys are used; elsewhere it is a closed terminal and

@@ -14,6 +14,11 @@ v1::Percentiles percentiles(LatencyHistogram& histogram) {
   return message;
 }
 
+// A stage that did not see the frame left no stamp.
+void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t to_ns) noexcept {
+  if (from_ns != kNoTime_ns && to_ns != kNoTime_ns) histogram.add(to_ns - from_ns);
+}
+
 constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "ended"};
 
 }  // namespace
@@ -37,9 +42,9 @@ Outlet::Outlet(StreamInfo stream_info) : info(std::move(stream_info)), styled(in
 void Outlet::measure(const Frame& frame, const StageStamps& stamps) noexcept {
   if (frame.quality == Quality::kStale) return;
   const std::int64_t arrival_ns = frame.header.arrival_ns;
-  decode.add(stamps.decoded_ns - arrival_ns);
-  style.add(stamps.styled_ns - stamps.decoded_ns);
-  publish.add(stamps.published_ns - arrival_ns);
+  add_between(decode, arrival_ns, stamps.decoded_ns);
+  add_between(style, stamps.decoded_ns, stamps.styled_ns);
+  add_between(publish, arrival_ns, stamps.published_ns);
 }
 
 void Outlet::report(v1::StreamStats& stats, double seconds_since) {

@@ -1,23 +1,11 @@
 // The clients against a running daemon: what they print, how they end, what they are refused.
+#include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {
 namespace {
 
 using nlohmann::json;
-
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
-Outcome posed(std::vector<std::string> arguments) {
-  Process process(std::move(arguments));
-  const std::string out = process.rest();
-  const auto code = process.exit_code();
-  REQUIRE(code);
-  return {*code, out, process.errors()};
-}
 
 TEST_CASE("ctl changes a running daemon and says from which frame on") {
   Served served;

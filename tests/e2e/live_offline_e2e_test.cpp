@@ -11,6 +11,7 @@
 #include "daemon/pipeline/messages.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/reader.hpp"
+#include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {
@@ -20,19 +21,6 @@ using std::chrono::steady_clock;
 
 constexpr int kFrames = 240;
 constexpr double kSame_rad = 1e-5;  // nine digits of a degree, and floats on the way
-
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
-Outcome posed(std::vector<std::string> arguments) {
-  Process process(std::move(arguments));
-  const std::string out = process.rest();
-  const auto code = process.exit_code();
-  REQUIRE(code);
-  return {*code, out, process.errors()};
-}
 
 // A config of one stream. `stream` and `file` are lines of its tables.
 std::string config_of(const std::string& stream, const std::string& file,

@@ -14,6 +14,7 @@
 #include "models/style/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/log/reader.hpp"
+#include "tests/e2e/outcome.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/toy_style.hpp"
@@ -23,19 +24,6 @@ namespace {
 
 using nlohmann::json;
 using namespace std::chrono_literals;
-
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
-Outcome posed(std::vector<std::string> arguments) {
-  Process process(std::move(arguments));
-  const std::string out = process.rest();
-  const auto code = process.exit_code();
-  REQUIRE(code);
-  return {*code, out, process.errors()};
-}
 
 // Two walkers with a style, and everything `posed record` needs for them.
 class Stage {

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/allocations.hpp"
+#include "tests/support/last_frame.hpp"
 #include "tests/unit/models/toy_style.hpp"
 
 using namespace posed;
@@ -16,18 +17,8 @@ namespace {
 
 constexpr int kJoints = 5;
 
-class Last final : public Emit {
- public:
-  void frame(const Frame& frame) noexcept override {
-    out = frame;
-    ++count;
-  }
-  Frame out;
-  int count = 0;
-};
-
 Frame run(style::StyleFilter& filter, const Frame& in) {
-  Last last;
+  test::LastFrame last;
   filter.step(&in, in.header.device_ns, last);
   REQUIRE(last.count == 1);
   return last.out;
@@ -120,7 +111,7 @@ TEST_CASE("a tick emits nothing and a stale frame keeps its quality", "[style]")
   const auto ready = bound(1);
   Frame in = toy_walk(50).frame(10);
   Settled filter(ready.get(), in);
-  Last last;
+  test::LastFrame last;
   filter.filter.step(nullptr, 5, last);
   CHECK(last.count == 0);
   in.quality = Quality::kStale;
@@ -280,7 +271,7 @@ TEST_CASE("the filter takes nothing from the heap", "[style]") {
   const auto b = bound(2, options);
   style::StyleFilter filter(a.get(), options);
   const clip::Clip walk = toy_walk(60);
-  Last last;
+  test::LastFrame last;
   std::uint64_t taken = 0;
   for (int i = 0; i < walk.frames(); ++i) {
     Frame in = walk.frame(i);

@@ -13,6 +13,7 @@
 #include "models/style/evaluate.hpp"
 #include "models/style/train.hpp"
 #include "proto/frame/rotation.hpp"
+#include "tests/support/last_frame.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;
@@ -93,16 +94,6 @@ clip::Clip upsampled(const clip::Clip& clip, double rate_hz) {
   return out;
 }
 
-class Last final : public Emit {
- public:
-  void frame(const Frame& frame) noexcept override {
-    out = frame;
-    ++count;
-  }
-  Frame out;
-  int count = 0;
-};
-
 }  // namespace
 
 TEST_CASE("a walk taught from one take each comes near the style's held-out take",
@@ -152,7 +143,7 @@ TEST_CASE("a model taught at 30 Hz serves the same walk at 120 Hz, frame by fram
 
   const auto bound = style::bind_model(model, *fast.skeleton, {}, "taught").value();
   style::StyleFilter filter(bound.get(), {});
-  Last last;
+  test::LastFrame last;
   for (int t = 0; t < fast.frames(); ++t) {
     Frame in = fast.frame(t);
     in.header.sequence = 7U + 3U * static_cast<std::uint64_t>(t);

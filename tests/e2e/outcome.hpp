@@ -1,0 +1,27 @@
+// One run of the real binary, to its end.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "tests/support/process.hpp"
+
+namespace posed::test {
+
+struct Outcome {
+  int code;
+  std::string out, err;
+};
+
+inline Outcome posed(std::vector<std::string> arguments) {
+  Process process(std::move(arguments));
+  const std::string out = process.rest();
+  const auto code = process.exit_code();
+  REQUIRE(code);
+  return {*code, out, process.errors()};
+}
+
+}  // namespace posed::test
