@@ -52,10 +52,11 @@ template <typename Gaussian>
 struct Tree {
   std::vector<TreeNode> nodes;  // node 0 is the root
   std::vector<Gaussian> leaves;
+  std::vector<double> occupancy;  // [leaf] training frames in it (duration tree: gestures)
 };
 
 struct Label {
-  std::string name;                          // 1 to 15 bytes, no blank
+  std::string name;                          // see proto/frame/label.hpp
   std::array<int, kFingers> finger_class{};  // 0 to kClasses - 1
   bool trained = false;                      // it was in the recordings
 };

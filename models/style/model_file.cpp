@@ -1,65 +1,26 @@
-// The model file: 8 bytes POSEDMDL, u32 version, u64 payload length, u32 CRC-32 of the payload (all
-// little-endian), then posed.v1.ModelFile. Nothing of the bytes is believed before it is checked.
-#include <algorithm>
-#include <array>
+// What lies inside the envelope of a style model's file (proto/model/model_file.hpp).
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 #include <set>
-#include <system_error>
 #include <utility>
 
-#include <zlib.h>
-
 #include "models/style/style_model.hpp"
-#include "posed/v1/model.pb.h"
+#include "proto/model/model_file.hpp"
+#include "proto/model/soundness.hpp"
 
 namespace posed::style {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using model_file::kMaxNumber;
 
-constexpr std::string_view kMagic = "POSEDMDL";
-constexpr std::uint32_t kVersion = 1;
-constexpr std::size_t kHeaderBytes = 24;
 constexpr int kMaxInputs = 20'000;
-constexpr double kMaxNumber = 1e30;  // what the hot path's floats can still hold and multiply
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-template <typename T>
-void put(std::string& out, T value) {
-  for (std::size_t i = 0; i < sizeof(T); ++i) {
-    out.push_back(static_cast<char>((value >> (8 * i)) & 0xFF));
-  }
-}
-
-template <typename T>
-T get(std::span<const std::byte> bytes) {
-  T value = 0;
-  for (std::size_t i = 0; i < sizeof(T); ++i) {
-    value |= static_cast<T>(std::to_integer<T>(bytes[i]) << (8 * i));
-  }
-  return value;
-}
-
-std::uint32_t crc_of(const void* data, std::size_t size) {
-  return static_cast<std::uint32_t>(
-      crc32_z(crc32_z(0, nullptr, 0), static_cast<const Bytef*>(data), size));
-}
-
-// Collects the first thing that is wrong, so that the reading below stays one straight line.
-class Reader {
+class Reader : public model_file::Soundness {
  public:
-  void want(bool condition, const char* what) {
-    if (!condition && wrong_.empty()) wrong_ = what;
-  }
-  [[nodiscard]] bool sound() const { return wrong_.empty(); }
-  [[nodiscard]] const std::string& wrong() const { return wrong_; }
-
   VectorXd vector(const google::protobuf::RepeatedField<double>& list, int size, const char* what) {
     want(list.size() == size, what);
     if (!sound()) return {};
@@ -79,17 +40,11 @@ class Reader {
     return out;
   }
 
-  double number(double value, double low, double high, const char* what) {
-    want(value >= low && value <= high, what);  // false for NaN
-    return value;
-  }
-
  private:
   template <typename M>
   static bool is_number(const M& m) {
     return (m.array().abs() <= kMaxNumber).all();  // false for NaN
   }
-  std::string wrong_;
 };
 
 motion::PoseSpaceSpec read_space(const v1::PoseSpace& from, Reader& reader) {
@@ -162,54 +117,23 @@ void write_vector(const VectorXd& v, google::protobuf::RepeatedField<double>& ou
 }  // namespace
 
 Result<StyleModel> parse_model(std::span<const std::byte> bytes, const std::string& name) {
-  if (bytes.size() < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
-    return fail("this is not a posed model; make one with `posed train style`", name);
-  }
-  const auto version = get<std::uint32_t>(bytes.subspan(8));
-  if (version != kVersion) {
-    return fail("the model has version " + std::to_string(version) + ", this posed reads version " +
-                    std::to_string(kVersion) + "; train it again",
-                name);
-  }
-  const auto length = get<std::uint64_t>(bytes.subspan(12));
-  const auto payload = bytes.subspan(kHeaderBytes);
-  if (length != payload.size()) {
-    return fail("the model is cut short or has something after it: " + std::to_string(length) +
-                    " bytes promised, " + std::to_string(payload.size()) + " there; copy it again",
-                name);
-  }
-  if (get<std::uint32_t>(bytes.subspan(20)) != crc_of(payload.data(), payload.size())) {
-    return fail("the model's checksum does not fit its bytes; copy it again", name);
-  }
-  v1::ModelFile file;
-  if (payload.size() > INT32_MAX ||
-      !file.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) {
-    return fail("the model's payload cannot be read; train it again", name);
-  }
-  if (!file.has_style()) return fail("the model is not a style model", name);
+  const auto file = model_file::open(bytes, name);
+  if (!file) return std::unexpected(file.error());
+  if (!file->has_style()) return fail("the model is not a style model", name);
   Reader reader;
-  StyleModel model = read_model(file.style(), reader);
-  if (!reader.sound()) {
-    return fail("the model is not sound: " + reader.wrong() + "; train it again", name);
-  }
+  StyleModel model = read_model(file->style(), reader);
+  if (auto verdict = reader.verdict(name); !verdict) return std::unexpected(verdict.error());
   return model;
 }
 
 Result<StyleModel> load_model(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
-    return fail("this is a folder, not a model file", path.string());
-  }
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return fail("the model cannot be opened; check the path", path.string());
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) return fail("the model cannot be read", path.string());
-  return parse_model(std::as_bytes(std::span(text)), path.string());
+  const auto bytes = model_file::load(path);
+  if (!bytes) return std::unexpected(bytes.error());
+  return parse_model(std::as_bytes(std::span(*bytes)), path.string());
 }
 
 std::string serialize_model(const StyleModel& model) {
   v1::ModelFile file;
-  file.set_posed_version("0.1.0");
   v1::StyleModel& style = *file.mutable_style();
   v1::PoseSpace& space = *style.mutable_space();
   space.set_name(std::string(motion::space_name(model.space.space)));
@@ -233,38 +157,11 @@ std::string serialize_model(const StyleModel& model) {
   style.set_from(model.from);
   style.set_to(model.to);
   style.set_report_json(model.report_json);
-
-  const std::string payload = file.SerializeAsString();
-  std::string out(kMagic);
-  put<std::uint32_t>(out, kVersion);
-  put<std::uint64_t>(out, payload.size());
-  put<std::uint32_t>(out, crc_of(payload.data(), payload.size()));
-  return out + payload;
+  return model_file::seal(std::move(file));
 }
 
 Result<> save_model(const StyleModel& model, const std::filesystem::path& path) {
-  // Written beside its place and then moved there: whoever opens the file sees all of it or none.
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream stream(part, std::ios::binary | std::ios::trunc);
-    const std::string bytes = serialize_model(model);
-    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    stream.close();
-    if (!stream) {
-      std::error_code ignored;
-      std::filesystem::remove(part, ignored);
-      return fail("the model cannot be written; check the folder and the disk's free space",
-                  path.string());
-    }
-  }
-  std::error_code error;
-  std::filesystem::rename(part, path, error);
-  if (error) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    return fail("the model cannot be put in its place: " + error.message(), path.string());
-  }
-  return {};
+  return model_file::save(serialize_model(model), path);
 }
 
 }  // namespace posed::style

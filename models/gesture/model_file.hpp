@@ -1,0 +1,25 @@
+// The gesture model's file: the envelope of proto/model/model_file.hpp around
+// posed.v1.GestureModel; proto/README.md says how a stranger reads a motion out of it. Cold.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "models/gesture/gesture_model.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::gesture {
+
+// Everything a lookup relies on is checked: each tree is one tree, its numbers are finite, its
+// variances positive, every label is in one class per finger.
+[[nodiscard]] Result<GestureModel> load_model(const std::filesystem::path& path);
+// The same from bytes (control message, device log). `name` is only for error messages. Whatever
+// the bytes are: an Error, never a crash.
+[[nodiscard]] Result<GestureModel> parse_model(std::span<const std::byte> bytes,
+                                               const std::string& name);
+[[nodiscard]] std::string serialize_model(const GestureModel& model);
+[[nodiscard]] Result<> save_model(const GestureModel& model, const std::filesystem::path& path);
+
+}  // namespace posed::gesture

@@ -1,0 +1,17 @@
+// The name of a gesture: what a label file, a play command, a model and a frame can all hold.
+#pragma once
+
+#include <algorithm>
+#include <string_view>
+
+#include "proto/frame/frame.hpp"
+
+namespace posed {
+
+// 1 to 15 signs of ASCII, no blank.
+[[nodiscard]] constexpr bool is_label_name(std::string_view name) noexcept {
+  return !name.empty() && name.size() < kMaxLabel &&
+         std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < '\x7F'; });
+}
+
+}  // namespace posed

@@ -1,0 +1,115 @@
+#include "proto/model/model_file.hpp"
+
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include <zlib.h>
+
+namespace posed::model_file {
+namespace {
+
+constexpr std::string_view kMagic = "POSEDMDL";
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kHeaderBytes = 24;
+
+template <typename T>
+void put(std::string& out, T value) {
+  for (std::size_t i = 0; i < sizeof(T); ++i) {
+    out.push_back(static_cast<char>((value >> (8 * i)) & 0xFF));
+  }
+}
+
+template <typename T>
+T get(std::span<const std::byte> bytes) {
+  T value = 0;
+  for (std::size_t i = 0; i < sizeof(T); ++i) {
+    value |= static_cast<T>(std::to_integer<T>(bytes[i]) << (8 * i));
+  }
+  return value;
+}
+
+std::uint32_t crc_of(const void* data, std::size_t size) {
+  return static_cast<std::uint32_t>(
+      crc32_z(crc32_z(0, nullptr, 0), static_cast<const Bytef*>(data), size));
+}
+
+}  // namespace
+
+Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& name) {
+  if (bytes.size() < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
+    return fail("this is not a posed model; make one with `posed train`", name);
+  }
+  const auto version = get<std::uint32_t>(bytes.subspan(8));
+  if (version != kVersion) {
+    return fail("the model has version " + std::to_string(version) + ", this posed reads version " +
+                    std::to_string(kVersion) + "; train it again",
+                name);
+  }
+  const auto length = get<std::uint64_t>(bytes.subspan(12));
+  const auto payload = bytes.subspan(kHeaderBytes);
+  if (length != payload.size()) {
+    return fail("the model is cut short or has something after it: " + std::to_string(length) +
+                    " bytes promised, " + std::to_string(payload.size()) + " there; copy it again",
+                name);
+  }
+  if (get<std::uint32_t>(bytes.subspan(20)) != crc_of(payload.data(), payload.size())) {
+    return fail("the model's checksum does not fit its bytes; copy it again", name);
+  }
+  v1::ModelFile file;
+  if (payload.size() > INT32_MAX ||
+      !file.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) {
+    return fail("the model's payload cannot be read; train it again", name);
+  }
+  return file;
+}
+
+std::string seal(v1::ModelFile file) {
+  file.set_posed_version("0.1.0");
+  const std::string payload = file.SerializeAsString();
+  std::string out(kMagic);
+  put<std::uint32_t>(out, kVersion);
+  put<std::uint64_t>(out, payload.size());
+  put<std::uint32_t>(out, crc_of(payload.data(), payload.size()));
+  return out + payload;
+}
+
+Result<std::string> load(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    return fail("this is a folder, not a model file", path.string());
+  }
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) return fail("the model cannot be opened; check the path", path.string());
+  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (stream.bad()) return fail("the model cannot be read", path.string());
+  return bytes;
+}
+
+Result<> save(const std::string& bytes, const std::filesystem::path& path) {
+  // Written beside its place and then moved there: whoever opens the file sees all of it or none.
+  const std::filesystem::path part = path.string() + ".part";
+  {
+    std::ofstream stream(part, std::ios::binary | std::ios::trunc);
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    stream.close();
+    if (!stream) {
+      std::error_code ignored;
+      std::filesystem::remove(part, ignored);
+      return fail("the model cannot be written; check the folder and the disk's free space",
+                  path.string());
+    }
+  }
+  std::error_code error;
+  std::filesystem::rename(part, path, error);
+  if (error) {
+    std::error_code ignored;
+    std::filesystem::remove(part, ignored);
+    return fail("the model cannot be put in its place: " + error.message(), path.string());
+  }
+  return {};
+}
+
+}  // namespace posed::model_file
