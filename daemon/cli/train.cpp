@@ -73,6 +73,10 @@ Result<Experiment> experiment_of(const Options& options) {
 void print_summary(const json& report, const std::string& out) {
   std::printf("%-12s %-10s %-28s %8s %8s\n", "group", "motion", "clip", "period", "theta0");
   for (const json& clip : report["clips"]) {
+    if (clip["dropped_first_frame"].get<bool>()) {
+      std::fprintf(stderr, "%s: left out the first frame, a rest pose that is no motion\n",
+                   clip["file"].get<std::string>().c_str());
+    }
     const auto stem = std::filesystem::path(clip["file"].get<std::string>()).stem().string();
     std::printf("%-12s %-10s %-28s %8.2f %8.3f\n", clip["group"].get<std::string>().c_str(),
                 clip["motion"].get<std::string>().c_str(), stem.c_str(),

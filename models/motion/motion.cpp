@@ -20,7 +20,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double kShortestChord_m = 0.5;
-constexpr double kSameRate = 1e-3;  // relative
+constexpr double kSameRate = 1e-3;           // relative
+constexpr double kAddedPoseJump = 4.0;       // times the largest step that follows
+constexpr double kAddedPoseJump_rad = 0.09;  // and at least 5 degrees rms over the joints
 
 Quaterniond rotation(const Frame& frame, int joint) {
   return to_eigen_double(frame.rotation_xyzw[joint]);
@@ -68,7 +70,29 @@ void fill_frame(const MatrixXd& columns, double position, Frame& frame) {
   }
 }
 
+// Between two frames, rms over the joints below the root.
+double step_rad(const Frame& a, const Frame& b, int root) {
+  double squares = 0.0;
+  for (int j = root + 1; j < a.joint_count; ++j) {
+    const double angle_rad = angle_between_rad(rotation(a, j), rotation(b, j));
+    squares += angle_rad * angle_rad;
+  }
+  return std::sqrt(squares / std::max(1, a.joint_count - root - 1));
+}
+
 }  // namespace
+
+bool begins_with_added_pose(const Motion& motion) {
+  if (motion.size() < 3) return false;
+  const auto step = [&](int t) {
+    return step_rad(motion.frames[t], motion.frames[t + 1], motion.skeleton->root_joint);
+  };
+  double largest = 0.0;
+  for (int t = 1; t + 1 < motion.size(); ++t) largest = std::max(largest, step(t));
+  return step(0) > std::max(kAddedPoseJump_rad, kAddedPoseJump * largest);
+}
+
+void drop_first_frame(Motion& motion) { motion.frames.erase(motion.frames.begin()); }
 
 Result<Motion> motion_of(const clip::Clip& clip) {
   if (clip.frames() == 0)

@@ -27,6 +27,11 @@ struct Motion {
 // value that is not finite; the error names the clip and the frame.
 [[nodiscard]] Result<Motion> motion_of(const clip::Clip& clip);
 
+// Whether the first frame is no part of the motion: some converters put the figure's rest pose in
+// front (CMU's cgspeed BVH files), a jump to the second frame that nobody makes.
+[[nodiscard]] bool begins_with_added_pose(const Motion& motion);
+void drop_first_frame(Motion& motion);
+
 // The same motion at another rate. Downwards: zero-phase low-pass at a third of the new rate (10 Hz
 // at 30), then the nearest instants; upwards: slerp. The same rate is returned as it is.
 [[nodiscard]] Motion resample(const Motion& motion, double rate_hz);

@@ -24,6 +24,7 @@ struct Source {
   const TrainingClip* clip;
   motion::Motion motion;
   double heading_rad;
+  bool dropped_first = false;
 };
 
 Error in_clip(Error error, const std::string& path) {
@@ -56,6 +57,8 @@ Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips,
   for (const TrainingClip& clip : clips) {
     auto motion = motion::motion_of(clip.clip);
     if (!motion) return std::unexpected(in_clip(motion.error(), clip.clip.path));
+    const bool added_pose = motion::begins_with_added_pose(*motion);
+    if (added_pose) motion::drop_first_frame(*motion);
     motion::Motion at_rate = motion::resample(*motion, rate_hz);
     if (!has_stride(at_rate.size(), rate_hz)) {
       return fail("the clip has " + std::to_string(at_rate.size()) + " frames at " +
@@ -69,7 +72,7 @@ Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips,
       if (!same) return std::unexpected(same.error());
     }
     const double heading_rad = motion::walk_heading_rad(at_rate);
-    sources.push_back({&clip, std::move(at_rate), heading_rad});
+    sources.push_back({&clip, std::move(at_rate), heading_rad, added_pose});
   }
   return sources;
 }
@@ -111,6 +114,7 @@ AlignedClip aligned_clip(const Source& source, MatrixXd q, double rate_hz) {
   clip.file = source.clip->clip.path;
   clip.group = source.clip->group;
   clip.motion = source.clip->motion;
+  clip.dropped_first = source.dropped_first;
   const MatrixXd velocity =
       motion::time_derivative(motion::root_positions_m(source.motion, source.heading_rad), rate_hz);
   const auto dims = q.cols();

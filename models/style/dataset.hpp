@@ -37,6 +37,7 @@ struct DatasetOptions {
 struct AlignedClip {
   std::string file, group, motion;
   int subject = 0;                    // index into Dataset::subjects
+  bool dropped_first = false;         // the file's first frame was an added rest pose
   Eigen::MatrixXd q;                  // [T x D], rad
   Eigen::MatrixXd state;              // y = (v, q, dq/dt) [T x 3 + 2D], the paper's 89 for cmu43
   Eigen::VectorXd leg;                // the stride's reference signal [T]

@@ -38,6 +38,10 @@ struct Fold {
 [[nodiscard]] Result<gp::Trained> fit_difference(const std::vector<Pairing>& pairings,
                                                  double length_rad, double noise);
 
+// The paper's way (--mode paper): differences Y [N x D] at the mean cycle X [N x D], all kernel
+// values by evidence (SCG).
+[[nodiscard]] Result<gp::Trained> fit_paper(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y);
+
 // Sum of squared errors on the fold's frames, and of the truth itself.
 struct FoldError {
   double error = 0.0, truth = 0.0;

@@ -60,8 +60,9 @@ double jerk(const MatrixXd& q) {
 
 Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
                                   const clip::Clip& target) {
-  const auto target_motion = motion::motion_of(target);
+  auto target_motion = motion::motion_of(target);
   if (!target_motion) return std::unexpected(target_motion.error());
+  if (motion::begins_with_added_pose(*target_motion)) motion::drop_first_frame(*target_motion);
   auto spec = motion::describe_space(motion::Space::kNative, *target.skeleton);
   if (!spec) return std::unexpected(spec.error());
   const motion::Motion* of_target[] = {&*target_motion};
@@ -70,12 +71,16 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
   }
   const auto goal = view_of(*target_motion, *spec, target.path);
   if (!goal) return std::unexpected(goal.error());
-  const auto source_motion = motion::motion_of(source);
+  auto source_motion = motion::motion_of(source);
   if (!source_motion) return std::unexpected(source_motion.error());
+  auto styled_motion = motion::motion_of(styled);
+  if (!styled_motion) return std::unexpected(styled_motion.error());
+  if (motion::begins_with_added_pose(*source_motion)) {  // and so does its styled copy
+    motion::drop_first_frame(*source_motion);
+    motion::drop_first_frame(*styled_motion);
+  }
   const auto before = view_of(*source_motion, *spec, source.path);
   if (!before) return std::unexpected(before.error());
-  const auto styled_motion = motion::motion_of(styled);
-  if (!styled_motion) return std::unexpected(styled_motion.error());
   const auto after = view_of(*styled_motion, *spec, styled.path);
   if (!after) return std::unexpected(after.error());
 

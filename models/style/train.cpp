@@ -23,10 +23,6 @@ constexpr double kLimitFactor = 1.5;      // of the largest difference in traini
 constexpr double kMeanCycleNoise = 1e-3;  // a group of one: its cycle is an average already
 constexpr double kPersonNoise = 0.1;      // several people: their cycles scatter about the group's
 
-// 1e-3 deg^2, 0.03 degrees: what no joint angle is known better than. MGPM cycles are free of
-// noise.
-constexpr double kMinNoise_rad2 = 3.05e-7;
-
 struct Learnt {
   gp::Trained process;
   MatrixXd differences;  // all that was taught [N x D]
@@ -123,18 +119,6 @@ MatrixXd mgpm_group_cycle(const Dataset& dataset, std::size_t motion, const std:
   return all.middleCols(3, dataset.dims());
 }
 
-// Where the search for the kernel values starts: the data's own size, 50 degrees, little noise.
-gp::Hyper paper_start(const MatrixXd& Y) {
-  constexpr double kLength_rad = 50.0 * std::numbers::pi / 180.0;
-  const Eigen::RowVectorXd mean = Y.colwise().mean();
-  const double variance = (Y.rowwise() - mean).squaredNorm() / static_cast<double>(Y.size());
-  const double constant = mean.squaredNorm() / static_cast<double>(mean.size());
-  return {.lambda = std::log(std::max(variance, 1e-9)),
-          .log_mu = -2.0 * std::log(kLength_rad),
-          .log_b = std::log(std::max(constant, 1e-9)),
-          .log_noise = std::log(1e-2 * std::max(variance, 1e-9))};
-}
-
 // The paper: mean source cycle -> difference of the mean cycles, kernel values by evidence.
 Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
   std::set<std::string> sources;
@@ -155,9 +139,7 @@ Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
       Y.bottomRows(cycle.rows()) = goal - cycle;
     }
   }
-  const gp::ScgResult best =
-      gp::maximise_evidence(X, Y, paper_start(Y), kMinNoise_rad2, {.max_iterations = 300});
-  auto process = gp::fit(X, Y, VectorXd::Zero(dataset.dims()), gp::Hyper::of(best.x));
+  auto process = fit_paper(X, Y);
   if (!process) return std::unexpected(process.error());
   return Learnt{std::move(*process), Y, {{"length_chosen_by", "evidence"}}};
 }
@@ -177,6 +159,7 @@ json report_of(const Dataset& dataset, const Learnt& learnt) {
                                {"group", clip.group},
                                {"motion", clip.motion},
                                {"frames", clip.q.rows()},
+                               {"dropped_first_frame", clip.dropped_first},
                                {"period_frames", 2.0 * std::numbers::pi / clip.dtheta},
                                {"theta0", clip.theta0}});
   }

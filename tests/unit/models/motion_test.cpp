@@ -10,6 +10,7 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/harmonics.hpp"
 #include "proto/frame/rotation.hpp"
+#include "tests/support/shared.hpp"
 
 using namespace posed;
 using namespace posed::motion;
@@ -52,6 +53,35 @@ double worst_angle_rad(const Motion& a, const Motion& b) {
 }
 
 }  // namespace
+
+TEST_CASE("A rest pose in front of a motion is found, and an ordinary first frame is not one",
+          "[motion]") {
+  Motion motion = walker(120.0, 0.3);
+  CHECK_FALSE(begins_with_added_pose(motion));
+  const int frames = motion.size();
+  Frame rest = motion.frames.front();
+  rest.rotation_xyzw.fill(kIdentity);
+  motion.frames.insert(motion.frames.begin(), rest);
+  CHECK(begins_with_added_pose(motion));
+  drop_first_frame(motion);
+  CHECK(motion.size() == frames);
+  CHECK_FALSE(begins_with_added_pose(motion));
+}
+
+TEST_CASE("CMU's BVH files begin with an added pose where they are said to", "[motion][real]") {
+  if (!test::shared("data/cmu/02_02.amc")) SKIP_WITHOUT_SHARED();
+  for (const auto& [name, added] : {std::pair{"cmu/02_03.bvh", true},
+                                    {"cmu/02_04.bvh", true},
+                                    {"cmu/07_01.bvh", true},
+                                    {"cmu/09_01.bvh", true},
+                                    {"cmu/16_15.bvh", false},
+                                    {"styles/dataset-2_walk_masculine_001.bvh", false}}) {
+    INFO(name);
+    const auto path = test::shared(std::string("data/") + name);
+    REQUIRE(path);
+    CHECK(begins_with_added_pose(motion_of(clip::read_clip(*path).value()).value()) == added);
+  }
+}
 
 TEST_CASE("The zero-phase low-pass agrees with scipy's filtfilt", "[motion]") {
   const VectorXd t = VectorXd::LinSpaced(40, 0.0, 39.0);
