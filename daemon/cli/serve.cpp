@@ -47,6 +47,7 @@ void add_serve_options(CLI::App& command, ServeOptions& options) {
 void block_end_signals() {
   const sigset_t set = end_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit is a full disk, which the recorder tells
 }
 
 void print_ready(const pipeline::Daemon& daemon) {

@@ -5,7 +5,7 @@
 // (second paper, section 3; algorithms.md 3.4, 3.5).
 //
 // Units: radians per frame at `rate_hz` to the power of the window's order. Immutable after load;
-// shared between threads. Lookups are RT-safe.
+// shared between threads.
 #pragma once
 
 #include <array>

@@ -1,0 +1,133 @@
+// What a replay offers beside the comparison of frames: its pace, its publishing, its instruction
+// set; and what a recording does when the disk is full.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <span>
+
+#include <sys/resource.h>
+
+#include "posed/v1/posed.pb.h"
+#include "tests/e2e/outcome.hpp"
+#include "tests/e2e/served.hpp"
+#include "tests/support/shared.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+// A copy of the golden log: opening one folds in its -wal.
+std::string staged_log(const TempFolder& folder) {
+  const auto copy = folder.path() / "staged.plog";
+  std::filesystem::copy_file(golden("replay/staged.plog"), copy);
+  return copy.string();
+}
+
+// FRAMES.bin: repeated {u32 length, posed.v1.Frame}.
+std::vector<v1::Frame> frames_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::vector<v1::Frame> frames;
+  std::uint32_t size = 0;
+  while (file.read(reinterpret_cast<char*>(&size), sizeof size)) {
+    std::string bytes(size, '\0');
+    REQUIRE(file.read(bytes.data(), size));
+    REQUIRE(frames.emplace_back().ParseFromString(bytes));
+  }
+  return frames;
+}
+
+}  // namespace
+
+TEST_CASE("a replay keeps the take's own pace and publishes as the run did") {
+  const TempFolder folder;
+  const std::string log = staged_log(folder);
+  const auto begin = std::chrono::steady_clock::now();
+  Process replay({"replay", log, "--speed", "0.1", "--publish", "--endpoint", "tcp://127.0.0.1:*"});
+  const auto line = replay.line();
+  INFO(replay.errors());
+  REQUIRE(line);
+  const std::string endpoint = json::parse(*line).at("publish");
+  const Outcome seen = posed({"monitor", "--connect", endpoint, "--json", "--count", "5"});
+  INFO(seen.err);
+  REQUIRE(seen.code == 0);
+  const json frame = json::parse(seen.out.substr(0, seen.out.find('\n')));
+  CHECK(frame.contains("sequence"));
+  REQUIRE(replay.exit_code() == 0);
+  // Slower is a busy machine; faster would be wrong.
+  const auto max =
+      posed({"replay", log, "--speed", "max", "--out", (folder.path() / "f").string()});
+  REQUIRE(max.code == 0);
+  const auto frames = frames_of(folder.path() / "f");
+  REQUIRE(frames.size() > 2);
+  const double take_s = seconds(frames.back().arrival_ns() - frames.front().arrival_ns());
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  CHECK(took.count() >= 10.0 * take_s);
+}
+
+TEST_CASE("a replay on another instruction set differs in the last bits at most") {
+  const TempFolder folder;
+  const std::string log = staged_log(folder);
+  const auto replay = [&](const std::string& isa, const std::string& out) {
+    return posed({"replay", log, "--speed", "max", "--isa", isa, "--out",
+                  (folder.path() / out).string(), "--json"});
+  };
+  const Outcome portable = replay("portable", "portable.bin");
+  INFO(portable.err);
+  REQUIRE(portable.code == 0);
+  CHECK(json::parse(portable.out).at("isa") == "portable");
+  CHECK(replay("sparc", "no.bin").code == 2);
+  const Outcome other = posed(
+      {"replay", log, "--speed", "max", "--out", (folder.path() / "own.bin").string(), "--json"});
+  REQUIRE(other.code == 0);
+  const auto a = frames_of(folder.path() / "portable.bin");
+  const auto b = frames_of(folder.path() / "own.bin");
+  REQUIRE(!a.empty());
+  REQUIRE(a.size() == b.size());
+  float worst = 0.0F;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    REQUIRE(a[i].rotation_xyzw_size() == b[i].rotation_xyzw_size());
+    for (int k = 0; k < a[i].rotation_xyzw_size(); ++k) {
+      worst = std::max(worst, std::abs(a[i].rotation_xyzw(k) - b[i].rotation_xyzw(k)));
+    }
+  }
+  CHECK(worst <= 1e-5F);
+}
+
+TEST_CASE("a full disk stops the recording and not the stream, and is counted and told") {
+  Served served;
+  served.daemon.emplace(std::vector<std::string>{"record", "--config", served.path("posed.toml"),
+                                                 "--out", served.path("take.plog")});
+  const auto line = served.daemon->line();
+  INFO(served.daemon->errors());
+  REQUIRE(line);
+  const auto ready = json::parse(*line);
+  const std::string publish = ready.at("publish"), control = ready.at("control");
+  std::this_thread::sleep_for(600ms);
+  const rlimit full{4096, 4096};  // of any file; what the daemon says on stderr still fits
+  REQUIRE(prlimit(served.daemon->pid(), RLIMIT_FSIZE, &full, nullptr) == 0);
+
+  std::uint64_t errors = 0;
+  for (int i = 0; i < 50 && errors == 0; ++i) {
+    std::this_thread::sleep_for(200ms);
+    const Outcome status = posed({"ctl", "--connect", control, "status", "--json"});
+    INFO(status.err);
+    REQUIRE(status.code == 0);
+    const json stats = json::parse(status.out).at("status");
+    errors = std::stoull(stats.value("recorderErrors", "0"));
+  }
+  CHECK(errors > 0);
+  CHECK(has(served.daemon->errors(), "recording stopped, streaming goes on"));
+  const Outcome seen = posed({"monitor", "--connect", publish, "--json", "--count", "30"});
+  INFO(seen.err);
+  CHECK(seen.code == 0);
+  served.daemon->send(SIGTERM);
+  CHECK(served.daemon->exit_code().value_or(-1) <= 1);  // 1: the log lacks something
+}
+
+}  // namespace posed::test
