@@ -1,6 +1,7 @@
 #include "models/generate/frame_clock.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace posed::generate {
 namespace {
@@ -18,7 +19,7 @@ constexpr double kGap = 1.5;           // beats: from here on a step is a gap, n
 double FrameClock::tick(const Header& header) noexcept {
   const bool device_time = header.device_ns != kNoTime_ns;
   const std::int64_t time_ns = device_time ? header.device_ns : header.arrival_ns;
-  const bool first = last_ns_ == kNoTime_ns && steps_ == 0 && now_s_ == 0.0;
+  const bool first = !std::exchange(started_, true);
   const bool known = time_ns != kNoTime_ns && last_ns_ != kNoTime_ns &&
                      device_time == device_time_ && time_ns > last_ns_;
   const double beat_s = period_s_ > 0.0 ? period_s_ : kFirstPeriod_s;

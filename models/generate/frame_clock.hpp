@@ -31,7 +31,9 @@ class FrameClock {
   int steps_ = 0;  // learned so far; counts on
   double period_s_ = 0.0;
   double now_s_ = 0.0;
+  double late_s_ = 0.0;  // how far an arrival lies behind the beat
   std::int64_t last_ns_ = kNoTime_ns;
+  bool started_ = false;
   bool device_time_ = false;
 };
 

@@ -13,8 +13,8 @@ namespace {
 constexpr double kRateSlack = 1.02;
 
 std::unexpected<Error> bad_lag(std::string_view text) {
-  return fail("'" + std::string(text) + "' is no lag: give 0 to " +
-              std::to_string(kMaxLagFrames) + " frames, as in 1, or up to 170 ms, as in 33ms");
+  return fail("'" + std::string(text) + "' is no lag: give 0 to " + std::to_string(kMaxLagFrames) +
+              " frames, as in 1, or up to 170 ms, as in 33ms");
 }
 
 }  // namespace
