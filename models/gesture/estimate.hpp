@@ -1,0 +1,53 @@
+// Statistics of aligned frames and the models made of them: flat start, segmental k-means and
+// Baum-Welch on isolated examples (algorithms.md 3.2, 3.3). Cold.
+#pragma once
+
+#include <vector>
+
+#include "models/gesture/hmm.hpp"
+
+namespace posed::gesture {
+
+// Sums over examples; states x dimensions where two words are needed.
+struct Statistics {
+  Eigen::VectorXd occupancy;      // expected frames in each state
+  Eigen::MatrixXd first, second;  // sums of o and o^2, weighted by gamma
+  Eigen::VectorXd stays;
+  Eigen::VectorXd duration_first, duration_second;  // sums of an example's d and d^2 a state
+  double examples = 0.0;
+  double log_likelihood = 0.0;
+
+  Statistics() = default;
+  Statistics(int states, Eigen::Index dims);
+  // One example whose frames are in the states with probability gamma [frame][state].
+  void add(const Frames& frames, const Eigen::MatrixXd& gamma, const Eigen::VectorXd& stays);
+};
+
+// Means and variances, these at least `floor` [dimension]; stay within 0.001 and 0.999. A state
+// that nothing is in keeps what `before` says.
+[[nodiscard]] StateModel estimate(const Statistics& sums, const Eigen::VectorXd& floor,
+                                  const StateModel& before);
+
+// Every example cut into equal parts, frame t of T in state t * states / T.
+[[nodiscard]] Statistics flat_start(const std::vector<Frames>& examples, int states);
+// Every example along its best path through the model.
+[[nodiscard]] Statistics align_hard(const std::vector<Frames>& examples, const StateModel& model);
+// Every example as the model expects it: the E step.
+[[nodiscard]] Statistics align_soft(const std::vector<Frames>& examples, const StateModel& model);
+
+// How long the examples stay in each state [frames], over the examples; variances at least 0.25.
+struct Durations {
+  Eigen::VectorXd mean, variance;
+};
+[[nodiscard]] Durations durations_of(const Statistics& sums);
+
+// `rounds` times estimate and align; `model` is what the last alignment was made with.
+struct Fit {
+  StateModel model;
+  Statistics sums;
+  std::vector<double> log_likelihood;  // before each round and after the last
+};
+[[nodiscard]] Fit baum_welch(const std::vector<Frames>& examples, StateModel start, int rounds,
+                             const Eigen::VectorXd& floor);
+
+}  // namespace posed::gesture
