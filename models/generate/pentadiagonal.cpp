@@ -68,6 +68,22 @@ HWY_INLINE Vec add_centred(Pending& a, Pending& b, Pending& c, const Dynamics& d
   return plus_times(d.p2, -0.25, d.p1);
 }
 
+// The same with the curve window [1 + k, -2, 1 - k].
+HWY_INLINE Vec add_skewed(Pending& a, Pending& b, Pending& c, const Dynamics& d, double k) {
+  const double left = 1.0 + k;
+  const double right = 1.0 - k;
+  const Vec delta = times(0.25, d.p1);
+  a.d0 = hn::Add(a.d0, plus_times(delta, left * left, d.p2));
+  b.d0 = plus_times(b.d0, 4.0, d.p2);
+  c.d0 = hn::Add(c.d0, plus_times(delta, right * right, d.p2));
+  a.d1 = plus_times(a.d1, -2.0 * left, d.p2);
+  b.d1 = plus_times(b.d1, -2.0 * right, d.p2);
+  a.r = hn::Add(a.r, plus_times(times(left, d.m2), -0.5, d.m1));
+  b.r = plus_times(b.r, -2.0, d.m2);
+  c.r = hn::Add(c.r, plus_times(times(right, d.m2), 0.5, d.m1));
+  return hn::Sub(times(left * right, d.p2), delta);
+}
+
 // The two coefficients that the boundary rule leaves of a window which loses one to the outside, at
 // the string's beginning; at its end they stand in the opposite order, the delta's negated.
 struct Cut {
@@ -148,7 +164,9 @@ HWY_INLINE void eliminate_columns(const System& s, std::ptrdiff_t column, double
       add_position(a[v], at(s.evidence[i], v), stride);
       Vec d2 = hn::Zero(Doubles());
       if (i + 2 <= last) {
-        d2 = add_centred(a[v], b[v], c[v], dynamics_of(at(s.evidence[i + 1], v), stride));
+        const Dynamics dynamics = dynamics_of(at(s.evidence[i + 1], v), stride);
+        d2 = s.skew == nullptr ? add_centred(a[v], b[v], c[v], dynamics)
+                               : add_skewed(a[v], b[v], c[v], dynamics, s.skew[i + 1]);
       } else if (cuts && i + 1 == last) {
         add_cut(a[v], b[v], dynamics_of(at(s.evidence[last], v), stride),
                 mirrored(cut_of(s.boundary)));

@@ -34,6 +34,9 @@ struct System {
   int frames;                     // at least 1
   int stride;
   Boundary boundary = Boundary::kDrop;
+  // Null: frames are even. Else [frames]: how uneven a frame stands between its neighbours, (h2 -
+  // h1) / (h1 + h2) of the times before and after it; its curve window is then [1 + k, -2, 1 - k].
+  const double* skew = nullptr;
   // Null: the string begins with the first frame. Else kCarryRows rows: what the frames before it
   // left; the boundary rule then holds for the end only.
   const double* carry_in = nullptr;

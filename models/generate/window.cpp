@@ -17,9 +17,10 @@ Window::Window(int channels, int max_frames)
 }
 
 // RT-safe.
-void Window::solve(std::span<const double* const> evidence, Boundary boundary) noexcept {
+void Window::solve(std::span<const double* const> evidence, Boundary boundary,
+                   const double* skew) noexcept {
   frames_ = static_cast<int>(evidence.size());
-  kernel::eliminate({evidence.data(), frames_, stride_, boundary}, factors_.data());
+  kernel::eliminate({evidence.data(), frames_, stride_, boundary, skew}, factors_.data());
   kernel::substitute(factors_.data(), frames_, 0, stride_, x_.get());
 }
 

@@ -17,8 +17,10 @@ class Window {
   Window(int channels, int max_frames);
 
   // Solves the given frames (1 to max_frames), each pointer to a frame's rows (Evidence::frame()
-  // of this many channels). RT-safe.
-  void solve(std::span<const double* const> evidence, Boundary boundary = Boundary::kDrop) noexcept;
+  // of this many channels). `skew`: [frames] of an uneven clock (kernel::System), else null.
+  // RT-safe.
+  void solve(std::span<const double* const> evidence, Boundary boundary = Boundary::kDrop,
+             const double* skew = nullptr) noexcept;
 
   // Of the last solve. [channels], padded; RT-safe.
   [[nodiscard]] const double* x(int frame) const noexcept {

@@ -1,0 +1,76 @@
+// A motion through the live generator's stage, frame by frame as it would come from a device.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "models/generate/live_smoother.hpp"
+#include "tests/support/grasps.hpp"
+
+namespace posed::test {
+
+// A body with `channels` rotation channels, three a joint where they suffice.
+inline Skeleton body_with_channels(int channels) {
+  Skeleton skeleton;
+  skeleton.name = "toy";
+  for (int c = 0; c < channels; ++c) {
+    const int joint = c / 3;
+    if (c % 3 == 0) {
+      Joint& added = skeleton.joints.emplace_back();
+      added.name = "joint" + std::to_string(joint);
+      added.parent = joint - 1;
+    }
+    skeleton.channels.push_back(
+        {.joint = static_cast<std::uint16_t>(joint), .axis = static_cast<Axis>(2 - c % 3)});
+  }
+  return skeleton;
+}
+
+inline Frame frame_of(const Skeleton& skeleton, const Eigen::RowVectorXd& angles_deg,
+                      std::uint64_t sequence, std::int64_t device_ns) {
+  Frame frame;
+  const Eigen::RowVectorXd angles_rad = angles_deg * kDegree;
+  pose_from_channels(skeleton, {angles_rad.data(), static_cast<std::size_t>(angles_rad.size())},
+                     frame);
+  frame.header.sequence = sequence;
+  frame.header.device_ns = device_ns;
+  return frame;
+}
+
+class Frames final : public Emit {
+ public:
+  void frame(const Frame& frame) noexcept override { all.push_back(frame); }
+  std::vector<Frame> all;
+};
+
+// Row t is the estimate of frame t [deg]. Channels that are not a number make their joint missing.
+inline Motion smoothed(const Motion& measured, double rate_hz,
+                       const generate::LiveOptions& options) {
+  Skeleton skeleton = body_with_channels(static_cast<int>(measured.cols()));
+  skeleton.finish().value();
+  generate::LiveSmoother smoother(skeleton, options);
+  Frames out;
+  for (Eigen::Index t = 0; t < measured.rows(); ++t) {
+    const Frame frame = frame_of(skeleton, measured.row(t), static_cast<std::uint64_t>(t + 1),
+                                 nanoseconds(static_cast<double>(t) / rate_hz));
+    smoother.step(&frame, 0, out);
+  }
+  smoother.flush(out);
+  Motion result(measured.rows(), measured.cols());
+  for (std::size_t t = 0; t < out.all.size(); ++t) {
+    for (Eigen::Index c = 0; c < measured.cols(); ++c) {
+      result(static_cast<Eigen::Index>(t), c) =
+          static_cast<double>(out.all[t].angle_rad[static_cast<std::size_t>(c)]) / kDegree;
+    }
+  }
+  return result;
+}
+
+// Root of the mean square over frames and channels, start and end left out as in the study.
+inline double rms(const Motion& estimate, const Motion& truth) {
+  const Eigen::Index frames = truth.rows() - 48;
+  return std::sqrt(
+      (estimate.middleRows(40, frames) - truth.middleRows(40, frames)).array().square().mean());
+}
+
+}  // namespace posed::test
