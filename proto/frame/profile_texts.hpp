@@ -1,4 +1,4 @@
-// The texts of config/skeletons/*.toml, which CMake writes into the binary (proto/CMakeLists.txt).
+// The texts of config/skeletons/*.toml and config/hands/*.toml, which CMake writes into the binary (proto/CMakeLists.txt).
 #pragma once
 
 #include <span>
@@ -12,5 +12,6 @@ struct ProfileText {
 };
 
 [[nodiscard]] std::span<const ProfileText> profile_texts();
+[[nodiscard]] std::span<const ProfileText> hand_texts();
 
 }  // namespace posed

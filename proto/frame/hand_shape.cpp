@@ -1,0 +1,186 @@
+#include "proto/frame/hand_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+
+#include <toml++/toml.h>
+
+#include "proto/frame/profile_texts.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kMillimetre = 1e-3;
+constexpr double kLongest_m = 1.0;  // of anything in a hand
+
+// Reads one hand; remembers the first mistake.
+class HandReader {
+ public:
+  explicit HandReader(const std::string& file) : file_(file) {}
+
+  Result<HandShape> read(const toml::table& table) {
+    for (const auto& [key, node] : table) entry(key.str(), node);
+    if (shape_.name.empty()) blame(table, "a hand needs a name");
+    for (std::size_t f = 0; f < kFingers; ++f) {
+      if (!seen_[f]) blame(table, "the hand lacks its [" + std::string(kFingerNames[f]) + "]");
+    }
+    if (error_) return std::unexpected(*error_);
+    return std::move(shape_);
+  }
+
+ private:
+  void blame(const toml::node& node, std::string message) {
+    if (error_) return;
+    error_ = Error{std::move(message), file_, static_cast<int>(node.source().begin.line)};
+  }
+
+  void entry(std::string_view key, const toml::node& node) {
+    const auto finger = std::ranges::find(kFingerNames, key);
+    if (key == "name") {
+      shape_.name = node.value_or("");
+    } else if (finger != kFingerNames.end() && node.is_table()) {
+      const auto f = static_cast<std::size_t>(finger - kFingerNames.begin());
+      seen_[f] = true;
+      read_finger(*node.as_table(), shape_.fingers[f]);
+    } else if (key == "palm" && node.is_array()) {
+      for (const toml::node& capsule : *node.as_array()) read_palm(capsule);
+    } else {
+      blame(node, "'" + std::string(key) + "' is not known in a hand, or of another type");
+    }
+  }
+
+  void read_finger(const toml::table& table, FingerShape& finger) {
+    for (const std::string_view needed :
+         {"base_mm", "length_mm", "radius_mm", "x_deg", "y_deg", "z_deg"}) {
+      if (!table.contains(needed)) blame(table, "a finger needs " + std::string(needed));
+    }
+    for (const auto& [toml_key, node] : table) {
+      const std::string_view key = toml_key.str();
+      if (key == "base_mm") {
+        finger.base_m = point(node);
+      } else if (key == "frame_deg") {
+        const Eigen::Vector3d angle = numbers(node, 360.0) * kDegree;
+        finger.frame = axis_rotation(Axis::kY, angle.y()) * axis_rotation(Axis::kX, angle.x()) *
+                       axis_rotation(Axis::kZ, angle.z());
+      } else if (key == "length_mm") {
+        for (int j = 0; j < kFingerJoints; ++j) finger.length_m[j] = lengths(node)[j];
+      } else if (key == "radius_mm") {
+        for (int j = 0; j < kFingerJoints; ++j) finger.radius_m[j] = lengths(node)[j];
+      } else if (key.size() == 5 && key.ends_with("_deg") && key[0] >= 'x' && key[0] <= 'z') {
+        read_ranges(node, static_cast<std::size_t>(key[0] - 'x'), finger);
+      } else {
+        blame(node, "'" + std::string(key) + "' is not known in a finger");
+      }
+    }
+  }
+
+  void read_ranges(const toml::node& node, std::size_t axis, FingerShape& finger) {
+    const toml::array* const joints = node.as_array();
+    if (joints == nullptr || joints->size() != kFingerJoints) {
+      return blame(node, "limits are three pairs, [least, most] of joints 1 to 3");
+    }
+    for (std::size_t j = 0; j < kFingerJoints; ++j) {
+      const toml::array* const pair = joints->get(j)->as_array();
+      const bool is_pair = pair != nullptr && pair->size() == 2;
+      const auto low = is_pair ? pair->get(0)->value<double>() : std::nullopt;
+      const auto high = is_pair ? pair->get(1)->value<double>() : std::nullopt;
+      if (!low || !high || !(*low <= 0.0) || !(*high >= 0.0) || *low < -180 || *high > 180) {
+        return blame(node, "a limit is [least, most] in degrees, with 0 between them");
+      }
+      finger.range[j][axis] = {*low * kDegree, *high * kDegree};
+    }
+  }
+
+  void read_palm(const toml::node& node) {
+    const toml::table* const table = node.as_table();
+    if (table == nullptr || table->size() != 3 || !table->contains("from_mm") ||
+        !table->contains("to_mm") || !table->contains("radius_mm")) {
+      return blame(node, "a capsule of the palm has from_mm, to_mm and radius_mm");
+    }
+    const auto radius_mm = (*table)["radius_mm"].value<double>();
+    if (!radius_mm || !(*radius_mm > 0) || *radius_mm * kMillimetre > kLongest_m) {
+      return blame(node, "radius_mm is a length above zero");
+    }
+    shape_.palm.push_back(
+        {point(*table->get("from_mm")), point(*table->get("to_mm")), *radius_mm * kMillimetre});
+  }
+
+  // Three numbers of at most `most` in size; zeros after a mistake.
+  Eigen::Vector3d numbers(const toml::node& node, double most) {
+    const toml::array* const array = node.as_array();
+    Eigen::Vector3d read = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto value =
+          array != nullptr && array->size() == 3 ? array->get(i)->value<double>() : std::nullopt;
+      if (!value || !(std::abs(*value) <= most)) {
+        blame(node, "three numbers are wanted here, of a size that fits a hand");
+        return Eigen::Vector3d::Zero();
+      }
+      read[static_cast<int>(i)] = *value;
+    }
+    return read;
+  }
+
+  Eigen::Vector3d point(const toml::node& node) {
+    return numbers(node, kLongest_m / kMillimetre) * kMillimetre;
+  }
+
+  Eigen::Vector3d lengths(const toml::node& node) {
+    const Eigen::Vector3d read = point(node);
+    if (!(read.minCoeff() > 0)) blame(node, "lengths are above zero");
+    return read;
+  }
+
+  const std::string& file_;
+  HandShape shape_;
+  std::array<bool, kFingers> seen_{};
+  std::optional<Error> error_;
+};
+
+}  // namespace
+
+Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file) {
+  try {
+    return HandReader(file).read(toml::parse(text, file));
+  } catch (const toml::parse_error& error) {
+    return fail(std::string(error.description()), file,
+                static_cast<int>(error.source().begin.line));
+  }
+}
+
+std::span<const HandShape> hand_shapes() {
+  static const std::vector<HandShape> all = [] {
+    std::vector<HandShape> read;
+    for (const ProfileText& text : hand_texts()) {
+      auto shape = parse_hand_shape(text.toml, std::string(text.file));
+      if (!shape) {  // our own bug: the program was built with it
+        std::fprintf(stderr, "posed: %s\n", shape.error().text().c_str());
+        std::abort();
+      }
+      read.push_back(std::move(*shape));
+    }
+    return read;
+  }();
+  return all;
+}
+
+Result<const HandShape*> find_hand_shape(const std::string& name) {
+  std::string known;
+  for (const HandShape& shape : hand_shapes()) {
+    if (shape.name == name) return &shape;
+    known += (known.empty() ? "" : ", ") + shape.name;
+  }
+  return misuse("there is no hand '" + name + "'; there are " + known);
+}
+
+const HandShape& default_hand_shape() {
+  static const HandShape& shape = **find_hand_shape(std::string(kDefaultHandShape));
+  return shape;
+}
+
+}  // namespace posed

@@ -1,0 +1,57 @@
+// HandShape: how long and thick a hand's bones are and how far its joints turn. Read from
+// config/hands/*.toml, which is built into the binary. Always the right hand, palm down, fingers
+// along +Z, thumb at +X, in the wrist's frame; hand_skeleton() and models/hand mirror it for a left
+// one. Cold.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "proto/frame/hand.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed {
+
+struct AngleRange {
+  double min_rad = 0.0;
+  double max_rad = 0.0;
+};
+
+struct FingerShape {
+  Eigen::Vector3d base_m = Eigen::Vector3d::Zero();  // its first joint
+  // How the straight finger lies: its bones point along frame * Z and its channels turn in `frame`.
+  // Identity but for the thumb.
+  Eigen::Quaterniond frame = Eigen::Quaterniond::Identity();
+  std::array<double, kFingerJoints> length_m{};
+  std::array<double, kFingerJoints> radius_m{};                  // of the capsule around each bone
+  std::array<std::array<AngleRange, 3>, kFingerJoints> range{};  // [joint][x, y, z]
+};
+
+struct PalmCapsule {
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+};
+
+struct HandShape {
+  std::string name;
+  std::array<FingerShape, kFingers> fingers;
+  std::vector<PalmCapsule> palm;
+};
+
+// `text` is TOML; `file` stands in the errors, which name the line.
+[[nodiscard]] Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file);
+
+// All that are built in, and the one called `name`; an unknown name is an error that lists them.
+[[nodiscard]] std::span<const HandShape> hand_shapes();
+[[nodiscard]] Result<const HandShape*> find_hand_shape(const std::string& name);
+
+inline constexpr std::string_view kDefaultHandShape = "adult";
+[[nodiscard]] const HandShape& default_hand_shape();
+
+}  // namespace posed

@@ -1,0 +1,60 @@
+// The skeleton of a hand that stands alone: a wrist for root and fifteen finger joints, named as
+// the canonical bones they are. Zero angles are a flat hand, palm down, fingers along +Z.
+//
+// Joints: the wrist (no channels, at the origin), then finger by finger, thumb to little, from the
+// palm outwards. Channels of a joint: z, x, y, because R = Rz(twist) Rx(flexion) Ry(spread). A
+// Frame's angle_rad holds hand45 angles with hand45's signs. What mirrors them is the joint's
+// channel_frame: a left hand is the mirror image of the right, and ring and little turn (spread
+// and twist) as a mirror image of the index does, so that spread is positive away from the middle.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "proto/frame/frame.hpp"
+#include "proto/frame/hand.hpp"
+#include "proto/frame/hand_shape.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed {
+
+inline constexpr int kHandSkeletonJoints = 1 + kHandJoints;
+
+// Index of a finger's joint (0 to 2, from the palm outwards) in the skeleton. RT-safe.
+[[nodiscard]] constexpr int hand_joint(int finger, int joint) noexcept {
+  return 1 + finger * kFingerJoints + joint;
+}
+
+// [channel of the skeleton] = index in HandAngles, and back.
+inline constexpr std::array<std::size_t, kHandChannels> kAngleOfChannel = [] {
+  constexpr std::array<std::size_t, 3> kOrder{2, 0, 1};  // z, x, y
+  std::array<std::size_t, kHandChannels> table{};
+  for (std::size_t c = 0; c < table.size(); ++c) table[c] = c / 3 * 3 + kOrder[c % 3];
+  return table;
+}();
+inline constexpr std::array<std::size_t, kHandChannels> kChannelOfAngle = [] {
+  std::array<std::size_t, kHandChannels> table{};
+  for (std::size_t c = 0; c < table.size(); ++c) table[kAngleOfChannel[c]] = c;
+  return table;
+}();
+
+// "hand45 right adult"; finished, with bones, T frames and the shape's limits. Cold.
+[[nodiscard]] Skeleton hand_skeleton(Side side, const HandShape& shape = default_hand_shape());
+
+// The frame in which a finger's channels turn, and the joints' offsets, mirrored for a left hand.
+[[nodiscard]] Eigen::Quaterniond channel_frame(Side side, const HandShape& shape, int finger);
+[[nodiscard]] Eigen::Vector3d mirrored(Side side, const Eigen::Vector3d& right_m) noexcept;
+
+// Which hand a skeleton is, when it is one of hand_skeleton()'s make (of any shape).
+[[nodiscard]] std::optional<Side> hand_side(const Skeleton& skeleton);
+
+// The angles that a frame of a hand skeleton carries; not finite where its source lacked one.
+// RT-safe.
+[[nodiscard]] HandAngles hand_angles(const Frame& frame) noexcept;
+
+// Poses the frame of a hand skeleton: rotations, validity and angle_rad. A joint with an angle that
+// is not finite is not valid. Leaves header, label, quality and stamps alone. RT-safe.
+void set_hand_angles(const Skeleton& skeleton, const HandAngles& angles, Frame& frame) noexcept;
+
+}  // namespace posed
