@@ -22,13 +22,13 @@ int walk(const Tree<Gaussian>& tree, const Context& context, const ClassOf& clas
   return tree.nodes[node].leaf;
 }
 
+}  // namespace
+
 int majority_class(const Label& label) noexcept {
   std::array<int, kClasses> votes{};
   for (const int finger_class : label.finger_class) ++votes[finger_class];
   return static_cast<int>(std::max_element(votes.begin(), votes.end()) - votes.begin());
 }
-
-}  // namespace
 
 int GestureModel::label_index(std::string_view name) const noexcept {
   const auto found = std::find_if(labels.begin(), labels.end(),

@@ -61,6 +61,9 @@ struct Label {
   bool trained = false;                      // it was in the recordings
 };
 
+// The class that most fingers of the label have, the lowest where they tie. RT-safe.
+[[nodiscard]] int majority_class(const Label& label) noexcept;
+
 struct GestureModel {
   double rate_hz = 30.0;
   std::vector<Label> labels;

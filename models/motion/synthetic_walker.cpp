@@ -3,9 +3,10 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <utility>
 #include <vector>
+
+#include "models/random.hpp"
 
 namespace posed::motion {
 namespace {
@@ -111,19 +112,15 @@ struct Person {
 };
 
 Person make_person(std::uint32_t seed) {
-  std::mt19937 random(seed * 2654435761U + 17U);
-  // Uniform from the raw bits: std distributions may differ between libraries, the demo must not.
-  const auto uniform = [&random](double low, double high) {
-    return low + (high - low) * (static_cast<double>(random()) / 4294967295.0);
-  };
+  PortableRandom random(seed * 2654435761U + 17U);
   Person person;
-  person.vigour = uniform(0.92, 1.08);
-  person.cadence_hz = uniform(0.85, 1.05);
-  person.scale = uniform(0.94, 1.06);
-  person.phase = uniform(0.0, 2.0 * std::numbers::pi);
+  person.vigour = random.uniform(0.92, 1.08);
+  person.cadence_hz = random.uniform(0.85, 1.05);
+  person.scale = random.uniform(0.94, 1.06);
+  person.phase = random.uniform(0.0, 2.0 * std::numbers::pi);
   person.carriage_deg.resize(kJoints.size());
   for (auto& joint : person.carriage_deg) {
-    for (double& axis : joint) axis = uniform(-2.0, 2.0);
+    for (double& axis : joint) axis = random.uniform(-2.0, 2.0);
   }
   return person;
 }
@@ -153,13 +150,6 @@ Result<Skeleton> make_skeleton(double scale) {
   return skeleton;
 }
 
-// Box-Muller on raw bits, for the same reason as in make_person.
-double normal(std::mt19937& random) {
-  const double u = (static_cast<double>(random()) + 1.0) / 4294967297.0;
-  const double v = static_cast<double>(random()) / 4294967296.0;
-  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * std::numbers::pi * v);
-}
-
 }  // namespace
 
 Result<clip::Clip> make_walker(const WalkerOptions& options) {
@@ -173,7 +163,7 @@ Result<clip::Clip> make_walker(const WalkerOptions& options) {
   walk.frame_rate_hz = options.rate_hz;
   const auto frames = static_cast<Eigen::Index>(std::lround(options.seconds * options.rate_hz));
   walk.channels.resize(frames, static_cast<Eigen::Index>(walk.skeleton->channels.size()));
-  std::mt19937 random(options.person * 977U + static_cast<std::uint32_t>(options.family) + 5U);
+  PortableRandom random(options.person * 977U + static_cast<std::uint32_t>(options.family) + 5U);
   const double speed_m_s = 1.35 * person.scale * person.vigour;
   for (Eigen::Index t = 0; t < frames; ++t) {
     const double time_s = static_cast<double>(t) / options.rate_hz;
@@ -190,7 +180,7 @@ Result<clip::Clip> make_walker(const WalkerOptions& options) {
       } else {
         const double turn = person.vigour * waves[channel.joint][axis].at(theta) +
                             person.carriage_deg[channel.joint][axis];
-        value = kRadiansPerDegree * (turn + options.noise_deg * normal(random));
+        value = kRadiansPerDegree * (turn + options.noise_deg * random.normal());
       }
     }
   }

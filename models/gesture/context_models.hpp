@@ -1,0 +1,36 @@
+// From labelled recordings to the statistics of every context (a gesture among its neighbours): a
+// model a label first, from it a model a context, at last rounds over whole recordings in which the
+// labels' borders may move (algorithms.md 3.2). Cold.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "models/gesture/estimate.hpp"
+#include "models/gesture/gesture_model.hpp"
+#include "models/gesture/recording.hpp"
+
+namespace posed::gesture {
+
+struct ContextOptions {
+  int segmental_rounds, rounds, embedded_rounds;
+  double embedded_slack_s;
+  std::function<bool(double fraction)> progress;  // false stops
+};
+
+struct ContextModels {
+  std::vector<Context> contexts;  // in the order of their indices
+  std::vector<Statistics> sums;   // [context] features [window][channel]
+  Eigen::VectorXd floor;          // least variance [feature]
+  std::vector<bool> moves;        // [channel] it is not constant
+  double log_likelihood = 0.0;    // of the last round, all contexts together
+};
+
+// Every segment's label is one of `labels`, every recording has segments; the neighbours of a
+// recording's first and last gesture are that gesture itself. Error: the progress callback said
+// stop, or nothing moves.
+[[nodiscard]] Result<ContextModels> train_contexts(const std::vector<Recording>& recordings,
+                                                   const std::vector<Label>& labels,
+                                                   const ContextOptions& options);
+
+}  // namespace posed::gesture

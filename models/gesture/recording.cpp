@@ -1,0 +1,111 @@
+#include "models/gesture/recording.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/gesture/gesture_model.hpp"
+
+namespace posed::gesture {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kEven = 0.25;        // of a frame: how far times may stray and still be the grid
+constexpr double kMaxFrames = 1e7;    // 90 hours at 30 Hz
+constexpr double kMaxAngle_rad = 20;  // three turns: no finger, surely degrees
+
+Result<> check_values(const Take& take) {
+  if (take.angles_rad.rows() < kStates) {
+    return fail("the recording has " + std::to_string(take.angles_rad.rows()) +
+                    " frames; a gesture alone needs " + std::to_string(kStates),
+                take.file);
+  }
+  for (Index t = 0; t < take.angles_rad.rows(); ++t) {
+    const std::string frame = "frame " + std::to_string(t + 1);
+    if (!take.angles_rad.row(t).allFinite()) {
+      return fail(frame + " lacks a value; fill gaps with `posed smooth` before training",
+                  take.file);
+    }
+    if (take.angles_rad.row(t).cwiseAbs().maxCoeff() > kMaxAngle_rad) {
+      return fail(frame + " has an angle beyond three turns; angles are in radians", take.file);
+    }
+    if (t > 0 && !(take.time_s[t] > take.time_s[t - 1])) {
+      return fail("the time of " + frame + " is not after the one before", take.file);
+    }
+  }
+  return {};
+}
+
+// Whether the frames already stand on the grid of `rate_hz`.
+bool is_even(const Take& take, double rate_hz) {
+  for (std::size_t t = 0; t < take.time_s.size(); ++t) {
+    const double on_grid = (take.time_s[t] - take.time_s[0]) * rate_hz;
+    if (std::abs(on_grid - static_cast<double>(t)) > kEven) return false;
+  }
+  return true;
+}
+
+FeatureMatrix interpolate(const Take& take, double rate_hz, Index frames) {
+  FeatureMatrix out(frames, take.angles_rad.cols());
+  std::size_t after = 1;
+  for (Index t = 0; t < frames; ++t) {
+    const double time_s = take.time_s[0] + static_cast<double>(t) / rate_hz;
+    while (after + 1 < take.time_s.size() && take.time_s[after] < time_s) ++after;
+    const double span_s = take.time_s[after] - take.time_s[after - 1];
+    const double share = std::clamp((time_s - take.time_s[after - 1]) / span_s, 0.0, 1.0);
+    out.row(t) = (1.0 - share) * take.angles_rad.row(static_cast<Index>(after) - 1) +
+                 share * take.angles_rad.row(static_cast<Index>(after));
+  }
+  return out;
+}
+
+}  // namespace
+
+double duration_s(const Take& take) {
+  if (take.time_s.size() < 2) return 0.0;
+  const double span_s = take.time_s.back() - take.time_s.front();
+  const auto steps = static_cast<double>(take.time_s.size() - 1);
+  return span_s * (steps + 1.0) / steps;  // the last frame lasts as long as the mean one
+}
+
+Result<Recording> recording_of(const Take& take, double rate_hz) {
+  if (auto sound = check_values(take); !sound) return std::unexpected(sound.error());
+  Recording recording{.file = take.file, .rate_hz = rate_hz, .angles_rad = {}, .segments = {}};
+  if (is_even(take, rate_hz)) {
+    recording.angles_rad = take.angles_rad;
+    return recording;
+  }
+  const double frames = std::floor(duration_s(take) * rate_hz + 0.5);
+  if (frames < kStates || frames > kMaxFrames) {
+    return fail("the recording lasts " + std::to_string(duration_s(take)) + " s, which at " +
+                    std::to_string(rate_hz) + " Hz is no number of frames to learn from",
+                take.file);
+  }
+  recording.angles_rad = interpolate(take, rate_hz, static_cast<Index>(frames));
+  return recording;
+}
+
+Result<> cut(Recording& recording, const std::vector<clip::LabelSegment>& labels,
+             const std::string& file) {
+  const auto frames = static_cast<int>(recording.angles_rad.rows());
+  for (const clip::LabelSegment& label : labels) {
+    const double begin = std::round(label.start_s * recording.rate_hz);
+    const double end = std::round(label.end_s * recording.rate_hz);
+    if (!(end <= frames + 1)) {  // one frame: whether the last one lasts is a matter of taste
+      return fail("the segment ends at " + std::to_string(label.end_s) + " s, after the end of " +
+                      recording.file,
+                  file, label.line);
+    }
+    Segment segment{static_cast<int>(begin), std::min(static_cast<int>(end), frames), label.name};
+    if (segment.frames() < kStates) {
+      return fail("the segment has " + std::to_string(segment.frames()) + " frames at " +
+                      std::to_string(recording.rate_hz) + " Hz; a gesture needs at least " +
+                      std::to_string(kStates),
+                  file, label.line);
+    }
+    recording.segments.push_back(std::move(segment));
+  }
+  return {};
+}
+
+}  // namespace posed::gesture

@@ -1,0 +1,47 @@
+// A labelled hand recording as training sees it: angles at one even rate, segments in frames. Cold.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "models/gesture/features.hpp"
+#include "proto/clip/lab.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::gesture {
+
+struct Segment {
+  int begin = 0, end = 0;  // frames [begin, end)
+  std::string label;
+
+  [[nodiscard]] int frames() const { return end - begin; }
+};
+
+struct Recording {
+  std::string file;  // for errors
+  double rate_hz = 0.0;
+  FeatureMatrix angles_rad;  // [frame][finger][joint][x, y, z]
+  std::vector<Segment> segments;
+};
+
+// Angles with the times of their frames, as a file holds them.
+struct Take {
+  std::string file;
+  std::vector<double> time_s;  // rising
+  FeatureMatrix angles_rad;    // one row a time
+};
+
+// From the first frame to the end of the last [s].
+[[nodiscard]] double duration_s(const Take& take);
+
+// At `rate_hz`, by linear interpolation where the take's own times are not already that. Refuses a
+// take that has fewer frames than a gesture has states, lacks a value (fill gaps with `posed
+// smooth`) or has times that do not rise.
+[[nodiscard]] Result<Recording> recording_of(const Take& take, double rate_hz);
+
+// Cuts the recording at the labels; `file` is the label file's name for errors. Refuses a segment
+// past the end, and one shorter than a gesture has states.
+[[nodiscard]] Result<> cut(Recording& recording, const std::vector<clip::LabelSegment>& labels,
+                           const std::string& file);
+
+}  // namespace posed::gesture

@@ -1,0 +1,129 @@
+#include "models/gesture/train_report.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+namespace posed::gesture {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kFewGestures = 20;  // hand-science.md section 1: below, unseen labels go astray
+constexpr int kFewExamples = 2;
+
+using Counts = std::array<std::array<int, kFingers>, kStates>;
+
+int total(const Counts& counts) {
+  int sum = 0;
+  for (const auto& state : counts) {
+    for (const int count : state) sum += count;
+  }
+  return sum;
+}
+
+json by_state(const Counts& counts) {
+  json states = json::array();
+  for (int state = 0; state < kStates; ++state) {
+    json row{{"state", state + 1}};
+    for (int f = 0; f < kFingers; ++f) row[std::string(kFingerNames[f])] = counts[state][f];
+    states.push_back(std::move(row));
+  }
+  return states;
+}
+
+std::string classes_text(const Label& label) {
+  std::string text;
+  for (const int finger_class : label.finger_class) text += static_cast<char>('A' + finger_class);
+  return text;
+}
+
+}  // namespace
+
+TrainReport::TrainReport(const std::vector<Recording>& recordings, const ContextModels& contexts,
+                         const std::vector<Label>& labels)
+    : recordings_(recordings), contexts_(contexts), labels_(labels) {}
+
+void TrainReport::add_tree(int state, int finger, const GrownTree& tree) {
+  leaves_[state][finger] = static_cast<int>(tree.members.size());
+  for (const auto& members : tree.members) {
+    std::set<int> classes;
+    for (const int row : members) {
+      classes.insert(labels_[contexts_.contexts[row].current].finger_class[finger]);
+    }
+    mixed_[state][finger] += classes.size() > 1 ? 1 : 0;
+  }
+}
+
+int TrainReport::gestures_of(const std::string& label) const {
+  int count = 0;
+  for (const Recording& recording : recordings_) {
+    count += static_cast<int>(std::ranges::count(recording.segments, label, &Segment::label));
+  }
+  return count;
+}
+
+std::vector<std::string> TrainReport::warnings() const {
+  std::vector<std::string> warnings;
+  std::size_t gestures = 0;
+  for (const Recording& recording : recordings_) gestures += recording.segments.size();
+  if (gestures < kFewGestures) {
+    warnings.push_back("only " + std::to_string(gestures) +
+                       " gestures; below 20 labels that were not recorded go astray, record more");
+  }
+  for (const Label& label : labels_) {
+    if (label.trained && gestures_of(label.name) < kFewExamples) {
+      warnings.push_back("label '" + label.name +
+                         "' was recorded once only; how it varies is a guess");
+    }
+  }
+  if (const int mixed = total(mixed_); mixed > 0) {
+    std::string fingers;
+    for (int f = 0; f < kFingers; ++f) {
+      int states = 0;
+      for (int state = 0; state < kStates; ++state) states += mixed_[state][f] > 0 ? 1 : 0;
+      if (states == 0) continue;
+      fingers += (fingers.empty() ? "" : ", ") + std::string(kFingerNames[f]) + " in " +
+                 std::to_string(states) + (states == 1 ? " state" : " states");
+    }
+    warnings.push_back(std::to_string(mixed) + " of " + std::to_string(total(leaves_)) +
+                       " leaves mix gestures whose finger is of different classes (" + fingers +
+                       "): fine where that finger does the same in them");
+  }
+  return warnings;
+}
+
+std::string TrainReport::json_of(const GestureModel& model) const {
+  json report{{"rate_hz", model.rate_hz}, {"recordings", json::array()}};
+  int frames = 0;
+  int gestures = 0;
+  for (const Recording& recording : recordings_) {
+    const auto count = static_cast<int>(recording.segments.size());
+    report["recordings"].push_back({{"file", std::filesystem::path(recording.file).filename()},
+                                    {"frames", recording.angles_rad.rows()},
+                                    {"gestures", count}});
+    frames += static_cast<int>(recording.angles_rad.rows());
+    gestures += count;
+  }
+  report["frames"] = frames;
+  report["gestures"] = gestures;
+  report["contexts"] = contexts_.contexts.size();
+  report["moving_channels"] = std::ranges::count(contexts_.moves, true);
+  report["labels"] = json::array();
+  for (const Label& label : labels_) {
+    report["labels"].push_back({{"name", label.name},
+                                {"classes", classes_text(label)},
+                                {"gestures", gestures_of(label.name)}});
+  }
+  report["leaves"] = total(leaves_);
+  report["leaves_by_state"] = by_state(leaves_);
+  report["mixed_leaves"] = total(mixed_);
+  report["duration_leaves"] = model.durations.leaves.size();
+  report["log_likelihood_per_frame"] = contexts_.log_likelihood / frames;
+  report["warnings"] = warnings();
+  return report.dump();
+}
+
+}  // namespace posed::gesture

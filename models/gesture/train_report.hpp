@@ -1,0 +1,37 @@
+// What a training tells people: what it learnt from, how large the trees became, what to beware of.
+// Cold.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "models/gesture/context_models.hpp"
+#include "models/gesture/gesture_model.hpp"
+#include "models/gesture/grow_tree.hpp"
+
+namespace posed::gesture {
+
+class TrainReport {
+ public:
+  // The arguments outlive the report.
+  TrainReport(const std::vector<Recording>& recordings, const ContextModels& contexts,
+              const std::vector<Label>& labels);
+
+  void add_tree(int state, int finger, const GrownTree& tree);
+
+  // One JSON object; the same training gives the same text.
+  [[nodiscard]] std::string json_of(const GestureModel& model) const;
+
+ private:
+  [[nodiscard]] std::vector<std::string> warnings() const;
+  [[nodiscard]] int gestures_of(const std::string& label) const;
+
+  const std::vector<Recording>& recordings_;
+  const ContextModels& contexts_;
+  const std::vector<Label>& labels_;
+  std::array<std::array<int, kFingers>, kStates> leaves_{};
+  std::array<std::array<int, kFingers>, kStates> mixed_{};  // leaves of different current classes
+};
+
+}  // namespace posed::gesture

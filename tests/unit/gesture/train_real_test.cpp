@@ -1,0 +1,107 @@
+// Training on a recording strung together from real CyberGlove poses: gestures that were not
+// recorded come out as the best composition of recorded fingers.
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <iostream>
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "models/gesture/train.hpp"
+#include "tests/support/real_pose_corpus.hpp"
+#include "tests/support/shared.hpp"
+
+using namespace posed;
+using namespace posed::gesture;
+
+namespace {
+
+constexpr const char* kLibras = "data/gloves/libras_cyberglove";
+
+// Flexion angles of the fingers without the thumb.
+std::vector<int> judged() {
+  std::vector<int> channels;
+  for (int finger = 1; finger < kFingers; ++finger) {
+    for (int joint = 0; joint < kFingerJoints; ++joint) {
+      channels.push_back(finger * kFingerChannels + 3 * joint);
+    }
+  }
+  return channels;
+}
+
+double rms_deg(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  const auto difference = (a - b)(judged());
+  return std::sqrt(difference.squaredNorm() / 12.0) * 180.0 / std::numbers::pi;
+}
+
+// What the model holds for a label of a string: mean of states 3 and 4.
+Eigen::VectorXd held(const GestureModel& model, const Context& context) {
+  Eigen::VectorXd pose = Eigen::VectorXd::Zero(kHandChannels);
+  for (const int state : {2, 3}) {
+    for (int f = 0; f < kFingers; ++f) {
+      for (int c = 0; c < kFingerChannels; ++c) {
+        pose[f * kFingerChannels + c] += 0.5 * leaf(model, state, f, context).mean[0][c];
+      }
+    }
+  }
+  return pose;
+}
+
+}  // namespace
+
+TEST_CASE("Gestures that nobody recorded are composed of recorded fingers", "[train][real]") {
+  const auto folder = test::shared(kLibras);
+  if (!folder) SKIP_WITHOUT_SHARED();
+  const auto recording = test::real_pose_corpus(*folder, 7);
+  const auto model = train_gesture({recording}, {});
+  REQUIRE(model.has_value());
+  const auto report = nlohmann::json::parse(model->report_json);
+  std::cout << "real-pose corpus: " << report["frames"] << " frames, " << report["contexts"]
+            << " contexts, " << report["leaves"] << " leaves, " << report["duration_leaves"]
+            << " of durations; " << report["warnings"] << "\n";
+  CHECK(report["leaves"] > 80);
+  CHECK(report["leaves"] < 250);
+
+  // g 1 c 3 4 p against the real frames of the signs, by the yardsticks of the figure.
+  const auto at = [&](const char* label) { return model->label_index(label); };
+  struct Unseen {
+    const char *label, *before, *after;
+    double yardstick_deg;
+  };
+  for (const Unseen& unseen :
+       {Unseen{"1", "g", "c", 12.4}, {"3", "c", "4", 19.8}, {"4", "3", "p", 13.6}}) {
+    const Context context{at(unseen.before), at(unseen.label), at(unseen.after)};
+    const Eigen::VectorXd real =
+        test::libras_poses(*folder, test::kSignOf.at(unseen.label)).colwise().mean();
+    const double off_deg = rms_deg(held(*model, context), real);
+    std::cout << unseen.label << ": " << off_deg << " deg from the real hand, yardstick "
+              << unseen.yardstick_deg << "\n";
+    CHECK(off_deg <= 1.25 * unseen.yardstick_deg);
+  }
+  CHECK(train_gesture({recording}, {})->report_json == model->report_json);
+}
+
+TEST_CASE("Embedded rounds mend borders that are off", "[train][real]") {
+  const auto folder = test::shared(kLibras);
+  if (!folder) SKIP_WITHOUT_SHARED();
+  auto recording = test::real_pose_corpus(*folder, 7, 40);
+  const auto right = train_gesture({recording}, {});
+  // Every second border 8 frames late.
+  for (std::size_t i = 0; i + 1 < recording.segments.size(); i += 2) {
+    recording.segments[i].end = recording.segments[i + 1].begin += 8;
+  }
+  const auto off = train_gesture({recording}, {});
+  TrainOptions options;
+  options.embedded_rounds = 3;
+  const auto mended = train_gesture({recording}, options);
+  REQUIRE(right.has_value());
+  REQUIRE(off.has_value());
+  REQUIRE(mended.has_value());
+  const auto fit = [](const GestureModel& model) {
+    return nlohmann::json::parse(model.report_json)["log_likelihood_per_frame"].get<double>();
+  };
+  std::cout << "log likelihood a frame: borders right " << fit(*right) << ", off " << fit(*off)
+            << ", mended " << fit(*mended) << "\n";
+  CHECK(fit(*mended) > fit(*off));
+}
