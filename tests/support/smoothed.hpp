@@ -66,11 +66,4 @@ inline Motion smoothed(const Motion& measured, double rate_hz,
   return result;
 }
 
-// Root of the mean square over frames and channels, start and end left out as in the study.
-inline double rms(const Motion& estimate, const Motion& truth) {
-  const Eigen::Index frames = truth.rows() - 48;
-  return std::sqrt(
-      (estimate.middleRows(40, frames) - truth.middleRows(40, frames)).array().square().mean());
-}
-
 }  // namespace posed::test
