@@ -1,0 +1,28 @@
+// A tree with the words that its drawings share; private to models/gesture. Cold.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "models/gesture/gesture_model.hpp"
+#include "models/gesture/tree_drawing.hpp"
+
+namespace posed::gesture {
+
+struct DrawnNode {
+  std::string words;      // the question, or the leaf's number and frames
+  std::string reach;      // the contexts that get here: {g,1}-c-*
+  int yes = -1, no = -1;  // -1: a leaf
+  int depth = 0;
+};
+
+struct DrawnTree {
+  std::string title;
+  std::vector<DrawnNode> nodes;  // as in the model: node 0 is the root
+};
+
+// Finger by finger, each with its states.
+[[nodiscard]] std::vector<DrawnTree> draw_trees(const GestureModel& model,
+                                                const TreeChoice& choice);
+
+}  // namespace posed::gesture

@@ -1,0 +1,24 @@
+// The decision trees for people: as text, as Graphviz source and as an SVG picture (the paper's
+// figure 3). Each node shows its question and the contexts that reach it, written as in the paper:
+// {g,1}-c-* is c after g or 1, before anything. Cold.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "models/gesture/gesture_model.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::gesture {
+
+struct TreeChoice {
+  int state = -1, finger = -1;  // from 0; -1: all of them
+};
+// "all", "middle" (all its states), "4" (state 4 of all fingers) or "middle:4". A misuse otherwise.
+[[nodiscard]] Result<TreeChoice> tree_choice(std::string_view text);
+
+[[nodiscard]] std::string trees_text(const GestureModel& model, const TreeChoice& choice);
+[[nodiscard]] std::string trees_dot(const GestureModel& model, const TreeChoice& choice);
+[[nodiscard]] std::string trees_svg(const GestureModel& model, const TreeChoice& choice);
+
+}  // namespace posed::gesture
