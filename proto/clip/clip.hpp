@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "proto/frame/hand_shape.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -20,7 +21,9 @@ struct Clip {
   std::string path;
   std::shared_ptr<const Skeleton> skeleton;
   double frame_rate_hz = 0.0;
-  ChannelMatrix channels;             // [frames x Skeleton::channels], rad and m
+  ChannelMatrix channels;             // [frames x Skeleton::channels], rad and m; a hand CSV's
+                                      // missing value is NaN
+  std::vector<double> time_s;         // [frame], increasing; empty: even, from 0 (hand CSV)
   std::vector<std::string> warnings;  // one sentence each: read leniently, and how
   double metres_per_unit = 0.01;      // of the file, kept for writing the same file back
 
@@ -33,10 +36,13 @@ struct ReadOptions {
   double amc_rate_hz = 120.0;   // an AMC carries no rate
   // Of a BVH; empty: the profile's, else found from the figure's height.
   std::optional<double> metres_per_unit{};
-  std::string profile{};  // named skeleton profile; empty: found by joint names
+  std::string profile{};       // named skeleton profile; empty: found by joint names
+  std::optional<Side> hand{};  // whose a hand CSV is (default right), which hand of a body to take
+  std::string hand_shape{kDefaultHandShape};  // of a hand CSV
+  double hand_rate_hz = 30.0;                 // of a hand CSV without times
 };
 
-// By extension: .bvh or .amc. Errors name file and line.
+// By extension: .bvh, .amc or .csv (a hand). Errors name file and line.
 [[nodiscard]] Result<Clip> read_clip(const std::filesystem::path& path,
                                      const ReadOptions& options = {});
 
