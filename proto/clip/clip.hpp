@@ -23,7 +23,7 @@ struct Clip {
   double frame_rate_hz = 0.0;
   ChannelMatrix channels;             // [frames x Skeleton::channels], rad and m; a hand CSV's
                                       // missing value is NaN
-  std::vector<double> time_s;         // [frame], increasing; empty: even, from 0 (hand CSV)
+  std::vector<double> time_s{};       // [frame], increasing; empty: even, from 0 (hand CSV)
   std::vector<std::string> warnings;  // one sentence each: read leniently, and how
   double metres_per_unit = 0.01;      // of the file, kept for writing the same file back
 
