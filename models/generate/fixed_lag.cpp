@@ -55,7 +55,7 @@ void FixedLag::estimate(int back, double* x, double* variance) noexcept {
   kernel::substitute(factors_.data(), held, first, stride(), x_.get());
   std::copy_n(x_.get(), stride(), x);
   if (variance != nullptr) {
-    kernel::variance(factors_.data(), held, first, stride(), variance);
+    kernel::variance(factors_.data(), held, first, stride(), variance, 0);
   }
 }
 

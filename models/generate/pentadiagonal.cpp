@@ -212,13 +212,14 @@ void substitute(const double* const* factors, int frames, int first, int stride,
   }
 }
 
-void variance(const double* const* factors, int frames, int frame, int stride, double* out) {
+void variance(const double* const* factors, int frames, int first, int stride, double* out,
+              int step) {
   const std::ptrdiff_t wide_stride = stride;
   for (int column = 0; column < stride; column += kWide) {
     Vec s11 = hn::Zero(Doubles());  // of frame i + 1, of i + 2, and between them
     Vec s22 = s11;
     Vec s12 = s11;
-    for (int i = frames - 1; i >= frame; --i) {
+    for (int i = frames - 1; i >= first; --i) {
       const double* factor = factors[i] + column;
       const Vec f1 = load(factor);
       const Vec f2 = load(factor + wide_stride);
@@ -229,8 +230,8 @@ void variance(const double* const* factors, int frames, int frame, int stride, d
       s22 = s11;
       s12 = s01;
       s11 = s00;
+      hn::Store(s11, Doubles(), out + static_cast<std::ptrdiff_t>(i - first) * step + column);
     }
-    hn::Store(s11, Doubles(), out + column);
   }
 }
 
@@ -254,9 +255,9 @@ void substitute(const double* const* factors, int frames, int first, int stride,
   HWY_DYNAMIC_DISPATCH(substitute)(factors, frames, first, stride, x);
 }
 // RT-safe.
-void variance(const double* const* factors, int frames, int frame, int stride,
-              double* out) noexcept {
-  HWY_DYNAMIC_DISPATCH(variance)(factors, frames, frame, stride, out);
+void variance(const double* const* factors, int frames, int first, int stride, double* out,
+              int step) noexcept {
+  HWY_DYNAMIC_DISPATCH(variance)(factors, frames, first, stride, out, step);
 }
 
 }  // namespace posed::generate::kernel

@@ -52,9 +52,11 @@ void eliminate(const System& system, double* const* factors) noexcept;
 void substitute(const double* const* factors, int frames, int first, int stride,
                 double* x) noexcept;
 
-// The posterior variance of frame `frame` given the evidence of all: out [stride].
-void variance(const double* const* factors, int frames, int frame, int stride,
-              double* out) noexcept;
+// The posterior variances, given the evidence of all, of the frames from the last back to `first`:
+// each is written `step` doubles before the one after it, so that `out` ends as that of `first`
+// (step 0: that one alone; step stride: rows like x).
+void variance(const double* const* factors, int frames, int first, int stride, double* out,
+              int step) noexcept;
 
 }  // namespace kernel
 }  // namespace posed::generate

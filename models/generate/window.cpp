@@ -26,7 +26,12 @@ void Window::solve(std::span<const double* const> evidence, Boundary boundary,
 
 // RT-safe.
 void Window::variance(int frame, double* out) const noexcept {
-  kernel::variance(factors_.data(), frames_, frame, stride_, out);
+  kernel::variance(factors_.data(), frames_, frame, stride_, out, 0);
+}
+
+// RT-safe.
+void Window::variances(double* out) const noexcept {
+  kernel::variance(factors_.data(), frames_, 0, stride_, out, stride_);
 }
 
 }  // namespace posed::generate

@@ -27,6 +27,7 @@ class Window {
     return x_.get() + static_cast<std::ptrdiff_t>(frame) * stride_;
   }
   void variance(int frame, double* out) const noexcept;  // out: [stride()], 64-byte aligned
+  void variances(double* out) const noexcept;            // out: [frames][stride()]
 
   [[nodiscard]] int channels() const noexcept { return channels_; }
   [[nodiscard]] int stride() const noexcept { return stride_; }
