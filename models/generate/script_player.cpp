@@ -83,19 +83,26 @@ void ScriptPlayer::start() noexcept {
 void ScriptPlayer::start(const HandAngles& before, const HandAngles& last) noexcept {
   start();
   if (!started_) return;
+  before_ = before;
+  last_ = last;
+  glide();
+}
+
+// The lead-in: from the last two poses into the cursor's state. RT-safe.
+void ScriptPlayer::glide() noexcept {
   double* lead = states_.row(0, kPosition);
   evidence_.fill(script_.context(cursor_.position), 0, lead);
   double farthest_rad = 0.0;
   for (int c = 0; c < kHandChannels; ++c) {
     const double goal = lead[kPositionMean * kStride + c] / lead[kPosition * kStride + c];
-    farthest_rad = std::max(farthest_rad, std::abs(goal - last[c]));
+    farthest_rad = std::max(farthest_rad, std::abs(goal - last_[c]));
   }
   const double lead_s = std::clamp(1.5 * farthest_rad / kLeadSpeed_rad_s, kMinLead_s, kMaxLead_s);
   lead_left_ = frames_in(lead_s, evidence_.rate_hz());
   std::fill_n(lead, kHandChannels, 0.0);  // of the first state only the curve's precision is left
   std::fill(lead + kPositionMean * kStride, lead + kCurve * kStride, 0.0);
   std::fill(lead + kCurveMean * kStride, lead + kRows * kStride, 0.0);
-  clamp_to(before, last, lead + kCurve * kStride, carry_.get());
+  clamp_to(before_, last_, lead + kCurve * kStride, carry_.get());
   carries_ = true;
 }
 
@@ -139,6 +146,10 @@ void ScriptPlayer::advance(int frames) noexcept {
 // RT-safe.
 bool ScriptPlayer::next(PlayedFrame& out) noexcept {
   if (!started_) return false;
+  if (cursor_.frames_left == 0 && script_.has_next(cursor_.position)) {  // a label ends the rest
+    step(cursor_, script_, evidence_, tempo_);
+    glide();
+  }
   Cursor shown = cursor_;
   const int frames = plan(shown);
   if (frames <= shown_) return false;
@@ -152,6 +163,8 @@ bool ScriptPlayer::next(PlayedFrame& out) noexcept {
   kernel::variance(factors_.data(), frames, shown_, kStride, variance_.get(), 0);
   std::copy_n(x_.get(), kHandChannels, out.angle.begin());
   std::copy_n(variance_.get(), kHandChannels, out.variance.begin());
+  before_ = last_;
+  last_ = out.angle;
   out.label = script_.context(shown.position).current;
   out.state = lead_left_ > shown_ || shown.frames_left == 0 ? -1 : shown.state;
   advance(frames);

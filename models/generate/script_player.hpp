@@ -19,7 +19,8 @@ namespace posed::generate {
 struct PlayerOptions {
   double look_ahead_s = 1.0;
   int capacity = 1024;  // labels that wait
-  // After the last label: rest in its last state until another is appended, or end.
+  // After the last label: rest in its last state until another is appended (and glide into that one
+  // as out of a live hand), or end.
   bool rest = false;
 };
 
@@ -54,6 +55,7 @@ class ScriptPlayer {
   [[nodiscard]] double tempo() const noexcept { return tempo_; }
 
  private:
+  void glide() noexcept;
   int plan(Cursor& shown) noexcept;
   void advance(int frames) noexcept;
 
@@ -66,7 +68,8 @@ class ScriptPlayer {
   Cursor cursor_;      // of the first frame that is not settled
   int lead_left_ = 0;  // frames of the lead-in before it
   int shown_ = 0;      // frames not settled that were given out: the last ones of a script
-  Evidence states_;    // slot 0: the lead-in's; one for each state ahead
+  HandAngles before_{}, last_{};  // the last two poses
+  Evidence states_;               // slot 0: the lead-in's; one for each state ahead
   std::vector<const double*> frames_;
   hwy::AlignedFreeUniquePtr<double[]> carry_, factor_rows_, x_, variance_;
   std::vector<double*> factors_;

@@ -3,23 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <span>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "models/generate/evidence.hpp"
-#include "tests/support/shared.hpp"
+#include "tests/support/golden_json.hpp"
 
 namespace posed::test {
 
 using Table = std::vector<std::vector<double>>;  // [frame][channel]
-
-inline nlohmann::json mlpg() {
-  std::ifstream file(golden("mlpg.json"));
-  return nlohmann::json::parse(file);
-}
 
 inline generate::Evidence evidence_of(const nlohmann::json& golden, bool with_observations) {
   const auto mean = golden["mean"].get<std::vector<Table>>();

@@ -29,7 +29,7 @@ double worst_of(const generate::Window& window, const nlohmann::json& expected) 
 }  // namespace
 
 TEST_CASE("a whole string is solved under all boundary rules", "[generate]") {
-  const auto golden = test::mlpg();
+  const auto golden = test::golden_json("mlpg.json");
   const auto evidence = test::evidence_of(golden, false);
   const auto frames = test::frames_of(evidence);
   generate::Window window(evidence.channels(), evidence.frames());
@@ -48,7 +48,7 @@ TEST_CASE("a whole string is solved under all boundary rules", "[generate]") {
 }
 
 TEST_CASE("observations with a dropout are evidence like any other", "[generate]") {
-  const auto golden = test::mlpg();
+  const auto golden = test::golden_json("mlpg.json");
   const auto evidence = test::evidence_of(golden, true);
   generate::Window window(evidence.channels(), evidence.frames());
   window.solve(test::frames_of(evidence));
@@ -79,7 +79,7 @@ TEST_CASE("strings of one and two frames are solved", "[generate]") {
 }
 
 TEST_CASE("the fixed-lag form gives what a solve of all frames so far would", "[generate]") {
-  const auto golden = test::mlpg();
+  const auto golden = test::golden_json("mlpg.json");
   for (const bool observed : {false, true}) {
     const auto evidence = test::evidence_of(golden, observed);
     const int last = evidence.frames() - 1;
@@ -106,7 +106,7 @@ TEST_CASE("the fixed-lag form gives what a solve of all frames so far would", "[
 }
 
 TEST_CASE("the fixed-lag variance is that of the frames so far", "[generate]") {
-  const auto golden = test::mlpg();
+  const auto golden = test::golden_json("mlpg.json");
   const auto evidence = test::evidence_of(golden, true);
   const auto frames = test::frames_of(evidence);
   generate::Window window(evidence.channels(), evidence.frames());
@@ -126,7 +126,7 @@ TEST_CASE("the fixed-lag variance is that of the frames so far", "[generate]") {
 }
 
 TEST_CASE("a solve takes nothing from the heap, and every width gives the same", "[generate]") {
-  const auto golden = test::mlpg();
+  const auto golden = test::golden_json("mlpg.json");
   const auto narrow = test::evidence_of(golden, true);
   generate::Evidence wide(66, narrow.frames());
   for (int t = 0; t < wide.frames(); ++t) {
