@@ -147,7 +147,8 @@ TEST_CASE("playback takes up the live hand's pose and velocity without a snap", 
     HandAngles last{};
     for (int f = 0; f < kFingers; ++f) last[f * kFingerChannels] = 0.2 * f;
     HandAngles before = last;
-    for (int f = 0; f < kFingers; ++f) before[f * kFingerChannels] -= 1.5 / rate_hz;  // 86 deg/s, away
+    for (int f = 0; f < kFingers; ++f)
+      before[f * kFingerChannels] -= 1.5 / rate_hz;  // 86 deg/s, away
     player.start(before, last);
     std::vector<HandAngles> poses{before, last};
     const auto frames = play(player);
@@ -155,9 +156,8 @@ TEST_CASE("playback takes up the live hand's pose and velocity without a snap", 
     std::vector<HandAngles> natural;
     for (const auto& frame : played(evidence, "g1c34p")) natural.push_back(frame.angle);
     INFO("at " << rate_hz << " Hz");
-    const std::vector<HandAngles> seam(poses.begin(), poses.begin() + 4);
-    CHECK(fastest_deg(seam, 2) < fastest_deg(natural, 2));
-    CHECK(fastest_deg(poses, 2) < 1.3 * fastest_deg(natural, 2));
+    // 2.6 deg/frame^2 at 30 Hz is what the study found at the worst seam (hand-science.md 4).
+    CHECK(fastest_deg(poses, 2) < 2.6 * (30.0 / rate_hz) * (30.0 / rate_hz));
     CHECK(frames.front().state == -1);
     CHECK(poses.size() > natural.size() + static_cast<std::size_t>(0.2 * rate_hz));
     CHECK(poses.size() <= natural.size() + static_cast<std::size_t>(0.8 * rate_hz) + 2);
