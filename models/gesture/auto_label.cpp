@@ -45,7 +45,11 @@ class Proposer {
     rest_ = sorted[count / 2];
   }
 
-  [[nodiscard]] std::size_t labels() const { return poses_.size(); }
+  [[nodiscard]] bool poses_differ() const {
+    return std::ranges::any_of(poses_, [&](const LabelPose& pose) {
+      return pose.angles_rad != poses_.front().angles_rad;
+    });
+  }
 
   std::vector<Segment> propose() {
     std::vector<Segment> segments = segments_of(best_labels());
@@ -207,8 +211,8 @@ class Proposer {
 
 Result<std::vector<Segment>> propose_segments(const Recording& recording) {
   Proposer proposer(recording);
-  if (proposer.labels() < 2) {
-    return fail("label at least one example each of two gestures; two of each are better",
+  if (!proposer.poses_differ()) {
+    return fail("label at least one example each of two different poses; two of each are better",
                 recording.file);
   }
   return proposer.propose();

@@ -13,7 +13,7 @@ namespace posed::gesture {
 
 // `recording.segments` are the examples, one or more of each label; they come back unchanged among
 // the proposals. Where in a move people put the border is learnt from the examples. Refuses
-// examples of fewer than two labels.
+// examples of fewer than two labels, and poses that are all alike.
 [[nodiscard]] Result<std::vector<Segment>> propose_segments(const Recording& recording);
 
 }  // namespace posed::gesture

@@ -14,74 +14,81 @@ constexpr double kEven = 0.25;        // of a frame: how far times may stray and
 constexpr double kMaxFrames = 1e7;    // 90 hours at 30 Hz
 constexpr double kMaxAngle_rad = 20;  // three turns: no finger, surely degrees
 
-Result<> check_values(const Take& take) {
-  if (take.angles_rad.rows() < kStates) {
-    return fail("the recording has " + std::to_string(take.angles_rad.rows()) +
+auto row_of(const clip::HandClip& clip, std::size_t frame) {
+  return Eigen::Map<const Eigen::RowVectorXd>(clip.angles[frame].data(), kHandChannels);
+}
+
+Result<> check_values(const clip::HandClip& clip) {
+  if (static_cast<int>(clip.angles.size()) < kStates) {
+    return fail("the recording has " + std::to_string(clip.angles.size()) +
                     " frames; a gesture alone needs " + std::to_string(kStates),
-                take.file);
+                clip.path);
   }
-  for (Index t = 0; t < take.angles_rad.rows(); ++t) {
+  for (std::size_t t = 0; t < clip.angles.size(); ++t) {
     const std::string frame = "frame " + std::to_string(t + 1);
-    if (!take.angles_rad.row(t).allFinite()) {
+    const auto angles = row_of(clip, t);
+    if (!angles.allFinite()) {
       return fail(frame + " lacks a value; fill gaps with `posed smooth` before training",
-                  take.file);
+                  clip.path);
     }
-    if (take.angles_rad.row(t).cwiseAbs().maxCoeff() > kMaxAngle_rad) {
-      return fail(frame + " has an angle beyond three turns; angles are in radians", take.file);
+    if (angles.cwiseAbs().maxCoeff() > kMaxAngle_rad) {
+      return fail(frame + " has an angle beyond three turns; angles are in radians", clip.path);
     }
-    if (t > 0 && !(take.time_s[t] > take.time_s[t - 1])) {
-      return fail("the time of " + frame + " is not after the one before", take.file);
+    if (t > 0 && !(clip.time_s[t] > clip.time_s[t - 1])) {
+      return fail("the time of " + frame + " is not after the one before", clip.path);
     }
   }
   return {};
 }
 
 // Whether the frames already stand on the grid of `rate_hz`.
-bool is_even(const Take& take, double rate_hz) {
-  for (std::size_t t = 0; t < take.time_s.size(); ++t) {
-    const double on_grid = (take.time_s[t] - take.time_s[0]) * rate_hz;
+bool is_even(const clip::HandClip& clip, double rate_hz) {
+  for (std::size_t t = 0; t < clip.time_s.size(); ++t) {
+    const double on_grid = (clip.time_s[t] - clip.time_s[0]) * rate_hz;
     if (std::abs(on_grid - static_cast<double>(t)) > kEven) return false;
   }
   return true;
 }
 
-FeatureMatrix interpolate(const Take& take, double rate_hz, Index frames) {
-  FeatureMatrix out(frames, take.angles_rad.cols());
+FeatureMatrix interpolate(const clip::HandClip& clip, double rate_hz, Index frames) {
+  FeatureMatrix out(frames, kHandChannels);
   std::size_t after = 1;
   for (Index t = 0; t < frames; ++t) {
-    const double time_s = take.time_s[0] + static_cast<double>(t) / rate_hz;
-    while (after + 1 < take.time_s.size() && take.time_s[after] < time_s) ++after;
-    const double span_s = take.time_s[after] - take.time_s[after - 1];
-    const double share = std::clamp((time_s - take.time_s[after - 1]) / span_s, 0.0, 1.0);
-    out.row(t) = (1.0 - share) * take.angles_rad.row(static_cast<Index>(after) - 1) +
-                 share * take.angles_rad.row(static_cast<Index>(after));
+    const double time_s = clip.time_s[0] + static_cast<double>(t) / rate_hz;
+    while (after + 1 < clip.time_s.size() && clip.time_s[after] < time_s) ++after;
+    const double span_s = clip.time_s[after] - clip.time_s[after - 1];
+    const double share = std::clamp((time_s - clip.time_s[after - 1]) / span_s, 0.0, 1.0);
+    out.row(t) = (1.0 - share) * row_of(clip, after - 1) + share * row_of(clip, after);
   }
   return out;
 }
 
 }  // namespace
 
-double duration_s(const Take& take) {
-  if (take.time_s.size() < 2) return 0.0;
-  const double span_s = take.time_s.back() - take.time_s.front();
-  const auto steps = static_cast<double>(take.time_s.size() - 1);
+double duration_s(const clip::HandClip& clip) {
+  if (clip.time_s.size() < 2) return 0.0;
+  const double span_s = clip.time_s.back() - clip.time_s.front();
+  const auto steps = static_cast<double>(clip.time_s.size() - 1);
   return span_s * (steps + 1.0) / steps;  // the last frame lasts as long as the mean one
 }
 
-Result<Recording> recording_of(const Take& take, double rate_hz) {
-  if (auto sound = check_values(take); !sound) return std::unexpected(sound.error());
-  Recording recording{.file = take.file, .rate_hz = rate_hz, .angles_rad = {}, .segments = {}};
-  if (is_even(take, rate_hz)) {
-    recording.angles_rad = take.angles_rad;
+Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz) {
+  if (auto sound = check_values(clip); !sound) return std::unexpected(sound.error());
+  Recording recording{.file = clip.path, .rate_hz = rate_hz, .angles_rad = {}, .segments = {}};
+  if (is_even(clip, rate_hz)) {
+    recording.angles_rad.resize(static_cast<Index>(clip.angles.size()), kHandChannels);
+    for (std::size_t t = 0; t < clip.angles.size(); ++t) {
+      recording.angles_rad.row(static_cast<Index>(t)) = row_of(clip, t);
+    }
     return recording;
   }
-  const double frames = std::floor(duration_s(take) * rate_hz + 0.5);
+  const double frames = std::floor(duration_s(clip) * rate_hz + 0.5);
   if (frames < kStates || frames > kMaxFrames) {
-    return fail("the recording lasts " + std::to_string(duration_s(take)) + " s, which at " +
+    return fail("the recording lasts " + std::to_string(duration_s(clip)) + " s, which at " +
                     std::to_string(rate_hz) + " Hz is no number of frames to learn from",
-                take.file);
+                clip.path);
   }
-  recording.angles_rad = interpolate(take, rate_hz, static_cast<Index>(frames));
+  recording.angles_rad = interpolate(clip, rate_hz, static_cast<Index>(frames));
   return recording;
 }
 

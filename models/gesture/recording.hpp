@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "models/gesture/features.hpp"
+#include "proto/clip/hand_clip.hpp"
 #include "proto/clip/lab.hpp"
 #include "proto/frame/result.hpp"
 
@@ -24,20 +25,13 @@ struct Recording {
   std::vector<Segment> segments;
 };
 
-// Angles with the times of their frames, as a file holds them.
-struct Take {
-  std::string file;
-  std::vector<double> time_s;  // rising
-  FeatureMatrix angles_rad;    // one row a time
-};
-
 // From the first frame to the end of the last [s].
-[[nodiscard]] double duration_s(const Take& take);
+[[nodiscard]] double duration_s(const clip::HandClip& clip);
 
-// At `rate_hz`, by linear interpolation where the take's own times are not already that. Refuses a
-// take that has fewer frames than a gesture has states, lacks a value (fill gaps with `posed
+// At `rate_hz`, by linear interpolation where the clip's own times are not already that. Refuses a
+// clip that has fewer frames than a gesture has states, lacks a value (fill gaps with `posed
 // smooth`) or has times that do not rise.
-[[nodiscard]] Result<Recording> recording_of(const Take& take, double rate_hz);
+[[nodiscard]] Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz);
 
 // Cuts the recording at the labels; `file` is the label file's name for errors. Refuses a segment
 // past the end, and one shorter than a gesture has states.

@@ -130,20 +130,22 @@ class Performer {
   }
 
   // What the glove makes of it.
-  Take measure() {
-    Take take{.file = "synthetic performer", .time_s = {}, .angles_rad = {}};
-    take.angles_rad = FeatureMatrix::Zero(static_cast<Eigen::Index>(rows_.size()), kHandChannels);
+  clip::HandClip measure() {
+    clip::HandClip clip;
+    clip.path = "synthetic performer";
+    clip.rate_hz = options_.rate_hz;
+    clip.angles.resize(rows_.size());
     Hand shown = rows_.front();
     for (std::size_t t = 0; t < rows_.size(); ++t) {
-      take.time_s.push_back(time_s(t));
+      clip.time_s.push_back(time_s(t));
       for (const Sensor& sensor : kSensors) {
         const int c = channel_of(sensor);
         const double measured = rows_[t][c] + options_.noise_deg * random_.normal();
         if (std::abs(measured - shown[c]) > options_.dead_band_deg) shown[c] = measured;
-        take.angles_rad(static_cast<Eigen::Index>(t), c) = kRadiansPerDegree * shown[c];
+        clip.angles[t][c] = kRadiansPerDegree * shown[c];
       }
     }
-    return take;
+    return clip;
   }
 
   const PerformerOptions& options_;

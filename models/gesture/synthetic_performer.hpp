@@ -32,7 +32,7 @@ struct PerformerOptions {
 };
 
 struct Performance {
-  Take take;
+  clip::HandClip clip;
   std::vector<clip::LabelSegment> labels;  // each from the start of its move to the next one's
 };
 

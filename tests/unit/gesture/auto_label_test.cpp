@@ -75,7 +75,7 @@ TEST_CASE("Nine borders of ten are proposed on real poses", "[auto_label][real]"
 
 TEST_CASE("Where people put the border is learnt from the examples", "[auto_label]") {
   const auto performance = make_performance({.gestures = 40});
-  auto truth = recording_of(performance->take, 30.0);
+  auto truth = recording_of(performance->clip, 30.0);
   REQUIRE(cut(*truth, performance->labels, "made-up.lab").has_value());
   for (const int late : {0, 7}) {  // some mark the start of the move, some its middle
     Recording moved = *truth;
@@ -92,8 +92,9 @@ TEST_CASE("Where people put the border is learnt from the examples", "[auto_labe
 
 TEST_CASE("Examples of one label propose nothing", "[auto_label]") {
   const auto performance = make_performance({.gestures = 4});
-  auto recording = recording_of(performance->take, 30.0);
+  auto recording = recording_of(performance->clip, 30.0);
   CHECK_FALSE(propose_segments(*recording).has_value());
   recording->segments = {{0, 40, "g"}};
-  CHECK(propose_segments(*recording).error().message.find("two gestures") != std::string::npos);
+  CHECK(propose_segments(*recording).error().message.find("two different poses") !=
+        std::string::npos);
 }

@@ -17,7 +17,7 @@ namespace {
 Recording performed(const PerformerOptions& options) {
   const auto performance = make_performance(options);
   REQUIRE(performance.has_value());
-  auto recording = recording_of(performance->take, 30.0);
+  auto recording = recording_of(performance->clip, 30.0);
   REQUIRE(recording.has_value());
   REQUIRE(cut(*recording, performance->labels, "made-up.lab").has_value());
   return *recording;
@@ -47,10 +47,10 @@ TEST_CASE("A performer is the corpus that was asked for", "[performer]") {
   const auto other = make_performance({.person = 2});
   REQUIRE(one.has_value());
   CHECK(one->labels.size() == 100);
-  CHECK(one->take.angles_rad.rows() > 5500);
-  CHECK(one->take.angles_rad.rows() < 6700);
-  CHECK(one->take.angles_rad == again->take.angles_rad);
-  CHECK_FALSE(one->take.angles_rad.topRows(1000) == other->take.angles_rad.topRows(1000));
+  CHECK(one->clip.angles.size() > 5500);
+  CHECK(one->clip.angles.size() < 6700);
+  CHECK(one->clip.angles == again->clip.angles);
+  CHECK_FALSE(one->clip.angles[1000] == other->clip.angles[1000]);
   // Never the same twice in a row, borders touch.
   for (std::size_t i = 1; i < one->labels.size(); ++i) {
     CHECK(one->labels[i].name != one->labels[i - 1].name);
@@ -128,27 +128,27 @@ TEST_CASE("Constant channels are no harm", "[train]") {
 
 TEST_CASE("Takes that are no recording are refused", "[recording]") {
   const auto performance = make_performance({.gestures = 3});
-  const auto refusal = [](const Take& take) {
-    const auto recording = recording_of(take, 30.0);
+  const auto refusal = [](const clip::HandClip& clip) {
+    const auto recording = recording_of(clip, 30.0);
     return recording ? std::string() : recording.error().message;
   };
-  Take take = performance->take;
-  take.angles_rad(7, 9) = std::numeric_limits<double>::quiet_NaN();
-  CHECK(refusal(take) == "frame 8 lacks a value; fill gaps with `posed smooth` before training");
-  take = performance->take;
-  take.time_s[20] = take.time_s[19];
-  CHECK(refusal(take).find("not after the one before") != std::string::npos);
-  take = performance->take;
-  take.angles_rad *= 57.3;
-  CHECK(refusal(take).find("angles are in radians") != std::string::npos);
-  take.time_s.resize(4);
-  take.angles_rad.conservativeResize(4, Eigen::NoChange);
-  CHECK(refusal(take).find("a gesture alone needs 5") != std::string::npos);
+  clip::HandClip clip = performance->clip;
+  clip.angles[7][9] = std::numeric_limits<double>::quiet_NaN();
+  CHECK(refusal(clip) == "frame 8 lacks a value; fill gaps with `posed smooth` before training");
+  clip = performance->clip;
+  clip.time_s[20] = clip.time_s[19];
+  CHECK(refusal(clip).find("not after the one before") != std::string::npos);
+  clip = performance->clip;
+  clip.angles[5][9] = 57.3;
+  CHECK(refusal(clip).find("angles are in radians") != std::string::npos);
+  clip.time_s.resize(4);
+  clip.angles.resize(4);
+  CHECK(refusal(clip).find("a gesture alone needs 5") != std::string::npos);
 }
 
 TEST_CASE("Labels that do not fit the recording are refused with their line", "[recording]") {
   const auto performance = make_performance({.gestures = 3});
-  auto recording = recording_of(performance->take, 30.0);
+  auto recording = recording_of(performance->clip, 30.0);
   const auto late = cut(*recording, {{0.0, 1000.0, "g", 4}}, "take.lab");
   REQUIRE_FALSE(late.has_value());
   CHECK(late.error().line == 4);
@@ -160,9 +160,10 @@ TEST_CASE("Labels that do not fit the recording are refused with their line", "[
 
 TEST_CASE("A faster recording is brought to the model's rate", "[recording]") {
   const auto fast = make_performance({.gestures = 10, .rate_hz = 120.0});
-  auto recording = recording_of(fast->take, 30.0);
+  auto recording = recording_of(fast->clip, 30.0);
   REQUIRE(recording.has_value());
-  CHECK(recording->angles_rad.rows() == Approx(fast->take.angles_rad.rows() / 4).margin(1));
-  CHECK((recording->angles_rad.row(50) - fast->take.angles_rad.row(200)).norm() < 1e-9);
+  CHECK(recording->angles_rad.rows() ==
+        Approx(static_cast<double>(fast->clip.angles.size()) / 4).margin(1));
+  CHECK(recording->angles_rad(50, 9) == Approx(fast->clip.angles[200][9]));
   CHECK(cut(*recording, fast->labels, "fast.lab").has_value());
 }
