@@ -11,7 +11,9 @@ double unit_of(const Skeleton& skeleton, const ReadOptions& options, const Profi
                std::vector<std::string>& warnings) {
   if (options.metres_per_unit) return *options.metres_per_unit;
   if (profile != nullptr && profile->metres_per_unit) {
-    if (is_a_person(skeleton, *profile->metres_per_unit)) return *profile->metres_per_unit;
+    if (!profile->person || is_a_person(skeleton, *profile->metres_per_unit)) {
+      return *profile->metres_per_unit;
+    }
     warnings.push_back("has the joints of profile '" + profile->name +
                        "' but not its unit of length");
   }

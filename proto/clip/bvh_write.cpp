@@ -1,11 +1,10 @@
 #include <array>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
-#include <fstream>
 #include <numbers>
+#include <ostream>
 
 #include "proto/clip/clip.hpp"
+#include "proto/clip/text.hpp"
 
 namespace posed::clip {
 namespace {
@@ -112,29 +111,15 @@ bool is_acclaim(const Skeleton& skeleton) {
   return false;
 }
 
-std::string why() { return std::strerror(errno); }
-
 }  // namespace
 
 Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
   if (is_acclaim(*clip.skeleton)) return write_bvh(with_zyx_channels(clip), path);
-  // Beside the target first: a full disk leaves no half-written clip behind under its name.
-  const std::filesystem::path part = path.string() + ".part";
-  std::ofstream file(part, std::ios::binary | std::ios::trunc);
-  if (!file) return fail("cannot be written: " + why(), path.string());
-  Writer writer(clip);
-  file << writer.header();
-  for (int i = 0; i < clip.frames() && file; ++i) file << writer.row(i);
-  file.close();
-  std::error_code error;
-  if (!file) {
-    const std::string reason = why();
-    std::filesystem::remove(part, error);
-    return fail("could not be written to its end: " + reason, path.string());
-  }
-  std::filesystem::rename(part, path, error);
-  if (error) return fail("cannot be written: " + error.message(), path.string());
-  return {};
+  return write_text(path, [&clip](std::ostream& file) {
+    Writer writer(clip);
+    file << writer.header();
+    for (int i = 0; i < clip.frames() && file; ++i) file << writer.row(i);
+  });
 }
 
 }  // namespace posed::clip

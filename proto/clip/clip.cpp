@@ -7,7 +7,8 @@ namespace posed::clip {
 Frame Clip::frame(int index) const {
   Frame frame;
   frame.header.sequence = static_cast<std::uint64_t>(index) + 1;
-  frame.header.device_ns = nanoseconds(index / frame_rate_hz);
+  frame.header.device_ns =
+      nanoseconds(time_s.empty() ? index / frame_rate_hz : time_s[static_cast<std::size_t>(index)]);
   frame.source = Source::kFile;
   const auto row = channels.row(index);
   pose_from_channels(*skeleton, {row.data(), static_cast<std::size_t>(row.size())}, frame);

@@ -17,14 +17,17 @@ Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOption
   ClipFiles files;
   files.name = path.string();
   const std::string extension = lower(path.extension().string());
-  files.is_amc = extension == ".amc";
-  if (!files.is_amc && extension != ".bvh") {
-    return fail("is no clip posed can read; a clip ends in .bvh or .amc", files.name);
+  if (extension == ".amc") {
+    files.kind = ClipKind::kAmc;
+  } else if (extension == ".csv") {
+    files.kind = ClipKind::kHandCsv;
+  } else if (extension != ".bvh") {
+    return fail("is no clip posed can read; a clip ends in .bvh, .amc or .csv", files.name);
   }
   auto text = load_text(path);
   if (!text) return std::unexpected(text.error());
   files.text = std::move(*text);
-  if (!files.is_amc) return files;
+  if (files.kind != ClipKind::kAmc) return files;
 
   const std::filesystem::path asf = options.asf.empty() ? asf_beside(path) : options.asf;
   if (options.asf.empty() && !std::filesystem::exists(asf)) {
@@ -39,8 +42,15 @@ Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOption
 }
 
 Result<Draft> draft_of(const ClipFiles& files, const ReadOptions& options) {
-  return files.is_amc ? draft_amc(files.text, files.name, files.asf, files.asf_name, options)
-                      : draft_bvh(files.text, files.name, options);
+  switch (files.kind) {
+    case ClipKind::kAmc:
+      return draft_amc(files.text, files.name, files.asf, files.asf_name, options);
+    case ClipKind::kHandCsv:
+      return draft_hand_csv(files.text, files.name, options);
+    case ClipKind::kBvh:
+      break;
+  }
+  return draft_bvh(files.text, files.name, options);
 }
 
 }  // namespace posed::clip

@@ -1,6 +1,7 @@
 // The files that make up one clip, as text; private to proto/clip.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -8,15 +9,17 @@
 
 namespace posed::clip {
 
+enum class ClipKind : std::uint8_t { kBvh, kAmc, kHandCsv };
+
 struct ClipFiles {
   std::string name;  // of the clip, for errors
-  std::string text;  // of the .bvh or .amc
-  bool is_amc = false;
+  std::string text;  // of the .bvh, .amc or .csv
+  ClipKind kind = ClipKind::kBvh;
   std::string asf_name;  // AMC only
   std::string asf;
 };
 
-// By extension: .bvh or .amc, the latter with its skeleton.
+// By extension: .bvh, .csv, or .amc, the latter with its skeleton.
 [[nodiscard]] Result<ClipFiles> load_files(const std::filesystem::path& path,
                                            const ReadOptions& options);
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "proto/clip/text.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::clip {
 namespace {
@@ -70,7 +71,15 @@ FrameParser FrameParser::amc(const Acclaim& acclaim, bool degrees) {
   return parser;
 }
 
+FrameParser FrameParser::hand_csv() {
+  FrameParser parser;
+  parser.scale_.assign(kHandChannels, 1.0);
+  parser.timed_ = true;
+  return parser;
+}
+
 FrameOutcome FrameParser::parse(std::string_view text, std::span<double> values) const noexcept {
+  if (timed_) return parse_fields(text, values);
   return bones_.empty() ? parse_line(text, values) : parse_block(text, values);
 }
 
@@ -97,6 +106,40 @@ FrameOutcome FrameParser::parse_line(std::string_view text,
   }
   if (outcome.found < scale_.size()) outcome.fault = FrameFault::kTooFew;
   return outcome;
+}
+
+FrameOutcome FrameParser::parse_fields(std::string_view text,
+                                       std::span<double> values) const noexcept {
+  constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+  FrameOutcome outcome;
+  outcome.expected = 1 + kHandChannels;
+  const char* const begin = text.data();
+  const auto blame = [&](FrameFault fault, std::string_view where) {
+    outcome.fault = fault;
+    outcome.where = where;
+    return outcome;
+  };
+  if (values.size() < kHandChannels) return blame(FrameFault::kTooFew, {});
+  text = trim(text);
+  for (bool more = true; more; ++outcome.found) {
+    const std::size_t comma = text.find(',');
+    const std::string_view field = trim(text.substr(0, comma));
+    outcome.offset = static_cast<std::size_t>(text.data() - begin);
+    more = comma != std::string_view::npos;
+    text.remove_prefix(more ? comma + 1 : text.size());
+    if (outcome.found == outcome.expected) {
+      ++outcome.found;
+      return blame(FrameFault::kTooMany, {});
+    }
+    const auto value = field.empty() ? std::optional(kMissing) : parse_number(field);
+    if (!value) return blame(FrameFault::kNotANumber, field);
+    if (outcome.found == 0) {
+      outcome.time_s = *value;
+    } else {
+      values[kChannelOfAngle[outcome.found - 1]] = *value;
+    }
+  }
+  return outcome.found < outcome.expected ? blame(FrameFault::kTooFew, {}) : outcome;
 }
 
 int FrameParser::find_bone(std::string_view name) const noexcept {

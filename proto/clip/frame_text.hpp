@@ -1,9 +1,11 @@
-// FrameParser: one frame's text, as it stands in a clip, to channel values. The readers and the
+// FrameParser: one frame's text, as it stands in a clip, to channel values, NaN where a hand CSV's
+// field is empty. The readers and the
 // file driver's decoder share it, so a recorded log decodes exactly as the clip does.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -31,7 +33,8 @@ struct FrameOutcome {
   std::size_t offset = 0;    // of the fault in the text
   std::size_t expected = 0;  // values wanted and found, for too few and too many
   std::size_t found = 0;
-  std::int64_t number = 0;  // AMC: the frame's number
+  std::int64_t number = 0;                                   // AMC: the frame's number
+  double time_s = std::numeric_limits<double>::quiet_NaN();  // hand CSV, where it is given
 
   [[nodiscard]] bool ok() const noexcept { return fault == FrameFault::kNone; }
   // One sentence for people. Cold.
@@ -46,11 +49,18 @@ class FrameParser {
   // An AMC block: the frame's number, then a bone's name and its values for each bone.
   [[nodiscard]] static FrameParser amc(const Acclaim& acclaim, bool degrees);
 
+  // A line of a hand CSV: the time and 45 angles in hand45 order, in radians; an empty field is a
+  // missing value.
+  [[nodiscard]] static FrameParser hand_csv();
+
   // Values parse() writes: the skeleton's channels.
   [[nodiscard]] std::size_t channels() const noexcept { return scale_.size(); }
 
   // Frames carry a number of their own (AMC).
   [[nodiscard]] bool numbered() const noexcept { return !bones_.empty(); }
+
+  // Frames may carry a time of their own (hand CSV).
+  [[nodiscard]] bool timed() const noexcept { return timed_; }
 
   // Lines that a frame's text has at least: one; for an AMC its number and a line for each bone
   // with channels.
@@ -63,11 +73,13 @@ class FrameParser {
  private:
   FrameOutcome parse_line(std::string_view text, std::span<double> values) const noexcept;
   FrameOutcome parse_block(std::string_view text, std::span<double> values) const noexcept;
+  FrameOutcome parse_fields(std::string_view text, std::span<double> values) const noexcept;
   [[nodiscard]] int find_bone(std::string_view name) const noexcept;
 
   std::vector<double> scale_;       // [channel], file value to rad or m
   std::vector<AcclaimBone> bones_;  // sorted by name; empty for a BVH
   std::size_t lines_ = 1;
+  bool timed_ = false;
 };
 
 }  // namespace posed::clip

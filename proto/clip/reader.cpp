@@ -12,8 +12,10 @@ namespace {
 
 constexpr double kSameLength_m = 0.001;
 
-// [frames x channels]; grows with what was really read, whatever a header promised.
-Result<std::vector<double>> read_rows(const Draft& draft, const std::string& name) {
+// [frames x channels]; grows with what was really read, whatever a header promised. Fills `time_s`
+// where frames carry times.
+Result<std::vector<double>> read_rows(const Draft& draft, const std::string& name,
+                                      std::vector<double>& time_s) {
   std::vector<double> values;
   std::vector<double> row(draft.parser.channels());
   std::optional<std::int64_t> before;
@@ -31,6 +33,7 @@ Result<std::vector<double>> read_rows(const Draft& draft, const std::string& nam
                   name, span.line);
     }
     before = outcome.number;
+    if (draft.parser.timed()) time_s.push_back(outcome.time_s);
     values.insert(values.end(), row.begin(), row.end());
   }
   return values;
@@ -100,9 +103,9 @@ Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const 
 
 Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   if (draft.frames.empty()) return fail("has no frames, so there is nothing to play", name);
-  const auto values = read_rows(draft, name);
-  if (!values) return std::unexpected(values.error());
   Clip clip;
+  const auto values = read_rows(draft, name, clip.time_s);
+  if (!values) return std::unexpected(values.error());
   clip.path = name;
   clip.frame_rate_hz = draft.frame_rate_hz;
   clip.metres_per_unit = draft.metres_per_unit;
@@ -112,6 +115,11 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
 
   auto skeleton = std::make_shared<Skeleton>(std::move(draft.skeleton));
   clip.skeleton = skeleton;
+  if (draft.parser.timed()) {  // a hand: its skeleton is ours
+    const auto ok = settle_times(draft, name, clip.time_s, clip.frame_rate_hz, clip.warnings);
+    if (!ok) return std::unexpected(ok.error());
+    return clip;
+  }
   if (auto ok = complete(clip, *skeleton, draft.profile, hints); !ok) {
     return fail(ok.error().message, name);
   }

@@ -20,7 +20,7 @@ struct FrameSpan {
 
 // A clip whose header has been read: what it takes to read the frames.
 struct Draft {
-  Skeleton skeleton;  // metres; not finished
+  Skeleton skeleton;  // metres; not finished, but for a hand's
   const Profile* profile = nullptr;
   FrameParser parser;
   double frame_rate_hz = 0.0;
@@ -28,6 +28,7 @@ struct Draft {
   std::string_view header;  // everything before the first frame
   std::vector<FrameSpan> frames;
   std::vector<std::string> warnings;
+  double untimed_rate_hz = 30.0;  // of a clip whose frames should carry times and do not
 };
 
 [[nodiscard]] Result<Draft> draft_bvh(std::string_view text, const std::string& name,
@@ -35,6 +36,15 @@ struct Draft {
 [[nodiscard]] Result<Draft> draft_amc(std::string_view amc, const std::string& amc_name,
                                       std::string_view asf, const std::string& asf_name,
                                       const ReadOptions& options);
+
+[[nodiscard]] Result<Draft> draft_hand_csv(std::string_view text, const std::string& name,
+                                           const ReadOptions& options);
+
+// The times of the frames of a clip that carries them, completed as hand_clip.hpp says; `time_s`
+// holds NaN where one is missing. `rate_hz` becomes 1 / median step.
+[[nodiscard]] Result<> settle_times(const Draft& draft, const std::string& name,
+                                    std::vector<double>& time_s, double& rate_hz,
+                                    std::vector<std::string>& warnings);
 
 // What is found by looking at all frames, where only the first is at hand (a log's device
 // description).

@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <iosfwd>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -55,6 +57,11 @@ class Cursor {
 
 // The whole file; an error says why it could not be read. At most 2 GB.
 [[nodiscard]] Result<std::string> load_text(const std::filesystem::path& path);
+
+// Writes a file beside the target first: a full disk leaves no half-written clip behind under its
+// name.
+[[nodiscard]] Result<> write_text(const std::filesystem::path& path,
+                                  const std::function<void(std::ostream&)>& write);
 
 // `text` without a UTF-8 byte order mark.
 [[nodiscard]] std::string_view without_bom(std::string_view text) noexcept;

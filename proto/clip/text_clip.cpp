@@ -1,5 +1,6 @@
 #include "proto/clip/text_clip.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <map>
@@ -19,18 +20,26 @@ std::string exact(double value) {
   return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
 }
 
+constexpr std::array<std::string_view, 3> kKinds{"bvh", "amc", "csv"};  // by ClipKind
+
 std::string describe(const ClipFiles& files, const Draft& draft, const Clip& clip,
-                     const std::string& profile) {
+                     const ReadOptions& options) {
   const Skeleton& skeleton = *clip.skeleton;
   std::string out(kMagic);
-  out += files.is_amc ? " amc" : " bvh";
+  out += ' ';
+  out += kKinds[static_cast<std::size_t>(files.kind)];
   out += " rate_hz=" + exact(clip.frame_rate_hz);
   out += " metres_per_unit=" + exact(clip.metres_per_unit);
   out += " root_joint=" + std::to_string(skeleton.root_joint);
   out += " asf_bytes=" + std::to_string(files.asf.size());
-  out += profile.empty() ? "" : " profile=" + profile;
+  if (files.kind == ClipKind::kHandCsv) {
+    out += options.hand == Side::kLeft ? " hand=left" : " hand=right";
+    out += " shape=" + options.hand_shape;
+  } else if (!options.profile.empty()) {
+    out += " profile=" + options.profile;
+  }
   // Only the whole clip could say it; the others follow from the header.
-  if (draft.profile == nullptr && !zero_pose_is_t(skeleton)) {
+  if (files.kind != ClipKind::kHandCsv && draft.profile == nullptr && !zero_pose_is_t(skeleton)) {
     out += " T=";
     for (const Joint& joint : skeleton.joints) out += axes_text(joint.T_world_joint);
   }
@@ -61,8 +70,9 @@ Result<std::unique_ptr<const TextClip>> open_text_clip(const std::filesystem::pa
   auto out = std::make_unique<TextClip>();
   out->format = {
       .skeleton = clip->skeleton, .frame_rate_hz = clip->frame_rate_hz, .parser = draft->parser};
-  out->description = describe(*files, *draft, *clip, options.profile);
+  out->description = describe(*files, *draft, *clip, options);
   out->warnings = std::move(clip->warnings);
+  out->time_s = std::move(clip->time_s);
   // The views move with the text: same offsets in its new place.
   const char* const before = files->text.data();
   out->text = std::move(files->text);
@@ -77,7 +87,8 @@ Result<ClipFormat> parse_description(std::string_view description, const std::st
   std::string_view line = next_line(body);
   const std::string_view magic = next_word(line);
   const std::string_view kind = next_word(line);
-  if (magic != kMagic || (kind != "bvh" && kind != "amc")) {
+  const auto known = std::ranges::find(kKinds, kind);
+  if (magic != kMagic || known == kKinds.end()) {
     return fail("is no description of a clip", name);
   }
   Facts facts;
@@ -96,13 +107,17 @@ Result<ClipFormat> parse_description(std::string_view description, const std::st
   ClipFiles files;
   files.name = name;
   files.asf_name = name;
-  files.is_amc = kind == "amc";
+  files.kind = static_cast<ClipKind>(known - kKinds.begin());
   files.asf = body.substr(0, static_cast<std::size_t>(*asf_bytes));
   files.text = body.substr(files.asf.size());
   ReadOptions options;
   options.amc_rate_hz = *rate_hz;
   options.metres_per_unit = *metres;
   if (const auto at = facts.find("profile"); at != facts.end()) options.profile = at->second;
+  if (const auto at = facts.find("shape"); at != facts.end()) options.hand_shape = at->second;
+  if (const auto at = facts.find("hand"); at != facts.end()) {
+    options.hand = at->second == "left" ? Side::kLeft : Side::kRight;
+  }
   auto draft = draft_of(files, options);
   if (!draft) return std::unexpected(draft.error());
   ClipFormat format;

@@ -25,6 +25,7 @@ struct TextClip {
   ClipFormat format;
   std::string description;  // for parse_description(): the clip's header and its first frame
   std::vector<std::string_view> frames;  // into `text`
+  std::vector<double> time_s;            // [frame], as Clip::time_s
   std::vector<std::string> warnings;
   std::string text;  // the file
 };

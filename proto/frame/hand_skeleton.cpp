@@ -8,10 +8,6 @@ namespace {
 
 constexpr int kFirstMirroredFinger = 3;  // ring and little lie beyond the middle finger
 
-Bone first_bone(Side side) {
-  return side == Side::kLeft ? Bone::kLeftThumbMetacarpal : Bone::kRightThumbMetacarpal;
-}
-
 // Fingers lie along +Z and shall lie along the side's own X axis, palm down either way.
 Eigen::Quaterniond t_frame(Side side) {
   const double quarter = std::numbers::pi / 2;
@@ -34,8 +30,7 @@ void add_finger(Side side, const HandShape& shape, int finger, Skeleton& skeleto
   };
   for (int j = 0; j < kFingerJoints; ++j) {
     const int index = hand_joint(finger, j);
-    const auto bone = static_cast<Bone>(static_cast<int>(first_bone(side)) + index - 1);
-    Joint joint = named_joint(side, bone, j == 0 ? 0 : index - 1);
+    Joint joint = named_joint(side, hand_bone(side, index - 1), j == 0 ? 0 : index - 1);
     joint.offset_m = j == 0 ? mirrored(side, form.base_m) : along(form.length_m[j - 1]);
     if (j + 1 == kFingerJoints) joint.end_site_m = along(form.length_m[j]);
     joint.channel_frame = channel_frame(side, shape, finger);
@@ -91,12 +86,10 @@ std::optional<Side> hand_side(const Skeleton& skeleton) {
     }
   }
   for (const Side side : {Side::kLeft, Side::kRight}) {
-    const int first = static_cast<int>(first_bone(side));
     bool all = true;
     for (int j = 0; j < kHandJoints && all; ++j) {
       const Joint& joint = skeleton.joints[static_cast<std::size_t>(j) + 1];
-      all = joint.bone == static_cast<Bone>(first + j) &&
-            joint.parent == (j % kFingerJoints == 0 ? 0 : j);
+      all = joint.bone == hand_bone(side, j) && joint.parent == (j % kFingerJoints == 0 ? 0 : j);
     }
     if (all) return side;
   }

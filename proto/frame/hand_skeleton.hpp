@@ -26,6 +26,12 @@ inline constexpr int kHandSkeletonJoints = 1 + kHandJoints;
   return 1 + finger * kFingerJoints + joint;
 }
 
+// The canonical bone of a finger joint, counted from 0 over the fingers. RT-safe.
+[[nodiscard]] constexpr Bone hand_bone(Side side, int joint) noexcept {
+  const Bone first = side == Side::kLeft ? Bone::kLeftThumbMetacarpal : Bone::kRightThumbMetacarpal;
+  return static_cast<Bone>(static_cast<int>(first) + joint);
+}
+
 // [channel of the skeleton] = index in HandAngles, and back.
 inline constexpr std::array<std::size_t, kHandChannels> kAngleOfChannel = [] {
   constexpr std::array<std::size_t, 3> kOrder{2, 0, 1};  // z, x, y

@@ -43,6 +43,8 @@ class ProfileReader {
       if (!profile_.metres_per_unit || !(*profile_.metres_per_unit > 0)) {
         blame(node, "metres_per_unit is a length in metres");
       }
+    } else if (key == "person" && node.is_boolean()) {
+      profile_.person = node.value_or(true);
     } else if (key == "match" && node.is_array()) {
       for (const toml::node& joint : *node.as_array()) {
         profile_.match.push_back(joint.value_or(""));

@@ -17,8 +17,9 @@ namespace posed {
 
 struct Profile {
   std::string name;
-  std::optional<double> metres_per_unit;        // of a file that names no unit
-  std::vector<std::string> match;               // a figure with all these joints is this one,
+  std::optional<double> metres_per_unit;  // of a file that names no unit
+  bool person = true;              // stands as high as people do, by which its unit is checked
+  std::vector<std::string> match;  // a figure with all these joints is this one,
   std::map<std::string, std::string> along;     // if these joints' OFFSETs point so ("-y")
   std::map<std::string, Bone> bones;            // joint name -> canonical bone
   std::map<std::string, Eigen::Quaterniond> T;  // joint name -> T; the rule finds the others

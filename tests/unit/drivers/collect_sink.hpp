@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <vector>
 
@@ -33,12 +34,19 @@ class CollectSink final : public Sink {
   std::array<int, kOutcomes> outcomes{};
 };
 
+// To the last bit, so that an angle that is missing (NaN) equals itself.
+inline bool same_bits(const std::array<float, kMaxChannels>& a,
+                      const std::array<float, kMaxChannels>& b) {
+  return std::bit_cast<std::array<std::uint32_t, kMaxChannels>>(a) ==
+         std::bit_cast<std::array<std::uint32_t, kMaxChannels>>(b);
+}
+
 // The poses agree to the last bit, whatever their times are.
 inline bool same_pose(const Frame& a, const Frame& b) {
   return a.skeleton == b.skeleton && a.joint_count == b.joint_count &&
          a.angle_count == b.angle_count && a.valid == b.valid && a.quality == b.quality &&
          a.source == b.source && a.root_position_m == b.root_position_m &&
-         a.rotation_xyzw == b.rotation_xyzw && a.angle_rad == b.angle_rad;
+         a.rotation_xyzw == b.rotation_xyzw && same_bits(a.angle_rad, b.angle_rad);
 }
 
 inline bool same_values(const Sample& a, const Sample& b) {

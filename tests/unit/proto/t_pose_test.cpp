@@ -86,7 +86,8 @@ TEST_CASE("every built-in profile is good, and a bad one is refused with its lin
   const auto none = find_profile(named({"a"}), "bandy");
   REQUIRE_FALSE(none.has_value());
   CHECK(none.error().text() ==
-        "there is no skeleton profile 'bandy'; there are bandai, cmu-asf, cmu-axes, cmu-bvh");
+        "there is no skeleton profile 'bandy'; there are bandai, cmu-asf, cmu-axes, cmu-bvh, "
+        "hand-left, hand-right");
   CHECK(none.error().exit_code == ExitCode::kWrongUse);
   Skeleton other = named({"Hips"});
   CHECK_FALSE(name_bones(profiles()[0], other).has_value());

@@ -1,0 +1,164 @@
+// The hand CSV: its header, its times, and writing one.
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+
+#include "proto/clip/hand_clip.hpp"
+#include "proto/clip/reader.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::clip {
+namespace {
+
+constexpr double kSameTime_s = 1e-6;  // two stamps closer than this are one
+
+// Column names without the time: thumb1_x_rad ... little3_z_rad.
+const std::array<std::string, kHandChannels>& column_names() {
+  static const auto names = [] {
+    std::array<std::string, kHandChannels> all;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i] = std::string(kFingerNames[i / kFingerChannels]) +
+               std::to_string(i % kFingerChannels / 3 + 1) + '_' + "xyz"[i % 3] + "_rad";
+    }
+    return all;
+  }();
+  return names;
+}
+
+std::string header_line() {
+  std::string line = "time_s";
+  for (const std::string& name : column_names()) line += ',' + name;
+  return line;
+}
+
+Result<> check_header(std::string_view line, const std::string& name, int line_number) {
+  for (std::size_t i = 0; i <= kHandChannels; ++i) {
+    const std::string_view expected =
+        i == 0 ? std::string_view("time_s") : std::string_view(column_names()[i - 1]);
+    const std::size_t comma = line.find(',');
+    const std::string_view found = trim(line.substr(0, comma));
+    if (found != expected) {
+      return fail("column " + std::to_string(i + 1) + " is " + in_quotes(found) +
+                      " where a hand CSV has '" + std::string(expected) +
+                      "'; its header is time_s,thumb1_x_rad,thumb1_y_rad, ..., little3_z_rad",
+                  name, line_number);
+    }
+    line.remove_prefix(comma == std::string_view::npos ? line.size() : comma + 1);
+    if (i == kHandChannels && comma != std::string_view::npos) {
+      return fail("has more than the 46 columns of a hand CSV", name, line_number);
+    }
+  }
+  return {};
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Times between two that are known lie on the line between them, outside of them a step apart.
+void interpolate(std::vector<double>& time_s, double step_s) {
+  const auto known = [](double t) { return !std::isnan(t); };
+  auto at = std::ranges::find_if(time_s, known);
+  if (at == time_s.end()) {
+    for (std::size_t i = 0; i < time_s.size(); ++i) time_s[i] = static_cast<double>(i) * step_s;
+    return;
+  }
+  for (auto before = at; before != time_s.begin(); --before) *(before - 1) = *before - step_s;
+  while (at != time_s.end()) {
+    const auto next = std::find_if(at + 1, time_s.end(), known);
+    const double gap = static_cast<double>(next - at);
+    const double step = next == time_s.end() ? step_s : (*next - *at) / gap;
+    for (auto i = at + 1; i != next; ++i) *i = *at + step * static_cast<double>(i - at);
+    at = next;
+  }
+}
+
+std::string exact(double value) {
+  std::array<char, 64> buffer{};
+  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
+}
+
+}  // namespace
+
+Result<Draft> draft_hand_csv(std::string_view text, const std::string& name,
+                             const ReadOptions& options) {
+  const auto shape = find_hand_shape(options.hand_shape);
+  if (!shape) return std::unexpected(shape.error());
+  text = without_bom(text);
+  const std::string_view all = text;
+  Draft draft;
+  bool has_header = false;
+  for (int number = 1; !text.empty(); ++number) {
+    const std::string_view line = trim(next_line(text));
+    if (line.empty()) continue;
+    if (has_header) {
+      if (draft.frames.empty()) {
+        draft.header = all.substr(0, static_cast<std::size_t>(line.data() - all.data()));
+      }
+      draft.frames.push_back({.text = line, .line = number});
+      continue;
+    }
+    if (auto ok = check_header(line, name, number); !ok) return std::unexpected(ok.error());
+    has_header = true;
+  }
+  if (!has_header) return fail("is empty, so it is no hand CSV", name);
+  draft.skeleton = hand_skeleton(options.hand.value_or(Side::kRight), **shape);
+  draft.parser = FrameParser::hand_csv();
+  draft.frame_rate_hz = draft.untimed_rate_hz = options.hand_rate_hz;
+  return draft;
+}
+
+Result<> settle_times(const Draft& draft, const std::string& name, std::vector<double>& time_s,
+                      double& rate_hz, std::vector<std::string>& warnings) {
+  std::vector<double> steps_s;
+  double last_s = 0.0;
+  std::size_t last = time_s.size();  // index of the last known time; none yet
+  int missing = 0;
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    double& now_s = time_s[i];
+    if (last < time_s.size() && now_s < last_s) {
+      return fail("frame " + std::to_string(i + 1) + ": its time " + exact(now_s) +
+                      " lies before the " + exact(last_s) + " of a frame above it",
+                  name, draft.frames[i].line);
+    }
+    if (last < time_s.size() && now_s - last_s < kSameTime_s) now_s = std::nan("");
+    if (std::isnan(now_s)) {
+      ++missing;
+      continue;
+    }
+    if (last < time_s.size()) steps_s.push_back((now_s - last_s) / static_cast<double>(i - last));
+    last_s = now_s;
+    last = i;
+  }
+  if (!steps_s.empty()) rate_hz = 1.0 / median(steps_s);
+  if (steps_s.empty()) rate_hz = draft.untimed_rate_hz;
+  if (missing > 0) {
+    warnings.push_back(std::to_string(missing) + " of " + std::to_string(time_s.size()) +
+                       " frames have no time of their own; " +
+                       (steps_s.empty() ? "played at " + exact(rate_hz) + " Hz"
+                                        : std::string("placed between the others")));
+  }
+  interpolate(time_s, 1.0 / rate_hz);
+  return {};
+}
+
+Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path) {
+  return write_text(path, [&clip](std::ostream& file) {
+    file << header_line() << '\n';
+    for (std::size_t i = 0; i < clip.angles.size(); ++i) {
+      std::string line = exact(clip.time_s[i]);
+      for (const double angle_rad : clip.angles[i]) {
+        line += ',';
+        if (std::isfinite(angle_rad)) line += exact(angle_rad);
+      }
+      file << line << '\n';
+    }
+  });
+}
+
+}  // namespace posed::clip
