@@ -9,6 +9,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/hand_clip.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::cli {
@@ -19,12 +20,18 @@ struct Convert {
   std::string out;
   clip::ReadOptions read;
   double metres_per_unit = 0.0;  // 0: not given
+  std::string hand;              // "left", "right" or not given
   bool json = false;
 };
 
+bool is_hand_csv(const std::string& path) {
+  return clip::lower(std::filesystem::path(path).extension().string()) == ".csv";
+}
+
 Result<> check_paths(const Convert& convert) {
-  if (clip::lower(std::filesystem::path(convert.out).extension().string()) != ".bvh") {
-    return misuse("can write .bvh only; name OUT so", convert.out);
+  if (!is_hand_csv(convert.out) &&
+      clip::lower(std::filesystem::path(convert.out).extension().string()) != ".bvh") {
+    return misuse("can write .bvh, and .csv of a hand; name OUT so", convert.out);
   }
   std::error_code error;
   if (std::filesystem::equivalent(convert.in, convert.out, error)) {
@@ -33,15 +40,38 @@ Result<> check_paths(const Convert& convert) {
   return {};
 }
 
+// A hand CSV has no room for a body, a BVH none for a gap or an uneven clock.
+Result<clip::Clip> read(const Convert& convert) {
+  auto clip = clip::read_clip(convert.in, convert.read);
+  if (!clip || !is_hand_csv(convert.in) || is_hand_csv(convert.out)) return clip;
+  auto hand = clip::hand_of(*clip, convert.read);
+  if (!hand) return std::unexpected(hand.error());
+  clip::fill_gaps(*hand);
+  if (clip::has_uneven_times(*hand)) {
+    hand->warnings.emplace_back("frames are not evenly spaced, but a BVH's are: its clock differs");
+  }
+  return clip::clip_of_hand(*hand, convert.read.hand_shape);
+}
+
+Result<> write(const Convert& convert, const clip::Clip& clip) {
+  if (!is_hand_csv(convert.out)) return clip::write_bvh(clip, convert.out);
+  const auto hand = clip::hand_of(clip, convert.read);
+  if (!hand) return std::unexpected(hand.error());
+  return clip::write_hand_csv(*hand, convert.out);
+}
+
 int run(Convert& convert) {
   if (auto ok = check_paths(convert); !ok) return report(ok.error());
   if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
-  const auto clip = clip::read_clip(convert.in, convert.read);
+  if (!convert.hand.empty()) {
+    convert.read.hand = convert.hand == "left" ? Side::kLeft : Side::kRight;
+  }
+  const auto clip = read(convert);
   if (!clip) return report(clip.error());
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());
   }
-  if (auto ok = clip::write_bvh(*clip, convert.out); !ok) return report(ok.error());
+  if (auto ok = write(convert, *clip); !ok) return report(ok.error());
   if (!convert.json) {
     std::fprintf(stderr, "posed: wrote %s: %d frames at %g Hz, %zu joints\n", convert.out.c_str(),
                  clip->frames(), clip->frame_rate_hz, clip->skeleton->joints.size());
@@ -65,8 +95,8 @@ int run(Convert& convert) {
 void add_convert(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("convert", "Write a clip in another format");
   auto convert = std::make_shared<Convert>();
-  command->add_option("IN", convert->in, "Clip to read: .bvh or .amc")->required();
-  command->add_option("--out", convert->out, "Clip to write: .bvh")->required();
+  command->add_option("IN", convert->in, "Clip to read: .bvh, .amc or a hand as .csv")->required();
+  command->add_option("--out", convert->out, "Clip to write: .bvh, or .csv of a hand")->required();
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   command->add_option("--rate", convert->read.amc_rate_hz, "Frames a second of an AMC")
@@ -77,13 +107,20 @@ void add_convert(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1e-6, 1e6));
   command->add_option("--profile", convert->read.profile,
                       "Skeleton profile (default: found by the joints' names)");
+  command->add_option("--hand", convert->hand, "Whose a hand CSV is, or which hand to take")
+      ->check(CLI::IsMember({"left", "right"}));
+  command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH")
+      ->capture_default_str();
   command->add_flag("--json", convert->json, "Print a summary as JSON on stdout");
   command->footer(
       "A BVH keeps its names, hierarchy, channel order and unit. An AMC becomes a BVH in\n"
-      "centimetres with Z, Y, X rotations on every joint.\n\n"
+      "centimetres with Z, Y, X rotations on every joint. A hand CSV\n"
+      "holds 45 angles a frame; any BVH with the fifteen finger joints of a hand can become "
+      "one.\n\n"
       "Examples:\n"
       "  posed convert 07_01.amc --out walk.bvh\n"
-      "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh");
+      "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
+      "  posed convert glove.csv --hand left --out glove.bvh");
   command->callback([convert, &exit_code] { exit_code = run(*convert); });
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 #include "proto/clip/text.hpp"
 #include "proto/frame/time.hpp"
@@ -106,7 +107,7 @@ void ClipDecoder::finish_frame(Sink& sink) noexcept {
     return;
   }
   Frame frame;
-  frame.header.device_ns = next_time_ns();
+  frame.header.device_ns = next_time_ns(parsed.time_s);
   frame.source = Source::kFile;
   pose_from_channels(*format_.skeleton, values_, frame);
   size_ = line_begin_ = lines_ = 0;
@@ -117,13 +118,33 @@ void ClipDecoder::finish_frame(Sink& sink) noexcept {
 // RT-safe.
 void ClipDecoder::drop_frame(Outcome outcome, Sink& sink) noexcept {
   size_ = line_begin_ = lines_ = 0;
-  (void)next_time_ns();
+  (void)next_time_ns(std::numeric_limits<double>::quiet_NaN());
   sink.outcome(outcome);
 }
 
 // RT-safe.
-std::int64_t ClipDecoder::next_time_ns() noexcept {
+std::int64_t ClipDecoder::next_time_ns(double given_s) noexcept {
+  if (format_.parser.timed()) return next_given_time_ns(given_s);
   return nanoseconds(static_cast<double>(frames_++) / format_.frame_rate_hz);
+}
+
+// RT-safe.
+std::int64_t ClipDecoder::next_given_time_ns(double given_s) noexcept {
+  const std::int64_t step_ns = std::max<std::int64_t>(1, nanoseconds(1 / format_.frame_rate_hz));
+  const bool is_first = last_ns_ == kNoTime_ns;
+  const std::int64_t following_ns = is_first ? 0 : last_ns_ + step_ns;
+  if (std::isnan(given_s)) {
+    last_ns_ = following_ns;
+    return last_ns_;
+  }
+  const std::int64_t time_ns = nanoseconds(given_s);
+  if (given_ns_ != kNoTime_ns && time_ns < given_ns_) round_ns_ = following_ns - time_ns;
+  const bool repeats = given_ns_ != kNoTime_ns && time_ns == given_ns_;
+  given_ns_ = time_ns;
+  const std::int64_t proper_ns = repeats ? following_ns : round_ns_ + time_ns;
+  // A frame without a time may have been placed later than this one really is.
+  last_ns_ = is_first ? proper_ns : std::max(proper_ns, last_ns_ + 1);
+  return last_ns_;
 }
 
 }  // namespace posed::drivers

@@ -1,4 +1,5 @@
-// A clip's text to frames, one by one: a BVH's motion lines, an AMC's blocks of lines.
+// A clip's text to frames, one by one: the lines of a BVH's motion or of a hand CSV, an AMC's
+// blocks of lines.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +13,8 @@
 namespace posed::drivers {
 
 // Device time is the clip's: frame n, counted over all loops and with the frames that could not be
-// read, is at n / rate.
+// read, is at n / rate. A hand CSV's frames bring their times: one without comes a step after the
+// frame before, one that lies before the times already given begins the next round.
 class ClipDecoder final : public Decoder {
  public:
   explicit ClipDecoder(clip::ClipFormat format);
@@ -26,7 +28,8 @@ class ClipDecoder final : public Decoder {
   void begin_block(std::string_view line, Sink& sink) noexcept;
   void finish_frame(Sink& sink) noexcept;
   void drop_frame(Outcome outcome, Sink& sink) noexcept;
-  [[nodiscard]] std::int64_t next_time_ns() noexcept;
+  [[nodiscard]] std::int64_t next_time_ns(double given_s) noexcept;
+  [[nodiscard]] std::int64_t next_given_time_ns(double given_s) noexcept;
 
   clip::ClipFormat format_;
   std::vector<double> values_;  // [channels]
@@ -36,6 +39,10 @@ class ClipDecoder final : public Decoder {
   std::size_t lines_ = 0;       // complete ones in text_
   bool skipping_ = false;       // the open line is too long and already counted
   std::int64_t frames_ = 0;     // so far
+  // Of frames that bring their times:
+  std::int64_t last_ns_ = kNoTime_ns;   // time of the frame before
+  std::int64_t given_ns_ = kNoTime_ns;  // the last time that a frame brought
+  std::int64_t round_ns_ = 0;           // added to what the frames of this round bring
 };
 
 }  // namespace posed::drivers

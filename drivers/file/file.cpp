@@ -38,17 +38,22 @@ Result<Device> open(const Options& given) {
   const auto options = complete_options(file_driver(), given);
   if (!options) return std::unexpected(options.error());
   const std::string path = option<std::string>(*options, "path");
+  const std::string hand = option<std::string>(*options, "hand");
+  if (hand != "left" && hand != "right") return misuse("hand is left or right");
   const clip::ReadOptions read{.asf = option<std::string>(*options, "skeleton"),
                                .amc_rate_hz = option<double>(*options, "rate_hz"),
                                .metres_per_unit = std::nullopt,
-                               .profile = option<std::string>(*options, "profile")};
+                               .profile = option<std::string>(*options, "profile"),
+                               .hand = hand == "left" ? Side::kLeft : Side::kRight,
+                               .hand_shape = option<std::string>(*options, "hand_shape")};
   const auto clip = clip::open_text_clip(path, read);
   if (!clip) return std::unexpected(clip.error());
   auto description = describe((*clip)->description, path);
   if (!description) return std::unexpected(description.error());
   auto transport = FileTransport::open(frames_of(**clip), {.rate_hz = description->rate_hz,
                                                            .pace = option<double>(*options, "pace"),
-                                                           .loop = option<bool>(*options, "loop")});
+                                                           .loop = option<bool>(*options, "loop"),
+                                                           .time_s = (*clip)->time_s});
   if (!transport) {
     Error error = transport.error();
     error.file = path;
@@ -68,7 +73,7 @@ std::vector<OptionSpec> options() {
        .default_value = std::string(),
        .required = true,
        .is_path = true,
-       .help = "the clip, a .bvh or an .amc"},
+       .help = "the clip: a .bvh, an .amc or a hand as .csv"},
       {.name = "skeleton",
        .default_value = std::string(),
        .is_path = true,
@@ -83,6 +88,12 @@ std::vector<OptionSpec> options() {
       {.name = "profile",
        .default_value = std::string(),
        .help = "skeleton profile; left out, found by the joints' names"},
+      {.name = "hand",
+       .default_value = std::string("right"),
+       .help = "whose hand a .csv is: left or right"},
+      {.name = "hand_shape",
+       .default_value = std::string(kDefaultHandShape),
+       .help = "of a .csv's hand: a name in config/hands"},
   };
 }
 
@@ -90,7 +101,7 @@ std::vector<OptionSpec> options() {
 
 const Driver& file_driver() {
   static const Driver driver{.name = "file",
-                             .summary = "a BVH or AMC clip, played by its own clock",
+                             .summary = "a BVH or AMC clip or a hand CSV, played by its own clock",
                              .options = options(),
                              .open = open,
                              .make_decoder = make_decoder,

@@ -33,8 +33,15 @@ Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks, const Play
                   std::to_string(kMaxChunk) + " bytes, so it cannot be played");
     }
   }
-  return std::unique_ptr<Transport>(
-      new FileTransport(std::move(chunks), *period_ns, playback.loop));
+  return std::unique_ptr<Transport>(new FileTransport(std::move(chunks), *period_ns, playback));
+}
+
+FileTransport::FileTransport(Chunks chunks, double period_ns, const Playback& playback)
+    : chunks_(std::move(chunks)), period_ns_(period_ns), loop_(playback.loop) {
+  if (playback.pace == 0.0 || playback.time_s.size() != chunks_.count()) return;
+  const double begin_s = playback.time_s.front();
+  for (const double t : playback.time_s) due_ns_.push_back((t - begin_s) * 1e9 / playback.pace);
+  round_ns_ = due_ns_.back() + period_ns_;
 }
 
 Result<> FileTransport::start(std::int64_t now_ns) {
@@ -44,7 +51,10 @@ Result<> FileTransport::start(std::int64_t now_ns) {
 
 // RT-safe.
 std::int64_t FileTransport::next_due_ns() const noexcept {
-  return start_ns_ + std::llround(static_cast<double>(given_) * period_ns_);
+  if (due_ns_.empty()) return start_ns_ + std::llround(static_cast<double>(given_) * period_ns_);
+  const std::uint64_t round = given_ / due_ns_.size();
+  return start_ns_ +
+         std::llround(static_cast<double>(round) * round_ns_ + due_ns_[given_ % due_ns_.size()]);
 }
 
 // RT-safe.

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/chunks.hpp"
@@ -13,10 +14,13 @@ struct Playback {
   double rate_hz = 0.0;  // of the recording, in chunks
   double pace = 1.0;     // of its clock; 0 is as fast as it can be used
   bool loop = true;
+  // When each chunk is due on the recording's clock [s], increasing; empty: evenly at rate_hz.
+  std::vector<double> time_s{};
 };
 
-// Chunk n is due n / (rate * pace) after start(), on an absolute schedule: what was late once does
-// not stay late, nothing drifts, and after a stop of the process all that fell due comes at once.
+// Chunk n is due n / (rate * pace) after start(), or at its own time / pace, on an absolute
+// schedule (a round after the last chunk's time comes one step later): what was late once does not
+// stay late, nothing drifts, and after a stop of the process all that fell due comes at once.
 class FileTransport final : public Transport {
  public:
   // At least one chunk, none longer than kMaxChunk. An impossible pace or rate is misuse.
@@ -34,12 +38,13 @@ class FileTransport final : public Transport {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 
  private:
-  FileTransport(Chunks chunks, double period_ns, bool loop)
-      : chunks_(std::move(chunks)), period_ns_(period_ns), loop_(loop) {}
+  FileTransport(Chunks chunks, double period_ns, const Playback& playback);
 
   Chunks chunks_;
   double period_ns_;  // 0: always due
   bool loop_;
+  std::vector<double> due_ns_;  // [chunk] after the round's begin; empty: evenly
+  double round_ns_ = 0.0;       // how long a round lasts
   std::int64_t start_ns_ = 0;
   std::uint64_t given_ = 0;  // chunks, over all loops
 };

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "drivers/driver.hpp"
+#include "proto/frame/hand.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
@@ -22,6 +23,20 @@ constexpr std::string_view kAsf =
     ":version 1.10\n:units\nlength 0.45\nangle deg\n:root\norder TX TY TZ RX RY RZ\naxis XYZ\n"
     "position 0 0 0\norientation 0 0 0\n:bonedata\nbegin\nid 1\nname b\ndirection 1 0 0\n"
     "length 5\naxis 0 0 20 XYZ\ndof rx ry\nend\n:hierarchy\nbegin\nroot b\nend\n";
+
+std::string hand_description() {
+  std::string text =
+      "posed-clip csv rate_hz=30 metres_per_unit=0.01 root_joint=0 asf_bytes=0 "
+      "hand=left shape=adult\ntime_s";
+  for (const std::string_view finger : posed::kFingerNames) {
+    for (const char joint : {'1', '2', '3'}) {
+      for (const char axis : {'x', 'y', 'z'}) {
+        text += ',' + std::string(finger) + joint + '_' + axis + "_rad";
+      }
+    }
+  }
+  return text + "\n0" + std::string(posed::kHandChannels, ',') + '\n';
+}
 
 std::string amc_description() {
   return "posed-clip amc rate_hz=120 metres_per_unit=0.056 root_joint=0 asf_bytes=" +
@@ -79,7 +94,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span bytes = std::as_bytes(std::span(data + 2, size - 2));
   const std::size_t piece = 1U + data[1];
   const std::string text(reinterpret_cast<const char*>(data + 2), size - 2);
-  switch (data[0] % 5) {
+  switch (data[0] % 6) {
     case 0:
       try_bytes("file", std::string(kBvh), piece, bytes);
       break;
@@ -90,6 +105,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       try_bytes("template", "BEND1 rate=100", piece, bytes);
       break;
     case 3:
+      try_bytes("file", hand_description(), piece, bytes);
+      break;
+    case 4:
       (void)decoder_of("template", text);
       break;
     default:

@@ -23,6 +23,7 @@ std::vector<Specimen> make_specimens() {
   const auto bvh = scratch_file("small.bvh", small_bvh());
   const auto amc = scratch_file("01_02.amc", small_amc());
   const auto asf = scratch_file("small.asf", small_asf());
+  const auto hand = scratch_file("hand.csv", small_hand_csv());
   return {
       {.name = "file, bvh",
        .driver = "file",
@@ -32,6 +33,11 @@ std::vector<Specimen> make_specimens() {
       {.name = "file, amc",
        .driver = "file",
        .options = {{"path", amc.string()}, {"skeleton", asf.string()}, {"pace", 0.0}},
+       .loop_chunks = 5,
+       .chunk_frames = 1},
+      {.name = "file, hand csv",
+       .driver = "file",
+       .options = {{"path", hand.string()}, {"pace", 0.0}, {"hand", std::string("left")}},
        .loop_chunks = 5,
        .chunk_frames = 1},
       {.name = "template",
@@ -164,6 +170,21 @@ std::string small_amc() {
             " -5 6\nltibia 2" + n + "\n";
   }
   return text;
+}
+
+std::string small_hand_csv() {
+  std::string text = "time_s";
+  for (const std::string finger : {"thumb", "index", "middle", "ring", "little"}) {
+    for (const std::string joint : {"1", "2", "3"}) {
+      for (const std::string axis : {"x", "y", "z"})
+        text += "," + finger + joint + "_" + axis + "_rad";
+    }
+  }
+  for (int i = 0; i < 5; ++i) {
+    text += "\n" + std::to_string(i / 50.0);
+    for (int k = 0; k < 45; ++k) text += "," + std::to_string(0.01 * k * (i + 1));
+  }
+  return text + "\n";
 }
 
 }  // namespace posed::test

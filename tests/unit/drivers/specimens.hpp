@@ -34,5 +34,7 @@ struct Specimen {
 [[nodiscard]] std::string small_bvh();
 [[nodiscard]] std::string small_asf();
 [[nodiscard]] std::string small_amc();
+// A hand at 50 Hz, every angle another.
+[[nodiscard]] std::string small_hand_csv();
 
 }  // namespace posed::test
