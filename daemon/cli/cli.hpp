@@ -31,6 +31,8 @@ void add_top(CLI::App& app, int& exit_code);
 void add_keygen(CLI::App& app, int& exit_code);
 void add_completion(CLI::App& app, int& exit_code);
 void add_train(CLI::App& app, int& exit_code);
+void add_train_gesture(CLI::App& train, int& exit_code);
+void add_train_style(CLI::App& train, int& exit_code);
 void add_apply(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);

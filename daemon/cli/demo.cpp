@@ -18,7 +18,7 @@
 #include "daemon/cli/client.hpp"
 #include "daemon/cli/demo_clips.hpp"
 #include "daemon/cli/live_view.hpp"
-#include "daemon/cli/train.hpp"
+#include "daemon/cli/train_style.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/daemon.hpp"
 

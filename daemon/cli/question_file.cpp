@@ -1,0 +1,87 @@
+#include "daemon/cli/question_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+
+#include <toml++/toml.h>
+
+#include "daemon/config/toml_reader.hpp"
+
+namespace posed::cli {
+namespace {
+
+constexpr std::array<const char*, gesture::kClasses> kClassNames{"A", "B", "C"};
+
+void read_fingers(const toml::table& root, config::Findings& findings, gesture::ClassLists& lists) {
+  config::TableReader reader(root, "", findings);
+  for (int finger = 0; finger < kFingers; ++finger) {
+    const std::string name(kFingerNames[finger]);
+    auto table = reader.table(name);
+    if (!table) {
+      if (findings.errors.empty()) findings.blame(1, "there is no table [" + name + "]; add it");
+      continue;
+    }
+    for (int k = 0; k < gesture::kClasses; ++k) table->read(kClassNames[k], lists[finger][k]);
+    table->finish();
+  }
+  reader.finish();
+}
+
+// A name as it stands between quotes in TOML; names have no control characters.
+std::string quoted(const std::string& name) {
+  std::string out = "\"";
+  for (const char c : name) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + "\"";
+}
+
+}  // namespace
+
+Result<std::vector<gesture::Label>> read_questions(const std::filesystem::path& path) {
+  config::Findings findings{path.string(), {}, {}};
+  gesture::ClassLists lists;
+  try {
+    read_fingers(toml::parse_file(path.string()), findings, lists);
+  } catch (const toml::parse_error& error) {
+    findings.blame(static_cast<int>(error.source().begin.line),
+                   "the questions file cannot be read: " + std::string(error.description()));
+  }
+  if (!findings.errors.empty()) {
+    return std::unexpected(*std::ranges::min_element(findings.errors, {}, &Error::line));
+  }
+  auto labels = gesture::labels_of(lists);
+  if (!labels) return misuse(labels.error().message, path.string());
+  if (labels->empty()) return misuse("no gesture is in any class", path.string());
+  return labels;
+}
+
+Result<> write_questions(const std::vector<gesture::Label>& labels,
+                         const std::filesystem::path& path) {
+  std::ofstream stream(path, std::ios::binary | std::ios::trunc);
+  stream
+      << "# Proposed by `posed train gesture`: k-means of each finger's pose, A the most closed.\n"
+         "# Correct it, then train with --questions; config/gestures/gcp134.toml explains.\n";
+  const gesture::ClassLists lists = gesture::lists_of(labels);
+  for (int finger = 0; finger < kFingers; ++finger) {
+    stream << "\n[" << kFingerNames[finger] << "]\n";
+    for (int k = 0; k < gesture::kClasses; ++k) {
+      stream << kClassNames[k] << " = [";
+      const auto& names = lists[finger][k];
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        stream << (i == 0 ? "" : ", ") << quoted(names[i]);
+      }
+      stream << "]\n";
+    }
+  }
+  stream.close();
+  if (!stream) {
+    return fail("the questions cannot be written; check the folder and the disk's free space",
+                path.string());
+  }
+  return {};
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,227 @@
+#include "daemon/cli/train_gesture.hpp"
+
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/auto_label.hpp"
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/progress.hpp"
+#include "daemon/cli/question_file.hpp"
+#include "daemon/cli/tree_options.hpp"
+#include "models/gesture/model_file.hpp"
+#include "proto/clip/hand_clip.hpp"
+
+namespace posed::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kFooter = R"(Examples:
+  posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture
+  posed train gesture --clip a.csv b.csv --labels a.lab b.lab --questions mine.toml --out h.gesture
+  posed train gesture --clip take1.csv --labels take1.lab --show ok=ok_pose.csv --out h.gesture
+  posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture \
+      --tree-svg tree.svg --trees middle:4
+
+A label file has a line a gesture, `start end name`, in seconds from the first frame (or HTK's
+100 ns). Label two gestures of each name by hand and let the rest be proposed:
+  posed train gesture --auto-label --clip take1.csv --labels few.lab --out take1.lab)";
+
+struct Options {
+  std::vector<std::string> clips, labels, shows;
+  std::string questions, propose, out;
+  double rate_hz = 30.0;
+  int embedded_rounds = 0;
+  bool auto_label = false;
+  bool json = false;
+  std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
+};
+
+Result<> check(const Options& options) {
+  if (options.clips.size() != options.labels.size()) {
+    return misuse("name one label file for each clip: --clip A.csv B.csv --labels A.lab B.lab");
+  }
+  if (!options.questions.empty() && !options.propose.empty()) {
+    return misuse("--propose-questions makes the classes that --questions reads; name one of them");
+  }
+  if (options.auto_label && options.clips.size() != 1) {
+    return misuse("--auto-label proposes labels for one clip at a time");
+  }
+  return check_tree_options(*options.trees);
+}
+
+// "ok=ok_pose.csv": the pose is the mean of the clip.
+Result<gesture::LabelPose> shown_pose(const std::string& show, double rate_hz) {
+  const auto equals = show.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == show.size()) {
+    return misuse("'" + show + "' shows no pose; write --show NAME=POSE.csv");
+  }
+  const auto clip = clip::read_hand_clip(show.substr(equals + 1));
+  if (!clip) return std::unexpected(clip.error());
+  const auto recording = gesture::recording_of(*clip, rate_hz);
+  if (!recording) return std::unexpected(recording.error());
+  gesture::LabelPose pose{show.substr(0, equals), {}};
+  const Eigen::RowVectorXd mean = recording->angles_rad.colwise().mean();
+  std::copy(mean.begin(), mean.end(), pose.angles_rad.begin());
+  return pose;
+}
+
+// The classes of every label: from the file, proposed, or built in; then the shown poses.
+Result<std::vector<gesture::Label>> classes(const Options& options,
+                                            const std::vector<gesture::Recording>& recordings) {
+  std::vector<gesture::Label> labels = gesture::built_in_labels();
+  const auto poses = gesture::label_poses(recordings);
+  if (!options.questions.empty()) {
+    auto read = read_questions(options.questions);
+    if (!read) return read;
+    labels = std::move(*read);
+  } else if (!options.propose.empty()) {
+    labels = gesture::propose_labels(poses);
+    if (auto written = write_questions(labels, options.propose); !written) {
+      return std::unexpected(written.error());
+    }
+  }
+  for (const std::string& show : options.shows) {
+    const auto shown = shown_pose(show, options.rate_hz);
+    if (!shown) return std::unexpected(shown.error());
+    const gesture::Label label = gesture::label_like(*shown, poses, labels);
+    std::erase_if(labels, [&](const gesture::Label& known) { return known.name == label.name; });
+    labels.push_back(label);
+  }
+  // A shown name must be a label too.
+  return gesture::labels_of(gesture::lists_of(labels));
+}
+
+void print_summary(const json& report, const std::string& out) {
+  std::printf("%d gestures, %d frames, %d contexts, %d moving channels; leaves a state:\n",
+              report["gestures"].get<int>(), report["frames"].get<int>(),
+              report["contexts"].get<int>(), report["moving_channels"].get<int>());
+  std::printf("%-8s", "state");
+  for (const auto finger : kFingerNames) std::printf("%8s", std::string(finger).c_str());
+  for (const json& state : report["leaves_by_state"]) {
+    std::printf("\n%-8d", state["state"].get<int>());
+    for (const auto finger : kFingerNames) {
+      std::printf("%8d", state[std::string(finger)].get<int>());
+    }
+  }
+  std::printf("\n%d leaves in 25 trees, %d of durations\n", report["leaves"].get<int>(),
+              report["duration_leaves"].get<int>());
+  std::printf(
+      "%s written after %.2f s; try: posed synth --model %s --labels \"g 1 c 3 4 p\" "
+      "--out hand.csv\n",
+      out.c_str(), report["seconds"].get<double>(), out.c_str());
+}
+
+Result<json> train(const Options& options) {
+  std::vector<gesture::Recording> recordings;
+  for (std::size_t i = 0; i < options.clips.size(); ++i) {
+    auto recording = load_recording(options.clips[i], options.labels[i], options.rate_hz);
+    if (!recording) return std::unexpected(recording.error());
+    recordings.push_back(std::move(*recording));
+  }
+  auto labels = classes(options, recordings);
+  if (!labels) return std::unexpected(labels.error());
+  gesture::TrainOptions train_options;
+  train_options.labels = std::move(*labels);
+  train_options.embedded_rounds = options.embedded_rounds;
+  const auto training = train_gesture_and_save(recordings, std::move(train_options), options.out);
+  if (!training) return std::unexpected(training.error());
+  if (auto drawn = draw_trees(training->model, *options.trees); !drawn) {
+    return std::unexpected(drawn.error());
+  }
+  json report = json::parse(training->model.report_json);
+  report["seconds"] = training->seconds;
+  report["out"] = options.out;
+  return report;
+}
+
+int run(const Options& options) {
+  if (auto checked = check(options); !checked) return report(checked.error());
+  if (options.auto_label) {
+    return auto_label(
+        {options.clips[0], options.labels[0], options.out, options.rate_hz, options.json});
+  }
+  const auto trained = train(options);
+  if (!trained) return report(trained.error());
+  for (const json& warning : (*trained)["warnings"]) {
+    std::fprintf(stderr, "posed: warning: %s\n", warning.get<std::string>().c_str());
+  }
+  if (options.json) {
+    std::printf("%s\n", trained->dump(2).c_str());
+  } else {
+    print_summary(*trained, options.out);
+  }
+  return 0;
+}
+
+}  // namespace
+
+Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
+                                          const std::filesystem::path& labels, double rate_hz) {
+  const auto hand = clip::read_hand_clip(clip);
+  if (!hand) return std::unexpected(hand.error());
+  for (const std::string& warning : hand->warnings) {
+    std::fprintf(stderr, "posed: warning: %s: %s\n", clip.c_str(), warning.c_str());
+  }
+  auto recording = gesture::recording_of(*hand, rate_hz);
+  if (!recording) return std::unexpected(recording.error());
+  const auto segments = clip::read_labels(labels);
+  if (!segments) return std::unexpected(segments.error());
+  if (auto done = gesture::cut(*recording, *segments, labels.string()); !done) {
+    return std::unexpected(done.error());
+  }
+  return recording;
+}
+
+Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Recording>& recordings,
+                                               gesture::TrainOptions options,
+                                               const std::filesystem::path& out) {
+  ProgressBar bar;
+  options.progress = [&bar](std::string_view step, double fraction) {
+    return bar.show(step, fraction);
+  };
+  auto model = gesture::train_gesture(recordings, options);
+  if (!model) return std::unexpected(model.error());
+  const double seconds = bar.elapsed_s();
+  if (auto saved = gesture::save_model(*model, out); !saved) {
+    return std::unexpected(saved.error());
+  }
+  return GestureTraining{std::move(*model), seconds};
+}
+
+void add_train_gesture(CLI::App& train_command, int& exit_code) {
+  CLI::App* command =
+      train_command.add_subcommand("gesture", "Learn a hand's gestures from labelled recordings");
+  command->footer(kFooter);
+  const auto options = std::make_shared<Options>();
+  command->add_option("--clip", options->clips, "Hand recordings (CSV, or BVH with fingers)")
+      ->required();
+  command->add_option("--labels", options->labels, "Their label files, in the same order")
+      ->required();
+  command->add_option("--questions", options->questions,
+                      "TOML file of the fingers' classes; without it the set g c p 1 3 4");
+  command->add_option("--propose-questions", options->propose,
+                      "Sort the recorded gestures into classes, write them here and use them");
+  command->add_option("--show", options->shows,
+                      "NAME=POSE.csv: a gesture not recorded, classes from the nearest poses");
+  command->add_option("--rate", options->rate_hz, "Frames per second to learn at")
+      ->check(CLI::Range(10.0, 1000.0))
+      ->capture_default_str();
+  command
+      ->add_option("--embedded-rounds", options->embedded_rounds,
+                   "Rounds in which borders may move, where labels are coarse")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  command->add_flag("--auto-label", options->auto_label,
+                    "Train nothing: propose labels from few examples and write them to --out");
+  add_tree_options(*command, options->trees);
+  command->add_option("--out", options->out, "Where to write the model")->required();
+  command->add_flag("--json", options->json, "One JSON object on stdout");
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,32 @@
+// Training a gesture model with a progress bar: what `train gesture` and the demo share.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "models/gesture/gesture_model.hpp"
+#include "models/gesture/train.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::cli {
+
+// A clip with its labels, at the rate to learn at.
+[[nodiscard]] Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
+                                                        const std::filesystem::path& labels,
+                                                        double rate_hz);
+
+struct GestureTraining {
+  gesture::GestureModel model;
+  double seconds = 0.0;  // of the training itself
+};
+
+// Learns and writes the model to `out`. Draws progress on stderr; Ctrl-C ends it with an error and
+// no file.
+[[nodiscard]] Result<GestureTraining> train_gesture_and_save(
+    const std::vector<gesture::Recording>& recordings, gesture::TrainOptions options,
+    const std::filesystem::path& out);
+
+}  // namespace posed::cli

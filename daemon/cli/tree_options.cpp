@@ -1,0 +1,57 @@
+#include "daemon/cli/tree_options.hpp"
+
+#include <cstdio>
+#include <fstream>
+
+#include <CLI/CLI.hpp>
+
+#include "models/gesture/tree_drawing.hpp"
+
+namespace posed::cli {
+namespace {
+
+Result<> put(const std::string& text, const std::string& file) {
+  if (file == "-") {
+    std::fwrite(text.data(), 1, text.size(), stdout);
+    return {};
+  }
+  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
+  stream << text;
+  stream.close();
+  if (!stream) {
+    return fail("the drawing cannot be written; check the folder and the disk's free space", file);
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_tree_options(CLI::App& command, const std::shared_ptr<TreeOptions>& options) {
+  command.add_option("--tree-text", options->text, "Write the trees as text here; - is stdout");
+  command.add_option("--tree-dot", options->dot, "Write them as Graphviz source");
+  command.add_option("--tree-svg", options->svg, "Write them as a picture");
+  command.add_option("--trees", options->which, "Which: all, middle, 4 (a state) or middle:4")
+      ->capture_default_str();
+}
+
+Result<> check_tree_options(const TreeOptions& options) {
+  auto choice = gesture::tree_choice(options.which);
+  if (!choice) return std::unexpected(choice.error());
+  return {};
+}
+
+Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options) {
+  const auto choice = gesture::tree_choice(options.which);
+  if (!choice) return std::unexpected(choice.error());
+  using Draw = std::string (*)(const gesture::GestureModel&, const gesture::TreeChoice&);
+  const std::pair<const std::string&, Draw> drawings[]{{options.text, gesture::trees_text},
+                                                       {options.dot, gesture::trees_dot},
+                                                       {options.svg, gesture::trees_svg}};
+  for (const auto& [file, draw] : drawings) {
+    if (file.empty()) continue;
+    if (auto done = put(draw(model, *choice), file); !done) return done;
+  }
+  return {};
+}
+
+}  // namespace posed::cli
