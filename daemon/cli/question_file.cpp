@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
+#include <ostream>
+#include <utility>
 
 #include <toml++/toml.h>
 
 #include "daemon/config/toml_reader.hpp"
+#include "proto/clip/text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -60,28 +62,23 @@ Result<std::vector<gesture::Label>> read_questions(const std::filesystem::path& 
 
 Result<> write_questions(const std::vector<gesture::Label>& labels,
                          const std::filesystem::path& path) {
-  std::ofstream stream(path, std::ios::binary | std::ios::trunc);
-  stream
-      << "# Proposed by `posed train gesture`: k-means of each finger's pose, A the most closed.\n"
-         "# Correct it, then train with --questions; config/gestures/gcp134.toml explains.\n";
   const gesture::ClassLists lists = gesture::lists_of(labels);
-  for (int finger = 0; finger < kFingers; ++finger) {
-    stream << "\n[" << kFingerNames[finger] << "]\n";
-    for (int k = 0; k < gesture::kClasses; ++k) {
-      stream << kClassNames[k] << " = [";
-      const auto& names = lists[finger][k];
-      for (std::size_t i = 0; i < names.size(); ++i) {
-        stream << (i == 0 ? "" : ", ") << quoted(names[i]);
+  return clip::write_text(path, [&](std::ostream& out) {
+    out << "# Proposed by `posed train gesture`: k-means of each finger's pose, A the most "
+           "closed.\n"
+           "# Correct it, then train with --questions; config/gestures/gcp134.toml explains.\n";
+    for (int finger = 0; finger < kFingers; ++finger) {
+      out << "\n[" << kFingerNames[finger] << "]\n";
+      for (int k = 0; k < gesture::kClasses; ++k) {
+        out << kClassNames[k] << " = [";
+        const char* separator = "";
+        for (const std::string& name : lists[finger][k]) {
+          out << std::exchange(separator, ", ") << quoted(name);
+        }
+        out << "]\n";
       }
-      stream << "]\n";
     }
-  }
-  stream.close();
-  if (!stream) {
-    return fail("the questions cannot be written; check the folder and the disk's free space",
-                path.string());
-  }
-  return {};
+  });
 }
 
 }  // namespace posed::cli

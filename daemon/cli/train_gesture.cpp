@@ -14,6 +14,7 @@
 #include "daemon/cli/tree_options.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/clip/hand_clip.hpp"
+#include "proto/frame/label.hpp"
 
 namespace posed::cli {
 namespace {
@@ -57,8 +58,9 @@ Result<> check(const Options& options) {
 // "ok=ok_pose.csv": the pose is the mean of the clip.
 Result<gesture::LabelPose> shown_pose(const std::string& show, double rate_hz) {
   const auto equals = show.find('=');
-  if (equals == std::string::npos || equals == 0 || equals + 1 == show.size()) {
-    return misuse("'" + show + "' shows no pose; write --show NAME=POSE.csv");
+  if (equals == std::string::npos || !is_label_name(std::string_view(show).substr(0, equals))) {
+    return misuse("'" + show +
+                  "' shows no pose; write --show NAME=POSE.csv, NAME of 1 to 15 signs");
   }
   const auto clip = clip::read_hand_clip(show.substr(equals + 1));
   if (!clip) return std::unexpected(clip.error());
@@ -92,8 +94,7 @@ Result<std::vector<gesture::Label>> classes(const Options& options,
     std::erase_if(labels, [&](const gesture::Label& known) { return known.name == label.name; });
     labels.push_back(label);
   }
-  // A shown name must be a label too.
-  return gesture::labels_of(gesture::lists_of(labels));
+  return labels;
 }
 
 void print_summary(const json& report, const std::string& out) {

@@ -1,11 +1,12 @@
 #include "daemon/cli/tree_options.hpp"
 
 #include <cstdio>
-#include <fstream>
+#include <ostream>
 
 #include <CLI/CLI.hpp>
 
 #include "models/gesture/tree_drawing.hpp"
+#include "proto/clip/text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -15,13 +16,7 @@ Result<> put(const std::string& text, const std::string& file) {
     std::fwrite(text.data(), 1, text.size(), stdout);
     return {};
   }
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream << text;
-  stream.close();
-  if (!stream) {
-    return fail("the drawing cannot be written; check the folder and the disk's free space", file);
-  }
-  return {};
+  return clip::write_text(file, [&](std::ostream& out) { out << text; });
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <fstream>
+#include <ostream>
 
 #include "proto/clip/text.hpp"
 #include "proto/frame/label.hpp"
@@ -125,14 +125,7 @@ std::string labels_text(const std::vector<LabelSegment>& segments) {
 
 Result<> write_labels(const std::vector<LabelSegment>& segments,
                       const std::filesystem::path& path) {
-  std::ofstream stream(path, std::ios::binary | std::ios::trunc);
-  stream << labels_text(segments);
-  stream.close();
-  if (!stream) {
-    return fail("the labels cannot be written; check the folder and the disk's free space",
-                path.string());
-  }
-  return {};
+  return write_text(path, [&](std::ostream& out) { out << labels_text(segments); });
 }
 
 }  // namespace posed::clip
