@@ -1,4 +1,5 @@
-// The demo: makes two families of walkers, learns the style between them, streams a walker it has
+// The demo: makes two families of walkers and a performer's glove recording, learns the style
+// between the one and the gestures of the other, streams a walker it has
 // not seen through the daemon and watches it as any client would, over ZeroMQ.
 #include <chrono>
 #include <cmath>
@@ -18,6 +19,7 @@
 #include "daemon/cli/client.hpp"
 #include "daemon/cli/demo_clips.hpp"
 #include "daemon/cli/live_view.hpp"
+#include "daemon/cli/train_gesture.hpp"
 #include "daemon/cli/train_style.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/daemon.hpp"
@@ -30,6 +32,7 @@ constexpr std::chrono::milliseconds kLookAround{50};
 constexpr double kRedrawEvery_s = 0.5;
 constexpr double kPlainLinesEvery_s = 5.0;
 constexpr double kFirstFrameWithin_s = 10.0;
+constexpr double kHandRate_hz = 30.0;
 
 struct DemoOptions {
   std::filesystem::path config = "config/demo.toml";
@@ -87,10 +90,11 @@ class Watcher {
 };
 
 Result<> prepare(const std::filesystem::path& folder) {
-  std::fprintf(stderr, "1/3 making two families of synthetic walkers in %s\n", folder.c_str());
+  std::fprintf(stderr, "1/4 making synthetic walkers and a synthetic performer in %s\n",
+               folder.c_str());
   const auto clips = make_demo_clips(folder);
   if (!clips) return std::unexpected(clips.error());
-  std::fprintf(stderr, "2/3 learning the style march -> sway from %zu clips\n",
+  std::fprintf(stderr, "2/4 learning the style march -> sway from %zu clips\n",
                clips->from.size() + clips->to.size());
   Experiment experiment;
   experiment.target = "sway";
@@ -102,6 +106,11 @@ Result<> prepare(const std::filesystem::path& folder) {
   }
   const auto report = train_and_save(experiment, 0, folder / kDemoModel);
   if (!report) return std::unexpected(report.error());
+  std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
+  const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);
+  if (!recording) return std::unexpected(recording.error());
+  const auto hand = train_gesture_and_save({*recording}, {}, folder / kDemoHand);
+  if (!hand) return std::unexpected(hand.error());
   return {};
 }
 
@@ -164,7 +173,7 @@ Result<> stream(const DemoOptions& options) {
   auto daemon = pipeline::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
   if (auto started = (*daemon)->start(); !started) return started;
-  std::fprintf(stderr, "3/3 streaming %s (not learnt from) on %s\n", kDemoWalker,
+  std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
                (*daemon)->publish_endpoint().c_str());
   Watcher watcher;
   const auto watched = watch(**daemon, options, watcher);

@@ -2,7 +2,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "models/gesture/synthetic_performer.hpp"
 #include "models/motion/synthetic_walker.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/clip/lab.hpp"
 
 namespace posed::cli {
 namespace {
@@ -19,6 +22,20 @@ Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
     return std::unexpected(written.error());
   }
   return path;
+}
+
+// The glove that is learnt from, with labels, and a new person who performs g, c, p.
+Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
+  clips.glove = folder / "glove_train.csv";
+  clips.labels = folder / "glove_train.lab";
+  const auto learnt = gesture::make_performance({});
+  if (!learnt) return std::unexpected(learnt.error());
+  if (auto done = clip::write_hand_csv(learnt->clip, clips.glove); !done) return done;
+  if (auto done = clip::write_labels(learnt->labels, clips.labels); !done) return done;
+  const auto stranger = gesture::make_performance(
+      {.person = kNewPerson, .script = {"g", "c", "p", "g", "c", "p", "c", "g", "p", "c"}});
+  if (!stranger) return std::unexpected(stranger.error());
+  return clip::write_hand_csv(stranger->clip, folder / kDemoPerformer);
 }
 
 }  // namespace
@@ -43,6 +60,7 @@ Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
       folder / kDemoWalker,
       {.family = motion::WalkerFamily::kMarch, .person = kNewPerson, .seconds = kNewWalkSeconds});
   if (!stranger) return std::unexpected(stranger.error());
+  if (auto done = write_hands(folder, clips); !done) return std::unexpected(done.error());
   return clips;
 }
 

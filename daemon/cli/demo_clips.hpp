@@ -1,5 +1,5 @@
-// What the demo learns from and streams: synthetic walkers as BVH files, and the model made of
-// them.
+// What the demo learns from and streams: synthetic walkers as BVH files, a synthetic performer's
+// glove as CSV with labels, and the names of the models made of them.
 #pragma once
 
 #include <filesystem>
@@ -14,11 +14,17 @@ inline constexpr const char* kDemoModel = "march-to-sway.style";
 // The walker that is streamed and was not learnt from.
 inline constexpr const char* kDemoWalker = "new_walker.bvh";
 
+// The gesture model, learnt from g, c and p; and a performer whom it has not learnt from.
+inline constexpr const char* kDemoHand = "hand.gesture";
+inline constexpr const char* kDemoPerformer = "new_performer.csv";
+
 struct DemoClips {
-  std::vector<std::filesystem::path> from, to;
+  std::vector<std::filesystem::path> from, to;  // walks of the two families
+  std::filesystem::path glove, labels;          // 100 gestures of one performer
 };
 
-// Writes the clips of both families and the new walker into `folder`, which is made.
+// Writes the clips of both families and the new walker, the glove recording with its labels and the
+// new performer into `folder`, which is made.
 [[nodiscard]] Result<DemoClips> make_demo_clips(const std::filesystem::path& folder);
 
 }  // namespace posed::cli

@@ -104,8 +104,8 @@ class Picture {
       body_ += "<line x1=\"" + number(placed[i].x) + "\" y1=\"" + number(from) + "\" x2=\"" +
                number(placed[child].x) + "\" y2=\"" + number(to) + "\"/>\n";
       const bool yes = child == node.yes;
-      text(0.35 * placed[i].x + 0.65 * placed[child].x + (yes ? -14.0 : 12.0),
-           0.35 * from + 0.65 * to, yes ? "yes" : "no", "answer");
+      text(0.35 * placed[i].x + 0.65 * placed[child].x + (yes ? -16.0 : 14.0),
+           0.35 * from + 0.65 * to - 4.0, yes ? "yes" : "no", "answer");
     }
   }
 
