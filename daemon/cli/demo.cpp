@@ -1,6 +1,6 @@
 // The demo: makes two families of walkers and a performer's glove recording, learns the style
-// between the one and the gestures of the other, streams a walker it has
-// not seen through the daemon and watches it as any client would, over ZeroMQ.
+// between the families and the gestures of the glove, streams a walker it has not seen through the
+// daemon and watches it as any client would, over ZeroMQ.
 #include <chrono>
 #include <cmath>
 #include <cstdio>

@@ -6,18 +6,10 @@
 #include <span>
 #include <string>
 
-#include <zlib.h>
-
 #include "models/style/style_model.hpp"
+#include "tests/fuzz/model_envelope.hpp"
 
 namespace {
-
-template <typename T>
-void put(std::string& out, T value) {
-  for (std::size_t i = 0; i < sizeof(T); ++i) {
-    out.push_back(static_cast<char>((value >> (8 * i)) & 0xFF));
-  }
-}
 
 void try_bytes(const std::string& bytes) {
   const auto model = posed::style::parse_model(std::as_bytes(std::span(bytes)), "fuzz");
@@ -33,10 +25,6 @@ void try_bytes(const std::string& bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string input(reinterpret_cast<const char*>(data), size);
   try_bytes(input);
-  std::string framed = "POSEDMDL";
-  put<std::uint32_t>(framed, 1);
-  put<std::uint64_t>(framed, size);
-  put<std::uint32_t>(framed, static_cast<std::uint32_t>(crc32_z(0, data, size)));
-  try_bytes(framed + input);
+  try_bytes(posed::fuzz::as_model_file(input));
   return 0;
 }
