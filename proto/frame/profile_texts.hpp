@@ -1,4 +1,5 @@
-// The texts of config/skeletons/*.toml and config/hands/*.toml, which CMake writes into the binary (proto/CMakeLists.txt).
+// The texts of config/skeletons/*.toml and config/hands/*.toml, which CMake writes into the binary
+// (proto/CMakeLists.txt).
 #pragma once
 
 #include <span>
