@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "models/generate/live_options.hpp"
 #include "models/generate/speed_prior.hpp"
@@ -21,7 +22,6 @@ constexpr double kDeltaSlope = 0.1;                // [s], times the squared spe
 constexpr double kSpeedReach_s = 0.067;            // the speed's mean is over so much on each side
 constexpr double kHandShare = 0.1;                 // of the mean speed of all channels
 constexpr int kPasses = 2;
-constexpr double kNothing = 1e-9 / kDegree2;  // precision of a value that was not measured
 
 constexpr double kEven = 1e-3;  // a clock that is off by less is even
 
@@ -39,7 +39,9 @@ int window_frames(double period_s) noexcept {
 AdaptiveWindow::AdaptiveWindow(int channels)
     : channels_(channels),
       evidence_(channels, kMaxWindow),
+      sensed_(static_cast<std::size_t>(2 * kMaxWindow * evidence_.stride()), 1.0),
       window_(channels, kMaxWindow),
+      whole_(kMaxWindow),
       ring_time_s_(kMaxWindow),
       last_measured_(static_cast<std::size_t>(channels)),
       held_rad_(static_cast<std::size_t>(channels)),
@@ -80,22 +82,32 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
   const int at = static_cast<int>(pushed_ % kMaxWindow);
   ring_time_s_[static_cast<std::size_t>(at)] = time_s;
   evidence_.clear(at);
-  double* const position = evidence_.row(at, kPosition);
-  double* const mean = evidence_.row(at, kPositionMean);
+  whole_[static_cast<std::size_t>(at)] = 1;
+  double* const position = sensed_.data() + static_cast<std::ptrdiff_t>(2 * at) * stride();
+  double* const mean = position + stride();
   const double precision = 1.0 / (noise_rad * noise_rad);
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c) {
     const bool measured = std::isfinite(measured_rad[c]);
+    if (!measured) whole_[static_cast<std::size_t>(at)] = 0;
     if (measured) {
       if (last_measured_[c] < 0 && pushed_ > 0) adopt(c, measured_rad[c]);
       if (last_measured_[c] >= 0 && measured_rad[c] != held_rad_[c]) active_[c] = 1.0;
       held_rad_[c] = measured_rad[c];
       last_measured_[c] = pushed_;
     }
-    // Nothing at all would leave a channel that is missing in the whole window without a value.
+    // No precision at all would leave a channel that is missing in the whole window without a
+    // value.
     position[c] = measured ? precision : kNothing;
     mean[c] = position[c] * held_rad_[c];
   }
+  take_sensed(at);
   ++pushed_;
+}
+
+// RT-safe.
+void AdaptiveWindow::take_sensed(int slot) noexcept {
+  std::copy_n(sensed(slot), stride(), evidence_.row(slot, kPosition));
+  std::copy_n(sensed(slot) + stride(), stride(), evidence_.row(slot, kPositionMean));
 }
 
 // A channel that is measured for the first time was there before, too: its earlier frames hold the
@@ -103,7 +115,9 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
 void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   const long from = std::max<long>(0, pushed_ - kMaxWindow + 1);
   for (long i = from; i < pushed_; ++i) {
-    evidence_.row(static_cast<int>(i % kMaxWindow), kPositionMean)[channel] = kNothing * value_rad;
+    const int at = static_cast<int>(i % kMaxWindow);
+    sensed_[static_cast<std::size_t>((2 * at + 1) * stride()) + channel] = kNothing * value_rad;
+    take_sensed(at);
   }
 }
 
@@ -124,6 +138,17 @@ void AdaptiveWindow::begin(double period_s) noexcept {
     const double after_s = step_s_[index + 1];
     skew_[index] = (after_s - before_s) / (after_s + before_s);
     even_ = even_ && std::abs(skew_[index]) < kEven;
+  }
+}
+
+// What the last solve was told beyond the sensors. The precisions of deltas and curves are written
+// anew each time, their means are zero otherwise. RT-safe.
+void AdaptiveWindow::forget_extra() noexcept {
+  if (!std::exchange(extra_, false)) return;
+  for (int i = 0; i < frames_; ++i) {
+    take_sensed(slot(i));
+    std::fill_n(evidence_.row(slot(i), kDeltaMean), stride(), 0.0);
+    std::fill_n(evidence_.row(slot(i), kCurveMean), stride(), 0.0);
   }
 }
 
@@ -186,13 +211,19 @@ void AdaptiveWindow::solve_once(double period_s) noexcept {
 }
 
 // RT-safe.
-void AdaptiveWindow::solve(double period_s) noexcept {
+void AdaptiveWindow::solve(double period_s, WindowEvidence* extra) noexcept {
   solve_once(period_s);
   if (frames_ < 3) return;  // no window fits: what was measured is all there is
   for (int pass = 0; pass < kPasses; ++pass) {
     speed_prior();
+    forget_extra();
+    if (extra != nullptr) {
+      extra->add(*this);
+      extra_ = true;
+    }
     run();
   }
+  forget_extra();
 }
 
 // Curve's variance over q: a second difference in time units, squared, over the time it stands for

@@ -7,6 +7,7 @@
 
 #include "models/generate/adaptive_window.hpp"
 #include "models/generate/frame_clock.hpp"
+#include "models/generate/live_evidence.hpp"
 #include "models/generate/noise_estimate.hpp"
 #include "models/generate/unwrap.hpp"
 #include "proto/frame/rotation.hpp"
@@ -54,6 +55,7 @@ struct LiveSmoother::State {
   void emit_until(long last, Emit& emit) noexcept;
   void rebuild(Frame& frame, int back) noexcept;
   void turn_joints(Frame& frame) noexcept;
+  void name_gesture(Frame& frame, int back) const noexcept;
   void forget() noexcept;
 
   Skeleton skeleton;
@@ -63,6 +65,8 @@ struct LiveSmoother::State {
   FrameClock clock;
   NoiseEstimate noise;
   AdaptiveWindow window;
+  Recogniser recogniser{kMaxWindow};
+  LiveEvidence live_evidence{recogniser};
   std::vector<double> measured;  // [channels] of the frame at hand
   hwy::AlignedFreeUniquePtr<double[]> variance;
   std::vector<std::size_t> angle_value;  // where a rotation channel stands in all channels
@@ -74,8 +78,11 @@ struct LiveSmoother::State {
   double last_s = 0.0;
 };
 
-LiveSmoother::LiveSmoother(const Skeleton& skeleton, const LiveOptions& options)
-    : state_(std::make_unique<State>(skeleton, options)) {}
+LiveSmoother::LiveSmoother(const Skeleton& skeleton, const LiveOptions& options,
+                           const LiveModel* model)
+    : state_(std::make_unique<State>(skeleton, options)) {
+  state_->recogniser.set_model(model);
+}
 LiveSmoother::~LiveSmoother() = default;
 
 // RT-safe.
@@ -99,6 +106,7 @@ void LiveSmoother::State::measure(const Frame& frame) noexcept {
 void LiveSmoother::State::forget() noexcept {
   unwrap.reset();
   window.reset();
+  recogniser.reset();
 }
 
 // RT-safe.
@@ -123,9 +131,14 @@ void LiveSmoother::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) no
   const double period_s = s.clock.period_s();
   if (s.taken - s.emitted >= window_frames(period_s)) flush(emit);  // the beat became much slower
   s.measure(*in);
-  if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, step_s < kEvenStep * period_s);
+  const bool even = step_s < kEvenStep * period_s;
+  if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, even);
   s.window.push(now_s, s.measured, noise_rad());
-  s.window.solve(period_s);
+  if (s.recogniser.model() != nullptr) {
+    s.recogniser.push(s.measured, even, period_s, noise_rad());
+    s.recogniser.sweep(window_frames(period_s));
+  }
+  s.window.solve(period_s, s.recogniser.model() != nullptr ? &s.live_evidence : nullptr);
   s.pending[static_cast<std::size_t>(s.taken % kMaxPending)] = *in;
   ++s.taken;
   // Until the beat is known a lag in time is no number of frames yet: the first frames wait.
@@ -145,6 +158,13 @@ void LiveSmoother::reset() noexcept {
   s.clock = FrameClock();
   s.emitted = s.taken = 0;
   s.last_s = 0.0;
+}
+
+// RT-safe.
+const LiveModel* LiveSmoother::set_model(const LiveModel* model) noexcept {
+  const LiveModel* const before = state_->recogniser.model();
+  state_->recogniser.set_model(model);
+  return before;
 }
 
 // RT-safe.
@@ -187,6 +207,14 @@ void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
     ++c;
   }
   turn_joints(frame);
+  if (recogniser.model() != nullptr) name_gesture(frame, back);
+}
+
+// RT-safe.
+void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
+  const Recogniser::Answer answer = recogniser.label(back);
+  frame.label = recogniser.model()->labels[static_cast<std::size_t>(answer.label)];
+  frame.label_probability = static_cast<float>(answer.probability);
 }
 
 // Rotations from channels; a joint counts as valid when all its channels are known. RT-safe.

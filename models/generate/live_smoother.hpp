@@ -17,6 +17,7 @@
 #include <memory>
 #include <span>
 
+#include "models/generate/live_model.hpp"
 #include "models/generate/live_options.hpp"
 #include "proto/frame/sink.hpp"
 #include "proto/frame/skeleton.hpp"
@@ -25,8 +26,9 @@ namespace posed::generate {
 
 class LiveSmoother final : public Stage {
  public:
-  // Allocates all it will ever need.
-  LiveSmoother(const Skeleton& skeleton, const LiveOptions& options);
+  // Allocates all it will ever need. `model` is bound to the same skeleton, not owned, may be null.
+  LiveSmoother(const Skeleton& skeleton, const LiveOptions& options,
+               const LiveModel* model = nullptr);
   ~LiveSmoother() override;
 
   // Emits none, one or several frames: those that are `lag` behind `in` and have not gone out. An
@@ -41,6 +43,9 @@ class LiveSmoother final : public Stage {
 
   // Forgets the past: the next frame is a first one. RT-safe.
   void reset() noexcept;
+
+  // From the next frame on; returns the model before. RT-safe.
+  const LiveModel* set_model(const LiveModel* model) noexcept;
 
   // Posterior variance of the frame that was emitted last, [rad^2], one a rotation channel in the
   // order of Frame::angle_rad; infinite where nothing is known. Valid within Emit::frame and until
