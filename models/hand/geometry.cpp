@@ -1,0 +1,64 @@
+#include "models/hand/geometry.hpp"
+
+#include <cmath>
+
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::hand {
+namespace {
+
+// RT-safe.
+void place_finger(const FingerGeometry& finger, const double* angles, Eigen::Vector3d* from_m,
+                  Eigen::Vector3d* to_m, Eigen::Vector3d* axis) noexcept {
+  Eigen::Matrix3d turned = finger.frame;  // columns: the channels' axes in the wrist's frame
+  Eigen::Vector3d at_m = finger.base_m;
+  const Eigen::Vector3d along = finger.frame.transpose() * finger.along;
+  for (int j = 0; j < kFingerJoints; ++j) {
+    const double* const q = angles + 3 * j;  // x, y, z
+    const auto turn = [&turned](int u, int v, double angle_rad) {
+      const double c = std::cos(angle_rad);
+      const double s = std::sin(angle_rad);
+      const Eigen::Vector3d before = turned.col(u);
+      turned.col(u) = c * before + s * turned.col(v);
+      turned.col(v) = c * turned.col(v) - s * before;
+    };
+    axis[3 * j + 2] = turned.col(2);
+    turn(0, 1, q[2]);
+    axis[3 * j] = turned.col(0);
+    turn(1, 2, q[0]);
+    axis[3 * j + 1] = turned.col(1);
+    turn(2, 0, q[1]);
+    from_m[j] = at_m;
+    at_m += turned * along * finger.length_m[j];
+    to_m[j] = at_m;
+  }
+}
+
+}  // namespace
+
+HandGeometry hand_geometry(const HandShape& shape) {
+  HandGeometry geometry;
+  for (int f = 0; f < kFingers; ++f) {
+    const FingerShape& form = shape.fingers[f];
+    geometry.fingers[f] = {.base_m = form.base_m,
+                           .frame = channel_frame(Side::kRight, shape, f).toRotationMatrix(),
+                           .along = form.frame * Eigen::Vector3d::UnitZ(),
+                           .length_m = form.length_m,
+                           .radius_m = form.radius_m};
+    for (int c = 0; c < kFingerChannels; ++c) {
+      const AngleRange& range = form.range[c / 3][c % 3];
+      geometry.low_rad[kFingerChannels * f + c] = range.min_rad;
+      geometry.high_rad[kFingerChannels * f + c] = range.max_rad;
+    }
+  }
+  return geometry;
+}
+
+void place(const HandGeometry& geometry, const HandAngles& angles, HandPose& pose) noexcept {
+  for (int f = 0; f < kFingers; ++f) {
+    place_finger(geometry.fingers[f], &angles[kFingerChannels * f], &pose.from_m[kFingerJoints * f],
+                 &pose.to_m[kFingerJoints * f], &pose.axis[kFingerChannels * f]);
+  }
+}
+
+}  // namespace posed::hand

@@ -1,0 +1,42 @@
+// The bones of a hand as capsules that move with its 45 angles: forward kinematics and the axis
+// that each angle turns about. Right hand, in the wrist's frame, metres; a left hand's bones lie as
+// their mirror image, so distances are the same.
+#pragma once
+
+#include <array>
+
+#include <Eigen/Geometry>
+
+#include "proto/frame/hand.hpp"
+#include "proto/frame/hand_shape.hpp"
+
+namespace posed::hand {
+
+struct FingerGeometry {
+  Eigen::Vector3d base_m = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // in which the channels turn
+  Eigen::Vector3d along = Eigen::Vector3d::UnitZ();     // where the straight bones point
+  std::array<double, kFingerJoints> length_m{};
+  std::array<double, kFingerJoints> radius_m{};
+};
+
+struct HandGeometry {
+  std::array<FingerGeometry, kFingers> fingers;
+  HandAngles low_rad{};
+  HandAngles high_rad{};
+};
+
+// Cold.
+[[nodiscard]] HandGeometry hand_geometry(const HandShape& shape);
+
+// A hand in one pose. Bone b = 3 finger + joint runs from its joint to the next one or the tip.
+struct HandPose {
+  std::array<Eigen::Vector3d, kHandJoints> from_m;
+  std::array<Eigen::Vector3d, kHandJoints> to_m;
+  std::array<Eigen::Vector3d, kHandChannels> axis;  // unit; of each angle, as it is turned now
+};
+
+// R = Rz(twist) Rx(flexion) Ry(spread) down each finger. RT-safe.
+void place(const HandGeometry& geometry, const HandAngles& angles, HandPose& pose) noexcept;
+
+}  // namespace posed::hand

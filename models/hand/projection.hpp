@@ -1,0 +1,42 @@
+// The quadratic step of the constraint stage: the point nearest to a target, in a metric, that
+// keeps linear constraints and a box (algorithms.md 5.1). Dual Gauss-Seidel: each constraint pushes
+// with a force of its own that is never below zero; forces are kept between calls as a warm start.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "models/hand/contacts.hpp"
+
+namespace posed::hand {
+
+inline constexpr int kMaxRows = 40;
+
+// slope * y >= least, y the 45 angles; the slope touches two fingers only.
+struct Row {
+  int pair = 0;
+  int finger_a = 0;
+  int finger_b = 0;
+  GapSlope slope;
+  double least = 0.0;
+};
+
+// Forces: [pair] of the contacts, [channel] of the box.
+struct Forces {
+  std::array<double, kBonePairs> contact{};
+  HandAngles low{};
+  HandAngles high{};
+};
+
+struct Box {
+  const HandAngles& low_rad;
+  const HandAngles& high_rad;
+};
+
+// min (y - target)' diag(1/variance) (y - target) with all `rows` kept and, where `box` is given,
+// inside of it. Forces of pairs without a row count as none. RT-safe.
+[[nodiscard]] HandAngles project(const HandAngles& target, const HandAngles& variance,
+                                 std::span<const Row> rows, const Box* box,
+                                 Forces& forces) noexcept;
+
+}  // namespace posed::hand
