@@ -4,6 +4,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/file/file.hpp"
+#include "drivers/labels/labels.hpp"
 #include "drivers/template/template.hpp"
 
 namespace posed::drivers {
@@ -11,6 +12,7 @@ namespace posed::drivers {
 std::span<const Driver> registry() {
   static const std::array drivers{
       file_driver(),
+      labels_driver(),
       template_driver(),
   };
   return drivers;

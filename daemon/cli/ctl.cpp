@@ -13,6 +13,7 @@
 #include "daemon/cli/json.hpp"
 #include "daemon/cli/live_view.hpp"
 #include "daemon/control/request_handler.hpp"
+#include "models/gesture/play_order.hpp"
 #include "posed/v1/control.pb.h"
 
 namespace posed::cli {
@@ -27,6 +28,9 @@ struct CtlOptions {
   std::string stream, parameter;
   float value = 0.0F;
   std::filesystem::path model;
+  std::string labels;
+  float tempo = 1.0F;
+  bool loop = false;
 };
 
 Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest& request) {
@@ -97,6 +101,24 @@ int send_model(const CtlOptions& options) {
   return ask_and_tell(options, request, tell_effect);
 }
 
+int play(const CtlOptions& options) {
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_play();
+  wanted.set_stream(options.stream);
+  for (std::string& label : gesture::split_labels(options.labels)) {
+    wanted.add_label(std::move(label));
+  }
+  wanted.set_tempo(options.tempo);
+  wanted.set_loop(options.loop);
+  return ask_and_tell(options, request, tell_effect);
+}
+
+int stop_playing(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_stop_playing()->set_stream(options.stream);
+  return ask_and_tell(options, request, tell_effect);
+}
+
 int show_status(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_status();
@@ -127,6 +149,10 @@ void add_ctl(CLI::App& app, int& exit_code) {
   command->footer(R"(Examples:
   posed ctl set walker alpha 0.5            # half the style; alpha slides there, -2 to 2
   posed ctl model walker march.style        # another style, from the next frame on
+  posed ctl model hand ours.gesture         # another gesture model: the file says what it is
+  posed ctl play hand "g 1 c 3 4 p"         # perform these labels, after those that still wait
+  posed ctl play hand "g c p" --tempo 1.5 --loop
+  posed ctl stop-playing hand               # back to the live hand
   posed ctl status
   posed ctl --connect tcp://stage:5571 --key me.key --server-key stage.pub stop)");
   const auto add = [&](const char* name, const char* help, int (*run)(const CtlOptions&)) {
@@ -140,9 +166,18 @@ void add_ctl(CLI::App& app, int& exit_code) {
       ->required()
       ->check(CLI::IsMember({"alpha"}));
   set->add_option("value", options->value, "The new value")->required();
-  CLI::App* model = add("model", "Give a stream another style model", send_model);
+  CLI::App* model = add("model", "Give a stream another style or gesture model", send_model);
   model->add_option("stream", options->stream, "The stream")->required();
-  model->add_option("model", options->model, "The model file (M.style)")->required();
+  model->add_option("model", options->model, "The model file (M.style, H.gesture)")->required();
+  CLI::App* perform = add("play", "Perform labels on a hand", play);
+  perform->add_option("stream", options->stream, "The stream")->required();
+  perform->add_option("labels", options->labels, "Names that the gesture model knows: \"g 1 c\"")
+      ->required();
+  perform->add_option("--tempo", options->tempo, "0.5 to 2; 2 takes half the time")
+      ->capture_default_str();
+  perform->add_flag("--loop", options->loop, "Begin again after the last, until others come");
+  CLI::App* stop = add("stop-playing", "Back to the live hand", stop_playing);
+  stop->add_option("stream", options->stream, "The stream")->required();
   add("status", "Print the daemon's state once", show_status);
   add("stop", "End the daemon cleanly", stop_daemon);
 }

@@ -14,6 +14,7 @@
 #include "daemon/pipeline/daemon.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/record/stream_settings.hpp"
+#include "proto/log/digest.hpp"
 
 namespace posed::cli {
 namespace {
@@ -32,10 +33,18 @@ record::RecordedStream recorded(const pipeline::OpenStream& stream) {
                                   .stale_after_s = config.stale_after_s,
                                   .rate_hz = description.rate_hz,
                                   .style = std::nullopt,
-                                  .model_name = {}};
+                                  .model_name = {},
+                                  .generate = std::nullopt,
+                                  .gesture_model = {}};
   if (config.style) {
     settings.style = config.style->filter;
     settings.model_name = config.style->model.filename().string();
+  }
+  const auto gesture = std::as_bytes(std::span(stream.gesture_file));
+  if (config.generate) {
+    settings.generate = config.generate->live;
+    if (!gesture.empty()) settings.gesture_model = log::sha256_hex(gesture);
+    if (!config.style) settings.model_name = config.generate->model.filename().string();
   }
   const auto model = std::as_bytes(std::span(stream.model_file));
   return {.row = {.id = 0,
@@ -46,7 +55,8 @@ record::RecordedStream recorded(const pipeline::OpenStream& stream) {
                   .config = record::to_json(settings),
                   .model = {}},
           .rate_hz = description.rate_hz,
-          .model = {model.begin(), model.end()}};
+          .model = {model.begin(), model.end()},
+          .gesture = {gesture.begin(), gesture.end()}};
 }
 
 // Tells what the recorder noticed on event/<stream>: a gap on its own stream, an error on all.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fstream>
 #include <limits>
+#include <numbers>
 #include <sstream>
 
 #include <spdlog/fmt/fmt.h>
@@ -10,6 +11,7 @@
 #include "daemon/config/toml_reader.hpp"
 #include "daemon/config/words.hpp"
 #include "daemon/control/keys.hpp"
+#include "models/gesture/play_order.hpp"
 
 namespace posed::config {
 namespace {
@@ -21,9 +23,15 @@ using pipeline::StreamConfig;
 constexpr Range kAlpha{-2.0, 2.0};
 constexpr Range kAlphaSlew{0.01, 1000.0};
 constexpr Range kGateFallback{0.0, 1.0};
+constexpr Range kTempo{gesture::kMinTempo, gesture::kMaxTempo};
+constexpr Range kLag_ms{0.0, generate::kMaxLag_s * 1e3};
+constexpr Range kNoise_deg{0.0, 90.0};
 constexpr Range kStaleAfter{0.01, 3600.0};
 constexpr Range kAnyNumber{std::numeric_limits<double>::lowest(),
                            std::numeric_limits<double>::max()};
+constexpr double kDegrees = 180.0 / std::numbers::pi;  // in a radian
+// The bound above 60 Hz is a time; no rate brings more frames into it than this.
+constexpr std::int64_t kMostLagFrames = 170;
 constexpr std::string_view kRawSuffix = "-raw";
 constexpr std::uintmax_t kLargestConfig = 1024 * 1024;  // bytes
 
@@ -46,6 +54,7 @@ class Reader {
   void read_option(TableReader& table, const drivers::OptionSpec& spec,
                    drivers::OptionValue& value);
   void read_style(TableReader table, pipeline::StyleConfig& style);
+  void read_generate(TableReader table, pipeline::GenerateConfig& generate);
   void check_names(const std::vector<StreamConfig>& streams, const std::vector<int>& lines);
 
   [[nodiscard]] std::filesystem::path resolve(const std::string& path) const {
@@ -158,6 +167,9 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
   table.read("publish_raw", stream.publish_raw);
   table.read("stale_after_s", stream.stale_after_s, kStaleAfter);
   if (auto style = table.table("style")) read_style(*style, stream.style.emplace());
+  if (auto generate = table.table("generate")) {
+    read_generate(*generate, stream.generate.emplace());
+  }
   if (!stream.name.empty() && !is_stream_name(stream.name)) {
     table.blame("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }
@@ -213,6 +225,34 @@ void Reader::read_style(TableReader table, pipeline::StyleConfig& style) {
   table.read("gate", style.filter.gate);
   table.read("gate_fallback", style.filter.gate_fallback, kGateFallback);
   table.read("calibrate", style.filter.calibrate);
+  table.finish();
+}
+
+void Reader::read_generate(TableReader table, pipeline::GenerateConfig& generate) {
+  std::int64_t lag_frames = generate.live.lag.frames;
+  double lag_ms = generate.live.lag.seconds * 1e3;
+  double noise_deg = generate.live.noise_rad * kDegrees;
+  std::string model, labels;
+  table.read("lag_frames", lag_frames);
+  if (lag_frames < 0 || lag_frames > kMostLagFrames) {
+    table.blame("lag_frames", fmt::format("stream.generate.lag_frames = {} is out of range: it"
+                                          " takes 0 to {} frames",
+                                          lag_frames, kMostLagFrames));
+    lag_frames = generate.live.lag.frames;
+  }
+  table.read("lag_ms", lag_ms, kLag_ms);
+  table.read("noise_deg", noise_deg, kNoise_deg);
+  table.read("model", model);
+  table.read("labels", labels);
+  table.read("tempo", generate.tempo, kTempo);
+  table.read("loop", generate.loop);
+  generate.live = {.lag = {.frames = static_cast<int>(lag_frames), .seconds = lag_ms * 1e-3},
+                   .noise_rad = noise_deg / kDegrees};
+  generate.model = resolve(model);
+  generate.labels = gesture::split_labels(labels);
+  if (!generate.labels.empty() && model.empty()) {
+    table.blame("labels", "labels need a gesture model to perform them; add model = \"H.gesture\"");
+  }
   table.finish();
 }
 

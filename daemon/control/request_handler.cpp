@@ -7,9 +7,11 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/words.hpp"
+#include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "proto/model/model_file.hpp"
 
 namespace posed::control {
 namespace {
@@ -57,6 +59,12 @@ std::optional<Answer> RequestHandler::handle(Asker asker, std::span<const std::b
     case v1::ControlRequest::kSetModel:
       done = set_model(request, asker);
       break;
+    case v1::ControlRequest::kPlay:
+      done = play(request, asker);
+      break;
+    case v1::ControlRequest::kStopPlaying:
+      done = stop_playing(request, asker);
+      break;
     case v1::ControlRequest::kStatus:
       helm_.fill(*reply.mutable_status());
       return answer(std::move(asker), reply);
@@ -70,26 +78,45 @@ std::optional<Answer> RequestHandler::handle(Asker asker, std::span<const std::b
   return std::nullopt;  // acknowledge() answers
 }
 
-Result<std::uint32_t> RequestHandler::styled_stream(const std::string& name) const {
+Result<std::uint32_t> RequestHandler::find_stream(const std::string& name) const {
   std::string names;
   for (std::size_t i = 0; i < streams_.size(); ++i) {
     const ControlledStream& stream = streams_[i];
-    if (stream.name == name) {
-      if (stream.style) return static_cast<std::uint32_t>(i);
-      return fail(
-          fmt::format("stream {} has no style; give it a [stream.style] table in the"
-                      " config and start again",
-                      name));
-    }
+    if (stream.name == name) return static_cast<std::uint32_t>(i);
     if (stream.publishes_raw && stream.name + "-raw" == name) {
       return fail(
-          fmt::format("{} is the input of {} before the style and cannot be changed; name"
+          fmt::format("{} is the input of {} before its stages and cannot be changed; name"
                       " {}",
                       name, stream.name, stream.name));
     }
     names += (names.empty() ? "" : ", ") + stream.name;
   }
   return fail(fmt::format("there is no stream '{}'; there is: {}", config::printable(name), names));
+}
+
+Result<std::uint32_t> RequestHandler::styled_stream(const std::string& name) const {
+  const auto stream = find_stream(name);
+  if (!stream || streams_[*stream].style) return stream;
+  return fail(fmt::format(
+      "stream {} has no style; give it a [stream.style] table in the config and start again",
+      name));
+}
+
+Result<std::uint32_t> RequestHandler::playing_stream(const std::string& name) const {
+  const auto stream = find_stream(name);
+  if (!stream) return stream;
+  if (!streams_[*stream].generates) {
+    return fail(fmt::format(
+        "stream {} performs no gestures; give it a [stream.generate] table in the config and"
+        " start again",
+        name));
+  }
+  if (coming_gesture(*stream) == nullptr) {
+    return fail(
+        fmt::format("stream {} has no gesture model; send one with `posed ctl model {} H.gesture`",
+                    name, name));
+  }
+  return stream;
 }
 
 Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, const Asker& asker) {
@@ -100,28 +127,85 @@ Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, const Aske
     return fail(fmt::format("alpha {} is out of range; it goes from -2 to 2", wanted.alpha()));
   }
   Command command{.kind = Command::Kind::kAlpha, .stream = *stream, .alpha = wanted.alpha()};
-  return send(command, {asker, nullptr});
+  return send(command, {.asker = asker});
 }
 
+// What kind of model it is, the file itself says.
 Result<> RequestHandler::set_model(const v1::ControlRequest& request, const Asker& asker) {
   const auto& wanted = request.set_model();
-  const auto index = styled_stream(wanted.stream());
+  const auto index = find_stream(wanted.stream());
   if (!index) return std::unexpected(index.error());
-  const ControlledStream& stream = streams_[*index];
   const std::string name =
       wanted.name().empty() ? "unnamed model" : config::printable(wanted.name());
   const auto bytes = std::as_bytes(std::span(wanted.model()));
+  const auto file = model_file::open(bytes, name);
+  if (!file) return std::unexpected(file.error());
+  return file->has_gesture() ? set_gesture_model(*index, bytes, name, asker)
+                             : set_style_model(*index, bytes, name, asker);
+}
+
+Result<> RequestHandler::set_style_model(std::uint32_t index, std::span<const std::byte> bytes,
+                                         const std::string& name, const Asker& asker) {
+  const ControlledStream& stream = streams_[index];
+  if (auto styled = styled_stream(stream.name); !styled) return std::unexpected(styled.error());
   const auto model = style::parse_model(bytes, name);
   if (!model) return std::unexpected(model.error());
   if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
   auto bound = style::bind_model(*model, *stream.skeleton, *stream.style, name);
   if (!bound) return std::unexpected(bound.error());
-  Command command{.kind = Command::Kind::kModel, .stream = *index, .model = bound->get()};
+  Command command{.kind = Command::Kind::kModel, .stream = index, .model = bound->get()};
+  keep_model(bytes, command);
+  return send(command, {.asker = asker, .model = std::move(*bound)});
+}
+
+Result<> RequestHandler::set_gesture_model(std::uint32_t index, std::span<const std::byte> bytes,
+                                           const std::string& name, const Asker& asker) {
+  const ControlledStream& stream = streams_[index];
+  if (!stream.generates) {
+    return fail(fmt::format(
+        "{} is a gesture model, and stream {} has no use for it; give it a [stream.generate]"
+        " table in the config and start again",
+        name, stream.name));
+  }
+  auto model = gesture::parse_model(bytes, name);
+  if (!model) return std::unexpected(model.error());
+  auto bound = generate::bind_model(std::move(*model), *stream.skeleton, stream.rate_hz, name);
+  if (!bound) return std::unexpected(bound.error());
+  Command command{.kind = Command::Kind::kGesture, .stream = index, .gesture = bound->get()};
+  keep_model(bytes, command);
+  return send(command, {.asker = asker, .gesture = std::move(*bound)});
+}
+
+void RequestHandler::keep_model(std::span<const std::byte> bytes, Command& command) {
   const std::string hash = log::sha256_hex(bytes);
   std::copy_n(hash.begin(), std::min(hash.size(), command.model_hash.size() - 1),
               command.model_hash.begin());
   helm_.keep_model(bytes);
-  return send(command, {asker, std::move(*bound)});
+}
+
+Result<> RequestHandler::play(const v1::ControlRequest& request, const Asker& asker) {
+  const auto& wanted = request.play();
+  const auto stream = playing_stream(wanted.stream());
+  if (!stream) return std::unexpected(stream.error());
+  const std::vector<std::string> names(wanted.label().begin(), wanted.label().end());
+  const auto order =
+      gesture::make_play_order(coming_gesture(*stream)->gesture(), names,
+                               wanted.tempo() == 0.0F ? 1.0 : wanted.tempo(), wanted.loop());
+  if (!order) return std::unexpected(order.error());
+  return send({.kind = Command::Kind::kPlay, .stream = *stream, .play = *order}, {.asker = asker});
+}
+
+Result<> RequestHandler::stop_playing(const v1::ControlRequest& request, const Asker& asker) {
+  const auto stream = playing_stream(request.stop_playing().stream());
+  if (!stream) return std::unexpected(stream.error());
+  return send({.kind = Command::Kind::kStopPlaying, .stream = *stream}, {.asker = asker});
+}
+
+const generate::BoundModel* RequestHandler::coming_gesture(std::uint32_t stream) const {
+  for (auto it = under_way_.rbegin(); it != under_way_.rend(); ++it) {
+    if (it->second.stream == stream && it->second.gesture) return it->second.gesture.get();
+  }
+  return streams_[stream].gesture.get();
 }
 
 Result<> RequestHandler::send(Command command, UnderWay under_way) {
@@ -129,6 +213,7 @@ Result<> RequestHandler::send(Command command, UnderWay under_way) {
   if (under_way_.size() >= kMostUnderWay || !helm_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
+  under_way.stream = command.stream;
   under_way_.emplace(++last_ticket_, std::move(under_way));
   return {};
 }
@@ -142,6 +227,16 @@ std::optional<Answer> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   if (done.model) {
     stream.model = std::move(done.model);  // the one it replaces is free now
     helm_.model_in_use(ack.stream, stream.model->name);
+  }
+  if (done.gesture) {
+    stream.gesture = std::move(done.gesture);
+    if (!stream.style) helm_.model_in_use(ack.stream, stream.gesture->name);
+  }
+  if (ack.refused) {
+    return refusal(std::move(done.asker), "too many labels wait already on " + stream.name +
+                                              "; try again later, or stop them with"
+                                              " `posed ctl stop-playing " +
+                                              stream.name + "`");
   }
   v1::ControlReply reply;
   reply.set_ok(true);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
+#include "models/generate/bound_model.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
@@ -33,9 +34,12 @@ struct ControlledStream {
   std::string name;
   bool publishes_raw = false;
   std::shared_ptr<const Skeleton> skeleton;   // models are bound to it; null: samples only
+  double rate_hz = 0.0;                       // nominal; 0 unknown
   std::optional<style::FilterOptions> style;  // the style stage is there when this is
   // What the stage runs with. The cold side owns every model; the pipeline only borrows.
   std::unique_ptr<const style::BoundModel> model;
+  bool generates = false;                               // the generate stage is there
+  std::unique_ptr<const generate::BoundModel> gesture;  // null until it has one
 };
 
 // What the handler asks of the rest of the daemon; every call comes from the control thread.
@@ -82,12 +86,25 @@ class RequestHandler {
  private:
   struct UnderWay {
     Asker asker;
-    std::unique_ptr<const style::BoundModel> model;  // null for an alpha
+    std::uint32_t stream = 0;
+    std::unique_ptr<const style::BoundModel> model{};       // of a new style
+    std::unique_ptr<const generate::BoundModel> gesture{};  // of a new gesture model
   };
   // Nothing when the command is under way.
   [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Asker& asker);
   [[nodiscard]] Result<> set_model(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> set_style_model(std::uint32_t stream, std::span<const std::byte> bytes,
+                                         const std::string& name, const Asker& asker);
+  [[nodiscard]] Result<> set_gesture_model(std::uint32_t stream, std::span<const std::byte> bytes,
+                                           const std::string& name, const Asker& asker);
+  void keep_model(std::span<const std::byte> bytes, pipeline::Command& command);
+  [[nodiscard]] Result<> play(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> stop_playing(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<std::uint32_t> find_stream(const std::string& name) const;
   [[nodiscard]] Result<std::uint32_t> styled_stream(const std::string& name) const;
+  [[nodiscard]] Result<std::uint32_t> playing_stream(const std::string& name) const;
+  // The model that the pipeline will have when a command sent now takes effect.
+  [[nodiscard]] const generate::BoundModel* coming_gesture(std::uint32_t stream) const;
   [[nodiscard]] Result<> send(pipeline::Command command, UnderWay under_way);
 
   std::vector<ControlledStream> streams_;

@@ -127,11 +127,15 @@ Result<> Daemon::Parts::open_sockets() {
   std::vector<publish::StreamInfo> infos;
   for (const auto& stream : streams) {
     const auto& style = stream->config.style;
+    const auto& generate = stream->config.generate;
+    const std::filesystem::path model = style      ? style->model
+                                        : generate ? generate->model
+                                                   : std::filesystem::path();
     infos.push_back({.name = stream->config.name,
                      .description = stream->device.description,
                      .rate_hz = rate_of(*stream),
                      .raw = stream->config.publish_raw,
-                     .model = style ? style->model.filename().string() : std::string(),
+                     .model = model.filename().string(),
                      .counters = &stream->counters});
   }
   publish::PublisherOptions options{.context = context.get(),
@@ -175,19 +179,34 @@ Result<> Daemon::Parts::open_engines() {
     OpenStream& stream = *streams[i];
     auto model = bind_style(stream);
     if (!model) return std::unexpected(model.error());
+    auto gesture = bind_gesture(stream);
+    if (!gesture) return std::unexpected(gesture.error());
     EngineOptions engine{.stream = i,
                          .stale_after_ns = nanoseconds(stream.config.stale_after_s),
                          .publish_raw = stream.config.publish_raw,
                          .style = std::nullopt,
-                         .model = model->get()};
+                         .model = model->get(),
+                         .generate = std::nullopt,
+                         .gesture = gesture->model.get(),
+                         .rate_hz = stream.device.description.rate_hz,
+                         .skeleton = stream.device.description.skeleton};
     if (stream.config.style) engine.style = stream.config.style->filter;
+    if (stream.config.generate) engine.generate = stream.config.generate->live;
     worker->add(engine, rate_of(stream), stream.counters);
     if (auto added = reader->add(stream.device, stream.counters); !added) return added;
     controlled.push_back({.name = stream.config.name,
                           .publishes_raw = stream.config.publish_raw,
                           .skeleton = stream.device.description.skeleton,
+                          .rate_hz = engine.rate_hz,
                           .style = engine.style,
-                          .model = std::move(*model)});
+                          .model = std::move(*model),
+                          .generates = engine.generate.has_value(),
+                          .gesture = std::move(gesture->model)});
+    // Nobody asked for it, so nobody is told: no ticket is 0. The ring has room for every stream.
+    if (gesture->play.size > 0 &&
+        !commands->push({.kind = Command::Kind::kPlay, .stream = i, .play = gesture->play})) {
+      return of_stream(stream.config.name, fail("too many streams perform from the start").error());
+    }
   }
   handler = std::make_unique<control::RequestHandler>(std::move(controlled), *this);
   return {};

@@ -10,6 +10,7 @@
 
 #include "daemon/control/security.hpp"
 #include "drivers/driver.hpp"
+#include "models/generate/live_options.hpp"
 #include "models/style/style_filter.hpp"
 
 namespace posed::pipeline {
@@ -19,6 +20,14 @@ struct StyleConfig {
   style::FilterOptions filter;
 };
 
+struct GenerateConfig {
+  generate::LiveOptions live;       // the defaults of lag and noise
+  std::filesystem::path model;      // the gesture model's file; empty: smooths only
+  std::vector<std::string> labels;  // performed from the start
+  double tempo = 1.0;
+  bool loop = false;
+};
+
 struct StreamConfig {
   std::string name;            // [a-z0-9_-]{1,32}, unique
   std::string driver;          // registry name
@@ -26,6 +35,7 @@ struct StreamConfig {
   bool publish_raw = false;    // the unstyled input too, as <name>-raw
   double stale_after_s = 0.5;  // silence after which the stream is called stale
   std::optional<StyleConfig> style;
+  std::optional<GenerateConfig> generate;
 };
 
 // Who may connect; CURVE is off when there is no server key.

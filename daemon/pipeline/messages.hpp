@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "models/generate/bound_model.hpp"
+#include "models/gesture/play_order.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/frame.hpp"
 
@@ -35,27 +37,38 @@ static_assert(std::is_trivially_copyable_v<Item>);
 
 // control -> pipeline; takes effect at the next frame boundary of its stream.
 struct Command {
-  enum class Kind : std::uint8_t { kAlpha, kModel, kStop };
+  enum class Kind : std::uint8_t { kAlpha, kModel, kGesture, kPlay, kStopPlaying };
   Kind kind = Kind::kAlpha;
   std::uint32_t stream = 0;
   std::uint64_t ticket = 0;  // comes back in the Ack
   float alpha = 0.0F;
-  const style::BoundModel* model = nullptr;  // ready-made; ownership passes with the message
-  std::array<char, 65> model_hash{};         // SHA-256 hex of the file's bytes, for the log
+  const style::BoundModel* model = nullptr;       // kModel: ready-made; the cold side owns it
+  const generate::BoundModel* gesture = nullptr;  // kGesture: the same
+  std::array<char, 65> model_hash{};              // SHA-256 hex of the file's bytes, for the log
+  gesture::PlayOrder play{};                      // kPlay
 };
+static_assert(std::is_trivially_copyable_v<Command>);
 
-// pipeline -> control; also how a replaced model returns to be freed by the cold side.
+// pipeline -> control: the command has taken effect; what it replaced is no longer read.
 struct Ack {
   std::uint64_t ticket = 0;
   std::uint32_t stream = 0;
   std::uint64_t sequence = 0;  // first frame that felt it
-  const style::BoundModel* retired = nullptr;
+  bool refused = false;        // a play for which there was no room; nothing happened
 };
 
 // pipeline -> recorder: every decision that decoding alone cannot repeat. It takes effect just
 // before frame `sequence` of its stream. Order within a stream is the order in the ring.
 struct Decision {
-  enum class Kind : std::uint8_t { kAlpha = 1, kModel = 2, kShed = 3, kTick = 4 };
+  enum class Kind : std::uint8_t {
+    kAlpha = 1,
+    kModel = 2,
+    kShed = 3,
+    kTick = 4,
+    kGesture = 5,
+    kPlay = 6,
+    kStopPlaying = 7
+  };
   Kind kind = Kind::kAlpha;
   std::uint32_t stream = 0;
   std::uint64_t sequence = 0;  // kShed: first sequence skipped
@@ -63,6 +76,7 @@ struct Decision {
   std::int64_t now_ns = 0;     // kTick
   float alpha = 0.0F;
   std::array<char, 65> model_hash{};
+  gesture::PlayOrder play{};  // kPlay
 };
 
 }  // namespace posed::pipeline

@@ -3,6 +3,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "models/gesture/model_file.hpp"
+
 namespace posed::pipeline {
 namespace {
 
@@ -30,10 +32,16 @@ Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config) {
   auto stream = std::make_unique<OpenStream>();
   stream->config = config;
   stream->device = std::move(*device);
-  if (!config.style) return stream;
-  auto bytes = load_bytes(config.style->model);
-  if (!bytes) return of_stream(config.name, bytes.error());
-  stream->model_file = std::move(*bytes);
+  if (config.style) {
+    auto bytes = load_bytes(config.style->model);
+    if (!bytes) return of_stream(config.name, bytes.error());
+    stream->model_file = std::move(*bytes);
+  }
+  if (config.generate && !config.generate->model.empty()) {
+    auto bytes = load_bytes(config.generate->model);
+    if (!bytes) return of_stream(config.name, bytes.error());
+    stream->gesture_file = std::move(*bytes);
+  }
   return stream;
 }
 
@@ -50,6 +58,31 @@ Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& st
   auto bound = style::bind_model(*model, *stream.device.description.skeleton,
                                  stream.config.style->filter, path.filename());
   if (!bound) return of_stream(stream.config.name, bound.error());
+  return bound;
+}
+
+Result<BoundGesture> bind_gesture(const OpenStream& stream) {
+  if (!stream.config.generate) return BoundGesture{};
+  const GenerateConfig& config = *stream.config.generate;
+  const drivers::Description& device = stream.device.description;
+  if (!device.skeleton || device.skeleton->channels.empty()) {
+    const std::string what = "driver '" + stream.config.driver +
+                             "' gives no joint angles, so there is nothing to generate";
+    return of_stream(stream.config.name, misuse(what).error());
+  }
+  BoundGesture bound;
+  if (config.model.empty()) return bound;
+  const std::string name = config.model.filename();
+  auto model = gesture::parse_model(std::as_bytes(std::span(stream.gesture_file)), config.model);
+  if (!model) return of_stream(stream.config.name, model.error());
+  auto ready = generate::bind_model(std::move(*model), *device.skeleton, device.rate_hz, name);
+  if (!ready) return of_stream(stream.config.name, ready.error());
+  bound.model = std::move(*ready);
+  if (config.labels.empty()) return bound;
+  const auto order =
+      gesture::make_play_order(bound.model->gesture(), config.labels, config.tempo, config.loop);
+  if (!order) return of_stream(stream.config.name, order.error());
+  bound.play = *order;
   return bound;
 }
 

@@ -7,6 +7,8 @@
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/daemon_config.hpp"
 #include "drivers/driver.hpp"
+#include "models/generate/bound_model.hpp"
+#include "models/gesture/play_order.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/result.hpp"
 
@@ -15,7 +17,8 @@ namespace posed::pipeline {
 struct OpenStream {
   StreamConfig config;
   drivers::Device device;
-  std::string model_file;  // the bytes of the style model's file; empty without a style stage
+  std::string model_file;    // the bytes of the style model's file; empty without a style stage
+  std::string gesture_file;  // the same of the gesture model
   StreamCounters counters;
 };
 
@@ -24,6 +27,14 @@ struct OpenStream {
 
 // The style model, bound to the stream's skeleton; null without a style stage. Cold.
 [[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream);
+
+// What the generate stage needs of a stream, tried: the model, null without one, and what is
+// performed from the start, empty when nothing is. Cold.
+struct BoundGesture {
+  std::unique_ptr<const generate::BoundModel> model;
+  gesture::PlayOrder play;
+};
+[[nodiscard]] Result<BoundGesture> bind_gesture(const OpenStream& stream);
 
 // Says which stream an error is about.
 [[nodiscard]] std::unexpected<Error> of_stream(const std::string& name, Error error);

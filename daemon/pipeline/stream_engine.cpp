@@ -1,17 +1,26 @@
 #include "daemon/pipeline/stream_engine.hpp"
 
+#include <algorithm>
+
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
 namespace {
 
 constexpr std::int64_t kHeldEvery_ns = kNanosPerSecond;
+// Silence after which frames that wait in the generate stage go out: none that is only late.
+constexpr std::int64_t kSilence_ns = 100'000'000;
+constexpr std::int64_t kSilentFrames = 4;
 
 }  // namespace
 
 StreamEngine::StreamEngine(const EngineOptions& options) noexcept
     : options_(options), model_(options.model) {
   if (options.style) style_.emplace(options.model, *options.style);
+  if (!options.generate) return;
+  const double rate_hz = generate::stream_rate_hz(options.rate_hz);
+  period_ns_ = nanoseconds(1.0 / rate_hz);
+  generate_.emplace(options.skeleton, *options.generate, rate_hz, options.gesture);
 }
 
 float StreamEngine::alpha() const noexcept { return style_ ? style_->alpha() : 0.0F; }
@@ -36,7 +45,16 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   }
   out_ = &out;
   if (style_) {
-    style_->step(&frame, header.arrival_ns, *this);
+    style_->step(&frame, header.arrival_ns, styled_);
+  } else {
+    generate(frame);
+  }
+  tell_played(header.arrival_ns, out);
+}
+
+void StreamEngine::generate(const Frame& frame) noexcept {
+  if (generate_) {
+    generate_->step(&frame, frame.header.arrival_ns, *this);
   } else {
     this->frame(frame);
   }
@@ -46,6 +64,7 @@ void StreamEngine::frame(const Frame& frame) noexcept {
   pose_.kind = Item::Kind::kFrame;
   pose_.frame = frame;
   has_pose_ = true;
+  last_out_ = frame.header.sequence;
   out_->item(pose_);
 }
 
@@ -59,6 +78,7 @@ void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
 // Something came: a silent stream has recovered.
 void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
   last_arrival_ns_ = arrival_ns;
+  last_generate_ns_ = kNoTime_ns;
   const StreamState before = state_;
   state_ = StreamState::kLive;
   if (before == StreamState::kWaiting) {
@@ -68,10 +88,23 @@ void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
   }
 }
 
-std::int64_t StreamEngine::next_tick_ns() const noexcept {
+std::int64_t StreamEngine::stale_due_ns() const noexcept {
   if (state_ == StreamState::kLive) return last_arrival_ns_ + options_.stale_after_ns;
   if (state_ == StreamState::kStale) return next_held_ns_;
   return kNoTime_ns;
+}
+
+std::int64_t StreamEngine::generate_due_ns() const noexcept {
+  const bool runs = state_ == StreamState::kLive || state_ == StreamState::kStale;
+  if (!runs || !generate_ || !generate_->waiting()) return kNoTime_ns;
+  if (last_generate_ns_ != kNoTime_ns) return last_generate_ns_ + period_ns_;
+  return last_arrival_ns_ + std::max(kSilence_ns, kSilentFrames * period_ns_);
+}
+
+std::int64_t StreamEngine::next_tick_ns() const noexcept {
+  const std::int64_t generate_ns = generate_due_ns();
+  const std::int64_t stale_ns = stale_due_ns();
+  return generate_ns == kNoTime_ns ? stale_ns : std::min(generate_ns, stale_ns);
 }
 
 bool StreamEngine::tick(std::int64_t now_ns, EngineOut& out) noexcept {
@@ -86,12 +119,21 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
                 .stream = options_.stream,
                 .sequence = last_sequence_ + 1,
                 .now_ns = now_ns});
+  const bool generates = generate_due_ns() != kNoTime_ns && now_ns >= generate_due_ns();
+  const bool stale = !generates || now_ns >= stale_due_ns();
+  if (generates) {
+    out_ = &out;
+    last_generate_ns_ = now_ns;
+    generate_->step(nullptr, now_ns, *this);
+    tell_played(now_ns, out);
+  }
+  if (!stale) return;
   if (state_ == StreamState::kLive) {
     state_ = StreamState::kStale;
     notice(v1::Event::KIND_STALE, now_ns, last_sequence_, seconds(now_ns - last_arrival_ns_), out);
   }
   next_held_ns_ = now_ns + kHeldEvery_ns;
-  if (has_pose_) {
+  if (has_pose_ && !(generate_ && generate_->performs())) {
     pose_.kind = Item::Kind::kFrame;
     pose_.frame.quality = Quality::kStale;
     out.item(pose_);
@@ -101,22 +143,59 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
 Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   Ack ack{.ticket = command.ticket, .stream = options_.stream, .sequence = last_sequence_ + 1};
   Decision decision{.stream = options_.stream, .sequence = ack.sequence};
-  if (command.kind == Command::Kind::kAlpha) {
-    decision.kind = Decision::Kind::kAlpha;
-    decision.alpha = command.alpha;
-    if (style_) style_->set_alpha(command.alpha);
-  } else {
-    decision.kind = Decision::Kind::kModel;
-    decision.model_hash = command.model_hash;
-    ack.retired = style_ ? style_->set_model(command.model) : command.model;
-    if (style_) model_ = command.model;
+  double value = command.alpha;
+  switch (command.kind) {
+    case Command::Kind::kAlpha:
+      decision.kind = Decision::Kind::kAlpha;
+      decision.alpha = command.alpha;
+      if (style_) style_->set_alpha(command.alpha);
+      break;
+    case Command::Kind::kModel:
+      decision.kind = Decision::Kind::kModel;
+      decision.model_hash = command.model_hash;
+      if (style_) static_cast<void>(style_->set_model(command.model));
+      if (style_) model_ = command.model;
+      break;
+    case Command::Kind::kGesture:
+      decision.kind = Decision::Kind::kGesture;
+      decision.model_hash = command.model_hash;
+      if (generate_) generate_->set_model(command.gesture);
+      break;
+    case Command::Kind::kPlay:
+      decision.kind = Decision::Kind::kPlay;
+      decision.play = command.play;
+      ack.refused = !generate_ || !generate_->play(command.play);
+      performs_ = performs_ || !ack.refused;
+      ack.sequence = last_out_ + 1;
+      value = command.play.size;
+      break;
+    case Command::Kind::kStopPlaying:
+      decision.kind = Decision::Kind::kStopPlaying;
+      if (generate_) generate_->stop_playing();
+      ack.sequence = last_out_ + 1;
+      break;
   }
   out.decision(decision);
-  notice(v1::Event::KIND_CONTROL, last_arrival_ns_, ack.sequence, command.alpha, out);
+  if (ack.refused) return ack;
+  const auto event =
+      command.kind == Command::Kind::kPlay ? v1::Event::KIND_PLAYING : v1::Event::KIND_CONTROL;
+  notice(event, last_arrival_ns_, ack.sequence, value, out);
   return ack;
 }
 
+void StreamEngine::flush(EngineOut& out) noexcept {
+  out_ = &out;
+  if (generate_) generate_->flush(*this);
+}
+
+void StreamEngine::tell_played(std::int64_t time_ns, EngineOut& out) noexcept {
+  const bool performed = performs_;
+  performs_ = generate_ && generate_->performs();
+  if (performed && !performs_) notice(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);
+}
+
 void StreamEngine::end(std::int64_t now_ns, EngineOut& out) noexcept {
+  flush(out);
   state_ = StreamState::kEnded;
   notice(v1::Event::KIND_ENDED, now_ns, last_sequence_, 0.0, out);
 }

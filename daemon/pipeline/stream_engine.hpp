@@ -8,6 +8,7 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "models/generate/generate_stage.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/sink.hpp"
 
@@ -30,11 +31,16 @@ struct EngineOptions {
   std::uint32_t stream = 0;
   std::int64_t stale_after_ns = kNanosPerSecond / 2;
   bool publish_raw = false;
-  std::optional<style::FilterOptions> style;  // the stage is there when this is
-  const style::BoundModel* model = nullptr;   // not owned; null passes frames through
+  std::optional<style::FilterOptions> style;        // the stage is there when this is
+  const style::BoundModel* model = nullptr;         // not owned; null passes frames through
+  std::optional<generate::LiveOptions> generate{};  // the stage is there when this is; hands only
+  const generate::BoundModel* gesture = nullptr;    // not owned; null: nothing can be performed
+  double rate_hz = 0.0;                             // of the stream; only `generate` needs it
+  std::shared_ptr<const Skeleton> skeleton{};       // the same
 };
 
-// All calls come from one thread and are RT-safe, but for construction.
+// style -> generate, each where its options are. All calls come from one thread and are RT-safe,
+// but for construction.
 class StreamEngine final : private Emit {
  public:
   explicit StreamEngine(const EngineOptions& options) noexcept;
@@ -44,42 +50,70 @@ class StreamEngine final : private Emit {
   void on_frame(const Frame& frame, EngineOut& out) noexcept;
   void on_sample(const Sample& sample, EngineOut& out) noexcept;
 
-  // Says that the time is `now_ns` when nothing came. Frames are missing for stale_after: the
-  // stream turns stale, and the last pose goes out once a second with quality stale, under its own
-  // old sequence and times. Returns whether anything happened; only then is a decision emitted.
+  // Says that the time is `now_ns` when nothing came. What waits in the generate stage goes out
+  // after a few frames' silence, and a performance goes on at the stream's rate. Frames are missing
+  // for stale_after: the stream turns stale, and the last pose goes out once a second with quality
+  // stale, under its own old sequence and times. Returns whether anything happened; only then is a
+  // decision emitted.
   bool tick(std::int64_t now_ns, EngineOut& out) noexcept;
   // The tick itself, for replay: the live run has decided that it was due.
   void tick_now(std::int64_t now_ns, EngineOut& out) noexcept;
   // When the next tick is due; kNoTime_ns while none is.
   [[nodiscard]] std::int64_t next_tick_ns() const noexcept;
 
-  // Alpha and model take effect at the next frame; its sequence is in the Ack.
+  // Alpha and model take effect at the next frame that enters, a play at the next that leaves; its
+  // sequence is in the Ack.
   [[nodiscard]] Ack apply(const Command& command, EngineOut& out) noexcept;
 
-  // The source will give no more: no longer stale, only ended.
+  // No more frames come: those that wait go out.
+  void flush(EngineOut& out) noexcept;
+  // The source will give no more: flushed; no longer stale, only ended.
   void end(std::int64_t now_ns, EngineOut& out) noexcept;
 
   [[nodiscard]] StreamState state() const noexcept { return state_; }
   [[nodiscard]] float alpha() const noexcept;  // where the slew is
   [[nodiscard]] const style::BoundModel* model() const noexcept { return model_; }
+  [[nodiscard]] const generate::BoundModel* gesture() const noexcept {
+    return generate_ ? generate_->model() : nullptr;
+  }
 
  private:
+  // What the style stage emitted.
+  class Styled final : public Emit {
+   public:
+    explicit Styled(StreamEngine& engine) noexcept : engine_(engine) {}
+    void frame(const Frame& frame) noexcept override { engine_.generate(frame); }
+
+   private:
+    StreamEngine& engine_;
+  };
+
+  void generate(const Frame& frame) noexcept;
+  void tell_played(std::int64_t time_ns, EngineOut& out) noexcept;
   void frame(const Frame& frame) noexcept override;  // what the last stage emitted
+  [[nodiscard]] std::int64_t stale_due_ns() const noexcept;
+  [[nodiscard]] std::int64_t generate_due_ns() const noexcept;
   void heard(std::int64_t arrival_ns, EngineOut& out) noexcept;
   void notice(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
               EngineOut& out) noexcept;
 
   EngineOptions options_;
   std::optional<style::StyleFilter> style_;
+  std::optional<generate::GenerateStage> generate_;
+  Styled styled_{*this};
   const style::BoundModel* model_ = nullptr;
   StreamState state_ = StreamState::kWaiting;
-  std::uint64_t last_sequence_ = 0;
+  std::uint64_t last_sequence_ = 0;  // that entered
+  std::uint64_t last_out_ = 0;       // that left
   std::int64_t last_arrival_ns_ = kNoTime_ns;
   std::int64_t next_held_ns_ = kNoTime_ns;
-  EngineOut* out_ = nullptr;  // of the call in progress
-  bool has_pose_ = false;     // pose_ holds a pose that went out
-  Item pose_;                 // frames on their way out, and the last pose
-  Item other_;                // samples and notices on their way out
+  std::int64_t period_ns_ = 0;                  // of a performance that goes on in silence
+  std::int64_t last_generate_ns_ = kNoTime_ns;  // last tick of the generate stage in this silence
+  EngineOut* out_ = nullptr;                    // of the call in progress
+  bool performs_ = false;                       // as last told
+  bool has_pose_ = false;                       // pose_ holds a pose that went out
+  Item pose_;                                   // frames on their way out, and the last pose
+  Item other_;                                  // samples and notices on their way out
 };
 
 }  // namespace posed::pipeline

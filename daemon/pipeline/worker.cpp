@@ -99,6 +99,7 @@ void Worker::run() noexcept {
     ports_.wake->awake();
   }
   drain();
+  for (const auto& lane : lanes_) lane->engine.flush(*lane);
 }
 
 void Worker::stop() noexcept {

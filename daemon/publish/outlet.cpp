@@ -1,5 +1,6 @@
 #include "daemon/publish/outlet.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace posed::publish {
@@ -66,6 +67,10 @@ void Outlet::report(v1::StreamStats& stats, double seconds_since) {
   *stats.mutable_publish() = percentiles(publish);
   stats.set_alpha(pipeline.alpha.load());
   stats.set_model(info.model);
+  stats.set_lag_frames(lag_frames);
+  stats.set_lag_ms(lag_ms);
+  stats.set_label(std::string(label.begin(), std::ranges::find(label, '\0')));
+  stats.set_label_probability(label_probability);
 }
 
 }  // namespace posed::publish

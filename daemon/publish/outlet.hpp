@@ -1,6 +1,7 @@
 // Outlet: what the publisher keeps of one stream: its topics, its reused messages, its counts.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,6 +38,11 @@ struct Outlet {
   std::uint64_t frames = 0;
   std::uint64_t samples = 0;
   std::uint64_t frames_reported = 0;
+  // Of the last frame.
+  std::uint16_t lag_frames = 0;
+  float lag_ms = 0.0F;
+  std::array<char, kMaxLabel> label{};
+  float label_probability = 0.0F;
   LatencyHistogram decode, style, publish;
 };
 

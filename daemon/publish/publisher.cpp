@@ -37,6 +37,11 @@ std::string sentence(const pipeline::Item& item) {
       return fmt::format("the source has ended after {} frames", notice.sequence);
     case v1::Event::KIND_CONTROL:
       return fmt::format("control takes effect at frame {}", notice.sequence);
+    case v1::Event::KIND_PLAYING:
+      return fmt::format("performs {:.0f} labels from frame {} on, or after those that wait",
+                         notice.value, notice.sequence);
+    case v1::Event::KIND_PLAYED:
+      return "all labels are performed";
     case v1::Event::KIND_SHED:
       return fmt::format("{:.0f} frames from {} on were skipped: newer ones waited", notice.value,
                          notice.sequence);
@@ -205,6 +210,10 @@ void Publisher::take_frame(const Frame& frame, bool raw) {
   if (raw) return;
   ++outlet.frames;
   outlet.measure(frame, stamps);
+  outlet.lag_frames = frame.lag_frames;
+  outlet.lag_ms = frame.lag_ms;
+  outlet.label = frame.label;
+  outlet.label_probability = frame.label_probability;
 }
 
 void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
@@ -216,7 +225,7 @@ void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int6
   event.set_sequence(sequence);
   event.set_text(text);
   const bool bad = kind == v1::Event::KIND_STALE || kind == v1::Event::KIND_SHED ||
-                   kind >= v1::Event::KIND_RECORDING_GAP;
+                   (kind >= v1::Event::KIND_RECORDING_GAP && kind <= v1::Event::KIND_WARNING);
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "{}: {}", event.stream(), text);
   send(outlets_[stream]->styled.event_topic, event);
 }

@@ -76,6 +76,11 @@ Result<log::Writer> make_log(const RecorderOptions& options, std::vector<Recorde
       if (!hash) return std::unexpected(hash.error());
       stream.row.model = *hash;
     }
+    if (!stream.gesture.empty()) {
+      if (auto hash = writer->add_blob(stream.gesture); !hash) {
+        return std::unexpected(hash.error());
+      }
+    }
     if (auto done = writer->add(stream.row); !done) return std::unexpected(done.error());
   }
   if (auto done = writer->commit(); !done) return std::unexpected(done.error());

@@ -23,9 +23,10 @@ namespace posed::record {
 
 // One stream as it stands before its first chunk.
 struct RecordedStream {
-  log::StreamRow row;            // id and model are filled in here: its place, its model's hash
-  double rate_hz = 0.0;          // sizes the rings; 0: unknown
-  std::vector<std::byte> model;  // the bytes of the model file it begins with; may be empty
+  log::StreamRow row;                // id and model are filled in here: its place, its model's hash
+  double rate_hz = 0.0;              // sizes the rings; 0: unknown
+  std::vector<std::byte> model;      // the bytes of the model file it begins with; may be empty
+  std::vector<std::byte> gesture{};  // the same of the gesture model, whose hash is in row.config
 };
 
 struct RecorderOptions {

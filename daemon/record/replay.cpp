@@ -1,49 +1,49 @@
 #include "daemon/record/replay.hpp"
 
 #include <algorithm>
-#include <array>
+#include <charconv>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "daemon/pipeline/stream_engine.hpp"
+#include "daemon/record/replay_models.hpp"
 #include "daemon/record/tape.hpp"
-#include "models/style/style_model.hpp"
+#include "models/gesture/play_order.hpp"
 
 namespace posed::record {
 namespace {
 
 using Decision = pipeline::Decision;
-using Model = std::unique_ptr<const style::BoundModel>;
-// By SHA-256. Two of each: live, a model that replaces itself is another object, too.
-using Models = std::map<std::string, std::array<Model, 2>>;
-
 constexpr double kMostAlpha = 2.0;
 constexpr std::uint64_t kEnd = std::numeric_limits<std::uint64_t>::max();
 
-Result<> load_model(const log::Reader& reader, const std::string& hash,
-                    const Replay::Stream& stream, Models& models) {
-  if (models.contains(hash)) return {};
-  const auto bytes = reader.blob(hash);
-  if (!bytes) return std::unexpected(bytes.error());
-  const std::string name = "the log's model " + hash.substr(0, 12);
-  const auto model = style::parse_model(*bytes, name);
-  if (!model) return std::unexpected(model.error());
-  for (Model& copy : models[hash]) {
-    auto bound =
-        style::bind_model(*model, *stream.description.skeleton, *stream.settings.style, name);
-    if (!bound) return std::unexpected(bound.error());
-    copy = std::move(*bound);
+// What a play's row says; nothing when no pipeline could have written it.
+std::optional<gesture::PlayOrder> play_order(const log::DecisionRow& row) {
+  gesture::PlayOrder order{
+      .tempo = static_cast<float>(row.alpha), .loop = row.count != 0, .size = 0, .label = {}};
+  for (const std::string& word : gesture::split_labels(row.labels)) {
+    unsigned label = 0;
+    const char* const end = word.data() + word.size();
+    if (order.size == order.label.size() || std::from_chars(word.data(), end, label).ptr != end ||
+        label > std::numeric_limits<std::uint16_t>::max()) {
+      return std::nullopt;
+    }
+    order.label[order.size++] = static_cast<std::uint16_t>(label);
   }
-  return {};
+  if (order.size == 0 || !(order.tempo > 0.0F)) return std::nullopt;
+  return order;
 }
 
 // A decision as the pipeline made it; one that no pipeline could have made is damage.
 Result<> check_decision(const log::DecisionRow& row, const std::string& file) {
   const bool known = row.kind >= static_cast<std::uint8_t>(Decision::Kind::kAlpha) &&
-                     row.kind <= static_cast<std::uint8_t>(Decision::Kind::kTick);
-  if (known && std::abs(row.alpha) <= kMostAlpha && row.count <= kEnd - row.sequence) return {};
+                     row.kind <= static_cast<std::uint8_t>(Decision::Kind::kStopPlaying);
+  const bool plays = row.kind == static_cast<std::uint8_t>(Decision::Kind::kPlay);
+  if (known && std::abs(row.alpha) <= kMostAlpha && row.count <= kEnd - row.sequence &&
+      (!plays || play_order(row).has_value())) {
+    return {};
+  }
   return fail("the log is damaged (a decision before frame " + std::to_string(row.sequence) +
                   " of stream " + std::to_string(row.stream) + " makes no sense)",
               file);
@@ -82,6 +82,7 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
 
  private:
   Result<> load_decisions(const log::Reader& reader, std::uint32_t id, const std::string& file);
+  Result<> open_engine(const log::Reader& reader, const log::StreamRow& row);
 
   void frame(Frame& frame) noexcept override {
     frame.header.stream = id_;
@@ -105,6 +106,7 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
   void decision(const Decision&) noexcept override {}
 
   void apply_decisions(std::uint64_t sequence) noexcept;
+  std::optional<pipeline::Command> command_of(const log::DecisionRow& row) const;
   void notice_gap(std::int64_t chunk) {
     if (gap_after_ && !broken_at_ && chunk > *gap_after_) broken_at_ = frames_ + 1;
   }
@@ -112,7 +114,7 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
   Stream stream_;
   std::uint32_t id_ = 0;
   std::unique_ptr<drivers::Decoder> decoder_;
-  Models models_;
+  ReplayModels models_;
   std::optional<pipeline::StreamEngine> engine_;
   std::vector<log::DecisionRow> decisions_;
   std::size_t next_decision_ = 0;
@@ -146,25 +148,39 @@ Result<std::unique_ptr<Replay::Lane>> Replay::Lane::open(const log::Reader& read
   auto decoder = driver->make_decoder(lane->stream_.description);
   if (!decoder) return std::unexpected(decoder.error());
   lane->decoder_ = std::move(*decoder);
-  if (lane->stream_.settings.style && !lane->stream_.description.skeleton) {
-    return fail("stream '" + row.name + "' has a style but no skeleton", file);
+  const StreamSettings& stages = lane->stream_.settings;
+  if ((stages.style || stages.generate) && !lane->stream_.description.skeleton) {
+    return fail("stream '" + row.name + "' has stages but no skeleton", file);
   }
   if (auto done = lane->load_decisions(reader, row.id, file); !done) {
     return std::unexpected(done.error());
   }
+  if (auto done = lane->open_engine(reader, row); !done) return std::unexpected(done.error());
+  return lane;
+}
+
+Result<> Replay::Lane::open_engine(const log::Reader& reader, const log::StreamRow& row) {
+  const StreamSettings& settings = stream_.settings;
   pipeline::EngineOptions options;
   options.stream = row.id;
-  options.stale_after_ns = nanoseconds(lane->stream_.settings.stale_after_s);
-  options.publish_raw = lane->stream_.settings.publish_raw;
-  options.style = lane->stream_.settings.style;
+  options.stale_after_ns = nanoseconds(settings.stale_after_s);
+  options.publish_raw = settings.publish_raw;
+  options.style = settings.style;
+  options.generate = settings.generate;
+  options.rate_hz = stream_.description.rate_hz;
+  options.skeleton = stream_.description.skeleton;
   if (options.style && !row.model.empty()) {
-    if (auto done = load_model(reader, row.model, lane->stream_, lane->models_); !done) {
-      return std::unexpected(done.error());
-    }
-    options.model = lane->models_[row.model].front().get();
+    auto done = models_.load_style(reader, row.model, stream_.description, *options.style);
+    if (!done) return done;
+    options.model = models_.style(row.model, nullptr);
   }
-  lane->engine_.emplace(options);
-  return lane;
+  if (options.generate && !settings.gesture_model.empty()) {
+    auto done = models_.load_gesture(reader, settings.gesture_model, stream_.description);
+    if (!done) return done;
+    options.gesture = models_.gesture(settings.gesture_model);
+  }
+  engine_.emplace(options);
+  return {};
 }
 
 // Loads every model that a decision names, so that nothing can fail on the way.
@@ -175,9 +191,15 @@ Result<> Replay::Lane::load_decisions(const log::Reader& reader, std::uint32_t i
   decisions_ = std::move(*decisions);
   for (const log::DecisionRow& row : decisions_) {
     if (auto sound = check_decision(row, file); !sound) return sound;
-    const bool swap = row.kind == static_cast<std::uint8_t>(Decision::Kind::kModel);
-    if (!swap || !stream_.settings.style) continue;
-    if (auto done = load_model(reader, row.model_hash, stream_, models_); !done) return done;
+    const auto kind = static_cast<Decision::Kind>(row.kind);
+    const StreamSettings& settings = stream_.settings;
+    Result<> done;
+    if (kind == Decision::Kind::kModel && settings.style) {
+      done = models_.load_style(reader, row.model_hash, stream_.description, *settings.style);
+    } else if (kind == Decision::Kind::kGesture && settings.generate) {
+      done = models_.load_gesture(reader, row.model_hash, stream_.description);
+    }
+    if (!done) return done;
   }
   return {};
 }
@@ -187,28 +209,47 @@ void Replay::Lane::apply_decisions(std::uint64_t sequence) noexcept {
     const log::DecisionRow& row = decisions_[next_decision_];
     if (row.sequence > sequence) return;
     switch (static_cast<Decision::Kind>(row.kind)) {
-      case Decision::Kind::kAlpha:
-        static_cast<void>(engine_->apply({.kind = pipeline::Command::Kind::kAlpha,
-                                          .stream = id_,
-                                          .alpha = static_cast<float>(row.alpha)},
-                                         *this));
-        break;
-      case Decision::Kind::kModel: {
-        const auto found = models_.find(row.model_hash);
-        if (found == models_.end()) break;  // a stream without a style ignored it live, too
-        const auto& [one, other] = found->second;
-        const Model& model = engine_->model() == one.get() ? other : one;
-        static_cast<void>(engine_->apply(
-            {.kind = pipeline::Command::Kind::kModel, .stream = id_, .model = model.get()}, *this));
-        break;
-      }
       case Decision::Kind::kShed:
         shed_until_ = row.sequence + row.count;
         break;
       case Decision::Kind::kTick:
         engine_->tick_now(row.now_ns, *this);
         break;
+      default:
+        if (const auto command = command_of(row)) {
+          static_cast<void>(engine_->apply(*command, *this));
+        }
     }
+  }
+}
+
+// The command behind a decision; nothing where the stage it is for is missing: live, it was
+// ignored, too.
+std::optional<pipeline::Command> Replay::Lane::command_of(const log::DecisionRow& row) const {
+  pipeline::Command command{.stream = id_};
+  switch (static_cast<Decision::Kind>(row.kind)) {
+    case Decision::Kind::kAlpha:
+      command.alpha = static_cast<float>(row.alpha);
+      return command;
+    case Decision::Kind::kModel:
+      command.kind = pipeline::Command::Kind::kModel;
+      command.model = models_.style(row.model_hash, engine_->model());
+      if (command.model == nullptr) return std::nullopt;
+      return command;
+    case Decision::Kind::kGesture:
+      command.kind = pipeline::Command::Kind::kGesture;
+      command.gesture = models_.gesture(row.model_hash);
+      if (command.gesture == nullptr) return std::nullopt;
+      return command;
+    case Decision::Kind::kPlay:
+      command.kind = pipeline::Command::Kind::kPlay;
+      command.play = play_order(row).value_or(gesture::PlayOrder{});
+      return command;
+    case Decision::Kind::kStopPlaying:
+      command.kind = pipeline::Command::Kind::kStopPlaying;
+      return command;
+    default:
+      return std::nullopt;
   }
 }
 

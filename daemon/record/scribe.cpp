@@ -14,14 +14,33 @@ constexpr std::int64_t kLastRetry_ns = 16'000'000'000;
 
 constexpr std::array<const char*, 3> kKindNames{"chunks", "decisions", "published frames"};
 
+std::string labels_of(const gesture::PlayOrder& play) {
+  std::string text;
+  for (const std::uint16_t label : play.labels()) {
+    text += (text.empty() ? "" : " ") + std::to_string(label);
+  }
+  return text;
+}
+
 log::DecisionRow row_of(const pipeline::Decision& decision) {
+  if (decision.kind == pipeline::Decision::Kind::kPlay) {
+    return {.stream = decision.stream,
+            .kind = static_cast<std::uint8_t>(decision.kind),
+            .sequence = decision.sequence,
+            .count = decision.play.loop ? 1U : 0U,
+            .now_ns = decision.now_ns,
+            .alpha = decision.play.tempo,
+            .model_hash = {},
+            .labels = labels_of(decision.play)};
+  }
   return {.stream = decision.stream,
           .kind = static_cast<std::uint8_t>(decision.kind),
           .sequence = decision.sequence,
           .count = decision.count,
           .now_ns = decision.now_ns,
           .alpha = decision.alpha,
-          .model_hash = decision.model_hash.data()};
+          .model_hash = decision.model_hash.data(),
+          .labels = {}};
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "models/generate/live_options.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/result.hpp"
 
@@ -14,9 +15,11 @@ namespace posed::record {
 struct StreamSettings {
   bool publish_raw = false;
   double stale_after_s = 0.5;
-  double rate_hz = 0.0;                       // the device's nominal rate; 0 unknown
-  std::optional<style::FilterOptions> style;  // the style stage is there when this is
-  std::string model_name;                     // for people
+  double rate_hz = 0.0;                           // the device's nominal rate; 0 unknown
+  std::optional<style::FilterOptions> style;      // the style stage is there when this is
+  std::string model_name;                         // for people
+  std::optional<generate::LiveOptions> generate;  // the generate stage is there when this is
+  std::string gesture_model;  // SHA-256 of the gesture model that it began with; may be empty
 };
 
 [[nodiscard]] std::string to_json(const StreamSettings& settings);

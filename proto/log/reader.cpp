@@ -90,6 +90,7 @@ struct Reader::State {
   std::map<std::string, std::string> meta;
   std::vector<StreamRow> streams;
   std::optional<Statement> chunks;
+  bool has_labels = true;  // nothing could be played when format 1 was written
 
   // A row may name only a stream that the log describes.
   Result<std::uint32_t> stream_of(std::int64_t id) const {
@@ -124,8 +125,12 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
   auto chunks = database->prepare(
       "SELECT id, stream, direction, arrival_ns, next_sequence, bytes FROM chunk ORDER BY id");
   if (!chunks) return std::unexpected(chunks.error());
-  return Reader(std::make_unique<State>(State{std::move(*database), file, std::move(*meta),
-                                              std::move(*streams), std::move(*chunks)}));
+  const auto labels =
+      database->value("SELECT count(*) FROM pragma_table_info('decision') WHERE name='labels'");
+  if (!labels) return std::unexpected(labels.error());
+  return Reader(
+      std::make_unique<State>(State{std::move(*database), file, std::move(*meta),
+                                    std::move(*streams), std::move(*chunks), *labels == "1"}));
 }
 
 const std::map<std::string, std::string>& Reader::meta() const { return state_->meta; }
@@ -162,9 +167,10 @@ Result<std::optional<ChunkRow>> Reader::next_chunk() {
 }
 
 Result<std::vector<DecisionRow>> Reader::decisions(std::uint32_t stream) const {
-  auto select = state_->database.prepare(
-      "SELECT kind, sequence, count, now_ns, alpha, model_hash FROM decision WHERE stream=? "
-      "ORDER BY id");
+  auto select =
+      state_->database.prepare("SELECT kind, sequence, count, now_ns, alpha, model_hash, " +
+                               std::string(state_->has_labels ? "labels" : "''") +
+                               " FROM decision WHERE stream=? ORDER BY id");
   if (!select) return std::unexpected(select.error());
   select->bind(std::int64_t{stream});
   std::vector<DecisionRow> decisions;
@@ -174,7 +180,8 @@ Result<std::vector<DecisionRow>> Reader::decisions(std::uint32_t stream) const {
     if (!*row) return decisions;
     decisions.push_back({stream, static_cast<std::uint8_t>(select->integer(0)),
                          sequence_of(select->integer(1)), sequence_of(select->integer(2)),
-                         select->integer(3), select->real(4), std::string(select->text(5))});
+                         select->integer(3), select->real(4), std::string(select->text(5)),
+                         std::string(select->text(6))});
   }
 }
 

@@ -40,6 +40,8 @@ struct DecisionRow {
   std::int64_t now_ns = 0;
   double alpha = 0.0;
   std::string model_hash;
+  // Of a play: "0 4 1", indices into the model; count 1 is a loop, alpha the tempo.
+  std::string labels{};
 };
 
 // Table frame, only when published frames were asked for: a posed.v1.Frame without stage stamps.

@@ -6,7 +6,7 @@
 namespace posed::log {
 
 inline constexpr std::int32_t kApplicationId = 0x504F5345;  // "POSE" in the SQLite header
-inline constexpr std::int32_t kFormatVersion = 1;           // user_version; grows with the tables
+inline constexpr std::int32_t kFormatVersion = 2;           // user_version; grows with the tables
 
 // STRICT: a value of the wrong type cannot get in, so a reader need not ask each row.
 inline constexpr const char* kSchema = R"sql(
@@ -20,7 +20,8 @@ CREATE TABLE chunk(id INTEGER PRIMARY KEY, stream INTEGER NOT NULL, direction IN
                    bytes BLOB NOT NULL) STRICT;
 CREATE TABLE decision(id INTEGER PRIMARY KEY, stream INTEGER NOT NULL, kind INTEGER NOT NULL,
                       sequence INTEGER NOT NULL, count INTEGER NOT NULL, now_ns INTEGER NOT NULL,
-                      alpha REAL NOT NULL, model_hash TEXT NOT NULL) STRICT;
+                      alpha REAL NOT NULL, model_hash TEXT NOT NULL,
+                      labels TEXT NOT NULL DEFAULT '') STRICT;
 CREATE TABLE frame(id INTEGER PRIMARY KEY, stream INTEGER NOT NULL, sequence INTEGER NOT NULL,
                    raw INTEGER NOT NULL, bytes BLOB NOT NULL) STRICT;
 CREATE TABLE gap(id INTEGER PRIMARY KEY, stream INTEGER NOT NULL, kind INTEGER NOT NULL,

@@ -19,7 +19,7 @@ constexpr std::array<std::string_view, kSqlCount> kSql{
     "COMMIT",
     "INSERT INTO stream VALUES(?,?,?,?,?,?,?)",
     "INSERT INTO chunk VALUES(NULL,?,?,?,?,?)",
-    "INSERT INTO decision VALUES(NULL,?,?,?,?,?,?,?)",
+    "INSERT INTO decision VALUES(NULL,?,?,?,?,?,?,?,?)",
     "INSERT INTO frame VALUES(NULL,?,?,?,?)",
     "INSERT INTO gap VALUES(NULL,?,?,?,?,?)",
     "INSERT OR IGNORE INTO blob VALUES(?,?)",
@@ -151,7 +151,8 @@ Result<> Writer::add(const DecisionRow& row) {
                             .bind(stored(row.count))
                             .bind(row.now_ns)
                             .bind(row.alpha)
-                            .bind(row.model_hash));
+                            .bind(row.model_hash)
+                            .bind(row.labels));
 }
 
 Result<> Writer::add(const FrameRow& row) {

@@ -103,12 +103,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       break;
     case 2:
       try_bytes("template", "BEND1 rate=100", piece, bytes);
+      try_bytes("labels", "right 30", piece, bytes);
       break;
     case 3:
       try_bytes("file", hand_description(), piece, bytes);
       break;
     case 4:
       (void)decoder_of("template", text);
+      (void)decoder_of("labels", text);
       break;
     default:
       if (const auto decoder = decoder_of("file", text)) {

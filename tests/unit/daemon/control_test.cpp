@@ -160,7 +160,7 @@ TEST_CASE("each refusal is one sentence") {
   Desk desk;
   CHECK(has(desk.refused(alpha_request("nobody", 0.0F)),
             "there is no stream 'nobody'; there is: walker, plain, runner"));
-  CHECK(has(desk.refused(alpha_request("walker-raw", 0.0F)), "before the style"));
+  CHECK(has(desk.refused(alpha_request("walker-raw", 0.0F)), "before its stages"));
   CHECK(has(desk.refused(alpha_request("plain", 0.0F)), "plain has no style"));
   for (const float alpha : {2.1F, -3.0F, NAN, INFINITY}) {
     CHECK(has(desk.refused(alpha_request("walker", alpha)), "out of range"));

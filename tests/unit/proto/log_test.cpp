@@ -219,7 +219,7 @@ TEST_CASE("a file that is no whole log of ours is refused with one sentence") {
   }
   SECTION("a newer format") {
     write_whole_log(path, 3);
-    run_sql(path, "PRAGMA user_version=2;");
+    run_sql(path, "PRAGMA user_version=3;");
     CHECK(refusal(path).find("update posed") != std::string::npos);
   }
   SECTION("a stream that is not described") {

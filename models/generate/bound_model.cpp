@@ -1,0 +1,31 @@
+#include "models/generate/bound_model.hpp"
+
+#include <utility>
+
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::generate {
+namespace {
+
+// Of the script: with 20 frames of 30 Hz a streamed trajectory's jerk is within 3 % of the full
+// solution's (algorithms.md 4.4).
+constexpr double kLookAhead_s = 20.0 / 30.0;
+
+}  // namespace
+
+Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
+                                                     const Skeleton& skeleton, double rate_hz,
+                                                     std::string name) {
+  if (!hand_side(skeleton)) {
+    return fail("a gesture model needs a stream of hands (hand45), not '" + skeleton.name + "'",
+                std::move(name));
+  }
+  auto shared = std::make_shared<const gesture::GestureModel>(std::move(model));
+  auto bound = std::make_unique<BoundModel>(BoundModel{
+      ModelEvidence(std::move(shared), stream_rate_hz(rate_hz)), nullptr, std::move(name)});
+  bound->player = std::make_unique<ScriptPlayer>(
+      bound->evidence, PlayerOptions{.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4});
+  return bound;
+}
+
+}  // namespace posed::generate

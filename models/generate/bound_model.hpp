@@ -1,0 +1,38 @@
+// BoundModel: a gesture model at one stream's rate and the player that performs it, ready for hot
+// use. Built cold; the hot side borrows a plain pointer. Of all of it only the player changes, and
+// only its stream uses it.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include "models/generate/script_player.hpp"
+#include "models/gesture/gesture_model.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::generate {
+
+inline constexpr int kMostWaiting = 1024;  // labels of one stream that wait to be performed
+
+struct BoundModel {
+  ModelEvidence evidence;  // holds the gesture model
+  std::unique_ptr<ScriptPlayer> player;
+  std::string name;  // of its file, for people
+
+  [[nodiscard]] const gesture::GestureModel& gesture() const noexcept { return evidence.model(); }
+};
+
+// The rate at which a stream is taken to come, [Hz], when it says `nominal_hz` (0: unknown).
+[[nodiscard]] constexpr double stream_rate_hz(double nominal_hz) noexcept {
+  return nominal_hz > 0.0 ? std::clamp(nominal_hz, 10.0, 1000.0) : 60.0;
+}
+
+// Refuses a skeleton that is no hand. `rate_hz` of the stream, 0 unknown.
+[[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
+                                                                   const Skeleton& skeleton,
+                                                                   double rate_hz,
+                                                                   std::string name);
+
+}  // namespace posed::generate

@@ -1,0 +1,57 @@
+#include "models/gesture/play_order.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+namespace posed::gesture {
+namespace {
+
+// A stranger's word, fit for a terminal and a log.
+std::string shown(const std::string& name) {
+  constexpr std::size_t kLongest = 20;
+  std::string out = name.substr(0, kLongest);
+  std::ranges::replace_if(out, [](char c) { return c <= ' ' || c >= '\x7F'; }, '?');
+  return name.size() > kLongest ? out + "..." : out;
+}
+
+std::string known_labels(const GestureModel& model) {
+  std::string names;
+  for (const Label& label : model.labels) names += (names.empty() ? "" : " ") + label.name;
+  return names;
+}
+
+}  // namespace
+
+Result<PlayOrder> make_play_order(const GestureModel& model, std::span<const std::string> names,
+                                  double tempo, bool loop) {
+  if (names.empty()) return misuse("there is no label to perform; give some, as in \"g 1 c\"");
+  if (names.size() > kMostLabels) {
+    return misuse(std::to_string(names.size()) + " labels are too many at once; give at most " +
+                  std::to_string(kMostLabels));
+  }
+  if (!(tempo >= kMinTempo && tempo <= kMaxTempo)) {
+    return misuse("the tempo is out of range; it goes from 0.5 to 2");
+  }
+  PlayOrder order{.tempo = static_cast<float>(tempo),
+                  .loop = loop,
+                  .size = static_cast<std::uint16_t>(names.size()),
+                  .label = {}};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const int index = model.label_index(names[i]);
+    if (index < 0) {
+      return misuse("the model does not know the label '" + shown(names[i]) +
+                    "'; it knows: " + known_labels(model));
+    }
+    order.label[i] = static_cast<std::uint16_t>(index);
+  }
+  return order;
+}
+
+std::vector<std::string> split_labels(const std::string& text) {
+  std::istringstream words(text);
+  std::vector<std::string> labels;
+  for (std::string word; words >> word;) labels.push_back(std::move(word));
+  return labels;
+}
+
+}  // namespace posed::gesture

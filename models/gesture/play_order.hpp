@@ -1,0 +1,42 @@
+// PlayOrder: a string of labels to perform, as indices into one model, small enough to cross a
+// ring.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "models/gesture/gesture_model.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::gesture {
+
+inline constexpr int kMostLabels = 256;  // labels
+inline constexpr double kMinTempo = 0.5;
+inline constexpr double kMaxTempo = 2.0;
+
+struct PlayOrder {
+  float tempo = 1.0F;                              // kMinTempo to kMaxTempo; 2 takes half the time
+  bool loop = false;                               // begin again after the last label
+  std::uint16_t size = 0;                          // labels in use
+  std::array<std::uint16_t, kMostLabels> label{};  // indices into GestureModel::labels
+
+  [[nodiscard]] std::span<const std::uint16_t> labels() const noexcept {
+    return std::span(label).first(size);
+  }
+};
+static_assert(std::is_trivially_copyable_v<PlayOrder>);
+
+// The order to perform these names. A name that the model does not know is refused with those it
+// does, as are no labels, too many, and a tempo out of range. Cold.
+[[nodiscard]] Result<PlayOrder> make_play_order(const GestureModel& model,
+                                                std::span<const std::string> names, double tempo,
+                                                bool loop);
+
+// "g 1  c" -> g, 1, c.
+[[nodiscard]] std::vector<std::string> split_labels(const std::string& text);
+
+}  // namespace posed::gesture
