@@ -13,6 +13,7 @@ using nlohmann::json;
 
 constexpr int kFewGestures = 20;  // hand-science.md section 1: below, unseen labels go astray
 constexpr int kFewExamples = 2;
+constexpr std::array<int, 2> kHold{2, 3};  // the states in which a gesture's pose is held
 
 using Counts = std::array<std::array<int, kFingers>, kStates>;
 
@@ -79,20 +80,28 @@ std::vector<std::string> TrainReport::warnings() const {
                          "' was recorded once only; how it varies is a guess");
     }
   }
-  if (const int mixed = total(mixed_); mixed > 0) {
-    std::string fingers;
-    for (int f = 0; f < kFingers; ++f) {
-      int states = 0;
-      for (int state = 0; state < kStates; ++state) states += mixed_[state][f] > 0 ? 1 : 0;
-      if (states == 0) continue;
-      fingers += (fingers.empty() ? "" : ", ") + std::string(kFingerNames[f]) + " in " +
-                 std::to_string(states) + (states == 1 ? " state" : " states");
-    }
-    warnings.push_back(std::to_string(mixed) + " of " + std::to_string(total(leaves_)) +
-                       " leaves mix gestures whose finger is of different classes (" + fingers +
-                       "): fine where that finger does the same in them");
-  }
+  if (const std::string mixed = mixed_warning(); !mixed.empty()) warnings.push_back(mixed);
   return warnings;
+}
+
+// A leaf of the hold that mixes classes gives a label that was not recorded the mean of two poses;
+// while the hand still moves, fingers that do the same may share a leaf.
+std::string TrainReport::mixed_warning() const {
+  const int mixed = total(mixed_);
+  if (mixed == 0) return {};
+  int held = 0;
+  std::string fingers;
+  for (int f = 0; f < kFingers; ++f) {
+    int of_finger = 0;
+    for (const int state : kHold) of_finger += mixed_[state][f];
+    held += of_finger;
+    if (of_finger > 0) fingers += (fingers.empty() ? "" : ", ") + std::string(kFingerNames[f]);
+  }
+  const std::string text = std::to_string(mixed) + " of " + std::to_string(total(leaves_)) +
+                           " leaves mix gestures whose finger is of different classes";
+  if (held == 0) return text + ", none of them in the hold (states 3 and 4)";
+  return text + ", " + std::to_string(held) + " of them in the hold (" + fingers +
+         "): a label that was not recorded may go astray there, record more";
 }
 
 std::string TrainReport::json_of(const GestureModel& model) const {

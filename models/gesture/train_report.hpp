@@ -25,6 +25,7 @@ class TrainReport {
 
  private:
   [[nodiscard]] std::vector<std::string> warnings() const;
+  [[nodiscard]] std::string mixed_warning() const;  // empty: no leaf mixes
   [[nodiscard]] int gestures_of(const std::string& label) const;
 
   const std::vector<Recording>& recordings_;

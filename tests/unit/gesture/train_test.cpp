@@ -65,6 +65,7 @@ TEST_CASE("A made-up corpus is learnt, unseen labels included", "[train]") {
   REQUIRE(model.has_value());
   CHECK(sound(*model));
   CHECK_FALSE(warned(*model, "gestures; below 20"));
+  CHECK_FALSE(warned(*model, "may go astray"));
   const auto report = nlohmann::json::parse(model->report_json);
   CHECK(report["gestures"] == 100);
   CHECK(report["moving_channels"] == 19);
@@ -93,6 +94,14 @@ TEST_CASE("Few gestures are learnt with a warning", "[train]") {
   REQUIRE(one.has_value());
   CHECK(sound(*one));
   CHECK(warned(*one, "'g' was recorded once only"));
+}
+
+TEST_CASE("Leaves of the hold that mix classes are told", "[train]") {
+  // Scissors were only ever made once, too few frames for leaves of their own.
+  const auto model = train_gesture(
+      {performed({.script = {"g", "p", "g", "p", "g", "c", "p", "g", "p", "g", "p", "g"}})}, {});
+  REQUIRE(model.has_value());
+  CHECK(warned(*model, "of them in the hold (thumb, index, middle, ring, little)"));
 }
 
 TEST_CASE("A recording that nothing can be learnt from is refused", "[train]") {
