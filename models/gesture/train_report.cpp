@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <numbers>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -14,6 +15,7 @@ using nlohmann::json;
 constexpr int kFewGestures = 20;  // hand-science.md section 1: below, unseen labels go astray
 constexpr int kFewExamples = 2;
 constexpr std::array<int, 2> kHold{2, 3};  // the states in which a gesture's pose is held
+constexpr double kAlike_rad = 10.0 * std::numbers::pi / 180.0;  // poses nearer are the same
 
 using Counts = std::array<std::array<int, kFingers>, kStates>;
 
@@ -47,14 +49,41 @@ TrainReport::TrainReport(const std::vector<Recording>& recordings, const Context
                          const std::vector<Label>& labels)
     : recordings_(recordings), contexts_(contexts), labels_(labels) {}
 
+// How far the classes of a leaf's members are apart in the channel where they differ most.
+double TrainReport::apart_rad(int state, int finger, const std::vector<int>& members) const {
+  struct Sum {
+    Eigen::VectorXd angles = Eigen::VectorXd::Zero(kFingerChannels);
+    double frames = 0.0;
+  };
+  std::array<Sum, kClasses> classes;
+  for (const int row : members) {
+    const Statistics& sums = contexts_.sums[row];
+    Sum& of = classes[labels_[contexts_.contexts[row].current].finger_class[finger]];
+    of.angles += sums.first.row(state).segment(finger * kFingerChannels, kFingerChannels);
+    of.frames += sums.occupancy[state];
+  }
+  double apart = 0.0;
+  for (const Sum& a : classes) {
+    for (const Sum& b : classes) {
+      if (a.frames == 0.0 || b.frames == 0.0) continue;
+      const Eigen::VectorXd difference = a.angles / a.frames - b.angles / b.frames;
+      apart = std::max(apart, difference.cwiseAbs().maxCoeff());
+    }
+  }
+  return apart;
+}
+
 void TrainReport::add_tree(int state, int finger, const GrownTree& tree) {
   leaves_[state][finger] = static_cast<int>(tree.members.size());
+  const bool held = std::ranges::count(kHold, state) > 0;
   for (const auto& members : tree.members) {
     std::set<int> classes;
     for (const int row : members) {
       classes.insert(labels_[contexts_.contexts[row].current].finger_class[finger]);
     }
-    mixed_[state][finger] += classes.size() > 1 ? 1 : 0;
+    if (classes.size() < 2) continue;
+    ++mixed_[state][finger];
+    if (held && apart_rad(state, finger, members) > kAlike_rad) ++astray_[finger];
   }
 }
 
@@ -84,23 +113,18 @@ std::vector<std::string> TrainReport::warnings() const {
   return warnings;
 }
 
-// A leaf of the hold that mixes classes gives a label that was not recorded the mean of two poses;
-// while the hand still moves, fingers that do the same may share a leaf.
+// A leaf of the hold that mixes classes gives a label that was not recorded the mean of two poses.
 std::string TrainReport::mixed_warning() const {
-  const int mixed = total(mixed_);
-  if (mixed == 0) return {};
-  int held = 0;
   std::string fingers;
+  int leaves = 0;
   for (int f = 0; f < kFingers; ++f) {
-    int of_finger = 0;
-    for (const int state : kHold) of_finger += mixed_[state][f];
-    held += of_finger;
-    if (of_finger > 0) fingers += (fingers.empty() ? "" : ", ") + std::string(kFingerNames[f]);
+    leaves += astray_[f];
+    if (astray_[f] > 0) fingers += (fingers.empty() ? "" : ", ") + std::string(kFingerNames[f]);
   }
-  const std::string text = std::to_string(mixed) + " of " + std::to_string(total(leaves_)) +
-                           " leaves mix gestures whose finger is of different classes";
-  if (held == 0) return text + ", none of them in the hold (states 3 and 4)";
-  return text + ", " + std::to_string(held) + " of them in the hold (" + fingers +
+  if (leaves == 0) return {};
+  return std::to_string(leaves) +
+         (leaves == 1 ? " leaf of the hold mixes" : " leaves of the hold mix") +
+         " gestures whose finger is of different classes and poses (" + fingers +
          "): a label that was not recorded may go astray there, record more";
 }
 

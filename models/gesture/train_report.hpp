@@ -26,13 +26,17 @@ class TrainReport {
  private:
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::string mixed_warning() const;  // empty: no leaf mixes
+  [[nodiscard]] double apart_rad(int state, int finger, const std::vector<int>& members) const;
   [[nodiscard]] int gestures_of(const std::string& label) const;
 
   const std::vector<Recording>& recordings_;
   const ContextModels& contexts_;
   const std::vector<Label>& labels_;
   std::array<std::array<int, kFingers>, kStates> leaves_{};
-  std::array<std::array<int, kFingers>, kStates> mixed_{};  // leaves of different current classes
+  // Leaves whose members' current labels are of different classes; those that matter are leaves of
+  // the hold (states 3 and 4) in which these classes are also different poses.
+  std::array<std::array<int, kFingers>, kStates> mixed_{};
+  std::array<int, kFingers> astray_{};
 };
 
 }  // namespace posed::gesture
