@@ -1,0 +1,50 @@
+// How natural a motion is, in figures (algorithms.md 5.2): jerk, log dimensionless jerk and
+// spectral arc length of a speed profile, and the Frechet distance between the features of two
+// motions. Each says nothing alone; compare with a recording of the same person. Cold.
+#pragma once
+
+#include <span>
+
+#include <Eigen/Core>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::motion {
+
+// One row a frame, one column a channel.
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Root mean square of the third difference over frames and channels, in units a frame^3; times
+// rate_hz^3 it is units/s^3. 0 for fewer than four frames.
+[[nodiscard]] double jerk_rms(const Rows& rows);
+
+// Speed of every frame step: the length of the difference of two rows, times the rate.
+[[nodiscard]] Eigen::VectorXd speed_of(const Rows& rows, double rate_hz);
+
+// -ln(T^3 / v_peak^2 * integral of (d^2 v / dt^2)^2): closer to 0 is smoother; a minimum-jerk reach
+// has about -5.2. NaN for fewer than three values or a speed that is always 0.
+[[nodiscard]] double log_dimensionless_jerk(std::span<const double> speed, double rate_hz);
+
+// Arc length of the speed's normalised amplitude spectrum up to 10 Hz or where it stays below 0.05
+// (Balasubramanian et al. 2015, zero-padded four times over): closer to 0 is smoother; a
+// minimum-jerk reach has about -1.4. A ripple below the amplitude bound does not count: report
+// both. NaN for fewer than two values or a speed that is always 0.
+[[nodiscard]] double spectral_arc_length(std::span<const double> speed, double rate_hz);
+
+// Mean and covariance (over n - 1) of rows.
+struct Gaussian {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+[[nodiscard]] Result<Gaussian> gaussian_of(const Rows& rows);
+
+// |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), at least 0.
+[[nodiscard]] double frechet_distance(const Gaussian& a, const Gaussian& b);
+
+// Frechet distance of what two motions look like over windows of 30 frames (each channel's mean,
+// and the mean size of its change a frame), in the first `dimensions` principal components of both
+// together; fewer where the motions are too short for ten windows a dimension. An error says so
+// where even one is too many.
+[[nodiscard]] Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions = 20);
+
+}  // namespace posed::motion
