@@ -12,7 +12,8 @@
 namespace posed::cli {
 
 int auto_label(const AutoLabelOptions& options) {
-  const auto recording = load_recording(options.clip, options.examples, options.rate_hz);
+  const auto recording =
+      load_recording(options.clip, options.examples, options.rate_hz, options.read);
   if (!recording) return report(recording.error());
   const auto proposed = gesture::propose_segments(*recording);
   if (!proposed) return report(proposed.error());

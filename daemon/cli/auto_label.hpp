@@ -3,11 +3,14 @@
 
 #include <filesystem>
 
+#include "proto/clip/clip.hpp"
+
 namespace posed::cli {
 
 struct AutoLabelOptions {
   std::filesystem::path clip, examples, out;
   double rate_hz;
+  clip::ReadOptions read;
   bool json;
 };
 

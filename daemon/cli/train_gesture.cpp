@@ -35,6 +35,7 @@ A label file has a line a gesture, `start end name`, in seconds from the first f
 struct Options {
   std::vector<std::string> clips, labels, shows;
   std::string questions, propose, out;
+  std::string hand;  // which one of a body
   double rate_hz = 30.0;
   int embedded_rounds = 0;
   bool auto_label = false;
@@ -55,16 +56,22 @@ Result<> check(const Options& options) {
   return check_tree_options(*options.trees);
 }
 
+clip::ReadOptions read_options(const std::string& hand) {
+  clip::ReadOptions read;
+  if (!hand.empty()) read.hand = hand == "left" ? Side::kLeft : Side::kRight;
+  return read;
+}
+
 // "ok=ok_pose.csv": the pose is the mean of the clip.
-Result<gesture::LabelPose> shown_pose(const std::string& show, double rate_hz) {
+Result<gesture::LabelPose> shown_pose(const std::string& show, const Options& options) {
   const auto equals = show.find('=');
   if (equals == std::string::npos || !is_label_name(std::string_view(show).substr(0, equals))) {
     return misuse("'" + show +
                   "' shows no pose; write --show NAME=POSE.csv, NAME of 1 to 15 signs");
   }
-  const auto clip = clip::read_hand_clip(show.substr(equals + 1));
+  const auto clip = clip::read_hand_clip(show.substr(equals + 1), read_options(options.hand));
   if (!clip) return std::unexpected(clip.error());
-  const auto recording = gesture::recording_of(*clip, rate_hz);
+  const auto recording = gesture::recording_of(*clip, options.rate_hz);
   if (!recording) return std::unexpected(recording.error());
   gesture::LabelPose pose{show.substr(0, equals), {}};
   const Eigen::RowVectorXd mean = recording->angles_rad.colwise().mean();
@@ -88,7 +95,7 @@ Result<std::vector<gesture::Label>> classes(const Options& options,
     }
   }
   for (const std::string& show : options.shows) {
-    const auto shown = shown_pose(show, options.rate_hz);
+    const auto shown = shown_pose(show, options);
     if (!shown) return std::unexpected(shown.error());
     const gesture::Label label = gesture::label_like(*shown, poses, labels);
     std::erase_if(labels, [&](const gesture::Label& known) { return known.name == label.name; });
@@ -120,7 +127,8 @@ void print_summary(const json& report, const std::string& out) {
 Result<json> train(const Options& options) {
   std::vector<gesture::Recording> recordings;
   for (std::size_t i = 0; i < options.clips.size(); ++i) {
-    auto recording = load_recording(options.clips[i], options.labels[i], options.rate_hz);
+    auto recording = load_recording(options.clips[i], options.labels[i], options.rate_hz,
+                                    read_options(options.hand));
     if (!recording) return std::unexpected(recording.error());
     recordings.push_back(std::move(*recording));
   }
@@ -162,8 +170,9 @@ int run(const Options& options) {
 }  // namespace
 
 Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
-                                          const std::filesystem::path& labels, double rate_hz) {
-  const auto hand = clip::read_hand_clip(clip);
+                                          const std::filesystem::path& labels, double rate_hz,
+                                          const clip::ReadOptions& read) {
+  const auto hand = clip::read_hand_clip(clip, read);
   if (!hand) return std::unexpected(hand.error());
   for (const std::string& warning : hand->warnings) {
     std::fprintf(stderr, "posed: warning: %s: %s\n", clip.c_str(), warning.c_str());

@@ -9,6 +9,7 @@
 
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/train.hpp"
+#include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::cli {
@@ -16,7 +17,8 @@ namespace posed::cli {
 // A clip with its labels, at the rate to learn at.
 [[nodiscard]] Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
                                                         const std::filesystem::path& labels,
-                                                        double rate_hz);
+                                                        double rate_hz,
+                                                        const clip::ReadOptions& read = {});
 
 struct GestureTraining {
   gesture::GestureModel model;

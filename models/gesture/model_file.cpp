@@ -14,8 +14,8 @@ using model_file::kMaxNumber;
 using model_file::Soundness;
 
 constexpr int kMaxLabels = 1'000;
-constexpr int kMaxLeaves = 10'000;
-constexpr double kMinVariance = 1e-20;  // its inverse is still a number that can be summed
+constexpr int kMaxLeaves = 1 << kQuestions;  // no path asks a question twice
+constexpr double kMinVariance = 1e-20;       // its inverse is still a number that can be summed
 
 constexpr int kRow = kWindows * kFingerChannels;
 
@@ -146,7 +146,9 @@ void write_tree(const Tree<Gaussian>& tree, v1::GestureTree& out) {
 Result<GestureModel> parse_model(std::span<const std::byte> bytes, const std::string& name) {
   const auto file = model_file::open(bytes, name);
   if (!file) return std::unexpected(file.error());
-  if (!file->has_gesture()) return fail("the model is not a gesture model", name);
+  if (!file->has_gesture()) {
+    return fail("the model is not a gesture model; make one with `posed train gesture`", name);
+  }
   Soundness check;
   GestureModel model = read_model(file->gesture(), check);
   if (auto verdict = check.verdict(name); !verdict) return std::unexpected(verdict.error());

@@ -119,7 +119,9 @@ void write_vector(const VectorXd& v, google::protobuf::RepeatedField<double>& ou
 Result<StyleModel> parse_model(std::span<const std::byte> bytes, const std::string& name) {
   const auto file = model_file::open(bytes, name);
   if (!file) return std::unexpected(file.error());
-  if (!file->has_style()) return fail("the model is not a style model", name);
+  if (!file->has_style()) {
+    return fail("the model is not a style model; make one with `posed train style`", name);
+  }
   Reader reader;
   StyleModel model = read_model(file->style(), reader);
   if (auto verdict = reader.verdict(name); !verdict) return std::unexpected(verdict.error());

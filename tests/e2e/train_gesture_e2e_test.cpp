@@ -1,0 +1,131 @@
+// `posed train gesture` through the real binary: a glove recording and its labels become a model,
+// the same bytes each time; labels are proposed; every mistake is one sentence and an exit code.
+#include <fstream>
+#include <iterator>
+
+#include <nlohmann/json.hpp>
+
+#include "models/gesture/model_file.hpp"
+#include "models/gesture/synthetic_performer.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "tests/e2e/outcome.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::test {
+namespace {
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// A made-up performer's recording with its labels, and the first examples of them.
+struct Glove {
+  TempFolder folder;
+  std::string clip = (folder.path() / "take.csv").string();
+  std::string labels = (folder.path() / "take.lab").string();
+  std::string few = (folder.path() / "few.lab").string();
+
+  Glove() {
+    const auto performance = gesture::make_performance({.gestures = 40});
+    REQUIRE(clip::write_hand_csv(performance->clip, clip));
+    REQUIRE(clip::write_labels(performance->labels, labels));
+    const auto& all = performance->labels;
+    REQUIRE(clip::write_labels({all.begin() + 1, all.begin() + 8}, few));
+  }
+
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return (folder.path() / name).string();
+  }
+
+  // train gesture with the recording, its labels and `more`.
+  [[nodiscard]] Outcome train(const std::string& out, std::vector<std::string> more = {},
+                              const std::string& with = {}) const {
+    std::vector<std::string> arguments{"train", "gesture",  "--clip",
+                                       clip,    "--labels", with.empty() ? labels : with,
+                                       "--out", file(out)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return posed(std::move(arguments));
+  }
+};
+
+bool one_sentence(const Outcome& outcome, int code, const std::string& what) {
+  UNSCOPED_INFO(outcome.code << ": " << outcome.err);
+  return outcome.code == code && outcome.out.empty() && outcome.err.find(what) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") {
+  const Glove glove;
+  const auto first = glove.train(
+      "a.gesture", {"--json", "--tree-svg", glove.file("t.svg"), "--trees", "middle:4"});
+  REQUIRE(first.code == 0);
+  const auto told = nlohmann::json::parse(first.out);
+  CHECK(told["gestures"] == 40);
+  CHECK(told["leaves"] > 25);
+  CHECK(told["leaves_by_state"].size() == 5);
+  CHECK(bytes_of(glove.file("t.svg")).find("state 4, middle") != std::string::npos);
+  REQUIRE(glove.train("b.gesture").code == 0);
+  CHECK(bytes_of(glove.file("a.gesture")) == bytes_of(glove.file("b.gesture")));
+  const auto model = gesture::load_model(glove.file("a.gesture"));
+  REQUIRE(model.has_value());
+  CHECK(model->label_index("3") >= 0);
+  // The documented questions are the built-in ones, in another order of labels.
+  const auto sample = (source_dir() / "config/gestures/gcp134.toml").string();
+  const auto asked = glove.train("c.gesture", {"--json", "--questions", sample});
+  REQUIRE(asked.code == 0);
+  CHECK(nlohmann::json::parse(asked.out)["leaves"] == told["leaves"]);
+}
+
+TEST_CASE("Classes are proposed, and a pose shown once becomes a label", "[train_gesture]") {
+  const Glove glove;
+  const auto three = gesture::make_performance({.person = 1, .script = {"3"}});
+  REQUIRE(clip::write_hand_csv(three->clip, glove.file("three.csv")));
+  const auto trained =
+      glove.train("a.gesture", {"--json", "--propose-questions", glove.file("q.toml"), "--show",
+                                "drei=" + glove.file("three.csv")});
+  REQUIRE(trained.code == 0);
+  const auto labels = nlohmann::json::parse(trained.out)["labels"];
+  CHECK(labels.size() == 4);
+  CHECK(labels.back()["name"] == "drei");
+  CHECK(bytes_of(glove.file("q.toml")).find("[middle]") != std::string::npos);
+}
+
+TEST_CASE("Labels are proposed from a few", "[train_gesture]") {
+  const Glove glove;
+  const auto proposed = glove.train("all.lab", {"--auto-label", "--json"}, glove.few);
+  REQUIRE(proposed.code == 0);
+  CHECK(nlohmann::json::parse(proposed.out)["segments"] == 40);
+  const auto labels = clip::read_labels(glove.file("all.lab"));
+  REQUIRE(labels.has_value());
+  CHECK(labels->size() == 40);
+}
+
+TEST_CASE("What cannot be trained from is refused", "[train_gesture]") {
+  const Glove glove;
+  const auto& folder = glove.folder;
+  const auto with = [&](const std::string& text) {
+    return glove.train("x.gesture", {}, folder.write("bad.lab", text).string());
+  };
+  CHECK(one_sentence(with("0 1 g\n0.5 2 c\n"), 1, "bad.lab:2: the segment overlaps"));
+  CHECK(one_sentence(with("0 1 g\n5 4 c\n"), 1, "bad.lab:2: the segment ends where it starts"));
+  CHECK(one_sentence(with("0 1 g\n1 1000 c\n"), 1, "bad.lab:2: the segment ends at 1000"));
+  CHECK(one_sentence(with("0 0.1 g\n"), 1, "bad.lab:1: the segment has 3 frames"));
+  CHECK(one_sentence(with("0 1 wave\n1 2 g\n"), 1, "label 'wave' is in no class"));
+  CHECK(one_sentence(glove.train("x.gesture", {"--questions", "none.toml"}), 2, "none.toml"));
+  CHECK(one_sentence(glove.train("x.gesture", {"--trees", "toe"}), 2, "names no tree"));
+  CHECK(one_sentence(glove.train("x.gesture", {"--show", "three"}), 2, "shows no pose"));
+  CHECK(one_sentence(glove.train("x.gesture", {"--clip", "b.csv"}), 2, "one label file"));
+  CHECK(
+      one_sentence(posed({"apply", "--model", glove.file("x.gesture"), "a.bvh", "--out", "b.bvh"}),
+                   1, "cannot be opened"));
+  CHECK_FALSE(std::filesystem::exists(glove.file("x.gesture")));
+  REQUIRE(glove.train("h.gesture").code == 0);
+  CHECK(
+      one_sentence(posed({"apply", "--model", glove.file("h.gesture"), "a.bvh", "--out", "b.bvh"}),
+                   1, "not a style model"));
+}
+
+}  // namespace posed::test
