@@ -151,8 +151,8 @@ Result<json> train(const Options& options) {
 int run(const Options& options) {
   if (auto checked = check(options); !checked) return report(checked.error());
   if (options.auto_label) {
-    return auto_label(
-        {options.clips[0], options.labels[0], options.out, options.rate_hz, options.json});
+    return auto_label({options.clips[0], options.labels[0], options.out, options.rate_hz,
+                       read_options(options.hand), options.json});
   }
   const auto trained = train(options);
   if (!trained) return report(trained.error());
