@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "models/hand/contacts.hpp"
@@ -16,8 +17,11 @@ constexpr double kNear_m = 3e-3;            // pairs this near take part in the 
 constexpr double kFar_m = 10e-3;            // gaps above need not be known
 constexpr double kHinge_rad = 4 * kDegree;  // a limit is felt this much before it is reached
 constexpr double kDone_rad = 1e-6;
-constexpr int kMaxRounds = 10;
-constexpr int kHalvings = 20;
+constexpr double kMaxStep_rad = 0.35;  // of one linearisation
+constexpr double kDeep_m = 2e-3;
+constexpr double kLoyalty = 0.7;  // another side must be this much cheaper
+constexpr int kMaxRounds = 16;
+constexpr int kHalvings = 10;
 constexpr double kLeastWeight = 1e-9;  // variances, of the largest one
 
 // `over` is how far an angle lies inside its limit, less than kHinge_rad: bent smoothly onto zero.
@@ -44,6 +48,15 @@ HandAngles parallel(const HandAngles& angles) noexcept {
   return out;
 }
 
+double largest_difference(const HandAngles& a, const HandAngles& b) noexcept {
+  double largest = 0.0;
+  for (std::size_t c = 0; c < a.size(); ++c) {
+    const double difference = std::abs(a[c] - b[c]);
+    if (!(difference <= largest)) largest = difference;  // a NaN stays
+  }
+  return largest;
+}
+
 HandAngles between(const HandAngles& from, const HandAngles& to, double share) noexcept {
   HandAngles out;
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = from[c] + share * (to[c] - from[c]);
@@ -60,6 +73,8 @@ struct ConstraintSolver::State {
   HandPose pose;
   Gaps gaps_m{};
   std::array<Row, kMaxRows> rows{};
+  HandAngles before{};   // what the frame before became
+  bool follows = false;  // and it was held apart
 
   double gap_of(const HandAngles& angles) noexcept {
     place(geometry, angles, pose);
@@ -97,28 +112,61 @@ struct ConstraintSolver::State {
     return {rows.data(), count};
   }
 
-  // Sequential QP from `target`. The gap after the last round.
-  double separate(const HandAngles& target, const HandAngles& variance, HandAngles& angles,
-                  ConstraintReport& report) noexcept {
+  // One way to the nearest pose: where it begins, and how it ended.
+  struct Path {
+    HandAngles angles;
+    Forces forces;
+    double gap_m = 0.0;
+    double cost = std::numeric_limits<double>::infinity();  // infinite: no gap was reached
+    int rounds = 0;
+  };
+
+  // Sequential QP towards `target`.
+  void descend(const HandAngles& target, const HandAngles& variance, Path& path) noexcept {
     const Box box{geometry.low_rad, geometry.high_rad};
-    double gap_m = gap_of(angles);
-    if (gap_m >= options.margin_m) {
-      forces = {};
-      return gap_m;
+    path.gap_m = gap_of(path.angles);
+    for (path.rounds = 0; path.rounds < kMaxRounds;) {
+      ++path.rounds;
+      const HandAngles next = project(target, variance, near_rows(path.angles),
+                                      options.limits ? &box : nullptr, path.forces);
+      const double step_rad = largest_difference(next, path.angles);
+      if (!std::isfinite(step_rad)) return;
+      // Far from where it was made, a linearisation means nothing.
+      path.angles = between(path.angles, next, std::min(1.0, kMaxStep_rad / step_rad));
+      path.gap_m = gap_of(path.angles);
+      if (step_rad < kDone_rad) break;
     }
-    for (report.rounds = 0; report.rounds < kMaxRounds;) {
-      ++report.rounds;
-      const HandAngles next =
-          project(target, variance, near_rows(angles), options.limits ? &box : nullptr, forces);
-      double step_rad = 0.0;
-      for (std::size_t c = 0; c < next.size(); ++c) {
-        step_rad = std::max(step_rad, std::abs(next[c] - angles[c]));
-      }
-      angles = next;
-      gap_m = gap_of(angles);
-      if (step_rad < kDone_rad || !std::isfinite(step_rad)) break;
+    if (path.gap_m < 0.0) return;
+    path.cost = 0.0;
+    for (std::size_t c = 0; c < target.size(); ++c) {
+      const double by = path.angles[c] - target[c];
+      path.cost += by * by / variance[c];
     }
-    return gap_m;
+  }
+
+  // The nearest pose with gaps; infinite cost where none was found. Fingers that are deep in each
+  // other can come apart on more than one side: of the ways that begin at the pose itself, at the
+  // pose with its fingers side by side, and at what the frame before became, the cheapest is taken,
+  // the last of them unless another is far cheaper, so that the side does not change to and fro.
+  Path separate(const HandAngles& target, const HandAngles& variance) noexcept {
+    Path best{.angles = target, .forces = {}};
+    best.gap_m = gap_of(target);
+    const bool is_deep = best.gap_m < -kDeep_m;
+    if (best.gap_m >= options.margin_m) {
+      best.cost = 0.0;
+      return best;
+    }
+    best.forces = forces;
+    descend(target, variance, best);
+    if (!is_deep) return best;
+    Path aside{.angles = target, .forces = {}};
+    (void)retreat(parallel(target), aside.angles);
+    descend(target, variance, aside);
+    if (aside.cost < best.cost) best = aside;
+    if (!follows) return best;
+    Path same_side{.angles = before, .forces = forces};
+    descend(target, variance, same_side);
+    return same_side.cost * kLoyalty <= best.cost ? same_side : best;
   }
 
   // The first pose on the way to `safe` that has a gap; the way's end where none is found earlier.
@@ -142,6 +190,30 @@ struct ConstraintSolver::State {
       }
     }
     return gap_m;
+  }
+
+  void keep_apart(HandAngles& angles, const HandAngles& variance,
+                  ConstraintReport& report) noexcept {
+    const Path path = separate(angles, variance);
+    report.rounds = path.rounds;
+    report.retreated = !std::isfinite(path.cost);
+    if (report.retreated) {
+      if (std::isfinite(path.gap_m)) angles = path.angles;
+      HandAngles safe = parallel(angles);
+      report.min_gap_m = retreat(safe, angles);
+      if (report.min_gap_m < 0.0) {
+        std::fill_n(safe.begin(), kFingerChannels, 0.0);  // the thumb aside
+        report.min_gap_m = retreat(safe, angles);
+      }
+      if (report.min_gap_m < 0.0) report.min_gap_m = retreat({}, angles);
+      forces = {};
+    } else {
+      angles = path.angles;
+      forces = path.forces;
+      report.min_gap_m = gap_of(angles);
+    }
+    follows = path.rounds > 0;
+    before = angles;
   }
 
   int count_touching() noexcept {
@@ -186,29 +258,19 @@ ConstraintReport ConstraintSolver::step(HandAngles& angles, const HandAngles& va
     }
   }
   if (state.options.collisions) {
-    const HandAngles target = angles;
-    report.min_gap_m = state.separate(target, weight, angles, report);
-    const bool is_apart = report.min_gap_m >= 0.0;  // false for NaN too
-    if (!is_apart) {
-      if (!std::isfinite(report.min_gap_m)) angles = target;
-      report.min_gap_m = state.retreat(parallel(angles), angles);
-      if (report.min_gap_m < 0.0) report.min_gap_m = state.retreat({}, angles);
-      state.forces = {};
-      report.retreated = true;
-    }
+    state.keep_apart(angles, weight, report);
     report.touching = state.count_touching();
   } else {
     report.min_gap_m = state.gap_of(angles);
   }
-  for (std::size_t c = 0; c < angles.size(); ++c) {
-    report.changed_rad = std::max(report.changed_rad, std::abs(angles[c] - given[c]));
-  }
+  report.changed_rad = largest_difference(angles, given);
   return report;
 }
 
 void ConstraintSolver::reset() noexcept {
   state_->forces = {};
   state_->touching.reset();
+  state_->follows = false;
 }
 
 double min_gap_m(const HandGeometry& geometry, const HandAngles& angles) noexcept {
