@@ -19,7 +19,7 @@ namespace posed::clip {
 struct HandClip {
   std::string path;
   Side side = Side::kRight;
-  double rate_hz = 30.0;           // 1 / median step
+  double rate_hz = 30.0;           // 1 / median step, of an even clock 1 / mean step
   std::vector<double> time_s;      // [frame], increasing
   std::vector<HandAngles> angles;  // [frame], rad; NaN where a value is missing
   std::vector<std::string> warnings;

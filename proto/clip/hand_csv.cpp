@@ -14,6 +14,7 @@ namespace posed::clip {
 namespace {
 
 constexpr double kSameTime_s = 1e-6;  // two stamps closer than this are one
+constexpr double kEven = 0.01;        // steps that differ by less are one step
 
 // Column names without the time: thumb1_x_rad ... little3_z_rad.
 const std::array<std::string, kHandChannels>& column_names() {
@@ -58,6 +59,17 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + std::ssize(values) / 2;
   std::ranges::nth_element(values, middle);
   return *middle;
+}
+
+// 1 / median step; of an even clock, whose stamps are only rounded, 1 / mean step.
+double rate_of(const std::vector<double>& steps_s) {
+  const double middle_s = median(steps_s);
+  const bool is_even = std::ranges::all_of(
+      steps_s, [&](double s) { return std::abs(s - middle_s) < kEven * middle_s; });
+  if (!is_even) return 1.0 / middle_s;
+  double sum_s = 0.0;
+  for (const double s : steps_s) sum_s += s;
+  return static_cast<double>(steps_s.size()) / sum_s;
 }
 
 // Times between two that are known lie on the line between them, outside of them a step apart.
@@ -135,8 +147,7 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
     last_s = now_s;
     last = i;
   }
-  if (!steps_s.empty()) rate_hz = 1.0 / median(steps_s);
-  if (steps_s.empty()) rate_hz = draft.untimed_rate_hz;
+  rate_hz = steps_s.empty() ? draft.untimed_rate_hz : rate_of(steps_s);
   if (missing > 0) {
     warnings.push_back(std::to_string(missing) + " of " + std::to_string(time_s.size()) +
                        " frames have no time of their own; " +

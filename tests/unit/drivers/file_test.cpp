@@ -77,6 +77,34 @@ TEST_CASE("a clip played live is the clip read offline, to the last bit") {
   const auto amc = test::scratch_file("small.amc", test::small_amc());
   check_plays_like_clip(amc, {{"skeleton", asf.string()}, {"rate_hz", 60.0}},
                         {.asf = asf, .amc_rate_hz = 60.0});
+  check_plays_like_clip(test::scratch_file("hand.csv", test::small_hand_csv()),
+                        {{"hand", std::string("left")}}, {.hand = Side::kLeft});
+}
+
+TEST_CASE("a hand CSV is played by its own uneven times, round after round") {
+  std::string text = test::small_hand_csv();
+  for (const auto& [from, to] : {std::pair("0.020000", "0.013"), {"0.060000", "0.07"}}) {
+    text = swap(text, std::string("\n") + from, std::string("\n") + to);
+  }
+  const auto path = test::scratch_file("uneven.csv", text);
+  const auto clip = clip::read_clip(path);
+  REQUIRE(clip);
+  Device device = must_open(path, {{"pace", 2.0}});
+  const double step_s = 1.0 / device.description.rate_hz;
+  REQUIRE(device.transport->start(1000));
+  CollectSink sink;
+  for (int i = 0; i < 10; ++i) {
+    const double time_s = clip->time_s[static_cast<std::size_t>(i % 5)] +
+                          (i < 5 ? 0.0 : clip->time_s.back() + step_s);
+    const std::int64_t due_ns = device.transport->next_due_ns();
+    CHECK(seconds(due_ns - 1000) == Approx(time_s / 2.0).margin(2e-9));
+    CHECK(device.transport->read(due_ns - 1).bytes.empty());
+    device.decoder->feed(device.transport->read(due_ns).bytes, 0, sink);
+    CHECK(seconds(sink.frames.back().header.device_ns) == Approx(time_s).margin(2e-9));
+  }
+  CHECK(open_file(path, {{"hand", std::string("both")}}).error().text() == "hand is left or right");
+  CHECK(open_file(path, {{"hand_shape", std::string("paw")}}).error().text() ==
+        "there is no hand 'paw'; there are adult");
 }
 
 TEST_CASE("a real walk played live is the walk read offline, to the last bit") {

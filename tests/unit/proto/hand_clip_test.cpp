@@ -99,6 +99,12 @@ TEST_CASE("times may be uneven, missing or repeated; they may not run back") {
         "h.csv:4: frame 3: its time 1 lies before the 2 of a frame above it");
 }
 
+TEST_CASE("stamps that are only rounded give the clock's own rate") {
+  std::string text = header();
+  for (int i = 0; i < 300; ++i) text += row(std::to_string(i / 30.0), 0);
+  CHECK(read(text).rate_hz == Approx(30.0).epsilon(1e-6));
+}
+
 TEST_CASE("a hand CSV that is none is refused with its line") {
   CHECK(error_of("") == "h.csv: is empty, so it is no hand CSV");
   CHECK(error_of("\ntime_s,thumb1_y_rad\n") ==
