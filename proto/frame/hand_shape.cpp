@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
+#include <vector>
 
 #include <toml++/toml.h>
 
@@ -47,8 +48,6 @@ class HandReader {
       const auto f = static_cast<std::size_t>(finger - kFingerNames.begin());
       seen_[f] = true;
       read_finger(*node.as_table(), shape_.fingers[f]);
-    } else if (key == "palm" && node.is_array()) {
-      for (const toml::node& capsule : *node.as_array()) read_palm(capsule);
     } else {
       blame(node, "'" + std::string(key) + "' is not known in a hand, or of another type");
     }
@@ -94,20 +93,6 @@ class HandReader {
       }
       finger.range[j][axis] = {*low * kDegree, *high * kDegree};
     }
-  }
-
-  void read_palm(const toml::node& node) {
-    const toml::table* const table = node.as_table();
-    if (table == nullptr || table->size() != 3 || !table->contains("from_mm") ||
-        !table->contains("to_mm") || !table->contains("radius_mm")) {
-      return blame(node, "a capsule of the palm has from_mm, to_mm and radius_mm");
-    }
-    const auto radius_mm = (*table)["radius_mm"].value<double>();
-    if (!radius_mm || !(*radius_mm > 0) || *radius_mm * kMillimetre > kLongest_m) {
-      return blame(node, "radius_mm is a length above zero");
-    }
-    shape_.palm.push_back(
-        {point(*table->get("from_mm")), point(*table->get("to_mm")), *radius_mm * kMillimetre});
   }
 
   // Three numbers of at most `most` in size; zeros after a mistake.

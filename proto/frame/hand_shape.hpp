@@ -8,7 +8,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -32,16 +31,9 @@ struct FingerShape {
   std::array<std::array<AngleRange, 3>, kFingerJoints> range{};  // [joint][x, y, z]
 };
 
-struct PalmCapsule {
-  Eigen::Vector3d from_m = Eigen::Vector3d::Zero();
-  Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
-  double radius_m = 0.0;
-};
-
 struct HandShape {
   std::string name;
   std::array<FingerShape, kFingers> fingers;
-  std::vector<PalmCapsule> palm;
 };
 
 // `text` is TOML; `file` stands in the errors, which name the line.

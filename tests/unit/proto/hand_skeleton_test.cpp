@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/profile_texts.hpp"
 #include "tests/support/allocations.hpp"
 
 namespace posed {
@@ -223,10 +224,13 @@ TEST_CASE("every built-in hand is good, and a bad one is refused with its line")
   CHECK(error("name = \"h\"\nclaw = 3\n") ==
         "h.toml:2: 'claw' is not known in a hand, or of another type");
   CHECK(error("[thumb]\nlength_mm = [1, 2]\n").starts_with("h.toml:1: a finger needs base_mm"));
-  CHECK(error("[[palm]]\nfrom_mm = [0, 0, 0]\nto_mm = [0, 0, nan]\nradius_mm = 3\n") ==
-        "h.toml:3: three numbers are wanted here, of a size that fits a hand");
-  CHECK(error("[[palm]]\nfrom_mm = [0, 0, 0]\nto_mm = [0, 0, 1]\nradius_mm = 0\n") ==
-        "h.toml:1: radius_mm is a length above zero");
+  CHECK(
+      error("[index]\nbase_mm = [0, 0, nan]\n").starts_with("h.toml:1: a finger needs length_mm"));
+  std::string long_bone(hand_texts()[0].toml);
+  const std::size_t at = long_bone.find("length_mm = [44, 33, 27]");
+  REQUIRE(at != std::string::npos);
+  long_bone.replace(at, 24, "length_mm = [44, -3, 27]");
+  CHECK(error(long_bone) == "h.toml:9: lengths are above zero");
 }
 
 }  // namespace posed
