@@ -28,6 +28,10 @@ Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
   if (!stream) return std::unexpected(stream.error());
   const auto bound = pipeline::bind_style(**stream);
   if (!bound) return std::unexpected(bound.error());
+  const auto gesture = pipeline::bind_gesture(**stream);
+  if (!gesture) return std::unexpected(gesture.error());
+  const auto constrains = pipeline::bind_constrain(**stream);
+  if (!constrains) return std::unexpected(constrains.error());
   const drivers::Description& device = (*stream)->device.description;
   ordered_json told{{"name", config.name},
                     {"driver", config.driver},
@@ -41,6 +45,12 @@ Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
     told["model"] = (*bound)->name;
     told["alpha"] = config.style->filter.alpha;
   }
+  if (config.generate) {
+    told["lag_frames"] = generate::lag_frames(config.generate->live.lag,
+                                              1.0 / generate::stream_rate_hz(device.rate_hz));
+    if (gesture->model) told["gesture_model"] = gesture->model->name;
+  }
+  told["constrain"] = *constrains;
   told["warnings"] = (*stream)->device.warnings;
   return told;
 }
@@ -62,6 +72,13 @@ void print(const pipeline::DaemonConfig& config, const ordered_json& streams) {
       std::printf(", style %s at alpha %g", stream["model"].get<std::string>().c_str(),
                   stream["alpha"].get<double>());
     }
+    if (stream.contains("lag_frames")) {
+      std::printf(", generated with a lag of %d frames", stream["lag_frames"].get<int>());
+    }
+    if (stream.contains("gesture_model")) {
+      std::printf(" and %s", stream["gesture_model"].get<std::string>().c_str());
+    }
+    if (stream["constrain"].get<bool>()) std::printf(", fingers held apart");
     std::puts(stream["publish_raw"].get<bool>() ? ", raw input too" : "");
     for (const auto& warning : stream["warnings"]) {
       std::printf("  note: %s\n", warning.get<std::string>().c_str());

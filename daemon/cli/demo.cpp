@@ -18,6 +18,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/client.hpp"
 #include "daemon/cli/demo_clips.hpp"
+#include "daemon/cli/demo_hand.hpp"
 #include "daemon/cli/live_view.hpp"
 #include "daemon/cli/train_gesture.hpp"
 #include "daemon/cli/train_style.hpp"
@@ -50,8 +51,11 @@ double turn_deg(const float* a, const float* b) {
 // What the demo sees as a client: raw and styled frames of the same instant, compared.
 class Watcher {
  public:
+  explicit Watcher(DemoHand& hand) : hand_(hand) {}
+
   void take(const std::string& topic, const void* body, std::size_t size) {
     if (!frame_.ParseFromArray(body, static_cast<int>(size))) return;
+    if (frame_.stream() == kDemoHandStream) return hand_.take(frame_);
     if (topic.ends_with("-raw")) {
       raw_[frame_.sequence()].assign(frame_.rotation_xyzw().begin(), frame_.rotation_xyzw().end());
       while (raw_.size() > kKept) raw_.erase(raw_.begin());
@@ -83,6 +87,7 @@ class Watcher {
     change_deg_ = std::sqrt(sum / (static_cast<double>(raw.size()) / 4.0));
   }
 
+  DemoHand& hand_;
   v1::Frame frame_;
   std::map<std::uint64_t, std::vector<float>> raw_;
   std::uint64_t styled_ = 0, gaps_ = 0, last_ = 0;
@@ -128,7 +133,8 @@ double seconds_since(SteadyClock::time_point then) {
 }
 
 // Shows the running daemon until Ctrl-C or `seconds` after the first frame.
-Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watcher& watcher) {
+Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watcher& watcher,
+               DemoHand& hand) {
   ClientOptions client;
   client.endpoint = daemon.publish_endpoint();
   auto connection = Connection::open(client, ZMQ_SUB);
@@ -144,6 +150,9 @@ Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watch
     if (connection->wait(kLookAround)) drain(*connection, watcher);
     if (!first_frame && watcher.styled() > 0) first_frame = SteadyClock::now();
     if (first_frame && options.seconds && seconds_since(*first_frame) >= *options.seconds) break;
+    if (first_frame) {
+      if (auto tended = hand.tend(seconds_since(*first_frame)); !tended) return tended;
+    }
     if (!first_frame && seconds_since(start) > kFirstFrameWithin_s) {
       return fail("no styled frame arrived within 10 s; the log above says why");
     }
@@ -154,12 +163,14 @@ Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watch
     screen.measure(view);
     view.notes = {
         fmt::format("received {} styled frames, {} missing; {:.1f} deg rms from the raw pose",
-                    watcher.styled(), watcher.gaps(), watcher.change_deg())};
+                    watcher.styled(), watcher.gaps(), watcher.change_deg()),
+        hand.note()};
     if (screen.is_terminal() || first_drawing) {
-      view.notes.insert(
-          view.notes.end(),
-          {"in another terminal: build/release/posed monitor",
-           "            or: build/release/posed ctl set walker alpha 0.5", "Ctrl-C ends the demo"});
+      view.notes.insert(view.notes.end(),
+                        {"in another terminal: build/release/posed monitor",
+                         "            or: build/release/posed ctl set walker alpha 0.5",
+                         "            or: build/release/posed ctl play hand \"p 4 3 1 g\"",
+                         "Ctrl-C ends the demo"});
     }
     screen.draw(live_view(daemon.stats(), view));
   }
@@ -175,8 +186,10 @@ Result<> stream(const DemoOptions& options) {
   if (auto started = (*daemon)->start(); !started) return started;
   std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
                (*daemon)->publish_endpoint().c_str());
-  Watcher watcher;
-  const auto watched = watch(**daemon, options, watcher);
+  auto hand = DemoHand::open((*daemon)->control_endpoint());
+  if (!hand) return std::unexpected(hand.error());
+  Watcher watcher(*hand);
+  const auto watched = watch(**daemon, options, watcher, *hand);
   const v1::Stats stats = (*daemon)->stats();
   (*daemon)->stop();
   if (!watched) return watched;
@@ -184,6 +197,7 @@ Result<> stream(const DemoOptions& options) {
       "\nreceived %llu styled frames over ZeroMQ, %llu missing; last pose %.1f deg rms from raw\n",
       static_cast<unsigned long long>(watcher.styled()),
       static_cast<unsigned long long>(watcher.gaps()), watcher.change_deg());
+  if (const std::string told = hand->summary(); !told.empty()) std::puts(told.c_str());
   for (const v1::StreamStats& s : stats.stream()) {
     std::printf(
         "%s: %.1f frames/s, arrival to ZeroMQ p50 %.0f us, p99 %.0f us, dropped %llu, shed %llu\n",

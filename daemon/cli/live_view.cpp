@@ -56,6 +56,20 @@ std::string row(const v1::StreamStats& stream, int model_width) {
       stage(stream.publish()), stream.alpha(), fit(config::printable(stream.model()), model_width));
 }
 
+// What a hand does, below its row; empty for a stream that has neither lag nor label.
+std::string hand_row(const v1::StreamStats& stream) {
+  std::string text;
+  if (!stream.label().empty()) {
+    text = fmt::format("label {} ({:.0f} %)", config::printable(stream.label()),
+                       100.0F * stream.label_probability());
+  }
+  if (stream.lag_frames() > 0) {
+    text += fmt::format("{}lag {} frame{} ({:.0f} ms)", text.empty() ? "" : ", ",
+                        stream.lag_frames(), stream.lag_frames() == 1 ? "" : "s", stream.lag_ms());
+  }
+  return text.empty() ? text : "  " + fit(stream.stream(), 10) + " " + text;
+}
+
 const char* colour_of(const v1::StreamStats& stream) {
   if (stream.dropped() > 0 || stream.shed() > 0) return kRed;
   if (stream.state() == "stale" || stream.state() == "waiting") return kYellow;
@@ -92,6 +106,11 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
   }
   if (shown < stats.stream_size()) {
     lines.push_back(fmt::format("... and {} more", stats.stream_size() - shown));
+  }
+  for (const v1::StreamStats& stream : stats.stream()) {
+    const std::string hand = hand_row(stream);
+    const bool fits = options.height == 0 || static_cast<int>(lines.size()) + 1 < options.height;
+    if (!hand.empty() && fits) lines.push_back(fit(hand, width));
   }
   lines.push_back(
       paint(kDim, fit("stage times: p50/p99 in us (m: ms), publish counts from arrival", width)));

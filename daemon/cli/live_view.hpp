@@ -20,7 +20,7 @@ struct LiveViewOptions {
 };
 
 // One line for the daemon, one for the columns' names, one a stream (rates, drops, sheds, p50/p99
-// of each stage, alpha, model), then the notes.
+// of each stage, alpha, model), one a stream that has a label or a lag, then the notes.
 [[nodiscard]] std::vector<std::string> live_view(const v1::Stats& stats,
                                                  const LiveViewOptions& options);
 

@@ -56,7 +56,12 @@ std::string line(const v1::Frame& frame) {
     out += fmt::format("  root {:7.3f} {:7.3f} {:7.3f} m", frame.root_position_m(0),
                        frame.root_position_m(1), frame.root_position_m(2));
   }
-  if (!frame.label().empty()) out += "  " + config::printable(frame.label());
+  if (!frame.label().empty()) {
+    out += fmt::format("  {} {:.2f}", config::printable(frame.label()), frame.label_probability());
+  }
+  if (frame.lag_frames() > 0) {
+    out += fmt::format("  lag {} ({:.0f} ms)", frame.lag_frames(), frame.lag_ms());
+  }
   return out;
 }
 
@@ -169,7 +174,7 @@ void add_monitor(CLI::App& app, int& exit_code) {
       ->check(CLI::PositiveNumber);
   command->add_flag("--json", options->json, "One proto3 JSON object a line");
   command->footer(R"(Examples:
-  posed monitor                                    # time, stream, sequence, quality, latency, root
+  posed monitor                    # time, stream, sequence, quality, latency, root, label, lag
   posed monitor --stream walker --json --count 10  # 10 posed.v1.Frame objects
   posed monitor --topic stats --json | jq .stream[0].rateHz
 The latency runs from arrival in the daemon to its publishing. A reader too slow for the stream

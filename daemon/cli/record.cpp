@@ -35,6 +35,7 @@ record::RecordedStream recorded(const pipeline::OpenStream& stream) {
                                   .style = std::nullopt,
                                   .model_name = {},
                                   .generate = std::nullopt,
+                                  .constrain = pipeline::bind_constrain(stream).value_or(false),
                                   .gesture_model = {}};
   if (config.style) {
     settings.style = config.style->filter;

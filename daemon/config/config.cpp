@@ -170,6 +170,10 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
   if (auto generate = table.table("generate")) {
     read_generate(*generate, stream.generate.emplace());
   }
+  if (auto constrain = table.table("constrain")) {
+    constrain->read("enabled", stream.constrain.emplace(true));
+    constrain->finish();
+  }
   if (!stream.name.empty() && !is_stream_name(stream.name)) {
     table.blame("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }

@@ -181,6 +181,8 @@ Result<> Daemon::Parts::open_engines() {
     if (!model) return std::unexpected(model.error());
     auto gesture = bind_gesture(stream);
     if (!gesture) return std::unexpected(gesture.error());
+    const auto constrain = bind_constrain(stream);
+    if (!constrain) return std::unexpected(constrain.error());
     EngineOptions engine{.stream = i,
                          .stale_after_ns = nanoseconds(stream.config.stale_after_s),
                          .publish_raw = stream.config.publish_raw,
@@ -188,6 +190,7 @@ Result<> Daemon::Parts::open_engines() {
                          .model = model->get(),
                          .generate = std::nullopt,
                          .gesture = gesture->model.get(),
+                         .constrain = *constrain,
                          .rate_hz = stream.device.description.rate_hz,
                          .skeleton = stream.device.description.skeleton};
     if (stream.config.style) engine.style = stream.config.style->filter;

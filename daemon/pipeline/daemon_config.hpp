@@ -36,6 +36,7 @@ struct StreamConfig {
   double stale_after_s = 0.5;  // silence after which the stream is called stale
   std::optional<StyleConfig> style;
   std::optional<GenerateConfig> generate;
+  std::optional<bool> constrain;  // fingers held apart and within their limits; default: on hands
 };
 
 // Who may connect; CURVE is off when there is no server key.

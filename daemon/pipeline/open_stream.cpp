@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "models/gesture/model_file.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::pipeline {
 namespace {
@@ -84,6 +85,18 @@ Result<BoundGesture> bind_gesture(const OpenStream& stream) {
   if (!order) return of_stream(stream.config.name, order.error());
   bound.play = *order;
   return bound;
+}
+
+Result<bool> bind_constrain(const OpenStream& stream) {
+  const auto& skeleton = stream.device.description.skeleton;
+  const bool hand = skeleton && hand_side(*skeleton);
+  if (stream.config.constrain.value_or(false) && !hand) {
+    return of_stream(stream.config.name,
+                     misuse("only hands (hand45) can be constrained; leave out its"
+                            " [stream.constrain] table")
+                         .error());
+  }
+  return stream.config.constrain.value_or(hand);
 }
 
 }  // namespace posed::pipeline

@@ -36,6 +36,9 @@ struct BoundGesture {
 };
 [[nodiscard]] Result<BoundGesture> bind_gesture(const OpenStream& stream);
 
+// Whether the stream's last stage constrains: on a hand, unless the config says no. Cold.
+[[nodiscard]] Result<bool> bind_constrain(const OpenStream& stream);
+
 // Says which stream an error is about.
 [[nodiscard]] std::unexpected<Error> of_stream(const std::string& name, Error error);
 

@@ -17,6 +17,7 @@ constexpr std::int64_t kSilentFrames = 4;
 StreamEngine::StreamEngine(const EngineOptions& options) noexcept
     : options_(options), model_(options.model) {
   if (options.style) style_.emplace(options.model, *options.style);
+  if (options.constrain) constrain_.emplace(options.skeleton);
   if (!options.generate) return;
   const double rate_hz = generate::stream_rate_hz(options.rate_hz);
   period_ns_ = nanoseconds(1.0 / rate_hz);
@@ -63,6 +64,10 @@ void StreamEngine::generate(const Frame& frame) noexcept {
 void StreamEngine::frame(const Frame& frame) noexcept {
   pose_.kind = Item::Kind::kFrame;
   pose_.frame = frame;
+  if (constrain_) {
+    constrain_->step(pose_.frame,
+                     generate_ ? generate_->variance_rad2() : std::span<const double>());
+  }
   has_pose_ = true;
   last_out_ = frame.header.sequence;
   out_->item(pose_);

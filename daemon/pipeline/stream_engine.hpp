@@ -9,6 +9,7 @@
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "models/generate/generate_stage.hpp"
+#include "models/hand/constrain_stage.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/sink.hpp"
 
@@ -35,12 +36,13 @@ struct EngineOptions {
   const style::BoundModel* model = nullptr;         // not owned; null passes frames through
   std::optional<generate::LiveOptions> generate{};  // the stage is there when this is; hands only
   const generate::BoundModel* gesture = nullptr;    // not owned; null: nothing can be performed
+  bool constrain = false;                           // the stage is there; hands only
   double rate_hz = 0.0;                             // of the stream; only `generate` needs it
-  std::shared_ptr<const Skeleton> skeleton{};       // the same
+  std::shared_ptr<const Skeleton> skeleton{};  // of the stream; `generate` and `constrain` need it
 };
 
-// style -> generate, each where its options are. All calls come from one thread and are RT-safe,
-// but for construction.
+// style -> generate -> constrain, each where its options are. All calls come from one thread and
+// are RT-safe, but for construction.
 class StreamEngine final : private Emit {
  public:
   explicit StreamEngine(const EngineOptions& options) noexcept;
@@ -100,6 +102,7 @@ class StreamEngine final : private Emit {
   EngineOptions options_;
   std::optional<style::StyleFilter> style_;
   std::optional<generate::GenerateStage> generate_;
+  std::optional<hand::ConstrainStage> constrain_;
   Styled styled_{*this};
   const style::BoundModel* model_ = nullptr;
   StreamState state_ = StreamState::kWaiting;

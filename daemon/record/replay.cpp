@@ -10,6 +10,7 @@
 #include "daemon/record/replay_models.hpp"
 #include "daemon/record/tape.hpp"
 #include "models/gesture/play_order.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::record {
 namespace {
@@ -167,8 +168,10 @@ Result<> Replay::Lane::open_engine(const log::Reader& reader, const log::StreamR
   options.publish_raw = settings.publish_raw;
   options.style = settings.style;
   options.generate = settings.generate;
-  options.rate_hz = stream_.description.rate_hz;
   options.skeleton = stream_.description.skeleton;
+  options.constrain =
+      settings.constrain && options.skeleton && hand_side(*options.skeleton).has_value();
+  options.rate_hz = stream_.description.rate_hz;
   if (options.style && !row.model.empty()) {
     auto done = models_.load_style(reader, row.model, stream_.description, *options.style);
     if (!done) return done;

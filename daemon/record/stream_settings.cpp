@@ -32,6 +32,7 @@ std::string to_json(const StreamSettings& settings) {
                      {"gate_fallback", settings.style->gate_fallback},
                      {"calibrate", settings.style->calibrate}};
   }
+  if (settings.constrain) json["constrain"] = true;
   if (settings.generate) {
     json["generate"] = {{"lag_frames", settings.generate->lag.frames},
                         {"lag_s", settings.generate->lag.seconds},
@@ -50,6 +51,7 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
                             .style = std::nullopt,
                             .model_name = root.at("model_name").get<std::string>(),
                             .generate = std::nullopt,
+                            .constrain = false,
                             .gesture_model = {}};
     if (root.contains("style")) {
       const auto& style = root.at("style");
@@ -60,6 +62,7 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
                                .gate_fallback = style.at("gate_fallback").get<double>(),
                                .calibrate = style.at("calibrate").get<bool>()};
     }
+    settings.constrain = root.value("constrain", false);
     if (root.contains("generate")) {
       const auto& generate = root.at("generate");
       settings.generate =

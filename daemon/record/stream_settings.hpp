@@ -19,6 +19,7 @@ struct StreamSettings {
   std::optional<style::FilterOptions> style;      // the style stage is there when this is
   std::string model_name;                         // for people
   std::optional<generate::LiveOptions> generate;  // the generate stage is there when this is
+  bool constrain = false;                         // the constrain stage is there
   std::string gesture_model;  // SHA-256 of the gesture model that it began with; may be empty
 };
 

@@ -20,9 +20,12 @@ Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model
     return fail("a gesture model needs a stream of hands (hand45), not '" + skeleton.name + "'",
                 std::move(name));
   }
+  auto live = bind_live_model(model, skeleton, name);
+  if (!live) return std::unexpected(live.error());
   auto shared = std::make_shared<const gesture::GestureModel>(std::move(model));
-  auto bound = std::make_unique<BoundModel>(BoundModel{
-      ModelEvidence(std::move(shared), stream_rate_hz(rate_hz)), nullptr, std::move(name)});
+  auto bound = std::make_unique<BoundModel>(
+      BoundModel{ModelEvidence(std::move(shared), stream_rate_hz(rate_hz)), nullptr,
+                 std::move(*live), std::move(name)});
   bound->player = std::make_unique<ScriptPlayer>(
       bound->evidence, PlayerOptions{.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4});
   return bound;

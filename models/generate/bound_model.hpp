@@ -1,12 +1,13 @@
-// BoundModel: a gesture model at one stream's rate and the player that performs it, ready for hot
-// use. Built cold; the hot side borrows a plain pointer. Of all of it only the player changes, and
-// only its stream uses it.
+// BoundModel: a gesture model at one stream's rate, the player that performs it and what the live
+// generator knows by it, ready for hot use. Built cold; the hot side borrows a plain pointer. Of
+// all of it only the player changes, and only its stream uses it.
 #pragma once
 
 #include <algorithm>
 #include <memory>
 #include <string>
 
+#include "models/generate/live_model.hpp"
 #include "models/generate/script_player.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "proto/frame/result.hpp"
@@ -19,6 +20,7 @@ inline constexpr int kMostWaiting = 1024;  // labels of one stream that wait to 
 struct BoundModel {
   ModelEvidence evidence;  // holds the gesture model
   std::unique_ptr<ScriptPlayer> player;
+  std::unique_ptr<const LiveModel> live;
   std::string name;  // of its file, for people
 
   [[nodiscard]] const gesture::GestureModel& gesture() const noexcept { return evidence.model(); }

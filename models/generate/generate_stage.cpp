@@ -12,7 +12,7 @@ GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton, const Liv
                              double rate_hz, const BoundModel* model)
     : skeleton_(std::move(skeleton)),
       hand_(hand_side(*skeleton_).has_value()),
-      smoother_(*skeleton_, options),
+      smoother_(*skeleton_, options, model != nullptr ? model->live.get() : nullptr),
       playback_(rate_hz),
       model_(model) {
   playback_.set_model(model);
@@ -21,6 +21,7 @@ GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton, const Liv
 // RT-safe.
 void GenerateStage::set_model(const BoundModel* model) noexcept {
   model_ = model;
+  static_cast<void>(smoother_.set_model(model != nullptr ? model->live.get() : nullptr));
   playback_.set_model(model);
 }
 

@@ -27,7 +27,7 @@ TEST_CASE("ctl changes a running daemon and says from which frame on") {
   CHECK(has(ctl({"status"}).out, "walker"));
   const auto raw = ctl({"set", "walker-raw", "alpha", "1"});
   CHECK(raw.code == 1);
-  CHECK(has(raw.err, "before the style"));
+  CHECK(has(raw.err, "before its stages"));
   const auto foreign = ctl({"model", "walker", served.path("walk.bvh")});
   CHECK(foreign.code == 1);
   CHECK(has(foreign.err, "walk.bvh"));

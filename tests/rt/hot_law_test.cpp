@@ -7,10 +7,13 @@
 
 #include <mutex>
 
+#include "models/gesture/synthetic_performer.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/hand_clip.hpp"
 #include "tests/rt/law.hpp"
 #include "tests/rt/rig.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/gesture/toy_gesture.hpp"
 #include "tests/unit/models/toy_style.hpp"
 
 namespace posed::rt {
@@ -70,15 +73,19 @@ TEST_CASE("reader and pipeline keep the hot law", "[rt]") {
   const auto path = folder.path() / "toy.bvh";
   REQUIRE(clip::write_bvh(test::toy_walk(120, 120.0), path));
   CountingTape tape;
-  std::vector<drivers::Device> devices;
-  devices.push_back(open_device("file", {{"path", path.string()}}));
-  devices.push_back(open_device("template", {}));
-  // Once through at 20 times its speed: ends, and is silent before that is noticed.
-  devices.push_back(open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}}));
-  const Skeleton& skeleton = *devices[0].description.skeleton;
+  const auto device = open_device("file", {{"path", path.string()}});
+  const Skeleton& skeleton = *device.description.skeleton;
   const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
   const auto second = style::bind_model(test::toy_model(2), skeleton, {}, "second").value();
-  Rig rig(std::move(devices), {first.get(), nullptr, first.get()}, &tape);
+  std::vector<RigStream> streams;
+  streams.push_back(
+      {.device = open_device("file", {{"path", path.string()}}), .style = first.get()});
+  streams.push_back({.device = open_device("template", {})});
+  // Once through at 20 times its speed: ends, and is silent before that is noticed.
+  streams.push_back(
+      {.device = open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}}),
+       .style = first.get()});
+  Rig rig(std::move(streams), &tape);
   forget_breaches();
   rig.start();
   REQUIRE(rig.take_frames(200) == 200);
@@ -89,6 +96,47 @@ TEST_CASE("reader and pipeline keep the hot law", "[rt]") {
   CHECK(tape.chunks > 0);
   CHECK(tape.decisions >= 2);
   if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
+  check_no_breach();
+}
+
+TEST_CASE("hands keep the hot law: smoothed, constrained, performing, given another model",
+          "[rt]") {
+  watch_log();
+  const test::TempFolder folder;
+  const auto path = folder.path() / "hand.csv";
+  const auto performer = gesture::make_performance({.person = 3, .gestures = 6}).value();
+  REQUIRE(clip::write_hand_csv(performer.clip, path));
+  CountingTape tape;
+  std::vector<RigStream> streams;
+  streams.push_back({.device = open_device("file", {{"path", path.string()}, {"pace", 4.0}})});
+  streams.push_back({.device = open_device("labels", {{"rate_hz", 120.0}})});
+  // Falls silent with frames in the smoother, and performs on.
+  streams.push_back(
+      {.device = open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}})});
+  std::vector<std::unique_ptr<const generate::BoundModel>> models;
+  const auto bind = [&](const drivers::Description& hand) {
+    models.push_back(
+        generate::bind_model(test::toy_gesture_model(), *hand.skeleton, hand.rate_hz, "toy")
+            .value());
+    return models.back().get();
+  };
+  for (RigStream& stream : streams) stream.gesture = bind(stream.device.description);
+  const auto* const another = bind(streams[0].device.description);
+  const auto order = gesture::make_play_order(models[0]->gesture(),
+                                              gesture::split_labels("g 1 c 3 4 p"), 2.0, true)
+                         .value();
+  Rig rig(std::move(streams), &tape);
+  forget_breaches();
+  rig.start();
+  REQUIRE(rig.take_frames(150) == 150);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    rig.command({.kind = Command::Kind::kPlay, .stream = i, .ticket = 1 + i, .play = order});
+  }
+  REQUIRE(rig.take_frames(150) == 150);
+  rig.command({.kind = Command::Kind::kGesture, .stream = 0, .ticket = 4, .gesture = another});
+  rig.command({.kind = Command::Kind::kStopPlaying, .stream = 1, .ticket = 5});
+  REQUIRE(rig.take_frames(150) == 150);
+  CHECK(rig.take_acks() == 5);
   check_no_breach();
 }
 
@@ -114,11 +162,11 @@ TEST_CASE("each way of breaking the hot law is found", "[rt]") {
   };
   for (const Way& way : ways) {
     INFO(kBreachNames[static_cast<std::size_t>(way.breach)]);
-    std::vector<drivers::Device> devices;
-    devices.push_back(open_device("template", {{"rate_hz", 500.0}}));
-    devices[0].decoder =
-        std::make_unique<BreakingDecoder>(std::move(devices[0].decoder), way.commit);
-    Rig rig(std::move(devices), {nullptr}, nullptr);
+    std::vector<RigStream> streams;
+    streams.push_back({.device = open_device("template", {{"rate_hz", 500.0}})});
+    auto& decoder = streams[0].device.decoder;
+    decoder = std::make_unique<BreakingDecoder>(std::move(decoder), way.commit);
+    Rig rig(std::move(streams), nullptr);
     forget_breaches();
     rig.start();
     REQUIRE(rig.take_frames(20) == 20);

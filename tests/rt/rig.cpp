@@ -6,9 +6,8 @@
 #include "tests/rt/law.hpp"
 
 namespace posed::rt {
-Rig::Rig(std::vector<drivers::Device> devices, std::vector<const style::BoundModel*> models,
-         record::Tape* tape)
-    : devices_(std::move(devices)),
+Rig::Rig(std::vector<RigStream> streams, record::Tape* tape)
+    : streams_(std::move(streams)),
       pipeline_wake_(pipeline::Wake::open().value()),
       publisher_wake_(pipeline::Wake::open().value()) {
   worker_ = pipeline::Worker::open({.in = &decoded_,
@@ -25,16 +24,22 @@ Rig::Rig(std::vector<drivers::Device> devices, std::vector<const style::BoundMod
                                     .tape = tape,
                                     .clock = pipeline::monotonic_ns})
                 .value();
-  for (std::uint32_t i = 0; i < devices_.size(); ++i) {
+  for (std::uint32_t i = 0; i < streams_.size(); ++i) {
+    RigStream& stream = streams_[i];
     counters_.push_back(std::make_unique<pipeline::StreamCounters>());
     pipeline::EngineOptions options{.stream = i,
                                     .stale_after_ns = 50'000'000,
                                     .publish_raw = true,
                                     .style = std::nullopt,
-                                    .model = models[i]};
-    if (models[i] != nullptr) options.style.emplace();
-    worker_->add(options, devices_[i].description.rate_hz, *counters_.back());
-    reader_->add(devices_[i], *counters_.back()).value();
+                                    .model = stream.style,
+                                    .gesture = stream.gesture,
+                                    .constrain = stream.gesture != nullptr,
+                                    .rate_hz = stream.device.description.rate_hz,
+                                    .skeleton = stream.device.description.skeleton};
+    if (stream.style != nullptr) options.style.emplace();
+    if (stream.gesture != nullptr) options.generate.emplace();
+    worker_->add(options, stream.device.description.rate_hz, *counters_.back());
+    reader_->add(stream.device, *counters_.back()).value();
   }
 }
 
@@ -46,7 +51,9 @@ Rig::~Rig() {
 }
 
 void Rig::start() {
-  for (auto& device : devices_) device.transport->start(pipeline::monotonic_ns()).value();
+  for (auto& stream : streams_) {
+    stream.device.transport->start(pipeline::monotonic_ns()).value();
+  }
   worker_thread_ = std::thread([this] {
     if (watch_system_calls()) ++watched_;
     worker_->run();

@@ -13,11 +13,16 @@
 
 namespace posed::rt {
 
+// A stream of the rig, with the stages that its models are for.
+struct RigStream {
+  drivers::Device device;
+  const style::BoundModel* style = nullptr;
+  const generate::BoundModel* gesture = nullptr;
+};
+
 class Rig {
  public:
-  // `devices` become streams in their order; each with `model` where there is one for it.
-  Rig(std::vector<drivers::Device> devices, std::vector<const style::BoundModel*> models,
-      record::Tape* tape);
+  Rig(std::vector<RigStream> streams, record::Tape* tape);
   ~Rig();  // stops both threads
 
   void start();
@@ -31,7 +36,7 @@ class Rig {
   [[nodiscard]] bool system_calls_watched() const noexcept { return watched_.load() == 2; }
 
  private:
-  std::vector<drivers::Device> devices_;
+  std::vector<RigStream> streams_;
   std::vector<std::unique_ptr<pipeline::StreamCounters>> counters_;
   pipeline::Ring<pipeline::Item> decoded_{1024};
   pipeline::Ring<pipeline::Item> finished_{1024};

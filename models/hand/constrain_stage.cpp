@@ -1,0 +1,49 @@
+#include "models/hand/constrain_stage.hpp"
+
+#include <string>
+#include <utility>
+
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::hand {
+namespace {
+
+// "hand45 right adult" -> adult; the default where no shape of ours is named so.
+const HandShape& shape_of(const Skeleton& skeleton) {
+  const std::string name = skeleton.name.substr(skeleton.name.rfind(' ') + 1);
+  const auto shape = find_hand_shape(name);
+  return shape ? **shape : default_hand_shape();
+}
+
+bool differ(const HandAngles& a, const HandAngles& b) noexcept {
+  for (std::size_t c = 0; c < a.size(); ++c) {
+    if (a[c] != b[c]) return true;  // false for what is not a number
+  }
+  return false;
+}
+
+}  // namespace
+
+ConstrainStage::ConstrainStage(std::shared_ptr<const Skeleton> skeleton)
+    : skeleton_(std::move(skeleton)), solver_(shape_of(*skeleton_)) {}
+
+// RT-safe.
+void ConstrainStage::step(Frame& frame, std::span<const double> variance_rad2) noexcept {
+  if (frame.skeleton != skeleton_->id) return solver_.reset();
+  HandAngles variance{};
+  if (variance_rad2.size() == variance.size()) {
+    for (std::size_t c = 0; c < variance.size(); ++c)
+      variance[kAngleOfChannel[c]] = variance_rad2[c];
+  }
+  const HandAngles before = hand_angles(frame);
+  HandAngles angles = before;
+  solver_.step(angles, variance);
+  if (!differ(angles, before)) return;
+  const auto valid = frame.valid;
+  const Vec3f root_position_m = frame.root_position_m;
+  set_hand_angles(*skeleton_, angles, frame);
+  frame.valid = valid;
+  frame.root_position_m = root_position_m;
+}
+
+}  // namespace posed::hand

@@ -1,0 +1,199 @@
+// Hands through the real binary: labels performed on a live hand and on a stream without a device,
+// what the wire says of them, what is refused, and a log of it all that replays to the bit.
+#include <algorithm>
+#include <set>
+#include <sstream>
+
+#include "models/gesture/model_file.hpp"
+#include "models/gesture/synthetic_performer.hpp"
+#include "posed/v1/posed.pb.h"
+#include "tests/e2e/outcome.hpp"
+#include "tests/e2e/served.hpp"
+#include "tests/unit/gesture/toy_gesture.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kTwoHands = R"(realtime = false
+[publish]
+endpoint = "tcp://127.0.0.1:*"
+[control]
+endpoint = "tcp://127.0.0.1:*"
+[[stream]]
+name = "hand"
+driver = "file"
+[stream.file]
+path = "hand.csv"
+[stream.generate]
+lag_frames = 2
+model = "toy.gesture"
+[[stream]]
+name = "puppet"
+driver = "labels"
+[stream.labels]
+side = "left"
+rate_hz = 60.0
+[stream.generate]
+model = "toy.gesture"
+labels = "p"
+)";
+
+void write_hands(const Served& served) {
+  const auto performer = gesture::make_performance({.person = 5, .gestures = 12});
+  REQUIRE(performer);
+  REQUIRE(clip::write_hand_csv(performer->clip, served.folder.path() / "hand.csv"));
+  REQUIRE(gesture::save_model(toy_gesture_model(), served.folder.path() / "toy.gesture"));
+  served.folder.write("posed.toml", kTwoHands);
+}
+
+std::vector<json> frames_of(const Served& served, const std::string& stream, int count) {
+  const auto got = posed({"monitor", "--connect", served.publish, "--stream", stream, "--json",
+                          "--count", std::to_string(count)});
+  REQUIRE(got.code == 0);
+  std::istringstream lines(got.out);
+  std::vector<json> frames;
+  for (std::string line; std::getline(lines, line);) frames.push_back(json::parse(line));
+  REQUIRE(static_cast<int>(frames.size()) == count);
+  return frames;
+}
+
+// Whether a frame with this source and label comes among the next `most`.
+bool comes(const Served& served, const std::string& stream, const std::string& source,
+           const std::string& label, int most) {
+  return std::ranges::any_of(frames_of(served, stream, most), [&](const json& frame) {
+    return frame.at("source") == source && frame.at("label") == label;
+  });
+}
+
+TEST_CASE("labels are performed on a live hand and on a stream without a device") {
+  Served served;
+  write_hands(served);
+  served.start();
+  const auto ctl = [&](std::vector<std::string> what) {
+    what.insert(what.begin(), {"ctl", "--connect", served.control});
+    return posed(std::move(what));
+  };
+  const json live = frames_of(served, "hand", 10).back();
+  CHECK(live.at("source") == "SOURCE_FILE");
+  CHECK(live.at("lagFrames") == 2);
+  CHECK(live.at("lagMs").get<double>() == Approx(2000.0 / 30.0).margin(0.5));
+  CHECK(live.at("angleRad").size() == 45);
+
+  const auto played = ctl({"play", "hand", "1 3", "--tempo", "2"});
+  INFO(played.err);
+  REQUIRE(played.code == 0);
+  CHECK(played.out.starts_with("hand: in effect from frame "));
+  CHECK(comes(served, "hand", "SOURCE_LABELS", "1", 60));
+  CHECK(comes(served, "hand", "SOURCE_LABELS", "3", 60));
+  CHECK(comes(served, "hand", "SOURCE_FILE", live.at("label"), 90));
+
+  REQUIRE(ctl({"--json", "play", "puppet", "g 4", "--loop"}).code == 0);
+  CHECK(comes(served, "puppet", "SOURCE_LABELS", "4", 400));
+  const json puppet = frames_of(served, "puppet", 1).back();
+  CHECK(puppet.at("lagFrames") == 0);
+  CHECK(puppet.at("labelProbability") == 1.0);
+  CHECK(puppet.at("quality") == "QUALITY_MEASURED");
+  REQUIRE(ctl({"stop-playing", "puppet"}).code == 0);
+  const json held = frames_of(served, "puppet", 90).back();
+  CHECK(held.at("quality") == "QUALITY_HELD");
+  CHECK(held.at("label") == "");
+  CHECK(has(ctl({"status"}).out, "lag 2 frames"));
+  served.daemon->send(SIGTERM);
+  CHECK(served.daemon->exit_code() == 0);
+}
+
+TEST_CASE("a play that cannot be is one sentence and an exit code") {
+  Served served;
+  write_hands(served);
+  served.folder.write("posed.toml", std::string(kTwoHands) +
+                                        "[[stream]]\nname = \"walker\"\ndriver = \"file\"\n"
+                                        "[stream.file]\npath = \"walk.bvh\"\n"
+                                        "[[stream]]\nname = \"bare\"\ndriver = \"labels\"\n"
+                                        "[stream.generate]\n");
+  served.start();
+  const auto refusal = [&](std::vector<std::string> what) {
+    what.insert(what.begin(), {"ctl", "--connect", served.control});
+    const auto outcome = posed(std::move(what));
+    CHECK(outcome.code == 1);
+    return outcome.err;
+  };
+  CHECK(
+      has(refusal({"play", "hand", "g x"}), "does not know the label 'x'; it knows: g c p 1 3 4"));
+  CHECK(has(refusal({"play", "hand", " "}), "no label"));
+  CHECK(has(refusal({"play", "hand", "g", "--tempo", "3"}), "0.5 to 2"));
+  CHECK(has(refusal({"play", "hand", std::string(600, 'g')}), "'gggggggggggggggggggg...'"));
+  std::string many;
+  for (int i = 0; i < 257; ++i) many += "g ";
+  CHECK(has(refusal({"play", "hand", many}), "at most 256"));
+  CHECK(has(refusal({"play", "nobody", "g"}), "there is no stream 'nobody'"));
+  CHECK(has(refusal({"play", "walker", "g"}), "[stream.generate]"));
+  CHECK(has(refusal({"play", "bare", "g"}), "no gesture model"));
+  CHECK(has(refusal({"stop-playing", "walker"}), "[stream.generate]"));
+  CHECK(has(refusal({"model", "walker", served.path("toy.gesture")}), "is a gesture model"));
+  CHECK(has(refusal({"model", "hand", served.path("one.style")}), "[stream.style]"));
+  const auto model =
+      posed({"ctl", "--connect", served.control, "model", "bare", served.path("toy.gesture")});
+  CHECK(model.code == 0);
+  CHECK(posed({"ctl", "--connect", served.control, "play", "bare", "g"}).code == 0);
+}
+
+TEST_CASE("a config that cannot be performed is refused with the stream's name") {
+  Served served;
+  write_hands(served);
+  const auto check = [&](const std::string& stream) {
+    served.folder.write("posed.toml", "[[stream]]\nname = \"w\"\n" + stream);
+    return posed({"check", "--config", served.path("posed.toml")});
+  };
+  const auto body = check(
+      "driver = \"file\"\n[stream.file]\npath = \"walk.bvh\"\n[stream.generate]\n"
+      "model = \"toy.gesture\"\n");
+  CHECK(body.code == 1);
+  CHECK(has(body.err, "stream 'w': "));
+  CHECK(has(body.err, "needs a stream of hands"));
+  const auto label =
+      check("driver = \"labels\"\n[stream.generate]\nmodel = \"toy.gesture\"\nlabels = \"g x\"\n");
+  CHECK(label.code == 2);
+  CHECK(has(label.err, "does not know the label 'x'"));
+  const auto fine =
+      check("driver = \"labels\"\n[stream.generate]\nmodel = \"toy.gesture\"\nlabels = \"g p\"\n");
+  INFO(fine.err);
+  CHECK(fine.code == 0);
+}
+
+TEST_CASE("a log of smoothing, plays and a new model replays to the bit") {
+  Served served;
+  write_hands(served);
+  Process record({"record", "--config", served.path("posed.toml"), "--out", served.path("a.plog"),
+                  "--frames"});
+  const auto ready = record.line();
+  INFO(record.errors());
+  REQUIRE(ready);
+  const std::string control = json::parse(*ready).at("control");
+  served.publish = json::parse(*ready).at("publish");
+  const auto ctl = [&](std::vector<std::string> what) {
+    what.insert(what.begin(), {"ctl", "--connect", control});
+    const auto outcome = posed(std::move(what));
+    INFO(outcome.err);
+    CHECK(outcome.code == 0);
+  };
+  (void)frames_of(served, "hand", 20);
+  ctl({"play", "hand", "1 c", "--tempo", "2"});
+  (void)frames_of(served, "hand", 40);
+  ctl({"play", "puppet", "g 4", "--loop", "--tempo", "1.5"});
+  ctl({"play", "hand", "4"});
+  (void)frames_of(served, "hand", 30);
+  ctl({"model", "hand", served.path("toy.gesture")});
+  ctl({"stop-playing", "puppet"});
+  (void)frames_of(served, "hand", 30);
+  record.send(SIGTERM);
+  CHECK(record.exit_code() == 0);
+  const auto replay = posed({"replay", served.path("a.plog"), "--speed", "max", "--out",
+                             served.path("FRAMES.bin"), "--expect"});
+  INFO(replay.err << replay.out);
+  CHECK(replay.code == 0);
+}
+
+}  // namespace
+}  // namespace posed::test
