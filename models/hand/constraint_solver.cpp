@@ -19,7 +19,8 @@ constexpr double kHinge_rad = 4 * kDegree;  // a limit is felt this much before 
 constexpr double kDone_rad = 1e-6;
 constexpr double kMaxStep_rad = 0.35;  // of one linearisation
 constexpr double kDeep_m = 2e-3;
-constexpr double kLoyalty = 0.7;  // another side must be this much cheaper
+constexpr double kSliver_m = 1e-5;  // a gap that outlives the rounding to a Frame's floats
+constexpr double kLoyalty = 0.7;    // another side must be this much cheaper
 constexpr int kMaxRounds = 16;
 constexpr int kHalvings = 10;
 constexpr double kLeastWeight = 1e-9;  // variances, of the largest one
@@ -181,7 +182,7 @@ struct ConstraintSolver::State {
       const double middle = 0.5 * (bad + good);
       const HandAngles there = between(from, safe, middle);
       const double there_m = gap_of(there);
-      if (there_m < 0.0) {
+      if (there_m < kSliver_m) {
         bad = middle;
       } else {
         good = middle;
