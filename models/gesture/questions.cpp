@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "proto/frame/label.hpp"
 
@@ -68,7 +69,7 @@ std::vector<int> cluster(const std::vector<Finger>& poses) {
   }
   std::vector<int> order(centres.size());
   std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, std::greater{}, [&](int k) { return flexion(centres[k]); });
+  std::ranges::sort(order, {}, [&](int k) { return std::pair(-flexion(centres[k]), k); });
   std::vector<int> rank(centres.size());
   for (int r = 0; r < static_cast<int>(order.size()); ++r) rank[order[r]] = r;
   for (int& k : member) k = rank[k];
@@ -144,6 +145,7 @@ std::vector<Label> propose_labels(const std::vector<LabelPose>& poses) {
   for (std::size_t i = 0; i < poses.size(); ++i) labels[i].name = poses[i].name;
   for (int f = 0; f < kFingers && !poses.empty(); ++f) {
     std::vector<Finger> fingers;
+    fingers.reserve(poses.size());
     for (const LabelPose& pose : poses) fingers.push_back(finger_of(pose.angles_rad, f));
     const std::vector<int> classes = cluster(fingers);
     for (std::size_t i = 0; i < poses.size(); ++i) labels[i].finger_class[f] = classes[i];
