@@ -22,6 +22,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_replay,
     add_train,
     add_apply,
+    add_smooth,
     add_convert,
     add_eval,
     add_ctl,

@@ -34,6 +34,7 @@ void add_train(CLI::App& app, int& exit_code);
 void add_train_gesture(CLI::App& train, int& exit_code);
 void add_train_style(CLI::App& train, int& exit_code);
 void add_apply(CLI::App& app, int& exit_code);
+void add_smooth(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_bench_pipeline(CLI::App& bench, int& exit_code);

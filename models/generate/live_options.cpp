@@ -13,8 +13,9 @@ namespace {
 constexpr double kRateSlack = 1.02;
 
 std::unexpected<Error> bad_lag(std::string_view text) {
-  return fail("'" + std::string(text) + "' is no lag: give 0 to " + std::to_string(kMaxLagFrames) +
-              " frames, as in 1, or up to 170 ms, as in 33ms");
+  return misuse("'" + std::string(text) +
+                "' is no lag: give frames, as in 1 (up to 5, and up to 170 ms above 60 Hz), or "
+                "milliseconds, as in 33ms (up to 170)");
 }
 
 }  // namespace
@@ -41,7 +42,7 @@ Result<LiveLag> parse_lag(std::string_view text) {
     lag.seconds = *value * 1e-3;
     return lag;
   }
-  if (*value != std::floor(*value) || *value > kMaxLagFrames) return bad_lag(text);
+  if (*value != std::floor(*value) || *value > kMaxLag_s * 1e3) return bad_lag(text);
   lag.frames = static_cast<int>(*value);
   return lag;
 }

@@ -23,7 +23,7 @@ inline constexpr double kEvenRate_hz = 60.0;  // up to here bounds count frames,
 // Frames of lag at a rate, within the bounds. RT-safe.
 [[nodiscard]] int lag_frames(const LiveLag& lag, double period_s) noexcept;
 
-// "1" (frames) or "33ms". Errors say what is allowed.
+// "1" (frames, as many as 170 ms can hold) or "33ms". Errors say what is allowed.
 [[nodiscard]] Result<LiveLag> parse_lag(std::string_view text);
 
 struct LiveOptions {

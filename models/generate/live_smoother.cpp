@@ -16,7 +16,6 @@ namespace posed::generate {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr double kForgetAfter_s = 1.0;  // a longer silence leaves nothing to go on from
 constexpr int kMaxPending = static_cast<int>(kMaxLag_s * 1000.0) + 2;  // frames at 1000 Hz
 constexpr long kMostWaiting = 8;   // frames that wait for a beat that may never be known
@@ -51,7 +50,7 @@ struct LiveSmoother::State {
   }
 
   [[nodiscard]] bool serves(const Frame& frame) const noexcept;
-  void measure(const Frame& frame) noexcept;
+  void take(const Frame& frame) noexcept;
   void emit_until(long last, Emit& emit) noexcept;
   void rebuild(Frame& frame, int back) noexcept;
   void turn_joints(Frame& frame) noexcept;
@@ -91,13 +90,26 @@ bool LiveSmoother::State::serves(const Frame& frame) const noexcept {
          frame.joint_count == skeleton.joints.size();
 }
 
-// The frame's channels, unwrapped; those of joints that were not measured are missing. RT-safe.
-void LiveSmoother::State::measure(const Frame& frame) noexcept {
-  std::size_t c = 0;
-  for (const Channel& channel : skeleton.channels) {
-    if (channel.translation) continue;
-    const auto angle = static_cast<double>(frame.angle_rad[c]);
-    measured[c++] = frame.valid[channel.joint] && std::isfinite(angle) ? angle : kMissing;
+// Takes the frame in and its channels out, unwrapped. What was not measured is not a number in
+// both: all channels of a joint that is not valid, but for those that its source does give beside
+// ones that it lacks. RT-safe.
+void LiveSmoother::State::take(const Frame& frame) noexcept {
+  Frame& kept = pending[static_cast<std::size_t>(taken % kMaxPending)];
+  kept = frame;
+  ++taken;
+  std::size_t first = 0;
+  for (const int joint : turning) {
+    std::size_t end = first;
+    bool lacks = false;
+    while (end < angle_value.size() && skeleton.channels[angle_value[end]].joint == joint) {
+      lacks = lacks || !std::isfinite(frame.angle_rad[end++]);
+    }
+    const bool there = lacks || frame.valid[static_cast<std::size_t>(joint)];
+    for (; first < end; ++first) {
+      float& angle = kept.angle_rad[first];
+      if (!there || !std::isfinite(angle)) angle = std::numeric_limits<float>::quiet_NaN();
+      measured[first] = static_cast<double>(angle);
+    }
   }
   unwrap.apply(measured);
 }
@@ -130,7 +142,7 @@ void LiveSmoother::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) no
   }
   const double period_s = s.clock.period_s();
   if (s.taken - s.emitted >= window_frames(period_s)) flush(emit);  // the beat became much slower
-  s.measure(*in);
+  s.take(*in);
   const bool even = step_s < kEvenStep * period_s;
   if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, even);
   s.window.push(now_s, s.measured, noise_rad());
@@ -139,8 +151,6 @@ void LiveSmoother::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) no
     s.recogniser.sweep(window_frames(period_s));
   }
   s.window.solve(period_s, s.recogniser.model() != nullptr ? &s.live_evidence : nullptr);
-  s.pending[static_cast<std::size_t>(s.taken % kMaxPending)] = *in;
-  ++s.taken;
   // Until the beat is known a lag in time is no number of frames yet: the first frames wait.
   const bool in_time = s.options.lag.seconds > 0.0;
   if (in_time && !s.clock.settled() && s.taken - s.emitted < kMostWaiting) return;
@@ -193,18 +203,15 @@ void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
   const double* const x = window.x(back);
   frame.lag_frames = static_cast<std::uint16_t>(back);
   frame.lag_ms = static_cast<float>(1e3 * window.age_s(back));
-  std::size_t c = 0;
-  for (const Channel& channel : skeleton.channels) {
-    if (channel.translation) continue;
+  for (std::size_t c = 0; c < angle_value.size(); ++c) {
     float& angle = frame.angle_rad[c];
     if (!window.known(static_cast<int>(c))) {
       variance[c] = kUnknown;
-    } else {
-      const bool there = frame.valid[channel.joint] && std::isfinite(angle);
-      if (!there) frame.quality = std::max(frame.quality, Quality::kPredicted);
-      angle = static_cast<float>(there ? unwrap_near(x[c], static_cast<double>(angle)) : x[c]);
+      continue;
     }
-    ++c;
+    const bool there = std::isfinite(angle);
+    if (!there) frame.quality = std::max(frame.quality, Quality::kPredicted);
+    angle = static_cast<float>(there ? unwrap_near(x[c], static_cast<double>(angle)) : x[c]);
   }
   turn_joints(frame);
   if (recogniser.model() != nullptr) name_gesture(frame, back);

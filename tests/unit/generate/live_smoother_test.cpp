@@ -102,7 +102,7 @@ TEST_CASE("the lag's bounds count frames up to 60 Hz and time above", "[live]") 
   CHECK(generate::parse_lag("2").value().frames == 2);
   CHECK(generate::parse_lag("33ms").value().seconds == Approx(0.033));
   CHECK(generate::parse_lag("0ms").value().frames == 0);
-  for (const char* bad : {"", "6", "-1", "1.5", "171ms", "ms", "fast", "1s", "nan", "1e99"}) {
+  for (const char* bad : {"", "171", "-1", "1.5", "171ms", "ms", "fast", "1s", "nan", "1e99"}) {
     INFO(bad);
     CHECK_FALSE(generate::parse_lag(bad));
   }
