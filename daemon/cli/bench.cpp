@@ -9,6 +9,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   bench->require_subcommand(1);
   add_bench_predict(*bench, exit_code);
   add_bench_pipeline(*bench, exit_code);
+  add_bench_smooth(*bench, exit_code);
 }
 
 }  // namespace posed::cli

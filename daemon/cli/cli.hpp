@@ -39,5 +39,6 @@ void add_eval(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_bench_pipeline(CLI::App& bench, int& exit_code);
 void add_bench_predict(CLI::App& bench, int& exit_code);
+void add_bench_smooth(CLI::App& bench, int& exit_code);
 
 }  // namespace posed::cli

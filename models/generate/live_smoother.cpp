@@ -101,8 +101,8 @@ void LiveSmoother::State::take(const Frame& frame) noexcept {
   for (const int joint : turning) {
     std::size_t end = first;
     bool lacks = false;
-    while (end < angle_value.size() && skeleton.channels[angle_value[end]].joint == joint) {
-      lacks = lacks || !std::isfinite(frame.angle_rad[end++]);
+    for (; end < angle_value.size() && skeleton.channels[angle_value[end]].joint == joint; ++end) {
+      lacks = lacks || !std::isfinite(frame.angle_rad[end]);
     }
     const bool there = lacks || frame.valid[static_cast<std::size_t>(joint)];
     for (; first < end; ++first) {
