@@ -85,7 +85,9 @@ Trial trial_of(const Truth& truth, double noise_deg, unsigned seed) {
   for (Eigen::Index c = 0; c < truth.angles.cols(); ++c) {
     if (truth.angles.col(c).maxCoeff() > truth.angles.col(c).minCoeff()) moving.push_back(c);
   }
-  Trial trial{truth.angles(Eigen::all, moving), {}, truth.rate_hz};
+  Trial trial;
+  trial.rate_hz = truth.rate_hz;
+  trial.truth = truth.angles(Eigen::all, moving);
   trial.measured = trial.truth;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, 1.0);
@@ -98,11 +100,12 @@ ChannelMatrix live(const Trial& trial, int lag, double noise_deg) {
   const auto channels = static_cast<int>(trial.measured.cols());
   generate::AdaptiveWindow window(channels);
   ChannelMatrix made = trial.measured;
-  Eigen::RowVectorXd row(channels);
+  std::vector<double> row(static_cast<std::size_t>(channels));
   for (Eigen::Index t = 0; t < made.rows(); ++t) {
-    row = trial.measured.row(t) / kDegrees;
-    window.push(static_cast<double>(t) / trial.rate_hz,
-                {row.data(), static_cast<std::size_t>(channels)}, noise_deg / kDegrees);
+    for (int c = 0; c < channels; ++c) {
+      row[static_cast<std::size_t>(c)] = trial.measured(t, c) / kDegrees;
+    }
+    window.push(static_cast<double>(t) / trial.rate_hz, row, noise_deg / kDegrees);
     window.solve(1.0 / trial.rate_hz);
     if (t < lag) continue;
     made.row(t - lag) = Eigen::Map<const Eigen::RowVectorXd>(window.x(lag), channels) * kDegrees;
@@ -145,7 +148,8 @@ Trial stairs_of(const Truth& truth, double band_deg) {
 
 // Up and down between 0 and 60 degrees at one speed.
 Truth ramps_of(double deg_s) {
-  Truth truth{ChannelMatrix(1800, 4), 60.0};
+  Truth truth;
+  truth.angles.resize(1800, 4);
   for (Eigen::Index t = 0; t < truth.angles.rows(); ++t) {
     const double way = std::fmod(deg_s * static_cast<double>(t) / truth.rate_hz, 120.0);
     truth.angles.row(t).setConstant(way < 60.0 ? way : 120.0 - way);
@@ -187,7 +191,7 @@ json cost(unsigned seed) {
   constexpr int kFrames = 4000;
   const Skeleton skeleton = hand_skeleton(Side::kRight);
   generate::AdaptiveWindow window(kHandChannels);
-  generate::LiveSmoother stage(skeleton, {.noise_rad = 1.0 / kDegrees});
+  generate::LiveSmoother stage(skeleton, {.lag = {}, .noise_rad = 1.0 / kDegrees});
   struct Last final : Emit {
     void frame(const Frame& frame) noexcept override { angle = frame.angle_rad[0]; }
     float angle = 0.0F;

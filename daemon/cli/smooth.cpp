@@ -1,5 +1,4 @@
 // posed smooth: a recorded hand through the live generator, as a stream would have been.
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -42,12 +41,10 @@ class Rows final : public Emit {
       if (!std::isfinite(row[c]) && std::isfinite(angles[c])) ++bridged_values;
       row[c] = angles[c];
     }
-    lag_frames = std::max<int>(lag_frames, frame.lag_frames);
     labels.emplace_back(frame.label.data());
     probability.push_back(static_cast<double>(frame.label_probability));
   }
 
-  int lag_frames = 0;
   long bridged_values = 0;
   std::vector<std::string> labels;
   std::vector<double> probability;
@@ -125,20 +122,21 @@ Result<> run(const Options& options) {
   smoother.flush(rows);
   if (auto written = clip::write_hand_csv(*clip, options.out); !written) return written;
 
-  const double lag_ms = 1e3 * rows.lag_frames / clip->rate_hz;
+  const int lag_frames = generate::lag_frames(live->lag, 1.0 / clip->rate_hz);
+  const double lag_ms = 1e3 * lag_frames / clip->rate_hz;
   const double noise_deg = smoother.noise_rad() * kDegrees;
   if (!options.json) {
     std::printf(
         "%s: %zu frames, %d behind (%.0f ms at %g Hz), sensor noise %.2f deg%s, "
         "%ld missing values bridged\n",
-        options.out.c_str(), measured.size(), rows.lag_frames, lag_ms, clip->rate_hz, noise_deg,
+        options.out.c_str(), measured.size(), lag_frames, lag_ms, clip->rate_hz, noise_deg,
         options.noise_deg > 0.0 ? "" : " (estimated)", rows.bridged_values);
     return {};
   }
   json report{{"out", options.out},
               {"frames", measured.size()},
               {"rate_hz", clip->rate_hz},
-              {"lag_frames", rows.lag_frames},
+              {"lag_frames", lag_frames},
               {"lag_ms", lag_ms},
               {"noise_deg", noise_deg},
               {"noise_given", options.noise_deg > 0.0},
