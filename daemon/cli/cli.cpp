@@ -23,6 +23,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_train,
     add_apply,
     add_smooth,
+    add_synth,
     add_convert,
     add_eval,
     add_ctl,

@@ -23,6 +23,7 @@ void add_demo(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_record(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
+void add_synth(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);
 void add_ctl(CLI::App& app, int& exit_code);

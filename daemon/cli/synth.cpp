@@ -1,0 +1,152 @@
+// posed synth: a hand performs a string of labels, into a file.
+#include <charconv>
+#include <cstdio>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "models/generate/perform.hpp"
+#include "models/generate/tempo.hpp"
+#include "models/gesture/model_file.hpp"
+#include "proto/clip/bvh.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/frame/hand_shape.hpp"
+
+namespace posed::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kFooter = R"(Examples:
+  posed synth --model hand.gesture --labels "g 1 c 3 4 p" --out hand.csv
+  posed synth --model hand.gesture --labels "g c p" --tempo 1.5 --hand left --out hand.bvh --json
+
+Labels that were never recorded are performed too, finger by finger, when the model's classes name
+them. --lookahead N performs as a stream would that knows the script N frames ahead (20 is enough
+for the eye). The same motion plays in a running daemon with `posed ctl play`.)";
+
+struct Options {
+  std::string model, labels, out;
+  double tempo = 1.0;
+  std::string lookahead = "full", hand = "right";
+  std::string shape{kDefaultHandShape};
+  bool global_variance = false, json = false;
+};
+
+Result<generate::PerformOptions> perform_options(const Options& options) {
+  generate::PerformOptions perform;
+  perform.tempo = options.tempo;
+  perform.global_variance = options.global_variance;
+  if (options.lookahead == "full") return perform;
+  int frames = -1;
+  const auto& text = options.lookahead;
+  const auto end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, frames);
+  constexpr int kMostFrames = 100'000;
+  if (error != std::errc{} || stop != end || frames < 0 || frames > kMostFrames) {
+    return misuse("--lookahead is a number of frames or full, not '" + text + "'");
+  }
+  perform.look_ahead = frames;
+  return perform;
+}
+
+Result<> write(const clip::HandClip& hand, const Options& options) {
+  if (options.out.ends_with(".csv")) return clip::write_hand_csv(hand, options.out);
+  const auto clip = clip::clip_of_hand(hand, options.shape);
+  if (!clip) return std::unexpected(clip.error());
+  return clip::write_bvh(*clip, options.out);
+}
+
+json states_json(const gesture::GestureModel& model, const generate::Performance& performance) {
+  json states = json::array();
+  for (const generate::PerformedState& state : performance.states) {
+    json leaf;
+    for (int f = 0; f < kFingers; ++f) leaf[std::string(kFingerNames[f])] = state.leaf[f];
+    states.push_back({{"label", model.labels[state.context.current].name},
+                      {"state", state.state + 1},
+                      {"start", state.start},
+                      {"frames", state.frames},
+                      {"leaf", leaf}});
+  }
+  return states;
+}
+
+Result<json> synth(const Options& options) {
+  if (!options.out.ends_with(".csv") && !options.out.ends_with(".bvh")) {
+    return misuse("can write a hand as .csv or .bvh; name --out so", options.out);
+  }
+  const auto perform_as = perform_options(options);
+  if (!perform_as) return std::unexpected(perform_as.error());
+  auto model = gesture::load_model(options.model);
+  if (!model) return std::unexpected(model.error());
+  const auto labels = generate::labels_of(*model, options.labels);
+  if (!labels) return std::unexpected(labels.error());
+  const double rate_hz = model->rate_hz;
+  const generate::ModelEvidence evidence(
+      std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
+  const auto performance = generate::perform(evidence, *labels, *perform_as);
+  clip::HandClip hand;
+  hand.side = options.hand == "left" ? Side::kLeft : Side::kRight;
+  hand.rate_hz = rate_hz;
+  hand.angles = performance.angles;
+  for (std::size_t t = 0; t < hand.angles.size(); ++t) {
+    hand.time_s.push_back(static_cast<double>(t) / rate_hz);
+  }
+  if (auto written = write(hand, options); !written) return std::unexpected(written.error());
+  return json{{"frames", hand.angles.size()},
+              {"rate_hz", rate_hz},
+              {"states", states_json(evidence.model(), performance)},
+              {"out", options.out}};
+}
+
+void print_summary(const json& report) {
+  std::printf("%-8s %6s %6s\n", "label", "start", "frames");
+  for (std::size_t i = 0; i < report["states"].size(); i += gesture::kStates) {
+    int frames = 0;
+    for (std::size_t s = i; s < i + gesture::kStates; ++s) {
+      frames += report["states"][s]["frames"].get<int>();
+    }
+    const json& first = report["states"][i];
+    std::printf("%-8s %6d %6d\n", first["label"].get<std::string>().c_str(),
+                first["start"].get<int>(), frames);
+  }
+  std::printf("%d frames at %g Hz written to %s\n", report["frames"].get<int>(),
+              report["rate_hz"].get<double>(), report["out"].get<std::string>().c_str());
+}
+
+}  // namespace
+
+void add_synth(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("synth", "Let a hand perform a string of labels");
+  command->footer(kFooter);
+  const auto options = std::make_shared<Options>();
+  command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
+  command->add_option("--labels", options->labels, "Labels with blanks between")->required();
+  command->add_option("--tempo", options->tempo, "2 is twice as fast")
+      ->check(CLI::Range(generate::kMinTempo, generate::kMaxTempo))
+      ->capture_default_str();
+  command->add_option("--lookahead", options->lookahead, "Frames of script that are known, or full")
+      ->capture_default_str();
+  command->add_option("--hand", options->hand, "left or right")
+      ->check(CLI::IsMember({"left", "right"}))
+      ->capture_default_str();
+  command->add_option("--hand-shape", options->shape, "Bones of a BVH")->capture_default_str();
+  command->add_flag("--global-variance", options->global_variance,
+                    "Give back the range that averaging took");
+  command->add_option("--out", options->out, "Where to write: .csv or .bvh")->required();
+  command->add_flag("--json", options->json, "One JSON object on stdout");
+  command->callback([options, &exit_code] {
+    const auto made = synth(*options);
+    if (!made) {
+      exit_code = report(made.error());
+    } else if (options->json) {
+      std::printf("%s\n", made->dump(2).c_str());
+    } else {
+      print_summary(*made);
+    }
+  });
+}
+
+}  // namespace posed::cli
