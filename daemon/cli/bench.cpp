@@ -8,6 +8,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   CLI::App* bench = app.add_subcommand("bench", "Measure, as ratios within one run");
   bench->require_subcommand(1);
   add_bench_predict(*bench, exit_code);
+  add_bench_generate(*bench, exit_code);
   add_bench_pipeline(*bench, exit_code);
   add_bench_smooth(*bench, exit_code);
 }

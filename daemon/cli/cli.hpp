@@ -39,6 +39,7 @@ void add_smooth(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_bench_pipeline(CLI::App& bench, int& exit_code);
+void add_bench_generate(CLI::App& bench, int& exit_code);
 void add_bench_predict(CLI::App& bench, int& exit_code);
 void add_bench_smooth(CLI::App& bench, int& exit_code);
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "models/generate/constrain.hpp"
 #include "models/generate/perform.hpp"
 #include "models/generate/tempo.hpp"
 #include "models/gesture/model_file.hpp"
@@ -32,7 +33,7 @@ struct Options {
   double tempo = 1.0;
   std::string lookahead = "full", hand = "right";
   std::string shape{kDefaultHandShape};
-  bool global_variance = false, json = false;
+  bool global_variance = false, unconstrained = false, json = false;
 };
 
 Result<generate::PerformOptions> perform_options(const Options& options) {
@@ -86,7 +87,11 @@ Result<json> synth(const Options& options) {
   const double rate_hz = model->rate_hz;
   const generate::ModelEvidence evidence(
       std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
-  const auto performance = generate::perform(evidence, *labels, *perform_as);
+  const auto shape = find_hand_shape(options.shape);
+  if (!shape) return std::unexpected(shape.error());
+  auto performance = generate::perform(evidence, *labels, *perform_as);
+  const double gap_m = options.unconstrained ? generate::smallest_gap_m(performance, **shape)
+                                             : generate::constrain(performance, **shape).min_gap_m;
   clip::HandClip hand;
   hand.side = options.hand == "left" ? Side::kLeft : Side::kRight;
   hand.rate_hz = rate_hz;
@@ -98,6 +103,7 @@ Result<json> synth(const Options& options) {
   return json{{"frames", hand.angles.size()},
               {"rate_hz", rate_hz},
               {"states", states_json(evidence.model(), performance)},
+              {"min_gap_cm", 100.0 * gap_m},
               {"out", options.out}};
 }
 
@@ -112,8 +118,9 @@ void print_summary(const json& report) {
     std::printf("%-8s %6d %6d\n", first["label"].get<std::string>().c_str(),
                 first["start"].get<int>(), frames);
   }
-  std::printf("%d frames at %g Hz written to %s\n", report["frames"].get<int>(),
-              report["rate_hz"].get<double>(), report["out"].get<std::string>().c_str());
+  std::printf("%d frames at %g Hz, fingers at least %.2f cm apart, written to %s\n",
+              report["frames"].get<int>(), report["rate_hz"].get<double>(),
+              report["min_gap_cm"].get<double>(), report["out"].get<std::string>().c_str());
 }
 
 }  // namespace
@@ -132,9 +139,12 @@ void add_synth(CLI::App& app, int& exit_code) {
   command->add_option("--hand", options->hand, "left or right")
       ->check(CLI::IsMember({"left", "right"}))
       ->capture_default_str();
-  command->add_option("--hand-shape", options->shape, "Bones of a BVH")->capture_default_str();
+  command->add_option("--hand-shape", options->shape, "Whose bones keep apart and make the BVH")
+      ->capture_default_str();
   command->add_flag("--global-variance", options->global_variance,
                     "Give back the range that averaging took");
+  command->add_flag("--unconstrained", options->unconstrained,
+                    "Leave out joint limits and collisions: the model's bare trajectory");
   command->add_option("--out", options->out, "Where to write: .csv or .bvh")->required();
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
