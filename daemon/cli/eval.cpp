@@ -60,6 +60,7 @@ Result<json> evaluate(const Options& options) {
 void add_eval(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("eval", "Judge a model on clips");
   command->require_subcommand(1);
+  add_eval_gesture(*command, exit_code);
   CLI::App* style = command->add_subcommand("style", "How near a styled clip comes to the target");
   style->footer(kFooter);
   const auto options = std::make_shared<Options>();
