@@ -21,8 +21,8 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kFooter =
-    R"(Three measurements in one run, with a model of a made-up performer
-unless --model names one:
+    R"(Three measurements in one run, with a
+model of a made-up performer unless --model names one:
   streaming   66 channels frame by frame, cost and error by delay, beside SPTK's mlpg over the whole
               file at the same delay (its -s S has delay S + 1)
   batch       366 frames of 45 channels at once, beside 45 calls of LAPACK's dpbsv

@@ -1,7 +1,7 @@
 // Script: the labels to perform, and a cursor that walks over their states frame by frame. The
 // same code plans a whole string and plays labels that are still coming: what lies ahead is looked
 // up anew whenever it is asked for, so an appended label or a new tempo counts from the next state
-// on. RT-safe after construction; one thread.
+// on. Hot: no heap after construction; one thread.
 #pragma once
 
 #include <array>

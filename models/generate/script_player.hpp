@@ -5,7 +5,7 @@
 //
 // Started from a live hand it takes up that hand's last two poses and glides into the first
 // gesture, the gesture's own pull off for the lead-in (hand-science.md section 4). Angles in
-// radians. RT-safe after construction; one thread.
+// radians. Hot: no heap after construction, no locks; one thread.
 #pragma once
 
 #include <memory>
