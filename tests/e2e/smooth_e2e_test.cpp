@@ -8,9 +8,7 @@
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/temp_folder.hpp"
 
-using namespace posed;
-using namespace posed::test;
-
+namespace posed::test {
 namespace {
 
 // A hand that opens and closes, 60 Hz; five frames of the index are missing.
@@ -76,3 +74,5 @@ TEST_CASE("wrong use of smooth is one sentence", "[smooth]") {
   CHECK(no_model.code == 1);
   CHECK(no_model.err.find("in.csv") != std::string::npos);
 }
+
+}  // namespace posed::test
