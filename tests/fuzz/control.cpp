@@ -1,5 +1,5 @@
-// Any bytes as a control message, models included: an answer with a sentence, or a command that is
-// well formed; nothing crashes, hangs or leaks.
+// Any bytes as a control message, models and plays included: an answer with a sentence, or a
+// command that is well formed; nothing crashes, hangs or leaks.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -7,22 +7,32 @@
 
 #include "daemon/control/request_handler.hpp"
 #include "posed/v1/control.pb.h"
+#include "proto/frame/hand_skeleton.hpp"
+#include "tests/unit/gesture/toy_gesture.hpp"
 #include "tests/unit/models/toy_style.hpp"
 
 namespace {
 
 using namespace posed;
 
+// What the pipeline takes for granted of a play.
+void check_play(const pipeline::Command& command) {
+  const auto& play = command.play;
+  if (command.stream != 1 || play.size == 0 || play.size > play.label.size()) std::abort();
+  if (!(play.tempo >= 0.5F && play.tempo <= 2.0F)) std::abort();
+}
+
 class Helm final : public control::Helm {
  public:
   bool send(const pipeline::Command& command) override {
     if (!(std::abs(command.alpha) <= 2.0F)) std::abort();
+    if (command.kind == pipeline::Command::Kind::kPlay) check_play(command);
     acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}
   void model_in_use(std::uint32_t stream, const std::string&) override {
-    if (stream != 0) std::abort();
+    if (stream > 1) std::abort();
   }
   void fill(v1::Stats& stats) override { stats.set_rss_bytes(1); }
   void stop() override {}
@@ -30,8 +40,15 @@ class Helm final : public control::Helm {
   std::vector<pipeline::Ack> acks;
 };
 
-std::vector<control::ControlledStream> one_stream() {
-  std::vector<control::ControlledStream> streams(1);
+// A body with a style and a hand with gestures.
+std::vector<control::ControlledStream> two_streams() {
+  std::vector<control::ControlledStream> streams(2);
+  streams[1].name = "h";
+  streams[1].skeleton = std::make_shared<const Skeleton>(hand_skeleton(Side::kRight));
+  streams[1].rate_hz = 30.0;
+  streams[1].generates = true;
+  streams[1].gesture =
+      generate::bind_model(test::toy_gesture_model(), *streams[1].skeleton, 30.0, "toy").value();
   streams[0].name = "w";
   streams[0].skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
   streams[0].style.emplace();
@@ -48,7 +65,7 @@ void check(const control::Answer& answer) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Helm helm;
-  static control::RequestHandler handler(one_stream(), helm);
+  static control::RequestHandler handler(two_streams(), helm);
   if (const auto answer = handler.handle({}, std::as_bytes(std::span(data, size)))) check(*answer);
   for (const pipeline::Ack& ack : std::exchange(helm.acks, {})) {
     const auto answer = handler.acknowledge(ack);

@@ -91,6 +91,16 @@ alpha_slew_per_s = 4.0
 gate = true
 gate_fallback = 0.25
 calibrate = true
+[stream.generate]
+lag_frames = 3
+lag_ms = 50
+noise_deg = 2
+model = "hand.gesture"
+labels = "g 1"
+tempo = 1.5
+loop = true
+[stream.constrain]
+enabled = false
 [[stream]]
 name = "b"
 driver = "glove"
@@ -116,6 +126,17 @@ driver = "glove"
   CHECK(a.style->filter.gate_fallback == 0.25);
   CHECK(a.style->filter.calibrate);
   CHECK(config.streams[1].driver == "glove");
+  REQUIRE(a.generate);
+  CHECK(a.generate->live.lag.frames == 3);
+  CHECK(a.generate->live.lag.seconds == Approx(0.05));
+  CHECK(a.generate->live.noise_rad == Approx(0.0349065850));
+  CHECK(a.generate->model == "stage/hand.gesture");
+  CHECK(a.generate->labels == std::vector<std::string>{"g", "1"});
+  CHECK(a.generate->tempo == 1.5);
+  CHECK(a.generate->loop);
+  CHECK(a.constrain == false);
+  CHECK_FALSE(config.streams[1].generate);
+  CHECK_FALSE(config.streams[1].constrain);
 }
 
 TEST_CASE("each mistake is one sentence with file and line") {
@@ -141,6 +162,18 @@ TEST_CASE("each mistake is one sentence with file and line") {
                   " endpoint") != std::string::npos);
   CHECK(complaint("[control]\nendpoint = \"tcp://127.0.0.1:5570\"\n").find("cannot share") !=
         std::string::npos);
+}
+
+TEST_CASE("generate: lags, tempo and labels are checked") {
+  const std::string table = "[stream.generate]\nmodel = \"m\"\n";
+  CHECK(complaint(table + "lag_frames = -1\n").find("0 to 170 frames") != std::string::npos);
+  CHECK(complaint(table + "lag_frames = 0.5\n").find("must be an integer") != std::string::npos);
+  CHECK(complaint(table + "lag_ms = 200\n").find("from 0 to 170") != std::string::npos);
+  CHECK(complaint(table + "tempo = 3\n").find("from 0.5 to 2") != std::string::npos);
+  CHECK(complaint(table + "noise_deg = -1\n").find("from 0 to 90") != std::string::npos);
+  CHECK(complaint("[stream.generate]\nlabels = \"g\"\n").find("need a gesture model") !=
+        std::string::npos);
+  CHECK(complaint("[stream.constrain]\nenable = true\n").find("'enabled'") != std::string::npos);
 }
 
 TEST_CASE("a wrong unit is told the right one") {
@@ -315,6 +348,16 @@ TEST_CASE("the shipped config lists every key there is, with its default") {
   CHECK(written.gate == defaults.gate);
   CHECK(written.gate_fallback == defaults.gate_fallback);
   CHECK(written.calibrate == defaults.calibrate);
+  REQUIRE(b.streams[0].generate);
+  const pipeline::GenerateConfig generate;
+  CHECK(b.streams[0].generate->live.lag.frames == generate.live.lag.frames);
+  CHECK(b.streams[0].generate->live.lag.seconds == generate.live.lag.seconds);
+  CHECK(b.streams[0].generate->live.noise_rad == generate.live.noise_rad);
+  CHECK(b.streams[0].generate->model == generate.model);
+  CHECK(b.streams[0].generate->labels == generate.labels);
+  CHECK(b.streams[0].generate->tempo == generate.tempo);
+  CHECK(b.streams[0].generate->loop == generate.loop);
+  CHECK(b.streams[0].constrain == true);
 }
 
 }  // namespace
