@@ -1,5 +1,5 @@
 // ReplayModels: the models of one stream that a log's decisions name, bound before anything is
-// replayed, so that nothing can fail on the way. Cold to fill; to look up, RT-safe is not asked.
+// replayed, so that nothing can fail on the way. Cold.
 #pragma once
 
 #include <array>
