@@ -26,7 +26,7 @@ model of a made-up performer unless --model names one:
   streaming   66 channels frame by frame, cost and error by delay, beside SPTK's mlpg over the whole
               file at the same delay (its -s S has delay S + 1)
   batch       366 frames of 45 channels at once, beside 45 calls of LAPACK's dpbsv
-  strings     every string of four labels of g c p 1 3 4: the smallest gap between two fingers, in cm
+  strings     every string of four labels of g c p 1 3 4: the smallest gap between fingers, in cm
 A rival that is not installed is named and left out (Debian: sptk, liblapack3).
 
   posed bench generate

@@ -31,10 +31,11 @@ using nlohmann::json;
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr const char* kFooter =
-    R"(Without --clip the truth is a made-up performer of 20 gestures at 60 Hz. White noise is added, and
-every rival is tuned on the very data it is judged by; errors are rms in degrees over the channels
-that move. "Where not" is what the live stage is not made for: a glove's own dead band, and slow
-steady ramps under noise. Costs are ratios to one bare solve of the same window in the same run.
+    R"(Without --clip the truth is a made-up performer of 20 gestures at 60 Hz. White noise is
+added, and every rival is tuned on the very data it is judged by; errors are rms in degrees over the
+channels that move. "Where not" is what the live stage is not made for: a glove's own dead band,
+and slow steady ramps under noise. Costs are ratios to one bare solve of the same window in the same
+run.
 
   posed bench smooth
   posed bench smooth --clip glove1.csv glove2.csv     # recordings taken as the truth

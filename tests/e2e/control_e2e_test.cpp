@@ -80,7 +80,8 @@ TEST_CASE("monitor and top show the daemon, to people and to scripts") {
 TEST_CASE("completion is made from the commands there are") {
   const auto bash = posed({"completion", "bash"});
   CHECK(bash.code == 0);
-  CHECK(has(bash.out, "'posed ctl') words='set model status stop --help --connect"));
+  CHECK(has(bash.out,
+            "'posed ctl') words='set model play stop-playing status stop --help --connect"));
   CHECK(has(posed({"completion", "zsh"}).out, "#compdef posed"));
   CHECK(has(posed({"completion", "fish"}).out, "-l 'connect'"));
   CHECK(posed({"completion", "tcsh"}).code == 2);

@@ -182,10 +182,17 @@ std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies) {
       ++start;
     }
     if (start == file.code.size()) break;
+    if (file.code[start].starts_with('#')) continue;  // it is about the whole file
     const std::size_t end = end_of_body(file.code, start);
     if (end == start && file.code[start].find('{') == std::string::npos) continue;
     ++bodies;
+    // Of a class that is RT-safe as a whole, what its members are is its constructor's business.
+    const bool is_class = file.code[start].starts_with("class ");
+    int depth = 0;
     for (std::size_t line = start; line <= end; ++line) {
+      const int before = depth;
+      for (const char c : file.code[line]) depth += c == '{' ? 1 : c == '}' ? -1 : 0;
+      if (is_class && before <= 1 && depth <= 1) continue;
       for (const Ban& ban : hot_bans()) {
         if (std::regex_search(file.code[line], ban.pattern)) {
           findings.push_back({file.path, static_cast<int>(line) + 1,
