@@ -184,7 +184,7 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   if (ack.refused) return ack;
   const auto event =
       command.kind == Command::Kind::kPlay ? v1::Event::KIND_PLAYING : v1::Event::KIND_CONTROL;
-  notice(event, last_arrival_ns_, ack.sequence, value, out);
+  notice(static_cast<std::uint8_t>(event), last_arrival_ns_, ack.sequence, value, out);
   return ack;
 }
 
