@@ -8,6 +8,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "models/generate/constrain.hpp"
 #include "models/gesture/train.hpp"
 #include "tests/support/real_pose_corpus.hpp"
 #include "tests/support/shared.hpp"
@@ -160,6 +161,25 @@ TEST_CASE("gestures of a real hand that nobody recorded are near the real ones",
         static_cast<double>(fast.angles.size()) * tempo / static_cast<double>(p.angles.size());
     CHECK(std::abs(length - 1.0) <= 0.05);
   }
+}
+
+// All 1,296 strings of four labels are asked in `posed bench generate`.
+TEST_CASE("no finger goes through another in strings of a real hand's gestures", "[real]") {
+  const auto folder = test::shared("data/gloves/libras_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  auto model = gesture::train_gesture({test::real_pose_corpus(*folder, 7)}, {});
+  REQUIRE(model.has_value());
+  const auto evidence = evidence_of(std::move(*model));
+  double before_m = 1.0;
+  for (const char* text : {"g 1 c 3", "4 p 3 c", "c 4 g p", "p 1 4 3", "3 3 1 c", "g p g p"}) {
+    auto p = perform(evidence, text);
+    const auto kept = generate::constrain(p, default_hand_shape());
+    INFO(text);
+    CHECK(kept.min_gap_m >= 0.0);
+    CHECK(generate::smallest_gap_m(p, default_hand_shape()) >= 0.0);
+    before_m = std::min(before_m, kept.before_m);
+  }
+  CHECK(before_m < 0.0);  // else the stage had nothing to do, and nothing was shown
 }
 
 TEST_CASE("global variance gives range back, within its limit", "[generate]") {
