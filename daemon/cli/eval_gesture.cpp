@@ -11,6 +11,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/lag_curve.hpp"
+#include "daemon/cli/tree_options.hpp"
 #include "models/generate/constrain.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/motion/naturalness.hpp"
@@ -26,7 +27,7 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr const char* kFooter = R"(Examples:
   posed eval gesture --model hand.gesture
   posed eval gesture --model hand.gesture --labels "g 1 c 3 4 p" --reference hand.csv --json
-  posed eval gesture --model hand.gesture --svg lag.svg
+  posed eval gesture --model hand.gesture --svg lag.svg --tree-svg tree.svg --trees middle:4
 
 jerk: rms third difference, deg/frame^3; ldlj and sparc: smoothness of the speed, closer to 0 is
 smoother; nearest_reference_deg: rms over the performed frames of the distance to the nearest
@@ -37,6 +38,7 @@ loses that knows its script only so many frames ahead.)";
 struct Options {
   std::string model, reference, labels, svg;
   bool json = false;
+  std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
 motion::Rows degrees_of(const std::vector<HandAngles>& angles) {
@@ -113,8 +115,14 @@ json curve_json(const std::vector<LagPoint>& curve) {
 }
 
 Result<json> evaluate(const Options& options) {
+  if (auto checked = check_tree_options(*options.trees); !checked) {
+    return std::unexpected(checked.error());
+  }
   auto model = gesture::load_model(options.model);
   if (!model) return std::unexpected(model.error());
+  if (auto drawn = draw_trees(*model, *options.trees); !drawn) {
+    return std::unexpected(drawn.error());
+  }
   std::string text = options.labels;
   if (text.empty()) {
     for (const gesture::Label& label : model->labels) text += label.name + " ";
@@ -180,6 +188,7 @@ void add_eval_gesture(CLI::App& eval, int& exit_code) {
   command->add_option("--labels", options->labels, "What to perform (default: every label once)");
   command->add_option("--reference", options->reference, "A recording to be held against");
   command->add_option("--svg", options->svg, "Where to draw look-ahead against error");
+  add_tree_options(*command, options->trees);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
     const auto made = evaluate(*options);

@@ -79,6 +79,32 @@ TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") 
   CHECK(nlohmann::json::parse(asked.out)["leaves"] == told["leaves"]);
 }
 
+TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
+  const Glove glove;
+  REQUIRE(glove.train("a.gesture").code == 0);
+  const auto eval = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"eval", "gesture", "--model", glove.file("a.gesture"), "--json"});
+    return posed(std::move(more));
+  };
+  const auto judged = eval({"--labels", "g c p g", "--reference", glove.clip, "--svg",
+                            glove.file("lag.svg"), "--tree-dot", glove.file("t.dot")});
+  INFO(judged.err);
+  REQUIRE(judged.code == 0);
+  const auto told = nlohmann::json::parse(judged.out);
+  CHECK(told["leaves"]["states"].size() == 5);
+  CHECK(told["min_gap_cm"] >= 0.0);
+  CHECK(told["reference"]["nearest_reference_deg"] < 10.0);
+  CHECK(told["reference"]["frechet"] > 0.0);
+  for (const char* figure : {"jerk", "ldlj", "sparc"}) CHECK(told["performed"][figure].is_number());
+  const auto& curve = told["curve"];
+  REQUIRE(curve.size() > 5);
+  CHECK(curve.back()["rms_deg"] < curve.front()["rms_deg"]);
+  CHECK(bytes_of(glove.file("lag.svg")).find("<svg") == 0);
+  CHECK(bytes_of(glove.file("t.dot")).find("digraph") != std::string::npos);
+  CHECK(one_sentence(eval({"--labels", "wave"}), 2, "wave"));
+  CHECK(one_sentence(eval({"--trees", "toe:9", "--tree-text", "-"}), 2, "toe:9"));
+}
+
 TEST_CASE("Classes are proposed, and a pose shown once becomes a label", "[train_gesture]") {
   const Glove glove;
   const auto three = gesture::make_performance({.person = 1, .script = {"3"}});
