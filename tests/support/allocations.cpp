@@ -10,7 +10,12 @@ thread_local std::uint64_t count = 0;
 
 std::uint64_t posed::test::allocations() noexcept { return count; }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifndef __has_feature
+#define __has_feature(name) 0  // gcc says it with a macro of its own
+#endif
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || \
+    __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
 // A sanitizer brings a heap of its own and tells of each call. gcc 12 comes without the header that
 // declares it.
 extern "C" int __sanitizer_install_malloc_and_free_hooks(  // NOLINT(bugprone-reserved-identifier)

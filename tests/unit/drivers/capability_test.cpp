@@ -267,8 +267,7 @@ TEST_CASE("reading takes nothing from the heap") {
     Device device = test::open_device(specimen);
     (void)test::read_chunks(*device.transport, 1);
     const std::uint64_t before = test::allocations();
-    std::size_t bytes = 0;
-    for (int i = 0; i < 1000; ++i) bytes += device.transport->read(0).bytes.size();
+    for (int i = 0; i < 1000; ++i) static_cast<void>(device.transport->read(0));
     CHECK(test::allocations() == before);
   }
 }
