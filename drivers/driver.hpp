@@ -3,6 +3,7 @@
 // frames. A log of the chunks therefore replays through the very decoder that ran live.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -14,11 +15,16 @@
 #include <variant>
 #include <vector>
 
+#include "drivers/emulator.hpp"
+#include "drivers/glove/model.hpp"
+#include "proto/frame/hand.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/sink.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::drivers {
+
+class Ports;  // drivers/transport/ports.hpp
 
 inline constexpr std::size_t kMaxChunk =
     64 * 1024;  // bytes; a longer one is an error of the transport
@@ -26,7 +32,8 @@ inline constexpr std::size_t kMaxChunk =
 // What one read gave.
 struct Chunk {
   std::span<const std::byte> bytes;  // valid until the next read; empty when nothing was due
-  bool end = false;  // comes alone, after the last bytes: the source will never give more
+  bool end = false;   // comes alone, after the last bytes: the source will never give more
+  bool lost = false;  // comes alone: the link is broken; the device may come back on a new one
 };
 
 // Where bytes come from. One reader thread uses it after open().
@@ -58,6 +65,10 @@ class Transport {
   // The next chunk, at most one; call again until it is empty. Never blocks. RT-safe but for its
   // read.
   [[nodiscard]] virtual Chunk read(std::int64_t now_ns) noexcept = 0;
+
+  // Sends bytes to the device, all or none; false when the link does not take them now. RT-safe but
+  // for its write.
+  [[nodiscard]] virtual bool send(std::span<const std::byte> /*bytes*/) noexcept { return false; }
 };
 
 // Bytes to frames. Pure: no clock, no I/O, no allocation after construction.
@@ -72,6 +83,10 @@ class Decoder {
   // crashes nor hangs, and counts what it cannot use. RT-safe.
   virtual void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept = 0;
+
+  // Uses this calibration from the next packet on; it must outlive its use. Without a call the
+  // device's default holds; what is no glove has nothing to calibrate. RT-safe.
+  virtual void calibrate(const glove::Calibration& /*calibration*/) noexcept {}
 };
 
 // Names and units of a device's sample values.
@@ -91,12 +106,28 @@ struct Description {
   double rate_hz = 0.0;  // nominal; 0 when unknown
 };
 
+// What is sent to a device that answers instead of streaming.
+struct Poll {
+  std::vector<std::byte> request;  // empty: the device streams by itself
+  std::int64_t period_ns = 0;
+};
+
 // One opened device.
 struct Device {
   Description description;
   std::unique_ptr<Transport> transport;
   std::unique_ptr<Decoder> decoder;
   std::vector<std::string> warnings;  // one sentence each, for the user: opened, but look at this
+  Poll poll{};
+  double reopen_after_s = 0.0;  // silence after which the link is opened anew; 0: never
+};
+
+// What a glove with motors is told: a control message, in units of the hand.
+struct Haptics {
+  std::array<float, kFingers> force{};  // thumb to little: 0 free, 1 blocked, negative unchanged
+  float vibration_hz = 0.0F;
+  float vibration_s = 0.0F;  // 0: no vibration
+  float vibration = 0.0F;    // amplitude, 0 to 1
 };
 
 // The options a driver takes from its [stream.<driver>] table; config/ checks them against this
@@ -116,11 +147,22 @@ struct Driver {
   std::string_view name;
   std::string_view summary;
   std::vector<OptionSpec> options;
-  Result<Device> (*open)(const Options& options);
+  // Finds the device, speaks with it and starts it; may take a few seconds. Files open at once.
+  Result<Device> (*open)(const Options& options, Ports& ports);
   // The decoder alone, from what a log kept of the description's text; replay uses it.
   Result<std::unique_ptr<Decoder>> (*make_decoder)(const Description& description);
   // Skeleton, samples and rate again from driver + text + identity.
   Result<Description> (*describe)(const std::string& text, const std::string& identity);
+  // For a device that may come later: its description as the options promise it. What open() finds
+  // has the same skeleton and samples. Null: the device must be there from the start.
+  Result<Description> (*expect)(const Options& options) = nullptr;
+  // The sensors of a glove and what they mean before calibration; null for what is no glove.
+  Result<glove::Model> (*glove_model)(const Description& description) = nullptr;
+  // The bytes for the device; null for one that cannot be felt.
+  Result<std::vector<std::byte>> (*encode_haptics)(const Options& options,
+                                                   const Haptics& haptics) = nullptr;
+  // The device's other side, for tests, `posed emulate` and the demo; null where there is none.
+  Result<std::unique_ptr<Emulator>> (*emulate)(const Options& options) = nullptr;
 };
 
 [[nodiscard]] std::span<const Driver> registry();                // the one list

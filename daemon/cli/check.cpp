@@ -11,6 +11,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/open_stream.hpp"
+#include "drivers/transport/ports.hpp"
 
 namespace posed::cli {
 namespace {
@@ -24,7 +25,8 @@ struct CheckOptions {
 
 // What one stream would run, after its device was opened and its model bound.
 Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
-  const auto stream = pipeline::open_stream(config);
+  drivers::Ports ports;
+  const auto stream = pipeline::open_stream(config, ports);
   if (!stream) return std::unexpected(stream.error());
   const auto bound = pipeline::bind_style(**stream);
   if (!bound) return std::unexpected(bound.error());

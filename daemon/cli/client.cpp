@@ -15,6 +15,10 @@ using control::Domain;
 constexpr int kMessagesWaiting = 16;
 constexpr int kReceiveBuffer = 8 * 1024;  // bytes
 
+// A secured daemon may hang up on a client without a key before its greeting was read (libzmq then
+// tells no reason), again and again. One that only ended is not there for a second try.
+constexpr int kHangUps = 3;
+
 constexpr const char* kMonitorEndpoint = "inproc://posed.connection";
 constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
                         ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
@@ -103,6 +107,7 @@ std::optional<Error> Connection::refusal() {
     switch (event) {
       case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
         established_ = true;
+        hang_ups_ = 0;
         break;
       case ZMQ_EVENT_DISCONNECTED:
         established_ = false;
@@ -113,23 +118,29 @@ std::optional<Error> Connection::refusal() {
                     (domain_ == Domain::kPublish ? "subscribe" : "control"))
             .error();
       case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
-        return fail(keyless ? "the daemon at " + where +
-                                  " wants a key; give --key NAME.key --server-key SERVER.pub"
-                            : "the daemon at " + where +
-                                  " does not use keys, or is no posed; leave out --key")
-            .error();
+        return keyless ? wants_key()
+                       : fail("the daemon at " + where +
+                              " does not use keys, or is no posed; leave out --key")
+                             .error();
       case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
         if (!keyless) {
           return fail("the daemon at " + where + " hangs up: --server-key " +
                       options_.server_key.string() + " is not its key, or it just ended")
               .error();
         }
+        if (++hang_ups_ == kHangUps) return wants_key();
         break;
       default:
         break;
     }
   }
   return std::nullopt;
+}
+
+Error Connection::wants_key() const {
+  return fail("the daemon at " + options_.endpoint +
+              " wants a key; give --key NAME.key --server-key SERVER.pub")
+      .error();
 }
 
 Error Connection::no_answer() const {

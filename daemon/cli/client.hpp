@@ -46,6 +46,7 @@ class Connection {
  private:
   Connection(ClientOptions options, control::Domain domain, control::Context context,
              control::Socket socket, control::Socket monitor);
+  [[nodiscard]] Error wants_key() const;
 
   ClientOptions options_;
   control::Domain domain_;
@@ -53,6 +54,7 @@ class Connection {
   control::Socket socket_;
   control::Socket monitor_;
   bool established_ = false;
+  int hang_ups_ = 0;  // in a row, before the handshake
 };
 
 // From its making on SIGINT and SIGTERM only set a flag.

@@ -15,6 +15,7 @@
 #include "daemon/pipeline/realtime.hpp"
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/publish/publisher.hpp"
+#include "drivers/transport/ports.hpp"
 
 namespace posed::pipeline {
 namespace {
@@ -58,6 +59,7 @@ class Daemon::Parts final : public control::Helm {
 
   DaemonConfig config;
   DaemonHooks hooks;
+  drivers::Ports ports;
   std::vector<std::unique_ptr<OpenStream>> streams;
   std::atomic<bool> stop_asked{false};
 
@@ -83,7 +85,7 @@ class Daemon::Parts final : public control::Helm {
 
 Result<> Daemon::Parts::open() {
   for (const StreamConfig& stream_config : config.streams) {
-    auto stream = open_stream(stream_config);
+    auto stream = open_stream(stream_config, ports);
     if (!stream) return std::unexpected(stream.error());
     for (const std::string& warning : (*stream)->device.warnings) {
       spdlog::warn("{}: {}", stream_config.name, warning);

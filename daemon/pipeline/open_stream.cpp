@@ -23,12 +23,12 @@ std::unexpected<Error> of_stream(const std::string& name, Error error) {
   return std::unexpected(std::move(error));
 }
 
-Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config) {
+Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config, drivers::Ports& ports) {
   const drivers::Driver* driver = drivers::find_driver(config.driver);
   if (driver == nullptr) {
     return of_stream(config.name, misuse("there is no driver '" + config.driver + "'").error());
   }
-  auto device = driver->open(config.options);
+  auto device = driver->open(config.options, ports);
   if (!device) return of_stream(config.name, device.error());
   auto stream = std::make_unique<OpenStream>();
   stream->config = config;

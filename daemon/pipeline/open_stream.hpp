@@ -23,7 +23,8 @@ struct OpenStream {
 };
 
 // Opens the device and reads the model's file. Errors name the stream. Cold.
-[[nodiscard]] Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config);
+[[nodiscard]] Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config,
+                                                              drivers::Ports& ports);
 
 // The style model, bound to the stream's skeleton; null without a style stage. Cold.
 [[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream);

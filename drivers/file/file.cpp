@@ -34,7 +34,7 @@ Chunks frames_of(const clip::TextClip& clip) {
   return chunks;
 }
 
-Result<Device> open(const Options& given) {
+Result<Device> open(const Options& given, Ports& /*ports*/) {
   const auto options = complete_options(file_driver(), given);
   if (!options) return std::unexpected(options.error());
   const std::string path = option<std::string>(*options, "path");

@@ -1,5 +1,5 @@
-// The texts of config/skeletons/*.toml and config/hands/*.toml, which CMake writes into the binary
-// (proto/CMakeLists.txt).
+// The texts of config/skeletons/*.toml, config/hands/*.toml and config/devices/*.toml, which CMake
+// writes into the binary (proto/CMakeLists.txt).
 #pragma once
 
 #include <span>
@@ -14,5 +14,6 @@ struct ProfileText {
 
 [[nodiscard]] std::span<const ProfileText> profile_texts();
 [[nodiscard]] std::span<const ProfileText> hand_texts();
+[[nodiscard]] std::span<const ProfileText> device_texts();
 
 }  // namespace posed

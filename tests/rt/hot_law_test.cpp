@@ -7,6 +7,7 @@
 
 #include <mutex>
 
+#include "drivers/transport/ports.hpp"
 #include "models/gesture/synthetic_performer.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/hand_clip.hpp"
@@ -38,7 +39,8 @@ class CountingTape final : public record::Tape {
 };
 
 drivers::Device open_device(const char* driver, const drivers::Options& options) {
-  return drivers::find_driver(driver)->open(options).value();
+  drivers::Ports ports;
+  return drivers::find_driver(driver)->open(options, ports).value();
 }
 
 // Breaks the law once, at the fifth chunk.

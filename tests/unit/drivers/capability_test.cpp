@@ -4,6 +4,7 @@
 #include <random>
 #include <set>
 
+#include "drivers/transport/ports.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/specimens.hpp"
@@ -273,9 +274,10 @@ TEST_CASE("reading takes nothing from the heap") {
 }
 
 TEST_CASE("wrong options are refused in a sentence that names them") {
+  Ports ports;
   for (const Driver& driver : registry()) {
     INFO(driver.name);
-    const auto unknown = driver.open({{"no_such_option", true}});
+    const auto unknown = driver.open({{"no_such_option", true}}, ports);
     REQUIRE_FALSE(unknown);
     CHECK(unknown.error().message.find("no_such_option") != std::string::npos);
     CHECK(unknown.error().exit_code == ExitCode::kWrongUse);
@@ -284,7 +286,7 @@ TEST_CASE("wrong options are refused in a sentence that names them") {
       const OptionValue wrong = is_bool ? OptionValue(std::string("x")) : OptionValue(true);
       Options options{{"path", std::string("x")}};
       options[std::string(option.name)] = wrong;
-      const auto device = driver.open(options);
+      const auto device = driver.open(options, ports);
       REQUIRE_FALSE(device);
       CHECK(device.error().exit_code == ExitCode::kWrongUse);
     }

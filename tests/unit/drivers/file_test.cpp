@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "drivers/transport/ports.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
@@ -17,7 +18,8 @@ using test::CollectSink;
 Result<Device> open_file(const std::filesystem::path& path, Options options = {}) {
   options["path"] = path.string();
   options.try_emplace("pace", 0.0);
-  return find_driver("file")->open(options);
+  Ports ports;
+  return find_driver("file")->open(options, ports);
 }
 
 Device must_open(const std::filesystem::path& path, const Options& options = {}) {

@@ -6,6 +6,8 @@
 
 #include <fstream>
 
+#include "drivers/transport/ports.hpp"
+
 namespace posed::test {
 namespace {
 
@@ -58,9 +60,10 @@ const std::vector<Specimen>& specimens() {
 }
 
 drivers::Device open_device(const Specimen& specimen) {
+  drivers::Ports ports;
   const drivers::Driver* driver = drivers::find_driver(specimen.driver);
   REQUIRE(driver != nullptr);
-  auto device = driver->open(specimen.options);
+  auto device = driver->open(specimen.options, ports);
   if (!device) FAIL(device.error().text());
   return std::move(*device);
 }

@@ -1,0 +1,50 @@
+// Ports: how drivers reach devices. One object belongs to one cold thread; it keeps what has to
+// stay open while a device is away (listening sockets), and ends every wait when it is told to.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/transport/link.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::drivers {
+
+struct SerialSettings {
+  std::string port;   // "/dev/ttyUSB0"; empty: found by `id`
+  std::string id;     // USB serial number or port path, as `posed devices` lists it
+  int baud = 115200;  // 8N1, no flow control
+  // Without port and id: the one port whose USB ids are among these.
+  std::vector<std::uint32_t> usb_ids;  // vendor << 16 | product
+};
+
+// For gloves that connect to us.
+struct ListenSettings {
+  std::string endpoint;            // "127.0.0.1:5200"
+  std::vector<std::string> peers;  // addresses that may connect; empty: loopback only
+};
+
+class Ports {
+ public:
+  Ports() = default;
+  Ports(const Ports&) = delete;
+  Ports& operator=(const Ports&) = delete;
+  ~Ports();
+
+  // Raw mode, exclusive, DTR set. Errors are one sentence: not there, no permission (with the udev
+  // rule or group that mends it), in use (by whom, if known). Cold.
+  [[nodiscard]] Result<Link> serial(const SerialSettings& settings);
+
+  // Waits up to half a second for a glove to connect; listens from the first call on, so that a
+  // glove that tries in between is kept. Others than the peers are dropped and counted. Cold.
+  [[nodiscard]] Result<Link> accept(const ListenSettings& settings);
+
+ private:
+  std::map<std::string, int> listeners_;  // by endpoint
+};
+
+}  // namespace posed::drivers
