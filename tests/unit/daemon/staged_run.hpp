@@ -15,6 +15,7 @@
 #include "daemon/record/recorder.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
+#include "drivers/transport/ports.hpp"
 #include "models/style/style_model.hpp"
 #include "proto/log/digest.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -147,8 +148,9 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
   const std::string two = style::serialize_model(toy_model(2));
   std::vector<std::unique_ptr<StagedStream>> streams;
   std::vector<record::RecordedStream> rows;
+  drivers::Ports ports;
   for (std::uint32_t id = 0; id < 2; ++id) {
-    auto device = drivers::find_driver("file")->open({{"path", bvh.string()}});
+    auto device = drivers::find_driver("file")->open({{"path", bvh.string()}}, ports);
     REQUIRE(device);
     streams.push_back(
         std::make_unique<StagedStream>(id, id == 0 ? "a" : "b", std::move(*device), one));
