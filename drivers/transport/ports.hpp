@@ -15,17 +15,17 @@
 namespace posed::drivers {
 
 struct SerialSettings {
-  std::string port;   // "/dev/ttyUSB0"; empty: found by `id`
-  std::string id;     // USB serial number or port path, as `posed devices` lists it
-  int baud = 115200;  // 8N1, no flow control
+  std::string port{};  // "/dev/ttyUSB0"; empty: found by `id`
+  std::string id{};    // USB serial number or port path, as `posed devices` lists it
+  int baud = 115200;   // 8N1, no flow control
   // Without port and id: the one port whose USB ids are among these.
-  std::vector<std::uint32_t> usb_ids;  // vendor << 16 | product
+  std::vector<std::uint32_t> usb_ids{};  // vendor << 16 | product
 };
 
 // For gloves that connect to us.
 struct ListenSettings {
-  std::string endpoint;            // "127.0.0.1:5200"
-  std::vector<std::string> peers;  // addresses that may connect; empty: loopback only
+  std::string endpoint{};            // "127.0.0.1:5200"
+  std::vector<std::string> peers{};  // addresses that may connect; empty: loopback only
 };
 
 class Ports {
@@ -43,7 +43,11 @@ class Ports {
   // glove that tries in between is kept. Others than the peers are dropped and counted. Cold.
   [[nodiscard]] Result<Link> accept(const ListenSettings& settings);
 
+  // Connections dropped so far because no peer in the list made them.
+  [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+
  private:
+  std::uint64_t refused_ = 0;
   std::map<std::string, int> listeners_;  // by endpoint
 };
 

@@ -1,0 +1,173 @@
+#include "drivers/transport/link.hpp"
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace posed::drivers {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr std::size_t kRead = 4096;  // bytes; a HID report and a terminal's buffer fit in one
+constexpr milliseconds kWritePatience{1000};
+constexpr milliseconds kDrainPatience{1000};
+
+bool not_now(int error) noexcept {
+  return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
+}
+
+// send() for sockets, where a plain write() to a peer that has gone would end the process.
+ssize_t write_some(int fd, std::span<const std::byte> bytes) noexcept {
+  const ssize_t sent = ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  if (sent >= 0 || errno != ENOTSOCK) return sent;
+  return ::write(fd, bytes.data(), bytes.size());
+}
+
+milliseconds left_until(Clock::time_point deadline) {
+  const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
+  return std::max(left, milliseconds{0});
+}
+
+void wait_for(int fd, short events, milliseconds patience) {
+  pollfd wanted{.fd = fd, .events = events, .revents = 0};
+  ::poll(&wanted, 1, static_cast<int>(patience.count()));
+}
+
+std::string gone(const std::string& name, int error) {
+  return name + " has gone (" + (error == 0 ? "hung up" : std::strerror(error)) +
+         "); plug it in again or switch it on";
+}
+
+class LinkTransport final : public Transport {
+ public:
+  explicit LinkTransport(Link link) : link_(std::move(link)) {}
+
+  [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
+  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+  [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
+
+ private:
+  bool flush() noexcept;
+
+  Link link_;
+  std::array<std::byte, kRead> buffer_;
+  // What the device took only in part; nothing else may go between its halves.
+  std::array<std::byte, kRead> unsent_;
+  std::size_t unsent_from_ = 0, unsent_to_ = 0;
+};
+
+// One read a call, so that one HID report is one chunk. All devices are opened such that 0 bytes
+// mean a hang-up (VMIN is 1). RT-safe but for the read.
+Chunk LinkTransport::read(std::int64_t /*now_ns*/) noexcept {
+  flush();
+  const ssize_t got = ::read(link_.fd(), buffer_.data(), buffer_.size());
+  if (got > 0) return {.bytes = {buffer_.data(), static_cast<std::size_t>(got)}};
+  if (got < 0 && not_now(errno)) return {};
+  return {.bytes = {}, .lost = true};
+}
+
+// RT-safe but for the write.
+bool LinkTransport::flush() noexcept {
+  while (unsent_from_ < unsent_to_) {
+    const ssize_t sent =
+        write_some(link_.fd(), std::span(unsent_).subspan(unsent_from_, unsent_to_ - unsent_from_));
+    if (sent <= 0) return false;
+    unsent_from_ += static_cast<std::size_t>(sent);
+  }
+  return true;
+}
+
+// RT-safe but for the write.
+bool LinkTransport::send(std::span<const std::byte> bytes) noexcept {
+  if (bytes.size() > unsent_.size() || !flush()) return false;
+  const ssize_t sent = write_some(link_.fd(), bytes);
+  if (sent < 0) return false;
+  const auto rest = bytes.subspan(static_cast<std::size_t>(sent));
+  std::memcpy(unsent_.data(), rest.data(), rest.size());
+  unsent_from_ = 0;
+  unsent_to_ = rest.size();
+  return true;
+}
+
+}  // namespace
+
+Link::Link(int fd, std::string name, std::string identity) noexcept
+    : fd_(fd), name_(std::move(name)), identity_(std::move(identity)) {}
+
+Link::~Link() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Link::Link(Link&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)),
+      name_(std::move(other.name_)),
+      identity_(std::move(other.identity_)) {}
+
+Link& Link::operator=(Link&& other) noexcept {
+  if (this == &other) return *this;
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = std::exchange(other.fd_, -1);
+  name_ = std::move(other.name_);
+  identity_ = std::move(other.identity_);
+  return *this;
+}
+
+Result<> Link::write(std::span<const std::byte> bytes) {
+  const auto deadline = Clock::now() + kWritePatience;
+  while (!bytes.empty()) {
+    const ssize_t sent = write_some(fd_, bytes);
+    if (sent > 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(sent));
+      continue;
+    }
+    if (sent < 0 && !not_now(errno)) return fail(gone(name_, errno));
+    const auto left = left_until(deadline);
+    if (left.count() == 0) {
+      return fail(name_ + " takes no bytes; check that a glove is on it and switched on");
+    }
+    wait_for(fd_, POLLOUT, left);
+  }
+  return {};
+}
+
+Result<> Link::write(std::string_view text) { return write(std::as_bytes(std::span(text))); }
+
+Result<std::vector<std::byte>> Link::read(std::chrono::milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  std::vector<std::byte> bytes(kRead);
+  while (true) {
+    const ssize_t got = ::read(fd_, bytes.data(), bytes.size());
+    if (got < 0 && not_now(errno)) {
+      const auto left = left_until(deadline);
+      if (left.count() == 0) return std::vector<std::byte>{};
+      wait_for(fd_, POLLIN, left);
+      continue;
+    }
+    if (got <= 0) return fail(gone(name_, got == 0 ? 0 : errno));
+    bytes.resize(static_cast<std::size_t>(got));
+    return bytes;
+  }
+}
+
+Result<> Link::drain(std::chrono::milliseconds quiet) {
+  const auto deadline = Clock::now() + kDrainPatience;
+  while (true) {
+    const auto bytes = read(std::min(quiet, left_until(deadline)));
+    if (!bytes) return std::unexpected(bytes.error());
+    if (bytes->empty() || Clock::now() >= deadline) return {};
+  }
+}
+
+std::unique_ptr<Transport> make_link_transport(Link link) {
+  return std::make_unique<LinkTransport>(std::move(link));
+}
+
+}  // namespace posed::drivers
