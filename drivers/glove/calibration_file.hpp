@@ -5,6 +5,7 @@
 //   glove = "SERIAL"        # identity; empty fits any glove of the driver
 //   hand = "right"
 //   user = "ann"
+//   sensor_count = 1        # lines under [sensors]; may be left out
 //   [parameters]            # the device's own constants, by name
 //   abduction_bias = 0.4
 //   [sensors]               # raw value, calibrated value; two points or more, raw ascending
@@ -38,7 +39,8 @@ struct CalibrationFile {
 
 // The model's default calibration, or what `file` makes of it (sensors it does not name keep their
 // default). Refused with a sentence: another driver, another hand, another glove (`identity` empty
-// is not compared), unknown sensors, a sensor whose raw values span less than 10 counts. Cold.
+// is not compared), unknown sensors, a sensor whose raw values span less than 10 counts (4 % of the
+// range of a coarser one). Cold.
 [[nodiscard]] Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model);
 [[nodiscard]] Result<std::shared_ptr<const Calibration>> make_calibration(
     const Model& model, const CalibrationFile& file, Side hand, const std::string& identity);

@@ -28,15 +28,18 @@ struct Packet {
 
 class GloveDecoder : public Decoder {
  public:
-  // RT-safe.
-  void calibrate(const Calibration& calibration) noexcept override { calibration_ = &calibration; }
+  // A calibration for another number of sensors than the glove has is not used. RT-safe.
+  void calibrate(const Calibration& calibration) noexcept override {
+    if (calibration.sensors == default_->sensors) calibration_ = &calibration;
+  }
 
  protected:
-  // `skeleton` is a hand45 skeleton.
+  // `skeleton` is a hand45 skeleton; null for a glove that poses nothing.
   GloveDecoder(std::shared_ptr<const Skeleton> skeleton,
                std::shared_ptr<const Calibration> default_calibration);
 
-  // Emits the Sample, then the Frame (no Frame when no joint of the map is valid). RT-safe.
+  // Emits the Sample, then the Frame (no Frame when no channel of the map is known). What is not a
+  // number of a sensible size is not valid, and zero in the Sample. RT-safe.
   void emit(const Packet& packet, Sink& sink) noexcept;
 
   // The device's formula on calibrated values, in place (relative abductions, computed joints); may
@@ -46,6 +49,9 @@ class GloveDecoder : public Decoder {
   [[nodiscard]] const Calibration& calibration() const noexcept { return *calibration_; }
 
  private:
+  void pose(std::span<const float> value, const std::bitset<kMaxSensors>& valid,
+            const Packet& packet, Sink& sink) noexcept;
+
   std::shared_ptr<const Skeleton> skeleton_;
   std::shared_ptr<const Calibration> default_;
   const Calibration* calibration_;

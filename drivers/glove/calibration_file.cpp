@@ -1,0 +1,149 @@
+#include "drivers/glove/calibration_file.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+#include <toml++/toml.h>
+
+namespace posed::drivers::glove {
+namespace {
+
+constexpr int kFormat = 1;
+constexpr double kMaxNumber = 1e6;  // of raw values, calibrated values and parameters
+
+std::string in_ticks(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+// Reads one calibration; remembers the first mistake.
+class FileReader {
+ public:
+  explicit FileReader(const std::string& file) : file_(file) {}
+
+  Result<CalibrationFile> read(const toml::table& table) {
+    if (table["format"].value_or(0) != kFormat) {
+      return fail("is no calibration of a glove (it should say format = 1)", file_);
+    }
+    for (const auto& [key, node] : table) entry(key.str(), node);
+    if (read_.driver.empty()) blame(table, "the calibration does not say its driver");
+    if (hand_.empty()) blame(table, "the calibration does not say its hand, right or left");
+    if (read_.sensors.empty() && read_.parameters.empty()) {
+      blame(table, "the calibration names no sensor; was the file cut off?");
+    }
+    if (count_ && *count_ != static_cast<std::int64_t>(read_.sensors.size())) {
+      blame(table, "the calibration should have " + std::to_string(*count_) + " sensors and has " +
+                       std::to_string(read_.sensors.size()) + "; was the file cut off?");
+    }
+    if (error_) return std::unexpected(*error_);
+    return std::move(read_);
+  }
+
+ private:
+  void blame(const toml::node& node, std::string message) {
+    if (error_) return;
+    error_ = Error{std::move(message), file_, static_cast<int>(node.source().begin.line)};
+  }
+
+  void entry(std::string_view key, const toml::node& node) {
+    if (key == "format") return;
+    if (key == "driver") return text(node, read_.driver);
+    if (key == "glove") return text(node, read_.glove);
+    if (key == "user") return text(node, read_.user);
+    if (key == "sensor_count" && node.is_integer()) {
+      count_ = node.value<std::int64_t>();
+    } else if (key == "hand") {
+      text(node, hand_);
+      if (hand_ != "right" && hand_ != "left") blame(node, "hand should be right or left");
+      read_.hand = hand_ == "left" ? Side::kLeft : Side::kRight;
+    } else if (key == "parameters" && node.is_table()) {
+      for (const auto& [name, value] : *node.as_table()) {
+        read_.parameters.emplace(name.str(), number(&value));
+      }
+    } else if (key == "sensors" && node.is_table()) {
+      for (const auto& [name, points] : *node.as_table()) read_sensor(name.str(), points);
+    } else {
+      blame(node, in_ticks(key) + " is not known in a calibration, or of another type");
+    }
+  }
+
+  void text(const toml::node& node, std::string& into) {
+    const auto value = node.value_exact<std::string>();
+    if (!value) return blame(node, "a text is wanted here");
+    into = *value;
+  }
+
+  double number(const toml::node* node) {
+    const auto value = node->is_number() ? node->value<double>() : std::nullopt;
+    if (value && std::abs(*value) <= kMaxNumber) return *value;
+    blame(*node, "a finite number of at most a million is wanted here");
+    return 0.0;
+  }
+
+  void read_sensor(std::string_view name, const toml::node& node) {
+    const toml::array* const points = node.as_array();
+    if (points == nullptr || points->size() < 2 || points->size() > kMaxCurvePoints) {
+      return blame(node, "sensor " + in_ticks(name) + " needs 2 to " +
+                             std::to_string(kMaxCurvePoints) + " points [raw, calibrated]");
+    }
+    auto& read = read_.sensors[std::string(name)];
+    for (const toml::node& point : *points) {
+      const toml::array* const pair = point.as_array();
+      if (pair == nullptr || pair->size() != 2) {
+        return blame(point, "a point of sensor " + in_ticks(name) + " is [raw, calibrated]");
+      }
+      read.push_back({number(pair->get(0)), number(pair->get(1))});
+      if (read.size() > 1 && !(read.back()[0] > read[read.size() - 2][0])) {
+        return blame(point, "the raw values of sensor " + in_ticks(name) + " should ascend");
+      }
+    }
+  }
+
+  const std::string& file_;
+  CalibrationFile read_;
+  std::string hand_;
+  std::optional<std::int64_t> count_;
+  std::optional<Error> error_;
+};
+
+std::string digits(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  return {text.data(), end};
+}
+
+}  // namespace
+
+Result<CalibrationFile> parse_calibration(const std::string& toml,
+                                          const std::filesystem::path& path) {
+  const std::string file = path.string();
+  try {
+    return FileReader(file).read(toml::parse(toml, file));
+  } catch (const toml::parse_error& error) {
+    return fail(std::string(error.description()) + "; was the file cut off?", file,
+                static_cast<int>(error.source().begin.line));
+  }
+}
+
+std::string format_calibration(const CalibrationFile& file) {
+  // toml++ quotes and escapes what a name or a serial number may hold.
+  std::ostringstream out;
+  out << "format = " << kFormat << "\ndriver = " << toml::value<std::string>(file.driver)
+      << "\nglove = " << toml::value<std::string>(file.glove)
+      << "\nhand = " << (file.hand == Side::kLeft ? "\"left\"" : "\"right\"")
+      << "\nuser = " << toml::value<std::string>(file.user)
+      << "\nsensor_count = " << file.sensors.size() << "  # a file cut in half is noticed\n";
+  if (!file.parameters.empty()) out << "\n[parameters]\n";
+  for (const auto& [name, value] : file.parameters) out << name << " = " << digits(value) << '\n';
+  if (!file.sensors.empty()) out << "\n[sensors]  # raw value, calibrated value\n";
+  for (const auto& [name, points] : file.sensors) {
+    out << name << " = [";
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      out << (i == 0 ? "[" : ", [") << digits(points[i][0]) << ", " << digits(points[i][1]) << ']';
+    }
+    out << "]\n";
+  }
+  return out.str();
+}
+
+}  // namespace posed::drivers::glove

@@ -1,0 +1,100 @@
+#include "drivers/glove/glove_decoder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::drivers::glove {
+namespace {
+
+// Beyond it nothing is a hand's: what a bent calibration or a foreign raw value may give.
+constexpr float kMaxValue = 1e6F;
+
+void drop_what_is_no_number(std::span<const float> value,
+                            std::bitset<kMaxSensors>& valid) noexcept {
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (!(std::abs(value[i]) <= kMaxValue)) valid[i] = false;
+  }
+}
+
+void add_value(float value, bool valid, Sample& sample) noexcept {
+  const bool sound = valid && std::isfinite(value);
+  sample.valid[sample.value_count] = sound;
+  sample.value[sample.value_count++] = sound ? value : 0.0F;
+}
+
+}  // namespace
+
+SampleLayout sample_layout(const Model& model, std::span<const std::string> extras) {
+  SampleLayout layout;
+  for (const Sensor& sensor : model.sensors) {
+    layout.names.push_back(sensor.name);
+    layout.units.push_back(sensor.unit);
+  }
+  for (const Sensor& sensor : model.sensors) layout.names.push_back("raw_" + sensor.name);
+  layout.names.insert(layout.names.end(), extras.begin(), extras.end());
+  layout.units.resize(layout.names.size(), "1");
+  return layout;
+}
+
+GloveDecoder::GloveDecoder(std::shared_ptr<const Skeleton> skeleton,
+                           std::shared_ptr<const Calibration> default_calibration)
+    : skeleton_(std::move(skeleton)),
+      default_(std::move(default_calibration)),
+      calibration_(default_.get()) {}
+
+// RT-safe.
+void GloveDecoder::compute(std::span<float> /*value*/,
+                           std::bitset<kMaxSensors>& /*valid*/) const noexcept {}
+
+// RT-safe.
+void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
+  const std::size_t sensors = default_->sensors;
+  std::array<float, kMaxSensors> raw{};
+  std::array<float, kMaxSensors> value{};
+  std::bitset<kMaxSensors> valid;
+  for (std::size_t i = 0; i < std::min(sensors, packet.raw.size()); ++i) {
+    raw[i] = packet.raw[i];
+    value[i] = calibration_->curve[i].at(raw[i]);
+    valid[i] = packet.valid[i];
+  }
+  const std::span<float> values = std::span(value).first(sensors);
+  drop_what_is_no_number(values, valid);
+  compute(values, valid);
+  drop_what_is_no_number(values, valid);
+
+  Sample sample;
+  sample.header.device_ns = packet.device_ns;
+  sample.quality = packet.quality;
+  for (std::size_t i = 0; i < sensors; ++i) add_value(value[i], valid[i], sample);
+  for (std::size_t i = 0; i < sensors; ++i) {
+    add_value(raw[i], i < packet.raw.size() && packet.valid[i], sample);
+  }
+  for (const float extra : packet.extra.first(
+           std::min<std::size_t>(packet.extra.size(), kMaxSampleValues - 2 * sensors))) {
+    add_value(extra, true, sample);
+  }
+  sink.sample(sample);
+  pose(values, valid, packet, sink);
+}
+
+// RT-safe.
+void GloveDecoder::pose(std::span<const float> value, const std::bitset<kMaxSensors>& valid,
+                        const Packet& packet, Sink& sink) noexcept {
+  if (skeleton_ == nullptr) return;
+  HandAngles angles;
+  calibration_->map_to_hand(value, valid, angles);
+  const auto mapped = std::span(calibration_->map).first(calibration_->map_rows);
+  const bool any = std::ranges::any_of(
+      mapped, [&](const MapRow& row) { return std::isfinite(angles[row.channel]); });
+  if (!any) return;
+  Frame frame;
+  frame.header.device_ns = packet.device_ns;
+  frame.quality = packet.quality;
+  frame.source = Source::kDevice;
+  set_hand_angles(*skeleton_, angles, frame);
+  sink.frame(frame);
+}
+
+}  // namespace posed::drivers::glove
