@@ -2,7 +2,6 @@
 // stay open while a device is away (listening sockets), and ends every wait when it is told to.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "drivers/transport/link.hpp"
+#include "drivers/transport/usb.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::drivers {
@@ -28,6 +28,14 @@ struct ListenSettings {
   std::vector<std::string> peers{};  // addresses that may connect; empty: loopback only
 };
 
+// For gloves on hidraw nodes.
+struct HidSettings {
+  std::uint16_t vendor = 0;
+  std::vector<std::uint16_t> products{};  // any of these; empty: all of the vendor's
+  std::string id{};                       // serial number or port path; empty: the only one
+  std::string path{};                     // "/dev/hidraw0" instead of all of the above
+};
+
 class Ports {
  public:
   Ports() = default;
@@ -42,6 +50,12 @@ class Ports {
   // Waits up to half a second for a glove to connect; listens from the first call on, so that a
   // glove that tries in between is kept. Others than the peers are dropped and counted. Cold.
   [[nodiscard]] Result<Link> accept(const ListenSettings& settings);
+
+  // The device's reports: one a read, and one a write. Cold.
+  [[nodiscard]] Result<Link> hid(const HidSettings& settings);
+
+  // A USB device without a node of its own kind, its interface claimed. Cold.
+  [[nodiscard]] Result<UsbLink> usb(const UsbSettings& settings);
 
   // Connections dropped so far because no peer in the list made them.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }

@@ -7,10 +7,12 @@
 #include <sys/sysmacros.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 
+#include "drivers/transport/enumerate.hpp"
 #include "drivers/transport/node.hpp"
 #include "drivers/transport/ports.hpp"
 
@@ -29,10 +31,10 @@ bool is_pseudo_terminal(int fd) {
 
 // Raw 8N1 without flow control. A read without bytes fails with EAGAIN and gives 0 only after a
 // hang-up (VMIN 1). Closing leaves DTR up: boards with a boot loader start anew when it drops.
-Result<> set_raw(int fd, const SerialSettings& settings) {
+Result<> set_raw(int fd, const std::string& port, int baud) {
   termios2 mode{};
   if (::ioctl(fd, TCGETS2, &mode) != 0) {
-    return fail(settings.port + " is no serial port; see `posed devices` for those that are");
+    return fail(port + " is no serial port; see `posed devices` for those that are");
   }
   mode.c_iflag = IGNBRK | IGNPAR;
   mode.c_oflag = 0;
@@ -40,30 +42,42 @@ Result<> set_raw(int fd, const SerialSettings& settings) {
   mode.c_cflag = BOTHER | CS8 | CREAD | CLOCAL;
   mode.c_cc[VMIN] = 1;
   mode.c_cc[VTIME] = 0;
-  mode.c_ispeed = mode.c_ospeed = static_cast<speed_t>(settings.baud);
+  mode.c_ispeed = mode.c_ospeed = static_cast<speed_t>(baud);
   if (::ioctl(fd, TCSETS2, &mode) != 0 || ::ioctl(fd, TCGETS2, &mode) != 0) {
-    return fail(settings.port + " refuses " + std::to_string(settings.baud) + " baud (" +
-                std::strerror(errno) + ")");
+    return fail(port + " refuses " + std::to_string(baud) + " baud (" + std::strerror(errno) + ")");
   }
-  if (std::abs(static_cast<double>(mode.c_ospeed) - settings.baud) > kBaudError * settings.baud) {
-    return fail(settings.port + " cannot run at " + std::to_string(settings.baud) +
-                " baud; its nearest rate is " + std::to_string(mode.c_ospeed));
+  if (std::abs(static_cast<double>(mode.c_ospeed) - baud) > kBaudError * baud) {
+    return fail(port + " cannot run at " + std::to_string(baud) + " baud; its nearest rate is " +
+                std::to_string(mode.c_ospeed));
   }
   return {};
+}
+
+Result<Plugged> find_port(const SerialSettings& settings) {
+  const auto ports = list_serial_ports();
+  if (!settings.port.empty()) return find_node(ports, settings.port);
+  const auto wanted = [&](const Plugged& one) {
+    const auto ids = static_cast<std::uint32_t>(one.vendor << 16 | one.product);
+    return !settings.id.empty() ||
+           (one.is_usb && std::ranges::find(settings.usb_ids, ids) != settings.usb_ids.end());
+  };
+  return choose(ports, settings.id, wanted, "serial port");
 }
 
 }  // namespace
 
 Result<Link> Ports::serial(const SerialSettings& settings) {
   if (settings.baud <= 0) return misuse("baud should be more than 0");
-  const auto fd = open_node(settings.port);
+  const auto port = find_port(settings);
+  if (!port) return std::unexpected(port.error());
+  const auto fd = open_node(port->node);
   if (!fd) return std::unexpected(fd.error());
-  Link link(*fd, settings.port, settings.port);
-  if (auto ok = set_raw(*fd, settings); !ok) return std::unexpected(ok.error());
+  Link link(*fd, port->node, port->identity());
+  if (auto ok = set_raw(*fd, port->node, settings.baud); !ok) return std::unexpected(ok.error());
   // flock keeps a second posed out; this keeps out the programs that know nothing of flock. Not on
   // a pseudo-terminal: there it would outlast us while the other side keeps the node open.
   if (!is_pseudo_terminal(*fd) && ::ioctl(*fd, TIOCEXCL) != 0) {
-    return fail(node_trouble(settings.port, errno));
+    return fail(node_trouble(port->node, errno));
   }
   const int lines = TIOCM_DTR | TIOCM_RTS;
   ::ioctl(*fd, TIOCMBIS, &lines);   // a port without modem lines answers with an error, rightly

@@ -1,0 +1,38 @@
+// HID gloves. hidapi says which there are; the reports are read from the hidraw node's own
+// descriptor, since hidapi hides it and a reader thread that polls all devices at once needs one.
+// The node gives one whole report a read, which is all that hidapi's hid_read does, too.
+#include <linux/hidraw.h>
+#include <sys/ioctl.h>
+
+#include <algorithm>
+
+#include "drivers/transport/enumerate.hpp"
+#include "drivers/transport/node.hpp"
+#include "drivers/transport/ports.hpp"
+
+namespace posed::drivers {
+
+Result<Link> Ports::hid(const HidSettings& settings) {
+  const auto nodes = list_hid_nodes();
+  auto chosen = find_node(nodes, settings.path);
+  if (settings.path.empty()) {
+    const auto wanted = [&](const Plugged& one) {
+      return one.is_usb && one.vendor == settings.vendor &&
+             (settings.products.empty() ||
+              std::ranges::find(settings.products, one.product) != settings.products.end());
+    };
+    auto found = choose(nodes, settings.id, wanted, "HID node");
+    if (!found) return std::unexpected(found.error());
+    chosen = std::move(*found);
+  }
+  const auto fd = open_node(chosen.node);
+  if (!fd) return std::unexpected(fd.error());
+  Link link(*fd, chosen.node, chosen.identity());
+  hidraw_devinfo info{};
+  if (::ioctl(*fd, HIDIOCGRAWINFO, &info) != 0) {
+    return fail(chosen.node + " is no HID device; see `posed devices` for those that are");
+  }
+  return link;
+}
+
+}  // namespace posed::drivers
