@@ -57,7 +57,7 @@ Result<Plugged> find_port(const SerialSettings& settings) {
   const auto ports = list_serial_ports();
   if (!settings.port.empty()) return find_node(ports, settings.port);
   const auto wanted = [&](const Plugged& one) {
-    const auto ids = static_cast<std::uint32_t>(one.vendor << 16 | one.product);
+    const auto ids = std::uint32_t{one.vendor} << 16 | one.product;
     return !settings.id.empty() ||
            (one.is_usb && std::ranges::find(settings.usb_ids, ids) != settings.usb_ids.end());
   };

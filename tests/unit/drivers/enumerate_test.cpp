@@ -68,14 +68,14 @@ TEST_CASE("an id that nothing answers to is named") {
 }
 
 TEST_CASE("ports, HID nodes and USB devices that are not there are refused in a sentence") {
-  constexpr std::uint16_t kNobody = 0xFFF0;  // no vendor has it
+  constexpr std::uint32_t kNobody = 0xFFF0;  // no vendor has it
   Ports ports;
   const auto port = ports.serial({.id = "no-such-glove"});
   REQUIRE_FALSE(port);
   CHECK(mentions(port.error(), "no-such-glove"));
   CHECK_FALSE(ports.serial({.usb_ids = {kNobody << 16}}));
-  CHECK_FALSE(ports.hid({.vendor = kNobody}));
-  CHECK_FALSE(ports.usb({.vendor = kNobody, .product = 1}));
+  CHECK_FALSE(ports.hid({.vendor = std::uint16_t{kNobody}}));
+  CHECK_FALSE(ports.usb({.vendor = std::uint16_t{kNobody}, .product = 1}));
   const auto missing = ports.hid({.path = "/dev/hidrawNotThere"});
   REQUIRE_FALSE(missing);
   CHECK(mentions(missing.error(), "is not there"));
