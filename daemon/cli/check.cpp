@@ -11,7 +11,6 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/open_stream.hpp"
-#include "drivers/transport/ports.hpp"
 
 namespace posed::cli {
 namespace {
@@ -25,8 +24,7 @@ struct CheckOptions {
 
 // What one stream would run, after its device was opened and its model bound.
 Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
-  drivers::Ports ports;
-  const auto stream = pipeline::open_stream(config, ports);
+  const auto stream = pipeline::open_stream(config);
   if (!stream) return std::unexpected(stream.error());
   const auto bound = pipeline::bind_style(**stream);
   if (!bound) return std::unexpected(bound.error());

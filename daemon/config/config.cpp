@@ -1,6 +1,7 @@
 #include "daemon/config/config.hpp"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <limits>
 #include <numbers>
@@ -32,6 +33,7 @@ constexpr Range kAnyNumber{std::numeric_limits<double>::lowest(),
 constexpr double kDegrees = 180.0 / std::numbers::pi;  // in a radian
 // The bound above 60 Hz is a time; no rate brings more frames into it than this.
 constexpr std::int64_t kMostLagFrames = 170;
+constexpr std::array<std::string_view, 3> kIdentityKeys{"port", "id", "hand"};
 constexpr std::string_view kRawSuffix = "-raw";
 constexpr std::uintmax_t kLargestConfig = 1024 * 1024;  // bytes
 
@@ -166,6 +168,9 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
   table.require("driver", stream.driver);
   table.read("publish_raw", stream.publish_raw);
   table.read("stale_after_s", stream.stale_after_s, kStaleAfter);
+  std::string calibration;
+  table.read("calibration", calibration);
+  stream.calibration = resolve(calibration);
   if (auto style = table.table("style")) read_style(*style, stream.style.emplace());
   if (auto generate = table.table("generate")) {
     read_generate(*generate, stream.generate.emplace());
@@ -198,8 +203,12 @@ void Reader::read_options(TableReader& stream_table, const drivers::Driver& driv
   for (const drivers::OptionSpec& spec : driver.options) {
     const std::string key(spec.name);
     drivers::OptionValue value = spec.default_value;
-    if (table) read_option(*table, spec, value);
-    if (spec.required && !(table && table->has(key))) {
+    // Which device it is stands beside the driver's name; how it is used, in the driver's table.
+    const bool beside = driver.expect != nullptr &&
+                        std::ranges::find(kIdentityKeys, spec.name) != kIdentityKeys.end();
+    if (beside) read_option(stream_table, spec, value);
+    if (!beside && table) read_option(*table, spec, value);
+    if (spec.required && !(beside ? stream_table.has(key) : table && table->has(key))) {
       findings_.blame(table ? table->line() : stream_table.line(),
                       fmt::format("stream.{}.{} is missing: {}", name, key, spec.help));
     }

@@ -65,6 +65,13 @@ std::optional<Answer> RequestHandler::handle(Asker asker, std::span<const std::b
     case v1::ControlRequest::kStopPlaying:
       done = stop_playing(request, asker);
       break;
+    case v1::ControlRequest::kCalibrate:
+      done = calibrate(request, asker);
+      break;
+    case v1::ControlRequest::kHaptics:
+      done = send_haptics(request);
+      if (done) return answer(std::move(asker), reply);  // the device does not answer
+      break;
     case v1::ControlRequest::kStatus:
       helm_.fill(*reply.mutable_status());
       return answer(std::move(asker), reply);
@@ -228,6 +235,7 @@ std::optional<Answer> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     stream.model = std::move(done.model);  // the one it replaces is free now
     helm_.model_in_use(ack.stream, stream.model->name);
   }
+  if (done.calibration) stream.calibration = std::move(done.calibration);
   if (done.gesture) {
     stream.gesture = std::move(done.gesture);
     if (!stream.style) helm_.model_in_use(ack.stream, stream.gesture->name);

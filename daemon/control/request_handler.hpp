@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
+#include "drivers/driver.hpp"
+#include "drivers/glove/calibration_file.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/result.hpp"
@@ -40,6 +42,10 @@ struct ControlledStream {
   std::unique_ptr<const style::BoundModel> model;
   bool generates = false;                               // the generate stage is there
   std::unique_ptr<const generate::BoundModel> gesture;  // null until it has one
+  drivers::Description description;                     // what calibrations must fit
+  drivers::Options options;                             // of its driver
+  // In use by the reader since it was sent; null: what the stream began with.
+  std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
 };
 
 // What the handler asks of the rest of the daemon; every call comes from the control thread.
@@ -52,6 +58,8 @@ class Helm {
 
   // Puts the command into the pipeline's ring; false when it is full.
   [[nodiscard]] virtual bool send(const pipeline::Command& command) = 0;
+  // The same for the reader and its devices.
+  [[nodiscard]] virtual bool send(const pipeline::DeviceCommand& command) = 0;
   // Keeps a model's file for the log, before the command that names its hash.
   virtual void keep_model(std::span<const std::byte> bytes) = 0;
   // A model has taken effect: `stats` should name it.
@@ -89,6 +97,7 @@ class RequestHandler {
     std::uint32_t stream = 0;
     std::unique_ptr<const style::BoundModel> model{};       // of a new style
     std::unique_ptr<const generate::BoundModel> gesture{};  // of a new gesture model
+    std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
   };
   // Nothing when the command is under way.
   [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Asker& asker);
@@ -100,6 +109,8 @@ class RequestHandler {
   void keep_model(std::span<const std::byte> bytes, pipeline::Command& command);
   [[nodiscard]] Result<> play(const v1::ControlRequest& request, const Asker& asker);
   [[nodiscard]] Result<> stop_playing(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
   [[nodiscard]] Result<std::uint32_t> find_stream(const std::string& name) const;
   [[nodiscard]] Result<std::uint32_t> styled_stream(const std::string& name) const;
   [[nodiscard]] Result<std::uint32_t> playing_stream(const std::string& name) const;

@@ -16,6 +16,9 @@ struct alignas(64) ReaderCounters {
   std::atomic<std::uint64_t> newest{0};   // sequence of the last frame that went into the ring
   std::atomic<std::uint64_t> dropped{0};  // frames and samples that found it full
   std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
+  std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
+  std::atomic<bool> connected{false};              // a link to the device is open
+  std::atomic<std::uint64_t> connections{0};       // links opened so far
 };
 
 struct alignas(64) PipelineCounters {

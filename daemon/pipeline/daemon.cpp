@@ -10,12 +10,12 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/keys.hpp"
+#include "daemon/devices/keeper.hpp"
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/realtime.hpp"
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/publish/publisher.hpp"
-#include "drivers/transport/ports.hpp"
 
 namespace posed::pipeline {
 namespace {
@@ -23,11 +23,9 @@ namespace {
 constexpr double kUnknownRate_hz = 1000.0;  // what rings must hold when a device does not say
 
 double rate_of(const OpenStream& stream) {
-  for (const double rate_hz :
-       {stream.device.transport->rate_hz(), stream.device.description.rate_hz}) {
-    if (rate_hz > 0.0) return rate_hz;
-  }
-  return kUnknownRate_hz;
+  const drivers::Device& device = stream.device;
+  if (device.transport && device.transport->rate_hz() > 0.0) return device.transport->rate_hz();
+  return device.description.rate_hz > 0.0 ? device.description.rate_hz : kUnknownRate_hz;
 }
 
 }  // namespace
@@ -48,6 +46,11 @@ class Daemon::Parts final : public control::Helm {
     pipeline_wake->ring();
     return sent;
   }
+  bool send(const DeviceCommand& command) override {
+    const bool sent = device_commands->push(command);
+    reader->call();
+    return sent;
+  }
   void keep_model(std::span<const std::byte> bytes) override {
     if (hooks.tape != nullptr) hooks.tape->keep_model(bytes);
   }
@@ -59,7 +62,6 @@ class Daemon::Parts final : public control::Helm {
 
   DaemonConfig config;
   DaemonHooks hooks;
-  drivers::Ports ports;
   std::vector<std::unique_ptr<OpenStream>> streams;
   std::atomic<bool> stop_asked{false};
 
@@ -69,6 +71,7 @@ class Daemon::Parts final : public control::Helm {
   std::unique_ptr<Wake> pipeline_wake, publisher_wake, control_wake;
   std::unique_ptr<Ring<Item>> decoded, finished;
   std::unique_ptr<Ring<Command>> commands;
+  std::unique_ptr<Ring<DeviceCommand>> device_commands;
   std::unique_ptr<Ring<Ack>> acks;
   std::unique_ptr<control::RequestHandler> handler;  // owns the models
   std::unique_ptr<publish::Publisher> publisher;
@@ -76,6 +79,7 @@ class Daemon::Parts final : public control::Helm {
   std::unique_ptr<Reader> reader;
   std::unique_ptr<control::ControlServer> control;
   std::thread publisher_thread, worker_thread, reader_thread;
+  std::vector<std::unique_ptr<devices::Keeper>> keepers;
 
  private:
   Result<> open_sockets();
@@ -85,10 +89,14 @@ class Daemon::Parts final : public control::Helm {
 
 Result<> Daemon::Parts::open() {
   for (const StreamConfig& stream_config : config.streams) {
-    auto stream = open_stream(stream_config, ports);
+    auto stream = open_stream(stream_config);
     if (!stream) return std::unexpected(stream.error());
     for (const std::string& warning : (*stream)->device.warnings) {
       spdlog::warn("{}: {}", stream_config.name, warning);
+    }
+    if (!(*stream)->away.empty()) {
+      spdlog::warn("{}: {}; posed looks for it until it is there", stream_config.name,
+                   (*stream)->away);
     }
     streams.push_back(std::move(*stream));
   }
@@ -97,6 +105,7 @@ Result<> Daemon::Parts::open() {
   decoded = std::make_unique<Ring<Item>>(ring_slots(frames_per_s));
   finished = std::make_unique<Ring<Item>>(ring_slots(2.0 * frames_per_s));  // raw and styled
   commands = std::make_unique<Ring<Command>>(control::kMostUnderWay);
+  device_commands = std::make_unique<Ring<DeviceCommand>>(control::kMostUnderWay);
   acks = std::make_unique<Ring<Ack>>(control::kMostUnderWay);
   for (auto* wake : {&pipeline_wake, &publisher_wake, &control_wake}) {
     auto opened = Wake::open();
@@ -138,6 +147,7 @@ Result<> Daemon::Parts::open_sockets() {
                      .rate_hz = rate_of(*stream),
                      .raw = stream->config.publish_raw,
                      .model = model.filename().string(),
+                     .comes_and_goes = stream->slot != nullptr,
                      .counters = &stream->counters});
   }
   publish::PublisherOptions options{.context = context.get(),
@@ -173,7 +183,8 @@ Result<> Daemon::Parts::open_engines() {
   auto opened_reader = Reader::open({.out = decoded.get(),
                                      .pipeline = pipeline_wake.get(),
                                      .tape = hooks.tape,
-                                     .clock = monotonic_ns});
+                                     .clock = monotonic_ns,
+                                     .commands = device_commands.get()});
   if (!opened_reader) return std::unexpected(opened_reader.error());
   reader = std::move(*opened_reader);
   std::vector<control::ControlledStream> controlled;
@@ -198,7 +209,10 @@ Result<> Daemon::Parts::open_engines() {
     if (stream.config.style) engine.style = stream.config.style->filter;
     if (stream.config.generate) engine.generate = stream.config.generate->live;
     worker->add(engine, rate_of(stream), stream.counters);
-    if (auto added = reader->add(stream.device, stream.counters); !added) return added;
+    reader->add({.device = stream.device.transport ? &stream.device : nullptr,
+                 .counters = &stream.counters,
+                 .slot = stream.slot.get(),
+                 .calibration = stream.calibration.get()});
     controlled.push_back({.name = stream.config.name,
                           .publishes_raw = stream.config.publish_raw,
                           .skeleton = stream.device.description.skeleton,
@@ -206,7 +220,10 @@ Result<> Daemon::Parts::open_engines() {
                           .style = engine.style,
                           .model = std::move(*model),
                           .generates = engine.generate.has_value(),
-                          .gesture = std::move(gesture->model)});
+                          .gesture = std::move(gesture->model),
+                          .description = stream.device.description,
+                          .options = stream.config.options,
+                          .calibration = nullptr});
     // Nobody asked for it, so nobody is told: no ticket is 0. The ring has room for every stream.
     if (gesture->play.size > 0 &&
         !commands->push({.kind = Command::Kind::kPlay, .stream = i, .play = gesture->play})) {
@@ -237,6 +254,7 @@ Result<> Daemon::Parts::start_threads() {
     worker->run();
   });
   for (const auto& stream : streams) {
+    if (!stream->device.transport) continue;
     if (auto started = stream->device.transport->start(monotonic_ns()); !started) {
       return of_stream(stream->config.name, started.error());
     }
@@ -246,6 +264,14 @@ Result<> Daemon::Parts::start_threads() {
     if (hooks.hot_thread) hooks.hot_thread("reader");
     reader->run();
   });
+  for (std::uint32_t i = 0; i < streams.size(); ++i) {
+    if (!streams[i]->slot) continue;
+    devices::KeeperPorts ports{.reader = reader.get(), .clock = monotonic_ns, .tell = {}};
+    ports.tell = [this, i](v1::Event::Kind kind, const std::string& text) {
+      publisher->post_event(i, kind, text);
+    };
+    keepers.push_back(std::make_unique<devices::Keeper>(*streams[i], std::move(ports)));
+  }
   return {};
 }
 
@@ -253,6 +279,7 @@ Result<> Daemon::Parts::start_threads() {
 void Daemon::Parts::halt() noexcept {
   if (reader) reader->stop();
   if (reader_thread.joinable()) reader_thread.join();
+  keepers.clear();
   if (worker) worker->stop();
   if (worker_thread.joinable()) worker_thread.join();
   control.reset();

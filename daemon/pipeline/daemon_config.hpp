@@ -29,11 +29,12 @@ struct GenerateConfig {
 };
 
 struct StreamConfig {
-  std::string name;            // [a-z0-9_-]{1,32}, unique
-  std::string driver;          // registry name
-  drivers::Options options;    // of the driver's own table, complete with its defaults
-  bool publish_raw = false;    // the unstyled input too, as <name>-raw
-  double stale_after_s = 0.5;  // silence after which the stream is called stale
+  std::string name;                   // [a-z0-9_-]{1,32}, unique
+  std::string driver;                 // registry name
+  drivers::Options options;           // of the driver, complete with its defaults
+  std::filesystem::path calibration;  // of a glove; empty: the device's default
+  bool publish_raw = false;           // the unstyled input too, as <name>-raw
+  double stale_after_s = 0.5;         // silence after which the stream is called stale
   std::optional<StyleConfig> style;
   std::optional<GenerateConfig> generate;
   std::optional<bool> constrain;  // fingers held apart and within their limits; default: on hands

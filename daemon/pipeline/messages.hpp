@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "drivers/glove/calibration_file.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/style/style_filter.hpp"
@@ -20,6 +21,7 @@ struct Notice {
   std::int64_t time_ns;
   std::uint64_t sequence;
   double value;
+  std::uint64_t ticket = 0;  // of the command that it answers; 0: nobody asked
 };
 
 // reader -> pipeline -> publisher
@@ -48,6 +50,18 @@ struct Command {
   gesture::PlayOrder play{};                      // kPlay
 };
 static_assert(std::is_trivially_copyable_v<Command>);
+
+// control -> reader: what a device or its decoder is told.
+struct DeviceCommand {
+  enum class Kind : std::uint8_t { kCalibrate, kSend };
+  Kind kind = Kind::kSend;
+  std::uint32_t stream = 0;
+  std::uint64_t ticket = 0;  // kCalibrate: comes back in the Ack
+  const drivers::glove::OwnedCalibration* calibration = nullptr;  // the cold side owns it
+  std::uint16_t size = 0;                                         // kSend
+  std::array<std::byte, 256> bytes{};
+};
+static_assert(std::is_trivially_copyable_v<DeviceCommand>);
 
 // pipeline -> control: the command has taken effect; what it replaced is no longer read.
 struct Ack {

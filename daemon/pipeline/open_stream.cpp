@@ -3,6 +3,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "daemon/devices/calibration.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
@@ -16,6 +17,43 @@ Result<std::string> load_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
+// A device that can come later is not missed now, unless the options make no sense.
+Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
+  auto device = driver.open(stream.config.options, *stream.ports);
+  if (device) {
+    stream.device = std::move(*device);
+    return {};
+  }
+  if (driver.expect == nullptr || device.error().exit_code == ExitCode::kWrongUse) {
+    return std::unexpected(device.error());
+  }
+  auto description = driver.expect(stream.config.options);
+  if (!description) return std::unexpected(description.error());
+  stream.device.description = std::move(*description);
+  stream.away = device.error().text();
+  return {};
+}
+
+Result<> open_calibration(OpenStream& stream) {
+  const std::filesystem::path& path = stream.config.calibration;
+  if (path.empty()) return {};
+  const auto text = load_bytes(path);
+  if (!text) return std::unexpected(text.error());
+  auto compiled = devices::compile_calibration(stream.device.description, *text, path.string());
+  if (!compiled) return std::unexpected(compiled.error());
+  stream.calibration = std::move(*compiled);
+  return {};
+}
+
+Result<> open_slot(const drivers::Driver& driver, OpenStream& stream) {
+  if (driver.expect == nullptr) return {};
+  stream.slot = std::make_unique<DeviceSlot>();
+  auto wake = Wake::open();
+  if (!wake) return std::unexpected(wake.error());
+  stream.slot->keeper = std::move(*wake);
+  return {};
+}
+
 }  // namespace
 
 std::unexpected<Error> of_stream(const std::string& name, Error error) {
@@ -23,16 +61,18 @@ std::unexpected<Error> of_stream(const std::string& name, Error error) {
   return std::unexpected(std::move(error));
 }
 
-Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config, drivers::Ports& ports) {
+Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config) {
   const drivers::Driver* driver = drivers::find_driver(config.driver);
   if (driver == nullptr) {
     return of_stream(config.name, misuse("there is no driver '" + config.driver + "'").error());
   }
-  auto device = driver->open(config.options, ports);
-  if (!device) return of_stream(config.name, device.error());
   auto stream = std::make_unique<OpenStream>();
   stream->config = config;
-  stream->device = std::move(*device);
+  stream->ports = std::make_unique<drivers::Ports>();
+  Result<> opened = open_device(*driver, *stream);
+  if (opened) opened = open_calibration(*stream);
+  if (opened) opened = open_slot(*driver, *stream);
+  if (!opened) return of_stream(config.name, opened.error());
   if (config.style) {
     auto bytes = load_bytes(config.style->model);
     if (!bytes) return of_stream(config.name, bytes.error());

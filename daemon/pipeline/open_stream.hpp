@@ -6,7 +6,10 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/daemon_config.hpp"
+#include "daemon/pipeline/reader.hpp"
 #include "drivers/driver.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/transport/ports.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/style/style_filter.hpp"
@@ -16,15 +19,21 @@ namespace posed::pipeline {
 
 struct OpenStream {
   StreamConfig config;
+  // Without transport and decoder while the device is away; the description is there from the
+  // start.
   drivers::Device device;
+  std::string away;  // why the device could not be opened, one sentence; empty: it is there
+  std::unique_ptr<drivers::Ports> ports;
+  std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;  // null: the default
+  std::unique_ptr<DeviceSlot> slot;  // null for a device that cannot come back
   std::string model_file;    // the bytes of the style model's file; empty without a style stage
   std::string gesture_file;  // the same of the gesture model
   StreamCounters counters;
 };
 
-// Opens the device and reads the model's file. Errors name the stream. Cold.
-[[nodiscard]] Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config,
-                                                              drivers::Ports& ports);
+// Opens the device, or finds out how it will be when it comes, and reads the files of models and
+// calibration. Errors name the stream. Cold.
+[[nodiscard]] Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config);
 
 // The style model, bound to the stream's skeleton; null without a style stage. Cold.
 [[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream);

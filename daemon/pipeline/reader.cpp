@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "daemon/pipeline/device_clock.hpp"
 #include "daemon/pipeline/hot_mark.hpp"
 #include "posed/v1/posed.pb.h"
 
@@ -16,44 +17,88 @@ constexpr std::int64_t kPatientLook_ns = 250'000;
 
 }  // namespace
 
-// One device, and the sink its decoder writes to.
+// One stream: its device while there is one, and the sink that the decoder writes to.
 class Reader::Source final : public Sink {
  public:
-  Source(std::uint32_t stream, drivers::Device& device, StreamCounters& counters,
-         const ReaderPorts& ports)
-      : device_(device), counters_(counters), ports_(ports), stream_(stream) {
+  Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports, Poller& poller)
+      : read_(read),
+        counters_(*read.counters),
+        ports_(ports),
+        poller_(poller),
+        stream_(stream),
+        device_(read.device),
+        calibration_(read.calibration) {
     item_.frame.header.stream = stream;
   }
 
-  [[nodiscard]] drivers::Transport& transport() const noexcept { return *device_.transport; }
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
   // Whether a chunk may be read now: always, but for a patient source with frames under way.
   [[nodiscard]] bool may_read() const noexcept {
-    return !transport().patient() ||
+    return !device_->transport->patient() ||
            frames_ - counters_.pipeline.consumed.load(std::memory_order_acquire) < kPatientFrames;
   }
 
-  // Reads and decodes one chunk; false when none was due.
-  bool read_one() noexcept {
-    const drivers::Chunk chunk = read();
-    arrival_ns_ = ports_.clock();
-    if (!chunk.bytes.empty()) {
-      if (ports_.tape != nullptr) {
-        ports_.tape->chunk(stream_, record::Direction::kFromDevice, arrival_ns_, frames_ + 1,
-                           chunk.bytes);
-      }
-      device_.decoder->feed(chunk.bytes, arrival_ns_, *this);
+  // When it has to be looked at without its descriptor saying so; kNoTime_ns: never.
+  [[nodiscard]] std::int64_t due_ns() const noexcept {
+    if (device_ == nullptr || ended_) return kNoTime_ns;
+    return poll_due_ns_ != kNoTime_ns ? poll_due_ns_ : device_->transport->next_due_ns();
+  }
+  [[nodiscard]] bool patient_now() const noexcept { return device_ != nullptr && !may_read(); }
+
+  // Before the first read: what the first device is and how it is calibrated.
+  void begin() noexcept {
+    if (calibration_ != nullptr) tell_calibration();
+    if (device_ != nullptr) use(*device_);
+  }
+
+  void calibrate(const DeviceCommand& command) noexcept {
+    calibration_ = command.calibration;
+    tell_calibration();
+    if (device_ != nullptr) device_->decoder->calibrate(*calibration_->calibration);
+    notify(v1::Event::KIND_CALIBRATED, command.ticket);
+  }
+
+  void send(std::span<const std::byte> bytes) noexcept {
+    if (device_ == nullptr) return;
+    const AllowedCall the_write;
+    if (!device_->transport->send(bytes)) return;
+    tape(record::Direction::kToDevice, bytes);
+  }
+
+  // Takes a device from the slot, and gives back the one that is asked for.
+  void exchange() noexcept {
+    if (read_.slot == nullptr) return;
+    if (device_ != nullptr && read_.slot->give_back.exchange(false)) give_back();
+    static_cast<void>(read_.slot->in.consume([this](drivers::Device* device) noexcept {
+      device_ = device;
+      clock_.restart();
+      arrival_ns_ = ports_.clock();
+      tape(record::Direction::kGreeting, std::as_bytes(std::span(device->description.text)));
+      use(*device);
+    }));
+  }
+
+  void serve() noexcept {
+    if (device_ == nullptr) return;
+    poll();
+    for (int i = 0; i < kMaxChunksInARow && device_ != nullptr && !ended_ && may_read(); ++i) {
+      if (!read_one()) break;
     }
-    if (chunk.end) end();
-    return !chunk.bytes.empty();
+    if (ended_ && device_->transport->poll_fd() >= 0) {
+      poller_.remove(device_->transport->poll_fd());
+    }
   }
 
   void frame(Frame& frame) noexcept override {
     frame.header.stream = stream_;
     frame.header.sequence = ++frames_;
     frame.header.arrival_ns = arrival_ns_;
+    if (frame.source == posed::Source::kDevice) {
+      frame.header.clock = clock_.take(frame.header.device_ns, arrival_ns_);
+    }
     frame.stamps.decoded_ns = ports_.clock();
+    counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
     item_.kind = Item::Kind::kFrame;
     item_.frame = frame;
     if (!ports_.out->push(item_)) return count(counters_.reader.dropped);
@@ -65,6 +110,7 @@ class Reader::Source final : public Sink {
     sample.header.stream = stream_;
     sample.header.sequence = ++samples_;
     sample.header.arrival_ns = arrival_ns_;
+    counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
     item_.kind = Item::Kind::kSample;
     item_.sample = sample;
     if (!ports_.out->push(item_)) return count(counters_.reader.dropped);
@@ -76,25 +122,92 @@ class Reader::Source final : public Sink {
   }
 
  private:
+  // Reads and decodes one chunk; false when none was due.
+  bool read_one() noexcept {
+    const drivers::Chunk chunk = read();
+    arrival_ns_ = ports_.clock();
+    if (!chunk.bytes.empty()) {
+      tape(record::Direction::kFromDevice, chunk.bytes);
+      device_->decoder->feed(chunk.bytes, arrival_ns_, *this);
+    }
+    if (chunk.end) end();
+    if (chunk.lost) give_back();
+    return !chunk.bytes.empty();
+  }
+
   // A source that goes by time alone has nothing to ask the system.
   drivers::Chunk read() noexcept {
-    if (transport().poll_fd() < 0) return transport().read(ports_.clock());
+    drivers::Transport& transport = *device_->transport;
+    if (transport.poll_fd() < 0) return transport.read(ports_.clock());
     const AllowedCall the_read;
-    return transport().read(ports_.clock());
+    return transport.read(ports_.clock());
+  }
+
+  // A device that answers instead of streaming is asked at its own pace; what was late once does
+  // not stay late.
+  void poll() noexcept {
+    if (poll_due_ns_ == kNoTime_ns) return;
+    const std::int64_t now_ns = ports_.clock();
+    if (now_ns < poll_due_ns_) return;
+    send(device_->poll.request);
+    poll_due_ns_ += device_->poll.period_ns;
+    if (poll_due_ns_ < now_ns) poll_due_ns_ = now_ns + device_->poll.period_ns;
+  }
+
+  void use(drivers::Device& device) noexcept {
+    if (calibration_ != nullptr) device.decoder->calibrate(*calibration_->calibration);
+    poll_due_ns_ = device.poll.request.empty() ? kNoTime_ns : ports_.clock();
+    counters_.reader.heard_ns.store(ports_.clock(), std::memory_order_relaxed);
+    counters_.reader.connected.store(true, std::memory_order_release);
+    count(counters_.reader.connections);
+    if (device.transport->poll_fd() < 0) return;
+    const AllowedCall the_call;  // once a connection, and nothing flows yet
+    static_cast<void>(poller_.add(device.transport->poll_fd(), stream_));
+  }
+
+  // A device without a keeper that is lost has ended.
+  void give_back() noexcept {
+    if (read_.slot == nullptr) return end();
+    if (device_->transport->poll_fd() >= 0) {
+      const AllowedCall the_call;
+      poller_.remove(device_->transport->poll_fd());
+    }
+    poll_due_ns_ = kNoTime_ns;
+    counters_.reader.connected.store(false, std::memory_order_release);
+    static_cast<void>(read_.slot->out.push(device_));  // holds more than there are devices
+    device_ = nullptr;
+    const AllowedCall the_wake;
+    read_.slot->keeper->ring();
   }
 
   // The end must be heard: without room it is tried again at the next read.
-  void end() noexcept {
+  void end() noexcept { ended_ = notify(v1::Event::KIND_ENDED, 0); }
+
+  bool notify(v1::Event::Kind event, std::uint64_t ticket) noexcept {
     item_.kind = Item::Kind::kNotice;
-    item_.notice = {stream_, v1::Event::KIND_ENDED, arrival_ns_, frames_, 0.0};
-    ended_ = ports_.out->push(item_);
+    item_.notice = {stream_, static_cast<std::uint8_t>(event), arrival_ns_, frames_, 0.0, ticket};
+    const bool fitted = ports_.out->push(item_);
     ports_.pipeline->ring();
+    return fitted;
   }
 
-  drivers::Device& device_;
+  void tell_calibration() noexcept {
+    tape(record::Direction::kCalibration, std::as_bytes(std::span(calibration_->text)));
+  }
+  void tape(record::Direction direction, std::span<const std::byte> bytes) noexcept {
+    if (ports_.tape == nullptr) return;
+    ports_.tape->chunk(stream_, direction, arrival_ns_, frames_ + 1, bytes);
+  }
+
+  ReadStream read_;
   StreamCounters& counters_;
   const ReaderPorts& ports_;
+  Poller& poller_;
   std::uint32_t stream_;
+  drivers::Device* device_;  // null while it is away
+  const drivers::glove::OwnedCalibration* calibration_;
+  DeviceClock clock_;
+  std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
   std::uint64_t frames_ = 0;
   std::uint64_t samples_ = 0;
@@ -116,26 +229,25 @@ Reader::Reader(const ReaderPorts& ports, std::unique_ptr<Wake> wake, std::unique
 
 Reader::~Reader() = default;
 
-Result<> Reader::add(drivers::Device& device, StreamCounters& counters) {
-  const auto stream = static_cast<std::uint32_t>(sources_.size());
-  if (const int fd = device.transport->poll_fd(); fd >= 0) {
-    if (auto added = poller_->add(fd, stream); !added) return added;
-  }
-  sources_.push_back(std::make_unique<Source>(stream, device, counters, ports_));
-  return {};
+void Reader::add(const ReadStream& stream) {
+  const auto index = static_cast<std::uint32_t>(sources_.size());
+  sources_.push_back(std::make_unique<Source>(index, stream, ports_, *poller_));
 }
 
 void Reader::run() noexcept {
   const HotSection hot;
+  for (const auto& source : sources_) source->begin();
   while (!stop_.load(std::memory_order_acquire)) {
+    hear();
     const std::int64_t due_ns = serve_timed(ports_.clock());
     wake_->going_to_sleep();
     if (stop_.load(std::memory_order_acquire)) break;
     std::int64_t timeout_ns = kForever_ns;
     if (due_ns != kForever_ns) timeout_ns = std::max<std::int64_t>(due_ns - ports_.clock(), 0);
+    if (called()) timeout_ns = 0;
     const auto ready = poller_->wait(timeout_ns);
     wake_->awake();
-    for (const std::uint32_t stream : ready) serve(*sources_[stream]);
+    for (const std::uint32_t stream : ready) sources_[stream]->serve();
   }
 }
 
@@ -144,29 +256,40 @@ void Reader::stop() noexcept {
   wake_->ring();
 }
 
+void Reader::call() noexcept {
+  called_.store(true, std::memory_order_release);
+  wake_->ring();
+}
+
+void Reader::hear() noexcept {
+  if (!called_.exchange(false, std::memory_order_acq_rel)) return;
+  for (const auto& source : sources_) source->exchange();
+  const auto obey = [this](const DeviceCommand& command) noexcept {
+    Source& source = *sources_[command.stream];
+    if (command.kind == DeviceCommand::Kind::kCalibrate) {
+      source.calibrate(command);
+    } else {
+      source.send(std::span(command.bytes).first(command.size));
+    }
+  };
+  while (ports_.commands != nullptr && ports_.commands->consume(obey)) {
+  }
+}
+
 std::int64_t Reader::serve_timed(std::int64_t now_ns) noexcept {
   std::int64_t next_ns = kForever_ns;
   for (const auto& source : sources_) {
-    std::int64_t due_ns = source->transport().next_due_ns();
-    if (source->ended() || due_ns == kNoTime_ns) continue;
+    std::int64_t due_ns = source->due_ns();
+    if (due_ns == kNoTime_ns) continue;
     if (due_ns <= now_ns) {
-      serve(*source);
-      if (source->ended()) continue;
-      due_ns = source->transport().next_due_ns();
-      if (!source->may_read()) due_ns = std::max(due_ns, now_ns + kPatientLook_ns);
+      source->serve();
+      due_ns = source->due_ns();
+      if (due_ns == kNoTime_ns) continue;
+      if (source->patient_now()) due_ns = std::max(due_ns, now_ns + kPatientLook_ns);
     }
     next_ns = std::min(next_ns, due_ns);
   }
   return next_ns;
-}
-
-void Reader::serve(Source& source) noexcept {
-  for (int i = 0; i < kMaxChunksInARow && !source.ended() && source.may_read(); ++i) {
-    if (!source.read_one()) break;
-  }
-  if (source.ended() && source.transport().poll_fd() >= 0) {
-    poller_->remove(source.transport().poll_fd());
-  }
 }
 
 }  // namespace posed::pipeline

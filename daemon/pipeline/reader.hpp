@@ -16,12 +16,30 @@
 
 namespace posed::pipeline {
 
+// A device that may go and come: how its keeper (daemon/devices) and the reader hand it over. Every
+// device that went in comes back once, when its link is lost or it is asked for.
+struct DeviceSlot {
+  Ring<drivers::Device*> in{kSlots}, out{kSlots};  // to and from the reader
+  std::atomic<bool> give_back{false};              // the keeper wants the device that is in use
+  std::unique_ptr<Wake> keeper;                    // rung when there is something in `out`
+  static constexpr std::size_t kSlots = 4;
+};
+
 // What the reader needs of its surroundings; all of it outlives the reader.
 struct ReaderPorts {
   Ring<Item>* out = nullptr;
   Wake* pipeline = nullptr;      // rung when there is something in `out`
   record::Tape* tape = nullptr;  // null: nothing is recorded
   Clock clock = nullptr;
+  Ring<DeviceCommand>* commands = nullptr;  // from control; may be null
+};
+
+// One stream as the reader takes it over; what it points to outlives the reader.
+struct ReadStream {
+  drivers::Device* device = nullptr;  // null while it is away
+  StreamCounters* counters = nullptr;
+  DeviceSlot* slot = nullptr;  // null: a device that never comes back
+  const drivers::glove::OwnedCalibration* calibration = nullptr;  // null: the device's default
 };
 
 class Reader {
@@ -30,23 +48,27 @@ class Reader {
   ~Reader();
 
   // Streams are numbered in the order of adding. Cold, before run().
-  [[nodiscard]] Result<> add(drivers::Device& device, StreamCounters& counters);
+  void add(const ReadStream& stream);
 
   // Runs until stop(). The calling thread becomes the reader thread.
   void run() noexcept;
   void stop() noexcept;  // any thread
+  // There is something in a slot or in the commands. Any thread.
+  void call() noexcept;
 
  private:
   class Source;
   Reader(const ReaderPorts& ports, std::unique_ptr<Wake> wake, std::unique_ptr<Poller> poller);
   // Reads what is due; returns when the next look at the clock is due.
   std::int64_t serve_timed(std::int64_t now_ns) noexcept;
-  void serve(Source& source) noexcept;
+  void hear() noexcept;  // slots and commands
+  [[nodiscard]] bool called() const noexcept { return called_.load(std::memory_order_acquire); }
 
   ReaderPorts ports_;
   std::unique_ptr<Wake> wake_;
   std::unique_ptr<Poller> poller_;
   std::vector<std::unique_ptr<Source>> sources_;
+  std::atomic<bool> called_{false};
   std::atomic<bool> stop_{false};
 };
 

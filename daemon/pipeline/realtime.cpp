@@ -38,8 +38,12 @@ bool ask_for_realtime() {
   return fifo;
 }
 
+void name_thread(const std::string& name) {
+  pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
+}
+
 void enter_hot_thread(const char* name, int priority) {
-  pthread_setname_np(pthread_self(), name);
+  name_thread(name);
   prctl(PR_SET_TIMERSLACK, 1UL);  // waits end on time, not up to 50 us later
   if (priority > 0) static_cast<void>(become_fifo(priority));
 }

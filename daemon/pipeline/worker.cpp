@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "daemon/pipeline/hot_mark.hpp"
+#include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
 
@@ -143,11 +144,29 @@ void Worker::take(const Item& item) noexcept {
     }
     case Item::Kind::kNotice: {
       Lane& lane = *lanes_[item.notice.stream];
-      lane.engine.end(item.notice.time_ns, lane);
+      if (item.notice.event == v1::Event::KIND_ENDED) {
+        lane.engine.end(item.notice.time_ns, lane);
+      } else {
+        pass_on(item.notice, lane);
+      }
       lane.tell();
       break;
     }
   }
+}
+
+// What the reader did between two frames: their order is right here.
+void Worker::pass_on(const Notice& notice, Lane& lane) noexcept {
+  if (notice.ticket != 0) {
+    const Ack ack{
+        .ticket = notice.ticket, .stream = notice.stream, .sequence = notice.sequence + 1};
+    static_cast<void>(ports_.acks->push(ack));  // there is room, as for every command
+    if (ports_.control != nullptr) ports_.control->ring();
+  }
+  Item item;
+  item.kind = Item::Kind::kNotice;
+  item.notice = notice;
+  lane.item(item);
 }
 
 void Worker::tick(std::int64_t now_ns) noexcept {

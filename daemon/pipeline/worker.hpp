@@ -52,6 +52,7 @@ class Worker {
   Worker(const WorkerPorts& ports, std::unique_ptr<Poller> poller);
   void drain() noexcept;
   void take(const Item& item) noexcept;
+  void pass_on(const Notice& notice, Lane& lane) noexcept;
   void tick(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool idle() const noexcept;
 

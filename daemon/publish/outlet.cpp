@@ -71,6 +71,10 @@ void Outlet::report(v1::StreamStats& stats, double seconds_since) {
   stats.set_lag_ms(lag_ms);
   stats.set_label(std::string(label.begin(), std::ranges::find(label, '\0')));
   stats.set_label_probability(label_probability);
+  stats.set_away(info.comes_and_goes && !reader.connected.load());
+  stats.set_connections(reader.connections.load());
+  if (clock.valid) stats.set_clock_offset_ns(clock.offset_ns);
+  stats.set_clock_drift_ppm(clock.drift_ppm);
 }
 
 }  // namespace posed::publish

@@ -43,6 +43,7 @@ struct Outlet {
   float lag_ms = 0.0F;
   std::array<char, kMaxLabel> label{};
   float label_probability = 0.0F;
+  ClockMapping clock;
   LatencyHistogram decode, style, publish;
 };
 

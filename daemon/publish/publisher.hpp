@@ -27,9 +27,10 @@ namespace posed::publish {
 struct StreamInfo {
   std::string name;
   drivers::Description description;
-  double rate_hz = 0.0;  // at which frames are to be expected; 0 unknown
-  bool raw = false;      // the unstyled input goes out as <name>-raw
-  std::string model;     // the style model's name at the start
+  double rate_hz = 0.0;         // at which frames are to be expected; 0 unknown
+  bool raw = false;             // the unstyled input goes out as <name>-raw
+  std::string model;            // the style model's name at the start
+  bool comes_and_goes = false;  // the device may be away
   const pipeline::StreamCounters* counters = nullptr;
 };
 

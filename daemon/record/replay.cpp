@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "daemon/devices/calibration.hpp"
+#include "daemon/pipeline/device_clock.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
 #include "daemon/record/replay_models.hpp"
 #include "daemon/record/tape.hpp"
@@ -58,13 +60,23 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
   static Result<std::unique_ptr<Lane>> open(const log::Reader& reader, const log::StreamRow& row,
                                             const std::string& file);
 
-  void feed(const log::ChunkRow& chunk, const Out& out) {
+  Result<> feed(const log::ChunkRow& chunk, const Out& out) {
     notice_gap(chunk.id);
-    if (chunk.direction != static_cast<std::uint8_t>(Direction::kFromDevice)) return;
     out_ = &out;
     arrival_ns_ = chunk.arrival_ns;
     frames_ = chunk.next_sequence - 1;
-    decoder_->feed(chunk.bytes, chunk.arrival_ns, *this);
+    switch (static_cast<Direction>(chunk.direction)) {
+      case Direction::kFromDevice:
+        decoder_->feed(chunk.bytes, chunk.arrival_ns, *this);
+        return {};
+      case Direction::kGreeting:
+        return greet(text_of(chunk));
+      case Direction::kCalibration:
+        return calibrate(text_of(chunk));
+      case Direction::kToDevice:
+        return {};
+    }
+    return fail("the log is damaged (chunk " + std::to_string(chunk.id) + " has no direction)");
   }
 
   // After the last chunk: what was decided when no frame came any more.
@@ -84,11 +96,19 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
  private:
   Result<> load_decisions(const log::Reader& reader, std::uint32_t id, const std::string& file);
   Result<> open_engine(const log::Reader& reader, const log::StreamRow& row);
+  Result<> greet(const std::string& text);
+  Result<> calibrate(const std::string& toml);
+  static std::string text_of(const log::ChunkRow& chunk) {
+    return {reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()};
+  }
 
   void frame(Frame& frame) noexcept override {
     frame.header.stream = id_;
     frame.header.sequence = ++frames_;
     frame.header.arrival_ns = arrival_ns_;
+    if (frame.source == Source::kDevice) {
+      frame.header.clock = clock_.take(frame.header.device_ns, arrival_ns_);
+    }
     apply_decisions(frames_);
     if (frames_ >= shed_until_) engine_->on_frame(frame, *this);
   }
@@ -115,6 +135,8 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
   Stream stream_;
   std::uint32_t id_ = 0;
   std::unique_ptr<drivers::Decoder> decoder_;
+  std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: the device's default
+  pipeline::DeviceClock clock_;
   ReplayModels models_;
   std::optional<pipeline::StreamEngine> engine_;
   std::vector<log::DecisionRow> decisions_;
@@ -158,6 +180,27 @@ Result<std::unique_ptr<Replay::Lane>> Replay::Lane::open(const log::Reader& read
   }
   if (auto done = lane->open_engine(reader, row); !done) return std::unexpected(done.error());
   return lane;
+}
+
+// The device came back, perhaps as another make of it; what the pipeline was bound to stays.
+Result<> Replay::Lane::greet(const std::string& text) {
+  const drivers::Driver* driver = drivers::find_driver(stream_.description.driver);
+  auto description = driver->describe(text, stream_.description.identity);
+  if (!description) return std::unexpected(description.error());
+  auto decoder = driver->make_decoder(*description);
+  if (!decoder) return std::unexpected(decoder.error());
+  decoder_ = std::move(*decoder);
+  clock_.restart();
+  if (calibration_) decoder_->calibrate(*calibration_->calibration);
+  return {};
+}
+
+Result<> Replay::Lane::calibrate(const std::string& toml) {
+  auto compiled = devices::compile_calibration(stream_.description, toml, "the log's calibration");
+  if (!compiled) return std::unexpected(compiled.error());
+  decoder_->calibrate(*(*compiled)->calibration);
+  calibration_ = std::move(*compiled);
+  return {};
 }
 
 Result<> Replay::Lane::open_engine(const log::Reader& reader, const log::StreamRow& row) {
@@ -287,7 +330,7 @@ Result<> Replay::run(const Out& out, const Pace& pace) {
     if (!chunk) return std::unexpected(chunk.error());
     if (!chunk->has_value()) break;
     if (!pace((*chunk)->arrival_ns)) return {};
-    lanes_[(*chunk)->stream]->feed(**chunk, out);
+    if (auto fed = lanes_[(*chunk)->stream]->feed(**chunk, out); !fed) return fed;
   }
   for (const auto& lane : lanes_) lane->finish(out);
   return {};

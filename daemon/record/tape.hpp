@@ -11,7 +11,14 @@
 
 namespace posed::record {
 
-enum class Direction : std::uint8_t { kFromDevice = 0, kToDevice = 1 };
+// What a row of the log's chunks is. A greeting (Description::text) says that a link is new and how
+// what follows is decoded; a calibration is its file's text, in use from the next chunk on.
+enum class Direction : std::uint8_t {
+  kFromDevice = 0,
+  kToDevice = 1,
+  kGreeting = 2,
+  kCalibration = 3
+};
 
 class Tape {
  public:

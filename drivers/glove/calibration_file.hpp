@@ -32,6 +32,12 @@ struct CalibrationFile {
   std::map<std::string, std::vector<std::array<double, 2>>> sensors;  // raw, calibrated
 };
 
+// A compiled calibration with the text it came from, which the log keeps.
+struct OwnedCalibration {
+  std::shared_ptr<const Calibration> calibration;
+  std::string text;
+};
+
 // Errors name file and line: cut in half, not finite, raw values that do not ascend. Cold.
 [[nodiscard]] Result<CalibrationFile> parse_calibration(const std::string& toml,
                                                         const std::filesystem::path& file);

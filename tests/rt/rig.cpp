@@ -39,7 +39,7 @@ Rig::Rig(std::vector<RigStream> streams, record::Tape* tape)
     if (stream.style != nullptr) options.style.emplace();
     if (stream.gesture != nullptr) options.generate.emplace();
     worker_->add(options, stream.device.description.rate_hz, *counters_.back());
-    reader_->add(stream.device, *counters_.back()).value();
+    reader_->add({.device = &stream.device, .counters = counters_.back().get()});
   }
 }
 

@@ -29,6 +29,11 @@ class FakeHelm final : public Helm {
     sent.push_back(command);
     return true;
   }
+  bool send(const pipeline::DeviceCommand& command) override {
+    if (full) return false;
+    to_device.push_back(command);
+    return true;
+  }
   void keep_model(std::span<const std::byte> bytes) override { kept.push_back(bytes.size()); }
   void model_in_use(std::uint32_t stream, const std::string& name) override {
     in_use = std::to_string(stream) + " " + name;
@@ -37,6 +42,7 @@ class FakeHelm final : public Helm {
   void stop() override { stopped = true; }
 
   std::deque<Command> sent;
+  std::vector<pipeline::DeviceCommand> to_device;
   std::vector<std::size_t> kept;
   std::string in_use;
   bool full = false;
@@ -212,6 +218,7 @@ class Booth final : public Helm {
         *ControlServer::start(context == nullptr ? context_.get() : context, "tcp://127.0.0.1:*",
                               {&acks_, wake_.get(), gatekeeper, std::move(secret)}, handler_);
   }
+  bool send(const pipeline::DeviceCommand&) override { return true; }
   bool send(const Command& command) override {
     ++commands;
     const bool pushed =

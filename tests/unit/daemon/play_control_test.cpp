@@ -20,6 +20,7 @@ class QuietHelm final : public Helm {
     sent.push_back(command);
     return true;
   }
+  bool send(const pipeline::DeviceCommand&) override { return true; }
   void keep_model(std::span<const std::byte>) override {}
   void model_in_use(std::uint32_t, const std::string&) override {}
   void fill(v1::Stats&) override {}

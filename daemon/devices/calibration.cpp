@@ -1,0 +1,24 @@
+#include "daemon/devices/calibration.hpp"
+
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::devices {
+
+Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
+    const drivers::Description& description, const std::string& toml, const std::string& file) {
+  const drivers::Driver* driver = drivers::find_driver(description.driver);
+  const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
+  if (driver == nullptr || driver->glove_model == nullptr || !hand) {
+    return misuse("driver '" + description.driver + "' has no sensors that can be calibrated",
+                  file);
+  }
+  const auto model = driver->glove_model(description);
+  if (!model) return std::unexpected(model.error());
+  const auto parsed = drivers::glove::parse_calibration(toml, file);
+  if (!parsed) return std::unexpected(parsed.error());
+  auto compiled = drivers::glove::make_calibration(*model, *parsed, *hand, description.identity);
+  if (!compiled) return std::unexpected(compiled.error());
+  return std::make_unique<const OwnedCalibration>(OwnedCalibration{std::move(*compiled), toml});
+}
+
+}  // namespace posed::devices

@@ -1,0 +1,133 @@
+#include "daemon/devices/keeper.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/devices/calibration.hpp"
+#include "daemon/pipeline/realtime.hpp"
+
+namespace posed::devices {
+namespace {
+
+constexpr std::chrono::milliseconds kTryEvery{400};   // at most 0.5 s apart, the try included
+constexpr std::chrono::milliseconds kLookEvery{200};  // for silence, while a device is there
+
+}  // namespace
+
+bool Keeper::wanted(const pipeline::OpenStream& stream) {
+  return drivers::find_driver(stream.config.driver)->expect != nullptr;
+}
+
+Keeper::Keeper(pipeline::OpenStream& stream, KeeperPorts ports)
+    : stream_(stream),
+      ports_(std::move(ports)),
+      driver_(*drivers::find_driver(stream.config.driver)),
+      away_(stream.device.transport == nullptr),
+      told_(stream.away),
+      thread_([this] { run(); }) {}
+
+Keeper::~Keeper() {
+  stop_.store(true);
+  stream_.slot->keeper->ring();
+  thread_.join();
+}
+
+void Keeper::run() {
+  pipeline::name_thread("keep-" + stream_.config.name);
+  while (!stop_.load()) {
+    while (stream_.slot->out.consume([this](drivers::Device* device) { take_back(device); })) {
+    }
+    if (away_) {
+      look_for_device();
+    } else {
+      watch_silence();
+    }
+    sleep();
+  }
+}
+
+void Keeper::sleep() {
+  pipeline::Wake& wake = *stream_.slot->keeper;
+  wake.going_to_sleep();
+  if (stream_.slot->out.empty() && !stop_.load()) {
+    pollfd fd{wake.fd(), POLLIN, 0};
+    if (poll(&fd, 1, static_cast<int>((away_ ? kTryEvery : kLookEvery).count())) > 0) {
+      std::uint64_t rung = 0;
+      [[maybe_unused]] const ssize_t cleared = read(wake.fd(), &rung, sizeof rung);
+    }
+  }
+  wake.awake();
+}
+
+// Closes the link: only then can the port be opened again.
+void Keeper::take_back(drivers::Device* device) {
+  device->transport.reset();
+  device->decoder.reset();
+  device_.reset();
+  away_ = true;
+  const std::string why = std::exchange(asked_back_, false)
+                              ? "nothing usable came from the device for a while"
+                              : "the link to the device is lost";
+  ports_.tell(v1::Event::KIND_LOST, why + "; posed looks for it until it is back");
+  told_.clear();
+}
+
+void Keeper::watch_silence() {
+  const drivers::Device& device = device_ ? *device_ : stream_.device;
+  if (device.reopen_after_s <= 0.0 || asked_back_) return;
+  const auto& reader = stream_.counters.reader;
+  if (!reader.connected.load()) return;
+  const std::int64_t silent_ns = ports_.clock() - reader.heard_ns.load();
+  if (seconds(silent_ns) < device.reopen_after_s) return;
+  asked_back_ = true;
+  stream_.slot->give_back.store(true);
+  ports_.reader->call();
+}
+
+void Keeper::look_for_device() {
+  auto found = try_open();
+  if (!found) {
+    const std::string text = found.error().text();
+    if (text == told_) return;  // said once
+    told_ = text;
+    ports_.tell(v1::Event::KIND_WARNING, text);
+    return;
+  }
+  device_ = std::move(*found);
+  away_ = false;
+  told_.clear();
+  for (const std::string& warning : device_->warnings) {
+    ports_.tell(v1::Event::KIND_WARNING, warning);
+  }
+  stream_.slot->give_back.store(false);  // that was about the one before
+  static_cast<void>(stream_.slot->in.push(device_.get()));
+  ports_.reader->call();
+  ports_.tell(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
+}
+
+// A device that is not what the stream was set up for would silently mean other joints.
+Result<std::unique_ptr<drivers::Device>> Keeper::try_open() {
+  auto opened = driver_.open(stream_.config.options, *stream_.ports);
+  if (!opened) return std::unexpected(opened.error());
+  auto device = std::make_unique<drivers::Device>(std::move(*opened));
+  const drivers::Description& is = device->description;
+  const drivers::Description& was = stream_.device.description;
+  const auto id = [](const drivers::Description& d) { return d.skeleton ? d.skeleton->id : 0; };
+  if (id(is) != id(was) || is.samples.names != was.samples.names) {
+    return fail("another device answers (" + is.identity +
+                "); connect the one that the stream began with, or start posed again");
+  }
+  if (stream_.calibration) {
+    const auto fits =
+        compile_calibration(is, stream_.calibration->text, stream_.config.calibration.string());
+    if (!fits) return std::unexpected(fits.error());
+  }
+  if (auto started = device->transport->start(ports_.clock()); !started) {
+    return std::unexpected(started.error());
+  }
+  return device;
+}
+
+}  // namespace posed::devices

@@ -1,0 +1,58 @@
+// Keeper: holds on to one device. Its thread opens the device when it is away, again and again
+// until it is there, hands it to the reader, and takes it back when its link is lost or it falls
+// silent. Cold: everything slow about a device (finding, start-up talk, closing) happens here, so
+// that no other stream notices.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "daemon/pipeline/open_stream.hpp"
+#include "daemon/pipeline/reader.hpp"
+#include "posed/v1/posed.pb.h"
+
+namespace posed::devices {
+
+struct KeeperPorts {
+  pipeline::Reader* reader = nullptr;  // called when the slot has something
+  Clock clock = nullptr;
+  // Tells on event/<stream>; any thread.
+  std::function<void(v1::Event::Kind kind, const std::string& text)> tell;
+};
+
+class Keeper {
+ public:
+  // Whether a stream's device can go and come; only such streams have a keeper.
+  [[nodiscard]] static bool wanted(const pipeline::OpenStream& stream);
+
+  // Starts the thread. `stream` outlives the keeper; its first device, where it has one, is with
+  // the reader already.
+  Keeper(pipeline::OpenStream& stream, KeeperPorts ports);
+  ~Keeper();  // after the reader's thread has ended
+  Keeper(const Keeper&) = delete;
+  Keeper& operator=(const Keeper&) = delete;
+
+ private:
+  void run();
+  void take_back(drivers::Device* device);
+  void watch_silence();
+  void look_for_device();
+  [[nodiscard]] Result<std::unique_ptr<drivers::Device>> try_open();
+  void sleep();
+
+  pipeline::OpenStream& stream_;
+  KeeperPorts ports_;
+  const drivers::Driver& driver_;
+  std::unique_ptr<drivers::Device> device_;  // the one opened here; null while it is away
+  bool away_ = false;
+  bool asked_back_ = false;
+  std::string told_;  // why it could not be opened, as last told
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace posed::devices
