@@ -15,7 +15,7 @@ Curve Curve::line(double raw0, double value0, double raw1, double value1) noexce
 }
 
 // RT-safe.
-float Curve::at(float raw_value) const noexcept {
+float Curve::value_at(float raw_value) const noexcept {
   std::size_t piece = 1;  // ends at this point; the first and the last go on beyond theirs
   while (piece + 1 < points && raw_value > raw[piece]) ++piece;
   const float share = (raw_value - raw[piece - 1]) / (raw[piece] - raw[piece - 1]);

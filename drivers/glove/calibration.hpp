@@ -26,7 +26,7 @@ struct Curve {
   std::uint8_t points = 0;  // at least 2 once made
 
   [[nodiscard]] static Curve line(double raw0, double value0, double raw1, double value1) noexcept;
-  [[nodiscard]] float at(float raw_value) const noexcept;  // RT-safe
+  [[nodiscard]] float value_at(float raw_value) const noexcept;  // RT-safe
 };
 
 // One calibrated value's share in one hand45 channel.

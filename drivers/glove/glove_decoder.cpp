@@ -56,7 +56,7 @@ void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
   std::bitset<kMaxSensors> valid;
   for (std::size_t i = 0; i < std::min(sensors, packet.raw.size()); ++i) {
     raw[i] = packet.raw[i];
-    value[i] = calibration_->curve[i].at(raw[i]);
+    value[i] = calibration_->curve[i].value_at(raw[i]);
     valid[i] = packet.valid[i];
   }
   const std::span<float> values = std::span(value).first(sensors);

@@ -66,16 +66,16 @@ class SmallDecoder final : public GloveDecoder {
 
 TEST_CASE("a curve goes through its points and on beyond them") {
   Curve curve = Curve::line(10, 1.0, 20, 3.0);
-  CHECK(curve.at(10) == 1.0F);
-  CHECK(curve.at(15) == 2.0F);
-  CHECK(curve.at(0) == -1.0F);
-  CHECK(curve.at(30) == 5.0F);
+  CHECK(curve.value_at(10) == 1.0F);
+  CHECK(curve.value_at(15) == 2.0F);
+  CHECK(curve.value_at(0) == -1.0F);
+  CHECK(curve.value_at(30) == 5.0F);
   curve.raw[2] = 30.0F;
   curve.value[2] = 4.0F;
   curve.points = 3;
-  CHECK(curve.at(25) == 3.5F);
-  CHECK(curve.at(40) == 5.0F);
-  CHECK(curve.at(0) == -1.0F);
+  CHECK(curve.value_at(25) == 3.5F);
+  CHECK(curve.value_at(40) == 5.0F);
+  CHECK(curve.value_at(0) == -1.0F);
 }
 
 TEST_CASE("the map adds shares, leaves others at zero, and knows what it does not know") {
@@ -130,8 +130,8 @@ TEST_CASE("a calibration file replaces what it names") {
   CHECK(file->user == "ann");
   const auto made = make_calibration(small_model(), *file, Side::kRight, "A1");
   REQUIRE(made);
-  CHECK((*made)->curve[0].at(100) == 1.0F);
-  CHECK((*made)->curve[1].at(255) == 1.0F);
+  CHECK((*made)->curve[0].value_at(100) == 1.0F);
+  CHECK((*made)->curve[1].value_at(255) == 1.0F);
   CHECK((*made)->parameter[0] == 0.25F);
   const auto again = parse_calibration(format_calibration(*file), "c.toml");
   REQUIRE(again);
