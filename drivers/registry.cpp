@@ -5,6 +5,7 @@
 #include "drivers/driver.hpp"
 #include "drivers/file/file.hpp"
 #include "drivers/labels/labels.hpp"
+#include "drivers/lucidgloves/lucidgloves.hpp"
 #include "drivers/template/template.hpp"
 
 namespace posed::drivers {
@@ -13,6 +14,7 @@ std::span<const Driver> registry() {
   static const std::array drivers{
       file_driver(),
       labels_driver(),
+      lucidgloves_driver(),
       template_driver(),
   };
   return drivers;

@@ -60,8 +60,10 @@ std::unique_ptr<posed::drivers::Decoder> decoder_of(const char* driver, const st
 void check(const CollectSink& sink) {
   std::int64_t before_ns = posed::kNoTime_ns;
   for (const posed::Frame& frame : sink.frames) {
-    demand(posed::test::is_sound(frame) && frame.header.device_ns > before_ns);
-    before_ns = frame.header.device_ns;
+    const std::int64_t device_ns = frame.header.device_ns;
+    demand(posed::test::is_sound(frame));
+    demand(device_ns == posed::kNoTime_ns || device_ns > before_ns);
+    before_ns = device_ns;
   }
   for (const posed::Sample& sample : sink.samples) demand(posed::test::is_sound(sample));
 }
@@ -94,7 +96,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span bytes = std::as_bytes(std::span(data + 2, size - 2));
   const std::size_t piece = 1U + data[1];
   const std::string text(reinterpret_cast<const char*>(data + 2), size - 2);
-  switch (data[0] % 6) {
+  switch (data[0] % 7) {
     case 0:
       try_bytes("file", std::string(kBvh), piece, bytes);
       break;
@@ -111,6 +113,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     case 4:
       (void)decoder_of("template", text);
       (void)decoder_of("labels", text);
+      break;
+    case 5:
+      try_bytes("lucidgloves", "lucidgloves hand=right encoding=auto max=4095", piece, bytes);
+      (void)decoder_of("lucidgloves", text);
       break;
     default:
       if (const auto decoder = decoder_of("file", text)) {

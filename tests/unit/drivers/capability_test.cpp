@@ -56,8 +56,9 @@ void check_sound(const CollectSink& sink) {
   bool sound = true;
   std::int64_t before_ns = kNoTime_ns;
   for (const Frame& frame : sink.frames) {
-    sound = sound && test::is_sound(frame) && frame.header.device_ns > before_ns;
-    before_ns = frame.header.device_ns;
+    const std::int64_t device_ns = frame.header.device_ns;
+    sound = sound && test::is_sound(frame) && (device_ns == kNoTime_ns || device_ns > before_ns);
+    before_ns = device_ns;
   }
   for (const Sample& sample : sink.samples) sound = sound && test::is_sound(sample);
   CHECK(sound);
@@ -94,6 +95,7 @@ TEST_CASE("a chunk is decoded at once, whole, and every loop is like the one bef
     const std::size_t loop = specimen.loop_chunks * specimen.chunk_frames;
     for (std::size_t i = loop; i < sink.frames.size(); ++i) {
       CHECK(test::same_pose(sink.frames[i], sink.frames[i - loop]));
+      if (sink.frames[i].header.device_ns == kNoTime_ns) continue;
       const auto step_ns = sink.frames[i].header.device_ns - sink.frames[i - 1].header.device_ns;
       CHECK(seconds(step_ns) == Approx(1.0 / device.description.rate_hz).margin(2e-9));
     }

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "drivers/transport/ports.hpp"
+#include "tests/unit/drivers/emulated.hpp"
 
 namespace posed::test {
 namespace {
@@ -43,6 +44,22 @@ std::vector<Specimen> make_specimens() {
        .loop_chunks = 5,
        .chunk_frames = 1},
       {.name = "labels", .driver = "labels", .options = {}, .loop_chunks = 1, .chunk_frames = 1},
+      {.name = "lucidgloves-alpha",
+       .driver = "lucidgloves",
+       .options = {},
+       .loop_chunks = 24,
+       .chunk_frames = 1,
+       .chunk_samples = 1,
+       .emulated = true},
+      {.name = "lucidgloves-legacy",
+       .driver = "lucidgloves",
+       .options = {{"encoding", std::string("legacy")},
+                   {"hand", std::string("left")},
+                   {"max_analog_value", std::int64_t{1023}}},
+       .loop_chunks = 24,
+       .chunk_frames = 1,
+       .chunk_samples = 1,
+       .emulated = true},
       {.name = "template",
        .driver = "template",
        .options = {},
@@ -60,6 +77,7 @@ const std::vector<Specimen>& specimens() {
 }
 
 drivers::Device open_device(const Specimen& specimen) {
+  if (specimen.emulated) return open_emulated(specimen);
   drivers::Ports ports;
   const drivers::Driver* driver = drivers::find_driver(specimen.driver);
   REQUIRE(driver != nullptr);

@@ -19,6 +19,8 @@ struct Specimen {
   std::size_t loop_chunks = 0;   // after which the input repeats
   std::size_t chunk_frames = 0;  // a chunk gives
   std::size_t chunk_samples = 0;
+  bool emulated = false;  // its driver's emulator stands for the device (emulated.hpp)
+  std::string start{};    // what the emulator has to hear before it streams
 };
 
 // Makes the clips they play in a folder of its own, removed at exit.

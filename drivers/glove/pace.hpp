@@ -1,0 +1,33 @@
+// Pace: when an emulated glove's next record is due. On an absolute schedule, so that late calls do
+// not add up; what a long pause missed is not made up for, as a real glove would not.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/frame/time.hpp"
+
+namespace posed::drivers::glove {
+
+class Pace {
+ public:
+  explicit Pace(std::int64_t period_ns) noexcept : period_ns_(period_ns) {}
+
+  [[nodiscard]] std::int64_t due_ns() const noexcept { return due_ns_; }
+  [[nodiscard]] bool running() const noexcept { return due_ns_ != kNoTime_ns; }
+
+  void start(std::int64_t now_ns) noexcept { due_ns_ = now_ns; }
+  void stop() noexcept { due_ns_ = kNoTime_ns; }
+
+  // The record due was sent.
+  void step(std::int64_t now_ns) noexcept {
+    constexpr std::int64_t kMostLate = 10;  // periods
+    const bool paused = now_ns - due_ns_ > kMostLate * period_ns_;
+    due_ns_ = (paused ? now_ns : due_ns_) + period_ns_;
+  }
+
+ private:
+  std::int64_t period_ns_;
+  std::int64_t due_ns_ = kNoTime_ns;
+};
+
+}  // namespace posed::drivers::glove

@@ -1,0 +1,58 @@
+// Lines of a LucidGlove to a hand and a sample each.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/glove/glove_decoder.hpp"
+#include "drivers/glove/model.hpp"
+#include "drivers/lucidgloves/protocol.hpp"
+
+namespace posed::drivers::lucidgloves {
+
+// What the decoder needs to know of a glove: its greeting, in numbers.
+struct Settings {
+  Encoding encoding = Encoding::kAuto;
+  int max_analog = 4095;
+};
+
+// Twenty joints (finger by finger, from the palm outwards) and five splays.
+inline constexpr std::size_t kSensors = kFingers * kJoints + kFingers;
+
+[[nodiscard]] Result<glove::Model> model(const Settings& settings);
+[[nodiscard]] std::vector<std::string> extra_names();
+
+class LucidDecoder final : public glove::GloveDecoder {
+ public:
+  LucidDecoder(std::shared_ptr<const Skeleton> skeleton,
+               std::shared_ptr<const glove::Calibration> calibration, const Settings& settings)
+      : GloveDecoder(std::move(skeleton), std::move(calibration)), settings_(settings) {}
+
+  // RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+ protected:
+  // A glove without splay holds its fingers side by side. RT-safe.
+  void compute(std::span<float> value,
+               std::bitset<glove::kMaxSensors>& valid) const noexcept override;
+
+ private:
+  void end_line(Sink& sink) noexcept;
+  [[nodiscard]] bool lost_a_key(const Line& line) noexcept;
+  void emit_line(const Line& line, Sink& sink) noexcept;
+
+  Settings settings_;
+  std::array<char, kMaxLine> text_{};
+  std::size_t length_ = 0;
+  bool overlong_ = false;        // the rest of the line is thrown away
+  std::bitset<kSplay> usual_{};  // fingers and joints that the glove sends
+  int unusual_lines_ = 0;        // in a row that lacked one of them
+  std::array<int, 3> info_{};    // as last heard
+  std::bitset<3> has_info_{};
+};
+
+}  // namespace posed::drivers::lucidgloves

@@ -1,0 +1,108 @@
+#include "drivers/lucidgloves/emulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace posed::drivers::lucidgloves {
+namespace {
+
+constexpr std::int64_t kPeriod_ns = 5'000'000;  // some firmware is faster; hosts must keep up
+constexpr int kFirmware = 5;
+
+constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
+
+// What a whole curl means, as config/devices/lucidgloves.toml has it; joints 0 to 3. A joint of 0
+// is not sent.
+constexpr std::array<double, kJoints> kThumb_rad{0.0, radians(60.0), radians(80.0), 0.0};
+constexpr std::array<double, kJoints> kFinger_rad{0.0, radians(90.0), radians(100.0),
+                                                  radians(70.0)};
+constexpr double kSplay_rad = radians(20.0);
+
+void add_text(const std::string& text, Emulator::Bytes& out) {
+  const auto bytes = std::as_bytes(std::span(text));
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+}  // namespace
+
+LucidEmulator::LucidEmulator(Side side, Encoding encoding, int max_analog)
+    : side_(side), encoding_(encoding), max_(max_analog), pace_(kPeriod_ns) {
+  pace_.start(0);
+  pose({});
+}
+
+void LucidEmulator::pose(const HandAngles& angles) {
+  line_ = {};
+  const auto set = [&](std::size_t place, double share) {
+    line_.has[place] = true;
+    line_.value[place] = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * max_));
+  };
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    const auto& whole = f == 0 ? kThumb_rad : kFinger_rad;
+    double sum = 0.0;
+    int joints = 0;
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      if (whole[j] == 0.0) continue;
+      // The thumb's joint 1 is hand45's second, a finger's is its first.
+      const std::size_t joint = f == 0 ? j : j - 1;
+      const double share = angles[f * kFingerChannels + 3 * joint] / whole[j];
+      set(kJoint + f * kJoints + j, share);
+      sum += share;
+      ++joints;
+    }
+    set(kCurl + f, sum / joints);
+    set(kSplay + f, 0.5 + 0.5 * angles[f * kFingerChannels + 1] / kSplay_rad);
+  }
+  set(kJoyX, 0.5);
+  set(kJoyY, 0.5);
+  // The firmware's gestures: more than half closed.
+  const auto curl = [&](std::size_t f) { return line_.value[kCurl + f]; };
+  line_.pressed[1] = 2 * curl(1) > max_;                                // trigger
+  line_.pressed[4] = curl(1) + curl(2) + curl(3) + curl(4) > 2 * max_;  // grab
+  line_.pressed[5] = curl(0) + curl(1) > max_;                          // pinch
+}
+
+void LucidEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) {
+  for (const std::byte byte : bytes) {
+    const char c = static_cast<char>(byte);
+    if (c == '\n') {
+      obey(command_, now_ns, answer);
+      command_.clear();
+    } else if (command_.size() < kMaxLine) {
+      command_ += c;
+    }
+  }
+}
+
+void LucidEmulator::obey(const std::string& command, std::int64_t now_ns, Bytes& answer) {
+  std::string rest = command;
+  const auto take = [&rest](const std::string& key) {
+    const std::size_t at = rest.find(key);
+    if (at != std::string::npos) rest.erase(at, key.size());
+    return at != std::string::npos;
+  };
+  const bool starts = take("(ZA)");
+  const bool stops = take("(ZZ)");
+  if (stops) pace_.stop();
+  if (starts && !pace_.running()) pace_.start(now_ns);
+  if (take("Z")) {
+    Line info;
+    info.has_info.set();
+    info.info = {kFirmware, 0, side_ == Side::kRight ? 1 : 0};
+    add_text(alpha_line(info), answer);
+  }
+  if (rest.starts_with('F')) {
+    vibration_ = rest;
+  } else {
+    apply_force_line(rest, forces_);
+  }
+}
+
+void LucidEmulator::emit(std::int64_t now_ns, Bytes& out) {
+  if (!pace_.running()) return;
+  pace_.step(now_ns);
+  add_text(encoding_ == Encoding::kLegacy ? legacy_line(line_) : alpha_line(line_), out);
+}
+
+}  // namespace posed::drivers::lucidgloves

@@ -1,0 +1,42 @@
+// A LucidGlove's other side: streams from power-on, tells who it is when asked, and hears force
+// feedback and vibration.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "drivers/emulator.hpp"
+#include "drivers/glove/pace.hpp"
+#include "drivers/lucidgloves/protocol.hpp"
+
+namespace posed::drivers::lucidgloves {
+
+class LucidEmulator final : public Emulator {
+ public:
+  // kAuto speaks alpha.
+  LucidEmulator(Side side, Encoding encoding, int max_analog);
+
+  void pose(const HandAngles& angles) override;
+  // Commands end with a line end; others than (ZA), (ZZ), Z and forces are not obeyed.
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
+  [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
+  void emit(std::int64_t now_ns, Bytes& out) override;
+
+  // How far each finger's motor blocks it, as last told, and the last vibration's line.
+  [[nodiscard]] const Forces& forces() const { return forces_; }
+  [[nodiscard]] const std::string& vibration() const { return vibration_; }
+
+ private:
+  void obey(const std::string& command, std::int64_t now_ns, Bytes& answer);
+
+  Side side_;
+  Encoding encoding_;
+  int max_;
+  glove::Pace pace_;
+  Line line_;
+  Forces forces_{};
+  std::string vibration_;
+  std::string command_;  // so far
+};
+
+}  // namespace posed::drivers::lucidgloves

@@ -1,0 +1,130 @@
+#include "tests/unit/drivers/emulated.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <numbers>
+
+#include "drivers/transport/file.hpp"
+#include "tests/support/shared.hpp"
+
+namespace posed::test {
+namespace {
+
+constexpr std::size_t kRounds = 4;  // that the capability tests read at most
+
+const drivers::Driver& driver_of(const Specimen& specimen) {
+  const drivers::Driver* driver = drivers::find_driver(specimen.driver);
+  REQUIRE(driver != nullptr);
+  REQUIRE(driver->emulate != nullptr);
+  return *driver;
+}
+
+drivers::Description promised(const Specimen& specimen) {
+  auto description = driver_of(specimen).expect(specimen.options);
+  if (!description) FAIL(description.error().text());
+  return std::move(*description);
+}
+
+std::string log_line(std::int64_t at_ns, std::span<const std::byte> bytes) {
+  std::string line = "at " + std::to_string(at_ns) + " hex";
+  for (const std::byte byte : bytes) {
+    std::array<char, 8> hex{};
+    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
+    line += hex.data();
+  }
+  return line + '\n';
+}
+
+}  // namespace
+
+HandAngles closing_hand(std::size_t index, std::size_t count) {
+  HandAngles angles{};
+  const double turn =
+      2.0 * std::numbers::pi * static_cast<double>(index % count) / static_cast<double>(count);
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    const double closed = 0.5 - 0.5 * std::cos(turn + 0.4 * static_cast<double>(f));
+    for (std::size_t j = 0; j < kFingerJoints; ++j) {
+      angles[f * kFingerChannels + 3 * j] = closed * (f == 0 && j == 0 ? 0.0 : 1.0);
+    }
+    angles[f * kFingerChannels + 1] = 0.2 * (1.0 - closed);
+  }
+  return angles;
+}
+
+std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(const Specimen& specimen,
+                                                            std::size_t rounds) {
+  auto emulator = driver_of(specimen).emulate(specimen.options);
+  if (!emulator) FAIL(emulator.error().text());
+  std::vector<std::pair<std::int64_t, Bytes>> chunks;
+  Bytes answer;
+  (*emulator)->receive(std::as_bytes(std::span(specimen.start)), 0, answer);
+  for (std::size_t i = 0; i < rounds * specimen.loop_chunks; ++i) {
+    const std::int64_t due_ns = (*emulator)->next_due_ns();
+    REQUIRE(due_ns != kNoTime_ns);
+    (*emulator)->pose(closing_hand(i, specimen.loop_chunks));
+    Bytes chunk;
+    (*emulator)->emit(due_ns, chunk);
+    REQUIRE_FALSE(chunk.empty());
+    chunks.emplace_back(due_ns, std::move(chunk));
+  }
+  return chunks;
+}
+
+drivers::Device open_emulated(const Specimen& specimen) {
+  drivers::Chunks chunks;
+  for (const auto& [due_ns, bytes] : emulated_chunks(specimen, kRounds)) chunks.add(bytes);
+  auto transport = drivers::FileTransport::open(std::move(chunks), {.rate_hz = 100.0, .pace = 0.0});
+  if (!transport) FAIL(transport.error().text());
+  drivers::Description description = promised(specimen);
+  auto decoder = driver_of(specimen).make_decoder(description);
+  if (!decoder) FAIL(decoder.error().text());
+  return {.description = std::move(description),
+          .transport = std::move(*transport),
+          .decoder = std::move(*decoder),
+          .warnings = {}};
+}
+
+std::string emulated_log(const Specimen& specimen) {
+  const drivers::Description description = promised(specimen);
+  std::string text = "# Not a recording: made by posed's emulator of this glove (" + specimen.name +
+                     "), with damage put in.\n# A real log takes its place as soon as somebody "
+                     "sends one (drivers/README.md).\ndriver " +
+                     description.driver + "\nidentity emulated\ntext " + description.text + '\n';
+  std::size_t index = 0;
+  for (auto& [due_ns, bytes] : emulated_chunks(specimen, 1)) {
+    switch (index++) {
+      case 2:  // a byte is lost
+        bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(bytes.size() / 2));
+        break;
+      case 5:  // a bit flips
+        bytes[bytes.size() / 3] ^= std::byte{0x40};
+        break;
+      case 8:  // half of it is missing
+        bytes.resize(bytes.size() / 2);
+        break;
+      case 11:  // garbage before it
+        bytes.insert(bytes.begin(), 7, std::byte{0xEE});
+        break;
+      default:
+        break;
+    }
+    text += log_line(due_ns, bytes);
+  }
+  return text;
+}
+
+// unit_drivers [.write-logs] makes the logs that are not there yet; UPDATE_EXPECTED=1 what they
+// decode to.
+TEST_CASE("write the logs of emulated gloves", "[.write-logs]") {
+  for (const Specimen& specimen : specimens()) {
+    if (!specimen.emulated) continue;
+    const auto path = golden("devices") / (specimen.name + ".log");
+    if (!std::filesystem::exists(path)) std::ofstream(path) << emulated_log(specimen);
+  }
+}
+
+}  // namespace posed::test

@@ -1,0 +1,240 @@
+// LucidGloves: lines that real gloves sent, what is made of damaged ones, forces to and fro, and
+// the glove on a port.
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <numbers>
+
+#include "drivers/lucidgloves/decoder.hpp"
+#include "drivers/lucidgloves/emulator.hpp"
+#include "drivers/transport/ports.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/emulated.hpp"
+#include "tests/unit/drivers/served_emulator.hpp"
+
+namespace posed::drivers {
+namespace {
+
+using lucidgloves::Encoding;
+using lucidgloves::Line;
+using lucidgloves::LucidEmulator;
+using test::CollectSink;
+
+const Driver& driver() { return *find_driver("lucidgloves"); }
+
+Outcome parse(std::string_view text, Line& line, int max = 4095) {
+  return lucidgloves::parse_line(text, Encoding::kAuto, max, line);
+}
+
+Outcome outcome_of(std::string_view text, int max = 4095) {
+  Line line;
+  return parse(text, line, max);
+}
+
+std::unique_ptr<Decoder> decoder_of(const Options& options = {}) {
+  const auto description = driver().expect(options);
+  if (!description) FAIL(description.error().text());
+  auto decoder = driver().make_decoder(*description);
+  if (!decoder) FAIL(decoder.error().text());
+  return std::move(*decoder);
+}
+
+void feed(Decoder& decoder, std::string_view text, Sink& sink) {
+  decoder.feed(std::as_bytes(std::span(text)), 0, sink);
+}
+
+std::string haptics_text(const Options& options, const Haptics& haptics) {
+  const auto bytes = driver().encode_haptics(options, haptics);
+  if (!bytes) return "refused: " + bytes.error().message;
+  return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
+}
+
+}  // namespace
+
+TEST_CASE("lines that real LucidGloves sent are read") {
+  Line line;
+  // lucidgloves issue 36; the last one from the legacy firmware's documentation.
+  REQUIRE(parse("A1662B3329C1229D4095E4095F384G0ILM", line) == Outcome::kOk);
+  CHECK(line.value[lucidgloves::kCurl + 0] == 1662);
+  CHECK(line.value[lucidgloves::kCurl + 4] == 4095);
+  CHECK(line.value[lucidgloves::kJoyX] == 384);
+  CHECK(line.has[lucidgloves::kJoyY]);
+  CHECK(line.pressed.to_string() == "00110010");  // I, L, M
+  REQUIRE(parse("A2816B4037C3596D4095E1115F469G56ILM", line) == Outcome::kOk);
+  CHECK(line.value[lucidgloves::kJoyY] == 56);
+  REQUIRE(parse("511&511&511&511&511&232&164&0&0&0&0&0&0", line, 1023) == Outcome::kOk);
+  CHECK(line.value[lucidgloves::kJoyX] == 232);
+  CHECK(line.pressed.none());
+}
+
+TEST_CASE("joints, splay, keys in any order and keys that nobody knows") {
+  Line line;
+  REQUIRE(parse("O(EAD)7P9(BB)2048X55(QQ)3B1(AAB)12", line) == Outcome::kOk);
+  CHECK(line.value[lucidgloves::kJoint + 4 * lucidgloves::kJoints + 3] == 7);
+  CHECK(line.value[lucidgloves::kJoint + 1] == 12);
+  CHECK(line.value[lucidgloves::kSplay + 1] == 2048);
+  CHECK(line.value[lucidgloves::kTrigger] == 9);
+  CHECK(line.pressed.to_string() == "10000000");
+  CHECK(line.has.count() == 5);
+  REQUIRE(parse("Z(ZV)5(ZG)0(ZH)1", line) == Outcome::kOk);
+  CHECK(line.info == std::array{5, 0, 1});
+  CHECK_FALSE(line.has_hand());
+}
+
+TEST_CASE("what no glove sends is told apart") {
+  CHECK(outcome_of("rst:0x1 (POWERON_RESET),boot:0x13") == Outcome::kForeign);
+  CHECK(outcome_of("ets Jun  8 2016 00:22:57") == Outcome::kForeign);
+  CHECK(outcome_of("62B3329C1229D4095E4095") == Outcome::kForeign);  // begins in its middle
+  CHECK(outcome_of("A1B2C3D4E5A1B2C3D4E5") == Outcome::kForeign);    // two lines, no end between
+  CHECK(outcome_of("A1B2C3D4EF5") == Outcome::kForeign);             // a curl without its value
+  CHECK(outcome_of("A1B2(AAB") == Outcome::kForeign);
+  CHECK(outcome_of("A1B2()5") == Outcome::kForeign);
+  CHECK(outcome_of("A1B23329999999999999999999") == Outcome::kOutOfRange);
+  CHECK(outcome_of("A1024", 1023) == Outcome::kOutOfRange);
+  CHECK(outcome_of("X5") == Outcome::kShort);
+  CHECK(outcome_of("IL") == Outcome::kShort);
+  CHECK(outcome_of("1&2&3") == Outcome::kShort);
+  CHECK(outcome_of("1&2&3&4&5&6&7&0&0&0&0&0&2") == Outcome::kOutOfRange);
+  CHECK(outcome_of("1&2&3&4&5&6&7&0&0&0&0&0&0&0") == Outcome::kForeign);
+  CHECK(outcome_of("1&2&3&4&5&6&&0&0&0&0&0&0") == Outcome::kForeign);
+}
+
+TEST_CASE("a finger's curl stands for joints and splay that the glove lacks") {
+  const auto decoder = decoder_of();
+  CollectSink sink;
+  feed(*decoder, "A0B4095C0D0E0(CAC)4095\r\n\r\n", sink);
+  REQUIRE(sink.frames.size() == 1);
+  CHECK(sink.count(Outcome::kOk) == 1);  // an empty line is nothing at all
+  const HandAngles angles = hand_angles(sink.frames[0]);
+  const double right_angle = std::acos(0.0);
+  CHECK(angles[1 * kFingerChannels] == Approx(right_angle));
+  CHECK(angles[1 * kFingerChannels + 3] == Approx(right_angle / 90.0 * 100.0));
+  CHECK(angles[2 * kFingerChannels] == Approx(0.0).margin(1e-6));
+  CHECK(angles[2 * kFingerChannels + 3] == Approx(right_angle / 90.0 * 100.0));
+  CHECK(sink.frames[0].valid.count() == kHandSkeletonJoints);
+  const auto layout = driver().expect({})->samples;
+  const auto place = [&](const std::string& name) {
+    return static_cast<std::size_t>(std::ranges::find(layout.names, name) - layout.names.begin());
+  };
+  const Sample& sample = sink.samples[0];
+  CHECK(sample.valid[place("index_splay")]);
+  CHECK_FALSE(sample.valid[place("raw_index_splay")]);
+  CHECK_FALSE(sample.valid[place("joystick_x")]);
+  CHECK_FALSE(sample.valid[place("firmware")]);
+  CHECK(sample.value[place("raw_middle_joint2")] == 4095.0F);
+}
+
+TEST_CASE("a line without a finger that the glove sends is damaged, until it stays away") {
+  const auto decoder = decoder_of();
+  CollectSink sink;
+  feed(*decoder, "A1B2C3D4E5\n", sink);
+  for (int i = 0; i < 7; ++i) feed(*decoder, "A1B2D4E5\n", sink);
+  CHECK(sink.frames.size() == 1);
+  CHECK(sink.count(Outcome::kShort) == 7);
+  feed(*decoder, "A1B2D4E5\n", sink);
+  REQUIRE(sink.frames.size() == 2);
+  CHECK_FALSE(sink.frames[1].valid[static_cast<std::size_t>(hand_joint(2, 1))]);
+}
+
+TEST_CASE("a line longer than any glove's is given up once, and its end is not read as a line") {
+  const auto decoder = decoder_of();
+  CollectSink sink;
+  feed(*decoder, std::string(1000, 'A') + "A1B2C3D4E5\nA1B2C3D4E5\n", sink);
+  CHECK(sink.count(Outcome::kForeign) == 1);
+  CHECK(sink.frames.size() == 1);
+}
+
+TEST_CASE("an emulated LucidGlove's pose comes back within half a count") {
+  for (const test::Specimen& specimen : test::specimens()) {
+    if (specimen.driver != "lucidgloves") continue;
+    INFO(specimen.name);
+    const bool joints = specimen.name == "lucidgloves-alpha";
+    const auto decoder = decoder_of(specimen.options);
+    CollectSink sink;
+    for (const auto& [due_ns, bytes] : test::emulated_chunks(specimen, 1)) {
+      decoder->feed(bytes, due_ns, sink);
+    }
+    REQUIRE(sink.frames.size() == specimen.loop_chunks);
+    double worst = 0.0;  // counts
+    for (std::size_t i = 0; joints && i < sink.frames.size(); ++i) {
+      const HandAngles sent = test::closing_hand(i, specimen.loop_chunks);
+      const HandAngles got = hand_angles(sink.frames[i]);
+      for (std::size_t c = 0; c < sent.size(); ++c) {
+        // The largest count is a middle joint's: 100 degrees over the range.
+        worst = std::max(worst, std::abs(sent[c] - got[c]) / (std::numbers::pi * 100.0 / 180.0));
+      }
+    }
+    CHECK(worst * 4095.0 <= 0.51);
+  }
+}
+
+TEST_CASE("forces and vibrations reach the glove as told, and what is negative stays") {
+  LucidEmulator glove(Side::kRight, Encoding::kAuto, 4095);
+  const auto tell = [&](const std::string& text) {
+    Emulator::Bytes answer;
+    glove.receive(std::as_bytes(std::span(text)), 0, answer);
+  };
+  tell(haptics_text({}, {.force = {0.0F, 0.5F, 1.0F, 0.25F, 0.75F}}));
+  CHECK(glove.forces() == lucidgloves::Forces{0, 500, 1000, 250, 750});
+  tell(haptics_text({}, {.force = {1.0F, -1.0F, -1.0F, -1.0F, 0.0F}}));
+  CHECK(glove.forces() == lucidgloves::Forces{1000, 500, 1000, 250, 0});
+  tell(haptics_text({{"force_range", std::int64_t{4095}}}, {.force = {1.0F, 0, 0, 0, 0}}));
+  CHECK(glove.forces()[0] == 4095);
+  const Options legacy{{"encoding", std::string("legacy")}};
+  CHECK(haptics_text(legacy, {.force = {0.1F, 0, 0, 0, 1.0F}}) == "100&0&0&0&1000\n");
+  tell(haptics_text(legacy, {.force = {0.1F, 0.2F, 0, -1.0F, 1.0F}}));
+  CHECK(glove.forces() == lucidgloves::Forces{100, 200, 0, 0, 1000});
+  const Haptics buzz{
+      .force = {-1, -1, -1, -1, -1}, .vibration_hz = 80.0F, .vibration_s = 0.1F, .vibration = 0.5F};
+  CHECK(haptics_text({}, buzz) == "A-1B-1C-1D-1E-1\nF80.00G0.10H0.50\n");
+  tell(haptics_text({}, buzz));
+  CHECK(glove.vibration() == "F80.00G0.10H0.50");
+  CHECK(glove.forces() == lucidgloves::Forces{100, 200, 0, 0, 1000});
+  CHECK(haptics_text(legacy, buzz).starts_with("refused"));
+  CHECK(haptics_text({}, {.force = {1.5F, 0, 0, 0, 0}}).starts_with("refused"));
+  CHECK(haptics_text({}, {.force = {NAN, 0, 0, 0, 0}}).starts_with("refused"));
+}
+
+TEST_CASE("a LucidGlove on a port is opened, read and told apart by hand and range") {
+  LucidEmulator glove(Side::kLeft, Encoding::kAlpha, 4095);
+  const test::ServedEmulator served(glove);
+  Ports ports;
+  const auto open = [&](const std::string& hand, std::int64_t max) {
+    return driver().open({{"port", served.port()}, {"hand", hand}, {"max_analog_value", max}},
+                         ports);
+  };
+  {
+    auto device = open("left", 4095);
+    if (!device) FAIL(device.error().text());
+    CHECK(device->description.text == "lucidgloves hand=left encoding=auto max=4095");
+    CollectSink sink;
+    REQUIRE(device->transport->start(0));
+    for (int i = 0; i < 1000 && sink.frames.size() < 3; ++i) {
+      pollfd ready{.fd = device->transport->poll_fd(), .events = POLLIN, .revents = 0};
+      (void)::poll(&ready, 1, 10);
+      device->decoder->feed(device->transport->read(0).bytes, 0, sink);
+    }
+    CHECK(sink.frames.size() >= 3);
+    CHECK(sink.count(Outcome::kForeign) == 0);
+  }
+  const auto other = open("right", 4095);
+  REQUIRE_FALSE(other);
+  CHECK(other.error().message.find("left glove") != std::string::npos);
+}
+
+TEST_CASE("a port with another device on it is refused with what to check") {
+  test::PseudoTerminal port;
+  Ports ports;
+  const auto device = driver().open({{"port", port.port()}}, ports);
+  REQUIRE_FALSE(device);
+  CHECK(device.error().message.find("sends nothing") != std::string::npos);
+  LucidEmulator glove(Side::kRight, Encoding::kAlpha, 4095);
+  const test::ServedEmulator served(glove);
+  const auto coarse =
+      driver().open({{"port", served.port()}, {"max_analog_value", std::int64_t{1023}}}, ports);
+  REQUIRE_FALSE(coarse);
+  CHECK(coarse.error().message.find("4095") != std::string::npos);
+}
+
+}  // namespace posed::drivers
