@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 
+#include "drivers/described/described.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/file/file.hpp"
 #include "drivers/labels/labels.hpp"
@@ -12,6 +13,7 @@ namespace posed::drivers {
 
 std::span<const Driver> registry() {
   static const std::array drivers{
+      described_driver(),
       file_driver(),
       labels_driver(),
       lucidgloves_driver(),

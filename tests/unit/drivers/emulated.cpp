@@ -29,6 +29,13 @@ drivers::Description promised(const Specimen& specimen) {
   return std::move(*description);
 }
 
+// A description may have several lines.
+std::string text_lines(const std::string& text) {
+  std::string lines = "text ";
+  for (const char c : text) lines += c == '\n' ? std::string("\ntext ") : std::string(1, c);
+  return lines + '\n';
+}
+
 std::string log_line(std::int64_t at_ns, std::span<const std::byte> bytes) {
   std::string line = "at " + std::to_string(at_ns) + " hex";
   for (const std::byte byte : bytes) {
@@ -93,7 +100,7 @@ std::string emulated_log(const Specimen& specimen) {
   std::string text = "# Not a recording: made by posed's emulator of this glove (" + specimen.name +
                      "), with damage put in.\n# A real log takes its place as soon as somebody "
                      "sends one (drivers/README.md).\ndriver " +
-                     description.driver + "\nidentity emulated\ntext " + description.text + '\n';
+                     description.driver + "\nidentity emulated\n" + text_lines(description.text);
   std::size_t index = 0;
   for (auto& [due_ns, bytes] : emulated_chunks(specimen, 1)) {
     switch (index++) {

@@ -19,6 +19,7 @@ struct Specimen {
   std::size_t loop_chunks = 0;   // after which the input repeats
   std::size_t chunk_frames = 0;  // a chunk gives
   std::size_t chunk_samples = 0;
+  std::size_t chunk_packets = 1;
   bool emulated = false;  // its driver's emulator stands for the device (emulated.hpp)
   std::string start{};    // what the emulator has to hear before it streams
 };

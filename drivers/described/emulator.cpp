@@ -1,0 +1,93 @@
+#include "drivers/described/emulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/described/protocol.hpp"
+
+namespace posed::drivers::described {
+namespace {
+
+constexpr double kDefaultRate_hz = 100.0;
+constexpr std::size_t kMaxHeard = 256;  // more than any command
+
+// The raw value of a two-point curve.
+double raw_of(const glove::Curve& curve, double value) {
+  const double raw0 = static_cast<double>(curve.raw[0]);
+  const double value0 = static_cast<double>(curve.value[0]);
+  const double slope =
+      (static_cast<double>(curve.value[1]) - value0) / (static_cast<double>(curve.raw[1]) - raw0);
+  return raw0 + (value - value0) / slope;
+}
+
+std::int64_t period_ns(const Table& table) {
+  return std::llround(1e9 / (table.rate_hz > 0.0 ? table.rate_hz : kDefaultRate_hz));
+}
+
+}  // namespace
+
+DescribedEmulator::DescribedEmulator(std::shared_ptr<const Table> table,
+                                     std::shared_ptr<const glove::Calibration> calibration)
+    : table_(std::move(table)), calibration_(std::move(calibration)), pace_(period_ns(*table_)) {
+  pose({});
+  if (table_->link.start.empty()) pace_.start(0);
+}
+
+void DescribedEmulator::pose(const HandAngles& angles) {
+  for (std::size_t s = 0; s < calibration_->sensors; ++s) {
+    const auto rows = std::span(calibration_->map).first(calibration_->map_rows);
+    const auto row = std::ranges::find(rows, s, &glove::MapRow::sensor);
+    if (row == rows.end() || row->gain == 0.0F) continue;
+    const double value = (angles[row->channel] - static_cast<double>(row->offset_rad)) /
+                         static_cast<double>(row->gain);
+    raw_[s] = raw_of(calibration_->curve[s], value);
+  }
+}
+
+void DescribedEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_ns,
+                                Bytes& /*answer*/) {
+  for (const std::byte byte : bytes) {
+    if (heard_.size() == kMaxHeard) heard_.erase(heard_.begin(), heard_.begin() + kMaxHeard / 2);
+    heard_.push_back(byte);
+    if (was_told(table_->link.stop)) pace_.stop();
+    if (was_told(table_->link.start) && !pace_.running()) pace_.start(now_ns);
+  }
+}
+
+bool DescribedEmulator::was_told(const std::vector<std::byte>& command) const {
+  return !command.empty() && heard_.size() >= command.size() &&
+         std::ranges::equal(command, std::span(heard_).last(command.size()));
+}
+
+void DescribedEmulator::emit(std::int64_t now_ns, Bytes& out) {
+  if (!pace_.running()) return;
+  for (const bool poses : {false, true}) {  // what goes with a pose comes before it
+    for (const PacketRule& rule : table_->packets) {
+      if (!rule.fields.empty() && rule.poses == poses) add_packet(rule, out);
+    }
+  }
+  const std::int64_t before_ns = pace_.due_ns();
+  pace_.step(now_ns);
+  clock_ns_ += pace_.due_ns() - before_ns;
+}
+
+void DescribedEmulator::add_packet(const PacketRule& rule, Bytes& out) const {
+  std::vector<std::byte> packet = blank_packet(*table_, rule);
+  for (const Field& field : rule.fields) write_field(field, value_of(field), packet);
+  seal_packet(rule, packet);
+  out.insert(out.end(), packet.begin(), packet.end());
+}
+
+double DescribedEmulator::value_of(const Field& field) const {
+  if (field.kind == FieldKind::kSensor) return raw_[field.index];
+  if (field.kind == FieldKind::kExtra) return (extra_[field.index] - field.offset) / field.scale;
+  const std::uint64_t mask = (std::uint64_t{1} << table_->time_bits) - 1;
+  const double ticks = std::round(static_cast<double>(clock_ns_) * 1e-9 / table_->tick_s);
+  return static_cast<double>(static_cast<std::uint64_t>(ticks) & mask);
+}
+
+void DescribedEmulator::set_ticks(std::uint64_t ticks) {
+  clock_ns_ = std::llround(static_cast<double>(ticks) * table_->tick_s * 1e9);
+}
+
+}  // namespace posed::drivers::described

@@ -1,0 +1,47 @@
+// Any described device's other side: sends all its packets at the described rate, from its start
+// bytes to its stop bytes (from power-on where it has none).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "drivers/described/table.hpp"
+#include "drivers/emulator.hpp"
+#include "drivers/glove/calibration.hpp"
+#include "drivers/glove/pace.hpp"
+
+namespace posed::drivers::described {
+
+class DescribedEmulator final : public Emulator {
+ public:
+  DescribedEmulator(std::shared_ptr<const Table> table,
+                    std::shared_ptr<const glove::Calibration> calibration);
+
+  // A sensor stands where its first share in the angle map puts it.
+  void pose(const HandAngles& angles) override;
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
+  [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
+  void emit(std::int64_t now_ns, Bytes& out) override;
+
+  // What the next packets carry: raw values of sensors, values of extras in their units.
+  void set_sensor(std::size_t sensor, double raw) { raw_.at(sensor) = raw; }
+  void set_extra(std::size_t extra, double value) { extra_.at(extra) = value; }
+  void set_ticks(std::uint64_t ticks);
+
+ private:
+  void add_packet(const PacketRule& rule, Bytes& out) const;
+  [[nodiscard]] double value_of(const Field& field) const;
+  // Whether `heard_` ends in these bytes.
+  [[nodiscard]] bool was_told(const std::vector<std::byte>& command) const;
+
+  std::shared_ptr<const Table> table_;
+  std::shared_ptr<const glove::Calibration> calibration_;
+  std::array<double, glove::kMaxSensors> raw_{};
+  std::array<double, kMaxExtras> extra_{};
+  std::vector<std::byte> heard_;
+  glove::Pace pace_;
+  std::int64_t clock_ns_ = 0;  // the device's own
+};
+
+}  // namespace posed::drivers::described

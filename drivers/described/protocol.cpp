@@ -1,0 +1,181 @@
+#include "drivers/described/protocol.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace posed::drivers::described {
+namespace {
+
+constexpr std::uint64_t mask_of(int bits) noexcept {
+  return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
+}
+
+// The bytes of a place as one number, in their order.
+std::uint64_t gather(const BitPlace& place, std::span<const std::byte> packet) noexcept {
+  std::uint64_t all = 0;
+  for (std::size_t i = 0; i < place.bytes; ++i) {
+    const auto byte = std::to_integer<std::uint64_t>(packet[place.first + i]);
+    all = place.big ? all << 8 | byte : all | byte << (8 * i);
+  }
+  return all;
+}
+
+void scatter(const BitPlace& place, std::uint64_t all, std::span<std::byte> packet) noexcept {
+  for (std::size_t i = 0; i < place.bytes; ++i) {
+    const std::size_t at = place.big ? place.bytes - 1U - i : i;
+    packet[place.first + at] = static_cast<std::byte>(all >> (8 * i) & 0xFF);
+  }
+}
+
+void write_bits(const BitPlace& place, std::uint64_t value, std::span<std::byte> packet) noexcept {
+  const std::uint64_t mask = mask_of(place.bits) << place.shift;
+  scatter(place, (gather(place, packet) & ~mask) | (value << place.shift & mask), packet);
+}
+
+std::size_t from_start(int place, std::size_t length) noexcept {
+  return static_cast<std::size_t>(place < 0 ? static_cast<int>(length) + place : place);
+}
+
+std::span<const std::byte> summed(const ChecksumRule& rule,
+                                  std::span<const std::byte> packet) noexcept {
+  const std::size_t from = from_start(rule.from, packet.size());
+  return packet.subspan(from, from_start(rule.to, packet.size()) - from);
+}
+
+std::uint32_t checksum(const ChecksumRule& rule, std::span<const std::byte> packet) noexcept {
+  const auto bytes = summed(rule, packet);
+  if (rule.kind == ChecksumKind::kCrc32) {
+    return static_cast<std::uint32_t>(
+        crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+  }
+  std::uint32_t sum = 0;
+  for (const std::byte byte : bytes) {
+    const auto value = std::to_integer<std::uint32_t>(byte);
+    sum = rule.kind == ChecksumKind::kSum8 ? sum + value : sum ^ value;
+  }
+  return sum & 0xFF;
+}
+
+BitPlace checksum_place(const ChecksumRule& rule, std::size_t length) noexcept {
+  const bool crc = rule.kind == ChecksumKind::kCrc32;
+  return {.first = static_cast<std::uint16_t>(from_start(rule.at, length)),
+          .bytes = static_cast<std::uint8_t>(crc ? 4 : 1),
+          .bits = static_cast<std::uint8_t>(crc ? 32 : 8),
+          .big = rule.big};
+}
+
+bool starts_alike(std::span<const std::byte> bytes, std::span<const std::byte> header) noexcept {
+  const std::size_t count = std::min(bytes.size(), header.size());
+  return std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count),
+                    header.begin());
+}
+
+bool ends_in(std::span<const std::byte> bytes, std::span<const std::byte> end) noexcept {
+  return std::ranges::equal(bytes.last(end.size()), end);
+}
+
+// How long a packet of this rule is; 0 when that is not known yet, more than any packet when it is
+// none.
+std::size_t length_of(const PacketRule& rule, std::span<const std::byte> bytes) noexcept {
+  if (rule.length.fixed) return rule.max_bytes;
+  const BitPlace& place = rule.length.place;
+  if (bytes.size() < std::size_t{place.first} + place.bytes) return 0;
+  const auto length = static_cast<std::int64_t>(read_bits(place, bytes)) + rule.length.add;
+  const bool sound = length >= static_cast<std::int64_t>(rule.min_bytes) &&
+                     length <= static_cast<std::int64_t>(rule.max_bytes);
+  return sound ? static_cast<std::size_t>(length) : kMaxPacketBytes + 1;
+}
+
+Look look_for(const Table& table, const PacketRule& rule,
+              std::span<const std::byte> bytes) noexcept {
+  Look look{.rule = &rule};
+  if (!starts_alike(bytes, rule.header)) return look;
+  look.found = Look::Found::kMayCome;
+  if (bytes.size() < rule.header.size()) return look;
+  look.bytes = length_of(rule, bytes);
+  if (look.bytes <= kMaxPacketBytes && (look.bytes == 0 || bytes.size() < look.bytes)) return look;
+  look.found = Look::Found::kNothing;
+  look.why = Outcome::kShort;
+  if (look.bytes > kMaxPacketBytes) return look;
+  const auto packet = bytes.first(look.bytes);
+  if (!ends_in(packet, rule.end) || !ends_in(packet, table.delimiter)) return look;
+  look.why = Outcome::kBadChecksum;
+  if (rule.checksum.kind != ChecksumKind::kNone &&
+      read_bits(checksum_place(rule.checksum, packet.size()), packet) !=
+          checksum(rule.checksum, packet)) {
+    return look;
+  }
+  look.found = Look::Found::kPacket;
+  return look;
+}
+
+}  // namespace
+
+// RT-safe.
+Look look_for_packet(const Table& table, std::span<const std::byte> bytes) noexcept {
+  Look best;
+  for (const PacketRule& rule : table.packets) {
+    const Look look = look_for(table, rule, bytes);
+    if (look.found > best.found || (look.found == best.found && best.why == Outcome::kForeign)) {
+      best = look;
+    }
+    if (best.found == Look::Found::kPacket) break;
+  }
+  return best;
+}
+
+// RT-safe.
+std::uint64_t read_bits(const BitPlace& place, std::span<const std::byte> packet) noexcept {
+  return gather(place, packet) >> place.shift & mask_of(place.bits);
+}
+
+// RT-safe.
+double read_field(const Field& field, std::span<const std::byte> packet) noexcept {
+  const std::uint64_t bits = read_bits(field.place, packet);
+  if (field.form == Form::kUnsigned) return static_cast<double>(bits);
+  if (field.form == Form::kSigned) {
+    const std::uint64_t sign = std::uint64_t{1} << (field.place.bits - 1);
+    return static_cast<double>(static_cast<std::int64_t>((bits ^ sign) - sign));
+  }
+  if (field.place.bits == 64) return std::bit_cast<double>(bits);
+  return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
+}
+
+void write_field(const Field& field, double raw, std::span<std::byte> packet) noexcept {
+  const double value = std::clamp(std::isfinite(raw) ? raw : field.low, field.low, field.high);
+  std::uint64_t bits = 0;
+  if (field.form != Form::kFloat) {
+    bits = static_cast<std::uint64_t>(std::llround(value));
+  } else if (field.place.bits == 64) {
+    bits = std::bit_cast<std::uint64_t>(value);
+  } else {
+    bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  }
+  write_bits(field.place, bits, packet);
+}
+
+std::vector<std::byte> blank_packet(const Table& table, const PacketRule& rule) {
+  std::vector<std::byte> packet(rule.min_bytes);
+  std::ranges::copy(rule.header, packet.begin());
+  const auto put_last = [&packet](const std::vector<std::byte>& bytes) {
+    std::ranges::copy(bytes, packet.end() - static_cast<std::ptrdiff_t>(bytes.size()));
+  };
+  put_last(rule.end);
+  put_last(table.delimiter);
+  if (!rule.length.fixed) {
+    write_bits(rule.length.place,
+               static_cast<std::uint64_t>(static_cast<int>(packet.size()) - rule.length.add),
+               packet);
+  }
+  return packet;
+}
+
+void seal_packet(const PacketRule& rule, std::span<std::byte> packet) noexcept {
+  if (rule.checksum.kind == ChecksumKind::kNone) return;
+  write_bits(checksum_place(rule.checksum, packet.size()), checksum(rule.checksum, packet), packet);
+}
+
+}  // namespace posed::drivers::described
