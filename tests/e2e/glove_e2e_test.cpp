@@ -1,0 +1,180 @@
+// Gloves as a stage meets them: emulated ones on pseudo-terminals behind the real binary, unplugged
+// and plugged in again, calibrated and felt, recorded and replayed.
+#include <catch2/catch.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/clock.hpp"
+#include "proto/log/reader.hpp"
+#include "tests/e2e/outcome.hpp"
+#include "tests/e2e/served.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+// Two gloves and a walker under `posed record`.
+class GloveStage {
+ public:
+  GloveStage() {
+    REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
+    std::string config =
+        "realtime = false\n[publish]\nendpoint = \"tcp://127.0.0.1:*\"\n"
+        "[control]\nendpoint = \"tcp://127.0.0.1:*\"\n"
+        "[[stream]]\nname = \"walker\"\ndriver = \"file\"\n[stream.file]\npath = \"walk.bvh\"\n";
+    for (const std::string hand : {"right", "left"}) {
+      config += "[[stream]]\nname = \"" + hand + "\"\ndriver = \"lucidgloves\"\nport = \"" +
+                path(hand) + "\"\nhand = \"" + hand + "\"\n";
+    }
+    folder.write("posed.toml", config);
+  }
+
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return (folder.path() / name).string();
+  }
+
+  void record() {
+    daemon.emplace(std::vector<std::string>{"record", "--config", path("posed.toml"), "--out",
+                                            path("take.plog"), "--frames"});
+    const auto line = daemon->line();
+    INFO(daemon->errors());
+    REQUIRE(line);
+    const auto ready = json::parse(*line);
+    publish = ready.at("publish");
+    control = ready.at("control");
+  }
+
+  // Plugs the glove in; the time on the daemon's clock at which it could be opened.
+  std::int64_t plug_in(const std::string& hand, std::optional<Process>& glove) const {
+    glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", path(hand), "--set",
+                                           "hand=" + hand});
+    const auto line = glove->line();
+    INFO(glove->errors());
+    REQUIRE(line);
+    CHECK(json::parse(*line).at("port") == path(hand));
+    return pipeline::monotonic_ns();
+  }
+
+  static void unplug(std::optional<Process>& glove) {
+    glove->send(SIGTERM);
+    CHECK(glove->exit_code() == 0);
+    glove.reset();
+  }
+
+  Outcome ctl(std::vector<std::string> what) const {
+    what.insert(what.begin(), {"ctl", "--connect", control});
+    return posed(std::move(what));
+  }
+
+  void expect_replay() const {
+    const auto replay = posed(
+        {"replay", path("take.plog"), "--speed", "max", "--out", path("frames.bin"), "--expect"});
+    INFO(replay.err);
+    CHECK(replay.code == 0);
+  }
+
+  TempFolder folder;
+  std::optional<Process> daemon;
+  std::string publish, control;
+};
+
+// The next event of this kind; its time.
+std::int64_t wait_for(Process& events, const std::string& kind) {
+  while (const auto line = events.line()) {
+    const auto event = json::parse(*line);
+    if (event.at("kind") == kind) return std::stoll(event.at("timeNs").get<std::string>());
+  }
+  FAIL("no event " << kind);
+  return 0;
+}
+
+// The numbers of a stream's published frames, as the log keeps them, without a hole.
+std::uint64_t check_frames_follow(const std::string& log, const std::string& stream) {
+  auto reader = log::Reader::open(log);
+  REQUIRE(reader);
+  std::uint64_t last = 0;
+  for (const log::StreamRow& row : reader->streams()) {
+    if (row.name != stream) continue;
+    auto frames = reader->frames(row.id, false);
+    REQUIRE(frames);
+    while (true) {
+      const auto frame = frames->next();
+      REQUIRE(frame);
+      if (!*frame) break;
+      const std::uint64_t sequence = (*frame)->sequence;
+      CHECK((sequence == last + 1 || sequence == last));  // once more while it is stale
+      last = sequence;
+    }
+  }
+  return last;
+}
+
+TEST_CASE("a glove comes late, goes and comes back; the others never notice") {
+  GloveStage stage;
+  stage.record();  // nothing is plugged in yet
+  std::optional<Process> right, left;
+  Process events(
+      {"monitor", "--connect", stage.publish, "--topic", "event", "--stream", "right", "--json"});
+  stage.plug_in("left", left);
+  std::int64_t slowest_ns = 0;
+  for (int i = 0; i < 4; ++i) {
+    const std::int64_t plugged_ns = stage.plug_in("right", right);
+    slowest_ns = std::max(slowest_ns, wait_for(events, "KIND_FOUND") - plugged_ns);
+    Process frames(
+        {"monitor", "--connect", stage.publish, "--stream", "right", "--json", "--count", "30"});
+    CHECK(frames.exit_code() == 0);
+    stage.unplug(right);
+    wait_for(events, "KIND_LOST");
+  }
+  WARN("plugged in to connected: at most " << slowest_ns / 1'000'000 << " ms");
+  CHECK(slowest_ns < 5'000'000'000);  // of a busy machine; an idle one needs half a second
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+  CHECK(check_frames_follow(stage.path("take.plog"), "walker") > 100);
+  CHECK(check_frames_follow(stage.path("take.plog"), "left") > 100);
+  CHECK(check_frames_follow(stage.path("take.plog"), "right") > 100);
+  stage.expect_replay();
+}
+
+TEST_CASE("a live calibration and haptics reach the glove, and the log repeats them") {
+  GloveStage stage;
+  std::optional<Process> right;
+  stage.plug_in("right", right);
+  stage.record();
+  const auto calibration =
+      stage.folder.write("ann.toml",
+                         "format = 1\ndriver = \"lucidgloves\"\n"
+                         "hand = \"right\"\nuser = \"ann\"\n"
+                         "[sensors]\nindex_joint1 = [[0, 0.0], [2000, 1.0]]\n");
+  const Outcome fitted = stage.ctl({"calibrate", "right", calibration.string()});
+  INFO(fitted.err);
+  CHECK(fitted.code == 0);
+  CHECK(has(fitted.out, "in effect from frame"));
+  const Outcome felt = stage.ctl({"haptics", "right", "--force", "0", "0.5", "1"});
+  INFO(felt.err);
+  CHECK(felt.code == 0);
+
+  const Outcome other_hand = stage.ctl({"calibrate", "left", calibration.string()});
+  CHECK(other_hand.code == 1);
+  CHECK(has(other_hand.err, "hand"));
+  const Outcome no_glove = stage.ctl({"calibrate", "walker", calibration.string()});
+  CHECK(no_glove.code == 1);
+  CHECK(has(no_glove.err, "no sensors that can be calibrated"));
+  const auto half = stage.folder.write("half.toml", "format = 1\ndriver = \"lucidgl");
+  CHECK(has(stage.ctl({"calibrate", "right", half.string()}).err, "half.toml:2"));
+  CHECK(has(stage.ctl({"haptics", "walker", "--force", "1"}).err, "nothing that could be felt"));
+
+  std::this_thread::sleep_for(300ms);  // frames under the new calibration
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+  stage.expect_replay();
+}
+
+}  // namespace
+}  // namespace posed::test
