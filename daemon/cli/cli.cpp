@@ -29,6 +29,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_ctl,
     add_monitor,
     add_top,
+    add_emulate,
     add_keygen,
     add_completion,
     add_bench,

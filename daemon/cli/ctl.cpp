@@ -27,7 +27,8 @@ struct CtlOptions {
   bool json = false;
   std::string stream, parameter;
   float value = 0.0F;
-  std::filesystem::path model;
+  std::filesystem::path model, calibration;
+  std::vector<float> force, vibration;
   std::string labels;
   float tempo = 1.0F;
   bool loop = false;
@@ -119,6 +120,33 @@ int stop_playing(const CtlOptions& options) {
   return ask_and_tell(options, request, tell_effect);
 }
 
+int calibrate(const CtlOptions& options) {
+  std::ifstream file(options.calibration, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) return report(fail("cannot read the calibration", options.calibration).error());
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_calibrate();
+  wanted.set_stream(options.stream);
+  wanted.set_toml(std::move(text));
+  wanted.set_name(options.calibration.filename().string());
+  return ask_and_tell(options, request, tell_effect);
+}
+
+int haptics(const CtlOptions& options) {
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_haptics();
+  wanted.set_stream(options.stream);
+  for (const float force : options.force) wanted.add_force(force);
+  if (!options.vibration.empty()) {
+    wanted.set_vibration_hz(options.vibration[0]);
+    wanted.set_vibration_s(options.vibration[1]);
+    wanted.set_vibration_amplitude(options.vibration[2]);
+  }
+  return ask_and_tell(options, request, [&](const v1::ControlReply&) {
+    std::printf("%s: sent to the device\n", options.stream.c_str());
+  });
+}
+
 int show_status(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_status();
@@ -153,6 +181,8 @@ void add_ctl(CLI::App& app, int& exit_code) {
   posed ctl play hand "g 1 c 3 4 p"         # perform these labels, after those that still wait
   posed ctl play hand "g c p" --tempo 1.5 --loop
   posed ctl stop-playing hand               # back to the live hand
+  posed ctl calibrate right ann.toml        # another calibration, from the next packet on
+  posed ctl haptics right --force 0 0.5 0.5 0 0   # thumb to little: 0 free, 1 blocked
   posed ctl status
   posed ctl --connect tcp://stage:5571 --key me.key --server-key stage.pub stop)");
   const auto add = [&](const char* name, const char* help, int (*run)(const CtlOptions&)) {
@@ -178,6 +208,16 @@ void add_ctl(CLI::App& app, int& exit_code) {
   perform->add_flag("--loop", options->loop, "Begin again after the last, until others come");
   CLI::App* stop = add("stop-playing", "Back to the live hand", stop_playing);
   stop->add_option("stream", options->stream, "The stream")->required();
+  CLI::App* fit = add("calibrate", "Give a glove another calibration", calibrate);
+  fit->add_option("stream", options->stream, "The stream")->required();
+  fit->add_option("calibration", options->calibration, "What `posed calibrate` wrote")->required();
+  CLI::App* feel = add("haptics", "Let a glove with motors be felt", haptics);
+  feel->add_option("stream", options->stream, "The stream")->required();
+  feel->add_option("--force", options->force,
+                   "Thumb to little: 0 free to 1 blocked; negative leaves a finger as it is")
+      ->expected(1, kFingers);
+  feel->add_option("--vibrate", options->vibration, "Frequency [Hz], time [s], amplitude 0 to 1")
+      ->expected(3);
   add("status", "Print the daemon's state once", show_status);
   add("stop", "End the daemon cleanly", stop_daemon);
 }
