@@ -18,6 +18,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_demo,
     add_run,
     add_check,
+    add_devices,
     add_record,
     add_replay,
     add_train,

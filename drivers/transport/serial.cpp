@@ -2,6 +2,7 @@
 // pseudo-terminal, which serves emulators and tests, is opened like a port (libserialport refuses
 // it).
 #include <asm/termbits.h>
+#include <linux/serial.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
@@ -53,6 +54,15 @@ Result<> set_raw(int fd, const std::string& port, int baud) {
   return {};
 }
 
+// USB adapters save interrupts by batching bytes, an FTDI chip for 16 ms; this asks for them at
+// once. Ports without the choice refuse, rightly.
+void ask_for_low_latency(int fd) {
+  serial_struct port{};
+  if (::ioctl(fd, TIOCGSERIAL, &port) != 0) return;
+  port.flags |= ASYNC_LOW_LATENCY;
+  ::ioctl(fd, TIOCSSERIAL, &port);
+}
+
 Result<Plugged> find_port(const SerialSettings& settings) {
   const auto ports = list_serial_ports();
   if (!settings.port.empty()) return find_node(ports, settings.port);
@@ -80,7 +90,8 @@ Result<Link> Ports::serial(const SerialSettings& settings) {
     return fail(node_trouble(port->node, errno));
   }
   const int lines = TIOCM_DTR | TIOCM_RTS;
-  ::ioctl(*fd, TIOCMBIS, &lines);   // a port without modem lines answers with an error, rightly
+  ::ioctl(*fd, TIOCMBIS, &lines);  // a port without modem lines answers with an error, rightly
+  ask_for_low_latency(*fd);
   ::ioctl(*fd, TCFLSH, TCIOFLUSH);  // what lies there was sent to someone else, at another rate
   return link;
 }

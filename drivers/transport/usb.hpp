@@ -18,9 +18,8 @@ namespace posed::drivers {
 struct UsbSettings {
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
-  std::string id{};               // serial number or port path; empty: the only one
-  int interface = 0;              // claimed; a kernel driver on it is detached
-  std::uint8_t endpoint = 0x81;   // interrupt, in
+  std::string id{};   // serial number or port path; empty: the only one
+  int interface = 0;  // claimed, a kernel driver on it detached; its interrupt endpoint streams
   std::size_t report_bytes = 64;  // the longest report, at most 64 (full speed)
 };
 

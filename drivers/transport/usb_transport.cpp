@@ -1,0 +1,162 @@
+// The hot half of a UsbLink: its reports, one a chunk.
+#include <sys/epoll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "drivers/transport/usb_impl.hpp"
+
+namespace posed::drivers {
+namespace {
+
+constexpr std::size_t kMaxReport = 64;  // bytes of a full-speed interrupt packet
+constexpr std::size_t kTransfers = 16;  // reports that may come between two reads
+constexpr int kMaxFailures = 16;        // in a row: every transfer once
+constexpr int kCloseTurns = 10;         // waits for cancelled transfers, a second in all
+constexpr timeval kCloseTurn{.tv_sec = 0, .tv_usec = 100'000};
+
+// Reports come in by libusb's callbacks, all of them on the thread that calls read(). A transfer
+// waits with its report until that is handed over and used, then it goes out again: nothing is
+// copied and nothing can overflow but the device's own patience.
+class UsbTransport final : public Transport {
+ public:
+  explicit UsbTransport(std::unique_ptr<UsbLink::Impl> link);
+  ~UsbTransport() override;
+  UsbTransport(const UsbTransport&) = delete;
+  UsbTransport& operator=(const UsbTransport&) = delete;
+
+  [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
+  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+
+ private:
+  struct Slot {
+    UsbTransport* owner = nullptr;
+    libusb_transfer* transfer = nullptr;
+    std::array<unsigned char, kMaxReport> bytes{};
+    bool in_flight = false;
+  };
+
+  static void completed(libusb_transfer* transfer) noexcept;
+  void take(Slot& slot) noexcept;
+  void submit(Slot& slot) noexcept;
+  void handle_events(timeval patience) noexcept;
+  void cancel_all() noexcept;
+  [[nodiscard]] bool any_in_flight() const noexcept;
+
+  std::unique_ptr<UsbLink::Impl> link_;
+  int epoll_;
+  std::array<Slot, kTransfers> slots_{};
+  std::array<Slot*, kTransfers> waiting_{};  // with a report, oldest first from first_
+  std::size_t first_ = 0, count_ = 0;
+  Slot* handed_over_ = nullptr;  // its bytes are in use until the next read
+  int failures_ = 0;             // in a row
+  bool lost_ = false;
+};
+
+UsbTransport::UsbTransport(std::unique_ptr<UsbLink::Impl> link)
+    : link_(std::move(link)), epoll_(::epoll_create1(EPOLL_CLOEXEC)) {
+  const libusb_pollfd** descriptors = libusb_get_pollfds(link_->context());
+  for (const libusb_pollfd** at = descriptors; at != nullptr && *at != nullptr; ++at) {
+    // libusb means poll()'s flags, which epoll shares.
+    epoll_event wanted{};
+    wanted.events = static_cast<std::uint32_t>((*at)->events);
+    ::epoll_ctl(epoll_, EPOLL_CTL_ADD, (*at)->fd, &wanted);
+  }
+  libusb_free_pollfds(descriptors);
+}
+
+UsbTransport::~UsbTransport() {
+  cancel_all();
+  for (Slot& slot : slots_) {
+    // A transfer that the kernel did not give back stays allocated: closing the device forgets it.
+    if (!slot.in_flight) libusb_free_transfer(slot.transfer);
+  }
+  ::close(epoll_);
+}
+
+Result<> UsbTransport::start(std::int64_t /*now_ns*/) {
+  const UsbSettings& settings = link_->settings();
+  for (Slot& slot : slots_) {
+    slot.owner = this;
+    slot.transfer = libusb_alloc_transfer(0);
+    if (slot.transfer == nullptr) return fail("no memory for USB transfers");
+    libusb_fill_interrupt_transfer(
+        slot.transfer, link_->handle(), link_->endpoint(), slot.bytes.data(),
+        static_cast<int>(std::min(settings.report_bytes, kMaxReport)), completed, &slot, 0);
+    submit(slot);
+  }
+  if (lost_) return fail(link_->name() + " does not stream; unplug it and plug it in again");
+  return {};
+}
+
+// RT-safe but for libusb's system calls.
+Chunk UsbTransport::read(std::int64_t /*now_ns*/) noexcept {
+  if (handed_over_ != nullptr) submit(*std::exchange(handed_over_, nullptr));
+  if (count_ == 0 && !lost_) handle_events({});
+  if (count_ == 0) return {.bytes = {}, .lost = lost_};
+  handed_over_ = waiting_[first_];
+  first_ = (first_ + 1) % kTransfers;
+  --count_;
+  const auto size = static_cast<std::size_t>(handed_over_->transfer->actual_length);
+  return {.bytes = std::as_bytes(std::span(handed_over_->bytes)).first(size)};
+}
+
+void UsbTransport::completed(libusb_transfer* transfer) noexcept {
+  Slot& slot = *static_cast<Slot*>(transfer->user_data);
+  slot.in_flight = false;
+  slot.owner->take(slot);
+}
+
+void UsbTransport::take(Slot& slot) noexcept {
+  switch (slot.transfer->status) {
+    case LIBUSB_TRANSFER_COMPLETED:
+      failures_ = 0;
+      if (slot.transfer->actual_length == 0) return submit(slot);
+      waiting_[(first_ + count_) % kTransfers] = &slot;
+      ++count_;
+      return;
+    case LIBUSB_TRANSFER_CANCELLED:
+      return;
+    case LIBUSB_TRANSFER_NO_DEVICE:
+    case LIBUSB_TRANSFER_STALL:
+      lost_ = true;
+      return;
+    default:
+      // A bad cable disturbs single packets; an unplugged device fails at every one.
+      if (++failures_ >= kMaxFailures) lost_ = true;
+      return submit(slot);
+  }
+}
+
+void UsbTransport::submit(Slot& slot) noexcept {
+  if (lost_) return;
+  slot.in_flight = libusb_submit_transfer(slot.transfer) == 0;
+  if (!slot.in_flight) lost_ = true;
+}
+
+void UsbTransport::handle_events(timeval patience) noexcept {
+  libusb_handle_events_timeout_completed(link_->context(), &patience, nullptr);
+}
+
+bool UsbTransport::any_in_flight() const noexcept {
+  return std::ranges::any_of(slots_, &Slot::in_flight);
+}
+
+void UsbTransport::cancel_all() noexcept {
+  lost_ = true;  // nothing is submitted from here on
+  for (Slot& slot : slots_) {
+    if (slot.in_flight) libusb_cancel_transfer(slot.transfer);
+  }
+  for (int turn = 0; turn < kCloseTurns && any_in_flight(); ++turn) handle_events(kCloseTurn);
+}
+
+}  // namespace
+
+std::unique_ptr<Transport> make_usb_transport(UsbLink link) {
+  return std::make_unique<UsbTransport>(std::move(link.impl_));
+}
+
+}  // namespace posed::drivers
