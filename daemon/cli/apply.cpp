@@ -2,13 +2,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <string>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/degrees.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
 #include "proto/clip/clip.hpp"
@@ -16,7 +16,6 @@
 namespace posed::cli {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr int kLongClip = 20'000;  // frames from which on waiting is felt
 
 struct Options {

@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFooter =
+constexpr const char* kBenchGenerateFooter =
     R"(Three measurements in one run, with a
 model of a made-up performer unless --model names one:
   streaming   66 channels frame by frame, cost and error by delay, beside SPTK's mlpg over the whole
@@ -32,7 +32,7 @@ A rival that is not installed is named and left out (Debian: sptk, liblapack3).
   posed bench generate
   posed bench generate --strings 50 --json)";
 
-struct Options {
+struct BenchGenerateOptions {
   std::string model;
   int samples = 500;
   int strings = -1;
@@ -89,7 +89,7 @@ Result<json> bench_strings(const generate::ModelEvidence& evidence, int count) {
               {"seconds", bar.elapsed_s()}};
 }
 
-Result<json> bench(const Options& options) {
+Result<json> bench(const BenchGenerateOptions& options) {
   auto model = options.model.empty() ? made_up_model() : gesture::load_model(options.model);
   if (!model) return std::unexpected(model.error());
   const double rate_hz = model->rate_hz;
@@ -154,9 +154,9 @@ void print_strings(const json& part) {
 }  // namespace
 
 void add_bench_generate(CLI::App& bench_app, int& exit_code) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchGenerateOptions>();
   CLI::App* command = bench_app.add_subcommand("generate", "Trajectories from gesture models");
-  command->footer(kFooter);
+  command->footer(kBenchGenerateFooter);
   command->add_option("--model", options->model, "A gesture model instead of the made-up one");
   command->add_option("--samples", options->samples, "Timed batch solves")
       ->check(CLI::Range(3, 1'000'000))

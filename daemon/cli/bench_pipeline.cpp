@@ -31,7 +31,7 @@ namespace posed::cli {
 namespace {
 
 constexpr double kRate_hz = 120.0;
-constexpr const char* kFooter =
+constexpr const char* kBenchPipelineFooter =
     R"(Synthetic walkers at 120 Hz through the real daemon: file driver, rings, a style model of
 --points poses, publisher; no recording, no real-time rights. Every other second the reader sends
 a message of the same size straight to ZeroMQ instead: the bare hop. The subscriber is another
@@ -354,7 +354,7 @@ void add_bench_pipeline(CLI::App& bench, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--gate", options->gate, "With the confidence gate");
   command->add_flag("--json", options->json, "JSON on stdout");
-  command->footer(kFooter);
+  command->footer(kBenchPipelineFooter);
   command->callback([options, &exit_code] {
     const auto watched = measure(*options);
     if (!watched) {

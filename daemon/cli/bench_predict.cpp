@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -17,6 +16,8 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/degrees.hpp"
+#include "daemon/cli/percentiles.hpp"
 #include "daemon/cli/stream_sum.hpp"
 #include "models/gp/confidence.hpp"
 #include "models/gp/isa.hpp"
@@ -32,8 +33,8 @@ using nlohmann::json;
 using Floats = hwy::AlignedFreeUniquePtr<float[]>;
 
 constexpr int kHotCalls = 8;  // one hot sample is the mean of so many calls, a clock read costs 1 %
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr const char* kFooter = R"(Made-up walkers, queries from one who is not in the training set.
+constexpr const char* kBenchPredictFooter =
+    R"(Made-up walkers, queries from one who is not in the training set.
 hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
 frames of a 120 Hz stream. The yardstick sums as many floats as the process logically reads
 (N x 2D; gate rows are also held against the confidence's triangle added), with eight vector
@@ -89,14 +90,6 @@ void measure(std::vector<Variant>& variants, int samples, const Evictor& evictor
       variant.cold_us.push_back(time_us(variant, i, 1));
     }
   }
-}
-
-json percentiles(std::vector<double> values) {
-  std::ranges::sort(values);
-  const auto at = [&](double p) {
-    return values[static_cast<std::size_t>(p * static_cast<double>(values.size() - 1))];
-  };
-  return {{"p50_us", at(0.5)}, {"p99_us", at(0.99)}, {"p99_9_us", at(0.999)}, {"max_us", at(1.0)}};
 }
 
 Floats ones(int count) {
@@ -227,7 +220,7 @@ void add_bench_predict(CLI::App& bench, int& exit_code) {
   };
   const auto options = std::make_shared<Options>();
   CLI::App* command = bench.add_subcommand("predict", "One call of the style filter's process");
-  command->footer(kFooter);
+  command->footer(kBenchPredictFooter);
   command->add_option("--samples", options->samples, "Timed samples a variant")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -15,6 +14,8 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/degrees.hpp"
+#include "daemon/cli/percentiles.hpp"
 #include "models/generate/adaptive_window.hpp"
 #include "models/generate/live_smoother.hpp"
 #include "models/generate/rivals.hpp"
@@ -29,8 +30,7 @@ using clip::ChannelMatrix;
 using generate::Trial;
 using nlohmann::json;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr const char* kFooter =
+constexpr const char* kBenchSmoothFooter =
     R"(Without --clip the truth is a made-up performer of 20 gestures at 60 Hz. White noise is
 added, and every rival is tuned on the very data it is judged by; errors are rms in degrees over the
 channels that move. "Where not" is what the live stage is not made for: a glove's own dead band,
@@ -41,7 +41,7 @@ run.
   posed bench smooth --clip glove1.csv glove2.csv     # recordings taken as the truth
   posed bench smooth --cost                           # only what a frame costs)";
 
-struct Options {
+struct BenchSmoothOptions {
   std::vector<std::string> clips;
   unsigned seed = 11;
   bool cost = false, json = false;
@@ -52,7 +52,7 @@ struct Truth {
   double rate_hz = 60.0;
 };
 
-Result<std::vector<Truth>> truths_of(const Options& options) {
+Result<std::vector<Truth>> truths_of(const BenchSmoothOptions& options) {
   std::vector<Truth> truths;
   const auto add = [&truths](clip::HandClip hand) {
     clip::fill_gaps(hand);
@@ -179,14 +179,6 @@ json accuracy(const std::vector<Truth>& truths, unsigned seed) {
   return report;
 }
 
-json percentiles(std::vector<double> values) {
-  std::ranges::sort(values);
-  const auto at = [&](double p) {
-    return values[static_cast<std::size_t>(p * static_cast<double>(values.size() - 1))];
-  };
-  return {{"p50_us", at(0.5)}, {"p99_us", at(0.99)}, {"p99_9_us", at(0.999)}, {"max_us", at(1.0)}};
-}
-
 // 45 channels, window 26: one bare solve, the whole solve, the whole stage. They take turns.
 json cost(unsigned seed) {
   constexpr int kFrames = 4000;
@@ -260,7 +252,7 @@ void print(const json& report) {
   for (const auto& [title, rows] : accuracy["where_not"].items()) print_table(title, rows);
 }
 
-Result<> run(const Options& options) {
+Result<> bench_smooth(const BenchSmoothOptions& options) {
   json report{{"cost", cost(options.seed)}};
   if (!options.cost) {
     const auto truths = truths_of(options);
@@ -278,16 +270,16 @@ Result<> run(const Options& options) {
 }  // namespace
 
 void add_bench_smooth(CLI::App& bench, int& exit_code) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchSmoothOptions>();
   CLI::App* command = bench.add_subcommand("smooth", "The live stage: its cost and its rivals");
-  command->footer(kFooter);
+  command->footer(kBenchSmoothFooter);
   command->add_option("--clip", options->clips, "Hand CSVs taken as the truth")
       ->type_name("REC.csv");
   command->add_option("--seed", options->seed, "Of the noise")->capture_default_str();
   command->add_flag("--cost", options->cost, "Only the cost of a frame");
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    if (auto done = run(*options); !done) exit_code = report(done.error());
+    if (auto done = bench_smooth(*options); !done) exit_code = report(done.error());
   });
 }
 

@@ -1,4 +1,5 @@
 #include "daemon/cli/bench_trajectory.hpp"
+#include "daemon/cli/degrees.hpp"
 
 #include <unistd.h>
 
@@ -6,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -27,7 +27,6 @@ using generate::Row;
 using nlohmann::json;
 using Steady = std::chrono::steady_clock;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr int kRepeats = 3;  // of everything beside SPTK; the median counts
 
 double since_us(Steady::time_point start) {

@@ -57,6 +57,9 @@ class Connection {
   int hang_ups_ = 0;  // in a row, before the handshake
 };
 
+// How long a client waits before it looks for keys, signals and refusals.
+inline constexpr std::chrono::milliseconds kLookAround{100};
+
 // From its making on SIGINT and SIGTERM only set a flag.
 class Interrupt {
  public:

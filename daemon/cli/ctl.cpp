@@ -19,8 +19,6 @@
 namespace posed::cli {
 namespace {
 
-constexpr std::chrono::milliseconds kLookAround{100};  // for signals and refusals
-
 struct CtlOptions {
   ClientOptions client;
   double timeout_s = 5.0;

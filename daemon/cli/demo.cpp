@@ -29,7 +29,6 @@ namespace posed::cli {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
-constexpr std::chrono::milliseconds kLookAround{50};
 constexpr double kRedrawEvery_s = 0.5;
 constexpr double kPlainLinesEvery_s = 5.0;
 constexpr double kFirstFrameWithin_s = 10.0;

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
 
@@ -23,7 +23,7 @@ The source goes through the same stage as live. cycle_ratio: how far the styled 
 is from the target's, over how far the unstyled one was (0 is the target, 1 is no change); ratio:
 the same frame by frame; jerk_ratio: roughness of the styled walk over the unstyled one's.)";
 
-struct Options {
+struct EvalOptions {
   std::string model, source, target, skeleton;
   double alpha = 1.0;
   bool json = false;
@@ -35,7 +35,7 @@ Result<clip::Clip> read(const std::string& path, const std::string& skeleton) {
   return clip::read_clip(path, options);
 }
 
-Result<json> evaluate(const Options& options) {
+Result<json> evaluate(const EvalOptions& options) {
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
   const auto source = read(options.source, options.skeleton);
@@ -62,8 +62,8 @@ void add_eval(CLI::App& app, int& exit_code) {
   command->require_subcommand(1);
   add_eval_gesture(*command, exit_code);
   CLI::App* style = command->add_subcommand("style", "How near a styled clip comes to the target");
-  style->footer(kFooter);
-  const auto options = std::make_shared<Options>();
+  style->footer(kEvalFooter);
+  const auto options = std::make_shared<EvalOptions>();
   style->add_option("--model", options->model, "Model from `posed train style`")->required();
   style->add_option("--source", options->source, "Clip to be styled")->required();
   style->add_option("--target", options->target, "Clip of the style wanted")->required();

@@ -3,13 +3,13 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <ostream>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/degrees.hpp"
 #include "daemon/cli/lag_curve.hpp"
 #include "daemon/cli/tree_options.hpp"
 #include "models/generate/constrain.hpp"
@@ -23,8 +23,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kEvalGestureFooter = R"(Examples:
   posed eval gesture --model hand.gesture
   posed eval gesture --model hand.gesture --labels "g 1 c 3 4 p" --reference hand.csv --json
   posed eval gesture --model hand.gesture --svg lag.svg --tree-svg tree.svg --trees middle:4
@@ -35,7 +34,7 @@ recorded frame; frechet: distance of the Gaussians of windows of 30 frames [deg^
 between any two bones, before and after the constraint stage. The curve says what a performance
 loses that knows its script only so many frames ahead.)";
 
-struct Options {
+struct EvalGestureOptions {
   std::string model, reference, labels, svg;
   bool json = false;
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
@@ -114,7 +113,7 @@ json curve_json(const std::vector<LagPoint>& curve) {
   return points;
 }
 
-Result<json> evaluate(const Options& options) {
+Result<json> evaluate_gesture(const EvalGestureOptions& options) {
   if (auto checked = check_tree_options(*options.trees); !checked) {
     return std::unexpected(checked.error());
   }
@@ -182,8 +181,8 @@ void print_report(const json& report) {
 
 void add_eval_gesture(CLI::App& eval, int& exit_code) {
   CLI::App* command = eval.add_subcommand("gesture", "What a gesture model performs, in figures");
-  command->footer(kFooter);
-  const auto options = std::make_shared<Options>();
+  command->footer(kEvalGestureFooter);
+  const auto options = std::make_shared<EvalGestureOptions>();
   command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
   command->add_option("--labels", options->labels, "What to perform (default: every label once)");
   command->add_option("--reference", options->reference, "A recording to be held against");
@@ -191,7 +190,7 @@ void add_eval_gesture(CLI::App& eval, int& exit_code) {
   add_tree_options(*command, options->trees);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const auto made = evaluate(*options);
+    const auto made = evaluate_gesture(*options);
     if (!made) {
       exit_code = report(made.error());
     } else if (options->json) {

@@ -20,7 +20,7 @@ constexpr std::size_t kRoom = 1 << 20;  // messages for which room is made befor
 
 std::string read_line(int fd) {
   std::string line;
-  for (char c = 0; read(fd, &c, 1) == 1 && c != '\n';) line.push_back(c);
+  for (char c = 0; ::read(fd, &c, 1) == 1 && c != '\n';) line.push_back(c);
   return line;
 }
 
@@ -38,7 +38,7 @@ bool write_all(int fd, const void* data, std::size_t size) {
 bool read_all(int fd, void* data, std::size_t size) {
   auto* bytes = static_cast<char*>(data);
   while (size > 0) {
-    const ssize_t count = read(fd, bytes, size);
+    const ssize_t count = ::read(fd, bytes, size);
     if (count <= 0) return false;
     bytes += count;
     size -= static_cast<std::size_t>(count);

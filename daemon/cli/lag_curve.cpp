@@ -1,8 +1,8 @@
 #include "daemon/cli/lag_curve.hpp"
+#include "daemon/cli/degrees.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -11,7 +11,6 @@
 namespace posed::cli {
 namespace {
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kWidth = 640.0, kHeight = 400.0;
 constexpr double kLeft = 64.0, kRight = 16.0, kTop = 40.0, kBottom = 52.0;
 

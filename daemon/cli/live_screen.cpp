@@ -13,7 +13,7 @@ namespace {
 
 termios keyboard_before;  // one terminal a process, so its state is the process's
 
-void print(const std::string& text) {
+void put_on_screen(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   std::fflush(stdout);
 }
@@ -29,11 +29,11 @@ LiveScreen::LiveScreen()
   } else {
     keyboard_ = false;
   }
-  if (terminal_) print("\x1b[?1049h\x1b[?25l\x1b[2J");  // own screen, no cursor
+  if (terminal_) put_on_screen("\x1b[?1049h\x1b[?25l\x1b[2J");  // own screen, no cursor
 }
 
 LiveScreen::~LiveScreen() {
-  if (terminal_) print("\x1b[?25h\x1b[?1049l");
+  if (terminal_) put_on_screen("\x1b[?25h\x1b[?1049l");
   if (keyboard_) tcsetattr(STDIN_FILENO, TCSANOW, &keyboard_before);
 }
 
@@ -59,7 +59,7 @@ void LiveScreen::draw(const std::vector<std::string>& lines) const {
     }
   }
   if (terminal_) text += "\x1b[J";
-  print(text);
+  put_on_screen(text);
 }
 
 bool LiveScreen::quit_pressed() const {
@@ -67,7 +67,7 @@ bool LiveScreen::quit_pressed() const {
   pollfd key{STDIN_FILENO, POLLIN, 0};
   while (keyboard_ && poll(&key, 1, 0) > 0) {
     char c = 0;
-    if (read(STDIN_FILENO, &c, 1) != 1) break;
+    if (::read(STDIN_FILENO, &c, 1) != 1) break;
     quit = quit || c == 'q' || c == 'Q';
   }
   return quit;

@@ -17,8 +17,7 @@
 namespace posed::cli {
 namespace {
 
-constexpr std::chrono::milliseconds kLookAround{100};  // for signals and refusals
-constexpr std::chrono::seconds kPatience{3};           // then we say that we are still waiting
+constexpr std::chrono::seconds kPatience{3};  // then we say that we are still waiting
 
 struct MonitorOptions {
   ClientOptions client;
@@ -98,20 +97,20 @@ std::string line(const v1::Stats& stats) {
 
 // False when stdout is gone or the bytes are none of ours.
 template <typename Message>
-bool show(std::span<const std::byte> bytes, bool json) {
+bool show(std::span<const std::byte> bytes, bool as_json) {
   Message message;
   if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return false;
-  if (json) return print_json(message);
+  if (as_json) return print_json(message);
   std::puts(line(message).c_str());
   return std::fflush(stdout) == 0;
 }
 
-bool show_topic(std::string_view topic, std::span<const std::byte> bytes, bool json) {
-  if (topic.starts_with("pose/")) return show<v1::Frame>(bytes, json);
-  if (topic.starts_with("sensor/")) return show<v1::Sample>(bytes, json);
-  if (topic.starts_with("event/")) return show<v1::Event>(bytes, json);
-  if (topic.starts_with("skeleton/")) return show<v1::Skeleton>(bytes, json);
-  return topic == "stats" && show<v1::Stats>(bytes, json);
+bool show_topic(std::string_view topic, std::span<const std::byte> bytes, bool as_json) {
+  if (topic.starts_with("pose/")) return show<v1::Frame>(bytes, as_json);
+  if (topic.starts_with("sensor/")) return show<v1::Sample>(bytes, as_json);
+  if (topic.starts_with("event/")) return show<v1::Event>(bytes, as_json);
+  if (topic.starts_with("skeleton/")) return show<v1::Skeleton>(bytes, as_json);
+  return topic == "stats" && show<v1::Stats>(bytes, as_json);
 }
 
 // The topics to ask for. Beside poses, people also want to see what happens to the stream.

@@ -1,7 +1,6 @@
 // `posed replay`: a log's run again, from the log alone.
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -14,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/client.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/record/broadcast.hpp"
 #include "daemon/record/expectation.hpp"
@@ -36,23 +36,20 @@ struct ReplayOptions {
   bool json = false;
 };
 
-volatile std::sig_atomic_t g_interrupted = 0;
-void interrupt(int) { g_interrupted = 1; }
-
 // Waits until a chunk is due; false when the user has had enough.
 class Pacer {
  public:
   explicit Pacer(double speed) : speed_(speed) {}  // 0: as fast as possible
 
   bool operator()(std::int64_t arrival_ns) {
-    if (speed_ == 0.0) return g_interrupted == 0;
+    if (speed_ == 0.0) return !Interrupt::came();
     if (!origin_ns_) origin_ns_ = arrival_ns;
     const std::chrono::duration<double> after(seconds(arrival_ns - *origin_ns_) / speed_);
-    while (g_interrupted == 0 && Clock::now() - start_ < after) {
+    while (!Interrupt::came() && Clock::now() - start_ < after) {
       std::this_thread::sleep_for(std::min<std::chrono::duration<double>>(
           after - (Clock::now() - start_), std::chrono::milliseconds(50)));
     }
-    return g_interrupted == 0;
+    return !Interrupt::came();
   }
 
  private:
@@ -202,11 +199,10 @@ Result<> replay(const ReplayOptions& options) {
   warn_of_gaps(*reader);
   Outputs outputs(replay, reader->streams().size());
   if (auto done = open_outputs(options, *reader, replay, outputs); !done) return done;
-  std::signal(SIGINT, interrupt);
-  std::signal(SIGTERM, interrupt);
+  const Interrupt interrupt;
   auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, Pacer(*speed));
   if (!done) return done;
-  if (g_interrupted != 0) {
+  if (Interrupt::came()) {
     spdlog::info("interrupted: nothing after frame {} was compared", outputs.frames);
     return {};
   }

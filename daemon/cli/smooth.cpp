@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -11,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/degrees.hpp"
 #include "models/generate/live_smoother.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/clip/hand_clip.hpp"
@@ -21,9 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-
-struct Options {
+struct SmoothOptions {
   std::string in, out, model, lag = "1", hand;
   double noise_deg = 0.0;
   bool json = false;
@@ -79,7 +77,7 @@ Result<std::unique_ptr<const generate::LiveModel>> load(const std::string& path,
   return generate::bind_live_model(*model, skeleton, path);
 }
 
-Result<generate::LiveOptions> live_options(const Options& options, double rate_hz) {
+Result<generate::LiveOptions> live_options(const SmoothOptions& options, double rate_hz) {
   const auto lag = generate::parse_lag(options.lag);
   if (!lag) return std::unexpected(lag.error());
   const int frames = generate::lag_frames(*lag, 1.0 / rate_hz);
@@ -91,7 +89,7 @@ Result<generate::LiveOptions> live_options(const Options& options, double rate_h
   return generate::LiveOptions{.lag = *lag, .noise_rad = options.noise_deg / kDegrees};
 }
 
-Result<> run(const Options& options) {
+Result<> smooth(const SmoothOptions& options) {
   clip::ReadOptions read;
   if (!options.hand.empty()) read.hand = options.hand == "left" ? Side::kLeft : Side::kRight;
   auto clip = clip::read_hand_clip(options.in, read);
@@ -150,7 +148,7 @@ Result<> run(const Options& options) {
 
 void add_smooth(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("smooth", "Smooth a recorded hand as the live stage would");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SmoothOptions>();
   command->add_option("in", options->in, "The hand: .csv, or a .bvh with finger joints")
       ->required()
       ->type_name("IN");
@@ -175,7 +173,7 @@ void add_smooth(CLI::App& app, int& exit_code) {
 The code is the live stream's: a row is estimated from what came up to the lag after it. An empty
 field is a missing value and is bridged; rows keep their times, even or not.)");
   command->callback([options, &exit_code] {
-    if (auto done = run(*options); !done) exit_code = report(done.error());
+    if (auto done = smooth(*options); !done) exit_code = report(done.error());
   });
 }
 

@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kSynthFooter = R"(Examples:
   posed synth --model hand.gesture --labels "g 1 c 3 4 p" --out hand.csv
   posed synth --model hand.gesture --labels "g c p" --tempo 1.5 --hand left --out hand.bvh --json
 
@@ -28,7 +28,7 @@ Labels that were never recorded are performed too, finger by finger, when the mo
 them. --lookahead N performs as a stream would that knows the script N frames ahead (20 is enough
 for the eye). The same motion plays in a running daemon with `posed ctl play`.)";
 
-struct Options {
+struct SynthOptions {
   std::string model, labels, out;
   double tempo = 1.0;
   std::string lookahead = "full", hand = "right";
@@ -36,7 +36,7 @@ struct Options {
   bool global_variance = false, unconstrained = false, json = false;
 };
 
-Result<generate::PerformOptions> perform_options(const Options& options) {
+Result<generate::PerformOptions> perform_options(const SynthOptions& options) {
   generate::PerformOptions perform;
   perform.tempo = options.tempo;
   perform.global_variance = options.global_variance;
@@ -53,7 +53,7 @@ Result<generate::PerformOptions> perform_options(const Options& options) {
   return perform;
 }
 
-Result<> write(const clip::HandClip& hand, const Options& options) {
+Result<> write(const clip::HandClip& hand, const SynthOptions& options) {
   if (options.out.ends_with(".csv")) return clip::write_hand_csv(hand, options.out);
   const auto clip = clip::clip_of_hand(hand, options.shape);
   if (!clip) return std::unexpected(clip.error());
@@ -74,7 +74,7 @@ json states_json(const gesture::GestureModel& model, const generate::Performance
   return states;
 }
 
-Result<json> synth(const Options& options) {
+Result<json> synth(const SynthOptions& options) {
   if (!options.out.ends_with(".csv") && !options.out.ends_with(".bvh")) {
     return misuse("can write a hand as .csv or .bvh; name --out so", options.out);
   }
@@ -127,8 +127,8 @@ void print_summary(const json& report) {
 
 void add_synth(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("synth", "Let a hand perform a string of labels");
-  command->footer(kFooter);
-  const auto options = std::make_shared<Options>();
+  command->footer(kSynthFooter);
+  const auto options = std::make_shared<SynthOptions>();
   command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
   command->add_option("--labels", options->labels, "Labels with blanks between")->required();
   command->add_option("--tempo", options->tempo, "2 is twice as fast")

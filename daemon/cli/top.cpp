@@ -17,7 +17,6 @@ namespace posed::cli {
 namespace {
 
 constexpr std::size_t kNotesKept = 50;
-constexpr std::chrono::milliseconds kLookAround{100};  // for keys, signals and refusals
 
 struct TopOptions {
   ClientOptions client;

@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture
   posed train gesture --clip a.csv b.csv --labels a.lab b.lab --questions mine.toml --out h.gesture
   posed train gesture --clip take1.csv --labels take1.lab --show ok=ok_pose.csv --out h.gesture
@@ -32,7 +32,7 @@ A label file has a line a gesture, `start end name`, in seconds from the first f
 100 ns). Label two gestures of each name by hand and let the rest be proposed:
   posed train gesture --auto-label --clip take1.csv --labels few.lab --out take1.lab)";
 
-struct Options {
+struct TrainGestureOptions {
   std::vector<std::string> clips, labels, shows;
   std::string questions, propose, out;
   std::string hand;  // which one of a body
@@ -43,7 +43,7 @@ struct Options {
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
-Result<> check(const Options& options) {
+Result<> check(const TrainGestureOptions& options) {
   if (options.clips.size() != options.labels.size()) {
     return misuse("name one label file for each clip: --clip A.csv B.csv --labels A.lab B.lab");
   }
@@ -63,7 +63,7 @@ clip::ReadOptions read_options(const std::string& hand) {
 }
 
 // "ok=ok_pose.csv": the pose is the mean of the clip.
-Result<gesture::LabelPose> shown_pose(const std::string& show, const Options& options) {
+Result<gesture::LabelPose> shown_pose(const std::string& show, const TrainGestureOptions& options) {
   const auto equals = show.find('=');
   if (equals == std::string::npos || !is_label_name(std::string_view(show).substr(0, equals))) {
     return misuse("'" + show +
@@ -80,7 +80,7 @@ Result<gesture::LabelPose> shown_pose(const std::string& show, const Options& op
 }
 
 // The classes of every label: from the file, proposed, or built in; then the shown poses.
-Result<std::vector<gesture::Label>> classes(const Options& options,
+Result<std::vector<gesture::Label>> classes(const TrainGestureOptions& options,
                                             const std::vector<gesture::Recording>& recordings) {
   std::vector<gesture::Label> labels = gesture::built_in_labels();
   const auto poses = gesture::label_poses(recordings);
@@ -104,7 +104,7 @@ Result<std::vector<gesture::Label>> classes(const Options& options,
   return labels;
 }
 
-void print_summary(const json& report, const std::string& out) {
+void print_gesture_summary(const json& report, const std::string& out) {
   std::printf("%d gestures, %d frames, %d contexts, %d moving channels; leaves a state:\n",
               report["gestures"].get<int>(), report["frames"].get<int>(),
               report["contexts"].get<int>(), report["moving_channels"].get<int>());
@@ -124,7 +124,7 @@ void print_summary(const json& report, const std::string& out) {
       out.c_str(), report["seconds"].get<double>(), out.c_str());
 }
 
-Result<json> train(const Options& options) {
+Result<json> train_gesture(const TrainGestureOptions& options) {
   std::vector<gesture::Recording> recordings;
   for (std::size_t i = 0; i < options.clips.size(); ++i) {
     auto recording = load_recording(options.clips[i], options.labels[i], options.rate_hz,
@@ -148,13 +148,13 @@ Result<json> train(const Options& options) {
   return report;
 }
 
-int run(const Options& options) {
+int train_or_report(const TrainGestureOptions& options) {
   if (auto checked = check(options); !checked) return report(checked.error());
   if (options.auto_label) {
     return auto_label({options.clips[0], options.labels[0], options.out, options.rate_hz,
                        read_options(options.hand), options.json});
   }
-  const auto trained = train(options);
+  const auto trained = train_gesture(options);
   if (!trained) return report(trained.error());
   for (const json& warning : (*trained)["warnings"]) {
     std::fprintf(stderr, "posed: warning: %s\n", warning.get<std::string>().c_str());
@@ -162,7 +162,7 @@ int run(const Options& options) {
   if (options.json) {
     std::printf("%s\n", trained->dump(2).c_str());
   } else {
-    print_summary(*trained, options.out);
+    print_gesture_summary(*trained, options.out);
   }
   return 0;
 }
@@ -206,8 +206,8 @@ Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Record
 void add_train_gesture(CLI::App& train_command, int& exit_code) {
   CLI::App* command =
       train_command.add_subcommand("gesture", "Learn a hand's gestures from labelled recordings");
-  command->footer(kFooter);
-  const auto options = std::make_shared<Options>();
+  command->footer(kTrainGestureFooter);
+  const auto options = std::make_shared<TrainGestureOptions>();
   command->add_option("--clip", options->clips, "Hand recordings (CSV, or BVH with fingers)")
       ->required();
   command->add_option("--labels", options->labels, "Their label files, in the same order")
@@ -231,7 +231,7 @@ void add_train_gesture(CLI::App& train_command, int& exit_code) {
   add_tree_options(*command, options->trees);
   command->add_option("--out", options->out, "Where to write the model")->required();
   command->add_flag("--json", options->json, "One JSON object on stdout");
-  command->callback([options, &exit_code] { exit_code = run(*options); });
+  command->callback([options, &exit_code] { exit_code = train_or_report(*options); });
 }
 
 }  // namespace posed::cli

@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kTrainStyleFooter = R"(Examples:
   posed train style --from plain_1.bvh plain_2.bvh --to proud_1.bvh proud_2.bvh --out proud.style
   posed train style --motion walk --from 02_02.amc 35_01.amc --to 08_01.amc --pose-space cmu43 \
       --out eight.style
@@ -31,7 +31,7 @@ make one model:
   subject = "ann"            # default: the file's stem
   motion = "walk")";
 
-struct Options {
+struct TrainStyleOptions {
   std::vector<std::string> from, to;
   std::string motion = "walk", experiment, skeleton, out;
   std::string pose_space = "native", mode = "default";
@@ -41,7 +41,7 @@ struct Options {
 };
 
 // The command line's own form of an experiment: each clip is one subject.
-Result<Experiment> experiment_of(const Options& options) {
+Result<Experiment> experiment_of(const TrainStyleOptions& options) {
   if (!options.experiment.empty()) {
     if (!options.from.empty() || !options.to.empty()) {
       return misuse("--experiment names the clips itself; leave out --from and --to");
@@ -70,7 +70,7 @@ Result<Experiment> experiment_of(const Options& options) {
   return experiment;
 }
 
-void print_summary(const json& report, const std::string& out) {
+void print_style_summary(const json& report, const std::string& out) {
   std::printf("%-12s %-10s %-28s %8s %8s\n", "group", "motion", "clip", "period", "theta0");
   for (const json& clip : report["clips"]) {
     if (clip["dropped_first_frame"].get<bool>()) {
@@ -96,7 +96,7 @@ double overall(std::string_view step, double fraction) {
   return 0.9 + 0.1 * fraction;
 }
 
-Result<json> train(const Options& options) {
+Result<json> train_style(const TrainStyleOptions& options) {
   auto experiment = experiment_of(options);
   if (!experiment) return std::unexpected(experiment.error());
   return train_and_save(*experiment, options.seed, options.out);
@@ -130,8 +130,8 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
 
 void add_train_style(CLI::App& train_command, int& exit_code) {
   CLI::App* style = train_command.add_subcommand("style", "Learn what makes one style another");
-  style->footer(kFooter);
-  const auto options = std::make_shared<Options>();
+  style->footer(kTrainStyleFooter);
+  const auto options = std::make_shared<TrainStyleOptions>();
   style->add_option("--from", options->from, "Clips of the style to change");
   style->add_option("--to", options->to, "Clips of the style to give");
   style->add_option("--motion", options->motion, "What all clips show")->capture_default_str();
@@ -148,13 +148,13 @@ void add_train_style(CLI::App& train_command, int& exit_code) {
   style->add_option("--out", options->out, "Where to write the model")->required();
   style->add_flag("--json", options->json, "One JSON object on stdout");
   style->callback([options, &exit_code] {
-    const auto report_or = train(*options);
+    const auto report_or = train_style(*options);
     if (!report_or) {
       exit_code = report(report_or.error());
     } else if (options->json) {
       std::printf("%s\n", report_or->dump(2).c_str());
     } else {
-      print_summary(*report_or, options->out);
+      print_style_summary(*report_or, options->out);
     }
   });
 }

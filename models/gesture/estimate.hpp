@@ -8,6 +8,8 @@
 
 namespace posed::gesture {
 
+inline constexpr double kMinDurationVariance = 0.25;  // of a state [frames^2]: half a frame
+
 // Sums over examples; states x dimensions where two words are needed.
 struct Statistics {
   Eigen::VectorXd occupancy;      // expected frames in each state

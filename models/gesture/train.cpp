@@ -18,7 +18,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kMinDurationExamples = 5.0;
-constexpr double kMinDurationVariance = 0.25;
 constexpr double kTreesFrom = 0.95;  // of the progress: the alignments take nearly all the time
 
 // The label of every segment has its classes; marks those that were recorded.

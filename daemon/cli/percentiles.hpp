@@ -1,0 +1,13 @@
+// How a benchmark tells a distribution: never by its mean alone.
+#pragma once
+
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace posed::cli {
+
+// {"p50_us", "p99_us", "p99_9_us", "max_us"}; at least one value.
+[[nodiscard]] nlohmann::json percentiles(std::vector<double> values_us);
+
+}  // namespace posed::cli
