@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 
+#include "drivers/cyberglove/cyberglove.hpp"
 #include "drivers/described/described.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/file/file.hpp"
@@ -13,6 +14,7 @@ namespace posed::drivers {
 
 std::span<const Driver> registry() {
   static const std::array drivers{
+      cyberglove_driver(),
       described_driver(),
       file_driver(),
       labels_driver(),

@@ -45,8 +45,10 @@ Result<Calibration> compile(const Model& model) {
   const auto rows =
       parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors);
   if (!rows) return std::unexpected(rows.error());
-  std::ranges::copy(*rows, made.map.begin());
-  made.map_rows = rows->size();
+  for (const MapRow& row : *rows) {
+    made.map[made.map_rows] = row;
+    made.map[made.map_rows++].gain *= static_cast<float>(model.sensors[row.sensor].map_sign);
+  }
   return made;
 }
 

@@ -16,6 +16,7 @@ struct Sensor {
   double raw_max = 255.0;
   Curve curve;               // raw to calibrated value by default
   std::string unit = "rad";  // of the calibrated value; "1" for a share of the finger's way
+  double map_sign = 1.0;     // -1 where this hand's value runs against the map: its gain is turned
 };
 
 struct Model {

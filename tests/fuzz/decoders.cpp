@@ -43,6 +43,11 @@ std::string amc_description() {
          std::to_string(kAsf.size()) + "\n" + std::string(kAsf) + "1\nroot 0 1 0 0 0 0\nb 1 2\n";
 }
 
+std::string cyberglove_greeting(const std::string& form) {
+  return "cyberglove hand=left sensors=18 mask=8108863 form=" + form +
+         " mode=stream time=1 status=1 ticks=1152 multiplier=3";
+}
+
 void demand(bool holds) {
   if (!holds) std::abort();
 }
@@ -96,7 +101,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span bytes = std::as_bytes(std::span(data + 2, size - 2));
   const std::size_t piece = 1U + data[1];
   const std::string text(reinterpret_cast<const char*>(data + 2), size - 2);
-  switch (data[0] % 7) {
+  switch (data[0] % 8) {
     case 0:
       try_bytes("file", std::string(kBvh), piece, bytes);
       break;
@@ -117,6 +122,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     case 5:
       try_bytes("lucidgloves", "lucidgloves hand=right encoding=auto max=4095", piece, bytes);
       (void)decoder_of("lucidgloves", text);
+      break;
+    case 6:
+      try_bytes("cyberglove", cyberglove_greeting("8bit"), piece, bytes);
+      try_bytes("cyberglove", cyberglove_greeting("16bit"), piece, bytes);
+      (void)decoder_of("cyberglove", text);
       break;
     default:
       if (const auto decoder = decoder_of("file", text)) {

@@ -28,6 +28,9 @@ struct Blind {
   const char* why;
 };
 constexpr std::array kBlind{
+    Blind{"cyberglove-16bit", 0.3, "no checksum: the lower 12 bits of a value may flip"},
+    Blind{"cyberglove-18", 0.4, "no checksum: a byte that flips to another than 0 is a value"},
+    Blind{"cyberglove-22", 0.4, "no checksum: a byte that flips to another than 0 is a value"},
     Blind{"described-bebop-forte", 0.6, "nothing checks its bytes but marks and ranges"},
     Blind{"described-vmg30", 0.005, "a sum of 8 bits misses one in 256 of two faults in a packet"},
     Blind{"lucidgloves-alpha", 0.9, "a line of text without a checksum: other digits are a line"},

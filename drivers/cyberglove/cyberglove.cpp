@@ -1,0 +1,215 @@
+#include "drivers/cyberglove/cyberglove.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/cyberglove/decoder.hpp"
+#include "drivers/cyberglove/emulator.hpp"
+#include "drivers/cyberglove/greeting.hpp"
+#include "drivers/cyberglove/start.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/connect.hpp"
+#include "drivers/options.hpp"
+#include "drivers/transport/ports.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::drivers {
+namespace {
+
+using namespace cyberglove;
+
+constexpr std::uint32_t kFtdi = 0x0403'6001;  // of the III's USB; the II's dongles differ
+constexpr double kMaxRate_hz = 1000.0;
+constexpr double kSilence_s = 1.0;
+constexpr std::int64_t kTicksAFrame = 3840;  // 1/115200 s in one of 30 frames a second
+
+template <std::size_t N>
+Result<std::size_t> choice(const Options& options, const std::string& name,
+                           const std::array<std::string_view, N>& names) {
+  const auto& given = option<std::string>(options, name);
+  const auto at = std::ranges::find(names, std::string_view(given));
+  if (at != names.end()) return static_cast<std::size_t>(at - names.begin());
+  std::string known;
+  for (const std::string_view one : names) known += (known.empty() ? "" : ", ") + std::string(one);
+  return misuse(name + " should be one of " + known);
+}
+
+// The III's frames: 30 a second, times a multiplier of at most 3 (the maker verified 100 Hz), or
+// one in every few.
+void set_frames(double rate_hz, Wish& wish) {
+  const double frames = rate_hz > 0.0 ? rate_hz / kFrames_hz : 3.0;
+  wish.layout.multiplier = static_cast<int>(std::clamp(std::round(frames), 1.0, 3.0));
+  wish.divider = static_cast<int>(std::clamp(std::round(1.0 / std::min(frames, 1.0)), 1.0, 255.0));
+}
+
+std::int64_t ticks_of(const Wish& wish) {
+  if (wish.layout.form == Form::k8Bit) return wish.period.ticks();
+  return kTicksAFrame * wish.divider / wish.layout.multiplier;
+}
+
+Result<Wish> wish_of(const Options& options) {
+  const auto hand = glove::hand_option(options);
+  if (!hand) return std::unexpected(hand.error());
+  const auto form = choice(options, "form", kForms);
+  if (!form) return std::unexpected(form.error());
+  const auto mode = choice(options, "mode", kModes);
+  if (!mode) return std::unexpected(mode.error());
+  Wish wish{.hand = *hand,
+            .sensors = static_cast<int>(option<std::int64_t>(options, "sensors")),
+            .layout = {.form = static_cast<Form>(*form),
+                       .mode = static_cast<Mode>(*mode),
+                       .mask = kMask22,
+                       .time = option<bool>(options, "time"),
+                       .multiplier = 1},
+            .filter = option<bool>(options, "filter"),
+            .period = {},
+            .over_tcp = option<std::string>(options, "link") == "tcp",
+            .baud = option<std::int64_t>(options, "baud")};
+  if (wish.sensors == 18) wish.layout.mask = kMask18;
+  const auto rate_hz = option<double>(options, "rate_hz");
+  if (!(rate_hz >= 0.0 && rate_hz <= kMaxRate_hz) || (rate_hz > 0.0 && rate_hz < 1.0)) {
+    return misuse("rate_hz should be 1 to 1000, or 0 for as fast as the glove can");
+  }
+  if (wish.layout.mode == Mode::kPoll && rate_hz == 0.0) {
+    return misuse("a polled glove needs a rate_hz above 0");
+  }
+  if (wish.layout.mode == Mode::kSync && wish.layout.form == Form::k16Bit) {
+    return misuse("mode = \"sync\" goes with form = \"8bit\" only");
+  }
+  wish.period = period_of(rate_hz);
+  if (wish.layout.form == Form::k16Bit) set_frames(rate_hz, wish);
+  return wish;
+}
+
+Result<Wish> wish_of_given(const Options& given) {
+  const auto options = complete_options(cyberglove_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  return wish_of(*options);
+}
+
+Result<Description> describe(const std::string& text, const std::string& identity) {
+  const auto glove = read_greeting(text, identity);
+  if (!glove) return std::unexpected(glove.error());
+  const auto model = cyberglove::glove_model(glove->hand);
+  if (!model) return std::unexpected(model.error());
+  const std::array<std::string, kExtras> extra_names{"switch", "light"};
+  return Description{
+      .driver = "cyberglove",
+      .text = text,
+      .identity = identity,
+      .skeleton = std::make_shared<Skeleton>(hand_skeleton(glove->hand)),
+      .samples = glove::sample_layout(*model, extra_names),
+      .rate_hz = glove->ticks == 0 ? 0.0 : kTicks_hz / static_cast<double>(glove->ticks)};
+}
+
+Result<Description> expect(const Options& given) {
+  const auto wish = wish_of_given(given);
+  if (!wish) return std::unexpected(wish.error());
+  const auto id = given.find("id");
+  return describe(
+      greeting_of({.hand = wish->hand, .layout = wish->layout, .ticks = ticks_of(*wish)}),
+      id == given.end() ? std::string() : std::get<std::string>(id->second));
+}
+
+Result<glove::Model> model_of(const Description& description) {
+  const auto glove = read_greeting(description.text, description.identity);
+  if (!glove) return std::unexpected(glove.error());
+  return cyberglove::glove_model(glove->hand);
+}
+
+Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
+  const auto glove = read_greeting(description.text, description.identity);
+  if (!glove) return std::unexpected(glove.error());
+  const auto model = cyberglove::glove_model(glove->hand);
+  if (!model) return std::unexpected(model.error());
+  auto calibration = glove::default_calibration(*model);
+  if (!calibration) return std::unexpected(calibration.error());
+  if (glove->layout.form == Form::k16Bit) {
+    return std::make_unique<Decoder16>(description.skeleton, std::move(*calibration), glove->hand,
+                                       glove->layout);
+  }
+  return std::make_unique<Decoder8>(description.skeleton, std::move(*calibration), glove->hand,
+                                    glove->layout);
+}
+
+Poll poll_of(const Wish& wish) {
+  if (wish.layout.mode != Mode::kPoll) return {};
+  const std::string_view request = wish.layout.form == Form::k8Bit ? "G" : "1G";
+  const auto bytes = std::as_bytes(std::span(request));
+  return {.request = {bytes.begin(), bytes.end()},
+          .period_ns = std::llround(1e9 * static_cast<double>(ticks_of(wish)) / kTicks_hz)};
+}
+
+Result<Device> open(const Options& given, Ports& ports) {
+  const auto options = complete_options(cyberglove_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const auto wish = wish_of(*options);
+  if (!wish) return std::unexpected(wish.error());
+  auto link = glove::connect(*options, ports, {kFtdi});
+  if (!link) return std::unexpected(link.error());
+  const auto layout = start(*link, *wish);
+  if (!layout) return std::unexpected(layout.error());
+  auto description =
+      describe(greeting_of({.hand = wish->hand, .layout = *layout, .ticks = ticks_of(*wish)}),
+               link->identity());
+  if (!description) return std::unexpected(description.error());
+  auto decoder = make_decoder(*description);
+  if (!decoder) return std::unexpected(decoder.error());
+  return Device{.description = std::move(*description),
+                .transport = make_link_transport(std::move(*link)),
+                .decoder = std::move(*decoder),
+                .warnings = {},
+                .poll = poll_of(*wish),
+                .reopen_after_s = kSilence_s};
+}
+
+Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
+  const auto wish = wish_of_given(given);
+  if (!wish) return std::unexpected(wish.error());
+  const bool is_iii = wish->layout.form == Form::k16Bit;
+  return CyberGloveEmulator::make(
+      {.hand = wish->hand,
+       .mask = wish->layout.mask,
+       .level_one = is_iii,
+       .info = is_iii ? "CyberGlove III, Version 3.0" : "CyberGlove II, Version 2.1"});
+}
+
+std::vector<OptionSpec> all_options() {
+  std::vector<OptionSpec> options = glove::serial_options(115200);
+  for (OptionSpec& tcp : glove::tcp_options("127.0.0.1:5200")) options.push_back(std::move(tcp));
+  options.push_back({.name = "form",
+                     .default_value = std::string("8bit"),
+                     .help = "8bit, or 16bit for the records of a CyberGlove III"});
+  options.push_back({.name = "mode",
+                     .default_value = std::string("stream"),
+                     .help = "stream; poll asks for each sample; sync waits for the box's input"});
+  options.push_back({.name = "rate_hz",
+                     .default_value = 100.0,
+                     .help = "samples a second; 0: as fast as the glove can"});
+  options.push_back({.name = "time",
+                     .default_value = true,
+                     .help = "have the glove stamp its 8-bit samples with its own clock"});
+  options.push_back(
+      {.name = "filter", .default_value = true, .help = "the box's own digital filter"});
+  options.push_back({.name = "sensors",
+                     .default_value = std::int64_t{0},
+                     .help = "18 or 22 to refuse a glove with another number; 0: any"});
+  return options;
+}
+
+}  // namespace
+
+const Driver& cyberglove_driver() {
+  static const Driver driver{.name = "cyberglove",
+                             .summary = "CyberGlove I, II and III over a serial port or TCP",
+                             .options = all_options(),
+                             .open = open,
+                             .make_decoder = make_decoder,
+                             .describe = describe,
+                             .expect = expect,
+                             .glove_model = model_of,
+                             .emulate = emulate};
+  return driver;
+}
+
+}  // namespace posed::drivers

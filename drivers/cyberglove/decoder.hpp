@@ -1,0 +1,85 @@
+// Bytes of a CyberGlove to samples and frames: one decoder for each form.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "drivers/cyberglove/angles.hpp"
+#include "drivers/cyberglove/protocol.hpp"
+#include "drivers/cyberglove/stamp_clock.hpp"
+#include "drivers/glove/glove_decoder.hpp"
+
+namespace posed::drivers::cyberglove {
+
+inline constexpr std::size_t kExtras = 2;  // switch, light
+
+class CyberGloveDecoder : public glove::GloveDecoder {
+ public:
+  CyberGloveDecoder(std::shared_ptr<const Skeleton> skeleton,
+                    std::shared_ptr<const glove::Calibration> calibration, Side hand,
+                    const Layout& layout)
+      : GloveDecoder(std::move(skeleton), std::move(calibration)), hand_(hand), layout_(layout) {}
+
+ protected:
+  [[nodiscard]] const Layout& layout() const noexcept { return layout_; }
+
+ private:
+  void compute(std::span<float> value, Valid& valid) const noexcept final {
+    compute_angles(calibration().parameter[kAbductionBias], hand_, layout_.mask, value, valid);
+  }
+
+  Side hand_;
+  Layout layout_;
+};
+
+// Frames by length and end mark together: 'S' is a legal value, and no byte inside is zero.
+class Decoder8 final : public CyberGloveDecoder {
+ public:
+  using CyberGloveDecoder::CyberGloveDecoder;
+
+  // RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+ private:
+  void take_piece(Sink& sink) noexcept;
+  [[nodiscard]] Outcome check_piece(std::span<const std::byte> piece) const noexcept;
+  void take_sample(std::span<const std::byte> piece, Sink& sink) noexcept;
+
+  std::array<std::byte, kMaxSample> piece_{};  // since the last end mark
+  std::size_t size_ = 0;
+  bool lost_ = false;  // the piece is longer than any sample: nothing of it is kept
+  StampClock clock_{std::int64_t{1} << 32, std::int64_t{10} * 115200};
+  std::array<std::byte, kSensors + kStampBytes> before_{};  // the last sample, without its status
+};
+
+// Records by time pattern and end: zeros are legal inside.
+class Decoder16 final : public CyberGloveDecoder {
+ public:
+  Decoder16(std::shared_ptr<const Skeleton> skeleton,
+            std::shared_ptr<const glove::Calibration> calibration, Side hand,
+            const Layout& record_layout)
+      : CyberGloveDecoder(std::move(skeleton), std::move(calibration), hand, record_layout),
+        clock_(sub_frames_a_day(record_layout.multiplier),
+               std::int64_t{10} * kFrames_hz * record_layout.multiplier) {}
+
+  // RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+ private:
+  void add(std::byte byte, Sink& sink) noexcept;
+  void hunt(Sink& sink) noexcept;
+  [[nodiscard]] bool could_be_record() const noexcept;
+  void take_record(Sink& sink) noexcept;
+
+  std::array<std::byte, kRecordBytes> record_{};
+  std::size_t size_ = 0;
+  std::size_t strays_ = 0;  // bytes since the last record that belong to none
+  bool told_ = false;       // of this hunt
+  StampClock clock_;
+};
+
+}  // namespace posed::drivers::cyberglove

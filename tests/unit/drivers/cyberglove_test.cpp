@@ -1,0 +1,494 @@
+// CyberGlove: bytes, angles and clocks; real joint angles turned back into its bytes.
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "drivers/cyberglove/angles.hpp"
+#include "drivers/cyberglove/cyberglove.hpp"
+#include "drivers/cyberglove/emulator.hpp"
+#include "drivers/cyberglove/greeting.hpp"
+#include "drivers/cyberglove/stamp_clock.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
+
+namespace posed::drivers::cyberglove {
+namespace {
+
+using test::CollectSink;
+using Raw = std::array<double, kSensors>;
+
+std::unique_ptr<Decoder> decoder_of(const Greeted& glove) {
+  const auto description = cyberglove_driver().describe(greeting_of(glove), "test");
+  if (!description) FAIL(description.error().text());
+  auto decoder = cyberglove_driver().make_decoder(*description);
+  if (!decoder) FAIL(decoder.error().text());
+  return std::move(*decoder);
+}
+
+std::unique_ptr<CyberGloveEmulator> emulator_of(EmulatorSettings settings) {
+  auto emulator = CyberGloveEmulator::make(std::move(settings));
+  if (!emulator) FAIL(emulator.error().text());
+  return std::move(*emulator);
+}
+
+Emulator::Bytes tell(Emulator& emulator, std::string_view text) {
+  Emulator::Bytes answer;
+  emulator.receive(std::as_bytes(std::span(text)), 0, answer);
+  return answer;
+}
+
+std::string text_of(const Emulator::Bytes& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Emulator::Bytes next(Emulator& emulator) {
+  Emulator::Bytes bytes;
+  emulator.emit(emulator.next_due_ns(), bytes);
+  return bytes;
+}
+
+// Counts that stand in the middle of what a hand does, each another.
+Raw some_raw() {
+  Raw raw{};
+  for (std::size_t i = 0; i < kSensors; ++i) raw[i] = 60.0 + 5.0 * static_cast<double>(i);
+  raw[kThumbMcp] = 'S';
+  return raw;
+}
+
+constexpr Layout kPlain22{.mask = kMask22, .time = false, .status = false};
+
+std::string plain_start() { return std::string("U\0D\0S", 5); }
+
+// One GraspDB14 recording: rows of 23 angles [rad] in mask order.
+std::vector<Raw> grasp_angles(const std::filesystem::path& path) {
+  constexpr std::size_t kBefore = 7;  // date, time, switch
+  std::vector<Raw> rows;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::vector<double> row;
+    for (double value = 0.0; words >> value;) row.push_back(value);
+    if (row.size() < kBefore + kSensors) continue;
+    rows.emplace_back();
+    std::copy_n(row.begin() + kBefore, kSensors, rows.back().begin());
+  }
+  return rows;
+}
+
+// Radians that a count is worth, with the sign.
+double count_rad(const glove::Model& model, std::size_t sensor) {
+  const glove::Curve& line = model.sensors[sensor].curve;
+  return (static_cast<double>(line.value[1]) - static_cast<double>(line.value[0])) /
+         (static_cast<double>(line.raw[1]) - static_cast<double>(line.raw[0]));
+}
+
+// Counts that a glove with the default gains would have sent for these angles.
+Raw counts_of(Raw angles, const glove::Model& model) {
+  uncompute_angles(Side::kRight, angles);
+  Raw raw{};
+  for (std::size_t i = 0; i < kSensors; ++i) {
+    const double zero = static_cast<double>(model.sensors[i].curve.raw[0]);
+    raw[i] = zero + angles[i] / count_rad(model, i);
+  }
+  return raw;
+}
+
+double distal(double pip) { return std::copysign(std::abs(0.32 * pip * pip + 0.17 * pip), pip); }
+
+}  // namespace
+
+TEST_CASE("a CyberGlove's masks have the sensors that its gloves have") {
+  CHECK(std::popcount(kMask18) == 18);
+  CHECK(std::popcount(kMask22) == 22);
+  CHECK((kMask18 & ~kMask22) == 0);
+  for (const std::size_t dip : {kIndexDip, kMiddleDip, kRingDip, kLittleDip}) {
+    CHECK((kMask18 >> dip & 1) == 0);
+    CHECK((kMask22 >> dip & 1) == 1);
+  }
+  CHECK((kMask22 >> kIndexAbd & 1) == 0);
+}
+
+TEST_CASE("real joint angles, turned back into a CyberGlove's bytes, come back") {
+  const auto folder = test::shared("data/gloves/graspdb14_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  const auto model = glove_model(Side::kRight);
+  REQUIRE(model);
+  const Layout layout{.mask = kMask18, .time = true, .status = true};
+  std::size_t frames = 0;
+  double worst_counts = 0.0;
+  double worst_distal = 0.0;
+  for (const auto& file : std::filesystem::directory_iterator(*folder)) {
+    const auto emulator = emulator_of({.mask = kMask18});
+    const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1920});
+    (void)tell(*emulator, "u 1\rd 1\rt 1920 1\rS");
+    for (const Raw& angles : grasp_angles(file.path())) {
+      emulator->set_raw(counts_of(angles, *model));
+      CollectSink sink(1);
+      decoder->feed(next(*emulator), 0, sink);
+      REQUIRE(sink.samples.size() == 1);
+      const Sample& sample = sink.samples[0];
+      ++frames;
+      for (std::size_t i = 0; i < kSensors; ++i) {
+        REQUIRE(sample.valid[i]);
+        const double difference = static_cast<double>(sample.value[i]) - angles[i];
+        worst_counts = std::max(worst_counts, std::abs(difference / count_rad(*model, i)));
+      }
+      for (const std::size_t dip : {kIndexDip, kMiddleDip, kRingDip, kLittleDip}) {
+        const double difference = static_cast<double>(sample.value[dip]) - angles[dip];
+        worst_distal = std::max(worst_distal, std::abs(difference));
+      }
+    }
+  }
+  WARN(frames << " real frames: at worst " << worst_counts << " counts and, distal joints, "
+              << worst_distal << " rad");
+  CHECK(frames > 8000);
+  CHECK(worst_counts < 0.5);
+  CHECK(worst_distal < 1e-5);
+}
+
+TEST_CASE("an 18-sensor CyberGlove's distal joints are computed, a 22's are measured") {
+  for (const std::uint32_t mask : {kMask18, kMask22}) {
+    const auto emulator = emulator_of({.mask = mask});
+    const auto decoder = decoder_of(
+        {.hand = Side::kRight, .layout = {.mask = mask, .time = false, .status = false}});
+    (void)tell(*emulator, plain_start());
+    emulator->set_raw(some_raw());
+    CollectSink sink;
+    decoder->feed(next(*emulator), 0, sink);
+    REQUIRE(sink.samples.size() == 1);
+    const Sample& sample = sink.samples[0];
+    for (std::size_t i = 0; i < kSensors; ++i) CHECK(sample.valid[i]);
+    for (std::size_t i = 0; i < kSensors; ++i) {
+      CHECK(sample.valid[kSensors + i] == ((mask >> i & 1) != 0));
+      if (sample.valid[kSensors + i]) {
+        CHECK(static_cast<double>(sample.value[kSensors + i]) == some_raw()[i]);
+      }
+    }
+    const double pip = static_cast<double>(sample.value[kIndexPip]);
+    const bool computed = static_cast<double>(sample.value[kIndexDip]) == Approx(distal(pip));
+    CHECK(computed == (mask == kMask18));
+    CHECK_FALSE(sample.valid[2 * kSensors]);  // no status byte: switch and light are not known
+  }
+}
+
+TEST_CASE("abductions of a CyberGlove are relative, and a left hand's are mirrored") {
+  std::array<float, kSensors> right{};
+  right[kMiddleAbd] = 0.3F;
+  right[kRingAbd] = -0.1F;
+  right[kLittleAbd] = -0.2F;
+  right[kThumbRoll] = 0.9F;
+  right[kThumbAbd] = -0.4F;
+  right[kWristYaw] = 0.1F;
+  auto left = right;
+  Valid valid = kMask22;
+  compute_angles(0.25F, Side::kRight, kMask22, right, valid);
+  CHECK(valid[kIndexAbd]);
+  CHECK(right[kMiddleAbd] == Approx(-0.05));
+  CHECK(right[kIndexAbd] == Approx(0.25));
+  CHECK(right[kRingAbd] == Approx(-0.15));
+  CHECK(right[kLittleAbd] == Approx(-0.35));
+  CHECK(right[kThumbRoll] == 0.5F);
+  compute_angles(0.25F, Side::kLeft, kMask22, left, valid);
+  for (const std::size_t i : {kThumbAbd, kIndexAbd, kMiddleAbd, kRingAbd, kLittleAbd, kWristYaw}) {
+    CHECK(left[i] == -right[i]);
+  }
+  CHECK(left[kThumbRoll] == right[kThumbRoll]);
+  valid = kMask22;
+  valid[kRingAbd] = false;
+  compute_angles(0.25F, Side::kRight, kMask22, right, valid);
+  for (const std::size_t i : {kIndexAbd, kMiddleAbd, kRingAbd, kLittleAbd}) CHECK_FALSE(valid[i]);
+}
+
+TEST_CASE("a pose given to the CyberGlove's emulator comes out of the decoder, either hand") {
+  for (const Side hand : {Side::kRight, Side::kLeft}) {
+    const auto emulator = emulator_of({.hand = hand});
+    const auto decoder = decoder_of({.hand = hand, .layout = kPlain22});
+    (void)tell(*emulator, plain_start());
+    // The middle finger's own spread follows from its neighbours'.
+    constexpr double kIndex = 0.2, kRing = 0.1, kBias = 0.248;
+    constexpr double kMiddle = -kBias * (kIndex - kRing) / (1.0 - 2.0 * kBias);
+    HandAngles pose{};
+    for (std::size_t f = 0; f < kFingers; ++f) {
+      for (std::size_t j = f == 0 ? 1 : 0; j < kFingerJoints; ++j) {
+        pose[f * kFingerChannels + 3 * j] = 0.3 + 0.1 * static_cast<double>(f + j);
+      }
+    }
+    pose[1] = 0.4;  // thumb away from the palm
+    pose[2] = 0.5;  // and rolled
+    pose[kFingerChannels + 1] = kIndex;
+    pose[3 * kFingerChannels + 1] = kRing;
+    pose[4 * kFingerChannels + 1] = 0.25;
+    pose[2 * kFingerChannels + 1] = kMiddle;
+    emulator->pose(pose);
+    CollectSink sink;
+    decoder->feed(next(*emulator), 0, sink);
+    REQUIRE(sink.frames.size() == 1);
+    const HandAngles got = hand_angles(sink.frames[0]);
+    for (std::size_t c = 0; c < got.size(); ++c) {
+      INFO("channel " << c);
+      CHECK(got[c] == Approx(pose[c]).margin(0.03));
+    }
+  }
+}
+
+TEST_CASE("an 8-bit sample is framed by length and end together") {
+  const auto emulator = emulator_of({});
+  (void)tell(*emulator, plain_start());
+  emulator->set_raw(some_raw());  // one value is 'S'
+  const Emulator::Bytes good = next(*emulator);
+  REQUIRE(good.size() == 24);
+  const auto outcomes = [&](Emulator::Bytes bytes) {
+    const auto decoder = decoder_of({.hand = Side::kRight, .layout = kPlain22});
+    CollectSink sink;
+    decoder->feed(good, 0, sink);
+    decoder->feed(bytes, 0, sink);
+    decoder->feed(good, 0, sink);
+    CHECK(sink.samples.size() == static_cast<std::size_t>(sink.count(Outcome::kOk)));
+    return sink.outcomes;
+  };
+  const auto expected = [](int ok, int is_short, int range, int foreign) {
+    return std::array<int, kOutcomes>{ok, is_short, 0, range, foreign};
+  };
+  CHECK(outcomes(good) == expected(3, 0, 0, 0));
+  CHECK(outcomes({good.begin(), good.begin() + 10}) == expected(1, 0, 0, 1));
+  auto bad = good;
+  bad.erase(bad.begin() + 5);  // dropped byte
+  CHECK(outcomes(bad) == expected(2, 1, 0, 0));
+  bad = good;
+  bad[5] = std::byte{0};
+  CHECK(outcomes(bad) == expected(2, 1, 0, 1));
+  bad = good;
+  bad.insert(bad.end() - 1, {std::byte{'e'}, std::byte{'s'}});
+  CHECK(outcomes(bad) == expected(3, 0, 0, 0));
+  bad.insert(bad.end() - 1, {std::byte{'e'}, std::byte{'g'}});  // unplugged: no measurement
+  CHECK(outcomes(bad) == expected(2, 0, 1, 0));
+  bad = good;
+  bad.insert(bad.end() - 1, std::byte{'x'});
+  CHECK(outcomes(bad) == expected(2, 0, 0, 1));
+  bad = good;
+  bad[0] = std::byte{'T'};
+  CHECK(outcomes(bad) == expected(2, 0, 0, 1));
+  CHECK(outcomes(Emulator::Bytes(1000, std::byte{'S'})) == expected(1, 0, 0, 1));
+}
+
+TEST_CASE("a CyberGlove's time stamp crosses zero bytes and its wrap") {
+  const Layout layout{.mask = kMask22, .time = true, .status = true};
+  for (const std::uint32_t first : {0U, 0xFFU, 0xFFFF'FF00U, 0x0100'0000U, 0xFFFF'FFFFU}) {
+    const auto emulator = emulator_of({.first_count = first});
+    const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1152});
+    (void)tell(*emulator, "u 1\rd 1\rt 1152 1\rS");
+    CollectSink sink;
+    for (int i = 0; i < 300; ++i) decoder->feed(next(*emulator), 0, sink);
+    REQUIRE(sink.samples.size() == 300);
+    for (std::size_t i = 0; i < 300; ++i) {
+      CHECK(sink.samples[i].header.device_ns == static_cast<std::int64_t>(i) * 10'000'000);
+    }
+  }
+}
+
+TEST_CASE("stamps with a flag that does not fit are no stamps; flags may be zero") {
+  std::uint32_t count = 0;
+  auto stamp = encode_stamp(0x01020304);
+  CHECK(decode_stamp(stamp, count));
+  CHECK(count == 0x01020304);
+  stamp[0] |= std::byte{1};
+  CHECK_FALSE(decode_stamp(stamp, count));
+  const Layout layout{.mask = kMask22, .time = true, .status = true};
+  const auto emulator = emulator_of({.first_count = 0x01010101});
+  const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1152});
+  (void)tell(*emulator, "u 1\rd 1\rt 1152 1\rS");
+  auto sample = next(*emulator);
+  REQUIRE(sample[23] == std::byte{0x80});
+  sample[23] = std::byte{0};
+  CollectSink sink;
+  decoder->feed(sample, 0, sink);
+  CHECK(sink.count(Outcome::kOk) == 1);
+}
+
+TEST_CASE("a doubtful stamp is believed when the next confirms it, and time always ascends") {
+  StampClock clock(1 << 20, 1000);
+  CHECK(clock.to(100) == 0);
+  CHECK(clock.to(110) == 10);
+  CHECK(clock.to(500'000) == 11);  // a flipped bit
+  CHECK(clock.to(120) == 20);      // was one
+  CHECK(clock.to(130) == 30);
+  CHECK(clock.to(130) == 31);  // a repeat
+  CHECK(clock.to(140) == 40);
+  CHECK(clock.to(5140) == 41);    // a pause
+  CHECK(clock.to(5150) == 5050);  // confirmed
+  CHECK(clock.to(50) == 5051);    // a restart
+  CHECK(clock.to(60) == 5060);    // goes on from where time was
+  CHECK(clock.to(70) == 5070);
+}
+
+TEST_CASE("a polled CyberGlove that has nothing new answers with what it had") {
+  const Layout layout{.mode = Mode::kPoll, .mask = kMask22, .time = false, .status = false};
+  const auto emulator = emulator_of({});
+  const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
+  (void)tell(*emulator, std::string("U\0D\0", 4));
+  CollectSink sink;
+  emulator->set_raw(some_raw());
+  decoder->feed(tell(*emulator, "G"), 0, sink);
+  decoder->feed(tell(*emulator, "G"), 0, sink);
+  Raw other = some_raw();
+  other[kThumbIp] += 1.0;
+  emulator->set_raw(other);
+  decoder->feed(tell(*emulator, "G"), 0, sink);
+  REQUIRE(sink.samples.size() == 3);
+  CHECK(sink.samples[0].quality == Quality::kMeasured);
+  CHECK(sink.samples[1].quality == Quality::kHeld);
+  CHECK(sink.frames[1].quality == Quality::kHeld);
+  CHECK(sink.samples[2].quality == Quality::kMeasured);
+}
+
+TEST_CASE("a CyberGlove out of its box is counted, not posed; its switch is in the sample") {
+  const Layout layout{.mask = kMask22, .time = false, .status = true};
+  const auto emulator = emulator_of({});
+  const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
+  (void)tell(*emulator, std::string("U\1D\0W\1L\1S", 9));
+  CollectSink sink;
+  decoder->feed(next(*emulator), 0, sink);
+  REQUIRE(sink.samples.size() == 1);
+  CHECK(sink.samples[0].value[2 * kSensors] == 1.0F);
+  CHECK(sink.samples[0].value[2 * kSensors + 1] == 1.0F);
+  emulator->settings().plugged_in = false;
+  decoder->feed(next(*emulator), 0, sink);
+  CHECK(sink.samples.size() == 1);
+  CHECK(sink.count(Outcome::kOutOfRange) == 1);
+  emulator->settings().plugged_in = true;
+  decoder->feed(next(*emulator), 0, sink);
+  CHECK(sink.samples.size() == 2);
+}
+
+TEST_CASE("16-bit records: sixteenths of a count, strays skipped, midnight crossed") {
+  const Layout layout{.form = Form::k16Bit, .mask = kMask22, .multiplier = 3};
+  const auto emulator =
+      emulator_of({.level_one = true, .first_sub_frame = sub_frames_a_day(3) - 10});
+  const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1280});
+  CHECK(text_of(tell(*emulator, "1m\x03")) == std::string("1m\x03\0", 4));
+  const Emulator::Bytes echo = tell(*emulator, "1S");
+  CHECK(text_of(echo) == "1S");
+  Raw raw = some_raw();
+  raw[kIndexMcp] = 100.0625;
+  emulator->set_raw(raw);
+  CollectSink sink;
+  decoder->feed(echo, 0, sink);
+  for (int i = 0; i < 50; ++i) {
+    emulator->settings().stray_echo = i % 7 == 3;
+    decoder->feed(next(*emulator), 0, sink);
+  }
+  CHECK(sink.count(Outcome::kOk) == 50);
+  CHECK(sink.count(Outcome::kForeign) == 0);
+  REQUIRE(sink.samples.size() == 50);
+  CHECK(sink.samples[0].value[kSensors + kIndexMcp] == 100.0625F);
+  for (std::size_t i = 0; i < 50; ++i) {
+    CHECK(sink.samples[i].header.device_ns == static_cast<std::int64_t>(i) * 1'000'000'000 / 90);
+  }
+}
+
+TEST_CASE("a damaged 16-bit record costs itself, and one outcome") {
+  const Layout layout{.form = Form::k16Bit, .mask = kMask22, .multiplier = 1};
+  const auto emulator = emulator_of({.level_one = true});
+  (void)tell(*emulator, "1S");
+  std::vector<Emulator::Bytes> records;
+  for (int i = 0; i < 3; ++i) records.push_back(next(*emulator));
+  REQUIRE(records[0].size() == kRecordBytes);
+  const auto outcomes = [&](const Emulator::Bytes& middle) {
+    const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
+    CollectSink sink;
+    decoder->feed(records[0], 0, sink);
+    decoder->feed(middle, 0, sink);
+    decoder->feed(records[2], 0, sink);
+    return sink.outcomes;
+  };
+  const auto expected = [](int ok, int range, int foreign) {
+    return std::array<int, kOutcomes>{ok, 0, 0, range, foreign};
+  };
+  CHECK(outcomes(records[1]) == expected(3, 0, 0));
+  for (std::size_t lost = 0; lost < kRecordBytes; ++lost) {
+    INFO("without byte " << lost);
+    auto bad = records[1];
+    bad.erase(bad.begin() + static_cast<std::ptrdiff_t>(lost));
+    CHECK(outcomes(bad) == expected(2, 0, 1));
+  }
+  auto bad = records[1];
+  bad[20] = bad[21] = std::byte{0};
+  CHECK(outcomes(bad) == expected(2, 1, 0));
+  bad = records[1];
+  bad[20] = std::byte{0x10};
+  CHECK(outcomes(bad) == expected(2, 1, 0));
+  bad = records[1];
+  bad[0] = std::byte{'3'};
+  CHECK(outcomes(bad) == expected(2, 1, 0));
+}
+
+TEST_CASE("an 18-sensor glove's 16-bit records have empty places") {
+  const Layout layout{.form = Form::k16Bit, .mask = kMask18, .multiplier = 1};
+  const auto emulator = emulator_of({.mask = kMask18, .level_one = true});
+  const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
+  (void)tell(*emulator, "1S");
+  CollectSink sink;
+  decoder->feed(next(*emulator), 0, sink);
+  CHECK(sink.count(Outcome::kOk) == 1);
+  CHECK(sink.samples[0].valid[kIndexDip]);
+  CHECK_FALSE(sink.samples[0].valid[kSensors + kIndexDip]);
+}
+
+TEST_CASE("the emulated CyberGlove answers like the real one") {
+  const auto emulator = emulator_of({.mask = kMask18});
+  const auto ask = [&](std::string_view text) { return text_of(tell(*emulator, text)); };
+  using namespace std::string_literals;
+  CHECK(ask("?i").contains("CyberGlove"));
+  CHECK(ask("?i").back() == '\0');
+  CHECK(ask("?G") == "?G\x03\0"s);
+  CHECK(ask("?S") == "?S\x12\0"s);
+  CHECK(ask("?K") == "?K\x3F\xBB\x7B\0"s);
+  CHECK(ask("?D") == "?D\0\0"s);
+  CHECK(ask("?d") == "?d 0\r\n\0"s);
+  CHECK(ask("?R") == "?R\1\0"s);
+  CHECK(ask("D\1"s) == "D\0"s);
+  CHECK(ask("?D") == "?D\1\0"s);
+  CHECK(ask("d 0\r") == "d 0\0"s);
+  CHECK(ask("?D") == "?D\0\0"s);
+  CHECK(ask("t 1152 1\r") == "t 1152 1\0"s);
+  CHECK(ask("?T") == "?T\x04\x80\x00\x01\0"s);
+  CHECK(ask("?t") == "?t 1152 1\r\n\0"s);
+  CHECK(ask("t x\r") == "en\0"s);
+  CHECK(ask("\r\n").empty());
+  CHECK(ask("^c") == " e?\r\n\0"s);
+  CHECK(ask("X") == " e?\r\n\0"s);
+  CHECK(ask("1S").starts_with(" e?"));  // no III
+  (void)ask("\x03");
+  CHECK(emulator->next_due_ns() == kNoTime_ns);
+  CHECK(ask("g").starts_with("g "));
+  CHECK(ask("S").empty());
+  CHECK(emulator->next_due_ns() == 10'000'000);
+  CHECK(ask("^c") == " e?\r\n\0"s);  // no stop
+  CHECK(emulator->next_due_ns() == 10'000'000);
+  CHECK(ask("\x03") == "\x03\0"s);
+  CHECK(emulator->next_due_ns() == kNoTime_ns);
+  CHECK(ask("\x12") == "\x12\r\n\0"s);
+  CHECK(ask("?t") == "?t 1920 1\r\n\0"s);
+  emulator->settings().plugged_in = false;
+  CHECK(ask("?G") == "?G\x01\0"s);
+  CHECK(ask("?U") == "?U\0\0"s);
+  CHECK(ask("M\x01"s).empty());  // not whole yet
+  CHECK(ask("\0\0"s) == "M\0"s);
+  CHECK(ask("?M") == "?M\x01\0\0\0"s);
+}
+
+TEST_CASE("a CyberGlove's sensor that is stuck stays where it is") {
+  const auto emulator = emulator_of({.stuck_sensor = kIndexMcp, .stuck_at = 77});
+  const auto decoder = decoder_of({.hand = Side::kRight, .layout = kPlain22});
+  (void)tell(*emulator, plain_start());
+  emulator->set_raw(some_raw());
+  CollectSink sink;
+  decoder->feed(next(*emulator), 0, sink);
+  CHECK(sink.samples[0].value[kSensors + kIndexMcp] == 77.0F);
+}
+
+}  // namespace posed::drivers::cyberglove
