@@ -47,7 +47,9 @@ Result<> set_raw(int fd, const std::string& port, int baud) {
   if (::ioctl(fd, TCSETS2, &mode) != 0 || ::ioctl(fd, TCGETS2, &mode) != 0) {
     return fail(port + " refuses " + std::to_string(baud) + " baud (" + std::strerror(errno) + ")");
   }
-  if (std::abs(static_cast<double>(mode.c_ospeed) - baud) > kBaudError * baud) {
+  serial_struct uart{};  // a port without one (the gadget side of a USB cable) has no rate at all
+  if (::ioctl(fd, TIOCGSERIAL, &uart) == 0 &&
+      std::abs(static_cast<double>(mode.c_ospeed) - baud) > kBaudError * baud) {
     return fail(port + " cannot run at " + std::to_string(baud) + " baud; its nearest rate is " +
                 std::to_string(mode.c_ospeed));
   }

@@ -1,0 +1,28 @@
+// The lab's three devices, each a gadget with a way to speak through it and a way to open it from
+// the host's side.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/driver.hpp"
+
+namespace posed::lab {
+
+struct LabDevice {
+  std::string name;
+  bool serial = false;  // bytes, not reports
+  std::function<void()> plug, unplug;
+  // From the device: false when the host did not take it.
+  std::function<bool(std::span<const std::byte>)> say;
+  std::function<Result<std::unique_ptr<drivers::Transport>>()> open;
+  std::function<bool()> is_there;  // the kernel has found it
+};
+
+// One HID device on hidraw, one that only libusb reaches, one on ttyACM. Made once, unplugged.
+std::vector<std::unique_ptr<LabDevice>> lab_devices();
+
+}  // namespace posed::lab

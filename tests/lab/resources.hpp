@@ -1,0 +1,32 @@
+// What a process holds: to see that a replug leaves nothing behind.
+#pragma once
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace posed::lab {
+
+inline constexpr long kMemorySlack_kb = 512;  // pages that a heap touches late
+
+struct Resources {
+  long descriptors = 0;
+  long memory_kb = 0;  // resident
+
+  static Resources of(const std::string& process) {
+    const std::filesystem::path folder = std::filesystem::path("/proc") / process;
+    Resources found;
+    for ([[maybe_unused]] const auto& fd : std::filesystem::directory_iterator(folder / "fd")) {
+      ++found.descriptors;
+    }
+    long ignored = 0;
+    std::ifstream(folder / "statm") >> ignored >> found.memory_kb;
+    found.memory_kb *= ::sysconf(_SC_PAGESIZE) / 1024;
+    return found;
+  }
+  static Resources now() { return of("self"); }
+};
+
+}  // namespace posed::lab
