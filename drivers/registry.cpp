@@ -6,6 +6,7 @@
 #include "drivers/described/described.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/file/file.hpp"
+#include "drivers/fivedt/fivedt.hpp"
 #include "drivers/labels/labels.hpp"
 #include "drivers/lucidgloves/lucidgloves.hpp"
 #include "drivers/template/template.hpp"
@@ -17,6 +18,7 @@ std::span<const Driver> registry() {
       cyberglove_driver(),
       described_driver(),
       file_driver(),
+      fivedt_driver(),
       labels_driver(),
       lucidgloves_driver(),
       template_driver(),

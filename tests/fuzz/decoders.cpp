@@ -101,7 +101,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span bytes = std::as_bytes(std::span(data + 2, size - 2));
   const std::size_t piece = 1U + data[1];
   const std::string text(reinterpret_cast<const char*>(data + 2), size - 2);
-  switch (data[0] % 8) {
+  switch (data[0] % 9) {
     case 0:
       try_bytes("file", std::string(kBvh), piece, bytes);
       break;
@@ -127,6 +127,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       try_bytes("cyberglove", cyberglove_greeting("8bit"), piece, bytes);
       try_bytes("cyberglove", cyberglove_greeting("16bit"), piece, bytes);
       (void)decoder_of("cyberglove", text);
+      break;
+    case 7:
+      for (const char* model :
+           {"5", "5-wireless", "16", "ultra-wireless", "ultra-usb-5", "ultra-usb-14"}) {
+        try_bytes("fivedt", std::string("fivedt hand=left mode=poll kit_port=a model=") + model,
+                  piece, bytes);
+      }
+      (void)decoder_of("fivedt", text);
       break;
     default:
       if (const auto decoder = decoder_of("file", text)) {

@@ -20,8 +20,9 @@ struct Specimen {
   std::size_t chunk_frames = 0;  // a chunk gives
   std::size_t chunk_samples = 0;
   std::size_t chunk_packets = 1;
-  bool emulated = false;  // its driver's emulator stands for the device (emulated.hpp)
-  std::string start{};    // what the emulator has to hear before it streams
+  bool emulated = false;       // its driver's emulator stands for the device (emulated.hpp)
+  bool whole_reports = false;  // over USB: a packet comes whole or not at all
+  std::string start{};         // what the emulator has to hear before it streams
 };
 
 // Makes the clips they play in a folder of its own, removed at exit.

@@ -1,0 +1,52 @@
+// Packets of a 5DT glove to a hand and a sample each.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/fivedt/framer.hpp"
+#include "drivers/glove/glove_decoder.hpp"
+#include "drivers/glove/model.hpp"
+
+namespace posed::drivers::fivedt {
+
+// A wide glove's values where a hand is straight and where it is closed: by default, for want of a
+// calibration. VRPN's own thresholds lie at 1490 and 3030.
+inline constexpr double kStraight = 1500.0;
+inline constexpr double kBent = 3000.0;
+
+struct Settings {
+  Form form = Form::kFive;
+  bool polled = false;  // an exact repeat is the same measurement again
+  bool port_b = false;  // which glove of an Ultra Wireless kit
+};
+
+[[nodiscard]] Result<glove::Model> model(Form form);
+[[nodiscard]] SampleLayout layout(const glove::Model& model, Form form);
+
+class FiveDtDecoder final : public glove::GloveDecoder, private Readings {
+ public:
+  FiveDtDecoder(std::shared_ptr<const Skeleton> skeleton,
+                std::shared_ptr<const glove::Calibration> calibration, const Settings& settings)
+      : GloveDecoder(std::move(skeleton), std::move(calibration)),
+        settings_(settings),
+        framer_(settings.form) {}
+
+  // RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+ private:
+  void reading(const Reading& reading) noexcept override;
+  void outcome(Outcome outcome) noexcept override { sink_->outcome(outcome); }
+
+  Settings settings_;
+  Framer framer_;
+  Sink* sink_ = nullptr;  // of the feed() under way
+  std::array<std::uint16_t, kMaxValues> before_{};
+  bool has_before_ = false;
+};
+
+}  // namespace posed::drivers::fivedt

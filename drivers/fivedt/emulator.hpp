@@ -1,0 +1,30 @@
+// The other side of a 5DT glove of each form.
+#pragma once
+
+#include "drivers/emulator.hpp"
+#include "drivers/fivedt/decoder.hpp"
+#include "drivers/glove/pace.hpp"
+
+namespace posed::drivers::fivedt {
+
+class FiveDtEmulator final : public Emulator {
+ public:
+  // A Data Glove 5 is silent until it is told D or asked C; all others stream at once.
+  FiveDtEmulator(Side side, const Settings& settings);
+
+  void pose(const HandAngles& angles) override;
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
+  [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
+  void emit(std::int64_t now_ns, Bytes& out) override;
+
+ private:
+  void send(const Reading& reading, Bytes& out) const;
+
+  Side side_;
+  Settings settings_;
+  glove::Pace pace_;
+  Reading reading_;
+  int records_ = 0;
+};
+
+}  // namespace posed::drivers::fivedt

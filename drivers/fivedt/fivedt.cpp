@@ -1,0 +1,205 @@
+#include "drivers/fivedt/fivedt.hpp"
+
+#include <algorithm>
+
+#include "drivers/fivedt/decoder.hpp"
+#include "drivers/fivedt/emulator.hpp"
+#include "drivers/fivedt/start.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/connect.hpp"
+#include "drivers/glove/greeting.hpp"
+#include "drivers/options.hpp"
+#include "drivers/transport/ports.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::drivers {
+namespace {
+
+using fivedt::Form;
+using fivedt::Settings;
+
+constexpr std::string_view kName = "fivedt";
+constexpr double kSilence_s = 2.0;  // as VRPN has it
+constexpr std::uint16_t kVendor = 0x5D70;
+constexpr std::int64_t kMaxPoll_hz = 200;  // what 19200 baud carry of nine bytes and a letter
+constexpr std::array<std::string_view, 2> kModes{"stream", "poll"};
+constexpr std::array<std::string_view, 2> kKitPorts{"a", "b"};
+
+struct Greeted {
+  Side side = Side::kRight;
+  Settings settings;
+};
+
+bool is_usb(Form form) { return form == Form::kUltraUsb5 || form == Form::kUltraUsb14; }
+
+Result<Greeted> read_greeting(const std::string& text, const std::string& identity) {
+  glove::Greeting greeting(text, kName, identity);
+  Greeted glove;
+  glove.side = greeting.side();
+  glove.settings.form = static_cast<Form>(greeting.choice("model", fivedt::kFormNames));
+  glove.settings.polled = greeting.choice("mode", kModes) == 1;
+  glove.settings.port_b = greeting.choice("kit_port", kKitPorts) == 1;
+  if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
+  return glove;
+}
+
+std::string greeting_of(const Greeted& glove) {
+  const Settings& settings = glove.settings;
+  return std::string(kName) + " hand=" + std::string(glove::side_name(glove.side)) +
+         " model=" + std::string(fivedt::kFormNames[static_cast<std::size_t>(settings.form)]) +
+         " mode=" + std::string(kModes[settings.polled ? 1 : 0]) +
+         " kit_port=" + std::string(kKitPorts[settings.port_b ? 1 : 0]);
+}
+
+Result<Greeted> from_options(const Options& options) {
+  const auto side = glove::hand_option(options);
+  if (!side) return std::unexpected(side.error());
+  const auto model = std::ranges::find(fivedt::kFormNames,
+                                       std::string_view(option<std::string>(options, "model")));
+  if (model == fivedt::kFormNames.end()) {
+    return misuse(
+        "model should be \"5\", \"5-wireless\", \"16\", \"ultra-wireless\", "
+        "\"ultra-usb-5\" or \"ultra-usb-14\"");
+  }
+  const auto form = static_cast<Form>(model - fivedt::kFormNames.begin());
+  const auto poll_hz = option<std::int64_t>(options, "poll_hz");
+  if (poll_hz < 0 || poll_hz > kMaxPoll_hz || (poll_hz > 0 && form != Form::kFive)) {
+    return misuse("poll_hz should be 0 (stream) to 200; only model = \"5\" can be polled");
+  }
+  const auto& kit_port = option<std::string>(options, "kit_port");
+  const auto port = std::ranges::find(kKitPorts, std::string_view(kit_port));
+  if (port == kKitPorts.end()) return misuse("kit_port should be \"a\" or \"b\"");
+  return Greeted{
+      .side = *side,
+      .settings = {.form = form, .polled = poll_hz > 0, .port_b = port != kKitPorts.begin()}};
+}
+
+Result<Description> describe(const std::string& text, const std::string& identity) {
+  const auto glove = read_greeting(text, identity);
+  if (!glove) return std::unexpected(glove.error());
+  const auto model = fivedt::model(glove->settings.form);
+  if (!model) return std::unexpected(model.error());
+  return Description{.driver = std::string(kName),
+                     .text = text,
+                     .identity = identity,
+                     .skeleton = std::make_shared<Skeleton>(hand_skeleton(glove->side)),
+                     .samples = fivedt::layout(*model, glove->settings.form),
+                     .rate_hz = 0.0};
+}
+
+Result<Description> expect(const Options& given) {
+  const auto options = complete_options(fivedt_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const auto glove = from_options(*options);
+  if (!glove) return std::unexpected(glove.error());
+  return describe(greeting_of(*glove), option<std::string>(*options, "id"));
+}
+
+Result<glove::Model> glove_model(const Description& description) {
+  const auto glove = read_greeting(description.text, description.identity);
+  if (!glove) return std::unexpected(glove.error());
+  return fivedt::model(glove->settings.form);
+}
+
+Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
+  const auto glove = read_greeting(description.text, description.identity);
+  if (!glove) return std::unexpected(glove.error());
+  const auto model = fivedt::model(glove->settings.form);
+  if (!model) return std::unexpected(model.error());
+  auto calibration = glove::default_calibration(*model);
+  if (!calibration) return std::unexpected(calibration.error());
+  return std::make_unique<fivedt::FiveDtDecoder>(description.skeleton, std::move(*calibration),
+                                                 glove->settings);
+}
+
+// Bit 0 of the product is a left hand, 1 and 2 a wireless kit and its port B, 4 five sensors.
+std::vector<std::uint16_t> products(const Greeted& glove) {
+  const int base =
+      (glove.side == Side::kLeft ? 0x01 : 0) | (glove.settings.form == Form::kUltraUsb5 ? 0x10 : 0);
+  const auto product = [base](int bits) { return static_cast<std::uint16_t>(base | bits); };
+  return {product(0), product(0x02), product(0x06)};
+}
+
+// The baud of the glove's own line, for who gives none.
+std::int64_t usual_baud(Form form) {
+  if (form == Form::kFiveWireless) return 9600;
+  return form == Form::kUltraWireless ? 115200 : 19200;
+}
+
+Result<Link> reach(Options options, const Greeted& glove, Ports& ports) {
+  if (is_usb(glove.settings.form)) {
+    return ports.hid({.vendor = kVendor,
+                      .products = products(glove),
+                      .id = option<std::string>(options, "id"),
+                      .path = option<std::string>(options, "port")});
+  }
+  if (option<std::int64_t>(options, "baud") == 0) {
+    options["baud"] = usual_baud(glove.settings.form);
+  }
+  return glove::connect(options, ports, {});
+}
+
+Result<Device> open(const Options& given, Ports& ports) {
+  const auto options = complete_options(fivedt_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const auto glove = from_options(*options);
+  if (!glove) return std::unexpected(glove.error());
+  auto link = reach(*options, *glove, ports);
+  if (!link) return std::unexpected(link.error());
+  auto warnings = fivedt::start(*link, glove->side, glove->settings);
+  if (!warnings) return std::unexpected(warnings.error());
+  auto description = describe(greeting_of(*glove), link->identity());
+  if (!description) return std::unexpected(description.error());
+  auto decoder = make_decoder(*description);
+  if (!decoder) return std::unexpected(decoder.error());
+  Poll poll;
+  if (const auto poll_hz = option<std::int64_t>(*options, "poll_hz"); poll_hz > 0) {
+    poll = {.request = {std::byte{'C'}}, .period_ns = 1'000'000'000 / poll_hz};
+  }
+  return Device{.description = std::move(*description),
+                .transport = make_link_transport(std::move(*link)),
+                .decoder = std::move(*decoder),
+                .warnings = std::move(*warnings),
+                .poll = std::move(poll),
+                .reopen_after_s = kSilence_s};
+}
+
+Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
+  const auto options = complete_options(fivedt_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const auto glove = from_options(*options);
+  if (!glove) return std::unexpected(glove.error());
+  return std::make_unique<fivedt::FiveDtEmulator>(glove->side, glove->settings);
+}
+
+std::vector<OptionSpec> all_options() {
+  std::vector<OptionSpec> options = glove::serial_options(0);
+  options.back().help = "bits a second of the serial port; 0: what the model uses as a rule";
+  options.push_back({.name = "model",
+                     .default_value = std::string("5"),
+                     .help = "5, 5-wireless, 16, ultra-wireless, ultra-usb-5 or ultra-usb-14"});
+  options.push_back({.name = "poll_hz",
+                     .default_value = std::int64_t{0},
+                     .help = "model 5 is asked so often a second; 0: it streams"});
+  options.push_back({.name = "kit_port",
+                     .default_value = std::string("a"),
+                     .help = "a or b: which glove of an Ultra Wireless kit"});
+  return options;
+}
+
+}  // namespace
+
+const Driver& fivedt_driver() {
+  static const Driver driver{.name = kName,
+                             .summary = "5DT data gloves: serial, Ultra Wireless and Ultra USB",
+                             .options = all_options(),
+                             .open = open,
+                             .make_decoder = make_decoder,
+                             .describe = describe,
+                             .expect = expect,
+                             .glove_model = glove_model,
+                             .emulate = emulate};
+  return driver;
+}
+
+}  // namespace posed::drivers

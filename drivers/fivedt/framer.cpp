@@ -1,0 +1,135 @@
+#include "drivers/fivedt/framer.hpp"
+
+#include <algorithm>
+
+namespace posed::drivers::fivedt {
+namespace {
+
+bool is_usb(Form form) noexcept { return form == Form::kUltraUsb5 || form == Form::kUltraUsb14; }
+
+}  // namespace
+
+// RT-safe.
+void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept {
+  for (const std::byte byte : bytes) {
+    pending_[pending_bytes_++] = byte;
+    while (pending_bytes_ > 0 && advance(readings)) {
+    }
+  }
+}
+
+// Uses up bytes at the front; false when it takes more of them to go on. RT-safe.
+bool Framer::advance(Readings& readings) noexcept {
+  return in_step_ ? advance_in_step(readings) : advance_hunting();
+}
+
+// RT-safe.
+bool Framer::advance_in_step(Readings& readings) noexcept {
+  const std::size_t length = packet_length(form_, pending());
+  if (length == 0) {
+    if (take_tail()) return true;
+    in_step_ = false;
+    just_lost_ = true;
+    readings.outcome(Outcome::kForeign);
+    return true;
+  }
+  if (pending_bytes_ < length) return false;
+  Reading reading;
+  const auto packet = pending().first(length);
+  Outcome outcome = decode_packet(form_, packet, reading);
+  if (outcome == Outcome::kOk && is_usb(form_) && !is_half_used(packet)) {
+    outcome = Outcome::kForeign;
+  }
+  // Who the glove is, is no measurement.
+  if (reading.kind == Reading::Kind::kData) readings.outcome(outcome);
+  in_step_ = outcome == Outcome::kOk;
+  just_lost_ = !in_step_;
+  if (!in_step_) return true;
+  if (form_ == Form::kUltraWireless) ports_[std::to_integer<std::size_t>(packet[1])] = true;
+  drop(length);
+  after_packet_ = true;
+  readings.reading(reading);
+  return true;
+}
+
+// Looks for the next packet that cannot be chance. RT-safe.
+bool Framer::advance_hunting() noexcept {
+  if (just_lost_) return skip_damaged();
+  const std::size_t length = packet_length(form_, pending());
+  const std::size_t needed = length + (form_ == Form::kUltraWireless ? 1 : 0);
+  if (length > 0 && pending_bytes_ < needed) return false;
+  in_step_ = length > 0 && is_packet(pending());
+  hunted_ = in_step_ ? 0 : hunted_ + 1;
+  if (!in_step_) drop(1);
+  return true;
+}
+
+// Where bytes were changed but none lost, the next packet stands in its place. It is tried first:
+// in a Data Glove 5's packets any byte 80 looks like the start of one, with a good checksum, too,
+// while the hand lies still. RT-safe.
+bool Framer::skip_damaged() noexcept {
+  const std::size_t length = packet_bytes(form_);
+  if (pending_bytes_ <= length) return false;
+  const std::size_t start = length + (is_tail(pending_[length]) ? 1 : 0);
+  if (pending_bytes_ <= start) return false;
+  const auto next = pending().subspan(start);
+  if (next.size() < packet_length(form_, next)) return false;
+  just_lost_ = false;
+  in_step_ = packet_length(form_, next) > 0 && is_packet(next);
+  if (in_step_) drop(start);
+  return true;
+}
+
+// `bytes` begins with a whole packet, and one byte more of an Ultra Wireless kit if it is there.
+// RT-safe.
+bool Framer::is_packet(std::span<const std::byte> bytes) noexcept {
+  const std::size_t length = packet_length(form_, bytes);
+  const auto packet = bytes.first(length);
+  Reading reading;
+  if (decode_packet(form_, packet, reading) != Outcome::kOk) return false;
+  if (form_ == Form::kUltraWireless) {
+    // Only the next record's start says that this is one, and a hand that lies still repeats its
+    // bytes, too: at first only a port is believed that was heard before.
+    constexpr std::size_t kShy = 256;  // bytes
+    const bool known = ports_[std::to_integer<std::size_t>(packet[1])];
+    const bool followed = bytes.size() == length || packet_length(form_, bytes.subspan(length)) > 0;
+    return followed && (known || ports_.none() || hunted_ > kShy);
+  }
+  // Zeros fit everywhere: a report begins with a sensor that measures.
+  return !is_usb(form_) || (reading.value[0] != 0 && is_half_used(packet));
+}
+
+// RT-safe.
+bool Framer::is_tail(std::byte byte) const noexcept {
+  return (form_ == Form::kFive && byte == kReady) ||
+         (form_ == Form::kFiveWireless && is_capability(byte));
+}
+
+// One byte may follow a packet of a Data Glove 5. RT-safe.
+bool Framer::take_tail() noexcept {
+  if (!after_packet_) return false;
+  after_packet_ = false;
+  const std::byte byte = pending_[0];
+  if (!is_tail(byte)) return false;
+  if (form_ == Form::kFiveWireless) capability_ = std::to_integer<int>(byte);
+  drop(1);
+  return true;
+}
+
+// Reports of a glove that leaves its second half zero have to go on doing so: over USB nothing
+// shifts, but a report of another kind is noticed. RT-safe.
+bool Framer::is_half_used(std::span<const std::byte> report) noexcept {
+  const bool zero = std::ranges::all_of(report.subspan(2 * kMaxValues),
+                                        [](std::byte byte) { return byte == std::byte{0}; });
+  if (usb_tail_ == Tail::kUnknown) usb_tail_ = zero ? Tail::kZero : Tail::kUsed;
+  return zero || usb_tail_ == Tail::kUsed;
+}
+
+// RT-safe.
+void Framer::drop(std::size_t count) noexcept {
+  std::copy(pending_.begin() + static_cast<std::ptrdiff_t>(count),
+            pending_.begin() + static_cast<std::ptrdiff_t>(pending_bytes_), pending_.begin());
+  pending_bytes_ -= count;
+}
+
+}  // namespace posed::drivers::fivedt
