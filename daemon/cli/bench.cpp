@@ -11,6 +11,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   add_bench_generate(*bench, exit_code);
   add_bench_pipeline(*bench, exit_code);
   add_bench_smooth(*bench, exit_code);
+  add_bench_decoders(*bench, exit_code);
 }
 
 }  // namespace posed::cli

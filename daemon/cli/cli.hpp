@@ -41,6 +41,7 @@ void add_smooth(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app, int& exit_code);
 void add_eval_gesture(CLI::App& eval, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
+void add_bench_decoders(CLI::App& bench, int& exit_code);
 void add_bench_pipeline(CLI::App& bench, int& exit_code);
 void add_bench_generate(CLI::App& bench, int& exit_code);
 void add_bench_predict(CLI::App& bench, int& exit_code);

@@ -1,0 +1,217 @@
+// posed bench decoders: how many packets a second each glove's decoder takes on one core, and what
+// it adds to a bare read() of the same pseudo-terminal.
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/bench_gloves.hpp"
+#include "daemon/cli/cli.hpp"
+#include "daemon/devices/emulated_port.hpp"
+#include "daemon/pipeline/clock.hpp"
+#include "daemon/pipeline/ring.hpp"
+#include "drivers/transport/ports.hpp"
+
+namespace posed::cli {
+namespace {
+
+using nlohmann::json;
+using pipeline::monotonic_ns;
+using Bytes = std::vector<std::byte>;
+
+constexpr std::size_t kRecords = 512;  // of the stream that is decoded again and again
+constexpr std::size_t kChunk = 4096;   // bytes a read gives at most
+constexpr auto kPause = std::chrono::milliseconds(1);
+constexpr const char* kFooter =
+    R"(Every glove that posed can emulate, its bytes as the emulator sends them.
+packets/s: decoded, calibrated and posed, one core, from memory; "samples" where a packet bends no
+joint. latency: from before the write of a whole packet into a pseudo-terminal to its read() (bare)
+or to the frame in a ring (decoded); packets take turns between the two, one a millisecond.
+
+  posed bench decoders
+  posed bench decoders --samples 500 --json)";
+
+// What a reader's sink does: into a ring, here its own.
+class RingSink final : public Sink {
+ public:
+  void frame(Frame& frame) noexcept override {
+    static_cast<void>(ring_.push(frame));
+    ++frames;
+  }
+  void sample(Sample& /*sample*/) noexcept override { ++samples; }
+  void outcome(Outcome outcome) noexcept override { bad += outcome == Outcome::kOk ? 0 : 1; }
+  void empty_ring() noexcept {
+    while (ring_.consume([](Frame&) {})) {
+    }
+  }
+  std::uint64_t frames = 0, samples = 0, bad = 0;
+
+ private:
+  pipeline::Ring<Frame> ring_{256};
+};
+
+json throughput(BenchGlove& glove) {
+  Bytes bytes;
+  for (std::size_t i = 0; i < kRecords; ++i) next_record(glove, i, bytes);
+  RingSink sink;
+  const std::span<const std::byte> all(bytes);
+  const std::int64_t start_ns = monotonic_ns();
+  std::int64_t end_ns = start_ns;
+  while (end_ns - start_ns < kNanosPerSecond / 2) {
+    for (std::size_t at = 0; at < all.size(); at += kChunk) {
+      glove.decoder->feed(all.subspan(at, std::min(kChunk, all.size() - at)), start_ns, sink);
+      sink.empty_ring();
+    }
+    end_ns = monotonic_ns();
+  }
+  return {{"record_bytes", bytes.size() / kRecords},
+          {"packets_per_s", static_cast<double>(sink.samples) / seconds(end_ns - start_ns)},
+          {"frames_per_s", static_cast<double>(sink.frames) / seconds(end_ns - start_ns)},
+          {"damaged", sink.bad}};
+}
+
+json percentiles(std::vector<double>& values) {
+  std::ranges::sort(values);
+  const auto at = [&](double share) {
+    return values.empty()
+               ? 0.0
+               : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+  };
+  return {{"p50_us", at(0.5)}, {"p99_us", at(0.99)}, {"p99_9_us", at(0.999)}, {"max_us", at(1.0)}};
+}
+
+// Both sides of one pseudo-terminal, and when the packet under way was written.
+struct Line {
+  devices::EmulatedPort port;
+  std::unique_ptr<drivers::Transport> host;
+  std::atomic<std::int64_t> written_ns{0};
+};
+
+// Waits for the packet and takes it in, with the decoder or without; 0 when none came.
+std::int64_t take(Line& line, std::size_t bytes, drivers::Decoder* decoder, RingSink& sink) {
+  std::array<std::byte, kChunk> buffer{};
+  while (bytes > 0) {
+    pollfd wait{line.host->poll_fd(), POLLIN, 0};
+    if (::poll(&wait, 1, 1000) <= 0) return 0;
+    std::size_t got = 0;
+    if (decoder == nullptr) {
+      const ssize_t size = ::read(wait.fd, buffer.data(), buffer.size());
+      got = size > 0 ? static_cast<std::size_t>(size) : 0;
+    } else {
+      const drivers::Chunk chunk = line.host->read(monotonic_ns());
+      decoder->feed(chunk.bytes, 0, sink);
+      got = chunk.bytes.size();
+    }
+    if (got == 0) return 0;
+    bytes -= std::min(bytes, got);
+  }
+  return monotonic_ns();
+}
+
+Result<json> latency(BenchGlove& glove, int samples) {
+  auto port = devices::EmulatedPort::open_pty();
+  if (!port) return std::unexpected(port.error());
+  drivers::Ports ports;
+  auto link = ports.serial({.port = port->name()});
+  if (!link) return std::unexpected(link.error());
+  Line line{std::move(*port), drivers::make_link_transport(std::move(*link))};
+  std::vector<double> bare_us, decoded_us;
+  RingSink sink;
+  std::atomic<int> wanted{0};
+  std::atomic<std::size_t> size{0};
+  std::jthread glove_side([&](const std::stop_token& stop) {
+    Bytes record;
+    for (int sent = 0; !stop.stop_requested(); std::this_thread::sleep_for(kPause)) {
+      if (wanted.load() == sent) continue;
+      record.clear();
+      next_record(glove, static_cast<std::size_t>(++sent), record);
+      size.store(record.size());
+      line.written_ns.store(monotonic_ns());
+      line.port.send(record);
+    }
+  });
+  for (int i = 0; i < 2 * samples; ++i) {
+    const bool decode = i % 2 == 1;
+    const std::uint64_t before = sink.samples;
+    wanted.fetch_add(1);
+    pollfd wait{line.host->poll_fd(), POLLIN, 0};
+    if (::poll(&wait, 1, 1000) <= 0) return fail("the pseudo-terminal gives nothing");
+    const std::int64_t done_ns =
+        take(line, size.load(), decode ? glove.decoder.get() : nullptr, sink);
+    sink.empty_ring();
+    if (done_ns == 0) return fail("a packet did not come through the pseudo-terminal");
+    if (decode && sink.samples == before) continue;  // it begins in a packet that was not decoded
+    (decode ? decoded_us : bare_us)
+        .push_back(static_cast<double>(done_ns - line.written_ns.load()) * 1e-3);
+  }
+  json report{{"bare_read", percentiles(bare_us)}, {"decoded", percentiles(decoded_us)}};
+  report["p99_ratio"] =
+      report["decoded"]["p99_us"].get<double>() / report["bare_read"]["p99_us"].get<double>();
+  return report;
+}
+
+void print(const json& glove) {
+  const json& rate = glove["throughput"];
+  std::printf("%-28s %4llu bytes %6.2f M packets/s", glove["glove"].get<std::string>().c_str(),
+              static_cast<unsigned long long>(rate["record_bytes"].get<std::uint64_t>()),
+              rate["packets_per_s"].get<double>() * 1e-6);
+  for (const char* const way : {"bare_read", "decoded"}) {
+    const json& us = glove["latency"][way];
+    std::printf("  %s %5.1f %5.1f %6.1f %6.1f", way, us["p50_us"].get<double>(),
+                us["p99_us"].get<double>(), us["p99_9_us"].get<double>(),
+                us["max_us"].get<double>());
+  }
+  std::printf("  p99 x%.2f\n", glove["latency"]["p99_ratio"].get<double>());
+}
+
+Result<> bench_decoders(int samples, bool as_json) {
+  json report = json::array();
+  if (!as_json) std::printf("latency in us: p50, p99, p99.9, max\n");
+  auto gloves = bench_gloves();
+  if (!gloves) return std::unexpected(gloves.error());
+  for (BenchGlove& glove : *gloves) {
+    json entry{{"glove", glove.name}, {"throughput", throughput(glove)}};
+    auto ways = latency(glove, samples);
+    if (!ways) return std::unexpected(ways.error());
+    entry["latency"] = std::move(*ways);
+    if (!as_json) print(entry);
+    report.push_back(std::move(entry));
+  }
+  if (as_json) std::printf("%s\n", report.dump(2).c_str());
+  return {};
+}
+
+}  // namespace
+
+void add_bench_decoders(CLI::App& bench, int& exit_code) {
+  struct Options {
+    int samples = 2000;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = bench.add_subcommand("decoders", "Every glove's decoder, from its bytes");
+  command->footer(kFooter);
+  command->add_option("--samples", options->samples, "Timed packets a glove and way")
+      ->check(CLI::Range(10, 1'000'000))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON array on stdout");
+  command->callback([options, &exit_code] {
+    if (auto done = bench_decoders(options->samples, options->json); !done) {
+      exit_code = report(done.error());
+    }
+  });
+}
+
+}  // namespace posed::cli

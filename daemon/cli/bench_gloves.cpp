@@ -1,0 +1,101 @@
+#include "daemon/cli/bench_gloves.hpp"
+
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <thread>
+
+#include "daemon/devices/emulated_glove.hpp"
+#include "drivers/described/device_file.hpp"
+#include "drivers/transport/ports.hpp"
+
+namespace posed::cli {
+namespace {
+
+using drivers::Driver;
+using drivers::Emulator;
+using drivers::Options;
+
+// An emulator lent to what wants one of its own.
+class Lent final : public Emulator {
+ public:
+  explicit Lent(Emulator& emulator) : emulator_(emulator) {}
+  void pose(const HandAngles& angles) override { emulator_.pose(angles); }
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override {
+    emulator_.receive(bytes, now_ns, answer);
+  }
+  [[nodiscard]] std::int64_t next_due_ns() const override { return emulator_.next_due_ns(); }
+  void emit(std::int64_t now_ns, Bytes& out) override { emulator_.emit(now_ns, out); }
+
+ private:
+  Emulator& emulator_;
+};
+
+// The driver opens the emulator as it would the glove; from then on it streams.
+Result<std::unique_ptr<drivers::Decoder>> opened(const Driver& driver, Options options,
+                                                 Emulator& emulator) {
+  auto port = devices::EmulatedPort::open_pty();
+  if (!port) return std::unexpected(port.error());
+  options["port"] = port->name();
+  devices::EmulatedGlove glove(std::make_unique<Lent>(emulator), std::move(*port), {}, {});
+  std::atomic<bool> stop{false};
+  std::jthread thread([&] { glove.run(stop); });
+  drivers::Ports ports;
+  auto device = driver.open(options, ports);
+  stop = true;
+  if (!device) return std::unexpected(device.error());
+  return std::move(device->decoder);
+}
+
+Result<std::unique_ptr<drivers::Decoder>> expected(const Driver& driver, const Options& options) {
+  const auto description = driver.expect(options);
+  if (!description) return std::unexpected(description.error());
+  return driver.make_decoder(*description);
+}
+
+Result<BenchGlove> make_glove(const Driver& driver, const std::string& name,
+                              const Options& options) {
+  auto emulator = driver.emulate(options);
+  if (!emulator) return std::unexpected(emulator.error());
+  auto decoder = (*emulator)->next_due_ns() == kNoTime_ns ? opened(driver, options, **emulator)
+                                                          : expected(driver, options);
+  if (!decoder) return std::unexpected(decoder.error());
+  return BenchGlove{name, std::move(*emulator), std::move(*decoder)};
+}
+
+// How a driver's gloves differ in their bytes.
+std::vector<std::pair<std::string, Options>> kinds(const Driver& driver) {
+  const std::string name(driver.name);
+  if (name != "described") return {{name, {}}};
+  std::vector<std::pair<std::string, Options>> kinds;
+  for (const std::string& device : drivers::described::shipped_devices()) {
+    kinds.push_back({name + " " + device, {{"device", device}}});
+  }
+  return kinds;
+}
+
+}  // namespace
+
+Result<std::vector<BenchGlove>> bench_gloves() {
+  std::vector<BenchGlove> gloves;
+  for (const Driver& driver : drivers::registry()) {
+    if (driver.emulate == nullptr) continue;
+    for (const auto& [name, options] : kinds(driver)) {
+      auto glove = make_glove(driver, name, options);
+      if (!glove) return std::unexpected(glove.error());
+      gloves.push_back(std::move(*glove));
+    }
+  }
+  return gloves;
+}
+
+void next_record(BenchGlove& glove, std::size_t index, std::vector<std::byte>& out) {
+  constexpr double kRecordsATurn = 64.0;
+  HandAngles angles{};
+  const double turn = 2.0 * std::numbers::pi * static_cast<double>(index) / kRecordsATurn;
+  for (std::size_t i = 0; i < angles.size(); i += 3) angles[i] = 0.5 - 0.5 * std::cos(turn);
+  glove.emulator->pose(angles);
+  glove.emulator->emit(glove.emulator->next_due_ns(), out);
+}
+
+}  // namespace posed::cli
