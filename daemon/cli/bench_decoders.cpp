@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <string>
 #include <thread>
@@ -19,6 +20,7 @@
 
 #include "daemon/cli/bench_gloves.hpp"
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/percentiles.hpp"
 #include "daemon/devices/emulated_port.hpp"
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/ring.hpp"
@@ -31,14 +33,14 @@ using nlohmann::json;
 using pipeline::monotonic_ns;
 using Bytes = std::vector<std::byte>;
 
-constexpr std::size_t kRecords = 512;  // of the stream that is decoded again and again
-constexpr std::size_t kChunk = 4096;   // bytes a read gives at most
-constexpr auto kPause = std::chrono::milliseconds(1);
-constexpr const char* kFooter =
+constexpr std::size_t kLoopRecords = 512;  // of the stream that is decoded again and again
+constexpr std::size_t kReadBytes = 4096;   // bytes a read gives at most
+constexpr auto kPacketPause = std::chrono::milliseconds(1);
+constexpr const char* kDecodersFooter =
     R"(Every glove that posed can emulate, its bytes as the emulator sends them.
-packets/s: decoded, calibrated and posed, one core, from memory; "samples" where a packet bends no
-joint. latency: from before the write of a whole packet into a pseudo-terminal to its read() (bare)
-or to the frame in a ring (decoded); packets take turns between the two, one a millisecond.
+packets/s: decoded, calibrated, posed and put into a ring, by CPU time of one thread.
+latency: from before the write of a whole packet into a pseudo-terminal to its read() (bare) or to
+its frame in a ring (decoded); packets take turns between the two, one a millisecond.
 
   posed bench decoders
   posed bench decoders --samples 500 --json)";
@@ -62,46 +64,44 @@ class RingSink final : public Sink {
   pipeline::Ring<Frame> ring_{256};
 };
 
-json throughput(BenchGlove& glove) {
+// Of this thread: what else runs on the machine does not count.
+std::int64_t cpu_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
+}
+
+json decoder_rate(BenchGlove& glove) {
   Bytes bytes;
-  for (std::size_t i = 0; i < kRecords; ++i) next_record(glove, i, bytes);
+  for (std::size_t i = 0; i < kLoopRecords; ++i) next_record(glove, i, bytes);
   RingSink sink;
   const std::span<const std::byte> all(bytes);
-  const std::int64_t start_ns = monotonic_ns();
+  const std::int64_t start_ns = cpu_ns();
   std::int64_t end_ns = start_ns;
   while (end_ns - start_ns < kNanosPerSecond / 2) {
-    for (std::size_t at = 0; at < all.size(); at += kChunk) {
-      glove.decoder->feed(all.subspan(at, std::min(kChunk, all.size() - at)), start_ns, sink);
+    for (std::size_t at = 0; at < all.size(); at += kReadBytes) {
+      glove.decoder->feed(all.subspan(at, std::min(kReadBytes, all.size() - at)), start_ns, sink);
       sink.empty_ring();
     }
-    end_ns = monotonic_ns();
+    end_ns = cpu_ns();
   }
-  return {{"record_bytes", bytes.size() / kRecords},
+  return {{"record_bytes", bytes.size() / kLoopRecords},
           {"packets_per_s", static_cast<double>(sink.samples) / seconds(end_ns - start_ns)},
           {"frames_per_s", static_cast<double>(sink.frames) / seconds(end_ns - start_ns)},
           {"damaged", sink.bad}};
 }
 
-json percentiles(std::vector<double>& values) {
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    return values.empty()
-               ? 0.0
-               : values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-  };
-  return {{"p50_us", at(0.5)}, {"p99_us", at(0.99)}, {"p99_9_us", at(0.999)}, {"max_us", at(1.0)}};
-}
-
 // Both sides of one pseudo-terminal, and when the packet under way was written.
-struct Line {
+struct BenchLine {
   devices::EmulatedPort port;
   std::unique_ptr<drivers::Transport> host;
   std::atomic<std::int64_t> written_ns{0};
 };
 
 // Waits for the packet and takes it in, with the decoder or without; 0 when none came.
-std::int64_t take(Line& line, std::size_t bytes, drivers::Decoder* decoder, RingSink& sink) {
-  std::array<std::byte, kChunk> buffer{};
+std::int64_t take_record(BenchLine& line, std::size_t bytes, drivers::Decoder* decoder,
+                         RingSink& sink) {
+  std::array<std::byte, kReadBytes> buffer{};
   while (bytes > 0) {
     pollfd wait{line.host->poll_fd(), POLLIN, 0};
     if (::poll(&wait, 1, 1000) <= 0) return 0;
@@ -120,20 +120,20 @@ std::int64_t take(Line& line, std::size_t bytes, drivers::Decoder* decoder, Ring
   return monotonic_ns();
 }
 
-Result<json> latency(BenchGlove& glove, int samples) {
+Result<json> decoder_latency(BenchGlove& glove, int samples) {
   auto port = devices::EmulatedPort::open_pty();
   if (!port) return std::unexpected(port.error());
   drivers::Ports ports;
   auto link = ports.serial({.port = port->name()});
   if (!link) return std::unexpected(link.error());
-  Line line{std::move(*port), drivers::make_link_transport(std::move(*link))};
+  BenchLine line{std::move(*port), drivers::make_link_transport(std::move(*link))};
   std::vector<double> bare_us, decoded_us;
   RingSink sink;
   std::atomic<int> wanted{0};
   std::atomic<std::size_t> size{0};
   std::jthread glove_side([&](const std::stop_token& stop) {
     Bytes record;
-    for (int sent = 0; !stop.stop_requested(); std::this_thread::sleep_for(kPause)) {
+    for (int sent = 0; !stop.stop_requested(); std::this_thread::sleep_for(kPacketPause)) {
       if (wanted.load() == sent) continue;
       record.clear();
       next_record(glove, static_cast<std::size_t>(++sent), record);
@@ -149,7 +149,7 @@ Result<json> latency(BenchGlove& glove, int samples) {
     pollfd wait{line.host->poll_fd(), POLLIN, 0};
     if (::poll(&wait, 1, 1000) <= 0) return fail("the pseudo-terminal gives nothing");
     const std::int64_t done_ns =
-        take(line, size.load(), decode ? glove.decoder.get() : nullptr, sink);
+        take_record(line, size.load(), decode ? glove.decoder.get() : nullptr, sink);
     sink.empty_ring();
     if (done_ns == 0) return fail("a packet did not come through the pseudo-terminal");
     if (decode && sink.samples == before) continue;  // it begins in a packet that was not decoded
@@ -162,7 +162,7 @@ Result<json> latency(BenchGlove& glove, int samples) {
   return report;
 }
 
-void print(const json& glove) {
+void print_glove(const json& glove) {
   const json& rate = glove["throughput"];
   std::printf("%-28s %4llu bytes %6.2f M packets/s", glove["glove"].get<std::string>().c_str(),
               static_cast<unsigned long long>(rate["record_bytes"].get<std::uint64_t>()),
@@ -182,11 +182,11 @@ Result<> bench_decoders(int samples, bool as_json) {
   auto gloves = bench_gloves();
   if (!gloves) return std::unexpected(gloves.error());
   for (BenchGlove& glove : *gloves) {
-    json entry{{"glove", glove.name}, {"throughput", throughput(glove)}};
-    auto ways = latency(glove, samples);
+    json entry{{"glove", glove.name}, {"throughput", decoder_rate(glove)}};
+    auto ways = decoder_latency(glove, samples);
     if (!ways) return std::unexpected(ways.error());
     entry["latency"] = std::move(*ways);
-    if (!as_json) print(entry);
+    if (!as_json) print_glove(entry);
     report.push_back(std::move(entry));
   }
   if (as_json) std::printf("%s\n", report.dump(2).c_str());
@@ -202,7 +202,7 @@ void add_bench_decoders(CLI::App& bench, int& exit_code) {
   };
   const auto options = std::make_shared<Options>();
   CLI::App* command = bench.add_subcommand("decoders", "Every glove's decoder, from its bytes");
-  command->footer(kFooter);
+  command->footer(kDecodersFooter);
   command->add_option("--samples", options->samples, "Timed packets a glove and way")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();

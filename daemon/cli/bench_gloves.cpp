@@ -17,9 +17,9 @@ using drivers::Emulator;
 using drivers::Options;
 
 // An emulator lent to what wants one of its own.
-class Lent final : public Emulator {
+class LentEmulator final : public Emulator {
  public:
-  explicit Lent(Emulator& emulator) : emulator_(emulator) {}
+  explicit LentEmulator(Emulator& emulator) : emulator_(emulator) {}
   void pose(const HandAngles& angles) override { emulator_.pose(angles); }
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override {
     emulator_.receive(bytes, now_ns, answer);
@@ -32,12 +32,12 @@ class Lent final : public Emulator {
 };
 
 // The driver opens the emulator as it would the glove; from then on it streams.
-Result<std::unique_ptr<drivers::Decoder>> opened(const Driver& driver, Options options,
-                                                 Emulator& emulator) {
+Result<std::unique_ptr<drivers::Decoder>> opened_decoder(const Driver& driver, Options options,
+                                                         Emulator& emulator) {
   auto port = devices::EmulatedPort::open_pty();
   if (!port) return std::unexpected(port.error());
   options["port"] = port->name();
-  devices::EmulatedGlove glove(std::make_unique<Lent>(emulator), std::move(*port), {}, {});
+  devices::EmulatedGlove glove(std::make_unique<LentEmulator>(emulator), std::move(*port), {}, {});
   std::atomic<bool> stop{false};
   std::jthread thread([&] { glove.run(stop); });
   drivers::Ports ports;
@@ -47,31 +47,33 @@ Result<std::unique_ptr<drivers::Decoder>> opened(const Driver& driver, Options o
   return std::move(device->decoder);
 }
 
-Result<std::unique_ptr<drivers::Decoder>> expected(const Driver& driver, const Options& options) {
+Result<std::unique_ptr<drivers::Decoder>> expected_decoder(const Driver& driver,
+                                                           const Options& options) {
   const auto description = driver.expect(options);
   if (!description) return std::unexpected(description.error());
   return driver.make_decoder(*description);
 }
 
-Result<BenchGlove> make_glove(const Driver& driver, const std::string& name,
-                              const Options& options) {
+Result<BenchGlove> make_bench_glove(const Driver& driver, const std::string& name,
+                                    const Options& options) {
   auto emulator = driver.emulate(options);
   if (!emulator) return std::unexpected(emulator.error());
-  auto decoder = (*emulator)->next_due_ns() == kNoTime_ns ? opened(driver, options, **emulator)
-                                                          : expected(driver, options);
+  auto decoder = (*emulator)->next_due_ns() == kNoTime_ns
+                     ? opened_decoder(driver, options, **emulator)
+                     : expected_decoder(driver, options);
   if (!decoder) return std::unexpected(decoder.error());
   return BenchGlove{name, std::move(*emulator), std::move(*decoder)};
 }
 
 // How a driver's gloves differ in their bytes.
-std::vector<std::pair<std::string, Options>> kinds(const Driver& driver) {
+std::vector<std::pair<std::string, Options>> glove_kinds(const Driver& driver) {
   const std::string name(driver.name);
   if (name != "described") return {{name, {}}};
-  std::vector<std::pair<std::string, Options>> kinds;
+  std::vector<std::pair<std::string, Options>> found;
   for (const std::string& device : drivers::described::shipped_devices()) {
-    kinds.push_back({name + " " + device, {{"device", device}}});
+    found.push_back({name + " " + device, {{"device", device}}});
   }
-  return kinds;
+  return found;
 }
 
 }  // namespace
@@ -80,8 +82,8 @@ Result<std::vector<BenchGlove>> bench_gloves() {
   std::vector<BenchGlove> gloves;
   for (const Driver& driver : drivers::registry()) {
     if (driver.emulate == nullptr) continue;
-    for (const auto& [name, options] : kinds(driver)) {
-      auto glove = make_glove(driver, name, options);
+    for (const auto& [name, options] : glove_kinds(driver)) {
+      auto glove = make_bench_glove(driver, name, options);
       if (!glove) return std::unexpected(glove.error());
       gloves.push_back(std::move(*glove));
     }

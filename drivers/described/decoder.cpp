@@ -117,15 +117,15 @@ void DescribedDecoder::take_reports(std::span<const std::byte> bytes, Sink& sink
 // RT-safe.
 bool DescribedDecoder::take_packet(const PacketRule& rule, std::span<const std::byte> packet,
                                    Sink& sink) noexcept {
-  const bool good = std::ranges::all_of(rule.fields, [packet](const Field& field) {
-    return in_range(field, read_field(field, packet));
-  });
-  if (!good) {
-    damaged(Outcome::kOutOfRange, sink);
-    return false;
+  for (std::size_t i = 0; i < rule.fields.size(); ++i) {
+    value_[i] = read_field(rule.fields[i], packet);
+    if (!in_range(rule.fields[i], value_[i])) {
+      damaged(Outcome::kOutOfRange, sink);
+      return false;
+    }
   }
   in_step_ = true;
-  keep_values(rule, packet);
+  keep_values(rule);
   sink.outcome(Outcome::kOk);
   if (!rule.poses) return true;
   emit({.raw = std::span(raw_).first(table_->model.sensors.size()),
@@ -138,10 +138,10 @@ bool DescribedDecoder::take_packet(const PacketRule& rule, std::span<const std::
 }
 
 // RT-safe.
-void DescribedDecoder::keep_values(const PacketRule& rule,
-                                   std::span<const std::byte> packet) noexcept {
-  for (const Field& field : rule.fields) {
-    const double value = read_field(field, packet);
+void DescribedDecoder::keep_values(const PacketRule& rule) noexcept {
+  for (std::size_t i = 0; i < rule.fields.size(); ++i) {
+    const Field& field = rule.fields[i];
+    const double value = value_[i];
     if (field.kind == FieldKind::kSensor) {
       raw_[field.index] = static_cast<float>(value);
       seen_[field.index] = true;

@@ -38,7 +38,7 @@ class DescribedDecoder final : public glove::GloveDecoder {
   // Whether the values of a whole packet are in their ranges; they are kept, and emitted when the
   // packet poses.
   bool take_packet(const PacketRule& rule, std::span<const std::byte> packet, Sink& sink) noexcept;
-  void keep_values(const PacketRule& rule, std::span<const std::byte> packet) noexcept;
+  void keep_values(const PacketRule& rule) noexcept;  // what take_packet() read
   // One outcome a damaged piece, not one a byte.
   void damaged(Outcome why, Sink& sink) noexcept;
 
@@ -49,6 +49,7 @@ class DescribedDecoder final : public glove::GloveDecoder {
   bool in_step_ = true;       // false while hunting for the next packet
   bool skipping_ = false;     // in a piece that is longer than any packet
 
+  std::array<double, kMaxFields> value_{};  // [field of the packet], as read
   std::array<float, glove::kMaxSensors> raw_{};
   std::bitset<glove::kMaxSensors> seen_;
   std::array<float, kMaxExtras> extra_;  // not a number while not seen

@@ -92,7 +92,7 @@ Result<Table> read_device(const toml::table& device, const std::string& text,
   table.model.driver = "described";
   table.model.map_toml = text;
   if (const auto rows = glove::parse_angle_map(text, file, table.model.sensors); !rows) {
-    return std::unexpected(rows.error());
+    return fail(printable(rows.error().message), file, rows.error().line);
   }
   return table;
 }
@@ -106,7 +106,7 @@ Result<Table> parse_device(const std::string& toml, const std::string& file) {
   try {
     return read_device(toml::parse(toml, file), toml, file);
   } catch (const toml::parse_error& error) {
-    return fail(std::string(error.description()), file,
+    return fail(printable(std::string(error.description())), file,
                 static_cast<int>(error.source().begin.line));
   }
 }

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 namespace posed::drivers::described {
 namespace {
+
+static_assert(std::endian::native == std::endian::little);
 
 constexpr std::uint64_t mask_of(int bits) noexcept {
   return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
@@ -15,10 +18,13 @@ constexpr std::uint64_t mask_of(int bits) noexcept {
 
 // The bytes of a place as one number, in their order.
 std::uint64_t gather(const BitPlace& place, std::span<const std::byte> packet) noexcept {
+  const std::byte* const first = packet.data() + place.first;
   std::uint64_t all = 0;
-  for (std::size_t i = 0; i < place.bytes; ++i) {
-    const auto byte = std::to_integer<std::uint64_t>(packet[place.first + i]);
-    all = place.big ? all << 8 | byte : all | byte << (8 * i);
+  if (place.big) {
+    for (std::size_t i = 0; i < place.bytes; ++i)
+      all = all << 8 | std::to_integer<unsigned>(first[i]);
+  } else {
+    std::memcpy(&all, first, place.bytes);  // the host is little-endian
   }
   return all;
 }

@@ -17,6 +17,7 @@ namespace posed::drivers::described {
 
 inline constexpr std::size_t kMaxPacketBytes = 1024;
 inline constexpr std::size_t kMaxExtras = 64;
+inline constexpr std::size_t kMaxFields = glove::kMaxSensors + kMaxExtras + 1;  // and the time
 
 enum class LinkKind : std::uint8_t { kSerial, kTcp, kHid };
 

@@ -25,9 +25,14 @@ std::string quoted(std::string_view key) { return "'" + std::string(key) + "'"; 
 
 }  // namespace
 
+std::string printable(std::string text) {
+  std::ranges::replace_if(text, [](unsigned char c) { return c < ' ' || c == 0x7F; }, '?');
+  return text;
+}
+
 void TomlReader::blame(const toml::node& node, std::string message) {
   if (error_) return;
-  error_ = Error{std::move(message), file_, static_cast<int>(node.source().begin.line)};
+  error_ = Error{printable(std::move(message)), file_, static_cast<int>(node.source().begin.line)};
 }
 
 void TomlReader::allow(const toml::table& table, std::string_view what,

@@ -16,6 +16,9 @@
 
 namespace posed::drivers::described {
 
+// Without what a terminal would obey: a description may come from a log that a stranger sent.
+[[nodiscard]] std::string printable(std::string text);
+
 class TomlReader {
  public:
   explicit TomlReader(std::string file) : file_(std::move(file)) {}
