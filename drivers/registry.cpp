@@ -9,6 +9,7 @@
 #include "drivers/fivedt/fivedt.hpp"
 #include "drivers/labels/labels.hpp"
 #include "drivers/lucidgloves/lucidgloves.hpp"
+#include "drivers/p5/p5.hpp"
 #include "drivers/template/template.hpp"
 
 namespace posed::drivers {
@@ -21,6 +22,7 @@ std::span<const Driver> registry() {
       fivedt_driver(),
       labels_driver(),
       lucidgloves_driver(),
+      p5_driver(),
       template_driver(),
   };
   return drivers;

@@ -101,7 +101,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span bytes = std::as_bytes(std::span(data + 2, size - 2));
   const std::size_t piece = 1U + data[1];
   const std::string text(reinterpret_cast<const char*>(data + 2), size - 2);
-  switch (data[0] % 9) {
+  switch (data[0] % 10) {
     case 0:
       try_bytes("file", std::string(kBvh), piece, bytes);
       break;
@@ -136,6 +136,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       }
       (void)decoder_of("fivedt", text);
       break;
+    case 8: {
+      const std::string zeros(114, '0');
+      try_bytes(
+          "p5",
+          "p5 hand=right firmware=none heads=06000000004f leds=0c0000ff010c" + zeros.substr(2),
+          piece, bytes);
+      (void)decoder_of("p5", text);
+      break;
+    }
     default:
       if (const auto decoder = decoder_of("file", text)) {
         CollectSink sink(0);

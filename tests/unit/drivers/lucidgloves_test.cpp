@@ -54,7 +54,7 @@ std::string haptics_text(const Options& options, const Haptics& haptics) {
 
 TEST_CASE("lines that real LucidGloves sent are read") {
   Line line;
-  // lucidgloves issue 36; the last one from the legacy firmware's documentation.
+  // As quoted by their users: lucidgloves issue 36, and a glove with the old firmware.
   REQUIRE(parse("A1662B3329C1229D4095E4095F384G0ILM", line) == Outcome::kOk);
   CHECK(line.value[lucidgloves::kCurl + 0] == 1662);
   CHECK(line.value[lucidgloves::kCurl + 4] == 4095);

@@ -1,0 +1,126 @@
+#include "drivers/p5/decoder.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "drivers/glove/angle_map.hpp"
+
+namespace posed::drivers::p5 {
+namespace {
+
+constexpr int kForgotten = 25;       // reports, half a second: what a LED showed before is no help
+constexpr std::size_t kPlaceAt = 4;  // among the extras
+const std::array<std::string, 11> kExtras{"button_a", "button_b", "button_c", "leds",
+                                          "palm_x",   "palm_y",   "palm_z",   "palm_qx",
+                                          "palm_qy",  "palm_qz",  "palm_qw"};
+
+}  // namespace
+
+Result<glove::Model> model() {
+  glove::Model model{.driver = "p5", .sensors = {}};
+  for (const std::string_view finger : kFingerNames) {
+    model.sensors.push_back({.name = std::string(finger),
+                             .raw_max = kMaxBend,
+                             .curve = glove::Curve::line(0.0, 0.0, kMaxBend, 1.0),
+                             .unit = "1"});
+  }
+  auto table = glove::device_table("p5");
+  if (!table) return std::unexpected(table.error());
+  model.map_toml = std::move(*table);
+  return model;
+}
+
+SampleLayout layout(const glove::Model& model) {
+  SampleLayout layout = glove::sample_layout(model, kExtras);
+  const std::string metre(1, 'm');
+  std::fill_n(layout.units.end() - (kExtras.size() - kPlaceAt), 3, metre);
+  return layout;
+}
+
+// RT-safe.
+void P5Decoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                     Sink& sink) noexcept {
+  for (const std::byte byte : bytes) {
+    pending_[pending_bytes_++] = byte;
+    while (pending_bytes_ > 0 && advance(sink)) {
+    }
+  }
+}
+
+// Over USB reports come whole; a log or a test may cut and damage them. RT-safe.
+bool P5Decoder::advance(Sink& sink) noexcept {
+  const bool begins = pending_[0] == std::byte{1};
+  if (!begins) {
+    if (in_step_) sink.outcome(Outcome::kForeign);
+    in_step_ = false;
+    drop(1);
+    return true;
+  }
+  if (pending_bytes_ < kReportBytes + (in_step_ ? 0 : 1)) return false;
+  if (!in_step_) {
+    // The last byte is unused, and another report follows.
+    in_step_ = pending_[kReportBytes - 1] == std::byte{0} && pending_[kReportBytes] == pending_[0];
+    if (!in_step_) drop(1);
+    return true;
+  }
+  Report report;
+  const Outcome outcome = decode_report(std::span(pending_).first(kReportBytes), report);
+  drop(kReportBytes);
+  sink.outcome(outcome);
+  take(report, sink);
+  return true;
+}
+
+// RT-safe.
+void P5Decoder::drop(std::size_t count) noexcept {
+  std::copy(pending_.begin() + static_cast<std::ptrdiff_t>(count),
+            pending_.begin() + static_cast<std::ptrdiff_t>(pending_bytes_), pending_.begin());
+  pending_bytes_ -= count;
+}
+
+// RT-safe.
+bool P5Decoder::locate(const Report& report, Place& place) noexcept {
+  for (int& reports : unseen_) reports = std::min(reports + 1, kForgotten);
+  if (!tower_) return false;
+  std::array<Eigen::Vector3d, kLeds> position_m;
+  std::bitset<kLeds> seen;
+  for (const Spot& spot : report.spot) {
+    if (spot.led >= kLeds) continue;
+    Spot& before = before_[spot.led];
+    Spot now = spot;
+    if (unseen_[spot.led] < kForgotten) {
+      now.v1 = unwrapped(spot.v1, before.v1);
+      now.v2 = unwrapped(spot.v2, before.v2);
+      now.h = unwrapped(spot.h, before.h);
+    }
+    before = now;
+    unseen_[spot.led] = 0;
+    seen[spot.led] = tower_->locate(now, position_m[spot.led]);
+  }
+  return fit_hand(*tower_, position_m, seen, place);
+}
+
+// RT-safe.
+void P5Decoder::take(const Report& report, Sink& sink) noexcept {
+  std::array<float, kFingers> raw{};
+  for (std::size_t f = 0; f < kFingers; ++f) raw[f] = static_cast<float>(report.bend[f]);
+  std::array<float, kExtras.size()> extra{};
+  for (std::size_t b = 0; b < 3; ++b) extra[b] = (report.buttons >> b & 1) != 0 ? 1.0F : 0.0F;
+  extra[3] = static_cast<float>(
+      std::ranges::count_if(report.spot, [](const Spot& spot) { return spot.led < kLeds; }));
+  std::fill(extra.begin() + kPlaceAt, extra.end(), std::numeric_limits<float>::quiet_NaN());
+  if (Place place; locate(report, place)) {
+    for (int i = 0; i < 3; ++i) {
+      extra[kPlaceAt + static_cast<std::size_t>(i)] = static_cast<float>(place.position_m[i]);
+    }
+    for (int i = 0; i < 4; ++i) {
+      extra[kPlaceAt + 3 + static_cast<std::size_t>(i)] =
+          static_cast<float>(place.rotation.coeffs()[i]);
+    }
+  }
+  glove::Packet packet{.raw = raw, .valid = {}, .extra = extra};
+  for (std::size_t f = 0; f < kFingers; ++f) packet.valid[f] = true;
+  emit(packet, sink);
+}
+
+}  // namespace posed::drivers::p5

@@ -1,0 +1,90 @@
+#include "drivers/p5/emulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace posed::drivers::p5 {
+namespace {
+
+constexpr std::int64_t kPeriod_ns = 20'000'000;  // libp5glove's users tell of 40 to 60 a second
+
+constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
+
+// What a whole bend means, as config/devices/p5.toml has it.
+constexpr std::array<double, kFingerJoints> kFinger_rad{radians(90.0), radians(100.0),
+                                                        radians(70.0)};
+constexpr std::array<double, kFingerJoints> kThumb_rad{0.0, radians(60.0), radians(80.0)};
+
+double bend(const HandAngles& angles, std::size_t finger) {
+  const auto& whole = finger == 0 ? kThumb_rad : kFinger_rad;
+  double sum = 0.0;
+  int joints = 0;
+  for (std::size_t j = 0; j < whole.size(); ++j) {
+    if (whole[j] == 0.0) continue;
+    sum += angles[finger * kFingerChannels + 3 * j] / whole[j];
+    ++joints;
+  }
+  return std::clamp(sum / joints, 0.0, 1.0);
+}
+
+}  // namespace
+
+std::array<std::byte, kHeadsBytes> emulated_heads() {
+  return {std::byte{kHeadsReport}, {}, {}, {}, {}, std::byte{80}};
+}
+
+std::array<std::byte, kFirmwareBytes> emulated_firmware() {
+  return {std::byte{kFirmwareReport}, std::byte{4}, std::byte{3}};
+}
+
+std::array<std::byte, kLedsBytes> emulated_leds() {
+  // 1/100 inch: around the hand, no three on one line.
+  constexpr std::array<std::array<int, 3>, kLeds> kPlaces{{{-250, 20, 170},
+                                                           {240, -30, -30},
+                                                           {-170, 30, -50},
+                                                           {40, 100, -10},
+                                                           {170, -20, -90},
+                                                           {200, 10, 210},
+                                                           {-280, -60, 150},
+                                                           {190, -70, 210}}};
+  std::array<std::byte, kLedsBytes> bytes{std::byte{kLedsReport}};
+  for (std::size_t i = 0; i < kLeds; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int value = k == 0 ? -kPlaces[i][k] : kPlaces[i][k];
+      bytes[2 + 6 * i + 2 * k] = static_cast<std::byte>(value >> 8 & 0xFF);
+      bytes[2 + 6 * i + 2 * k + 1] = static_cast<std::byte>(value & 0xFF);
+    }
+  }
+  return bytes;
+}
+
+P5Emulator::P5Emulator() : pace_(kPeriod_ns) {
+  pace_.start(0);
+  const Tower tower = Tower::of(emulated_heads(), emulated_leds());
+  const Eigen::Vector3d palm_m(0.05, 0.02, 0.5);
+  for (std::size_t i = 0; i < kSpots; ++i) {
+    const std::size_t led = 2 * i;
+    report_.spot[i] = tower.project(led, palm_m + tower.led_m[led]);
+  }
+  pose({});
+}
+
+void P5Emulator::pose(const HandAngles& angles) {
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    report_.bend[f] = static_cast<std::uint8_t>(std::lround(kMaxBend * bend(angles, f)));
+  }
+}
+
+void P5Emulator::receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
+                         Bytes& /*answer*/) {
+  // What a P5 is asked goes over control transfers, not into this stream.
+}
+
+void P5Emulator::emit(std::int64_t now_ns, Bytes& out) {
+  pace_.step(now_ns);
+  const auto bytes = encode_report(report_);
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+}  // namespace posed::drivers::p5

@@ -1,0 +1,32 @@
+// The other side of a P5: its input reports and what it answers to feature requests.
+#pragma once
+
+#include <vector>
+
+#include "drivers/emulator.hpp"
+#include "drivers/glove/pace.hpp"
+#include "drivers/p5/tower.hpp"
+
+namespace posed::drivers::p5 {
+
+// Feature reports of an emulated P5: heads that lean as libp5glove has it, LEDs of our invention.
+[[nodiscard]] std::array<std::byte, kHeadsBytes> emulated_heads();
+[[nodiscard]] std::array<std::byte, kFirmwareBytes> emulated_firmware();
+[[nodiscard]] std::array<std::byte, kLedsBytes> emulated_leds();
+
+class P5Emulator final : public Emulator {
+ public:
+  P5Emulator();
+
+  // The hand stands still half a metre before the tower; four of its LEDs are seen.
+  void pose(const HandAngles& angles) override;
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
+  [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
+  void emit(std::int64_t now_ns, Bytes& out) override;
+
+ private:
+  glove::Pace pace_;
+  Report report_;
+};
+
+}  // namespace posed::drivers::p5
