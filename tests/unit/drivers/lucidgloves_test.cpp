@@ -1,7 +1,11 @@
 // LucidGloves: lines that real gloves sent, what is made of damaged ones, forces to and fro, and
 // the glove on a port.
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <catch2/catch.hpp>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -49,6 +53,50 @@ std::string haptics_text(const Options& options, const Haptics& haptics) {
   if (!bytes) return "refused: " + bytes.error().message;
   return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
 }
+
+// A glove on the network: connects to us, then talks.
+class NetworkGlove {
+ public:
+  explicit NetworkGlove(std::uint16_t port)
+      : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    const sockaddr_in to = loopback(port);
+    REQUIRE(::connect(fd_, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0);
+  }
+  ~NetworkGlove() { ::close(fd_); }
+  NetworkGlove(const NetworkGlove&) = delete;
+  NetworkGlove& operator=(const NetworkGlove&) = delete;
+
+  void say(std::string_view text) const {
+    REQUIRE(::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) ==
+            static_cast<ssize_t>(text.size()));
+  }
+  [[nodiscard]] std::string heard() const {
+    std::array<char, 256> text{};
+    const ssize_t got = ::recv(fd_, text.data(), text.size(), 0);
+    return {text.data(), static_cast<std::size_t>(got < 0 ? 0 : got)};
+  }
+
+  static sockaddr_in loopback(std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    return address;
+  }
+  // A port that was free a moment ago.
+  static std::uint16_t free_port() {
+    const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in address = loopback(0);
+    socklen_t size = sizeof address;
+    REQUIRE(::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0);
+    REQUIRE(::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0);
+    ::close(fd);
+    return ntohs(address.sin_port);
+  }
+
+ private:
+  int fd_;
+};
 
 }  // namespace
 
@@ -221,6 +269,31 @@ TEST_CASE("a LucidGlove on a port is opened, read and told apart by hand and ran
   const auto other = open("right", 4095);
   REQUIRE_FALSE(other);
   CHECK(other.error().message.find("left glove") != std::string::npos);
+}
+
+TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out") {
+  const std::uint16_t port = NetworkGlove::free_port();
+  const Options options{{"link", std::string("tcp")},
+                        {"listen", "127.0.0.1:" + std::to_string(port)}};
+  Ports ports;
+  CHECK_FALSE(driver().open(options, ports));  // nobody there yet; it goes on listening
+  const NetworkGlove glove(port);
+  glove.say("A1B2C3D4E5\n\r\nZ(ZV)5(ZG)0(ZH)1\n\r\n");
+  auto device = driver().open(options, ports);
+  if (!device) FAIL(device.error().text());
+  CHECK(glove.heard() == "(ZA)Z\n");
+  glove.say("A1B2C3D4E5\n\r\nA2B2C3D4E5\n\r\n");
+  CollectSink sink;
+  REQUIRE(device->transport->start(0));
+  for (int i = 0; i < 1000 && sink.frames.size() < 2; ++i) {
+    pollfd ready{.fd = device->transport->poll_fd(), .events = POLLIN, .revents = 0};
+    (void)::poll(&ready, 1, 10);
+    device->decoder->feed(device->transport->read(0).bytes, 0, sink);
+  }
+  CHECK(sink.frames.size() == 2);
+  CHECK(sink.outcomes == std::array<int, kOutcomes>{2});
+  REQUIRE(device->transport->send(std::as_bytes(std::span(std::string_view("A0B0C0D0E0\n")))));
+  CHECK(glove.heard() == "A0B0C0D0E0\n");
 }
 
 TEST_CASE("a port with another device on it is refused with what to check") {
