@@ -53,6 +53,9 @@ void compute_abductions(float bias, std::span<float> value, Valid& valid) noexce
   value[kLittleAbd] += value[kRingAbd];
 }
 
+void uncompute_left(std::span<double> value) noexcept { uncompute_angles(Side::kLeft, value); }
+void uncompute_right(std::span<double> value) noexcept { uncompute_angles(Side::kRight, value); }
+
 }  // namespace
 
 Result<glove::Model> glove_model(Side hand) {
@@ -74,6 +77,7 @@ Result<glove::Model> glove_model(Side hand) {
   if (hand == Side::kLeft) {
     for (const std::size_t i : kMirrored) model.sensors[i].map_sign = -1.0;
   }
+  model.uncompute = hand == Side::kLeft ? uncompute_left : uncompute_right;
   return model;
 }
 

@@ -4,6 +4,7 @@
 
 #include "drivers/glove/angle_map.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/fit.hpp"
 #include "drivers/glove/greeting.hpp"
 
 namespace posed::drivers::glove {
@@ -70,13 +71,6 @@ Result<> check_owner(const Model& model, const CalibrationFile& file, Side hand,
   return {};
 }
 
-// A sensor that hardly moved while it was calibrated would turn its noise into motion.
-double least_span(const Sensor& sensor) {
-  constexpr double kCounts = 10.0;
-  constexpr double kShareOfRange = 0.04;
-  return std::min(kCounts, kShareOfRange * (sensor.raw_max - sensor.raw_min));
-}
-
 Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>>& points,
                    Curve& curve) {
   if (points.size() < 2 || points.size() > kMaxCurvePoints) {
@@ -99,6 +93,13 @@ Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>
 }
 
 }  // namespace
+
+// A sensor that hardly moved while it was calibrated would turn its noise into motion.
+double least_span(const Sensor& sensor) {
+  constexpr double kCounts = 10.0;
+  constexpr double kShareOfRange = 0.04;
+  return std::min(kCounts, kShareOfRange * (sensor.raw_max - sensor.raw_min));
+}
 
 Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model) {
   const auto made = compile(model);

@@ -2,6 +2,7 @@
 // which joints they bend. A driver states it; calibrations are checked and compiled against it.
 #pragma once
 
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,9 @@ struct Model {
   // The device's own constants that a calibration may set, with their defaults.
   std::vector<std::pair<std::string, double>> parameters{};
   std::string map_toml{};  // config/devices/<name>.toml: calibrated values to hand45
+  // The device's formula the other way: values as the map has them to what the curves give, in
+  // place. Null: the same.
+  void (*uncompute)(std::span<double> value) = nullptr;
 };
 
 }  // namespace posed::drivers::glove

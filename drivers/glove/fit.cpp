@@ -1,0 +1,107 @@
+#include "drivers/glove/fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "drivers/glove/angle_map.hpp"
+
+namespace posed::drivers::glove {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kSame = 0.05;  // rad or share: two poses that differ less do not move a sensor
+
+std::size_t channel(std::string_view name) { return static_cast<std::size_t>(hand_channel(name)); }
+
+void bend(HandAngles& hand, std::string_view name, double degrees) {
+  hand[channel(name)] = degrees * kDegree;
+}
+
+}  // namespace
+
+HandAngles hand_in(Pose pose) {
+  HandAngles hand{};
+  if (pose == Pose::kFist) {
+    for (const std::string finger : {"index", "middle", "ring", "little"}) {
+      bend(hand, finger + "1_x", 80);
+      bend(hand, finger + "2_x", 100);
+      bend(hand, finger + "3_x", 60);
+    }
+  } else if (pose == Pose::kThumb) {
+    bend(hand, "thumb1_x", 30);
+    bend(hand, "thumb1_z", 60);
+    bend(hand, "thumb2_x", 50);
+    bend(hand, "thumb3_x", 70);
+  } else if (pose == Pose::kSpread) {
+    bend(hand, "thumb1_y", 45);
+    bend(hand, "index1_y", 15);
+    bend(hand, "ring1_y", 12);
+    bend(hand, "little1_y", 25);
+  }
+  return hand;
+}
+
+Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand) {
+  const auto rows =
+      parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors);
+  if (!rows) return std::unexpected(rows.error());
+  const std::size_t sensors = model.sensors.size();
+  std::vector<double> sum(sensors, 0.0);
+  std::vector<double> count(sensors, 0.0);
+  for (const MapRow& row : *rows) {
+    const double gain = static_cast<double>(row.gain) * model.sensors[row.sensor].map_sign;
+    if (gain == 0.0) continue;
+    sum[row.sensor] += (hand[row.channel] - static_cast<double>(row.offset_rad)) / gain;
+    count[row.sensor] += 1.0;
+  }
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> values(sensors, kUnknown);
+  for (std::size_t i = 0; i < sensors; ++i) {
+    if (count[i] > 0.0) values[i] = sum[i] / count[i];
+    // A share of a finger's way is none or all of it in a pose, whatever its joints' limits are.
+    if (count[i] > 0.0 && model.sensors[i].unit == "1") values[i] = std::round(values[i]);
+  }
+  if (model.uncompute != nullptr) model.uncompute(values);
+  return values;
+}
+
+Result<Fitted> fit_poses(const Model& model, const Recorded& recorded) {
+  std::array<std::vector<double>, kPoses> wanted;
+  for (std::size_t p = 0; p < kPoses; ++p) {
+    auto values = values_of(model, hand_in(static_cast<Pose>(p)));
+    if (!values) return std::unexpected(values.error());
+    wanted[p] = std::move(*values);
+  }
+  Fitted fitted;
+  bool flat_seen = false;
+  for (std::size_t i = 0; i < model.sensors.size(); ++i) {
+    const Sensor& sensor = model.sensors[i];
+    const Held& flat = recorded[0][i];
+    if (flat.count == 0) continue;  // a sensor that this glove lacks
+    flat_seen = true;
+    std::size_t most = 0;
+    for (std::size_t p = 1; p < kPoses; ++p) {
+      const double moves = std::abs(wanted[p][i] - wanted[0][i]);
+      if (recorded[p][i].count > 0 && moves > std::abs(wanted[most][i] - wanted[0][i])) most = p;
+    }
+    if (!(std::abs(wanted[most][i] - wanted[0][i]) > kSame)) continue;
+    const double raw = recorded[most][i].mean();
+    if (!(std::abs(raw - flat.mean()) >= least_span(sensor))) {
+      fitted.warnings.push_back("sensor " + sensor.name + " hardly moved from flat to " +
+                                std::string(kPoseNames[most]) + ": it keeps its default");
+      continue;
+    }
+    std::vector<std::array<double, 2>> points{{flat.mean(), wanted[0][i]}, {raw, wanted[most][i]}};
+    std::ranges::sort(points);
+    fitted.sensors[sensor.name] = std::move(points);
+  }
+  if (!flat_seen) return fail("no raw values came while the hand was flat: is the glove sending?");
+  if (fitted.sensors.empty()) {
+    return fail("no sensor moved between the poses: is the glove worn, and its cable in?");
+  }
+  return fitted;
+}
+
+}  // namespace posed::drivers::glove

@@ -1,0 +1,63 @@
+// Fit: a user's calibration from a few poses of the hand, held still. Cold.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/model.hpp"
+#include "proto/frame/hand.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::drivers::glove {
+
+enum class Pose : std::uint8_t { kFlat, kFist, kThumb, kSpread };
+inline constexpr std::size_t kPoses = 4;
+inline constexpr std::array<std::string_view, kPoses> kPoseNames{"flat", "fist", "thumb", "spread"};
+// What the user is asked to do.
+inline constexpr std::array<std::string_view, kPoses> kPoseHints{
+    "lay the hand flat on the table, fingers together and straight, thumb beside the index",
+    "make a fist, tight, with the thumb outside",
+    "fingers straight, the thumb bent across the palm to the root of the little finger",
+    "spread all fingers as far as they go, hand flat"};
+
+// How the hand stands in a pose [rad]: an average of what people do, so fitted angles are as
+// good as the user's own poses.
+[[nodiscard]] HandAngles hand_in(Pose pose);
+
+// Raw values of one sensor while a pose was held.
+struct Held {
+  double sum = 0.0;
+  std::size_t count = 0;
+  void add(float raw) {
+    sum += static_cast<double>(raw);
+    ++count;
+  }
+  [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
+};
+using Recorded = std::array<std::array<Held, kMaxSensors>, kPoses>;  // [pose][sensor]
+
+struct Fitted {
+  std::map<std::string, std::vector<std::array<double, 2>>> sensors;  // for CalibrationFile
+  std::vector<std::string> warnings;  // sensors that keep their default though a pose moves them
+};
+
+// Two points a sensor: the flat hand and the pose that moves it most. A sensor that no pose moves
+// keeps its default; one that moved less than 10 counts, too, with a warning. An error when no
+// flat hand was recorded, or no sensor moved at all.
+[[nodiscard]] Result<Fitted> fit_poses(const Model& model, const Recorded& recorded);
+
+// The calibrated values [sensor] that a hand in this pose gives, before the device's own formula;
+// not finite for a sensor that the map does not name.
+[[nodiscard]] Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand);
+
+// The least movement of a sensor that a calibration may rest on [counts].
+[[nodiscard]] double least_span(const Sensor& sensor);
+
+}  // namespace posed::drivers::glove
