@@ -19,6 +19,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_run,
     add_check,
     add_devices,
+    add_calibrate,
     add_record,
     add_replay,
     add_train,
