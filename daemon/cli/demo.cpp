@@ -23,6 +23,7 @@
 #include "daemon/cli/train_gesture.hpp"
 #include "daemon/cli/train_style.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/devices/performer.hpp"
 #include "daemon/pipeline/daemon.hpp"
 
 namespace posed::cli {
@@ -176,10 +177,28 @@ Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watch
   return {};
 }
 
-Result<> stream(const DemoOptions& options) {
+// Somebody wears the glove of every stream that names no device of its own.
+using Performers = std::vector<std::unique_ptr<devices::Performer>>;
+Result<Performers> put_on_gloves(pipeline::DaemonConfig& config,
+                                 const std::filesystem::path& clip) {
+  Performers performers;
+  for (pipeline::StreamConfig& stream : config.streams) {
+    const auto port = stream.options.find("port");
+    if (port == stream.options.end() || !std::get<std::string>(port->second).empty()) continue;
+    auto performer = devices::Performer::start(stream.driver, clip);
+    if (!performer) return std::unexpected(performer.error());
+    port->second = (*performer)->port();
+    performers.push_back(std::move(*performer));
+  }
+  return performers;
+}
+
+Result<> stream(const DemoOptions& options, const std::filesystem::path& folder) {
   auto config = config::load_config(options.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
   const Interrupt interrupt;
+  const auto performers = put_on_gloves(*config, folder / kDemoPerformer);
+  if (!performers) return std::unexpected(performers.error());
   auto daemon = pipeline::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
   if (auto started = (*daemon)->start(); !started) return started;
@@ -210,9 +229,10 @@ Result<> stream(const DemoOptions& options) {
 Result<> demo(const DemoOptions& options) {
   if (!options.prepare.empty()) return prepare(options.prepare);
   // The clips and the model lie where the demo's config looks for them.
-  const auto folder = std::filesystem::absolute(options.config).parent_path() / "../build/demo";
-  if (auto prepared = prepare(folder.lexically_normal()); !prepared) return prepared;
-  return stream(options);
+  const auto beside = std::filesystem::absolute(options.config).parent_path() / "../build/demo";
+  const auto folder = beside.lexically_normal();
+  if (auto prepared = prepare(folder); !prepared) return prepared;
+  return stream(options, folder);
 }
 
 }  // namespace

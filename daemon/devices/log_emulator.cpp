@@ -37,7 +37,8 @@ Result<LoggedDevice> read_logged_device(const std::string& log, const std::strin
   if (wanted == nullptr) {
     return misuse("choose one of its streams with --stream: " + names, log);
   }
-  LoggedDevice device{.stream = wanted->name, .driver = wanted->driver, .text = wanted->text, .recording = {}};
+  LoggedDevice device{
+      .stream = wanted->name, .driver = wanted->driver, .text = wanted->text, .recording = {}};
   for (;;) {
     const auto chunk = reader->next_chunk();
     if (!chunk) return std::unexpected(chunk.error());
