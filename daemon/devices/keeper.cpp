@@ -1,5 +1,7 @@
 #include "daemon/devices/keeper.hpp"
 
+#include <array>
+
 #include <poll.h>
 #include <unistd.h>
 
@@ -52,11 +54,15 @@ void Keeper::sleep() {
   pipeline::Wake& wake = *stream_.slot->keeper;
   wake.going_to_sleep();
   if (stream_.slot->out.empty() && !stop_.load()) {
-    pollfd fd{wake.fd(), POLLIN, 0};
-    if (poll(&fd, 1, static_cast<int>((away_ ? kTryEvery : kLookEvery).count())) > 0) {
+    // A node that comes is tried at once; where nothing tells of it, at the next turn.
+    std::array<pollfd, 2> wait{
+        {{wake.fd(), POLLIN, 0}, {away_ ? arrivals_.poll_fd() : -1, POLLIN, 0}}};
+    poll(wait.data(), wait.size(), static_cast<int>((away_ ? kTryEvery : kLookEvery).count()));
+    if ((wait[0].revents & POLLIN) != 0) {
       std::uint64_t rung = 0;
-      [[maybe_unused]] const ssize_t cleared = read(wake.fd(), &rung, sizeof rung);
+      [[maybe_unused]] const ssize_t cleared = ::read(wake.fd(), &rung, sizeof rung);
     }
+    if ((wait[1].revents & POLLIN) != 0) static_cast<void>(arrivals_.take());
   }
   wake.awake();
 }

@@ -13,6 +13,7 @@
 
 #include "daemon/pipeline/open_stream.hpp"
 #include "daemon/pipeline/reader.hpp"
+#include "drivers/transport/arrivals.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::devices {
@@ -47,6 +48,7 @@ class Keeper {
   pipeline::OpenStream& stream_;
   KeeperPorts ports_;
   const drivers::Driver& driver_;
+  drivers::Arrivals arrivals_;
   std::unique_ptr<drivers::Device> device_;  // the one opened here; null while it is away
   bool away_ = false;
   bool asked_back_ = false;
