@@ -25,7 +25,9 @@ struct EmulateOptions {
   std::string stream;
   std::string tcp;
   std::filesystem::path link, clip;
-  std::vector<std::string> set;  // KEY=VALUE
+  std::vector<std::string> set;     // KEY=VALUE
+  std::vector<std::string> faults;  // KIND:RATE
+  std::uint64_t seed = 1;
   bool pty = false;
   double speed = 1.0;
   std::optional<double> seconds;
@@ -82,6 +84,12 @@ Result<> emulate(const EmulateOptions& options) {
   const Interrupt interrupt;
   auto emulator = open_emulator(options);
   if (!emulator) return std::unexpected(emulator.error());
+  devices::EmulatedGlove::Settings settings{.speed = options.speed};
+  for (const std::string& word : options.faults) {
+    const auto fault = drivers::emulate::parse_fault(word);
+    if (!fault) return std::unexpected(fault.error());
+    settings.faults.emplace_back(*fault, options.seed + settings.faults.size());
+  }
   auto moves = motion(options);
   if (!moves) return std::unexpected(moves.error());
   auto port = options.tcp.empty() ? devices::EmulatedPort::open_pty(options.link)
@@ -90,7 +98,7 @@ Result<> emulate(const EmulateOptions& options) {
   const nlohmann::ordered_json ready{
       {"port", options.link.empty() ? port->name() : options.link.string()}};
   devices::EmulatedGlove glove(std::move(*emulator), std::move(*port), std::move(*moves),
-                               {.speed = options.speed});
+                               std::move(settings));
   std::printf("%s\n", ready.dump().c_str());
   std::fflush(stdout);
   std::atomic<bool> stop{false};
@@ -134,13 +142,19 @@ void add_emulate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command->add_option("--set", options->set, "An option of the driver, like hand=left")
       ->type_name("KEY=VALUE");
+  command->add_option("--fault", options->faults, "A fault of the line, so many a byte or packet")
+      ->type_name("KIND:RATE");
+  command->add_option("--seed", options->seed, "Of the faults: the same seed, the same faults")
+      ->capture_default_str();
   command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");
   command->add_option("--seconds", options->seconds, "End after this long")
       ->check(CLI::PositiveNumber);
   command->footer(R"(Prints one JSON line {"port": ...} when it can be opened. Examples:
   posed emulate cyberglove --link /tmp/glove   # and a stream with port = "/tmp/glove"
   posed emulate lucidgloves --tcp 127.0.0.1:65432
-  posed emulate take1.plog --stream right      # the bytes of a recorded glove)");
+  posed emulate take1.plog --stream right      # the bytes of a recorded glove
+  posed emulate cyberglove --fault drop:0.01 --fault burst:0.001
+Faults: drop, zero, flip, insert, noise (share of bytes); duplicate, silence, baud, burst (of packets).)");
   command->callback([options, &exit_code] {
     if (auto done = emulate(*options); !done) exit_code = report(done.error());
   });

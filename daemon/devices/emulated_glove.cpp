@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "daemon/pipeline/clock.hpp"
 
@@ -75,13 +76,12 @@ void EmulatedGlove::emit(std::int64_t device_ns) {
     packet_.clear();
     emulator_->emit(device_ns, packet_);
     ++packets_;
-    if (settings_.line) {
-      sent_.clear();
-      settings_.line(packet_, sent_);
-      port_.send(sent_);
-    } else {
-      port_.send(packet_);
+    for (auto& fault : settings_.faults) {
+      passed_.clear();
+      static_cast<void>(fault.pass(packet_, device_ns, passed_));
+      std::swap(packet_, passed_);
     }
+    port_.send(packet_);
   }
 }
 

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "daemon/devices/emulated_port.hpp"
+#include "drivers/emulate/faults.hpp"
 #include "drivers/emulator.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/result.hpp"
@@ -21,9 +23,8 @@ class EmulatedGlove {
  public:
   using Bytes = drivers::Emulator::Bytes;
   struct Settings {
-    double speed = 1.0;  // times the device's own pace
-    // What a bad line makes of a packet, added to `out`; empty: a good line.
-    std::function<void(const Bytes& packet, Bytes& out)> line{};
+    double speed = 1.0;                                     // times the device's own pace
+    std::vector<drivers::emulate::FaultInjector> faults{};  // of the line, one after the other
   };
 
   // `motion` gives the hand's pose at a time since the start; empty leaves the pose alone.
@@ -44,7 +45,7 @@ class EmulatedGlove {
   EmulatedPort port_;
   std::function<HandAngles(double time_s)> motion_;
   Settings settings_;
-  Bytes packet_, sent_;
+  Bytes packet_, passed_;
   std::atomic<std::uint64_t> packets_{0};
 };
 

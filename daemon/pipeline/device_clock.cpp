@@ -22,12 +22,19 @@ bool plausible(std::int64_t time_ns) noexcept {
 
 }  // namespace
 
-void DeviceClock::restart() noexcept { *this = DeviceClock(); }
+void DeviceClock::restart() noexcept {
+  const std::uint64_t jumps = jumps_;
+  *this = DeviceClock();
+  jumps_ = jumps;
+}
 
 ClockMapping DeviceClock::take(std::int64_t device_ns, std::int64_t arrival_ns) noexcept {
   if (!plausible(device_ns) || !plausible(arrival_ns)) return mapping_;
   const std::int64_t delay_ns = arrival_ns - device_ns;
-  if (jumped(device_ns, delay_ns)) restart();
+  if (jumped(device_ns, delay_ns)) {
+    restart();
+    ++jumps_;
+  }
   if (open_until_ns_ == kNoTime_ns || device_ns >= open_until_ns_) {
     if (open_until_ns_ != kNoTime_ns) close_point();
     open_ = {device_ns, delay_ns};

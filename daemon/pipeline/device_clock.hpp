@@ -25,6 +25,8 @@ class DeviceClock {
   // The link is new: what is known of the old one no longer holds.
   void restart() noexcept;
 
+  // Times that the device's time jumped, over all links.
+  [[nodiscard]] std::uint64_t jumps() const noexcept { return jumps_; }
   [[nodiscard]] const ClockMapping& mapping() const noexcept { return mapping_; }
 
  private:
@@ -46,6 +48,7 @@ class DeviceClock {
   std::int64_t open_until_ns_ = kNoTime_ns;
   std::int64_t late_since_ns_ = kNoTime_ns;
   ClockMapping mapping_;
+  std::uint64_t jumps_ = 0;
 };
 
 // Host time of a device time.

@@ -73,6 +73,7 @@ class Reader::Source final : public Sink {
     static_cast<void>(read_.slot->in.consume([this](drivers::Device* device) noexcept {
       device_ = device;
       clock_.restart();
+      jumps_ = clock_.jumps();
       arrival_ns_ = ports_.clock();
       tape(record::Direction::kGreeting, std::as_bytes(std::span(device->description.text)));
       use(*device);
@@ -96,6 +97,10 @@ class Reader::Source final : public Sink {
     frame.header.arrival_ns = arrival_ns_;
     if (frame.source == posed::Source::kDevice) {
       frame.header.clock = clock_.take(frame.header.device_ns, arrival_ns_);
+      if (clock_.jumps() != jumps_) {
+        jumps_ = clock_.jumps();
+        static_cast<void>(notify(v1::Event::KIND_CLOCK_JUMPED, 0));
+      }
     }
     frame.stamps.decoded_ns = ports_.clock();
     counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
@@ -207,6 +212,7 @@ class Reader::Source final : public Sink {
   drivers::Device* device_;  // null while it is away
   const drivers::glove::OwnedCalibration* calibration_;
   DeviceClock clock_;
+  std::uint64_t jumps_ = 0;  // of the clock, told so far
   std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
   std::uint64_t frames_ = 0;

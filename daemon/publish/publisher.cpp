@@ -39,6 +39,8 @@ std::string sentence(const pipeline::Item& item) {
       return fmt::format("control takes effect at frame {}", notice.sequence);
     case v1::Event::KIND_CALIBRATED:
       return fmt::format("a calibration takes effect at frame {}", notice.sequence + 1);
+    case v1::Event::KIND_CLOCK_JUMPED:
+      return "the device's own time jumped (did it restart?); it is mapped to the host's anew";
     case v1::Event::KIND_PLAYING:
       return fmt::format("performs {:.0f} labels from frame {} on, or after those that wait",
                          notice.value, notice.sequence);
@@ -228,7 +230,7 @@ void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int6
   event.set_sequence(sequence);
   event.set_text(text);
   const bool bad = kind == v1::Event::KIND_STALE || kind == v1::Event::KIND_SHED ||
-                   kind == v1::Event::KIND_LOST ||
+                   kind == v1::Event::KIND_LOST || kind == v1::Event::KIND_CLOCK_JUMPED ||
                    (kind >= v1::Event::KIND_RECORDING_GAP && kind <= v1::Event::KIND_WARNING);
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "{}: {}", event.stream(), text);
   send(outlets_[stream]->styled.event_topic, event);

@@ -5,8 +5,14 @@
 #include <unistd.h>
 #include <catch2/catch.hpp>
 
+#include <atomic>
+#include <chrono>
 #include <mutex>
+#include <thread>
 
+#include "daemon/devices/emulated_glove.hpp"
+#include "daemon/pipeline/clock.hpp"
+#include "drivers/options.hpp"
 #include "drivers/transport/ports.hpp"
 #include "models/gesture/synthetic_performer.hpp"
 #include "proto/clip/clip.hpp"
@@ -140,6 +146,64 @@ TEST_CASE("hands keep the hot law: smoothed, constrained, performing, given anot
   REQUIRE(rig.take_frames(150) == 150);
   CHECK(rig.take_acks() == 5);
   check_no_breach();
+}
+
+TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "[rt]") {
+  watch_log();
+  CountingTape tape;
+  std::atomic<bool> stop{false};
+  const auto plug_in = [] {
+    auto emulator =
+        drivers::find_driver("lucidgloves")
+            ->emulate(drivers::complete_options(*drivers::find_driver("lucidgloves"), {}).value());
+    return std::make_unique<devices::EmulatedGlove>(std::move(*emulator),
+                                                    devices::EmulatedPort::open_pty().value(),
+                                                    nullptr, devices::EmulatedGlove::Settings{});
+  };
+  auto glove = plug_in();
+  std::thread worn([&] { glove->run(stop); });
+  pipeline::DeviceSlot slot;
+  slot.keeper = pipeline::Wake::open().value();
+  std::vector<RigStream> streams;
+  streams.push_back(
+      {.device = open_device("lucidgloves", {{"port", glove->port()}}), .slot = &slot});
+  const auto model =
+      drivers::find_driver("lucidgloves")->glove_model(streams[0].device.description);
+  const drivers::glove::OwnedCalibration calibration{
+      drivers::glove::default_calibration(*model).value(), "calibration"};
+  drivers::Device again;
+  {
+    Rig rig(std::move(streams), &tape);
+    forget_breaches();
+    rig.start();
+    REQUIRE(rig.take_frames(50) == 50);
+    rig.command({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
+                 .ticket = 1,
+                 .calibration = &calibration});
+    rig.command({.kind = pipeline::DeviceCommand::Kind::kSend, .size = 5});
+    REQUIRE(rig.take_frames(50) == 50);
+    CHECK(rig.take_acks() == 1);
+    stop = true;
+    worn.join();
+    glove.reset();  // unplugged
+    drivers::Device* lost = nullptr;
+    while (!slot.out.consume([&](drivers::Device* device) { lost = device; })) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    lost->transport.reset();
+    stop = false;
+    glove = plug_in();
+    worn = std::thread([&] { glove->run(stop); });
+    again = open_device("lucidgloves", {{"port", glove->port()}});
+    again.transport->start(pipeline::monotonic_ns()).value();
+    REQUIRE(slot.in.push(&again));
+    rig.call_reader();
+    REQUIRE(rig.take_frames(50) == 50);
+    if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
+    check_no_breach();
+  }
+  stop = true;
+  worn.join();
 }
 
 TEST_CASE("each way of breaking the hot law is found", "[rt]") {

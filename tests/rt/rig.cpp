@@ -22,7 +22,8 @@ Rig::Rig(std::vector<RigStream> streams, record::Tape* tape)
   reader_ = pipeline::Reader::open({.out = &decoded_,
                                     .pipeline = pipeline_wake_.get(),
                                     .tape = tape,
-                                    .clock = pipeline::monotonic_ns})
+                                    .clock = pipeline::monotonic_ns,
+                                    .commands = &device_commands_})
                 .value();
   for (std::uint32_t i = 0; i < streams_.size(); ++i) {
     RigStream& stream = streams_[i];
@@ -39,7 +40,8 @@ Rig::Rig(std::vector<RigStream> streams, record::Tape* tape)
     if (stream.style != nullptr) options.style.emplace();
     if (stream.gesture != nullptr) options.generate.emplace();
     worker_->add(options, stream.device.description.rate_hz, *counters_.back());
-    reader_->add({.device = &stream.device, .counters = counters_.back().get()});
+    reader_->add(
+        {.device = &stream.device, .counters = counters_.back().get(), .slot = stream.slot});
   }
 }
 
@@ -82,6 +84,11 @@ int Rig::take_frames(int frames) {
 void Rig::command(const pipeline::Command& command) {
   while (!commands_.push(command)) std::this_thread::yield();
   pipeline_wake_->ring();
+}
+
+void Rig::command(const pipeline::DeviceCommand& command) {
+  while (!device_commands_.push(command)) std::this_thread::yield();
+  reader_->call();
 }
 
 int Rig::take_acks() {

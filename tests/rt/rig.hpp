@@ -18,6 +18,7 @@ struct RigStream {
   drivers::Device device;
   const style::BoundModel* style = nullptr;
   const generate::BoundModel* gesture = nullptr;
+  pipeline::DeviceSlot* slot = nullptr;  // for a device that goes and comes
 };
 
 class Rig {
@@ -31,6 +32,9 @@ class Rig {
   int take_frames(int frames);
   // Puts a command where control would.
   void command(const pipeline::Command& command);
+  void command(const pipeline::DeviceCommand& command);
+  // There is something in a stream's slot.
+  void call_reader() { reader_->call(); }
   // Acknowledgements that have come.
   [[nodiscard]] int take_acks();
   [[nodiscard]] bool system_calls_watched() const noexcept { return watched_.load() == 2; }
@@ -41,6 +45,7 @@ class Rig {
   pipeline::Ring<pipeline::Item> decoded_{1024};
   pipeline::Ring<pipeline::Item> finished_{1024};
   pipeline::Ring<pipeline::Command> commands_{16};
+  pipeline::Ring<pipeline::DeviceCommand> device_commands_{16};
   pipeline::Ring<pipeline::Ack> acks_{16};
   std::unique_ptr<pipeline::Wake> pipeline_wake_, publisher_wake_;
   std::unique_ptr<pipeline::Worker> worker_;

@@ -86,6 +86,7 @@ TEST_CASE("a device that restarts is mapped anew, and nonsense moves nothing") {
   device_ns = 7;  // switched off and on again
   for (int i = 0; i < 10; ++i) clock.take(device_ns += 10'000'000, arrival_ns += 10'000'000);
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);
+  CHECK(clock.jumps() == 1);
   // Away for a minute while its time stood still.
   arrival_ns += 60 * kNanosPerSecond;
   for (int i = 0; i < 300; ++i) clock.take(device_ns += 10'000'000, arrival_ns += 10'000'000);
