@@ -163,6 +163,27 @@ Result<Device> open(const Options& given, Ports& ports) {
                 .reopen_after_s = kSilence_s};
 }
 
+// The motors shake; they cannot hold a finger. So a force is a finger's strength of shaking, and a
+// vibration, which would have to be ended by us after its time, is refused.
+Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptics& haptics) {
+  const auto wish = wish_of_given(given);
+  if (!wish) return std::unexpected(wish.error());
+  if (wish->layout.form == Form::k16Bit) return misuse("CyberTouch goes with form = \"8bit\"");
+  if (haptics.vibration_s != 0.0F) {
+    return misuse("a CyberTouch shakes until it is told otherwise: send forces, 0 to end them");
+  }
+  std::vector<std::byte> bytes{kTouch, std::byte{0}};
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    const float force = haptics.force[f];
+    if (!(force <= 1.0F)) return misuse("a force should be 0 (free) to 1");
+    if (force < 0.0F) continue;
+    bytes.push_back(static_cast<std::byte>(f));
+    bytes.push_back(static_cast<std::byte>(std::lround(force * 255.0F)));
+  }
+  bytes[1] = static_cast<std::byte>((bytes.size() - 2) / 2);
+  return bytes;
+}
+
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
   const auto wish = wish_of_given(given);
   if (!wish) return std::unexpected(wish.error());
@@ -208,6 +229,7 @@ const Driver& cyberglove_driver() {
                              .describe = describe,
                              .expect = expect,
                              .glove_model = model_of,
+                             .encode_haptics = encode_haptics,
                              .emulate = emulate};
   return driver;
 }

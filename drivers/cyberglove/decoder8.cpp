@@ -48,7 +48,8 @@ void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*
 
 // RT-safe.
 void Decoder8::take_piece(Sink& sink) noexcept {
-  if (lost_ || size_ == 0) return;  // told already; or the end of an answer
+  if (lost_ || size_ == 0) return;                // told already; or the end of an answer
+  if (size_ == 1 && piece_[0] == kTouch) return;  // the answer to a CyberTouch command
   const std::span<const std::byte> piece = std::span(piece_).first(size_);
   const Outcome outcome = check_piece(piece);
   sink.outcome(outcome);

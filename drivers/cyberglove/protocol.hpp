@@ -89,6 +89,10 @@ inline constexpr std::byte kSwitch{0x02};
 inline constexpr std::byte kLight{0x04};
 inline constexpr std::byte kStatusMark{0x80};
 
+// CyberTouch: 'A', n, then n times (motor, strength 0 to 255); motors 0 to 4 are thumb to
+// little, 5 the palm. The answer is 'A' 00, between two samples.
+inline constexpr std::byte kTouch{'A'};
+
 // Bytes before the pairs and the end: lead, sensors, stamp, status. RT-safe.
 [[nodiscard]] std::size_t sample_bytes(const Layout& layout) noexcept;
 

@@ -1,9 +1,10 @@
 // CyberGlove: bytes, angles and clocks; real joint angles turned back into its bytes.
+#include <poll.h>
+
 #include <catch2/catch.hpp>
 
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <sstream>
 
 #include "drivers/cyberglove/angles.hpp"
@@ -11,9 +12,11 @@
 #include "drivers/cyberglove/emulator.hpp"
 #include "drivers/cyberglove/greeting.hpp"
 #include "drivers/cyberglove/stamp_clock.hpp"
+#include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/pseudo_terminal.hpp"
 
 namespace posed::drivers::cyberglove {
 namespace {
@@ -62,6 +65,34 @@ Raw some_raw() {
 constexpr Layout kPlain22{.mask = kMask22, .time = false, .status = false};
 
 std::string plain_start() { return std::string("U\0D\0S", 5); }
+
+// A serial line from a glove to a decoder.
+class Line {
+ public:
+  Line() {
+    Ports ports;
+    auto link = ports.serial({.port = terminal_.port()});
+    if (!link) FAIL(link.error().text());
+    transport_ = make_link_transport(std::move(*link));
+    REQUIRE(transport_->start(0));
+  }
+  // All of it, in whatever pieces it comes.
+  void carry(const Emulator::Bytes& bytes, Decoder& decoder, Sink& sink) {
+    terminal_.say(text_of(bytes));
+    for (std::size_t came = 0; came < bytes.size();) {
+      pollfd wanted{.fd = transport_->poll_fd(), .events = POLLIN, .revents = 0};
+      REQUIRE(::poll(&wanted, 1, 10'000) == 1);
+      const Chunk chunk = transport_->read(0);
+      REQUIRE_FALSE(chunk.lost);
+      decoder.feed(chunk.bytes, 0, sink);
+      came += chunk.bytes.size();
+    }
+  }
+
+ private:
+  test::PseudoTerminal terminal_;
+  std::unique_ptr<Transport> transport_;
+};
 
 // One GraspDB14 recording: rows of 23 angles [rad] in mask order.
 std::vector<Raw> grasp_angles(const std::filesystem::path& path) {
@@ -112,7 +143,7 @@ TEST_CASE("a CyberGlove's masks have the sensors that its gloves have") {
   CHECK((kMask22 >> kIndexAbd & 1) == 0);
 }
 
-TEST_CASE("real joint angles, turned back into a CyberGlove's bytes, come back") {
+TEST_CASE("real joint angles come back from a CyberGlove's bytes on a pseudo-terminal") {
   const auto folder = test::shared("data/gloves/graspdb14_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   const auto model = glove_model(Side::kRight);
@@ -125,10 +156,11 @@ TEST_CASE("real joint angles, turned back into a CyberGlove's bytes, come back")
     const auto emulator = emulator_of({.mask = kMask18});
     const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1920});
     (void)tell(*emulator, "u 1\rd 1\rt 1920 1\rS");
+    Line line;
     for (const Raw& angles : grasp_angles(file.path())) {
       emulator->set_raw(counts_of(angles, *model));
       CollectSink sink(1);
-      decoder->feed(next(*emulator), 0, sink);
+      line.carry(next(*emulator), *decoder, sink);
       REQUIRE(sink.samples.size() == 1);
       const Sample& sample = sink.samples[0];
       ++frames;
@@ -479,6 +511,25 @@ TEST_CASE("the emulated CyberGlove answers like the real one") {
   CHECK(ask("M\x01"s).empty());  // not whole yet
   CHECK(ask("\0\0"s) == "M\0"s);
   CHECK(ask("?M") == "?M\x01\0\0\0"s);
+}
+
+TEST_CASE("a CyberTouch shakes the fingers that a force names, and samples go on") {
+  const auto bytes =
+      cyberglove_driver().encode_haptics({}, {.force = {1.0F, -1.0F, 0.0F, -1.0F, 0.5F}});
+  REQUIRE(bytes);
+  CHECK(text_of(*bytes) == std::string("A\x03\x00\xFF\x02\x00\x04\x80", 8));
+  const auto emulator = emulator_of({});
+  const auto decoder = decoder_of({.hand = Side::kRight, .layout = kPlain22});
+  (void)tell(*emulator, plain_start());
+  CollectSink sink;
+  decoder->feed(next(*emulator), 0, sink);
+  decoder->feed(tell(*emulator, text_of(*bytes)), 0, sink);
+  decoder->feed(next(*emulator), 0, sink);
+  CHECK(sink.outcomes == std::array<int, kOutcomes>{2, 0, 0, 0, 0});
+  CHECK(text_of(tell(*emulator, "?A")) == std::string("?A\xFF\0\0\0\x80\0\0", 9));
+  const auto driver = cyberglove_driver();
+  CHECK_FALSE(driver.encode_haptics({}, {.force = {2.0F}}));
+  CHECK_FALSE(driver.encode_haptics({}, {.vibration_s = 1.0F}));
 }
 
 TEST_CASE("a CyberGlove's sensor that is stuck stays where it is") {
