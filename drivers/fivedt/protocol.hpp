@@ -81,7 +81,7 @@ struct Reading {
 
 // What the glove would send; `side` goes into a wireless type's tenth byte.
 [[nodiscard]] std::vector<std::byte> encode_packet(Form form, const Reading& reading, Side side);
-// The answer to G of a Data Glove 5, and whether one says right; nothing else is read of it.
+// The answer to G of a Data Glove 5; only its hand is read.
 inline constexpr std::size_t kInfoBytes = 32;
 [[nodiscard]] std::vector<std::byte> encode_info(Side side);
 

@@ -1,9 +1,7 @@
 #include "drivers/lucidgloves/lucidgloves.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <optional>
 
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"

@@ -8,6 +8,7 @@
 #include "drivers/p5/decoder.hpp"
 #include "drivers/p5/emulator.hpp"
 #include "drivers/p5/greeting.hpp"
+#include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/specimens.hpp"
@@ -126,7 +127,9 @@ TEST_CASE("an emulated P5 with its feature reports shows where its hand is") {
   Bytes bytes;
   emulator.emit(0, bytes);
   test::CollectSink sink;
+  const std::uint64_t allocations = test::allocations();
   (*decoder)->feed(bytes, 0, sink);
+  CHECK(test::allocations() == allocations);  // the fit takes nothing from the heap
   REQUIRE(sink.samples.size() == 1);
   REQUIRE(sink.frames.size() == 1);
   const Sample& sample = sink.samples[0];
