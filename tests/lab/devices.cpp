@@ -179,8 +179,8 @@ std::unique_ptr<LabDevice> usb_device() {
 
 }  // namespace
 
-std::vector<std::unique_ptr<LabDevice>> lab_devices() {
-  std::vector<std::unique_ptr<LabDevice>> devices;
+LabDevices lab_devices() {
+  LabDevices devices;
   devices.push_back(hid_device());
   devices.push_back(usb_device());
   devices.push_back(serial_device());

@@ -22,7 +22,10 @@ struct LabDevice {
   std::function<bool()> is_there;  // the kernel has found it
 };
 
-// One HID device on hidraw, one that only libusb reaches, one on ttyACM. Made once, unplugged.
-std::vector<std::unique_ptr<LabDevice>> lab_devices();
+using LabDevices = std::vector<std::unique_ptr<LabDevice>>;
+
+// One HID device on hidraw, one that only libusb reaches, one on ttyACM. To be made once;
+// unplugged.
+LabDevices lab_devices();
 
 }  // namespace posed::lab

@@ -14,7 +14,6 @@
 
 #include "drivers/transport/arrivals.hpp"
 #include "drivers/transport/ports.hpp"
-#include "tests/lab/devices.hpp"
 #include "tests/lab/gadget.hpp"
 #include "tests/lab/resources.hpp"
 
@@ -199,9 +198,9 @@ bool check(LabDevice& device) {
 
 }  // namespace
 
-int check_transports(std::string_view only) {
+int check_transports(const LabDevices& devices, std::string_view only) {
   int failed = 0;
-  for (const auto& device : lab_devices()) {
+  for (const auto& device : devices) {
     if (only.empty() || device->name == only) failed += check(*device) ? 0 : 1;
   }
   return failed;
