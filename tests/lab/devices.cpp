@@ -133,7 +133,7 @@ std::unique_ptr<LabDevice> serial_device() {
   const Ids ids{.vendor = 0x1A86, .product = 0x55D4, .serial = "ACM-1", .name = "lucidgloves"};
   auto bench = std::make_shared<Bench<SerialSide>>("dummy_udc.2", ids);
   bench->gadget.add_serial();
-  auto device = device_of(bench, "ttyACM");
+  auto device = device_of(bench, "ttyacm");
   device->serial = true;
   device->is_there = looks_for(drivers::list_serial_ports, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {

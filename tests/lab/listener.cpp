@@ -18,8 +18,7 @@ std::optional<std::uint32_t> common_value(const v1::Sample& sample) {
   std::optional<float> common;
   int sensors = 0;
   for (int i = 0; i < sample.value_size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const bool valid = (sample.validity().at(at / 8) >> (at % 8) & 1) != 0;
+    const bool valid = sample.validity().at(static_cast<std::size_t>(i)) != 0;
     if (!valid || !sample.name(i).starts_with("raw_")) continue;
     if (common && *common != sample.value(i)) return {};
     common = sample.value(i);
