@@ -68,8 +68,14 @@ Result<BenchGlove> make_bench_glove(const Driver& driver, const std::string& nam
 // How a driver's gloves differ in their bytes.
 std::vector<std::pair<std::string, Options>> glove_kinds(const Driver& driver) {
   const std::string name(driver.name);
-  if (name != "described") return {{name, {}}};
   std::vector<std::pair<std::string, Options>> found;
+  if (name != "described") found.push_back({name, {}});
+  if (name == "cyberglove") found.push_back({name + " 16bit", {{"form", std::string("16bit")}}});
+  if (name == "fivedt") found.push_back({name + " 16", {{"model", std::string("16")}}});
+  if (name == "lucidgloves") {
+    found.push_back({name + " legacy", {{"encoding", std::string("legacy")}}});
+  }
+  if (name != "described") return found;
   for (const std::string& device : drivers::described::shipped_devices()) {
     found.push_back({name + " " + device, {{"device", device}}});
   }

@@ -137,8 +137,9 @@ Eigen::Quaterniond local_rotation(const Joint& joint, std::span<const Channel> c
     m = turned ? m * turn : turn;
     turned = true;
   }
-  if (!turned) return m;
-  return joint.channel_frame * m * joint.channel_frame.conjugate();
+  // C M C^-1 turns M's axis by C and leaves its angle alone.
+  if (turned) m.vec() = joint.channel_frame * m.vec();
+  return m;
 }
 
 // Position of a joint in its parent's frame. RT-safe.
