@@ -18,11 +18,28 @@ void drop_what_is_no_number(std::span<const float> value,
   }
 }
 
-void add_value(float value, bool valid, Sample& sample) noexcept {
-  const bool sound = valid && std::isfinite(value);
-  sample.valid[sample.value_count] = sound;
-  sample.value[sample.value_count++] = sound ? value : 0.0F;
-}
+// Fills a Sample's values from the first on.
+class SampleWriter {
+ public:
+  explicit SampleWriter(Sample& sample) noexcept : sample_(sample) {}
+
+  void add(float value, bool valid) noexcept {
+    const bool sound = valid && std::isfinite(value);
+    valid_ |= std::uint64_t{sound} << count_;
+    sample_.value[count_++] = sound ? value : 0.0F;
+  }
+  void finish() noexcept {
+    sample_.valid = valid_;
+    sample_.value_count = static_cast<std::uint16_t>(count_);
+  }
+
+ private:
+  static_assert(kMaxSampleValues <= 64);
+
+  Sample& sample_;
+  std::uint64_t valid_ = 0;
+  std::size_t count_ = 0;
+};
 
 }  // namespace
 
@@ -67,14 +84,16 @@ void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
   Sample sample;
   sample.header.device_ns = packet.device_ns;
   sample.quality = packet.quality;
-  for (std::size_t i = 0; i < sensors; ++i) add_value(value[i], valid[i], sample);
+  SampleWriter writer(sample);
+  for (std::size_t i = 0; i < sensors; ++i) writer.add(value[i], valid[i]);
   for (std::size_t i = 0; i < sensors; ++i) {
-    add_value(raw[i], i < packet.raw.size() && packet.valid[i], sample);
+    writer.add(raw[i], i < packet.raw.size() && packet.valid[i]);
   }
   for (const float extra : packet.extra.first(
            std::min<std::size_t>(packet.extra.size(), kMaxSampleValues - 2 * sensors))) {
-    add_value(extra, true, sample);
+    writer.add(extra, true);
   }
+  writer.finish();
   sink.sample(sample);
   pose(values, valid, packet, sink);
 }
