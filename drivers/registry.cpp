@@ -16,14 +16,8 @@ namespace posed::drivers {
 
 std::span<const Driver> registry() {
   static const std::array drivers{
-      cyberglove_driver(),
-      described_driver(),
-      file_driver(),
-      fivedt_driver(),
-      labels_driver(),
-      lucidgloves_driver(),
-      p5_driver(),
-      template_driver(),
+      cyberglove_driver(), described_driver(),   file_driver(), fivedt_driver(),
+      labels_driver(),     lucidgloves_driver(), p5_driver(),   template_driver(),
   };
   return drivers;
 }
