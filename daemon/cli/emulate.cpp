@@ -154,7 +154,8 @@ void add_emulate(CLI::App& app, int& exit_code) {
   posed emulate lucidgloves --tcp 127.0.0.1:65432
   posed emulate take1.plog --stream right      # the bytes of a recorded glove
   posed emulate cyberglove --fault drop:0.01 --fault burst:0.001
-Faults: drop, zero, flip, insert, noise (share of bytes); duplicate, silence, baud, burst (of packets).)");
+Faults of so many bytes: drop, zero, flip, insert, noise (any of drop, flip, insert);
+of so many packets: duplicate, silence, baud, burst.)");
   command->callback([options, &exit_code] {
     if (auto done = emulate(*options); !done) exit_code = report(done.error());
   });

@@ -8,63 +8,18 @@
 #include <sstream>
 
 #include "drivers/cyberglove/angles.hpp"
-#include "drivers/cyberglove/cyberglove.hpp"
-#include "drivers/cyberglove/emulator.hpp"
-#include "drivers/cyberglove/greeting.hpp"
 #include "drivers/cyberglove/stamp_clock.hpp"
 #include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/cyberglove_rig.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
 
 namespace posed::drivers::cyberglove {
 namespace {
 
 using test::CollectSink;
-using Raw = std::array<double, kSensors>;
-
-std::unique_ptr<Decoder> decoder_of(const Greeted& glove) {
-  const auto description = cyberglove_driver().describe(greeting_of(glove), "test");
-  if (!description) FAIL(description.error().text());
-  auto decoder = cyberglove_driver().make_decoder(*description);
-  if (!decoder) FAIL(decoder.error().text());
-  return std::move(*decoder);
-}
-
-std::unique_ptr<CyberGloveEmulator> emulator_of(EmulatorSettings settings) {
-  auto emulator = CyberGloveEmulator::make(std::move(settings));
-  if (!emulator) FAIL(emulator.error().text());
-  return std::move(*emulator);
-}
-
-Emulator::Bytes tell(Emulator& emulator, std::string_view text) {
-  Emulator::Bytes answer;
-  emulator.receive(std::as_bytes(std::span(text)), 0, answer);
-  return answer;
-}
-
-std::string text_of(const Emulator::Bytes& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-Emulator::Bytes next(Emulator& emulator) {
-  Emulator::Bytes bytes;
-  emulator.emit(emulator.next_due_ns(), bytes);
-  return bytes;
-}
-
-// Counts that stand in the middle of what a hand does, each another.
-Raw some_raw() {
-  Raw raw{};
-  for (std::size_t i = 0; i < kSensors; ++i) raw[i] = 60.0 + 5.0 * static_cast<double>(i);
-  raw[kThumbMcp] = 'S';
-  return raw;
-}
-
-constexpr Layout kPlain22{.mask = kMask22, .time = false, .status = false};
-
-std::string plain_start() { return std::string("U\0D\0S", 5); }
 
 // A serial line from a glove to a decoder.
 class Line {
@@ -468,78 +423,6 @@ TEST_CASE("an 18-sensor glove's 16-bit records have empty places") {
   CHECK(sink.count(Outcome::kOk) == 1);
   CHECK(sink.samples[0].valid[kIndexDip]);
   CHECK_FALSE(sink.samples[0].valid[kSensors + kIndexDip]);
-}
-
-TEST_CASE("the emulated CyberGlove answers like the real one") {
-  const auto emulator = emulator_of({.mask = kMask18});
-  const auto ask = [&](std::string_view text) { return text_of(tell(*emulator, text)); };
-  using namespace std::string_literals;
-  CHECK(ask("?i").contains("CyberGlove"));
-  CHECK(ask("?i").back() == '\0');
-  CHECK(ask("?G") == "?G\x03\0"s);
-  CHECK(ask("?S") == "?S\x12\0"s);
-  CHECK(ask("?K") == "?K\x3F\xBB\x7B\0"s);
-  CHECK(ask("?D") == "?D\0\0"s);
-  CHECK(ask("?d") == "?d 0\r\n\0"s);
-  CHECK(ask("?R") == "?R\1\0"s);
-  CHECK(ask("D\1"s) == "D\0"s);
-  CHECK(ask("?D") == "?D\1\0"s);
-  CHECK(ask("d 0\r") == "d 0\0"s);
-  CHECK(ask("?D") == "?D\0\0"s);
-  CHECK(ask("t 1152 1\r") == "t 1152 1\0"s);
-  CHECK(ask("?T") == "?T\x04\x80\x00\x01\0"s);
-  CHECK(ask("?t") == "?t 1152 1\r\n\0"s);
-  CHECK(ask("t x\r") == "en\0"s);
-  CHECK(ask("\r\n").empty());
-  CHECK(ask("^c") == " e?\r\n\0"s);
-  CHECK(ask("X") == " e?\r\n\0"s);
-  CHECK(ask("1S").starts_with(" e?"));  // no III
-  (void)ask("\x03");
-  CHECK(emulator->next_due_ns() == kNoTime_ns);
-  CHECK(ask("g").starts_with("g "));
-  CHECK(ask("S").empty());
-  CHECK(emulator->next_due_ns() == 10'000'000);
-  CHECK(ask("^c") == " e?\r\n\0"s);  // no stop
-  CHECK(emulator->next_due_ns() == 10'000'000);
-  CHECK(ask("\x03") == "\x03\0"s);
-  CHECK(emulator->next_due_ns() == kNoTime_ns);
-  CHECK(ask("\x12") == "\x12\r\n\0"s);
-  CHECK(ask("?t") == "?t 1920 1\r\n\0"s);
-  emulator->settings().plugged_in = false;
-  CHECK(ask("?G") == "?G\x01\0"s);
-  CHECK(ask("?U") == "?U\0\0"s);
-  CHECK(ask("M\x01"s).empty());  // not whole yet
-  CHECK(ask("\0\0"s) == "M\0"s);
-  CHECK(ask("?M") == "?M\x01\0\0\0"s);
-}
-
-TEST_CASE("a CyberTouch shakes the fingers that a force names, and samples go on") {
-  const auto bytes =
-      cyberglove_driver().encode_haptics({}, {.force = {1.0F, -1.0F, 0.0F, -1.0F, 0.5F}});
-  REQUIRE(bytes);
-  CHECK(text_of(*bytes) == std::string("A\x03\x00\xFF\x02\x00\x04\x80", 8));
-  const auto emulator = emulator_of({});
-  const auto decoder = decoder_of({.hand = Side::kRight, .layout = kPlain22});
-  (void)tell(*emulator, plain_start());
-  CollectSink sink;
-  decoder->feed(next(*emulator), 0, sink);
-  decoder->feed(tell(*emulator, text_of(*bytes)), 0, sink);
-  decoder->feed(next(*emulator), 0, sink);
-  CHECK(sink.outcomes == std::array<int, kOutcomes>{2, 0, 0, 0, 0});
-  CHECK(text_of(tell(*emulator, "?A")) == std::string("?A\xFF\0\0\0\x80\0\0", 9));
-  const auto driver = cyberglove_driver();
-  CHECK_FALSE(driver.encode_haptics({}, {.force = {2.0F}}));
-  CHECK_FALSE(driver.encode_haptics({}, {.vibration_s = 1.0F}));
-}
-
-TEST_CASE("a CyberGlove's sensor that is stuck stays where it is") {
-  const auto emulator = emulator_of({.stuck_sensor = kIndexMcp, .stuck_at = 77});
-  const auto decoder = decoder_of({.hand = Side::kRight, .layout = kPlain22});
-  (void)tell(*emulator, plain_start());
-  emulator->set_raw(some_raw());
-  CollectSink sink;
-  decoder->feed(next(*emulator), 0, sink);
-  CHECK(sink.samples[0].value[kSensors + kIndexMcp] == 77.0F);
 }
 
 }  // namespace posed::drivers::cyberglove
