@@ -1,6 +1,7 @@
 #include "tests/lab/listener.hpp"
 
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 #include "daemon/control/zmq_handle.hpp"
@@ -80,7 +81,11 @@ void Listener::take(std::string_view bytes) {
     ++state.heard.mixed;
     return;
   }
-  if (state.follows && *value != (state.value + 1) % state.modulus) ++state.heard.skipped;
+  if (state.follows && *value != (state.value + 1) % state.modulus) {
+    ++state.heard.skipped;
+    std::printf("     %s: after report %u came %u, sample %llu\n", sample.stream().c_str(),
+                state.value, *value, static_cast<unsigned long long>(sample.sequence()));
+  }
   state.value = *value;
   state.follows = true;
 }
