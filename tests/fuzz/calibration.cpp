@@ -33,7 +33,7 @@ void try_calibration(const std::string& text) {
   if (!made) return demand(!made.error().message.empty());
   for (const float raw : {-1e6F, 0.0F, 77.0F, 1e6F}) {
     for (std::size_t s = 0; s < (*made)->sensors; ++s)
-      demand(!std::isnan((*made)->curve[s].at(raw)));
+      demand(!std::isnan((*made)->curve[s].value_at(raw)));
   }
 }
 
