@@ -9,6 +9,7 @@
 #include "daemon/publish/encode.hpp"
 #include "daemon/publish/histogram.hpp"
 #include "daemon/publish/publisher.hpp"
+#include "daemon/publish/shed_tally.hpp"
 
 namespace posed::publish {
 
@@ -45,6 +46,7 @@ struct Outlet {
   float label_probability = 0.0F;
   ClockMapping clock;
   LatencyHistogram decode, style, publish;
+  ShedTally shed;
 };
 
 }  // namespace posed::publish

@@ -24,8 +24,7 @@ std::int64_t clock_ns(clockid_t clock) {
 }
 
 // What the pipeline's notices say to people.
-std::string sentence(const pipeline::Item& item) {
-  const auto& notice = item.notice;
+std::string sentence(const pipeline::Notice& notice) {
   switch (notice.event) {
     case v1::Event::KIND_STARTED:
       return "the first data came";
@@ -46,12 +45,16 @@ std::string sentence(const pipeline::Item& item) {
                          notice.value, notice.sequence);
     case v1::Event::KIND_PLAYED:
       return "all labels are performed";
-    case v1::Event::KIND_SHED:
-      return fmt::format("{:.0f} frames from {} on were skipped: newer ones waited", notice.value,
-                         notice.sequence);
     default:
       return {};
   }
+}
+
+std::string sentence(const ShedTally::Sum& shed) {
+  const std::string which = shed.frames == 1 ? fmt::format("frame {} was", shed.first)
+                                             : fmt::format("{} frames, {} to {}, were", shed.frames,
+                                                           shed.first, shed.last);
+  return which + " skipped: newer ones waited";
 }
 
 }  // namespace
@@ -159,6 +162,7 @@ void Publisher::run() {
     wake_.awake();
   }
   drain();
+  for (std::uint32_t i = 0; i < outlets_.size(); ++i) tell_shed(i, true);
   every_second(options_.clock());
 }
 
@@ -192,10 +196,25 @@ void Publisher::take(const pipeline::Item& item) {
       break;
     }
     case Kind::kNotice:
-      send_event(item.notice.stream, static_cast<v1::Event::Kind>(item.notice.event),
-                 item.notice.time_ns, item.notice.sequence, sentence(item));
+      take_notice(item.notice);
       break;
   }
+}
+
+void Publisher::take_notice(const pipeline::Notice& notice) {
+  const auto kind = static_cast<v1::Event::Kind>(notice.event);
+  if (kind == v1::Event::KIND_SHED) {
+    outlets_[notice.stream]->shed.add(notice.sequence, static_cast<std::uint64_t>(notice.value));
+    return tell_shed(notice.stream, false);
+  }
+  if (kind == v1::Event::KIND_ENDED) tell_shed(notice.stream, true);
+  send_event(notice.stream, kind, notice.time_ns, notice.sequence, sentence(notice));
+}
+
+void Publisher::tell_shed(std::uint32_t stream, bool at_end) {
+  const std::int64_t now_ns = options_.clock();
+  const auto sum = outlets_[stream]->shed.take(now_ns, at_end);
+  if (sum) send_event(stream, v1::Event::KIND_SHED, now_ns, sum->first, sentence(*sum));
 }
 
 void Publisher::take_frame(const Frame& frame, bool raw) {
@@ -266,9 +285,10 @@ void Publisher::every_second(std::int64_t now_ns) {
   stats.set_rss_bytes(resident_bytes());
   stats.set_cpu_percent(
       static_cast<float>(100.0 * seconds(cpu_ns - told_->cpu_ns) / std::max(since_s, 1e-3)));
-  for (const auto& outlet : outlets_) {
-    outlet->report(*stats.add_stream(), since_s);
-    send_skeletons(*outlet, {});
+  for (std::uint32_t i = 0; i < outlets_.size(); ++i) {
+    outlets_[i]->report(*stats.add_stream(), since_s);
+    send_skeletons(*outlets_[i], {});
+    tell_shed(i, false);
   }
   if (options_.more_stats) options_.more_stats(stats);
   told_->reported_ns = now_ns;

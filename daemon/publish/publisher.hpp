@@ -81,6 +81,8 @@ class Publisher {
             std::string endpoint);
   void take(const pipeline::Item& item);
   void take_frame(const Frame& frame, bool raw);
+  void take_notice(const pipeline::Notice& notice);
+  void tell_shed(std::uint32_t stream, bool at_end);
   void send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
                   std::uint64_t sequence, const std::string& text);
   void send_skeletons(const Outlet& outlet, std::string_view prefix);

@@ -5,6 +5,7 @@
 
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/publish/publisher.hpp"
+#include "daemon/publish/shed_tally.hpp"
 #include "tests/unit/models/toy_style.hpp"
 
 namespace posed::publish {
@@ -137,6 +138,54 @@ TEST_CASE("each kind of item goes out under its topic") {
   CHECK(stats.stream(0).state() == "waiting");
   CHECK(stats.monotonic_to_utc_ns() > 0);
   CHECK(stats.rss_bytes() > 0);
+}
+
+TEST_CASE("skipped frames are told at once, then as a sum a second, and none is left out") {
+  constexpr std::int64_t kStep_ns = kNanosPerSecond / 100;
+  ShedTally tally;
+  std::uint64_t told = 0, lines = 0;
+  for (std::uint64_t i = 0; i < 1000; ++i) {  // ten seconds; of four frames one goes out
+    tally.add(4 * i + 1, 3);
+    const auto sum = tally.take(static_cast<std::int64_t>(i) * kStep_ns);
+    if (!sum) continue;
+    CHECK(sum->first == told / 3 * 4 + 1);
+    CHECK(sum->last == 4 * i + 3);
+    told += sum->frames;
+    ++lines;
+  }
+  CHECK(lines == 10);
+  const auto rest = tally.take(999 * kStep_ns, true);
+  REQUIRE(rest);
+  CHECK(told + rest->frames == 3000);
+  CHECK_FALSE(tally.take(2000 * kStep_ns, true));
+}
+
+TEST_CASE("a flood of skipped frames is one event, and its sum when the stream ends") {
+  Rig rig;
+  REQUIRE(rig.receive("skeleton/toy", 1));  // subscribed
+  Item notice;
+  notice.kind = Item::Kind::kNotice;
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    notice.notice = {0, v1::Event::KIND_SHED, 77, 10 * i + 1, 9.0};
+    rig.put(notice);
+  }
+  notice.notice = {0, v1::Event::KIND_ENDED, 78, 500, 0.0};
+  rig.put(notice);
+  std::vector<std::string> texts;
+  for (std::string last; !last.contains("has ended"); texts.push_back(last)) {
+    REQUIRE(rig.receive("event/toy", static_cast<int>(texts.size()) + 1));
+    v1::Event event;
+    REQUIRE(event.ParseFromString(rig.bodies["event/toy"]));
+    last = event.text();
+  }
+  CHECK(texts[0] == "9 frames, 1 to 9, were skipped: newer ones waited");
+  CHECK(texts[texts.size() - 2].contains("to 499, were skipped"));
+  std::uint64_t told = 0;
+  for (const std::string& text : texts) {
+    if (text.contains("skipped")) told += std::stoull(text);
+  }
+  CHECK(told == 450);
+  CHECK(texts.size() < 50);  // three, unless the machine took seconds for this
 }
 
 TEST_CASE("a busy port is one sentence that names it") {
