@@ -62,13 +62,17 @@ void LiveScreen::draw(const std::vector<std::string>& lines) const {
   put_on_screen(text);
 }
 
+char LiveScreen::key_pressed() const {
+  char key = 0;
+  pollfd waits{STDIN_FILENO, POLLIN, 0};
+  if (!keyboard_ || poll(&waits, 1, 0) <= 0 || ::read(STDIN_FILENO, &key, 1) != 1) return 0;
+  return key;
+}
+
 bool LiveScreen::quit_pressed() const {
   bool quit = false;
-  pollfd key{STDIN_FILENO, POLLIN, 0};
-  while (keyboard_ && poll(&key, 1, 0) > 0) {
-    char c = 0;
-    if (::read(STDIN_FILENO, &c, 1) != 1) break;
-    quit = quit || c == 'q' || c == 'Q';
+  for (char key = key_pressed(); key != 0; key = key_pressed()) {
+    quit = quit || key == 'q' || key == 'Q';
   }
   return quit;
 }

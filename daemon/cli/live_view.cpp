@@ -7,11 +7,13 @@
 
 #include "daemon/config/words.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/frame/time.hpp"
 
 namespace posed::cli {
 namespace {
 
 constexpr int kLeastWidth = 80;
+constexpr int kNameWidth = 11;
 constexpr const char* kRed = "\x1b[31m";
 constexpr const char* kYellow = "\x1b[33m";
 constexpr const char* kDim = "\x1b[2m";
@@ -48,10 +50,15 @@ std::string head(const v1::Stats& stats, const std::string& title) {
   return line;
 }
 
+// A device that is not there is more than a stream in which nothing comes.
+std::string state_of(const v1::StreamStats& stream) {
+  return stream.away() ? "away" : stream.state();
+}
+
 std::string row(const v1::StreamStats& stream, int model_width) {
   return fmt::format(
-      "{} {} {:>6.1f} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}", fit(stream.stream(), 12),
-      fit(stream.state(), 7), std::min(stream.rate_hz(), 9999.9F), short_count(stream.dropped()),
+      "{} {} {:>6.1f} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}", fit(stream.stream(), kNameWidth),
+      fit(state_of(stream), 7), std::min(stream.rate_hz(), 9999.9F), short_count(stream.dropped()),
       short_count(stream.shed()), stage(stream.decode()), stage(stream.style()),
       stage(stream.publish()), stream.alpha(), fit(config::printable(stream.model()), model_width));
 }
@@ -67,12 +74,53 @@ std::string hand_row(const v1::StreamStats& stream) {
     text += fmt::format("{}lag {} frame{} ({:.0f} ms)", text.empty() ? "" : ", ",
                         stream.lag_frames(), stream.lag_frames() == 1 ? "" : "s", stream.lag_ms());
   }
-  return text.empty() ? text : "  " + fit(stream.stream(), 10) + " " + text;
+  return text;
+}
+
+// "8 s", "5 min", "2.5 h"
+std::string for_people(double time_s) {
+  if (time_s < 120.0) return fmt::format("{:.0f} s", std::max(time_s, 0.0));
+  if (time_s < 7200.0) return fmt::format("{:.0f} min", time_s / 60.0);
+  return fmt::format("{:.1f} h", time_s / 3600.0);
+}
+
+// Whether a glove is there and how its clock runs; empty for a stream without either.
+std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
+  const std::string since = for_people(seconds(now_ns - stream.link_ns()));
+  const std::uint64_t links = stream.connections();
+  if (stream.away()) {
+    if (links == 0) return "not there yet; posed has looked for it for " + since;
+    return fmt::format("away for {}; connected {} before", since,
+                       links == 1 ? "once" : fmt::format("{} times", links));
+  }
+  std::string text;
+  const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  if (links > 1) {
+    add(fmt::format("back for {}, reconnected {}", since,
+                    links == 2 ? "once" : fmt::format("{} times", links - 1)));
+  }
+  if (stream.has_clock_offset_ns()) {
+    add(fmt::format("clock {:+.3f} s, drift {:+.1f} ppm", seconds(stream.clock_offset_ns()),
+                    stream.clock_drift_ppm()));
+  }
+  if (!stream.greeting().empty()) add(config::without_controls(stream.identity()));
+  return text;
+}
+
+// What stands below the streams' rows.
+std::vector<std::string> rows_below(const v1::Stats& stats) {
+  std::vector<std::string> rows;
+  for (const v1::StreamStats& stream : stats.stream()) {
+    for (const std::string& text : {device_row(stream, stats.time_ns()), hand_row(stream)}) {
+      if (!text.empty()) rows.push_back("  " + fit(stream.stream(), kNameWidth - 1) + text);
+    }
+  }
+  return rows;
 }
 
 const char* colour_of(const v1::StreamStats& stream) {
   if (stream.dropped() > 0 || stream.shed() > 0) return kRed;
-  if (stream.state() == "stale" || stream.state() == "waiting") return kYellow;
+  if (stream.away() || stream.state() == "stale" || stream.state() == "waiting") return kYellow;
   return stream.state() == "ended" ? kDim : "";
 }
 
@@ -91,7 +139,7 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
     return options.colour && *colour != 0 ? colour + text + kPlain : text;
   };
   const std::string names =
-      fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} ", fit("STREAM", 12),
+      fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} ", fit("STREAM", kNameWidth),
                   fit("STATE", 7), "HZ", "DROP", "SHED", "DECODE", "STYLE", "PUBLISH", "ALPHA");
   const int model_width = std::max(1, width - static_cast<int>(names.size()));
   std::vector<std::string> lines{
@@ -107,10 +155,9 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
   if (shown < stats.stream_size()) {
     lines.push_back(fmt::format("... and {} more", stats.stream_size() - shown));
   }
-  for (const v1::StreamStats& stream : stats.stream()) {
-    const std::string hand = hand_row(stream);
+  for (const std::string& below : rows_below(stats)) {
     const bool fits = options.height == 0 || static_cast<int>(lines.size()) + 1 < options.height;
-    if (!hand.empty() && fits) lines.push_back(fit(hand, width));
+    if (fits) lines.push_back(fit(below, width));
   }
   lines.push_back(
       paint(kDim, fit("stage times: p50/p99 in us (m: ms), publish counts from arrival", width)));

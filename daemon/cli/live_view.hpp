@@ -20,7 +20,8 @@ struct LiveViewOptions {
 };
 
 // One line for the daemon, one for the columns' names, one a stream (rates, drops, sheds, p50/p99
-// of each stage, alpha, model), one a stream that has a label or a lag, then the notes.
+// of each stage, alpha, model), then what is to be told of single streams: a glove that is away,
+// came back or has a clock of its own; a hand's label and lag. Last the notes.
 [[nodiscard]] std::vector<std::string> live_view(const v1::Stats& stats,
                                                  const LiveViewOptions& options);
 
@@ -40,7 +41,8 @@ class LiveScreen {
   // Fills width, height and colour from the terminal as it is now.
   void measure(LiveViewOptions& options) const;
   void draw(const std::vector<std::string>& lines) const;
-  [[nodiscard]] bool quit_pressed() const;  // 'q' on the keyboard; never waits
+  [[nodiscard]] char key_pressed() const;   // the next one on the keyboard; 0: none. Never waits
+  [[nodiscard]] bool quit_pressed() const;  // 'q' was; takes all keys
 
  private:
   bool terminal_ = false;

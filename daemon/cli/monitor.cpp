@@ -1,7 +1,6 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <string>
 
@@ -10,6 +9,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/client.hpp"
+#include "daemon/cli/clock_time.hpp"
 #include "daemon/cli/json.hpp"
 #include "daemon/config/words.hpp"
 #include "posed/v1/posed.pb.h"
@@ -26,16 +26,6 @@ struct MonitorOptions {
   int count = 0;
   bool json = false;
 };
-
-std::string clock_time() {
-  const auto now = std::chrono::system_clock::now();
-  const std::time_t whole = std::chrono::system_clock::to_time_t(now);
-  const auto ms =
-      std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;
-  std::tm local{};
-  localtime_r(&whole, &local);
-  return fmt::format("{:02}:{:02}:{:02}.{:03}", local.tm_hour, local.tm_min, local.tm_sec, ms);
-}
 
 // "QUALITY_HELD" -> "held"
 std::string short_name(const std::string& name) {
@@ -76,7 +66,7 @@ std::string line(const v1::Sample& sample) {
 std::string line(const v1::Event& event) {
   return fmt::format("{} {:<16} {:>8} {:<9} {}", clock_time(), event.stream(), event.sequence(),
                      short_name(v1::Event::Kind_Name(event.kind())).substr(5),
-                     config::printable(event.text()));
+                     config::without_controls(event.text()));
 }
 
 std::string line(const v1::Skeleton& skeleton) {
@@ -89,8 +79,9 @@ std::string line(const v1::Stats& stats) {
   std::string out = fmt::format("{} cpu {:.1f} %, rss {:.1f} MB", clock_time(), stats.cpu_percent(),
                                 static_cast<double>(stats.rss_bytes()) / 1e6);
   for (const auto& stream : stats.stream()) {
-    out += fmt::format("; {} {} {:.1f} Hz, {} dropped, {} shed", stream.stream(), stream.state(),
-                       stream.rate_hz(), stream.dropped(), stream.shed());
+    out += fmt::format("; {} {} {:.1f} Hz, {} dropped, {} shed", stream.stream(),
+                       stream.away() ? "away" : stream.state(), stream.rate_hz(), stream.dropped(),
+                       stream.shed());
   }
   return out;
 }

@@ -3,11 +3,11 @@
 #include <deque>
 #include <memory>
 
-#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/client.hpp"
+#include "daemon/cli/clock_time.hpp"
 #include "daemon/cli/json.hpp"
 #include "daemon/cli/live_view.hpp"
 #include "daemon/config/words.hpp"
@@ -54,7 +54,8 @@ class Top {
     if (topic.text() == "stats") return stats_.ParseFromArray(body.bytes().data(), size);
     v1::Event event;
     if (!event.ParseFromArray(body.bytes().data(), size)) return false;
-    notes_.push_back(fmt::format("{} {}", event.stream(), config::printable(event.text())));
+    notes_.push_back(clock_time().substr(0, 8) + " " + event.stream() + ": " +
+                     config::without_controls(event.text()));
     if (notes_.size() > kNotesKept) notes_.pop_front();
     return false;
   }

@@ -45,8 +45,8 @@ Result<> RequestHandler::calibrate(const v1::ControlRequest& request, const Aske
   const auto& wanted = request.calibrate();
   const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
-  auto compiled =
-      devices::compile_calibration(streams_[*stream].description, wanted.toml(), wanted.name());
+  auto compiled = devices::compile_calibration(*streams_[*stream].device->description(),
+                                               wanted.toml(), wanted.name());
   if (!compiled) return std::unexpected(compiled.error());
   const DeviceCommand command{.kind = DeviceCommand::Kind::kCalibrate,
                               .stream = *stream,
@@ -67,10 +67,11 @@ Result<> RequestHandler::send_haptics(const v1::ControlRequest& request) {
   const auto found = find_stream(request.haptics().stream());
   if (!found) return std::unexpected(found.error());
   const ControlledStream& stream = streams_[*found];
-  const drivers::Driver* driver = drivers::find_driver(stream.description.driver);
+  const std::string driver_name = stream.device->description()->driver;
+  const drivers::Driver* driver = drivers::find_driver(driver_name);
   if (driver == nullptr || driver->encode_haptics == nullptr) {
     return fail(fmt::format("stream {} has nothing that could be felt: driver '{}' sends only",
-                            stream.name, stream.description.driver));
+                            stream.name, driver_name));
   }
   const auto haptics = read_haptics(request.haptics());
   if (!haptics) return std::unexpected(haptics.error());

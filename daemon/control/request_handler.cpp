@@ -235,7 +235,11 @@ std::optional<Answer> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     stream.model = std::move(done.model);  // the one it replaces is free now
     helm_.model_in_use(ack.stream, stream.model->name);
   }
-  if (done.calibration) stream.calibration = std::move(done.calibration);
+  if (done.calibration) {
+    stream.calibration = std::move(done.calibration);
+    stream.device->calibrated(
+        {.toml = stream.calibration->text, .file = "the calibration sent last"});
+  }
   if (done.gesture) {
     stream.gesture = std::move(done.gesture);
     if (!stream.style) helm_.model_in_use(ack.stream, stream.gesture->name);

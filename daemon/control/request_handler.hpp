@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
@@ -42,8 +43,9 @@ struct ControlledStream {
   std::unique_ptr<const style::BoundModel> model;
   bool generates = false;                               // the generate stage is there
   std::unique_ptr<const generate::BoundModel> gesture;  // null until it has one
-  drivers::Description description;                     // what calibrations must fit
-  drivers::Options options;                             // of its driver
+  // What calibrations must fit.
+  std::shared_ptr<devices::PresentDevice> device = std::make_shared<devices::PresentDevice>();
+  drivers::Options options;  // of its driver
   // In use by the reader since it was sent; null: what the stream began with.
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
 };

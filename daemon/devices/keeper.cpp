@@ -73,6 +73,7 @@ void Keeper::take_back(drivers::Device* device) {
   device->decoder.reset();
   device_.reset();
   away_ = true;
+  stream_.present->gone();
   const std::string why = std::exchange(asked_back_, false)
                               ? "nothing usable came from the device for a while"
                               : "the link to the device is lost";
@@ -107,6 +108,7 @@ void Keeper::look_for_device() {
   for (const std::string& warning : device_->warnings) {
     ports_.tell(v1::Event::KIND_WARNING, warning);
   }
+  stream_.present->connected(device_->description);
   stream_.slot->give_back.store(false);  // that was about the one before
   static_cast<void>(stream_.slot->in.push(device_.get()));
   ports_.reader->call();
@@ -125,9 +127,8 @@ Result<std::unique_ptr<drivers::Device>> Keeper::try_open() {
     return fail("another device answers (" + is.identity +
                 "); connect the one that the stream began with, or start posed again");
   }
-  if (stream_.calibration) {
-    const auto fits =
-        compile_calibration(is, stream_.calibration->text, stream_.config.calibration.string());
+  if (const auto in_use = stream_.present->calibration(); !in_use.toml.empty()) {
+    const auto fits = compile_calibration(is, in_use.toml, in_use.file);
     if (!fits) return std::unexpected(fits.error());
   }
   if (auto started = device->transport->start(ports_.clock()); !started) {

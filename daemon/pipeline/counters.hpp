@@ -19,6 +19,7 @@ struct alignas(64) ReaderCounters {
   std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
   std::atomic<bool> connected{false};              // a link to the device is open
   std::atomic<std::uint64_t> connections{0};       // links opened so far
+  std::atomic<std::int64_t> link_ns{kNoTime_ns};   // when `connected` changed last
 };
 
 struct alignas(64) PipelineCounters {

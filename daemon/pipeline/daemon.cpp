@@ -148,6 +148,7 @@ Result<> Daemon::Parts::open_sockets() {
                      .raw = stream->config.publish_raw,
                      .model = model.filename().string(),
                      .comes_and_goes = stream->slot != nullptr,
+                     .present = stream->present,
                      .counters = &stream->counters});
   }
   publish::PublisherOptions options{.context = context.get(),
@@ -221,7 +222,7 @@ Result<> Daemon::Parts::open_engines() {
                           .model = std::move(*model),
                           .generates = engine.generate.has_value(),
                           .gesture = std::move(gesture->model),
-                          .description = stream.device.description,
+                          .device = stream.present,
                           .options = stream.config.options,
                           .calibration = nullptr});
     // Nobody asked for it, so nobody is told: no ticket is 0. The ring has room for every stream.

@@ -22,6 +22,7 @@ Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
   auto device = driver.open(stream.config.options, *stream.ports);
   if (device) {
     stream.device = std::move(*device);
+    stream.present->connected(stream.device.description);
     return {};
   }
   if (driver.expect == nullptr || device.error().exit_code == ExitCode::kWrongUse) {
@@ -30,6 +31,8 @@ Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
   auto description = driver.expect(stream.config.options);
   if (!description) return std::unexpected(description.error());
   stream.device.description = std::move(*description);
+  stream.present->connected(stream.device.description);
+  stream.present->gone();
   stream.away = device.error().text();
   return {};
 }
@@ -39,8 +42,10 @@ Result<> open_calibration(OpenStream& stream) {
   if (path.empty()) return {};
   const auto text = load_bytes(path);
   if (!text) return std::unexpected(text.error());
-  auto compiled = devices::compile_calibration(stream.device.description, *text, path.string());
+  auto compiled =
+      devices::compile_calibration(*stream.present->description(), *text, path.string());
   if (!compiled) return std::unexpected(compiled.error());
+  stream.present->calibrated({.toml = *text, .file = path.string()});
   stream.calibration = std::move(*compiled);
   return {};
 }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/daemon_config.hpp"
 #include "daemon/pipeline/reader.hpp"
@@ -22,6 +23,7 @@ struct OpenStream {
   // Without transport and decoder while the device is away; the description is there from the
   // start.
   drivers::Device device;
+  std::shared_ptr<devices::PresentDevice> present = std::make_shared<devices::PresentDevice>();
   std::string away;  // why the device could not be opened, one sentence; empty: it is there
   std::unique_ptr<drivers::Ports> ports;
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;  // null: the default

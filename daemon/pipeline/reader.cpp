@@ -49,6 +49,7 @@ class Reader::Source final : public Sink {
   // Before the first read: what the first device is and how it is calibrated.
   void begin() noexcept {
     if (calibration_ != nullptr) tell_calibration();
+    counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
     if (device_ != nullptr) use(*device_);
   }
 
@@ -162,7 +163,9 @@ class Reader::Source final : public Sink {
   void use(drivers::Device& device) noexcept {
     if (calibration_ != nullptr) device.decoder->calibrate(*calibration_->calibration);
     poll_due_ns_ = device.poll.request.empty() ? kNoTime_ns : ports_.clock();
-    counters_.reader.heard_ns.store(ports_.clock(), std::memory_order_relaxed);
+    const std::int64_t now_ns = ports_.clock();
+    counters_.reader.heard_ns.store(now_ns, std::memory_order_relaxed);
+    counters_.reader.link_ns.store(now_ns, std::memory_order_relaxed);
     counters_.reader.connected.store(true, std::memory_order_release);
     count(counters_.reader.connections);
     if (device.transport->poll_fd() < 0) return;
@@ -178,6 +181,7 @@ class Reader::Source final : public Sink {
       poller_.remove(device_->transport->poll_fd());
     }
     poll_due_ns_ = kNoTime_ns;
+    counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
     counters_.reader.connected.store(false, std::memory_order_release);
     static_cast<void>(read_.slot->out.push(device_));  // holds more than there are devices
     device_ = nullptr;

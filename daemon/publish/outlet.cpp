@@ -20,6 +20,13 @@ void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t
   if (from_ns != kNoTime_ns && to_ns != kNoTime_ns) histogram.add(to_ns - from_ns);
 }
 
+// The greeting of what is no glove would be a whole file's header.
+void tell_device(const drivers::Description& device, v1::StreamStats& stats) {
+  const drivers::Driver* driver = drivers::find_driver(device.driver);
+  stats.set_identity(device.identity);
+  if (driver != nullptr && driver->glove_model != nullptr) stats.set_greeting(device.text);
+}
+
 constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "ended"};
 
 }  // namespace
@@ -73,8 +80,10 @@ void Outlet::report(v1::StreamStats& stats, double seconds_since) {
   stats.set_label_probability(label_probability);
   stats.set_away(info.comes_and_goes && !reader.connected.load());
   stats.set_connections(reader.connections.load());
+  stats.set_link_ns(std::max<std::int64_t>(reader.link_ns.load(), 0));
   if (clock.valid) stats.set_clock_offset_ns(clock.offset_ns);
   stats.set_clock_drift_ppm(clock.drift_ppm);
+  if (info.present) tell_device(*info.present->description(), stats);
 }
 
 }  // namespace posed::publish

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "daemon/control/zmq_handle.hpp"
+#include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/ring.hpp"
@@ -31,6 +32,7 @@ struct StreamInfo {
   bool raw = false;             // the unstyled input goes out as <name>-raw
   std::string model;            // the style model's name at the start
   bool comes_and_goes = false;  // the device may be away
+  std::shared_ptr<const devices::PresentDevice> present{};  // null: nothing comes from a device
   const pipeline::StreamCounters* counters = nullptr;
 };
 

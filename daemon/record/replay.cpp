@@ -135,6 +135,7 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
   Stream stream_;
   std::uint32_t id_ = 0;
   std::unique_ptr<drivers::Decoder> decoder_;
+  drivers::Description device_;                                   // as it greeted last
   std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: the device's default
   pipeline::DeviceClock clock_;
   ReplayModels models_;
@@ -167,8 +168,9 @@ Result<std::unique_ptr<Replay::Lane>> Replay::Lane::open(const log::Reader& read
   lane->stream_.settings = std::move(*settings);
   auto description = driver->describe(row.text, row.identity);
   if (!description) return std::unexpected(description.error());
-  lane->stream_.description = std::move(*description);
-  auto decoder = driver->make_decoder(lane->stream_.description);
+  lane->stream_.description = *description;
+  lane->device_ = std::move(*description);
+  auto decoder = driver->make_decoder(lane->device_);
   if (!decoder) return std::unexpected(decoder.error());
   lane->decoder_ = std::move(*decoder);
   const StreamSettings& stages = lane->stream_.settings;
@@ -190,13 +192,16 @@ Result<> Replay::Lane::greet(const std::string& text) {
   auto decoder = driver->make_decoder(*description);
   if (!decoder) return std::unexpected(decoder.error());
   decoder_ = std::move(*decoder);
+  device_ = std::move(*description);
   clock_.restart();
   if (calibration_) decoder_->calibrate(*calibration_->calibration);
   return {};
 }
 
 Result<> Replay::Lane::calibrate(const std::string& toml) {
-  auto compiled = devices::compile_calibration(stream_.description, toml, "the log's calibration");
+  drivers::Description device = device_;
+  device.identity.clear();  // whose it was, the live run has checked
+  auto compiled = devices::compile_calibration(device, toml, "the log's calibration");
   if (!compiled) return std::unexpected(compiled.error());
   decoder_->calibrate(*(*compiled)->calibration);
   calibration_ = std::move(*compiled);

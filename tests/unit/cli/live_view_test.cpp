@@ -58,6 +58,43 @@ TEST_CASE("the live view shows what matters of each stream") {
   CHECK(lines[3].find("-0.50 march-to-sway.style") != std::string::npos);
 }
 
+TEST_CASE("the live view tells which gloves are away, since when, and how a glove's clock runs") {
+  v1::Stats stats = stats_of(4);
+  stats.set_time_ns(1'000'000'000'000);
+  for (auto& stream : *stats.mutable_stream()) {
+    stream.set_greeting("cyberglove hand=right");
+    stream.set_link_ns(stats.time_ns() - 180'000'000'000);
+    stream.set_connections(1);
+    stream.set_identity("0403:6001 A9XYZ");
+  }
+  auto& late = *stats.mutable_stream(0);
+  late.set_away(true);
+  late.set_connections(0);
+  auto& lost = *stats.mutable_stream(1);
+  lost.set_away(true);
+  lost.set_state("stale");
+  lost.set_connections(3);
+  lost.set_link_ns(stats.time_ns() - 12'000'000'000);
+  auto& back = *stats.mutable_stream(2);
+  back.set_connections(4);
+  back.set_clock_offset_ns(-2'500'000'000);
+  back.set_clock_drift_ppm(7.26F);
+  back.set_identity("/dev/\x1b[2J");
+  const auto lines = live_view(stats, {.title = "posed", .height = 0});
+  REQUIRE(lines.size() == 11);
+  CHECK(lines[2].starts_with("walker0     away "));
+  CHECK(lines[3].starts_with("walker1     away "));
+  CHECK(lines[4].starts_with("walker2     live "));
+  CHECK(lines[6].starts_with("  walker0   not there yet; posed has looked for it for 3 min"));
+  CHECK(lines[7].starts_with("  walker1   away for 12 s; connected 3 times before"));
+  CHECK(
+      lines[8].starts_with("  walker2   back for 3 min, reconnected 3 times, clock -2.500 s, dri"));
+  CHECK(lines[9].starts_with("  walker3   0403:6001 A9XYZ"));
+  const auto wide = live_view(stats, {.title = "posed", .width = 120, .height = 0});
+  CHECK(wide[8].contains("drift +7.3 ppm, /dev/?[2J"));
+  CHECK(live_view(stats, {.height = 0, .colour = true})[3].starts_with("\x1b[33m"));
+}
+
 TEST_CASE("streams that do not fit are counted, notes fill what is left") {
   LiveViewOptions options{.title = "posed", .height = 10};
   const auto many = live_view(stats_of(32), options);

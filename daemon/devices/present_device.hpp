@@ -1,0 +1,56 @@
+// PresentDevice: which device a stream has now and what calibration it is read by, for the threads
+// that come and ask: control checks calibrations against it, stats tell it, the keeper changes it.
+// Cold; any thread.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "drivers/driver.hpp"
+
+namespace posed::devices {
+
+class PresentDevice {
+ public:
+  void connected(drivers::Description description) {
+    auto now = std::make_shared<const drivers::Description>(std::move(description));
+    const std::scoped_lock lock(mutex_);
+    description_ = std::move(now);
+  }
+
+  // No device answers: what the stream was opened for stays, but nobody knows who comes next.
+  void gone() {
+    drivers::Description description = *this->description();
+    description.identity.clear();
+    connected(std::move(description));
+  }
+
+  // Never null. The identity is empty while there is no device.
+  [[nodiscard]] std::shared_ptr<const drivers::Description> description() const {
+    const std::scoped_lock lock(mutex_);
+    return description_;
+  }
+
+  // The text of the calibration in use, empty for the device's default, and its name for errors.
+  struct CalibrationText {
+    std::string toml, file;
+  };
+  void calibrated(CalibrationText text) {
+    const std::scoped_lock lock(mutex_);
+    calibration_ = std::move(text);
+  }
+  [[nodiscard]] CalibrationText calibration() const {
+    const std::scoped_lock lock(mutex_);
+    return calibration_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const drivers::Description> description_ =
+      std::make_shared<const drivers::Description>();
+  CalibrationText calibration_;
+};
+
+}  // namespace posed::devices
