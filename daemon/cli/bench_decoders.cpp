@@ -43,7 +43,7 @@ latency: from before the write of a whole packet into a pseudo-terminal to its r
 its frame in a ring (decoded); packets take turns between the two, one a millisecond.
 
   posed bench decoders
-  posed bench decoders --samples 500 --json)";
+  posed bench decoders --glove cyberglove --samples 500 --json)";
 
 // What a reader's sink does: into a ring, here its own.
 class RingSink final : public Sink {
@@ -176,12 +176,13 @@ void print_glove(const json& glove) {
   std::printf("  p99 x%.2f\n", glove["latency"]["p99_ratio"].get<double>());
 }
 
-Result<> bench_decoders(int samples, bool as_json) {
+Result<> bench_decoders(const std::string& only, int samples, bool as_json) {
   json report = json::array();
   if (!as_json) std::printf("latency in us: p50, p99, p99.9, max\n");
   auto gloves = bench_gloves();
   if (!gloves) return std::unexpected(gloves.error());
   for (BenchGlove& glove : *gloves) {
+    if (!glove.name.starts_with(only)) continue;
     json entry{{"glove", glove.name}, {"throughput", decoder_rate(glove)}};
     auto ways = decoder_latency(glove, samples);
     if (!ways) return std::unexpected(ways.error());
@@ -189,6 +190,8 @@ Result<> bench_decoders(int samples, bool as_json) {
     if (!as_json) print_glove(entry);
     report.push_back(std::move(entry));
   }
+  if (report.empty())
+    return misuse("there is no glove '" + only + "'; leave --glove out to see them");
   if (as_json) std::printf("%s\n", report.dump(2).c_str());
   return {};
 }
@@ -197,18 +200,20 @@ Result<> bench_decoders(int samples, bool as_json) {
 
 void add_bench_decoders(CLI::App& bench, int& exit_code) {
   struct Options {
+    std::string glove;
     int samples = 2000;
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
   CLI::App* command = bench.add_subcommand("decoders", "Every glove's decoder, from its bytes");
   command->footer(kDecodersFooter);
+  command->add_option("--glove", options->glove, "Only gloves whose name begins so");
   command->add_option("--samples", options->samples, "Timed packets a glove and way")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON array on stdout");
   command->callback([options, &exit_code] {
-    if (auto done = bench_decoders(options->samples, options->json); !done) {
+    if (auto done = bench_decoders(options->glove, options->samples, options->json); !done) {
       exit_code = report(done.error());
     }
   });

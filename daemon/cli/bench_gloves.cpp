@@ -1,6 +1,5 @@
 #include "daemon/cli/bench_gloves.hpp"
 
-#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <thread>
@@ -38,11 +37,9 @@ Result<std::unique_ptr<drivers::Decoder>> opened_decoder(const Driver& driver, O
   if (!port) return std::unexpected(port.error());
   options["port"] = port->name();
   devices::EmulatedGlove glove(std::make_unique<LentEmulator>(emulator), std::move(*port), {}, {});
-  std::atomic<bool> stop{false};
-  std::jthread thread([&] { glove.run(stop); });
+  const std::jthread thread([&](const std::stop_token& stop) { glove.run(stop); });
   drivers::Ports ports;
   auto device = driver.open(options, ports);
-  stop = true;
   if (!device) return std::unexpected(device.error());
   return std::move(device->decoder);
 }

@@ -1,4 +1,5 @@
 // `posed emulate`: a glove that is not there, for any program that expects one.
+#include <atomic>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -101,9 +102,8 @@ Result<> emulate(const EmulateOptions& options) {
                                std::move(settings));
   std::printf("%s\n", ready.dump().c_str());
   std::fflush(stdout);
-  std::atomic<bool> stop{false};
   std::atomic<bool> ended{false};
-  std::thread thread([&] {
+  std::jthread thread([&](const std::stop_token& stop) {
     glove.run(stop);
     ended = true;
   });
@@ -115,7 +115,7 @@ Result<> emulate(const EmulateOptions& options) {
   while (!Interrupt::came() && !ended && !over()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  stop = true;
+  thread.request_stop();
   thread.join();
   std::fprintf(stderr, "%llu packets sent\n", static_cast<unsigned long long>(glove.packets()));
   return {};

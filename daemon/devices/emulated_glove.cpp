@@ -42,13 +42,13 @@ EmulatedGlove::EmulatedGlove(std::unique_ptr<drivers::Emulator> emulator, Emulat
       motion_(std::move(motion)),
       settings_(std::move(settings)) {}
 
-void EmulatedGlove::run(const std::atomic<bool>& stop) {
+void EmulatedGlove::run(const std::stop_token& stop) {
   const std::int64_t start_ns = pipeline::monotonic_ns();
   const auto device_time_ns = [&] {
     return static_cast<std::int64_t>(static_cast<double>(pipeline::monotonic_ns() - start_ns) *
                                      settings_.speed);
   };
-  while (!stop.load()) {
+  while (!stop.stop_requested()) {
     const std::int64_t due_ns = emulator_->next_due_ns();
     std::int64_t wait_ns = kLookEvery_ns;
     if (due_ns != kNoTime_ns) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "daemon/devices/emulated_port.hpp"
@@ -33,8 +34,8 @@ class EmulatedGlove {
 
   [[nodiscard]] const std::string& port() const noexcept { return port_.name(); }
 
-  // Until `stop` is set, or the host has hung up for good. Blocks.
-  void run(const std::atomic<bool>& stop);
+  // Until a stop is asked for, or the host has hung up for good. Blocks.
+  void run(const std::stop_token& stop);
 
   [[nodiscard]] std::uint64_t packets() const noexcept { return packets_.load(); }
 

@@ -109,11 +109,11 @@ std::optional<std::vector<std::byte>> EmulatedPort::receive(std::chrono::nanosec
 
 void EmulatedPort::send(std::span<const std::byte> bytes) noexcept {
   while (!bytes.empty()) {
-    const ssize_t sent = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    const ssize_t wrote =
-        sent < 0 && errno == ENOTSOCK ? ::write(fd_, bytes.data(), bytes.size()) : sent;
-    if (wrote <= 0) return;
-    bytes = bytes.subspan(static_cast<std::size_t>(wrote));
+    const bool is_socket = other_side_ < 0;
+    const ssize_t sent = is_socket ? ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL)
+                                   : ::write(fd_, bytes.data(), bytes.size());
+    if (sent <= 0) return;
+    bytes = bytes.subspan(static_cast<std::size_t>(sent));
   }
 }
 

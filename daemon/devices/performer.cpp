@@ -28,11 +28,6 @@ Performer::Performer(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort p
     : clip_(std::move(clip)),
       glove_(std::move(emulator), std::move(port),
              [this](double time_s) { return pose_at(clip_, time_s); }, {}),
-      thread_([this] { glove_.run(stop_); }) {}
-
-Performer::~Performer() {
-  stop_ = true;
-  thread_.join();
-}
+      thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
 
 }  // namespace posed::devices

@@ -3,7 +3,6 @@
 // everything behind it is what a real glove goes through.
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -19,7 +18,6 @@ class Performer {
   // Wears a glove of this driver, with its default options.
   [[nodiscard]] static Result<std::unique_ptr<Performer>> start(const std::string& driver,
                                                                 const std::filesystem::path& clip);
-  ~Performer();
   Performer(const Performer&) = delete;
   Performer& operator=(const Performer&) = delete;
 
@@ -30,8 +28,7 @@ class Performer {
 
   clip::HandClip clip_;
   EmulatedGlove glove_;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace posed::devices

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "proto/frame/frame.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::pipeline {
@@ -21,6 +22,12 @@ class DeviceClock {
   // The mapping with this packet taken in. Device times without one (kNoTime_ns) change nothing.
   // One that jumps (the device restarted) begins anew.
   ClockMapping take(std::int64_t device_ns, std::int64_t arrival_ns) noexcept;
+
+  // The same for a frame, whose header gets the mapping; one that no device stamped is left alone.
+  void stamp(Frame& frame) noexcept {
+    if (frame.source != Source::kDevice) return;
+    frame.header.clock = take(frame.header.device_ns, frame.header.arrival_ns);
+  }
 
   // The link is new: what is known of the old one no longer holds.
   void restart() noexcept;

@@ -96,12 +96,10 @@ class Reader::Source final : public Sink {
     frame.header.stream = stream_;
     frame.header.sequence = ++frames_;
     frame.header.arrival_ns = arrival_ns_;
-    if (frame.source == posed::Source::kDevice) {
-      frame.header.clock = clock_.take(frame.header.device_ns, arrival_ns_);
-      if (clock_.jumps() != jumps_) {
-        jumps_ = clock_.jumps();
-        static_cast<void>(notify(v1::Event::KIND_CLOCK_JUMPED, 0));
-      }
+    clock_.stamp(frame);
+    if (clock_.jumps() != jumps_) {
+      jumps_ = clock_.jumps();
+      static_cast<void>(notify(v1::Event::KIND_CLOCK_JUMPED, 0));
     }
     frame.stamps.decoded_ns = ports_.clock();
     counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);

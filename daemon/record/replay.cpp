@@ -106,9 +106,7 @@ class Replay::Lane final : public Sink, private pipeline::EngineOut {
     frame.header.stream = id_;
     frame.header.sequence = ++frames_;
     frame.header.arrival_ns = arrival_ns_;
-    if (frame.source == Source::kDevice) {
-      frame.header.clock = clock_.take(frame.header.device_ns, arrival_ns_);
-    }
+    clock_.stamp(frame);
     apply_decisions(frames_);
     if (frames_ >= shed_until_) engine_->on_frame(frame, *this);
   }

@@ -9,14 +9,14 @@
 #include "drivers/cyberglove/start.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
+namespace cyberglove {
 namespace {
-
-using namespace cyberglove;
 
 constexpr std::uint32_t kFtdi = 0x0403'6001;  // of the III's USB; the II's dongles differ
 constexpr double kMaxRate_hz = 1000.0;
@@ -90,7 +90,7 @@ Result<Wish> wish_of_given(const Options& given) {
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto glove = read_greeting(text, identity);
   if (!glove) return std::unexpected(glove.error());
-  const auto model = cyberglove::glove_model(glove->hand);
+  const auto model = glove_model(glove->hand);
   if (!model) return std::unexpected(model.error());
   const std::array<std::string, kExtras> extra_names{"switch", "light"};
   return Description{
@@ -114,13 +114,13 @@ Result<Description> expect(const Options& given) {
 Result<glove::Model> model_of(const Description& description) {
   const auto glove = read_greeting(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
-  return cyberglove::glove_model(glove->hand);
+  return glove_model(glove->hand);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   const auto glove = read_greeting(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
-  const auto model = cyberglove::glove_model(glove->hand);
+  const auto model = glove_model(glove->hand);
   if (!model) return std::unexpected(model.error());
   auto calibration = glove::default_calibration(*model);
   if (!calibration) return std::unexpected(calibration.error());
@@ -149,18 +149,15 @@ Result<Device> open(const Options& given, Ports& ports) {
   if (!link) return std::unexpected(link.error());
   const auto layout = start(*link, *wish);
   if (!layout) return std::unexpected(layout.error());
-  auto description =
-      describe(greeting_of({.hand = wish->hand, .layout = *layout, .ticks = ticks_of(*wish)}),
-               link->identity());
-  if (!description) return std::unexpected(description.error());
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  return Device{.description = std::move(*description),
-                .transport = make_link_transport(std::move(*link)),
-                .decoder = std::move(*decoder),
-                .warnings = {},
-                .poll = poll_of(*wish),
-                .reopen_after_s = kSilence_s};
+  auto device =
+      make_device(cyberglove_driver(),
+                  greeting_of({.hand = wish->hand, .layout = *layout, .ticks = ticks_of(*wish)}),
+                  link->identity());
+  if (!device) return device;
+  device->transport = make_link_transport(std::move(*link));
+  device->poll = poll_of(*wish);
+  device->reopen_after_s = kSilence_s;
+  return device;
 }
 
 // The motors shake; they cannot hold a finger. So a force is a finger's strength of shaking, and a
@@ -219,18 +216,19 @@ std::vector<OptionSpec> all_options() {
 }
 
 }  // namespace
+}  // namespace cyberglove
 
 const Driver& cyberglove_driver() {
   static const Driver driver{.name = "cyberglove",
                              .summary = "CyberGlove I, II and III over a serial port or TCP",
-                             .options = all_options(),
-                             .open = open,
-                             .make_decoder = make_decoder,
-                             .describe = describe,
-                             .expect = expect,
-                             .glove_model = model_of,
-                             .encode_haptics = encode_haptics,
-                             .emulate = emulate};
+                             .options = cyberglove::all_options(),
+                             .open = cyberglove::open,
+                             .make_decoder = cyberglove::make_decoder,
+                             .describe = cyberglove::describe,
+                             .expect = cyberglove::expect,
+                             .glove_model = cyberglove::model_of,
+                             .encode_haptics = cyberglove::encode_haptics,
+                             .emulate = cyberglove::emulate};
   return driver;
 }
 

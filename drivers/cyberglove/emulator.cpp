@@ -14,10 +14,6 @@ constexpr std::int64_t kNs = 78125, kTicks = 9;  // 9 ticks of 1/115200 s are 78
 constexpr std::int64_t kFastest_ticks = 768;     // 150 Hz: what "as fast as possible" comes to
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
-void add(std::string_view text, Emulator::Bytes& out) {
-  for (const char c : text) out.push_back(static_cast<std::byte>(c));
-}
-
 double raw_of(const glove::Curve& line, double value) {
   const double slope = (static_cast<double>(line.value[1]) - line.value[0]) /
                        (static_cast<double>(line.raw[1]) - line.raw[0]);

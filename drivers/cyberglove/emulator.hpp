@@ -53,6 +53,7 @@ class CyberGloveEmulator final : public Emulator {
   CyberGloveEmulator(EmulatorSettings settings, glove::Model model,
                      std::shared_ptr<const glove::Calibration> calibration);
 
+  static void add(std::string_view text, Bytes& out);
   void power_up();
   // Bytes of the command at the start of `input`, 0 when it is not whole yet.
   [[nodiscard]] std::size_t take_command(std::string_view input, Bytes& answer);

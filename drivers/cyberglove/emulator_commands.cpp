@@ -13,10 +13,6 @@ constexpr char kStop = 0x03, kInitialise = 0x09, kReboot = 0x12;
 constexpr std::string_view kUnknown(" e?\r\n\0", 6);
 constexpr std::size_t kLongestCommand = 64;  // ASCII, up to its CR
 
-void add(std::string_view text, Emulator::Bytes& out) {
-  for (const char c : text) out.push_back(static_cast<std::byte>(c));
-}
-
 char upper(char letter) { return static_cast<char>(letter - 'a' + 'A'); }
 
 bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
@@ -38,6 +34,10 @@ std::vector<unsigned> mask_bytes(std::uint32_t mask) {
 }
 
 }  // namespace
+
+void CyberGloveEmulator::add(std::string_view text, Bytes& out) {
+  for (const char c : text) out.push_back(static_cast<std::byte>(c));
+}
 
 void CyberGloveEmulator::power_up() {
   flags_ = {{'B', 0}, {'D', 0}, {'F', 1},

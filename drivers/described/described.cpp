@@ -11,14 +11,15 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
 #include "drivers/glove/greeting.hpp"
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
+namespace described {
 namespace {
 
-using described::Table;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kQuiet{50};
@@ -43,7 +44,7 @@ Result<Described> parse_text(const std::string& text, const std::string& identit
   made.side = greeting.side();
   if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
   if (line_end == text.size()) return fail("lacks the device's description", identity);
-  auto table = described::parse_device(text.substr(line_end + 1), identity);
+  auto table = parse_device(text.substr(line_end + 1), identity);
   if (!table) return std::unexpected(table.error());
   made.table = std::move(*table);
   return made;
@@ -68,9 +69,8 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   if (!made) return std::unexpected(made.error());
   auto calibration = glove::default_calibration(made->table.model);
   if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<described::DescribedDecoder>(
-      std::make_shared<const Table>(std::move(made->table)), description.skeleton,
-      std::move(*calibration));
+  return std::make_unique<DescribedDecoder>(std::make_shared<const Table>(std::move(made->table)),
+                                            description.skeleton, std::move(*calibration));
 }
 
 Result<glove::Model> glove_model(const Description& description) {
@@ -93,14 +93,14 @@ Result<Chosen> choose(const Options& given) {
   const auto side = glove::hand_option(*options);
   if (!side) return std::unexpected(side.error());
   const auto device = option<std::string>(*options, "device");
-  auto toml = described::device_text(device);
+  auto toml = device_text(device);
   if (!toml) return std::unexpected(toml.error());
-  auto table = described::parse_device(*toml, device);
+  auto table = parse_device(*toml, device);
   if (!table) return std::unexpected(table.error());
   const std::int64_t baud = option<std::int64_t>(*options, "baud");
   (*options)["baud"] = baud == 0 ? std::int64_t{table->link.baud} : baud;
   if (option<std::string>(*options, "listen").empty()) (*options)["listen"] = table->link.listen;
-  const bool tcp = table->link.kind == described::LinkKind::kTcp;
+  const bool tcp = table->link.kind == LinkKind::kTcp;
   (*options)["link"] = std::string(tcp ? "tcp" : "serial");
   return Chosen{std::move(*options), *side, std::move(*toml), std::move(*table)};
 }
@@ -115,7 +115,7 @@ Result<Description> expect(const Options& given) {
 
 bool has_packet(const Table& table, std::span<const std::byte> bytes) {
   for (; !bytes.empty(); bytes = bytes.subspan(1)) {
-    if (described::look_for_packet(table, bytes).found == described::Look::Found::kPacket) {
+    if (look_for_packet(table, bytes).found == Look::Found::kPacket) {
       return true;
     }
   }
@@ -134,8 +134,7 @@ Result<> start(const Table& table, Link& link) {
   }
   std::vector<std::byte> heard;
   const auto until = std::chrono::steady_clock::now() + kFirstPacket;
-  while (std::chrono::steady_clock::now() < until &&
-         heard.size() < 8 * described::kMaxPacketBytes) {
+  while (std::chrono::steady_clock::now() < until && heard.size() < 8 * kMaxPacketBytes) {
     const auto bytes = link.read(kQuiet);
     if (!bytes) return std::unexpected(bytes.error());
     heard.insert(heard.end(), bytes->begin(), bytes->end());
@@ -151,8 +150,8 @@ Result<> start(const Table& table, Link& link) {
 }
 
 Result<Link> connect(const Chosen& chosen, Ports& ports) {
-  const described::LinkRule& rule = chosen.table.link;
-  if (rule.kind != described::LinkKind::kHid) {
+  const LinkRule& rule = chosen.table.link;
+  if (rule.kind != LinkKind::kHid) {
     return glove::connect(chosen.options, ports, rule.usb_ids);
   }
   const std::uint32_t id = rule.usb_ids.front();
@@ -168,17 +167,14 @@ Result<Device> open(const Options& given, Ports& ports) {
   auto link = connect(*chosen, ports);
   if (!link) return std::unexpected(link.error());
   if (auto ok = start(chosen->table, *link); !ok) return std::unexpected(ok.error());
-  auto description = describe(text_of(chosen->side, chosen->toml), link->identity());
-  if (!description) return std::unexpected(description.error());
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  const double rate_hz = description->rate_hz;
-  return Device{.description = std::move(*description),
-                .transport = make_link_transport(std::move(*link)),
-                .decoder = std::move(*decoder),
-                .warnings = {},
-                .reopen_after_s =
-                    rate_hz > 0.0 ? std::max(kSilence_s, kSilentPeriods / rate_hz) : kSilence_s};
+  auto device =
+      make_device(described_driver(), text_of(chosen->side, chosen->toml), link->identity());
+  if (!device) return device;
+  device->transport = make_link_transport(std::move(*link));
+  const double rate_hz = device->description.rate_hz;
+  device->reopen_after_s =
+      rate_hz > 0.0 ? std::max(kSilence_s, kSilentPeriods / rate_hz) : kSilence_s;
+  return device;
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
@@ -186,7 +182,7 @@ Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
   if (!chosen) return std::unexpected(chosen.error());
   auto calibration = glove::default_calibration(chosen->table.model);
   if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<described::DescribedEmulator>(
+  return std::make_unique<DescribedEmulator>(
       std::make_shared<const Table>(std::move(chosen->table)), std::move(*calibration));
 }
 
@@ -208,18 +204,19 @@ std::vector<OptionSpec> all_options() {
 }
 
 }  // namespace
+}  // namespace described
 
 const Driver& described_driver() {
   static const Driver driver{
       .name = "described",
       .summary = "any device that a TOML file describes: VMG30, OpenCyberGlove, BeBop Forte, yours",
-      .options = all_options(),
-      .open = open,
-      .make_decoder = make_decoder,
-      .describe = describe,
-      .expect = expect,
-      .glove_model = glove_model,
-      .emulate = emulate};
+      .options = described::all_options(),
+      .open = described::open,
+      .make_decoder = described::make_decoder,
+      .describe = described::describe,
+      .expect = described::expect,
+      .glove_model = described::glove_model,
+      .emulate = described::emulate};
   return driver;
 }
 

@@ -92,7 +92,7 @@ Result<Table> read_device(const toml::table& device, const std::string& text,
   table.model.driver = "described";
   table.model.map_toml = text;
   if (const auto rows = glove::parse_angle_map(text, file, table.model.sensors); !rows) {
-    return fail(printable(rows.error().message), file, rows.error().line);
+    return std::unexpected(rows.error());
   }
   return table;
 }
@@ -103,12 +103,9 @@ bool describes_packets(std::string_view toml) { return toml.find("[[packet]]") !
 
 Result<Table> parse_device(const std::string& toml, const std::string& file) {
   if (toml.size() > kMaxDeviceFile) return fail("is too long to describe a device", file);
-  try {
-    return read_device(toml::parse(toml, file), toml, file);
-  } catch (const toml::parse_error& error) {
-    return fail(printable(std::string(error.description())), file,
-                static_cast<int>(error.source().begin.line));
-  }
+  const auto table = parse_toml(toml, file);
+  if (!table) return std::unexpected(table.error());
+  return read_device(*table, toml, file);
 }
 
 std::vector<std::string> shipped_devices() {

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "proto/frame/degree.hpp"
 #include "proto/frame/frame.hpp"
 
 namespace posed::drivers::described {
@@ -21,7 +21,6 @@ constexpr std::array<std::string_view, 3> kForms{"unsigned", "signed", "float"};
 constexpr std::array<std::string_view, 3> kKinds{"sensor", "extra", "time"};
 constexpr std::array<std::string_view, 4> kChecksums{"none", "sum8", "xor8", "crc32"};
 constexpr std::array<std::string_view, 3> kSensorUnits{"1", "rad", "deg"};
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 constexpr std::array<std::string_view, 6> kPacketKeys{"header", "end",      "bytes",
                                                       "length", "checksum", "field"};

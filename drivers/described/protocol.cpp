@@ -16,17 +16,16 @@ constexpr std::uint64_t mask_of(int bits) noexcept {
   return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
 }
 
-// The bytes of a place as one number, in their order.
+// The bytes of a place as one number, in their order; what lies above them is of the bytes behind.
 std::uint64_t gather(const BitPlace& place, std::span<const std::byte> packet) noexcept {
-  const std::byte* const first = packet.data() + place.first;
-  std::uint64_t all = 0;
-  if (place.big) {
-    for (std::size_t i = 0; i < place.bytes; ++i)
-      all = all << 8 | std::to_integer<unsigned>(first[i]);
+  const auto behind = packet.subspan(place.first);
+  std::uint64_t all = 0;  // the host is little-endian
+  if (behind.size() >= sizeof all) {
+    std::memcpy(&all, behind.data(), sizeof all);  // one load, where a copy of few bytes is a call
   } else {
-    std::memcpy(&all, first, place.bytes);  // the host is little-endian
+    std::memcpy(&all, behind.data(), behind.size());
   }
-  return all;
+  return place.big ? std::byteswap(all) >> (64 - 8 * place.bytes) : all;
 }
 
 void scatter(const BitPlace& place, std::uint64_t all, std::span<std::byte> packet) noexcept {

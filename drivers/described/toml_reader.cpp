@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "proto/frame/in_quotes.hpp"
+
 namespace posed::drivers::described {
 namespace {
 
@@ -21,25 +23,13 @@ std::string short_number(double value) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
-std::string quoted(std::string_view key) { return "'" + std::string(key) + "'"; }
-
 }  // namespace
-
-std::string printable(std::string text) {
-  std::ranges::replace_if(text, [](unsigned char c) { return c < ' ' || c == 0x7F; }, '?');
-  return text;
-}
-
-void TomlReader::blame(const toml::node& node, std::string message) {
-  if (error_) return;
-  error_ = Error{printable(std::move(message)), file_, static_cast<int>(node.source().begin.line)};
-}
 
 void TomlReader::allow(const toml::table& table, std::string_view what,
                        std::span<const std::string_view> keys) {
   for (const auto& [key, node] : table) {
     if (std::ranges::find(keys, key.str()) == keys.end()) {
-      blame(node, quoted(key.str()) + " is not known in " + std::string(what) +
+      blame(node, in_quotes(key.str()) + " is not known in " + std::string(what) +
                       "; allowed: " + listed(keys));
     }
   }
@@ -49,7 +39,7 @@ std::string TomlReader::text(const toml::table& table, std::string_view key,
                              const std::string& without) {
   const toml::node* const node = table.get(key);
   if (node == nullptr) return without;
-  if (!node->is_string()) blame(*node, quoted(key) + " is a text in quotes");
+  if (!node->is_string()) blame(*node, in_quotes(key) + " is a text in quotes");
   return node->value_or(std::string(without));
 }
 
@@ -59,7 +49,7 @@ std::int64_t TomlReader::whole(const toml::table& table, std::string_view key, s
   if (node == nullptr) return without;
   const auto value = node->is_integer() ? node->value<std::int64_t>() : std::nullopt;
   if (value && *value >= low && *value <= high) return *value;
-  blame(*node, quoted(key) + " is a whole number from " + std::to_string(low) + " to " +
+  blame(*node, in_quotes(key) + " is a whole number from " + std::to_string(low) + " to " +
                    std::to_string(high));
   return without;
 }
@@ -71,7 +61,7 @@ double TomlReader::number(const toml::table& table, std::string_view key, double
   const auto value = node->is_number() ? node->value<double>() : std::nullopt;
   if (value && *value >= low && *value <= high) return *value;
   blame(*node,
-        quoted(key) + " is a number from " + short_number(low) + " to " + short_number(high));
+        in_quotes(key) + " is a number from " + short_number(low) + " to " + short_number(high));
   return without;
 }
 
@@ -81,7 +71,7 @@ std::size_t TomlReader::word(const toml::table& table, std::string_view key,
   if (node == nullptr) return without;
   const auto at = std::ranges::find(words, node->value_or(std::string_view()));
   if (at != words.end()) return static_cast<std::size_t>(at - words.begin());
-  blame(*node, quoted(key) + " is one of: " + listed(words));
+  blame(*node, in_quotes(key) + " is one of: " + listed(words));
   return without;
 }
 
@@ -106,7 +96,7 @@ std::vector<std::byte> TomlReader::hex(const toml::table& table, std::string_vie
     at = stop;
   }
   if (good && bytes.size() <= most) return bytes;
-  blame(*node, quoted(key) + " is up to " + std::to_string(most) +
+  blame(*node, in_quotes(key) + " is up to " + std::to_string(most) +
                    " bytes of two hexadecimal digits each, as \"24 0a 57\"");
   return {};
 }
@@ -122,14 +112,14 @@ std::optional<std::pair<double, double>> TomlReader::pair(const toml::table& tab
       return std::pair(*low, *high);
     }
   }
-  blame(*node, quoted(key) + " is two different numbers, as [0, 1000]");
+  blame(*node, in_quotes(key) + " is two different numbers, as [0, 1000]");
   return std::nullopt;
 }
 
 const toml::table* TomlReader::table(const toml::table& in, std::string_view key) {
   const toml::node* const node = in.get(key);
   if (node == nullptr) return nullptr;
-  if (!node->is_table()) blame(*node, quoted(key) + " is a table");
+  if (!node->is_table()) blame(*node, in_quotes(key) + " is a table");
   return node->as_table();
 }
 

@@ -1,5 +1,5 @@
-// TomlReader: reads checked values out of a TOML table and remembers the first mistake, with its
-// line and what would have been right. Cold.
+// TomlReader: reads checked values out of a TOML table; the first mistake is told with its line and
+// what would have been right. Cold.
 #pragma once
 
 #include <cstddef>
@@ -10,21 +10,13 @@
 #include <string_view>
 #include <vector>
 
-#include <toml++/toml.h>
-
-#include "proto/frame/result.hpp"
+#include "proto/frame/toml_text.hpp"
 
 namespace posed::drivers::described {
 
-// Without what a terminal would obey: a description may come from a log that a stranger sent.
-[[nodiscard]] std::string printable(std::string text);
-
-class TomlReader {
+class TomlReader : public FirstMistake {
  public:
-  explicit TomlReader(std::string file) : file_(std::move(file)) {}
-
-  void blame(const toml::node& node, std::string message);
-  [[nodiscard]] const std::optional<Error>& error() const noexcept { return error_; }
+  using FirstMistake::FirstMistake;
 
   // Blames the first key of `table` that is not among `keys`; `what` the table is ("a packet").
   void allow(const toml::table& table, std::string_view what,
@@ -48,10 +40,6 @@ class TomlReader {
                                                               std::string_view key);
   // The table of a key; null when it is not there.
   [[nodiscard]] const toml::table* table(const toml::table& in, std::string_view key);
-
- private:
-  std::string file_;
-  std::optional<Error> error_;
 };
 
 }  // namespace posed::drivers::described

@@ -1,11 +1,13 @@
 #include "drivers/file/file.hpp"
 
 #include "drivers/file/decoder.hpp"
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
 #include "proto/clip/text_clip.hpp"
 
 namespace posed::drivers {
+namespace file {
 namespace {
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
@@ -48,9 +50,9 @@ Result<Device> open(const Options& given, Ports& /*ports*/) {
                                .hand_shape = option<std::string>(*options, "hand_shape")};
   const auto clip = clip::open_text_clip(path, read);
   if (!clip) return std::unexpected(clip.error());
-  auto description = describe((*clip)->description, path);
-  if (!description) return std::unexpected(description.error());
-  auto transport = FileTransport::open(frames_of(**clip), {.rate_hz = description->rate_hz,
+  auto device = make_device(file_driver(), (*clip)->description, path);
+  if (!device) return device;
+  auto transport = FileTransport::open(frames_of(**clip), {.rate_hz = device->description.rate_hz,
                                                            .pace = option<double>(*options, "pace"),
                                                            .loop = option<bool>(*options, "loop"),
                                                            .time_s = (*clip)->time_s});
@@ -59,12 +61,9 @@ Result<Device> open(const Options& given, Ports& /*ports*/) {
     error.file = path;
     return std::unexpected(std::move(error));
   }
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  return Device{.description = std::move(*description),
-                .transport = std::move(*transport),
-                .decoder = std::move(*decoder),
-                .warnings = (*clip)->warnings};
+  device->transport = std::move(*transport);
+  device->warnings = (*clip)->warnings;
+  return device;
 }
 
 std::vector<OptionSpec> options() {
@@ -98,14 +97,15 @@ std::vector<OptionSpec> options() {
 }
 
 }  // namespace
+}  // namespace file
 
 const Driver& file_driver() {
   static const Driver driver{.name = "file",
                              .summary = "a BVH or AMC clip or a hand CSV, played by its own clock",
-                             .options = options(),
-                             .open = open,
-                             .make_decoder = make_decoder,
-                             .describe = describe};
+                             .options = file::options(),
+                             .open = file::open,
+                             .make_decoder = file::make_decoder,
+                             .describe = file::describe};
   return driver;
 }
 

@@ -8,15 +8,14 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
 #include "drivers/glove/greeting.hpp"
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
+namespace fivedt {
 namespace {
-
-using fivedt::Form;
-using fivedt::Settings;
 
 constexpr std::string_view kName = "fivedt";
 constexpr double kSilence_s = 2.0;  // as VRPN has it
@@ -30,13 +29,11 @@ struct Greeted {
   Settings settings;
 };
 
-bool is_usb(Form form) { return form == Form::kUltraUsb5 || form == Form::kUltraUsb14; }
-
 Result<Greeted> read_greeting(const std::string& text, const std::string& identity) {
   glove::Greeting greeting(text, kName, identity);
   Greeted glove;
   glove.side = greeting.side();
-  glove.settings.form = static_cast<Form>(greeting.choice("model", fivedt::kFormNames));
+  glove.settings.form = static_cast<Form>(greeting.choice("model", kFormNames));
   glove.settings.polled = greeting.choice("mode", kModes) == 1;
   glove.settings.port_b = greeting.choice("kit_port", kKitPorts) == 1;
   if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
@@ -46,7 +43,7 @@ Result<Greeted> read_greeting(const std::string& text, const std::string& identi
 std::string greeting_of(const Greeted& glove) {
   const Settings& settings = glove.settings;
   return std::string(kName) + " hand=" + std::string(glove::side_name(glove.side)) +
-         " model=" + std::string(fivedt::kFormNames[static_cast<std::size_t>(settings.form)]) +
+         " model=" + std::string(kFormNames[static_cast<std::size_t>(settings.form)]) +
          " mode=" + std::string(kModes[settings.polled ? 1 : 0]) +
          " kit_port=" + std::string(kKitPorts[settings.port_b ? 1 : 0]);
 }
@@ -54,14 +51,14 @@ std::string greeting_of(const Greeted& glove) {
 Result<Greeted> from_options(const Options& options) {
   const auto side = glove::hand_option(options);
   if (!side) return std::unexpected(side.error());
-  const auto model = std::ranges::find(fivedt::kFormNames,
-                                       std::string_view(option<std::string>(options, "model")));
-  if (model == fivedt::kFormNames.end()) {
+  const auto model =
+      std::ranges::find(kFormNames, std::string_view(option<std::string>(options, "model")));
+  if (model == kFormNames.end()) {
     return misuse(
         "model should be \"5\", \"5-wireless\", \"16\", \"ultra-wireless\", "
         "\"ultra-usb-5\" or \"ultra-usb-14\"");
   }
-  const auto form = static_cast<Form>(model - fivedt::kFormNames.begin());
+  const auto form = static_cast<Form>(model - kFormNames.begin());
   const auto poll_hz = option<std::int64_t>(options, "poll_hz");
   if (poll_hz < 0 || poll_hz > kMaxPoll_hz || (poll_hz > 0 && form != Form::kFive)) {
     return misuse("poll_hz should be 0 (stream) to 200; only model = \"5\" can be polled");
@@ -83,7 +80,7 @@ Result<Description> describe(const std::string& text, const std::string& identit
                      .text = text,
                      .identity = identity,
                      .skeleton = std::make_shared<Skeleton>(hand_skeleton(glove->side)),
-                     .samples = fivedt::layout(*model, glove->settings.form),
+                     .samples = layout(*model, glove->settings.form),
                      .rate_hz = 0.0};
 }
 
@@ -98,7 +95,7 @@ Result<Description> expect(const Options& given) {
 Result<glove::Model> glove_model(const Description& description) {
   const auto glove = read_greeting(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
-  return fivedt::model(glove->settings.form);
+  return model(glove->settings.form);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
@@ -108,8 +105,8 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   if (!model) return std::unexpected(model.error());
   auto calibration = glove::default_calibration(*model);
   if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<fivedt::FiveDtDecoder>(description.skeleton, std::move(*calibration),
-                                                 glove->settings);
+  return std::make_unique<FiveDtDecoder>(description.skeleton, std::move(*calibration),
+                                         glove->settings);
 }
 
 // Bit 0 of the product is a left hand, 1 and 2 a wireless kit and its port B, 4 five sensors.
@@ -146,22 +143,17 @@ Result<Device> open(const Options& given, Ports& ports) {
   if (!glove) return std::unexpected(glove.error());
   auto link = reach(*options, *glove, ports);
   if (!link) return std::unexpected(link.error());
-  auto warnings = fivedt::start(*link, glove->side, glove->settings);
+  auto warnings = start(*link, glove->side, glove->settings);
   if (!warnings) return std::unexpected(warnings.error());
-  auto description = describe(greeting_of(*glove), link->identity());
-  if (!description) return std::unexpected(description.error());
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  Poll poll;
+  auto device = make_device(fivedt_driver(), greeting_of(*glove), link->identity());
+  if (!device) return device;
+  device->transport = make_link_transport(std::move(*link));
+  device->warnings = std::move(*warnings);
   if (const auto poll_hz = option<std::int64_t>(*options, "poll_hz"); poll_hz > 0) {
-    poll = {.request = {std::byte{'C'}}, .period_ns = 1'000'000'000 / poll_hz};
+    device->poll = {.request = {std::byte{'C'}}, .period_ns = 1'000'000'000 / poll_hz};
   }
-  return Device{.description = std::move(*description),
-                .transport = make_link_transport(std::move(*link)),
-                .decoder = std::move(*decoder),
-                .warnings = std::move(*warnings),
-                .poll = std::move(poll),
-                .reopen_after_s = kSilence_s};
+  device->reopen_after_s = kSilence_s;
+  return device;
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
@@ -169,7 +161,7 @@ Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);
   if (!glove) return std::unexpected(glove.error());
-  return std::make_unique<fivedt::FiveDtEmulator>(glove->side, glove->settings);
+  return std::make_unique<FiveDtEmulator>(glove->side, glove->settings);
 }
 
 std::vector<OptionSpec> all_options() {
@@ -188,17 +180,18 @@ std::vector<OptionSpec> all_options() {
 }
 
 }  // namespace
+}  // namespace fivedt
 
 const Driver& fivedt_driver() {
-  static const Driver driver{.name = kName,
+  static const Driver driver{.name = fivedt::kName,
                              .summary = "5DT data gloves: serial, Ultra Wireless and Ultra USB",
-                             .options = all_options(),
-                             .open = open,
-                             .make_decoder = make_decoder,
-                             .describe = describe,
-                             .expect = expect,
-                             .glove_model = glove_model,
-                             .emulate = emulate};
+                             .options = fivedt::all_options(),
+                             .open = fivedt::open,
+                             .make_decoder = fivedt::make_decoder,
+                             .describe = fivedt::describe,
+                             .expect = fivedt::expect,
+                             .glove_model = fivedt::glove_model,
+                             .emulate = fivedt::emulate};
   return driver;
 }
 

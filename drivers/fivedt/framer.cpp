@@ -3,11 +3,6 @@
 #include <algorithm>
 
 namespace posed::drivers::fivedt {
-namespace {
-
-bool is_usb(Form form) noexcept { return form == Form::kUltraUsb5 || form == Form::kUltraUsb14; }
-
-}  // namespace
 
 // RT-safe.
 void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept {

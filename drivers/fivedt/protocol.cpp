@@ -101,6 +101,8 @@ std::vector<std::byte> encode_ultra(const Reading& reading) {
 }  // namespace
 
 // RT-safe.
+bool is_usb(Form form) noexcept { return form == Form::kUltraUsb5 || form == Form::kUltraUsb14; }
+
 std::size_t sensors_of(Form form) noexcept {
   constexpr std::array<std::size_t, 6> kSensors{5, 5, 16, 14, 5, 14};
   return kSensors[static_cast<std::size_t>(form)];

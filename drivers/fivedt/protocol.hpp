@@ -55,6 +55,7 @@ inline constexpr std::size_t kMaxPacket = 64;
 inline constexpr std::size_t kMaxValues = 16;
 inline constexpr std::byte kReady{0x55};  // the answer to A, and what may follow a packet
 
+[[nodiscard]] bool is_usb(Form form) noexcept;               // reports, no byte stream; RT-safe
 [[nodiscard]] std::size_t sensors_of(Form form) noexcept;    // RT-safe
 [[nodiscard]] std::size_t packet_bytes(Form form) noexcept;  // of a measurement; RT-safe
 // Where sensor `index` stands among the values of a packet. RT-safe.

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <optional>
 
-#include <toml++/toml.h>
-
+#include "proto/frame/degree.hpp"
+#include "proto/frame/in_quotes.hpp"
 #include "proto/frame/profile_texts.hpp"
+#include "proto/frame/toml_text.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -15,11 +14,10 @@ namespace {
 constexpr double kMaxGain = 1000.0;
 constexpr double kMaxOffset_deg = 360.0;
 
-// Reads one map; remembers the first mistake.
-class MapReader {
+class MapReader : private FirstMistake {
  public:
   MapReader(const std::string& file, const std::vector<Sensor>& sensors)
-      : file_(file), sensors_(sensors) {}
+      : FirstMistake(file), sensors_(sensors) {}
 
   Result<std::vector<MapRow>> read(const toml::table& table) {
     const toml::table* const angles = table["angles"].as_table();
@@ -27,16 +25,11 @@ class MapReader {
     if (angles != nullptr) {
       for (const auto& [key, node] : *angles) read_value(key.str(), node);
     }
-    if (error_) return std::unexpected(*error_);
+    if (error()) return std::unexpected(*error());
     return std::move(rows_);
   }
 
  private:
-  void blame(const toml::node& node, std::string message) {
-    if (error_) return;
-    error_ = Error{std::move(message), file_, static_cast<int>(node.source().begin.line)};
-  }
-
   void read_value(std::string_view name, const toml::node& node) {
     const auto sensor = std::ranges::find(sensors_, name, &Sensor::name);
     if (sensor == sensors_.end()) {
@@ -53,15 +46,14 @@ class MapReader {
   void read_share(std::uint8_t sensor, const toml::table& share) {
     for (const auto& [key, node] : share) {
       if (key != "channel" && key != "gain" && key != "offset_deg") {
-        blame(node, "'" + std::string(key.str()) + "' is not known in an angle");
+        blame(node, in_quotes(key.str()) + " is not known in an angle");
       }
     }
     const std::string channel = share["channel"].value_or(std::string());
     const int index = hand_channel(channel);
     if (index < 0) blame(share, "the hand has no channel '" + channel + "'");
     if (rows_.size() == kMaxMapRows) blame(share, "too many angles in one table");
-    if (error_) return;
-    constexpr double kDegree = std::numbers::pi / 180.0;
+    if (error()) return;
     rows_.push_back({.sensor = sensor,
                      .channel = static_cast<std::uint8_t>(index),
                      .gain = static_cast<float>(number(share, "gain", 1.0, kMaxGain)),
@@ -78,10 +70,8 @@ class MapReader {
     return without;
   }
 
-  const std::string& file_;
   const std::vector<Sensor>& sensors_;
   std::vector<MapRow> rows_;
-  std::optional<Error> error_;
 };
 
 }  // namespace
@@ -96,12 +86,9 @@ Result<std::string> device_table(std::string_view name) {
 
 Result<std::vector<MapRow>> parse_angle_map(const std::string& toml, const std::string& file,
                                             const std::vector<Sensor>& sensors) {
-  try {
-    return MapReader(file, sensors).read(toml::parse(toml, file));
-  } catch (const toml::parse_error& error) {
-    return fail(std::string(error.description()), file,
-                static_cast<int>(error.source().begin.line));
-  }
+  const auto table = parse_toml(toml, file);
+  if (!table) return std::unexpected(table.error());
+  return MapReader(file, sensors).read(*table);
 }
 
 int hand_channel(std::string_view name) {

@@ -6,7 +6,8 @@
 #include <optional>
 #include <sstream>
 
-#include <toml++/toml.h>
+#include "proto/frame/in_quotes.hpp"
+#include "proto/frame/toml_text.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -14,16 +15,13 @@ namespace {
 constexpr int kFormat = 1;
 constexpr double kMaxNumber = 1e6;  // of raw values, calibrated values and parameters
 
-std::string in_ticks(std::string_view text) { return "'" + std::string(text) + "'"; }
-
-// Reads one calibration; remembers the first mistake.
-class FileReader {
+class FileReader : private FirstMistake {
  public:
-  explicit FileReader(const std::string& file) : file_(file) {}
+  using FirstMistake::FirstMistake;
 
   Result<CalibrationFile> read(const toml::table& table) {
     if (table["format"].value_or(0) != kFormat) {
-      return fail("is no calibration of a glove (it should say format = 1)", file_);
+      return fail("is no calibration of a glove (it should say format = 1)", file());
     }
     for (const auto& [key, node] : table) entry(key.str(), node);
     if (read_.driver.empty()) blame(table, "the calibration does not say its driver");
@@ -35,16 +33,11 @@ class FileReader {
       blame(table, "the calibration should have " + std::to_string(*count_) + " sensors and has " +
                        std::to_string(read_.sensors.size()) + "; was the file cut off?");
     }
-    if (error_) return std::unexpected(*error_);
+    if (error()) return std::unexpected(*error());
     return std::move(read_);
   }
 
  private:
-  void blame(const toml::node& node, std::string message) {
-    if (error_) return;
-    error_ = Error{std::move(message), file_, static_cast<int>(node.source().begin.line)};
-  }
-
   void entry(std::string_view key, const toml::node& node) {
     if (key == "format") return;
     if (key == "driver") return text(node, read_.driver);
@@ -63,7 +56,7 @@ class FileReader {
     } else if (key == "sensors" && node.is_table()) {
       for (const auto& [name, points] : *node.as_table()) read_sensor(name.str(), points);
     } else {
-      blame(node, in_ticks(key) + " is not known in a calibration, or of another type");
+      blame(node, in_quotes(key) + " is not known in a calibration, or of another type");
     }
   }
 
@@ -83,27 +76,25 @@ class FileReader {
   void read_sensor(std::string_view name, const toml::node& node) {
     const toml::array* const points = node.as_array();
     if (points == nullptr || points->size() < 2 || points->size() > kMaxCurvePoints) {
-      return blame(node, "sensor " + in_ticks(name) + " needs 2 to " +
+      return blame(node, "sensor " + in_quotes(name) + " needs 2 to " +
                              std::to_string(kMaxCurvePoints) + " points [raw, calibrated]");
     }
     auto& read = read_.sensors[std::string(name)];
     for (const toml::node& point : *points) {
       const toml::array* const pair = point.as_array();
       if (pair == nullptr || pair->size() != 2) {
-        return blame(point, "a point of sensor " + in_ticks(name) + " is [raw, calibrated]");
+        return blame(point, "a point of sensor " + in_quotes(name) + " is [raw, calibrated]");
       }
       read.push_back({number(pair->get(0)), number(pair->get(1))});
       if (read.size() > 1 && !(read.back()[0] > read[read.size() - 2][0])) {
-        return blame(point, "the raw values of sensor " + in_ticks(name) + " should ascend");
+        return blame(point, "the raw values of sensor " + in_quotes(name) + " should ascend");
       }
     }
   }
 
-  const std::string& file_;
   CalibrationFile read_;
   std::string hand_;
   std::optional<std::int64_t> count_;
-  std::optional<Error> error_;
 };
 
 std::string digits(double value) {
@@ -117,12 +108,9 @@ std::string digits(double value) {
 Result<CalibrationFile> parse_calibration(const std::string& toml,
                                           const std::filesystem::path& path) {
   const std::string file = path.string();
-  try {
-    return FileReader(file).read(toml::parse(toml, file));
-  } catch (const toml::parse_error& error) {
-    return fail(std::string(error.description()) + "; was the file cut off?", file,
-                static_cast<int>(error.source().begin.line));
-  }
+  const auto table = parse_toml(toml, file);
+  if (table) return FileReader(file).read(*table);
+  return fail(table.error().message + "; was the file cut off?", file, table.error().line);
 }
 
 std::string format_calibration(const CalibrationFile& file) {

@@ -6,11 +6,10 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/fit.hpp"
 #include "drivers/glove/greeting.hpp"
+#include "proto/frame/in_quotes.hpp"
 
 namespace posed::drivers::glove {
 namespace {
-
-std::string in_ticks(std::string_view text) { return "'" + std::string(text) + "'"; }
 
 // A driver's own mistake shows in the first test that opens it.
 bool is_sound(const Curve& curve) {
@@ -26,7 +25,7 @@ Result<Calibration> compile(const Model& model) {
   Calibration made;
   if (model.sensors.empty() || model.sensors.size() > kMaxSensors ||
       model.parameters.size() > kMaxParameters) {
-    return fail("driver " + in_ticks(model.driver) +
+    return fail("driver " + in_quotes(model.driver) +
                 " states a glove without sensors, or with more " + "than " +
                 std::to_string(kMaxSensors) + ": mend the driver");
   }
@@ -34,7 +33,7 @@ Result<Calibration> compile(const Model& model) {
   for (std::size_t i = 0; i < made.sensors; ++i) {
     const Sensor& sensor = model.sensors[i];
     if (!is_sound(sensor.curve)) {
-      return fail("sensor " + in_ticks(sensor.name) + " of driver " + in_ticks(model.driver) +
+      return fail("sensor " + in_quotes(sensor.name) + " of driver " + in_quotes(model.driver) +
                   " needs a default curve of ascending finite points: mend the driver");
     }
     made.curve[i] = sensor.curve;
@@ -56,8 +55,8 @@ Result<Calibration> compile(const Model& model) {
 Result<> check_owner(const Model& model, const CalibrationFile& file, Side hand,
                      const std::string& identity) {
   if (file.driver != model.driver) {
-    return fail("this calibration is for driver " + in_ticks(file.driver) + ", the glove is a " +
-                in_ticks(model.driver) + ": calibrate this glove");
+    return fail("this calibration is for driver " + in_quotes(file.driver) + ", the glove is a " +
+                in_quotes(model.driver) + ": calibrate this glove");
   }
   if (file.hand != hand) {
     return fail("this calibration is for the " + std::string(side_name(file.hand)) +
@@ -65,8 +64,8 @@ Result<> check_owner(const Model& model, const CalibrationFile& file, Side hand,
                 " one: use that hand's file");
   }
   if (!file.glove.empty() && !identity.empty() && file.glove != identity) {
-    return fail("this calibration is for glove " + in_ticks(file.glove) + ", this one is " +
-                in_ticks(identity) + ": calibrate this glove, or leave `glove` empty in the file");
+    return fail("this calibration is for glove " + in_quotes(file.glove) + ", this one is " +
+                in_quotes(identity) + ": calibrate this glove, or leave `glove` empty in the file");
   }
   return {};
 }
@@ -74,7 +73,7 @@ Result<> check_owner(const Model& model, const CalibrationFile& file, Side hand,
 Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>>& points,
                    Curve& curve) {
   if (points.size() < 2 || points.size() > kMaxCurvePoints) {
-    return fail("sensor " + in_ticks(sensor.name) + " needs 2 to " +
+    return fail("sensor " + in_quotes(sensor.name) + " needs 2 to " +
                 std::to_string(kMaxCurvePoints) + " points");
   }
   curve.points = static_cast<std::uint8_t>(points.size());
@@ -83,10 +82,10 @@ Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>
     curve.value[i] = static_cast<float>(points[i][1]);
   }
   if (!is_sound(curve)) {
-    return fail("the raw values of sensor " + in_ticks(sensor.name) + " should ascend");
+    return fail("the raw values of sensor " + in_quotes(sensor.name) + " should ascend");
   }
   if (points.back()[0] - points.front()[0] < least_span(sensor)) {
-    return fail("sensor " + in_ticks(sensor.name) +
+    return fail("sensor " + in_quotes(sensor.name) +
                 " hardly moved in this calibration: calibrate again, or delete its line");
   }
   return {};
@@ -116,7 +115,7 @@ Result<std::shared_ptr<const Calibration>> make_calibration(const Model& model,
   for (const auto& [name, points] : file.sensors) {
     const auto sensor = std::ranges::find(model.sensors, name, &Sensor::name);
     if (sensor == model.sensors.end()) {
-      return fail("the glove has no sensor " + in_ticks(name) + ": is the calibration another's?");
+      return fail("the glove has no sensor " + in_quotes(name) + ": is the calibration another's?");
     }
     const auto index = static_cast<std::size_t>(sensor - model.sensors.begin());
     if (auto ok = set_curve(*sensor, points, made->curve[index]); !ok) {
@@ -127,7 +126,7 @@ Result<std::shared_ptr<const Calibration>> make_calibration(const Model& model,
     const auto at =
         std::ranges::find(model.parameters, name, &std::pair<std::string, double>::first);
     if (at == model.parameters.end()) {
-      return fail("the glove has no parameter " + in_ticks(name) +
+      return fail("the glove has no parameter " + in_quotes(name) +
                   ": is the calibration another's?");
     }
     made->parameter[static_cast<std::size_t>(at - model.parameters.begin())] =

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "drivers/glove/angle_map.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::glove {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kSame = 0.05;  // rad or share: two poses that differ less do not move a sensor
 
 std::size_t channel(std::string_view name) { return static_cast<std::size_t>(hand_channel(name)); }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kLeastCounts = 10.0;
 
-constexpr std::array<std::string_view, 22> kNames{
+constexpr std::array<std::string_view, 22> kAsrNames{
     "wrist_yaw",  "wrist_pitch", "thumb_abd",  "thumb_roll", "thumb_mcp",  "thumb_ip",
     "index_mcp",  "middle_abd",  "index_pip",  "index_dip",  "middle_mcp", "",
     "middle_pip", "middle_dip",  "ring_mcp",   "ring_abd",   "ring_pip",   "ring_dip",
@@ -33,7 +33,7 @@ bool read_point(std::string_view word, std::array<double, 2>& point) {
 
 Result<> import_asr(std::string_view text, const std::string& file, CalibrationFile& into) {
   std::string_view rest = text;
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
+  for (std::size_t i = 0; i < kAsrNames.size(); ++i) {
     const int number = static_cast<int>(i) + 1;
     std::string_view line = clip::next_line(rest);
     std::array<double, 2> first{}, second{};
@@ -41,14 +41,14 @@ Result<> import_asr(std::string_view text, const std::string& file, CalibrationF
         !clip::trim(line).empty()) {
       return cut_off(file, number);
     }
-    if (kNames[i].empty() || first[1] == second[1]) continue;  // the default stays
+    if (kAsrNames[i].empty() || first[1] == second[1]) continue;  // the default stays
     if (first[0] > second[0]) std::swap(first, second);
     if (second[0] - first[0] < kLeastCounts) {
-      return fail("sensor '" + std::string(kNames[i]) +
+      return fail("sensor '" + std::string(kAsrNames[i]) +
                       "' hardly moved in this calibration (less than 10 counts): calibrate again",
                   file, number);
     }
-    into.sensors[std::string(kNames[i])] = {first, second};
+    into.sensors[std::string(kAsrNames[i])] = {first, second};
   }
   return {};
 }

@@ -2,21 +2,19 @@
 // calibrated values in degrees, flexion and spread positive, two points or more in any order.
 #include <algorithm>
 #include <array>
-#include <numbers>
 
 #include "drivers/glove/import_parts.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::glove {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct Name {
   std::string_view theirs, ours;
   double sign = -1.0;  // ours: flexion negative; only the index spreads the positive way
 };
-constexpr std::array<Name, 22> kNames{{
+constexpr std::array<Name, 22> kShadowNames{{
     {"G_ThumbRotate", "thumb_roll"},
     {"G_ThumbMPJ", "thumb_mcp"},
     {"G_ThumbIJ", "thumb_ip"},
@@ -63,8 +61,8 @@ Result<> import_shadow(std::string_view text, const std::string& file, Calibrati
     const std::string_view tag = text.substr(at, text.find('>', at) - at);
     const int line = 1 + static_cast<int>(std::ranges::count(text.substr(0, at), '\n'));
     if (tag.starts_with("<Joint ")) {
-      const auto name = std::ranges::find(kNames, attribute(tag, "name"), &Name::theirs);
-      if (name == kNames.end())
+      const auto name = std::ranges::find(kShadowNames, attribute(tag, "name"), &Name::theirs);
+      if (name == kShadowNames.end())
         return fail("a Joint has a name that no CyberGlove has", file, line);
       joint = &*name;
     } else if (tag.starts_with("<calib ")) {

@@ -15,7 +15,7 @@ constexpr std::size_t kJoints = 24;
 constexpr std::size_t kIndexAbd = 7, kMiddleAbd = 11;
 constexpr double kCounts = 100.0;  // between the two points that a line is written with
 
-constexpr std::array<std::string_view, kJoints> kNames{
+constexpr std::array<std::string_view, kJoints> kVirtualHandNames{
     "thumb_roll", "thumb_mcp",  "thumb_ip",   "thumb_abd",   "index_mcp",  "index_pip",
     "index_dip",  "",           "middle_mcp", "middle_pip",  "middle_dip", "middle_abd",
     "ring_mcp",   "ring_pip",   "ring_dip",   "ring_abd",    "little_mcp", "little_pip",
@@ -69,10 +69,10 @@ Result<> import_virtual_hand(std::string_view text, const std::string& file,
   }
   if (rows.size() < kJoints) return cut_off(file);
   for (std::size_t i = 0; i < kJoints; ++i) {
-    if (kNames[i].empty()) continue;
+    if (kVirtualHandNames[i].empty()) continue;
     const double slope = i == kMiddleAbd ? rows[kIndexAbd].gain : -rows[i].gain;
-    into.sensors[std::string(kNames[i])] = {{rows[i].offset, 0.0},
-                                            {rows[i].offset + kCounts, slope * kCounts}};
+    into.sensors[std::string(kVirtualHandNames[i])] = {{rows[i].offset, 0.0},
+                                                       {rows[i].offset + kCounts, slope * kCounts}};
   }
   into.parameters["abduction_bias"] = rows[kMiddleAbd].gain;
   into.hand = side_of(text, into.hand);

@@ -3,11 +3,13 @@
 #include <sstream>
 
 #include "drivers/labels/decoder.hpp"
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
+namespace labels {
 namespace {
 
 constexpr double kMaxRate_hz = 1000.0;
@@ -60,21 +62,18 @@ Result<Device> open(const Options& given, Ports& /*ports*/) {
   if (!(rate_hz >= 1.0 && rate_hz <= kMaxRate_hz)) {
     return misuse("rate_hz should be 1 to 1000 frames a second");
   }
-  auto description = describe(text_of(side, rate_hz), side + " hand");
-  if (!description) return std::unexpected(description.error());
+  auto device = make_device(labels_driver(), text_of(side, rate_hz), side + " hand");
+  if (!device) return device;
   Chunks beat;
   beat.add(LabelsDecoder::kBeat);
-  auto transport = FileTransport::open(std::move(beat), {.rate_hz = description->rate_hz});
+  auto transport = FileTransport::open(std::move(beat), {.rate_hz = device->description.rate_hz});
   if (!transport) return std::unexpected(transport.error());
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  return Device{.description = std::move(*description),
-                .transport = std::move(*transport),
-                .decoder = std::move(*decoder),
-                .warnings = {}};
+  device->transport = std::move(*transport);
+  return device;
 }
 
 }  // namespace
+}  // namespace labels
 
 const Driver& labels_driver() {
   static const Driver driver{
@@ -82,9 +81,9 @@ const Driver& labels_driver() {
       .summary = "a hand without a device, which performs labels (needs a [stream.generate] table)",
       .options = {{.name = "side", .default_value = std::string("right"), .help = "left or right"},
                   {.name = "rate_hz", .default_value = 30.0, .help = "frames a second"}},
-      .open = open,
-      .make_decoder = make_decoder,
-      .describe = describe};
+      .open = labels::open,
+      .make_decoder = labels::make_decoder,
+      .describe = labels::describe};
   return driver;
 }
 

@@ -1,5 +1,6 @@
 #include "drivers/lucidgloves/decoder.hpp"
 
+#include <cstring>
 #include <limits>
 
 #include "drivers/glove/angle_map.hpp"
@@ -49,24 +50,32 @@ std::vector<std::string> extra_names() {
 // RT-safe.
 void LucidDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                         Sink& sink) noexcept {
-  for (const std::byte byte : bytes) {
-    const char c = static_cast<char>(byte);
-    if (c == '\n') {
-      end_line(sink);
-    } else if (overlong_ || c == '\r') {
-      continue;
-    } else if (length_ == text_.size()) {
-      overlong_ = true;
-      sink.outcome(Outcome::kForeign);
-    } else {
-      text_[length_++] = c;
-    }
+  while (!bytes.empty()) {
+    const void* const line_feed = std::memchr(bytes.data(), '\n', bytes.size());
+    const std::size_t size =
+        line_feed == nullptr
+            ? bytes.size()
+            : static_cast<std::size_t>(static_cast<const std::byte*>(line_feed) - bytes.data());
+    keep(bytes.first(size), sink);
+    if (line_feed == nullptr) return;
+    end_line(sink);
+    bytes = bytes.subspan(size + 1);
   }
 }
 
 // RT-safe.
+void LucidDecoder::keep(std::span<const std::byte> piece, Sink& sink) noexcept {
+  if (overlong_) return;
+  overlong_ = piece.size() > text_.size() - length_;
+  if (overlong_) return sink.outcome(Outcome::kForeign);
+  std::memcpy(text_.data() + length_, piece.data(), piece.size());
+  length_ += piece.size();
+}
+
+// RT-safe.
 void LucidDecoder::end_line(Sink& sink) noexcept {
-  const std::string_view text(text_.data(), length_);
+  std::string_view text(text_.data(), length_);
+  while (text.ends_with('\r')) text.remove_suffix(1);
   length_ = 0;
   if (overlong_) {
     overlong_ = false;

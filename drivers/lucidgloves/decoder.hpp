@@ -41,6 +41,7 @@ class LucidDecoder final : public glove::GloveDecoder {
                std::bitset<glove::kMaxSensors>& valid) const noexcept override;
 
  private:
+  void keep(std::span<const std::byte> piece, Sink& sink) noexcept;
   void end_line(Sink& sink) noexcept;
   [[nodiscard]] bool lost_a_key(const Line& line) noexcept;
   void emit_line(const Line& line, Sink& sink) noexcept;

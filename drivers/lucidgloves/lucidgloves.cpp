@@ -9,15 +9,14 @@
 #include "drivers/lucidgloves/decoder.hpp"
 #include "drivers/lucidgloves/emulator.hpp"
 #include "drivers/lucidgloves/start.hpp"
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
+namespace lucidgloves {
 namespace {
-
-using lucidgloves::Encoding;
-using lucidgloves::Settings;
 
 constexpr std::string_view kName = "lucidgloves";
 constexpr std::int64_t kBaud = 115200;
@@ -35,9 +34,8 @@ Result<Greeted> read_greeting(const std::string& text, const std::string& identi
   glove::Greeting greeting(text, kName, identity);
   Greeted glove;
   glove.side = greeting.side();
-  glove.settings.encoding =
-      static_cast<Encoding>(greeting.choice("encoding", lucidgloves::kEncodingNames));
-  glove.settings.max_analog = greeting.whole("max", 1, lucidgloves::kMaxAnalog);
+  glove.settings.encoding = static_cast<Encoding>(greeting.choice("encoding", kEncodingNames));
+  glove.settings.max_analog = greeting.whole("max", 1, kMaxAnalog);
   if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
   return glove;
 }
@@ -45,7 +43,7 @@ Result<Greeted> read_greeting(const std::string& text, const std::string& identi
 std::string greeting_of(const Greeted& glove) {
   const auto encoding = static_cast<std::size_t>(glove.settings.encoding);
   return std::string(kName) + " hand=" + std::string(glove::side_name(glove.side)) +
-         " encoding=" + std::string(lucidgloves::kEncodingNames[encoding]) +
+         " encoding=" + std::string(kEncodingNames[encoding]) +
          " max=" + std::to_string(glove.settings.max_analog);
 }
 
@@ -53,18 +51,17 @@ Result<Greeted> from_options(const Options& options) {
   const auto side = glove::hand_option(options);
   if (!side) return std::unexpected(side.error());
   const auto& encoding = option<std::string>(options, "encoding");
-  const auto at = std::ranges::find(lucidgloves::kEncodingNames, std::string_view(encoding));
-  if (at == lucidgloves::kEncodingNames.end()) {
+  const auto at = std::ranges::find(kEncodingNames, std::string_view(encoding));
+  if (at == kEncodingNames.end()) {
     return misuse("encoding should be \"auto\", \"alpha\" or \"legacy\"");
   }
   const auto max = option<std::int64_t>(options, "max_analog_value");
-  if (max < 1 || max > lucidgloves::kMaxAnalog) {
+  if (max < 1 || max > kMaxAnalog) {
     return misuse("max_analog_value should be 1 to 65535; it is 4095 on an ESP32, 1023 on an AVR");
   }
-  return Greeted{
-      .side = *side,
-      .settings = {.encoding = static_cast<Encoding>(at - lucidgloves::kEncodingNames.begin()),
-                   .max_analog = static_cast<int>(max)}};
+  return Greeted{.side = *side,
+                 .settings = {.encoding = static_cast<Encoding>(at - kEncodingNames.begin()),
+                              .max_analog = static_cast<int>(max)}};
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
@@ -76,7 +73,7 @@ Result<Description> describe(const std::string& text, const std::string& identit
                      .text = text,
                      .identity = identity,
                      .skeleton = std::make_shared<Skeleton>(hand_skeleton(glove->side)),
-                     .samples = glove::sample_layout(*model, lucidgloves::extra_names()),
+                     .samples = glove::sample_layout(*model, extra_names()),
                      .rate_hz = 0.0};
 }
 
@@ -91,7 +88,7 @@ Result<Description> expect(const Options& given) {
 Result<glove::Model> glove_model(const Description& description) {
   const auto glove = read_greeting(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
-  return lucidgloves::model(glove->settings);
+  return model(glove->settings);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
@@ -101,8 +98,8 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   if (!model) return std::unexpected(model.error());
   auto calibration = glove::default_calibration(*model);
   if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<lucidgloves::LucidDecoder>(description.skeleton, std::move(*calibration),
-                                                     glove->settings);
+  return std::make_unique<LucidDecoder>(description.skeleton, std::move(*calibration),
+                                        glove->settings);
 }
 
 Result<Device> open(const Options& given, Ports& ports) {
@@ -110,21 +107,15 @@ Result<Device> open(const Options& given, Ports& ports) {
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);
   if (!glove) return std::unexpected(glove.error());
-  auto link =
-      glove::connect(*options, ports, {lucidgloves::kUsbIds.begin(), lucidgloves::kUsbIds.end()});
+  auto link = glove::connect(*options, ports, {kUsbIds.begin(), kUsbIds.end()});
   if (!link) return std::unexpected(link.error());
-  const auto started = lucidgloves::start(*link, glove->side, glove->settings);
+  const auto started = start(*link, glove->side, glove->settings);
   if (!started) return std::unexpected(started.error());
-  auto description = describe(greeting_of(*glove), link->identity());
-  if (!description) return std::unexpected(description.error());
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  return Device{.description = std::move(*description),
-                .transport = make_link_transport(std::move(*link)),
-                .decoder = std::move(*decoder),
-                .warnings = {},
-                .poll = {},
-                .reopen_after_s = kSilence_s};
+  auto device = make_device(lucidgloves_driver(), greeting_of(*glove), link->identity());
+  if (!device) return device;
+  device->transport = make_link_transport(std::move(*link));
+  device->reopen_after_s = kSilence_s;
+  return device;
 }
 
 Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptics& haptics) {
@@ -136,7 +127,7 @@ Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptic
   if (range < 1 || range > kMaxForceRange) {
     return misuse("force_range should be 1 to 65535; it is 1000, or 4095 for senseshift's library");
   }
-  lucidgloves::Forces forces{};
+  Forces forces{};
   for (std::size_t f = 0; f < kFingers; ++f) {
     const float force = haptics.force[f];
     if (!(force <= 1.0F)) return misuse("a force should be 0 (free) to 1 (blocked)");
@@ -144,7 +135,7 @@ Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptic
         force < 0.0F ? -1 : static_cast<int>(std::lround(force * static_cast<float>(range)));
   }
   const Encoding encoding = glove->settings.encoding;
-  std::string text = lucidgloves::force_line(forces, encoding);
+  std::string text = force_line(forces, encoding);
   if (haptics.vibration_s != 0.0F) {
     const bool sound = haptics.vibration_s > 0.0F && haptics.vibration_s <= 60.0F &&
                        haptics.vibration_hz >= 0.0F && haptics.vibration_hz <= 10'000.0F &&
@@ -153,8 +144,7 @@ Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptic
     if (encoding == Encoding::kLegacy) {
       return misuse("gloves with the legacy encoding cannot vibrate; send forces only");
     }
-    text +=
-        lucidgloves::vibration_line(haptics.vibration_hz, haptics.vibration_s, haptics.vibration);
+    text += vibration_line(haptics.vibration_hz, haptics.vibration_s, haptics.vibration);
   }
   const auto bytes = std::as_bytes(std::span(text));
   return std::vector(bytes.begin(), bytes.end());
@@ -165,8 +155,8 @@ Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);
   if (!glove) return std::unexpected(glove.error());
-  return std::make_unique<lucidgloves::LucidEmulator>(glove->side, glove->settings.encoding,
-                                                      glove->settings.max_analog);
+  return std::make_unique<LucidEmulator>(glove->side, glove->settings.encoding,
+                                         glove->settings.max_analog);
 }
 
 std::vector<OptionSpec> all_options() {
@@ -185,19 +175,20 @@ std::vector<OptionSpec> all_options() {
 }
 
 }  // namespace
+}  // namespace lucidgloves
 
 const Driver& lucidgloves_driver() {
   static const Driver driver{
-      .name = kName,
+      .name = lucidgloves::kName,
       .summary = "LucidGloves and others that speak OpenGloves, over a serial port or TCP",
-      .options = all_options(),
-      .open = open,
-      .make_decoder = make_decoder,
-      .describe = describe,
-      .expect = expect,
-      .glove_model = glove_model,
-      .encode_haptics = encode_haptics,
-      .emulate = emulate};
+      .options = lucidgloves::all_options(),
+      .open = lucidgloves::open,
+      .make_decoder = lucidgloves::make_decoder,
+      .describe = lucidgloves::describe,
+      .expect = lucidgloves::expect,
+      .glove_model = lucidgloves::glove_model,
+      .encode_haptics = lucidgloves::encode_haptics,
+      .emulate = lucidgloves::emulate};
   return driver;
 }
 

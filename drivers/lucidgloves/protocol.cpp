@@ -20,12 +20,13 @@ bool is_key(char c) noexcept { return c >= 'A' && c <= 'Z'; }
 // digit.
 int take_number(std::string_view& text) noexcept {
   constexpr int kTop = 10'000'000;
-  int value = -1;
-  while (!text.empty() && is_digit(text.front())) {
-    value = std::min(std::max(value, 0) * 10 + (text.front() - '0'), kTop);
-    text.remove_prefix(1);
+  int value = 0;
+  std::size_t digits = 0;
+  for (; digits < text.size() && is_digit(text[digits]); ++digits) {
+    if (value < kTop) value = value * 10 + (text[digits] - '0');
   }
-  return value;
+  text.remove_prefix(digits);
+  return digits == 0 ? -1 : value;
 }
 
 // The key at the front of `text`, which loses it; without its parentheses, empty when it is none.

@@ -1,7 +1,7 @@
 // The lines of a LucidGlove and of other gloves that speak OpenGloves. No I/O here.
 //
-// Glove to host, one line a measurement, closed by LF (CR and empty lines mean nothing). Values are
-// decimal, 0 to max: 4095 on an ESP32, 1023 on an AVR board.
+// Glove to host, one line a measurement, closed by LF or CR LF (empty ones mean nothing). Values
+// are decimal, 0 to max: 4095 on an ESP32, 1023 on an AVR board.
 //
 //   alpha    A1662B3329C1229D4095E4095F384G0P512(AAB)1500(BB)2048ILM      keys in any order
 //     A B C D E   curl of thumb, index, middle, ring, pinky: 0 open, max closed

@@ -2,6 +2,7 @@
 
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/p5/decoder.hpp"
 #include "drivers/p5/emulator.hpp"
@@ -10,6 +11,7 @@
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
+namespace p5 {
 namespace {
 
 constexpr std::string_view kName = "p5";
@@ -18,7 +20,7 @@ constexpr std::uint16_t kProduct = 0x0100;
 constexpr int kInterface = 1;  // of two, the one that is no mouse
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto glove = p5::read_greeting(text, identity);
+  const auto glove = read_greeting(text, identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = p5::model();
   if (!model) return std::unexpected(model.error());
@@ -26,7 +28,7 @@ Result<Description> describe(const std::string& text, const std::string& identit
                      .text = text,
                      .identity = identity,
                      .skeleton = std::make_shared<Skeleton>(hand_skeleton(glove->side)),
-                     .samples = p5::layout(*model),
+                     .samples = layout(*model),
                      .rate_hz = 0.0};
 }
 
@@ -35,21 +37,20 @@ Result<Description> expect(const Options& given) {
   if (!options) return std::unexpected(options.error());
   const auto side = glove::hand_option(*options);
   if (!side) return std::unexpected(side.error());
-  const p5::Greeted unknown{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
-  return describe(p5::greeting_of(unknown), option<std::string>(*options, "id"));
+  const Greeted unknown{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
+  return describe(greeting_of(unknown), option<std::string>(*options, "id"));
 }
 
-Result<glove::Model> glove_model(const Description& /*description*/) { return p5::model(); }
+Result<glove::Model> glove_model(const Description& /*description*/) { return model(); }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto glove = p5::read_greeting(description.text, description.identity);
+  const auto glove = read_greeting(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = p5::model();
   if (!model) return std::unexpected(model.error());
   auto calibration = glove::default_calibration(*model);
   if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<p5::P5Decoder>(description.skeleton, std::move(*calibration),
-                                         glove->tower());
+  return std::make_unique<P5Decoder>(description.skeleton, std::move(*calibration), glove->tower());
 }
 
 // A feature report, whole; empty with a warning when the glove does not give it.
@@ -58,7 +59,7 @@ std::vector<std::byte> feature(UsbLink& link, std::uint8_t number, std::size_t b
   auto report = link.feature(number, bytes);
   if (report && report->size() == bytes && (*report)[0] == std::byte{number}) return *report;
   warnings.push_back("the glove does not give its feature report " + std::to_string(number) +
-                     (number == p5::kFirmwareReport ? "" : "; where the hand is stays unknown"));
+                     (number == kFirmwareReport ? "" : "; where the hand is stays unknown"));
   return {};
 }
 
@@ -71,35 +72,33 @@ Result<Device> open(const Options& given, Ports& ports) {
                          .product = kProduct,
                          .id = option<std::string>(*options, "id"),
                          .interface = kInterface,
-                         .report_bytes = p5::kReportBytes});
+                         .report_bytes = kReportBytes});
   if (!link) return std::unexpected(link.error());
   std::vector<std::string> warnings;
-  p5::Greeted glove{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
-  glove.firmware = feature(*link, p5::kFirmwareReport, p5::kFirmwareBytes, warnings);
-  glove.heads = feature(*link, p5::kHeadsReport, p5::kHeadsBytes, warnings);
-  glove.leds = feature(*link, p5::kLedsReport, p5::kLedsBytes, warnings);
-  auto description = describe(p5::greeting_of(glove), link->identity());
-  if (!description) return std::unexpected(description.error());
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
+  Greeted glove{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
+  glove.firmware = feature(*link, kFirmwareReport, kFirmwareBytes, warnings);
+  glove.heads = feature(*link, kHeadsReport, kHeadsBytes, warnings);
+  glove.leds = feature(*link, kLedsReport, kLedsBytes, warnings);
+  auto device = make_device(p5_driver(), greeting_of(glove), link->identity());
+  if (!device) return device;
   // A device that idles sends no reports: silence is no reason to open it anew.
-  return Device{.description = std::move(*description),
-                .transport = make_usb_transport(std::move(*link)),
-                .decoder = std::move(*decoder),
-                .warnings = std::move(warnings)};
+  device->transport = make_usb_transport(std::move(*link));
+  device->warnings = std::move(warnings);
+  return device;
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
   const auto options = complete_options(p5_driver(), given);
   if (!options) return std::unexpected(options.error());
-  return std::make_unique<p5::P5Emulator>();
+  return std::make_unique<P5Emulator>();
 }
 
 }  // namespace
+}  // namespace p5
 
 const Driver& p5_driver() {
   static const Driver driver{
-      .name = kName,
+      .name = p5::kName,
       .summary = "Essential Reality P5, over libusb",
       .options = {{.name = "id",
                    .default_value = std::string(),
@@ -107,12 +106,12 @@ const Driver& p5_driver() {
                   {.name = "hand",
                    .default_value = std::string("right"),
                    .help = "right or left: which hand wears it"}},
-      .open = open,
-      .make_decoder = make_decoder,
-      .describe = describe,
-      .expect = expect,
-      .glove_model = glove_model,
-      .emulate = emulate};
+      .open = p5::open,
+      .make_decoder = p5::make_decoder,
+      .describe = p5::describe,
+      .expect = p5::expect,
+      .glove_model = p5::glove_model,
+      .emulate = p5::emulate};
   return driver;
 }
 

@@ -3,21 +3,21 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::p5 {
 namespace {
 
 constexpr double kInch_m = 0.0254;
-constexpr double kFocal = 512.0;  // counts at the tangent 1
-constexpr double kDegree_rad = std::numbers::pi / 180.0;
+constexpr double kFocal = 512.0;         // counts at the tangent 1
 constexpr double kMaxDistance_m = 10.0;  // farther than any cable is long
 // How the heads of glove type 0 lean; of other types nothing is known.
 constexpr double kLean1_deg = 17.0;
 constexpr double kLean2_deg = -10.0;
 
 double correction_rad(std::byte byte) {
-  return static_cast<double>(static_cast<std::int8_t>(byte)) / 32.0 * kDegree_rad;
+  return static_cast<double>(static_cast<std::int8_t>(byte)) / 32.0 * kDegree;
 }
 
 double hundredths_m(std::span<const std::byte> bytes) {
@@ -55,8 +55,8 @@ Tower Tower::of(std::span<const std::byte, kHeadsBytes> heads,
                 std::span<const std::byte, kLedsBytes> leds) {
   Tower tower;
   const bool leans = leds[1] == std::byte{0};
-  tower.tilt1_rad = correction_rad(heads[1]) + (leans ? kLean1_deg * kDegree_rad : 0.0);
-  tower.tilt2_rad = correction_rad(heads[3]) + (leans ? kLean2_deg * kDegree_rad : 0.0);
+  tower.tilt1_rad = correction_rad(heads[1]) + (leans ? kLean1_deg * kDegree : 0.0);
+  tower.tilt2_rad = correction_rad(heads[3]) + (leans ? kLean2_deg * kDegree : 0.0);
   tower.distance_m = std::to_integer<int>(heads[5]) / 10.0 * kInch_m;
   for (std::size_t i = 0; i < kLeds; ++i) {
     const auto at = leds.subspan(2 + 6 * i, 6);

@@ -3,12 +3,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/template/decoder.hpp"
 #include "drivers/template/protocol.hpp"
 #include "drivers/transport/file.hpp"
 
 namespace posed::drivers {
+namespace bend {
 namespace {
 
 constexpr double kDefaultRate_hz = 100.0;
@@ -32,7 +34,7 @@ Result<std::shared_ptr<const Skeleton>> finger_skeleton() {
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto rate_hz = bend::parse_greeting(text, identity);
+  const auto rate_hz = parse_greeting(text, identity);
   if (!rate_hz) return std::unexpected(rate_hz.error());
   const auto skeleton = finger_skeleton();
   if (!skeleton) return std::unexpected(skeleton.error());
@@ -45,7 +47,7 @@ Result<Description> describe(const std::string& text, const std::string& identit
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  return std::make_unique<bend::BendDecoder>(description.skeleton, description.rate_hz);
+  return std::make_unique<BendDecoder>(description.skeleton, description.rate_hz);
 }
 
 // A finger that closes and opens once in one turn of the packet counter, so that it loops smoothly.
@@ -56,10 +58,10 @@ Chunks simulated_packets() {
   Chunks chunks;
   for (int i = 0; i < kPackets; ++i) {
     const double phase = 2.0 * std::numbers::pi * i / kPackets;
-    chunks.add(bend::encode_packet(
-        {.count = static_cast<std::uint8_t>(i),
-         .bend_rad = static_cast<float>(kHalfRange_rad * (1.0 - std::cos(phase))),
-         .battery = 0.8F}));
+    chunks.add(
+        encode_packet({.count = static_cast<std::uint8_t>(i),
+                       .bend_rad = static_cast<float>(kHalfRange_rad * (1.0 - std::cos(phase))),
+                       .battery = 0.8F}));
   }
   return chunks;
 }
@@ -68,30 +70,27 @@ Result<Device> open(const Options& given, Ports& /*ports*/) {
   const auto options = complete_options(template_driver(), given);
   if (!options) return std::unexpected(options.error());
   const double rate_hz = option<double>(*options, "rate_hz");
-  auto description = describe(bend::greeting(rate_hz), "simulated");
-  if (!description) return misuse("rate_hz should be more than 0 and at most 1000000");
+  auto device = make_device(template_driver(), greeting(rate_hz), "simulated");
+  if (!device) return misuse("rate_hz should be more than 0 and at most 1000000");
   auto transport = FileTransport::open(simulated_packets(), {.rate_hz = rate_hz});
   if (!transport) return std::unexpected(transport.error());
-  auto decoder = make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  return Device{.description = std::move(*description),
-                .transport = std::move(*transport),
-                .decoder = std::move(*decoder),
-                .warnings = {}};
+  device->transport = std::move(*transport);
+  return device;
 }
 
 }  // namespace
+}  // namespace bend
 
 const Driver& template_driver() {
   static const Driver driver{
       .name = "template",
       .summary = "a simulated bend sensor on one finger; copy its folder to begin a driver",
       .options = {{.name = "rate_hz",
-                   .default_value = kDefaultRate_hz,
+                   .default_value = bend::kDefaultRate_hz,
                    .help = "packets a second"}},
-      .open = open,
-      .make_decoder = make_decoder,
-      .describe = describe};
+      .open = bend::open,
+      .make_decoder = bend::make_decoder,
+      .describe = bend::describe};
   return driver;
 }
 

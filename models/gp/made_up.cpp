@@ -6,6 +6,7 @@
 #include <random>
 
 #include "models/gp/regression.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::gp {
 namespace {
@@ -14,7 +15,6 @@ constexpr int kHarmonics = 4;
 constexpr int kFrames = 28;  // of one cycle
 constexpr int kWalkers = 6;
 constexpr int kQueries = 256;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // std::normal_distribution differs between libraries; the sum of twelve uniforms does not.
 class Numbers {

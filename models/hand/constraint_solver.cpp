@@ -4,15 +4,14 @@
 #include <bitset>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "models/hand/contacts.hpp"
 #include "models/hand/projection.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::hand {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNear_m = 3e-3;            // pairs this near take part in the projection
 constexpr double kFar_m = 10e-3;            // gaps above need not be known
 constexpr double kHinge_rad = 4 * kDegree;  // a limit is felt this much before it is reached

@@ -1,13 +1,12 @@
 #include <algorithm>
-#include <numbers>
 
 #include "proto/clip/asf_parts.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::clip {
 namespace {
 
 constexpr double kInch_m = 0.0254;
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 // Translations in listed order, then the rotations reversed: posed lists the outermost first.
 void add_channels(const AsfBone& bone, double radians, Acclaim& out) {

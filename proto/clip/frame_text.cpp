@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <bitset>
 #include <charconv>
-#include <numbers>
 
 #include "proto/clip/text.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::clip {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 std::string counted(std::size_t count) {
   return std::to_string(count) + (count == 1 ? " value" : " values");

@@ -7,22 +7,21 @@
 #include <optional>
 #include <vector>
 
-#include <toml++/toml.h>
-
+#include "proto/frame/degree.hpp"
+#include "proto/frame/in_quotes.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/frame/rotation.hpp"
+#include "proto/frame/toml_text.hpp"
 
 namespace posed {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kMillimetre = 1e-3;
 constexpr double kLongest_m = 1.0;  // of anything in a hand
 
-// Reads one hand; remembers the first mistake.
-class HandReader {
+class HandReader : private FirstMistake {
  public:
-  explicit HandReader(const std::string& file) : file_(file) {}
+  using FirstMistake::FirstMistake;
 
   Result<HandShape> read(const toml::table& table) {
     for (const auto& [key, node] : table) entry(key.str(), node);
@@ -30,16 +29,11 @@ class HandReader {
     for (std::size_t f = 0; f < kFingers; ++f) {
       if (!seen_[f]) blame(table, "the hand lacks its [" + std::string(kFingerNames[f]) + "]");
     }
-    if (error_) return std::unexpected(*error_);
+    if (error()) return std::unexpected(*error());
     return std::move(shape_);
   }
 
  private:
-  void blame(const toml::node& node, std::string message) {
-    if (error_) return;
-    error_ = Error{std::move(message), file_, static_cast<int>(node.source().begin.line)};
-  }
-
   void entry(std::string_view key, const toml::node& node) {
     const auto finger = std::ranges::find(kFingerNames, key);
     if (key == "name") {
@@ -49,7 +43,7 @@ class HandReader {
       seen_[f] = true;
       read_finger(*node.as_table(), shape_.fingers[f]);
     } else {
-      blame(node, "'" + std::string(key) + "' is not known in a hand, or of another type");
+      blame(node, in_quotes(key) + " is not known in a hand, or of another type");
     }
   }
 
@@ -73,7 +67,7 @@ class HandReader {
       } else if (key.size() == 5 && key.ends_with("_deg") && key[0] >= 'x' && key[0] <= 'z') {
         read_ranges(node, static_cast<std::size_t>(key[0] - 'x'), finger);
       } else {
-        blame(node, "'" + std::string(key) + "' is not known in a finger");
+        blame(node, in_quotes(key) + " is not known in a finger");
       }
     }
   }
@@ -121,21 +115,16 @@ class HandReader {
     return read;
   }
 
-  const std::string& file_;
   HandShape shape_;
   std::array<bool, kFingers> seen_{};
-  std::optional<Error> error_;
 };
 
 }  // namespace
 
 Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file) {
-  try {
-    return HandReader(file).read(toml::parse(text, file));
-  } catch (const toml::parse_error& error) {
-    return fail(std::string(error.description()), file,
-                static_cast<int>(error.source().begin.line));
-  }
+  const auto table = parse_toml(text, file);
+  if (!table) return std::unexpected(table.error());
+  return HandReader(file).read(*table);
 }
 
 std::span<const HandShape> hand_shapes() {

@@ -5,34 +5,27 @@
 #include <cmath>
 #include <cstdlib>
 
-#include <toml++/toml.h>
-
+#include "proto/frame/degree.hpp"
+#include "proto/frame/in_quotes.hpp"
 #include "proto/frame/profile_texts.hpp"
+#include "proto/frame/toml_text.hpp"
 
 namespace posed {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
-
-// Reads one profile; remembers the first mistake.
-class ProfileReader {
+class ProfileReader : private FirstMistake {
  public:
-  explicit ProfileReader(const std::string& name) : name_(name) {}
+  using FirstMistake::FirstMistake;
 
   Result<Profile> read(const toml::table& table) {
     for (const auto& [key, node] : table) entry(key.str(), node);
     if (profile_.name.empty()) blame(table, "a profile needs a name");
     if (profile_.bones.empty()) blame(table, "a profile needs its [bones]");
-    if (error_) return std::unexpected(*error_);
+    if (error()) return std::unexpected(*error());
     return std::move(profile_);
   }
 
  private:
-  void blame(const toml::node& node, std::string message) {
-    if (error_) return;
-    error_ = Error{std::move(message), name_, static_cast<int>(node.source().begin.line)};
-  }
-
   void entry(std::string_view key, const toml::node& node) {
     if (key == "name") {
       profile_.name = node.value_or("");
@@ -52,7 +45,7 @@ class ProfileReader {
     } else if ((key == "along" || key == "bones" || key == "T") && node.is_table()) {
       for (const auto& [joint, value] : *node.as_table()) pair(key, joint.str(), value);
     } else {
-      blame(node, "'" + std::string(key) + "' is not known in a profile, or of another type");
+      blame(node, in_quotes(key) + " is not known in a profile, or of another type");
     }
   }
 
@@ -62,7 +55,7 @@ class ProfileReader {
       profile_.along.emplace(key, text);
     } else if (table == "bones") {  // canonical bone = "joint"
       const auto bone = bone_from_name(key);
-      if (!bone) return blame(value, "'" + std::string(key) + "' is no canonical bone");
+      if (!bone) return blame(value, in_quotes(key) + " is no canonical bone");
       if (!profile_.bones.emplace(text, *bone).second) {
         blame(value, "joint '" + text + "' is given to two bones");
       }
@@ -88,9 +81,7 @@ class ProfileReader {
     return T;
   }
 
-  const std::string& name_;
   Profile profile_;
-  std::optional<Error> error_;
 };
 
 bool points_along(const Joint& joint, std::string_view axis) {
@@ -113,12 +104,9 @@ bool matches(const Profile& profile, const Skeleton& skeleton) {
 }  // namespace
 
 Result<Profile> parse_profile(std::string_view text, const std::string& name) {
-  try {
-    return ProfileReader(name).read(toml::parse(text, name));
-  } catch (const toml::parse_error& error) {
-    return fail(std::string(error.description()), name,
-                static_cast<int>(error.source().begin.line));
-  }
+  const auto table = parse_toml(text, name);
+  if (!table) return std::unexpected(table.error());
+  return ProfileReader(name).read(*table);
 }
 
 std::span<const Profile> profiles() {

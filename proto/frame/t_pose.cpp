@@ -3,10 +3,11 @@
 #include <array>
 #include <cmath>
 
+#include "proto/frame/degree.hpp"
+
 namespace posed {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kShort_m = 1e-6;
 
 enum class Part : std::uint8_t { kTrunk, kLimb, kFoot, kThumb };

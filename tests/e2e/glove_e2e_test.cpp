@@ -15,7 +15,6 @@
 
 #include "daemon/pipeline/clock.hpp"
 #include "proto/log/reader.hpp"
-#include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {
@@ -25,34 +24,18 @@ using nlohmann::json;
 using namespace std::chrono_literals;
 
 // Two gloves and a walker under `posed record`.
-class GloveStage {
+class GloveStage : public Stage {
  public:
   GloveStage() {
     REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
     std::string config =
-        "realtime = false\n[publish]\nendpoint = \"tcp://127.0.0.1:*\"\n"
-        "[control]\nendpoint = \"tcp://127.0.0.1:*\"\n"
+        std::string(kEndpoints) +
         "[[stream]]\nname = \"walker\"\ndriver = \"file\"\n[stream.file]\npath = \"walk.bvh\"\n";
     for (const std::string hand : {"right", "left"}) {
       config += "[[stream]]\nname = \"" + hand + "\"\ndriver = \"lucidgloves\"\nport = \"" +
                 path(hand) + "\"\nhand = \"" + hand + "\"\n";
     }
     folder.write("posed.toml", config);
-  }
-
-  [[nodiscard]] std::string path(const std::string& name) const {
-    return (folder.path() / name).string();
-  }
-
-  void record() {
-    daemon.emplace(std::vector<std::string>{"record", "--config", path("posed.toml"), "--out",
-                                            path("take.plog"), "--frames"});
-    const auto line = daemon->line();
-    INFO(daemon->errors());
-    REQUIRE(line);
-    const auto ready = json::parse(*line);
-    publish = ready.at("publish");
-    control = ready.at("control");
   }
 
   // Plugs the glove in; the time on the daemon's clock at which it could be opened.
@@ -72,21 +55,12 @@ class GloveStage {
     glove.reset();
   }
 
-  Outcome ctl(std::vector<std::string> what) const {
-    what.insert(what.begin(), {"ctl", "--connect", control});
-    return posed(std::move(what));
-  }
-
   void expect_replay() const {
     const auto replay = posed(
         {"replay", path("take.plog"), "--speed", "max", "--out", path("frames.bin"), "--expect"});
     INFO(replay.err);
     CHECK(replay.code == 0);
   }
-
-  TempFolder folder;
-  std::optional<Process> daemon;
-  std::string publish, control;
 };
 
 // The next event of this kind; its time.

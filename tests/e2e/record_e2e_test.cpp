@@ -14,9 +14,7 @@
 #include "models/style/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/log/reader.hpp"
-#include "tests/e2e/outcome.hpp"
-#include "tests/support/process.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "tests/e2e/stage.hpp"
 #include "tests/unit/models/toy_style.hpp"
 
 namespace posed::test {
@@ -26,15 +24,13 @@ using nlohmann::json;
 using namespace std::chrono_literals;
 
 // Two walkers with a style, and everything `posed record` needs for them.
-class Stage {
+class Walkers : public Stage {
  public:
-  Stage() {
+  Walkers() {
     REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
     REQUIRE(style::save_model(toy_model(1), folder.path() / "one.style"));
     REQUIRE(style::save_model(toy_model(2), folder.path() / "two.style"));
-    std::string config =
-        "realtime = false\n[publish]\nendpoint = \"tcp://127.0.0.1:*\"\n"
-        "[control]\nendpoint = \"tcp://127.0.0.1:*\"\n";
+    std::string config = kEndpoints;
     for (const char* name : {"walker", "other"}) {
       config += std::string("[[stream]]\nname = \"") + name +
                 "\"\ndriver = \"file\"\npublish_raw = true\n"
@@ -43,23 +39,8 @@ class Stage {
     folder.write("posed.toml", config);
   }
 
-  [[nodiscard]] std::string path(const std::string& name) const {
-    return (folder.path() / name).string();
-  }
-
-  // Starts `posed record` and waits until it is ready.
-  void record() {
-    daemon.emplace(std::vector<std::string>{"record", "--config", path("posed.toml"), "--out",
-                                            path("take.plog"), "--frames"});
-    const auto line = daemon->line();
-    INFO(daemon->errors());
-    REQUIRE(line);
-    control = json::parse(*line).at("control");
-  }
-
-  void ctl(std::vector<std::string> what) const {
-    what.insert(what.begin(), {"ctl", "--connect", control});
-    const Outcome outcome = posed(std::move(what));
+  void tell(std::vector<std::string> what) const {
+    const Outcome outcome = ctl(std::move(what));
     INFO(outcome.err);
     CHECK(outcome.code == 0);
   }
@@ -95,10 +76,6 @@ class Stage {
     }
     return kinds;
   }
-
-  TempFolder folder;
-  std::optional<Process> daemon;
-  std::string control;
 };
 
 std::string bytes_of(const std::string& path) {
@@ -109,10 +86,10 @@ std::string bytes_of(const std::string& path) {
 }  // namespace
 
 TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.bin as published") {
-  Stage stage;
+  Walkers stage;
   stage.record();
-  stage.ctl({"set", "walker", "alpha", "-0.5"});
-  stage.ctl({"model", "other", stage.path("two.style")});
+  stage.tell({"set", "walker", "alpha", "-0.5"});
+  stage.tell({"model", "other", stage.path("two.style")});
   stage.hold_back_pipeline(true);
   for (int i = 0; i < 10 && !stage.decisions().contains(3); ++i) {
     stage.daemon->send(SIGSTOP);
@@ -121,7 +98,7 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
     std::this_thread::sleep_for(800ms);  // a log may be read while it is written
   }
   stage.hold_back_pipeline(false);
-  stage.ctl({"set", "other", "alpha", "0.25"});
+  stage.tell({"set", "other", "alpha", "0.25"});
   std::this_thread::sleep_for(300ms);
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
@@ -145,7 +122,7 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
 TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
   std::vector<double> lost_s;
   for (const auto life : {900ms, 1050ms, 1200ms}) {
-    Stage stage;
+    Walkers stage;
     stage.record();
     std::this_thread::sleep_for(life);
     timespec now{};
@@ -171,7 +148,7 @@ TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
 }
 
 TEST_CASE("record and replay refuse what they must with one sentence") {
-  Stage stage;
+  Walkers stage;
   stage.folder.write("take.plog", "not a log, but somebody's");
   const Outcome kept =
       posed({"record", "--config", stage.path("posed.toml"), "--out", stage.path("take.plog")});

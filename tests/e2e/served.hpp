@@ -2,19 +2,18 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 
 #include "models/style/style_model.hpp"
 #include "proto/clip/clip.hpp"
-#include "tests/support/process.hpp"
-#include "tests/support/temp_folder.hpp"
+#include "tests/e2e/stage.hpp"
 #include "tests/unit/models/toy_style.hpp"
 
 namespace posed::test {
 
-class Served {
+class Served : public Stage {
  public:
   // `security` is TOML put before the streams; {} are the endpoints' defaults of a test.
   explicit Served(const std::string& security = "") {
@@ -25,12 +24,7 @@ class Served {
   }
 
   void write_config(const std::string& security) const {
-    folder.write("posed.toml", R"(realtime = false
-[publish]
-endpoint = "tcp://127.0.0.1:*"
-[control]
-endpoint = "tcp://127.0.0.1:*"
-)" + security + R"(
+    folder.write("posed.toml", kEndpoints + security + R"(
 [[stream]]
 name = "walker"
 driver = "file"
@@ -43,26 +37,7 @@ model = "one.style"
 )");
   }
 
-  [[nodiscard]] std::string path(const std::string& name) const {
-    return (folder.path() / name).string();
-  }
-
-  // Starts `posed run` with these options, too, and waits until it is ready.
-  void start(const std::vector<std::string>& options = {}) {
-    std::vector<std::string> arguments{"run", "--config", path("posed.toml")};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    daemon.emplace(std::move(arguments));
-    const auto line = daemon->line();
-    INFO(daemon->errors());
-    REQUIRE(line);
-    const auto ready = nlohmann::json::parse(*line);
-    publish = ready.at("publish");
-    control = ready.at("control");
-  }
-
-  TempFolder folder;
-  std::optional<Process> daemon;
-  std::string publish, control;
+  void start(const std::vector<std::string>& options = {}) { launch("run", options); }
 };
 
 inline bool has(const std::string& text, const std::string& part) {

@@ -151,7 +151,6 @@ TEST_CASE("hands keep the hot law: smoothed, constrained, performing, given anot
 TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "[rt]") {
   watch_log();
   CountingTape tape;
-  std::atomic<bool> stop{false};
   const auto plug_in = [] {
     auto emulator =
         drivers::find_driver("lucidgloves")
@@ -161,7 +160,10 @@ TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "
                                                     nullptr, devices::EmulatedGlove::Settings{});
   };
   auto glove = plug_in();
-  std::thread worn([&] { glove->run(stop); });
+  const auto wear = [&] {
+    return std::jthread([&glove](const std::stop_token& stop) { glove->run(stop); });
+  };
+  std::jthread worn = wear();
   pipeline::DeviceSlot slot;
   slot.keeper = pipeline::Wake::open().value();
   std::vector<RigStream> streams;
@@ -183,7 +185,7 @@ TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "
     rig.command({.kind = pipeline::DeviceCommand::Kind::kSend, .size = 5});
     REQUIRE(rig.take_frames(50) == 50);
     CHECK(rig.take_acks() == 1);
-    stop = true;
+    worn.request_stop();
     worn.join();
     glove.reset();  // unplugged
     drivers::Device* lost = nullptr;
@@ -191,9 +193,8 @@ TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     lost->transport.reset();
-    stop = false;
     glove = plug_in();
-    worn = std::thread([&] { glove->run(stop); });
+    worn = wear();
     again = open_device("lucidgloves", {{"port", glove->port()}});
     again.transport->start(pipeline::monotonic_ns()).value();
     REQUIRE(slot.in.push(&again));
@@ -202,8 +203,6 @@ TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "
     if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
     check_no_breach();
   }
-  stop = true;
-  worn.join();
 }
 
 TEST_CASE("each way of breaking the hot law is found", "[rt]") {

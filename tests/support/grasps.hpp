@@ -3,10 +3,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 #include <random>
 #include <sstream>
 #include <string>
@@ -14,30 +14,41 @@
 
 #include <Eigen/Core>
 
+#include "proto/frame/degree.hpp"
+
 namespace posed::test {
 
 using Motion = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-inline constexpr double kDegree = std::numbers::pi / 180.0;
+inline constexpr std::size_t kGraspAngles = 23;
 
-// One recording as the glove sent it. The date, six numbers, comes first; palm arch, wrist and one
-// sensor that hardly moves are left out.
-inline Motion read_grasps(const std::filesystem::path& path) {
-  constexpr int kFirst = 7;
-  constexpr int kSensors = 20;
-  constexpr int kLeftOut = 11;
-  std::vector<double> values;
+// One recording's angles as its file has them [rad]; date, time and switch come before them.
+inline std::vector<std::array<double, kGraspAngles>> read_grasp_rows(
+    const std::filesystem::path& path) {
+  constexpr std::size_t kBefore = 7;
+  std::vector<std::array<double, kGraspAngles>> rows;
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {
     std::istringstream words(line);
     std::vector<double> row;
     for (double value = 0.0; words >> value;) row.push_back(value);
-    if (row.size() < 28) continue;
-    for (int s = 0; s < kSensors; ++s) {
-      if (s != kLeftOut) values.push_back(row[static_cast<std::size_t>(kFirst + s)] / kDegree);
+    if (row.size() < kBefore + kGraspAngles) continue;
+    std::copy_n(row.begin() + kBefore, kGraspAngles, rows.emplace_back().begin());
+  }
+  return rows;
+}
+
+// The same as motion; palm arch, wrist and one sensor that hardly moves are left out.
+inline Motion read_grasps(const std::filesystem::path& path) {
+  constexpr std::size_t kSensors = 20;
+  constexpr std::size_t kLeftOut = 11;
+  std::vector<double> values;
+  for (const auto& row : read_grasp_rows(path)) {
+    for (std::size_t s = 0; s < kSensors; ++s) {
+      if (s != kLeftOut) values.push_back(row[s] / kDegree);
     }
   }
-  const auto frames = static_cast<Eigen::Index>(values.size()) / (kSensors - 1);
+  const auto frames = static_cast<Eigen::Index>(values.size() / (kSensors - 1));
   return Eigen::Map<Motion>(values.data(), frames, kSensors - 1);
 }
 

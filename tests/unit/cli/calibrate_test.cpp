@@ -20,19 +20,14 @@ class Performer {
       : glove_(drivers::find_driver("cyberglove")->emulate({}).value(),
                devices::EmulatedPort::open_pty({}).value(),
                [this](double) { return drivers::glove::hand_in(pose_.load()); }, {}),
-        thread_([this] { glove_.run(stop_); }) {}
-  ~Performer() {
-    stop_ = true;
-    thread_.join();
-  }
+        thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
   [[nodiscard]] std::string port() const { return glove_.port(); }
   void hold(Pose pose) { pose_ = pose; }
 
  private:
   std::atomic<Pose> pose_{Pose::kFlat};
-  std::atomic<bool> stop_{false};
   devices::EmulatedGlove glove_;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace

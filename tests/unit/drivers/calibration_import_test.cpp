@@ -1,19 +1,16 @@
 // Calibrations of other programs, real ones where there are any, and fits from poses.
 #include <catch2/catch.hpp>
 
-#include <numbers>
-
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/glove/fit.hpp"
 #include "drivers/glove/import.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/frame/degree.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/specimens.hpp"
 
 namespace posed::drivers::glove {
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 Model cyber_model(Side hand = Side::kRight) { return cyberglove::glove_model(hand).value(); }
 

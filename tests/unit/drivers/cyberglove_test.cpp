@@ -4,13 +4,12 @@
 #include <catch2/catch.hpp>
 
 #include <cmath>
-#include <fstream>
-#include <sstream>
 
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/cyberglove/stamp_clock.hpp"
 #include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/grasps.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/cyberglove_rig.hpp"
@@ -50,21 +49,6 @@ class Line {
 };
 
 // One GraspDB14 recording: rows of 23 angles [rad] in mask order.
-std::vector<Raw> grasp_angles(const std::filesystem::path& path) {
-  constexpr std::size_t kBefore = 7;  // date, time, switch
-  std::vector<Raw> rows;
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
-    std::istringstream words(line);
-    std::vector<double> row;
-    for (double value = 0.0; words >> value;) row.push_back(value);
-    if (row.size() < kBefore + kSensors) continue;
-    rows.emplace_back();
-    std::copy_n(row.begin() + kBefore, kSensors, rows.back().begin());
-  }
-  return rows;
-}
-
 // Radians that a count is worth, with the sign.
 double count_rad(const glove::Model& model, std::size_t sensor) {
   const glove::Curve& line = model.sensors[sensor].curve;
@@ -112,7 +96,7 @@ TEST_CASE("real joint angles come back from a CyberGlove's bytes on a pseudo-ter
     const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1920});
     (void)tell(*emulator, "u 1\rd 1\rt 1920 1\rS");
     Line line;
-    for (const Raw& angles : grasp_angles(file.path())) {
+    for (const Raw& angles : test::read_grasp_rows(file.path())) {
       emulator->set_raw(counts_of(angles, *model));
       CollectSink sink(1);
       line.carry(next(*emulator), *decoder, sink);

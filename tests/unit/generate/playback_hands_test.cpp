@@ -100,7 +100,7 @@ TEST_CASE("real hands are led into real poses and back without a snap", "[playba
   for (Eigen::Index t = 0; t < motion.rows(); t += 2) {
     HandAngles angles{};
     for (int j = 0; j < kHandJoints; ++j) {
-      angles[static_cast<std::size_t>(3 * j)] = motion(t, j) * test::kDegree;
+      angles[static_cast<std::size_t>(3 * j)] = motion(t, j) * kDegree;
     }
     live.push_back(angles);
   }

@@ -144,7 +144,7 @@ TEST_CASE("an angle that is not finite leaves the pose as it is, and tells") {
 
 TEST_CASE("the uncertain finger gives way") {
   HandAngles crossing{};
-  crossing[test::angle(1, 0, 1)] = -15 * test::kDegree;  // the index into the middle
+  crossing[test::angle(1, 0, 1)] = -15 * kDegree;  // the index into the middle
   const auto moved = [&](int uncertain) {
     HandAngles variance;
     variance.fill(1e-4);
@@ -171,7 +171,7 @@ TEST_CASE("a finger that slides into another moves the pose without a jump") {
   constexpr int kFrames = 200;
   for (int i = 0; i < kFrames; ++i) {
     HandAngles angles{};
-    angles[test::angle(1, 0, 1)] = -12 * test::kDegree * std::sin(0.05 * i);
+    angles[test::angle(1, 0, 1)] = -12 * kDegree * std::sin(0.05 * i);
     angles[test::angle(1, 0, 0)] = 0.2;
     (void)solver.step(angles, test::same_variance());
     if (i > 0) {
@@ -181,7 +181,7 @@ TEST_CASE("a finger that slides into another moves the pose without a jump") {
     }
     before = angles;
   }
-  CHECK(most_rad < 1.5 * 12 * test::kDegree * 0.05);
+  CHECK(most_rad < 1.5 * 12 * kDegree * 0.05);
 }
 
 TEST_CASE("the constraint stage takes nothing from the heap, and gives the same bits again") {

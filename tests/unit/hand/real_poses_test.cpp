@@ -42,7 +42,7 @@ Change change_of(const gesture::FeatureMatrix& poses, bool turned) {
     change.retreats += report.retreated ? 1 : 0;
     change.worst_gap_mm = std::min(change.worst_gap_mm, 1e3 * report.min_gap_m);
     for (std::size_t c = 0; c < angles.size(); ++c) {
-      const double squared = std::pow((angles[c] - raw[c]) / test::kDegree, 2);
+      const double squared = std::pow((angles[c] - raw[c]) / kDegree, 2);
       if (c % 3 == 0) {
         (c < kFingerChannels ? change.thumb_deg : change.flexion_deg) +=
             squared / (c < kFingerChannels ? 3 : 12);

@@ -1,6 +1,5 @@
 // The predictor on real poses: five people's walks, asked about a sixth's. Needs ../shared.
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -10,13 +9,12 @@
 #include "models/gp/regression.hpp"
 #include "models/motion/motion.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/frame/degree.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 Eigen::MatrixXd poses(const std::filesystem::path& path) {
   const auto clip = clip::read_clip(path);

@@ -3,11 +3,11 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <numbers>
 
 #include "proto/clip/acclaim.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/text_clip.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"
 
@@ -78,8 +78,6 @@ void check_amc(const std::string& from, const std::string& to, const std::string
 void check_asf(const std::string& from, const std::string& to, const std::string& expected) {
   check_error(swap(kAsf, from, to), kAmc, expected);
 }
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 }  // namespace
 

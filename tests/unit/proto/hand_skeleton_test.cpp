@@ -3,6 +3,7 @@
 #include <array>
 #include <limits>
 
+#include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "tests/support/allocations.hpp"
@@ -10,7 +11,6 @@
 namespace posed {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr int kThumb = 0, kIndex = 1, kMiddle = 2, kRing = 3, kLittle = 4;
 
 std::size_t angle(int finger, int joint, int axis) {

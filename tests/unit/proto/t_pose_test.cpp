@@ -3,6 +3,7 @@
 #include "proto/clip/bvh.hpp"
 #include "proto/clip/standing.hpp"
 #include "proto/frame/bone_names.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/profile.hpp"
 #include "proto/frame/t_pose.hpp"
 #include "tests/support/shared.hpp"
@@ -28,8 +29,6 @@ void check_bone(const Skeleton& skeleton, const std::string& joint, std::string_
   const auto& found = skeleton.joints[skeleton.joint_index(joint)].bone;
   CHECK((found ? bone_name(*found) : std::string_view()) == bone);
 }
-
-constexpr double kDegree = std::numbers::pi / 180.0;
 
 }  // namespace
 

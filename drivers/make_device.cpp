@@ -1,0 +1,17 @@
+#include "drivers/make_device.hpp"
+
+namespace posed::drivers {
+
+Result<Device> make_device(const Driver& driver, const std::string& text,
+                           const std::string& identity) {
+  auto description = driver.describe(text, identity);
+  if (!description) return std::unexpected(description.error());
+  auto decoder = driver.make_decoder(*description);
+  if (!decoder) return std::unexpected(decoder.error());
+  return Device{.description = std::move(*description),
+                .transport = nullptr,
+                .decoder = std::move(*decoder),
+                .warnings = {}};
+}
+
+}  // namespace posed::drivers

@@ -1,0 +1,55 @@
+// Stage: a daemon of a test's own, in a folder of its own, on ephemeral ports.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "tests/e2e/outcome.hpp"
+#include "tests/support/process.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::test {
+
+class Stage {
+ public:
+  // How a config begins here: the streams follow.
+  static constexpr const char* kEndpoints =
+      "realtime = false\n[publish]\nendpoint = \"tcp://127.0.0.1:*\"\n"
+      "[control]\nendpoint = \"tcp://127.0.0.1:*\"\n";
+
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return (folder.path() / name).string();
+  }
+
+  // Starts `posed COMMAND --config posed.toml` with these options, too, and waits until it is
+  // ready.
+  void launch(const std::string& command, const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments{command, "--config", path("posed.toml")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    daemon.emplace(std::move(arguments));
+    const auto line = daemon->line();
+    INFO(daemon->errors());
+    REQUIRE(line);
+    const auto ready = nlohmann::json::parse(*line);
+    publish = ready.at("publish");
+    control = ready.at("control");
+  }
+
+  void record() { launch("record", {"--out", path("take.plog"), "--frames"}); }
+
+  [[nodiscard]] Outcome ctl(std::vector<std::string> what) const {
+    what.insert(what.begin(), {"ctl", "--connect", control});
+    return posed(std::move(what));
+  }
+
+  TempFolder folder;
+  std::optional<Process> daemon;
+  std::string publish, control;
+};
+
+}  // namespace posed::test
