@@ -4,11 +4,10 @@
 #include <cstddef>
 #include <random>
 
+#include "proto/frame/degree.hpp"
 #include "proto/frame/hand.hpp"
 
 namespace posed::test {
-
-inline constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 // Index in HandAngles; joints and axes (x, y, z) from 0.
 constexpr std::size_t angle(int finger, int joint, int axis) {
