@@ -1,5 +1,4 @@
 // `posed calibrate`: a user's glove from a few poses, or from another program's file.
-#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,7 +14,10 @@
 #include "daemon/cli/calibrate_poses.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/driver_options.hpp"
+#include "daemon/cli/pose_screen.hpp"
+#include "daemon/config/words.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/greeting.hpp"
 #include "drivers/glove/import.hpp"
 #include "proto/clip/text.hpp"
 
@@ -23,14 +25,14 @@ namespace posed::cli {
 namespace {
 
 using drivers::glove::CalibrationFile;
-using drivers::glove::kPoseHints;
 using drivers::glove::kPoseNames;
-using drivers::glove::Pose;
 
 constexpr double kMostSeconds = 60.0;
+constexpr double kReady_s = 3.0;  // to go from pose to pose without a key
 
 struct CalibrateOptions {
-  std::string driver, port, id, stream, user, hand = "right";
+  std::string driver, port, id, stream, user;
+  std::string hand;  // empty: right, or with --connect the stream's
   std::filesystem::path import, out;
   std::vector<std::string> set;    // KEY=VALUE
   std::vector<std::string> poses;  // POSE=SECONDS
@@ -53,7 +55,7 @@ Result<const drivers::Driver*> named_driver(const std::string& name) {
 Result<drivers::Options> driver_options(const drivers::Driver& driver,
                                         const CalibrateOptions& options) {
   std::vector<std::string> words = options.set;
-  words.push_back("hand=" + options.hand);
+  words.push_back("hand=" + (options.hand.empty() ? "right" : options.hand));
   if (!options.port.empty()) words.push_back("port=" + options.port);
   if (!options.id.empty()) words.push_back("id=" + options.id);
   return parse_driver_options(driver, words);
@@ -61,7 +63,10 @@ Result<drivers::Options> driver_options(const drivers::Driver& driver,
 
 Result<PosePlan> plan_of(const CalibrateOptions& options) {
   PosePlan plan;
-  if (options.seconds > 0.0) plan.seconds.fill(options.seconds);
+  if (options.seconds > 0.0) {
+    plan.seconds.fill(options.seconds);
+    plan.ready_s = kReady_s;
+  }
   for (const std::string& word : options.poses) {
     const auto equals = word.find('=');
     const auto name = std::ranges::find(kPoseNames, std::string_view(word).substr(0, equals));
@@ -80,71 +85,87 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
   return plan;
 }
 
-// A line on stdin; false at its end or on Ctrl-C.
-bool wait_for_enter() {
-  while (!Interrupt::came()) {
-    pollfd wanted{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
-    if (::poll(&wanted, 1, static_cast<int>(kLookAround.count())) <= 0) continue;
-    char c = 0;
-    if (::read(STDIN_FILENO, &c, 1) != 1) return false;
-    if (c == '\n') return true;
+// The glove of a stream is what it is; options that say otherwise are a mistake.
+Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
+  if (options.stream.empty()) return misuse("--connect also needs --stream");
+  auto source = GloveSource::connect(options.client, options.stream);
+  if (!source) return source;
+  const std::string& driver = (*source)->model().driver;
+  const std::string_view hand = drivers::glove::side_name((*source)->hand());
+  if (!options.driver.empty() && options.driver != driver) {
+    return misuse("stream '" + options.stream + "' is of driver '" + driver +
+                  "': leave out --driver");
   }
-  return false;
+  if (!options.hand.empty() && options.hand != hand) {
+    return misuse("stream '" + options.stream + "' is of a " + std::string(hand) +
+                  " hand: name the other hand's stream, or leave out --hand");
+  }
+  return source;
 }
 
-// Without --seconds a line on stdin begins the pose, so that a script can set the pace, too.
-bool ask_user(Pose pose, bool wait) {
-  const auto index = static_cast<std::size_t>(pose);
-  std::printf("pose %s\n", std::string(kPoseNames[index]).c_str());
-  std::fflush(stdout);
-  std::fprintf(stderr, "%s: %s%s\n", std::string(kPoseNames[index]).c_str(),
-               std::string(kPoseHints[index]).c_str(), wait ? "; then press Enter" : "");
-  return !wait || wait_for_enter();
+Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options) {
+  if (options.live) return connect(options);
+  const auto driver = named_driver(options.driver);
+  if (!driver) return std::unexpected(driver.error());
+  const auto completed = driver_options(**driver, options);
+  if (!completed) return std::unexpected(completed.error());
+  return GloveSource::open(**driver, *completed);
 }
 
-Result<CalibrationFile> from_poses(const CalibrateOptions& options, Side hand) {
+// What a calibration is for. A port's path is no glove's identity: the same glove may be plugged in
+// elsewhere tomorrow.
+CalibrationFile blank_file(const GloveSource& source) {
+  const std::string& identity = source.identity();
+  return {.driver = source.model().driver,
+          .glove = identity.starts_with('/') ? std::string() : identity,
+          .user = {},
+          .hand = source.hand(),
+          .parameters = {},
+          .sensors = {}};
+}
+
+// On a terminal a screen leads the user; it is gone before anything else is printed.
+Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
+                                      const CalibrateOptions& options) {
+  if (::isatty(STDIN_FILENO) == 0 || ::isatty(STDOUT_FILENO) == 0) {
+    PoseLines lines(plan);
+    return record_poses(source, plan, lines);
+  }
+  std::string title = "posed calibrate: " + source.model().driver + ", " +
+                      std::string(drivers::glove::side_name(source.hand())) + " hand of " +
+                      options.user;
+  if (!source.identity().empty()) title += ", " + source.identity();
+  PoseScreen screen(source.model(), plan, config::without_controls(title));
+  return record_poses(source, plan, screen);
+}
+
+Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   const auto plan = plan_of(options);
   if (!plan) return std::unexpected(plan.error());
-  const drivers::Driver* driver = nullptr;
-  if (!options.live || !options.driver.empty()) {
-    const auto named = named_driver(options.driver);
-    if (!named) return std::unexpected(named.error());
-    driver = *named;
-  }
-  Result<std::unique_ptr<GloveSource>> source = nullptr;
-  if (options.live) {
-    source = GloveSource::connect(options.client, options.stream, driver, hand);
-  } else {
-    const auto completed = driver_options(*driver, options);
-    if (!completed) return std::unexpected(completed.error());
-    source = GloveSource::open(*driver, *completed);
-  }
+  const auto source = open_glove(options);
   if (!source) return std::unexpected(source.error());
-  SensorBars bars((*source)->model());
-  const auto recorded = record_poses(
-      **source, *plan,
-      [&](Pose pose) {
-        bars.end();
-        return ask_user(pose, options.seconds <= 0.0);
-      },
-      [&](const auto& raw, const auto& valid) { bars.show(raw, valid); });
+  const auto recorded = lead(**source, *plan, options);
   if (!recorded) return std::unexpected(recorded.error());
   auto fitted = drivers::glove::fit_poses((*source)->model(), *recorded);
   if (!fitted) return std::unexpected(fitted.error());
   for (const std::string& warning : fitted->warnings) {
     std::fprintf(stderr, "posed: warning: %s\n", warning.c_str());
   }
-  // A port's path is no glove's identity: the same glove may be plugged in elsewhere tomorrow.
-  const std::string& identity = (*source)->identity();
-  return CalibrationFile{.driver = (*source)->model().driver,
-                         .glove = identity.starts_with('/') ? std::string() : identity,
-                         .user = {},
-                         .hand = hand,
-                         .parameters = {},
-                         .sensors = std::move(fitted->sensors)};
+  CalibrationFile file = blank_file(**source);
+  file.sensors = std::move(fitted->sensors);
+  return file;
 }
 
-Result<CalibrationFile> from_file(const CalibrateOptions& options, Side hand) {
+// Without a device only the driver and the hand are known; through a daemon the glove is, too.
+Result<CalibrationFile> from_file(const CalibrateOptions& options) {
+  if (options.live) {
+    const auto source = connect(options);
+    if (!source) return std::unexpected(source.error());
+    auto file =
+        drivers::glove::import_calibration(options.import, (*source)->model(), (*source)->hand());
+    if (file) file->glove = blank_file(**source).glove;
+    return file;
+  }
   const auto driver = named_driver(options.driver.empty() ? "cyberglove" : options.driver);
   if (!driver) return std::unexpected(driver.error());
   const auto completed = driver_options(**driver, options);
@@ -153,21 +174,35 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options, Side hand) {
   if (!description) return std::unexpected(description.error());
   const auto model = (*driver)->glove_model(*description);
   if (!model) return std::unexpected(model.error());
+  const Side hand = options.hand == "left" ? Side::kLeft : Side::kRight;
   return drivers::glove::import_calibration(options.import, *model, hand);
+}
+
+// Before anybody has gone through the poses.
+Result<> check_out(const std::filesystem::path& out) {
+  const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
+  if (std::filesystem::is_directory(out)) return misuse("--out is a folder; name a file", out);
+  if (::access(folder.c_str(), W_OK) == 0) return {};
+  return misuse("cannot write there; name another --out, or make its folder", out);
 }
 
 Result<> calibrate(const CalibrateOptions& options) {
   const Interrupt interrupt;
-  const Side hand = options.hand == "left" ? Side::kLeft : Side::kRight;
-  if (options.live && options.stream.empty()) return misuse("--connect also needs --stream");
-  auto file = options.import.empty() ? from_poses(options, hand) : from_file(options, hand);
+  if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
+  if (auto ok = check_out(options.out); !ok) return ok;
+  auto file = options.import.empty() ? from_poses(options) : from_file(options);
   if (!file) return std::unexpected(file.error());
   file->user = options.user;
   const std::string text = drivers::glove::format_calibration(*file);
   auto written = clip::write_text(options.out, [&](std::ostream& out) { out << text; });
   if (!written) return written;
-  std::fprintf(stderr, "%zu sensors calibrated: %s\n", file->sensors.size(),
-               options.out.string().c_str());
+  const std::string out = options.out.string();
+  std::fprintf(stderr, "%zu sensors calibrated: %s\n", file->sensors.size(), out.c_str());
+  if (options.live) {
+    std::fprintf(stderr, "use it now:     posed ctl calibrate %s %s\n", options.stream.c_str(),
+                 out.c_str());
+  }
+  std::fprintf(stderr, "use it always:  calibration = \"%s\" in the stream's table\n", out.c_str());
   return {};
 }
 
@@ -189,19 +224,22 @@ void add_calibrate(CLI::App& app, int& exit_code) {
   command->add_option("--set", options->set, "An option of the driver, like baud=38400")
       ->type_name("KEY=VALUE");
   command->add_option("--user", options->user, "Whose hand it is")->required();
-  command->add_option("--hand", options->hand, "right or left")
-      ->capture_default_str()
+  command->add_option("--hand", options->hand, "right or left; with --connect the stream's")
+      ->default_str("right")
       ->check(CLI::IsMember({"right", "left"}));
   command->add_option("--import", options->import, "Another program's calibration, no poses")
       ->type_name("FILE");
-  command->add_option("--seconds", options->seconds, "Begin each pose by itself, this long")
+  command
+      ->add_option("--seconds", options->seconds, "Hold each pose this long; it begins by itself")
       ->check(CLI::Range(0.1, kMostSeconds));
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")
       ->type_name("POSE=SECONDS");
   command->add_option("--out", options->out, "The calibration to write")
       ->type_name("C.toml")
       ->required();
-  command->footer(R"(Poses: flat, fist, thumb, spread. Examples:
+  command->footer(
+      R"(Poses: flat, fist, thumb, spread. On a terminal a screen leads through them; elsewhere
+a line on stdout names each pose and a line on stdin begins it, or --seconds does. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml
   posed calibrate --driver cyberglove --import old.cal --user ann --out ann.toml)");

@@ -1,65 +1,130 @@
 #include "daemon/cli/calibrate_poses.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstdio>
-
-#include <spdlog/fmt/fmt.h>
+#include <chrono>
 
 namespace posed::cli {
 namespace {
 
 using drivers::glove::Pose;
 using drivers::glove::Recorded;
+using SteadyClock = std::chrono::steady_clock;
 
-constexpr int kBarWidth = 40;
-constexpr std::chrono::milliseconds kRedraw{100};
+constexpr double kRestlessShare = 0.12;  // of a sensor's range; its noise is far less
+constexpr double kPatience_s = 5.0;      // for a glove that sends nothing while the user reads
+
+class Recording {
+ public:
+  Recording(GloveSource& source, const PosePlan& plan, PoseGuide& guide)
+      : source_(source), plan_(plan), guide_(guide) {}
+
+  Result<Recorded> run() {
+    const std::vector<Pose> poses = plan_.poses();
+    for (std::size_t i = 0; i < poses.size();) {
+      const auto word = ask(poses[i]);
+      if (!word) return std::unexpected(word.error());
+      if (*word == PoseGuide::Word::kStop) return fail("stopped; no calibration was written");
+      if (*word == PoseGuide::Word::kBack) {
+        i -= i > 0 ? 1 : 0;
+        continue;
+      }
+      if (auto held = hold(poses[i]); !held) return std::unexpected(held.error());
+      ++i;
+    }
+    return recorded_;
+  }
+
+ private:
+  using Raw = GloveSource::Raw;
+  using Valid = GloveSource::Valid;
+
+  // Shows the live hand until the user, or the time to get ready, is over.
+  Result<PoseGuide::Word> ask(Pose pose) {
+    guide_.want(pose);
+    const double ready_s = plan_.ready_s.value_or(0.0);
+    begin();
+    PoseGuide::Word word = PoseGuide::Word::kNothing;
+    const auto enough = [&] {
+      word = guide_.hear();
+      if (plan_.ready_s && word == PoseGuide::Word::kNothing && past_s() >= ready_s) {
+        word = PoseGuide::Word::kGo;
+      }
+      return word != PoseGuide::Word::kNothing;
+    };
+    const auto show = [&](const Raw& raw, const Valid& valid) {
+      guide_.show(raw, valid, PosePhase::kAsked, ready_s - past_s(), ready_s);
+    };
+    while (word == PoseGuide::Word::kNothing) {
+      if (auto ok = source_.listen(kPatience_s, show, enough); !ok) {
+        return std::unexpected(ok.error());
+      }
+    }
+    return word;
+  }
+
+  Result<> hold(Pose pose) {
+    auto& held = recorded_[static_cast<std::size_t>(pose)];
+    held = {};
+    begin();
+    const auto settle = [&](const Raw& raw, const Valid& valid) {
+      guide_.show(raw, valid, PosePhase::kSettling, plan_.settle_s - past_s(), plan_.settle_s);
+    };
+    if (auto ok = source_.listen(plan_.settle_s, settle); !ok) return ok;
+    begin();
+    const double whole_s = plan_.seconds[static_cast<std::size_t>(pose)];
+    std::array<std::optional<Span>, drivers::glove::kMaxSensors> spans{};
+    const auto keep = [&](const Raw& raw, const Valid& valid) {
+      for (std::size_t i = 0; i < raw.size(); ++i) {
+        if (!valid[i]) continue;
+        held[i].add(raw[i]);
+        if (!spans[i]) spans[i] = Span{raw[i], raw[i]};
+        spans[i]->low = std::min(spans[i]->low, raw[i]);
+        spans[i]->high = std::max(spans[i]->high, raw[i]);
+      }
+      guide_.show(raw, valid, PosePhase::kHeld, whole_s - past_s(), whole_s);
+    };
+    if (auto ok = source_.listen(whole_s, keep); !ok) return ok;
+    const auto& sensors = source_.model().sensors;
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      if (!spans[i] || !is_restless(*spans[i], sensors[i])) continue;
+      guide_.restless(pose, sensors[i].name);
+      break;
+    }
+    return {};
+  }
+
+  struct Span {
+    float low, high;
+  };
+  static bool is_restless(const Span& span, const drivers::glove::Sensor& sensor) {
+    const double range = sensor.raw_max - sensor.raw_min;
+    return static_cast<double>(span.high - span.low) > kRestlessShare * range;
+  }
+
+  void begin() { begun_ = SteadyClock::now(); }
+  [[nodiscard]] double past_s() const {
+    return std::chrono::duration<double>(SteadyClock::now() - begun_).count();
+  }
+
+  GloveSource& source_;
+  const PosePlan& plan_;
+  PoseGuide& guide_;
+  Recorded recorded_{};
+  SteadyClock::time_point begun_{};  // of the phase
+};
 
 }  // namespace
 
-Result<Recorded> record_poses(GloveSource& source, const PosePlan& plan, const AskForPose& ask,
-                              const ShowSensors& show) {
-  Recorded recorded{};
-  for (std::size_t p = 0; p < plan.seconds.size(); ++p) {
-    if (plan.seconds[p] <= 0.0) continue;
-    if (!ask(static_cast<Pose>(p))) return fail("stopped; no calibration was written");
-    // What came while the user was reading is thrown away with the settling hand.
-    if (auto ok = source.listen(plan.settle_s, show); !ok) return std::unexpected(ok.error());
-    const auto keep = [&](const GloveSource::Raw& raw, const GloveSource::Valid& valid) {
-      for (std::size_t i = 0; i < raw.size(); ++i) {
-        if (valid[i]) recorded[p][i].add(raw[i]);
-      }
-      show(raw, valid);
-    };
-    if (auto ok = source.listen(plan.seconds[p], keep); !ok) return std::unexpected(ok.error());
+std::vector<Pose> PosePlan::poses() const {
+  std::vector<Pose> poses;
+  for (std::size_t p = 0; p < seconds.size(); ++p) {
+    if (seconds[p] > 0.0) poses.push_back(static_cast<Pose>(p));
   }
-  return recorded;
+  return poses;
 }
 
-SensorBars::SensorBars(const drivers::glove::Model& model)
-    : model_(model), terminal_(::isatty(STDERR_FILENO) != 0) {}
-
-void SensorBars::show(const GloveSource::Raw& raw, const GloveSource::Valid& valid) {
-  const auto now = std::chrono::steady_clock::now();
-  if (!terminal_ || now - last_ < kRedraw) return;
-  last_ = now;
-  std::string text;
-  if (drawn_) text += fmt::format("\x1b[{}A", model_.sensors.size());
-  for (std::size_t i = 0; i < model_.sensors.size(); ++i) {
-    const drivers::glove::Sensor& sensor = model_.sensors[i];
-    const double share =
-        (static_cast<double>(raw[i]) - sensor.raw_min) / (sensor.raw_max - sensor.raw_min);
-    const int full = valid[i] ? static_cast<int>(std::clamp(share, 0.0, 1.0) * kBarWidth) : 0;
-    const std::string bar(static_cast<std::size_t>(full), '#');
-    const std::string value =
-        valid[i] ? fmt::format("{:8.1f}", static_cast<double>(raw[i])) : std::string("       -");
-    text += fmt::format("\x1b[2K{:<14}{} |{:<{}}|\n", sensor.name, value, bar, kBarWidth);
-  }
-  std::fputs(text.c_str(), stderr);
-  drawn_ = true;
+Result<Recorded> record_poses(GloveSource& source, const PosePlan& plan, PoseGuide& guide) {
+  return Recording(source, plan, guide).run();
 }
-
-void SensorBars::end() { drawn_ = false; }
 
 }  // namespace posed::cli

@@ -1,9 +1,11 @@
-// The part of `posed calibrate` in which a hand goes from pose to pose.
+// The part of `posed calibrate` in which a hand goes from pose to pose. Who leads the user through
+// it is a PoseGuide: a screen (pose_screen.hpp), lines for scripts, or a test.
 #pragma once
 
 #include <array>
-#include <functional>
+#include <optional>
 
+#include "daemon/cli/calibrate_view.hpp"
 #include "daemon/cli/glove_source.hpp"
 #include "drivers/glove/fit.hpp"
 
@@ -12,32 +14,37 @@ namespace posed::cli {
 struct PosePlan {
   // How long each pose is recorded [s]; 0 leaves it out. The flat hand is never left out.
   std::array<double, drivers::glove::kPoses> seconds{2.0, 2.0, 2.0, 2.0};
+  // How long the user has to take a pose that begins by itself [s]; none: the guide says when.
+  std::optional<double> ready_s{};
   double settle_s = 0.5;  // not recorded: the hand comes to rest, the glove's filter, too
+
+  [[nodiscard]] std::vector<drivers::glove::Pose> poses() const;
 };
 
-// Called before each pose; false ends the calibration (the user gave up).
-using AskForPose = std::function<bool(drivers::glove::Pose)>;
-// Called for each measurement while a pose is held: a live view.
-using ShowSensors =
-    std::function<void(const GloveSource::Raw& raw, const GloveSource::Valid& valid)>;
-
-[[nodiscard]] Result<drivers::glove::Recorded> record_poses(GloveSource& source,
-                                                            const PosePlan& plan,
-                                                            const AskForPose& ask,
-                                                            const ShowSensors& show);
-
-// A bar for each sensor on a terminal, redrawn in place; nothing elsewhere.
-class SensorBars {
+class PoseGuide {
  public:
-  explicit SensorBars(const drivers::glove::Model& model);
-  void show(const GloveSource::Raw& raw, const GloveSource::Valid& valid);
-  void end();  // the next show() draws below
+  PoseGuide() = default;
+  PoseGuide(const PoseGuide&) = delete;
+  PoseGuide& operator=(const PoseGuide&) = delete;
+  virtual ~PoseGuide() = default;
 
- private:
-  const drivers::glove::Model& model_;
-  bool terminal_;
-  bool drawn_ = false;
-  std::chrono::steady_clock::time_point last_{};
+  virtual void want(drivers::glove::Pose pose) = 0;
+
+  // What the user says while a pose is asked for; never waits, called ten times a second at least.
+  enum class Word { kNothing, kGo, kBack, kStop };
+  [[nodiscard]] virtual Word hear() = 0;
+
+  // A measurement. `left_s` of a phase of `whole_s` is still to come; both 0 where the user ends
+  // it.
+  virtual void show(const GloveSource::Raw& raw, const GloveSource::Valid& valid, PosePhase phase,
+                    double left_s, double whole_s) = 0;
+
+  // The hand was not still while the pose was held; this sensor tells.
+  virtual void restless(drivers::glove::Pose pose, const std::string& sensor) = 0;
 };
+
+// An error when the user gives up, the glove goes, or nothing comes from it.
+[[nodiscard]] Result<drivers::glove::Recorded> record_poses(GloveSource& source,
+                                                            const PosePlan& plan, PoseGuide& guide);
 
 }  // namespace posed::cli

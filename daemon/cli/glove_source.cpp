@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "posed/v1/posed.pb.h"
+#include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/sink.hpp"
 
 namespace posed::cli {
@@ -18,6 +19,14 @@ constexpr double kGlovePatience_s = 5.0;  // without a value: the glove or the d
 
 std::unexpected<Error> nothing_came() {
   return fail("no values come from the glove: is it switched on and worn?");
+}
+
+std::unexpected<Error> gone() { return fail("the glove has gone: plug it in and begin again"); }
+
+std::unexpected<Error> no_such_stream(const std::string& stream, const v1::Stats& stats) {
+  std::string names;
+  for (const auto& other : stats.stream()) names += (names.empty() ? "" : ", ") + other.stream();
+  return misuse("there is no stream '" + stream + "'; there is: " + names);
 }
 
 std::unexpected<Error> interrupted() { return fail("stopped; no calibration was written"); }
@@ -52,18 +61,19 @@ class RawSink final : public Sink {
 
 class OpenedGlove final : public GloveSource {
  public:
-  OpenedGlove(Model model, drivers::Device device, std::unique_ptr<drivers::Ports> ports)
-      : GloveSource(std::move(model), device.description.identity),
-        ports_(std::move(ports)),
-        device_(std::move(device)) {}
+  using GloveSource::known;
+  using GloveSource::listen;
+  OpenedGlove(Glove glove, drivers::Device device, std::unique_ptr<drivers::Ports> ports)
+      : GloveSource(std::move(glove)), ports_(std::move(ports)), device_(std::move(device)) {}
 
-  Result<> listen(double seconds, const Take& take) override {
+  Result<> listen(double seconds, const Take& take, const std::function<bool()>& enough) override {
     RawSink sink(model().sensors.size(), take);
     const std::int64_t start_ns = now_ns();
     const std::int64_t end_ns = start_ns + static_cast<std::int64_t>(seconds * 1e9);
     const bool polled = !device_.poll.request.empty();
     for (std::int64_t now = start_ns, asked = 0; now < end_ns; now = now_ns()) {
       if (Interrupt::came()) return interrupted();
+      if (enough()) return {};
       if (polled && now - asked >= device_.poll.period_ns) {
         asked = now;
         (void)device_.transport->send(device_.poll.request);
@@ -80,7 +90,7 @@ class OpenedGlove final : public GloveSource {
   Result<> read(std::int64_t now, Sink& sink) {
     for (;;) {
       const drivers::Chunk chunk = device_.transport->read(now);
-      if (chunk.lost || chunk.end) return fail("the glove has gone: plug it in and begin again");
+      if (chunk.lost || chunk.end) return gone();
       if (chunk.bytes.empty()) return {};
       device_.decoder->feed(chunk.bytes, now, sink);
     }
@@ -90,127 +100,159 @@ class OpenedGlove final : public GloveSource {
   drivers::Device device_;
 };
 
-// The places of a model's raw values in the samples of a stream; none when it is another glove's.
-std::optional<std::vector<int>> places_of(const Model& model, const v1::Sample& sample) {
-  std::vector<int> places;
-  for (const auto& sensor : model.sensors) {
-    const auto at = std::ranges::find(sample.name(), "raw_" + sensor.name);
-    if (at == sample.name().end()) return std::nullopt;
-    places.push_back(static_cast<int>(at - sample.name().begin()));
+// One message of the daemon about the stream; both empty: nothing came within a look-around.
+struct Heard {
+  std::optional<v1::Sample> sample;
+  std::optional<v1::Stats> stats;
+};
+
+// What a daemon publishes about one of its streams.
+class Subscription {
+ public:
+  static Result<Subscription> open(const ClientOptions& client, const std::string& stream) {
+    auto connection = Connection::open(client, ZMQ_SUB);
+    if (!connection) return std::unexpected(connection.error());
+    for (const std::string& topic : {sensor_topic(stream), std::string("stats")}) {
+      if (auto ok = control::set_option(connection->socket(), ZMQ_SUBSCRIBE, topic); !ok) {
+        return std::unexpected(ok.error());
+      }
+    }
+    return Subscription(std::move(*connection), stream);
   }
-  return places;
-}
+
+  Result<Heard> next() {
+    if (Interrupt::came()) return interrupted();
+    if (auto refused = connection_.refusal()) return std::unexpected(*refused);
+    Heard heard;
+    if (!connection_.wait(kLookAround)) return heard;
+    control::Message topic, body;
+    if (!topic.receive(connection_.socket()) || !topic.more()) return heard;
+    if (!body.receive(connection_.socket(), 0)) return heard;
+    const int size = static_cast<int>(body.bytes().size());
+    if (topic.text() == "stats") {
+      if (!heard.stats.emplace().ParseFromArray(body.bytes().data(), size)) heard.stats.reset();
+    } else if (topic.text() == sensor_topic(stream_)) {
+      if (!heard.sample.emplace().ParseFromArray(body.bytes().data(), size)) heard.sample.reset();
+    }
+    return heard;
+  }
+
+  // The stream's own part; null when there is no such stream.
+  [[nodiscard]] const v1::StreamStats* part_of(const v1::Stats& stats) const {
+    const auto at = std::ranges::find(stats.stream(), stream_, &v1::StreamStats::stream);
+    return at == stats.stream().end() ? nullptr : &*at;
+  }
+
+  [[nodiscard]] const std::string& stream() const { return stream_; }
+  [[nodiscard]] Error no_answer() const {
+    if (!connection_.established()) return connection_.no_answer();
+    return fail("the daemon sends no stats: is it posed that answers there?").error();
+  }
+
+ private:
+  Subscription(Connection connection, std::string stream)
+      : connection_(std::move(connection)), stream_(std::move(stream)) {}
+  static std::string sensor_topic(const std::string& stream) { return "sensor/" + stream; }
+
+  Connection connection_;
+  std::string stream_;
+};
 
 class PublishedGlove final : public GloveSource {
  public:
-  PublishedGlove(Model model, Connection connection, std::string topic)
-      : GloveSource(std::move(model), {}),
-        connection_(std::move(connection)),
-        topic_(std::move(topic)) {}
+  using GloveSource::known;
+  using GloveSource::listen;
+  PublishedGlove(Glove glove, Subscription subscription)
+      : GloveSource(std::move(glove)), subscription_(std::move(subscription)) {}
 
-  Result<> listen(double seconds, const Take& take) override {
+  Result<> listen(double seconds, const Take& take, const std::function<bool()>& enough) override {
     const auto end = Clock::now() + std::chrono::duration<double>(seconds);
     std::size_t count = 0;
     while (Clock::now() < end) {
-      auto sample = next(connection_, topic_);
-      if (!sample) return std::unexpected(sample.error());
-      if (!*sample) continue;
-      const auto places = places_of(model(), **sample);
-      if (!places) continue;
-      Raw raw{};
-      Valid valid;
-      for (std::size_t i = 0; i < places->size(); ++i) {
-        const int place = (*places)[i];
-        if (place >= (*sample)->value_size()) continue;
-        raw[i] = (*sample)->value(place);
-        valid[i] = is_valid(**sample, place);
-      }
-      take(raw, valid);
-      ++count;
+      if (enough()) return {};
+      const auto heard = subscription_.next();
+      if (!heard) return std::unexpected(heard.error());
+      if (heard->stats && !still_there(*heard->stats)) return gone();
+      if (heard->sample && pass_on(*heard->sample, take)) ++count;
     }
     if (count == 0) return nothing_came();
     return {};
   }
 
-  // The next sample of exactly this topic; none within a look-around.
-  static Result<std::optional<v1::Sample>> next(Connection& connection, const std::string& topic) {
-    if (Interrupt::came()) return interrupted();
-    if (auto refused = connection.refusal()) return std::unexpected(*refused);
-    if (!connection.wait(kLookAround)) return std::nullopt;
-    control::Message name, body;
-    if (!name.receive(connection.socket()) || !name.more()) return std::nullopt;
-    if (!body.receive(connection.socket(), 0)) return std::nullopt;
-    v1::Sample sample;
-    if (name.text() != topic ||
-        !sample.ParseFromArray(body.bytes().data(), static_cast<int>(body.bytes().size()))) {
-      return std::nullopt;
-    }
-    return sample;
-  }
-
  private:
-  static bool is_valid(const v1::Sample& sample, int place) {
-    const auto at = static_cast<std::size_t>(place);
-    return at < sample.validity().size() && sample.validity()[at] != 0;
+  // Another glove on the same port would be mixed into the one that went.
+  [[nodiscard]] bool still_there(const v1::Stats& stats) const {
+    const v1::StreamStats* stream = subscription_.part_of(stats);
+    return stream != nullptr && !stream->away() && stream->identity() == identity();
   }
 
-  Connection connection_;
-  std::string topic_;
+  [[nodiscard]] bool pass_on(const v1::Sample& sample, const Take& take) const {
+    Raw raw{};
+    Valid valid;
+    for (std::size_t i = 0; i < model().sensors.size(); ++i) {
+      const auto at = std::ranges::find(sample.name(), "raw_" + model().sensors[i].name);
+      const auto place = static_cast<std::size_t>(at - sample.name().begin());
+      if (place >= static_cast<std::size_t>(sample.value_size())) return false;
+      raw[i] = sample.value(static_cast<int>(place));
+      valid[i] = place < sample.validity().size() && sample.validity()[place] != 0;
+    }
+    take(raw, valid);
+    return true;
+  }
+
+  Subscription subscription_;
 };
 
-Result<Model> model_of(const drivers::Driver& driver, Side hand) {
-  if (driver.expect == nullptr || driver.glove_model == nullptr) {
+}  // namespace
+
+Result<GloveSource::Glove> GloveSource::known(const drivers::Driver& driver,
+                                              const drivers::Description& description) {
+  const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
+  if (driver.glove_model == nullptr || !hand) {
     return misuse("driver '" + std::string(driver.name) + "' is no glove");
   }
-  const auto description =
-      driver.expect({{"hand", std::string(hand == Side::kLeft ? "left" : "right")}});
-  if (!description) return std::unexpected(description.error());
-  return driver.glove_model(*description);
+  auto model = driver.glove_model(description);
+  if (!model) return std::unexpected(model.error());
+  return Glove{.model = std::move(*model), .identity = description.identity, .hand = *hand};
 }
-
-}  // namespace
 
 Result<std::unique_ptr<GloveSource>> GloveSource::open(const drivers::Driver& driver,
                                                        const drivers::Options& options) {
   auto ports = std::make_unique<drivers::Ports>();
   auto device = driver.open(options, *ports);
   if (!device) return std::unexpected(device.error());
-  if (driver.glove_model == nullptr) {
-    return misuse("driver '" + std::string(driver.name) + "' is no glove");
-  }
-  auto model = driver.glove_model(device->description);
-  if (!model) return std::unexpected(model.error());
+  auto glove = known(driver, device->description);
+  if (!glove) return std::unexpected(glove.error());
   if (auto ok = device->transport->start(now_ns()); !ok) return std::unexpected(ok.error());
-  return std::make_unique<OpenedGlove>(std::move(*model), std::move(*device), std::move(ports));
+  return std::make_unique<OpenedGlove>(std::move(*glove), std::move(*device), std::move(ports));
 }
 
 Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& client,
-                                                          const std::string& stream,
-                                                          const drivers::Driver* driver,
-                                                          Side hand) {
-  auto connection = Connection::open(client, ZMQ_SUB);
-  if (!connection) return std::unexpected(connection.error());
-  const std::string topic = "sensor/" + stream;
-  if (auto ok = control::set_option(connection->socket(), ZMQ_SUBSCRIBE, topic); !ok) {
-    return std::unexpected(ok.error());
-  }
+                                                          const std::string& stream) {
+  auto subscription = Subscription::open(client, stream);
+  if (!subscription) return std::unexpected(subscription.error());
   const auto end = Clock::now() + std::chrono::duration<double>(kGlovePatience_s);
   while (Clock::now() < end) {
-    auto sample = PublishedGlove::next(*connection, topic);
-    if (!sample) return std::unexpected(sample.error());
-    if (!*sample) continue;
-    for (const drivers::Driver& known : drivers::registry()) {
-      if (driver != nullptr ? driver->name != known.name : known.glove_model == nullptr) continue;
-      auto model = model_of(known, hand);
-      if (!model && driver != nullptr) return std::unexpected(model.error());
-      if (model && places_of(*model, **sample)) {
-        return std::make_unique<PublishedGlove>(std::move(*model), std::move(*connection), topic);
-      }
+    const auto heard = subscription->next();
+    if (!heard) return std::unexpected(heard.error());
+    if (!heard->stats) continue;
+    const v1::StreamStats* told = subscription->part_of(*heard->stats);
+    if (told == nullptr) return no_such_stream(stream, *heard->stats);
+    const drivers::Driver* driver = drivers::find_driver(told->driver());
+    if (driver == nullptr || told->greeting().empty()) {
+      return misuse("stream '" + stream + "' is of driver '" + told->driver() +
+                    "', which has no sensors that can be calibrated");
     }
-    return fail("stream '" + stream + "' is not of a glove that posed knows; name its --driver");
+    if (told->away()) {
+      return fail("the glove of stream '" + stream + "' is away: plug it in and begin again");
+    }
+    const auto description = driver->describe(told->greeting(), told->identity());
+    if (!description) return std::unexpected(description.error());
+    auto glove = known(*driver, *description);
+    if (!glove) return std::unexpected(glove.error());
+    return std::make_unique<PublishedGlove>(std::move(*glove), std::move(*subscription));
   }
-  if (!connection->established()) return std::unexpected(connection->no_answer());
-  return fail("nothing comes on " + topic + ": is there such a stream, and its glove switched on?");
+  return std::unexpected(subscription->no_answer());
 }
 
 }  // namespace posed::cli

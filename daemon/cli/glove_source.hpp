@@ -25,28 +25,37 @@ class GloveSource {
   // Speaks with the device and starts it.
   [[nodiscard]] static Result<std::unique_ptr<GloveSource>> open(const drivers::Driver& driver,
                                                                  const drivers::Options& options);
-  // Of a stream that a daemon publishes. Without a driver it is known by its sensors' names.
+  // Of a stream that a daemon publishes: what glove it is, the daemon tells.
   [[nodiscard]] static Result<std::unique_ptr<GloveSource>> connect(const ClientOptions& client,
-                                                                    const std::string& stream,
-                                                                    const drivers::Driver* driver,
-                                                                    Side hand);
+                                                                    const std::string& stream);
   virtual ~GloveSource() = default;
   GloveSource(const GloveSource&) = delete;
   GloveSource& operator=(const GloveSource&) = delete;
 
-  [[nodiscard]] const drivers::glove::Model& model() const { return model_; }
-  [[nodiscard]] const std::string& identity() const { return identity_; }
+  [[nodiscard]] const drivers::glove::Model& model() const { return glove_.model; }
+  [[nodiscard]] const std::string& identity() const { return glove_.identity; }
+  [[nodiscard]] Side hand() const { return glove_.hand; }
 
-  // Hands over what comes for this long. An error when the glove is lost, nothing comes, or Ctrl-C.
-  [[nodiscard]] virtual Result<> listen(double seconds, const Take& take) = 0;
+  // Hands over what comes for this long, or until it is `enough`, which is asked after each
+  // measurement and ten times a second. An error when the glove is lost, nothing comes, or Ctrl-C.
+  [[nodiscard]] virtual Result<> listen(double seconds, const Take& take,
+                                        const std::function<bool()>& enough) = 0;
+  [[nodiscard]] Result<> listen(double seconds, const Take& take) {
+    return listen(seconds, take, [] { return false; });
+  }
 
  protected:
-  GloveSource(drivers::glove::Model model, std::string identity)
-      : model_(std::move(model)), identity_(std::move(identity)) {}
+  struct Glove {
+    drivers::glove::Model model;
+    std::string identity;
+    Side hand = Side::kRight;
+  };
+  [[nodiscard]] static Result<Glove> known(const drivers::Driver& driver,
+                                           const drivers::Description& description);
+  explicit GloveSource(Glove glove) : glove_(std::move(glove)) {}
 
  private:
-  drivers::glove::Model model_;
-  std::string identity_;
+  Glove glove_;
 };
 
 }  // namespace posed::cli

@@ -1,0 +1,34 @@
+// An emulated glove whose hand does as it is told, on a thread of its own.
+#pragma once
+
+#include <atomic>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "daemon/devices/emulated_glove.hpp"
+#include "drivers/driver.hpp"
+#include "drivers/glove/fit.hpp"
+
+namespace posed::test {
+
+class PosingGlove {
+ public:
+  using Pose = drivers::glove::Pose;
+
+  explicit PosingGlove(const std::string& driver = "cyberglove",
+                       devices::EmulatedPort port = devices::EmulatedPort::open_pty({}).value())
+      : glove_(drivers::find_driver(driver)->emulate({}).value(), std::move(port),
+               [this](double) { return drivers::glove::hand_in(pose_.load()); }, {}),
+        thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
+
+  [[nodiscard]] std::string port() const { return glove_.port(); }
+  void hold(Pose pose) { pose_ = pose; }
+
+ private:
+  std::atomic<Pose> pose_{Pose::kFlat};
+  devices::EmulatedGlove glove_;
+  std::jthread thread_;
+};
+
+}  // namespace posed::test
