@@ -28,7 +28,6 @@ using drivers::glove::CalibrationFile;
 using drivers::glove::kPoseNames;
 
 constexpr double kMostSeconds = 60.0;
-constexpr double kReady_s = 3.0;  // to go from pose to pose without a key
 
 struct CalibrateOptions {
   std::string driver, port, id, stream, user;
@@ -37,6 +36,7 @@ struct CalibrateOptions {
   std::vector<std::string> set;    // KEY=VALUE
   std::vector<std::string> poses;  // POSE=SECONDS
   double seconds = 0.0;            // 0: Enter begins each pose
+  double ready_s = 3.0;            // to go from pose to pose without a key
   ClientOptions client;
   bool live = false;
 };
@@ -65,7 +65,7 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
   PosePlan plan;
   if (options.seconds > 0.0) {
     plan.seconds.fill(options.seconds);
-    plan.ready_s = kReady_s;
+    plan.ready_s = options.ready_s;
   }
   for (const std::string& word : options.poses) {
     const auto equals = word.find('=');
@@ -232,6 +232,9 @@ void add_calibrate(CLI::App& app, int& exit_code) {
   command
       ->add_option("--seconds", options->seconds, "Hold each pose this long; it begins by itself")
       ->check(CLI::Range(0.1, kMostSeconds));
+  command->add_option("--ready", options->ready_s, "With --seconds: the time from pose to pose")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, kMostSeconds));
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")
       ->type_name("POSE=SECONDS");
   command->add_option("--out", options->out, "The calibration to write")

@@ -17,8 +17,9 @@ class PosingGlove {
   using Pose = drivers::glove::Pose;
 
   explicit PosingGlove(const std::string& driver = "cyberglove",
-                       devices::EmulatedPort port = devices::EmulatedPort::open_pty({}).value())
-      : glove_(drivers::find_driver(driver)->emulate({}).value(), std::move(port),
+                       devices::EmulatedPort port = devices::EmulatedPort::open_pty({}).value(),
+                       const drivers::Options& options = {})
+      : glove_(drivers::find_driver(driver)->emulate(options).value(), std::move(port),
                [this](double) { return drivers::glove::hand_in(pose_.load()); }, {}),
         thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
 

@@ -8,12 +8,14 @@
 #include <numeric>
 
 #include "drivers/transport/ports.hpp"
+#include "tests/support/free_port.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
 
 namespace posed::drivers {
 namespace {
 
 using std::chrono::milliseconds;
+using test::free_port;
 using test::PseudoTerminal;
 
 constexpr milliseconds kPatience{2000};
@@ -61,20 +63,6 @@ class Client {
  private:
   int fd_;
 };
-
-// A port that was free a moment ago.
-std::uint16_t free_port() {
-  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  auto* any = reinterpret_cast<sockaddr*>(&address);
-  socklen_t size = sizeof(address);
-  REQUIRE(::bind(fd, any, size) == 0);
-  REQUIRE(::getsockname(fd, any, &size) == 0);
-  ::close(fd);
-  return ntohs(address.sin_port);
-}
 
 std::string loopback(std::uint16_t port) { return "127.0.0.1:" + std::to_string(port); }
 

@@ -13,6 +13,7 @@
 #include "drivers/lucidgloves/emulator.hpp"
 #include "drivers/transport/ports.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/free_port.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/emulated.hpp"
 #include "tests/unit/drivers/served_emulator.hpp"
@@ -82,16 +83,6 @@ class NetworkGlove {
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     return address;
-  }
-  // A port that was free a moment ago.
-  static std::uint16_t free_port() {
-    const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_in address = loopback(0);
-    socklen_t size = sizeof address;
-    REQUIRE(::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0);
-    REQUIRE(::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0);
-    ::close(fd);
-    return ntohs(address.sin_port);
   }
 
  private:
@@ -272,7 +263,7 @@ TEST_CASE("a LucidGlove on a port is opened, read and told apart by hand and ran
 }
 
 TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out") {
-  const std::uint16_t port = NetworkGlove::free_port();
+  const std::uint16_t port = test::free_port();
   const Options options{{"link", std::string("tcp")},
                         {"listen", "127.0.0.1:" + std::to_string(port)}};
   Ports ports;

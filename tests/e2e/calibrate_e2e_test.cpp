@@ -1,0 +1,201 @@
+// A glove behind a running daemon, calibrated from outside: poses, the file, its use, and whose it
+// is.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+
+#include "tests/e2e/served.hpp"
+#include "tests/support/free_port.hpp"
+#include "tests/support/posing_glove.hpp"
+
+namespace posed::test {
+namespace {
+
+using drivers::glove::kPoseNames;
+using drivers::glove::Pose;
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+// A walker, and a LucidGlove that connects over TCP: its address is its identity.
+class CalibrationStage : public Stage {
+ public:
+  CalibrationStage() {
+    REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
+    write_config("");
+  }
+
+  void write_config(const std::string& calibration) const {
+    folder.write("posed.toml",
+                 std::string(kEndpoints) +
+                     "[[stream]]\nname = \"walker\"\ndriver = \"file\"\n[stream.file]\n"
+                     "path = \"walk.bvh\"\nloop = true\n[[stream]]\nname = \"right\"\n"
+                     "driver = \"lucidgloves\"\n" +
+                     calibration + "[stream.lucidgloves]\nlink = \"tcp\"\nlisten = \"" +
+                     endpoint() + "\"\n");
+  }
+
+  void put_on() {
+    glove.emplace("lucidgloves", devices::EmulatedPort::connect_tcp(endpoint()).value());
+  }
+
+  [[nodiscard]] std::string endpoint() const { return "127.0.0.1:" + std::to_string(port_); }
+
+  // `posed calibrate --connect`; the glove's hand does as it is told.
+  Outcome calibrate(const std::vector<std::string>& options) {
+    std::vector<std::string> arguments{"calibrate", "--connect", publish,         "--user",
+                                       "ann",       "--out",     path("ann.toml")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    Process process(arguments);
+    std::string out;
+    while (const auto line = process.line()) {
+      out += *line + "\n";
+      for (std::size_t p = 0; p < kPoseNames.size(); ++p) {
+        if (*line == "pose " + std::string(kPoseNames[p])) glove->hold(static_cast<Pose>(p));
+      }
+    }
+    const auto code = process.exit_code();
+    REQUIRE(code);
+    return {*code, out, process.errors()};
+  }
+
+  [[nodiscard]] std::string read(const std::string& name) const {
+    std::ifstream file(path(name));
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  void wait_for_frame() const {
+    CHECK(posed({"monitor", "--connect", publish, "--stream", "right", "--count", "1"}).code == 0);
+  }
+
+  // The calibrated value of a sensor, now.
+  [[nodiscard]] double value_of(const std::string& sensor) const {
+    const Outcome seen = posed({"monitor", "--connect", publish, "--topic", "sensor", "--stream",
+                                "right", "--json", "--count", "1"});
+    REQUIRE(seen.code == 0);
+    const auto sample = json::parse(seen.out);
+    const auto names = sample.at("name").get<std::vector<std::string>>();
+    const auto at = std::ranges::find(names, sensor);
+    REQUIRE(at != names.end());
+    return sample.at("value").at(static_cast<std::size_t>(at - names.begin()));
+  }
+
+  std::optional<PosingGlove> glove;
+
+ private:
+  std::uint16_t port_ = free_port();
+};
+
+std::string of_another_glove(std::string calibration) {
+  const std::string mine = "tcp 127.0.0.1";
+  const auto at = calibration.find(mine);
+  REQUIRE(at != std::string::npos);
+  return calibration.replace(at, mine.size(), "tcp 10.0.0.7");
+}
+
+}  // namespace
+
+TEST_CASE("a glove is calibrated through the daemon, and the file is for this glove only") {
+  CalibrationStage stage;
+  stage.record();
+  const Outcome away = stage.calibrate({"--stream", "right"});
+  CHECK(away.code == 1);
+  CHECK(has(away.err, "the glove of stream 'right' is away: plug it in"));
+  stage.put_on();
+  stage.wait_for_frame();
+
+  const Outcome done = stage.calibrate(
+      {"--stream", "right", "--seconds", "0.5", "--ready", "0.5", "--pose", "spread=0"});
+  INFO(done.err);
+  REQUIRE(done.code == 0);
+  CHECK(done.out == "pose flat\npose fist\npose thumb\n");
+  CHECK(has(done.err, "posed ctl calibrate right " + stage.path("ann.toml")));
+  const std::string mine = stage.read("ann.toml");
+  CHECK(
+      has(mine, "driver = 'lucidgloves'\nglove = 'tcp 127.0.0.1'\nhand = \"right\"\nuser = 'ann'"));
+
+  stage.glove->hold(Pose::kFist);
+  const double before = stage.value_of("index_joint1");
+  CHECK(before == Approx(80.0 / 90.0).margin(0.01));  // the default: a whole curl is 90 degrees
+  const Outcome applied = stage.ctl({"calibrate", "right", stage.path("ann.toml")});
+  INFO(applied.err);
+  CHECK(applied.code == 0);
+  CHECK(stage.value_of("index_joint1") == Approx(1.0).margin(0.01));  // ann's fist is all of it
+
+  const auto other = stage.folder.write("other.toml", of_another_glove(mine));
+  const Outcome refused = stage.ctl({"calibrate", "right", other.string()});
+  CHECK(refused.code == 1);
+  CHECK(has(refused.err,
+            "this calibration is for glove 'tcp 10.0.0.7', this one is"
+            " 'tcp 127.0.0.1': calibrate this glove"));
+  CHECK(stage.value_of("index_joint1") == Approx(1.0).margin(0.01));
+
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+  const Outcome replayed = posed({"replay", stage.path("take.plog"), "--speed", "max", "--out",
+                                  stage.path("frames.bin"), "--expect"});
+  INFO(replayed.err);
+  CHECK(replayed.code == 0);
+}
+
+TEST_CASE("calibrate --connect says what is wrong with what was asked") {
+  CalibrationStage stage;
+  stage.launch("run");
+  const auto refused = [&](const std::vector<std::string>& options, const std::string& sentence) {
+    const Outcome done = stage.calibrate(options);
+    CHECK(done.code == 2);
+    CHECK(has(done.err, sentence));
+  };
+  refused({"--stream", "nobody"}, "there is no stream 'nobody'; there is: walker, right");
+  refused({"--stream", "walker"}, "no sensors that can be calibrated");
+  refused({}, "--connect also needs --stream");
+  stage.put_on();
+  stage.wait_for_frame();
+  refused({"--stream", "right", "--hand", "left"}, "is of a right hand");
+  refused({"--stream", "right", "--driver", "cyberglove"}, "is of driver 'lucidgloves'");
+  CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
+}
+
+TEST_CASE(
+    "a stream's calibration waits for its glove; another glove is turned away with a sentence") {
+  CalibrationStage stage;
+  const std::string toml =
+      "format = 1\ndriver = \"lucidgloves\"\nhand = \"right\"\nuser = \"ann\"\n"
+      "glove = \"tcp 127.0.0.1\"\n[sensors]\nindex_joint1 = [[0, 0.0], [2000, 1.0]]\n";
+  stage.folder.write("mine.toml", toml);
+  stage.folder.write("other.toml", of_another_glove(toml));
+  stage.write_config("calibration = \"mine.toml\"\n");
+  stage.launch("run");  // the glove is away: whose it will be is not known
+  stage.put_on();
+  stage.glove->hold(Pose::kFist);
+  stage.wait_for_frame();
+  CHECK(stage.value_of("index_joint1") > 1.5);
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+
+  stage.glove.reset();
+  stage.write_config("calibration = \"other.toml\"\n");
+  stage.launch("run");
+  Process events(
+      {"monitor", "--connect", stage.publish, "--topic", "event", "--stream", "right", "--json"});
+  bool told = false;
+  for (int i = 0; i < 10 && !told; ++i) {
+    stage.put_on();  // posed hangs up; the glove tries again
+    for (std::optional<std::string> line; !told && (line = events.line(2s));) {
+      told = line->contains("this calibration is for glove 'tcp 10.0.0.7'");
+    }
+  }
+  CHECK(told);
+  const auto status = json::parse(stage.ctl({"--json", "status"}).out).at("status");
+  const auto& right = status.at("stream").at(1);
+  CHECK(right.at("away") == true);
+  CHECK(right.at("identity") == "");
+}
+
+}  // namespace posed::test
