@@ -15,6 +15,10 @@ namespace {
 
 constexpr std::chrono::milliseconds kTryEvery{400};   // at most 0.5 s apart, the try included
 constexpr std::chrono::milliseconds kLookEvery{200};  // for silence, while a device is there
+// A node that has just come may not open yet: the kernel still finds the device's interfaces, or
+// udev has not given its permissions.
+constexpr std::chrono::milliseconds kTrySoon{50};
+constexpr std::chrono::nanoseconds kSettles = std::chrono::seconds(1);
 
 }  // namespace
 
@@ -55,17 +59,22 @@ void Keeper::sleep() {
   wake.going_to_sleep();
   if (stream_.slot->out.empty() && !stop_.load()) {
     // A node that comes is tried at once; where nothing tells of it, at the next turn.
+    const auto turn = !away_ ? kLookEvery : settling() ? kTrySoon : kTryEvery;
     std::array<pollfd, 2> wait{
         {{wake.fd(), POLLIN, 0}, {away_ ? arrivals_.poll_fd() : -1, POLLIN, 0}}};
-    poll(wait.data(), wait.size(), static_cast<int>((away_ ? kTryEvery : kLookEvery).count()));
+    poll(wait.data(), wait.size(), static_cast<int>(turn.count()));
     if ((wait[0].revents & POLLIN) != 0) {
       std::uint64_t rung = 0;
       [[maybe_unused]] const ssize_t cleared = ::read(wake.fd(), &rung, sizeof rung);
     }
-    if ((wait[1].revents & POLLIN) != 0) static_cast<void>(arrivals_.take());
+    if ((wait[1].revents & POLLIN) != 0 && arrivals_.take()) {
+      settled_ns_ = ports_.clock() + kSettles.count();
+    }
   }
   wake.awake();
 }
+
+bool Keeper::settling() const { return ports_.clock() < settled_ns_; }
 
 // Closes the link: only then can the port be opened again.
 void Keeper::take_back(drivers::Device* device) {
@@ -97,7 +106,7 @@ void Keeper::look_for_device() {
   auto found = try_open();
   if (!found) {
     const std::string text = found.error().text();
-    if (text == told_) return;  // said once
+    if (text == told_ || settling()) return;  // said once, and not of a device that is just coming
     told_ = text;
     ports_.tell(v1::Event::KIND_WARNING, text);
     return;

@@ -44,6 +44,7 @@ class Keeper {
   void look_for_device();
   [[nodiscard]] Result<std::unique_ptr<drivers::Device>> try_open();
   void sleep();
+  [[nodiscard]] bool settling() const;  // a node has come a moment ago
 
   pipeline::OpenStream& stream_;
   KeeperPorts ports_;
@@ -52,7 +53,8 @@ class Keeper {
   std::unique_ptr<drivers::Device> device_;  // the one opened here; null while it is away
   bool away_ = false;
   bool asked_back_ = false;
-  std::string told_;  // why it could not be opened, as last told
+  std::int64_t settled_ns_ = 0;  // when what came last should open
+  std::string told_;             // why it could not be opened, as last told
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

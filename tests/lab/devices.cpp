@@ -1,6 +1,7 @@
 #include "tests/lab/devices.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -107,11 +108,26 @@ std::unique_ptr<LabDevice> device_of(const std::shared_ptr<Bench<Side>>& bench,
   return device;
 }
 
-std::function<bool()> looks_for(std::vector<drivers::Plugged> (*list)(), const Ids& ids) {
-  return [list, ids] {
-    return std::ranges::any_of(list(), [&](const drivers::Plugged& one) {
+// devtmpfs notes when it made a node, on the clock of files; both clocks tick alike.
+std::optional<Moment> made(const std::string& node) {
+  struct statx info{};
+  if (::statx(AT_FDCWD, node.c_str(), 0, STATX_BTIME, &info) != 0) return {};
+  if ((info.stx_mask & STATX_BTIME) == 0) give_up("this kernel does not tell when a node was made");
+  const auto age = std::chrono::system_clock::now().time_since_epoch() -
+                   std::chrono::seconds(info.stx_btime.tv_sec) -
+                   std::chrono::nanoseconds(info.stx_btime.tv_nsec);
+  return std::chrono::steady_clock::now() - age;
+}
+
+std::function<std::optional<Moment>()> looks_for(std::vector<drivers::Plugged> (*list)(),
+                                                 const Ids& ids) {
+  return [list, ids]() -> std::optional<Moment> {
+    const auto all = list();
+    const auto at = std::ranges::find_if(all, [&](const drivers::Plugged& one) {
       return one.vendor == ids.vendor && one.product == ids.product && one.trouble.empty();
     });
+    if (at == all.end()) return {};
+    return made(at->node);
   };
 }
 
@@ -120,7 +136,7 @@ std::unique_ptr<LabDevice> hid_device() {
   auto bench = std::make_shared<Bench<HidSide>>("dummy_udc.0", ids);
   bench->gadget.add_hid(kVendorBytes, kHidReport);
   auto device = device_of(bench, "hidraw");
-  device->is_there = looks_for(drivers::list_hid_nodes, ids);
+  device->there_since = looks_for(drivers::list_hid_nodes, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
     auto link = Ports().hid({.vendor = ids.vendor, .id = ids.serial});
     if (!link) return std::unexpected(link.error());
@@ -135,7 +151,7 @@ std::unique_ptr<LabDevice> serial_device() {
   bench->gadget.add_serial();
   auto device = device_of(bench, "ttyacm");
   device->serial = true;
-  device->is_there = looks_for(drivers::list_serial_ports, ids);
+  device->there_since = looks_for(drivers::list_serial_ports, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
     auto link = Ports().serial({.id = ids.serial});
     if (!link) return std::unexpected(link.error());
@@ -163,7 +179,7 @@ std::unique_ptr<LabDevice> usb_device() {
   device->plug = [gadget, side] { gadget->plug(); };
   device->unplug = [gadget] { gadget->unplug(); };
   device->say = [side](auto bytes) { return side->send(bytes); };
-  device->is_there = looks_for(drivers::list_usb_devices, ids);
+  device->there_since = looks_for(drivers::list_usb_devices, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
     auto link =
         Ports().usb({.vendor = ids.vendor, .product = ids.product, .interface = kP5Interface});

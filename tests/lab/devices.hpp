@@ -2,8 +2,10 @@
 // the host's side.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +14,8 @@
 
 namespace posed::lab {
 
+using Moment = std::chrono::steady_clock::time_point;
+
 struct LabDevice {
   std::string name;
   bool serial = false;  // bytes, not reports
@@ -19,7 +23,8 @@ struct LabDevice {
   // From the device: false when the host did not take it.
   std::function<bool(std::span<const std::byte>)> say;
   std::function<Result<std::unique_ptr<drivers::Transport>>()> open;
-  std::function<bool()> is_there;  // the kernel has found it
+  // When the kernel made its node; nothing while there is none.
+  std::function<std::optional<Moment>()> there_since;
 };
 
 using LabDevices = std::vector<std::unique_ptr<LabDevice>>;

@@ -1,8 +1,7 @@
 #include "tests/lab/listener.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <optional>
 
 #include "daemon/control/zmq_handle.hpp"
 #include "posed/v1/posed.pb.h"
@@ -12,6 +11,7 @@ namespace posed::lab {
 namespace {
 
 constexpr int kLookAround_ms = 50;
+constexpr std::string_view kSamples = "sensor/", kEvents = "event/";
 constexpr int kFewestSensors = 4;  // of a line whose beginning was cut off by opening the port
 
 // The value that all valid raw sensors share; nothing when they differ or are too few.
@@ -29,21 +29,35 @@ std::optional<std::uint32_t> common_value(const v1::Sample& sample) {
   return static_cast<std::uint32_t>(std::lround(*common));
 }
 
+Moment moment(std::int64_t monotonic_ns) { return Moment(std::chrono::nanoseconds(monotonic_ns)); }
+
 }  // namespace
 
-Listener::Listener(const std::string& endpoint, std::map<std::string, std::uint32_t> modulus) {
-  for (const auto& [stream, n] : modulus) states_[stream].modulus = n;
-  thread_ = std::jthread([this, endpoint](const std::stop_token& stop) { listen(stop, endpoint); });
+Listener::Listener(const std::string& endpoint)
+    : thread_([this, endpoint](const std::stop_token& stop) { listen(stop, endpoint); }) {}
+
+const Heard& Listener::of(const std::string& stream) const {
+  static const Heard nothing;
+  const auto at = heard_.find(stream);
+  return at == heard_.end() ? nothing : at->second;
 }
 
 Heard Listener::heard(const std::string& stream) const {
   const std::lock_guard lock(mutex_);
-  return states_.at(stream).heard;
+  return of(stream);
 }
 
-void Listener::new_session(const std::string& stream) {
+std::size_t Listener::samples_since(const std::string& stream, Moment begin) const {
   const std::lock_guard lock(mutex_);
-  states_.at(stream).follows = false;
+  const auto& samples = of(stream).samples;
+  const auto first = std::ranges::lower_bound(samples, begin, {}, &HeardSample::arrived);
+  return static_cast<std::size_t>(samples.end() - first);
+}
+
+bool Listener::lost_since(const std::string& stream, Moment begin) const {
+  const std::lock_guard lock(mutex_);
+  const auto& lost = of(stream).lost;
+  return !lost.empty() && lost.back() >= begin;
 }
 
 void Listener::listen(const std::stop_token& stop, const std::string& endpoint) {
@@ -52,7 +66,8 @@ void Listener::listen(const std::stop_token& stop, const std::string& endpoint) 
   const auto socket = control::open_socket(context->get(), ZMQ_SUB);
   if (!socket) give_up(socket.error().message);
   void* const from = socket->get();
-  if (!control::set_option(from, ZMQ_SUBSCRIBE, "sensor/") ||
+  if (!control::set_option(from, ZMQ_SUBSCRIBE, kSamples) ||
+      !control::set_option(from, ZMQ_SUBSCRIBE, kEvents) ||
       !control::set_option(from, ZMQ_RCVTIMEO, kLookAround_ms) ||
       !control::connect_socket(from, endpoint)) {
     give_up("cannot listen to the daemon");
@@ -60,34 +75,34 @@ void Listener::listen(const std::stop_token& stop, const std::string& endpoint) 
   while (!stop.stop_requested()) {
     control::Message topic, body;
     if (!topic.receive(from, 0) || !topic.more() || !body.receive(from, 0)) continue;
-    take(body.text());
+    topic.text().starts_with(kSamples) ? take_sample(body.text()) : take_event(body.text());
   }
 }
 
-void Listener::take(std::string_view bytes) {
+void Listener::take_sample(std::string_view bytes) {
   v1::Sample sample;
   if (!sample.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
     give_up("a sample that is no message");
   }
   const std::lock_guard lock(mutex_);
-  State& state = states_.at(sample.stream());
-  if (state.sequence != 0 && sample.sequence() > state.sequence + 1) ++state.heard.gaps;
-  if (sample.sequence() == state.sequence) return;  // told once more while it is stale
-  state.sequence = sample.sequence();
-  ++state.heard.samples;
-  state.heard.last_ns = sample.arrival_ns();
-  const auto value = common_value(sample);
-  if (!value) {
-    ++state.heard.mixed;
-    return;
+  auto& samples = heard_[sample.stream()].samples;
+  // One that is told once more while its stream is stale is none.
+  if (!samples.empty() && samples.back().sequence == sample.sequence()) return;
+  samples.push_back({.sequence = sample.sequence(),
+                     .arrived = moment(sample.arrival_ns()),
+                     .heard = std::chrono::steady_clock::now(),
+                     .value = common_value(sample)});
+}
+
+void Listener::take_event(std::string_view bytes) {
+  v1::Event event;
+  if (!event.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    give_up("an event that is no message");
   }
-  if (state.follows && *value != (state.value + 1) % state.modulus) {
-    ++state.heard.skipped;
-    std::printf("     %s: after report %u came %u, sample %llu\n", sample.stream().c_str(),
-                state.value, *value, static_cast<unsigned long long>(sample.sequence()));
-  }
-  state.value = *value;
-  state.follows = true;
+  const std::lock_guard lock(mutex_);
+  Heard& heard = heard_[event.stream()];
+  if (event.kind() == v1::Event::KIND_FOUND) heard.found.push_back(moment(event.time_ns()));
+  if (event.kind() == v1::Event::KIND_LOST) heard.lost.push_back(moment(event.time_ns()));
 }
 
 }  // namespace posed::lab

@@ -94,17 +94,14 @@ struct Outcome {
   std::string trouble;
 };
 
-// Waits as the daemon's keeper does: for news of a node, half a second at most.
-Result<std::unique_ptr<Transport>> open_soon(const LabDevice& device, drivers::Arrivals& arrivals,
-                                             Clock::time_point& there_at) {
+// Waits as the daemon's keeper does for a device that is just coming: for news, or a moment.
+Result<std::unique_ptr<Transport>> open_soon(const LabDevice& device, drivers::Arrivals& arrivals) {
   const auto deadline = Clock::now() + kPatience;
   while (true) {
-    if (there_at == Clock::time_point{} && device.is_there()) there_at = Clock::now();
     auto transport = device.open();
-    if (transport && there_at == Clock::time_point{}) there_at = Clock::now();
     if (transport || Clock::now() > deadline) return transport;
     pollfd wanted{.fd = arrivals.poll_fd(), .events = POLLIN, .revents = 0};
-    ::poll(&wanted, 1, 500);
+    ::poll(&wanted, 1, 50);
     arrivals.take();
   }
 }
@@ -135,18 +132,20 @@ Outcome one_round(LabDevice& device, drivers::Arrivals& arrivals) {
     }
   });
   Outcome outcome;
-  Clock::time_point there_at{};
-  auto transport = open_soon(device, arrivals, there_at);
+  auto transport = open_soon(device, arrivals);
+  const auto there_since = device.there_since();
   if (!transport) {
     outcome.trouble = transport.error().message;
+  } else if (!there_since) {
+    outcome.trouble = "what was opened has no node";
   } else if (auto ok = (*transport)->start(0); !ok) {
     outcome.trouble = ok.error().message;
   }
   Judge judge;
   if (outcome.trouble.empty()) {
     (void)read_until(**transport, judge, device.serial, [&] { return judge.right() > 0; });
-    outcome.enumerated = there_at - plugged_at;
-    outcome.back = Clock::now() - there_at;
+    outcome.enumerated = *there_since - plugged_at;
+    outcome.back = Clock::now() - *there_since;
     (void)read_until(**transport, judge, device.serial,
                      [&] { return judge.right() >= kReportsARound; });
   }
