@@ -6,7 +6,7 @@ build=$(realpath "$1")
 here=$(realpath "$(dirname "$0")")
 lab=$here/../../build/lab # the kernel stays when a build folder goes
 root=$lab/root
-seconds=${POSED_LAB_SECONDS:-300}
+seconds=${POSED_LAB_SECONDS:-600}
 
 # The modules in the order in which they need each other; the rest of a line is options.
 modules="configfs
@@ -69,7 +69,7 @@ boot() {
   [ -z "${POSED_LAB_SMP:-}" ] || clock="-smp $POSED_LAB_SMP"
   timeout "$seconds" qemu-system-x86_64 -m 768 $clock -nographic -no-reboot \
     -kernel "$lab/kernel/unpacked/boot/vmlinuz-$kernel_version" -initrd "$lab/init.gz" \
-    -append "console=ttyS0 panic=-1 ${POSED_LAB_VERBOSE:-quiet} ${POSED_LAB_ONLY:+posed_lab=$POSED_LAB_ONLY}" </dev/null | tr -d '\r' | tee "$lab/console.log" | grep --line-buffered -aE '^(ok|FAIL|LAB)' || true
+    -append "console=ttyS0 panic=-1 ${POSED_LAB_VERBOSE:-loglevel=3} ${POSED_LAB_ONLY:+posed_lab=$POSED_LAB_ONLY}" </dev/null | tr -d '\r' | tee "$lab/console.log" | grep --line-buffered -aE '^(ok|FAIL|LAB)' || true
   grep -q '^LAB PASSED$' "$lab/console.log" || { echo "the lab failed; see $lab/console.log" >&2; tail -20 "$lab/console.log" >&2; exit 1; }
 }
 

@@ -9,7 +9,7 @@
 
 namespace posed::lab {
 
-inline constexpr long kMemorySlack_kb = 512;  // pages that a heap touches late
+inline constexpr long kMemorySlack_kb = 128;  // pages that a heap touches late
 
 struct Resources {
   long descriptors = 0;
