@@ -65,7 +65,7 @@ pack() {
 # its times do not depend on what else the host does. That needs one processor. POSED_LAB_SMP=2 gives it
 # two and the host's clock, to look for races.
 boot() {
-  local clock="-smp 1 -icount shift=${POSED_LAB_SHIFT:-0},sleep=off -rtc clock=vm"
+  local clock="-smp 1 -icount shift=0,sleep=off -rtc clock=vm"
   [ -z "${POSED_LAB_SMP:-}" ] || clock="-smp $POSED_LAB_SMP"
   timeout "$seconds" qemu-system-x86_64 -m 768 $clock -nographic -no-reboot \
     -kernel "$lab/kernel/unpacked/boot/vmlinuz-$kernel_version" -initrd "$lab/init.gz" \
