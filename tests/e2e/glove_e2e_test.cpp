@@ -15,6 +15,7 @@
 
 #include "daemon/pipeline/clock.hpp"
 #include "proto/log/reader.hpp"
+#include "tests/e2e/events.hpp"
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {
@@ -62,16 +63,6 @@ class GloveStage : public Stage {
     CHECK(replay.code == 0);
   }
 };
-
-// The next event of this kind; its time.
-std::int64_t wait_for(Process& events, const std::string& kind) {
-  while (const auto line = events.line()) {
-    const auto event = json::parse(*line);
-    if (event.at("kind") == kind) return std::stoll(event.at("timeNs").get<std::string>());
-  }
-  FAIL("no event " << kind);
-  return 0;
-}
 
 // The numbers of a stream's published frames, as the log keeps them, without a hole.
 std::uint64_t check_frames_follow(const std::string& log, const std::string& stream) {

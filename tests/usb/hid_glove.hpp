@@ -1,0 +1,53 @@
+// A glove on a hidraw node that is not there.
+#pragma once
+
+#include <deque>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/usb/bench.hpp"
+
+namespace posed::test {
+
+class HidGlove {
+ public:
+  using Bytes = std::vector<std::byte>;
+
+  HidGlove(Bench& bench, UsbIds ids);
+  ~HidGlove();
+  HidGlove(const HidGlove&) = delete;
+  HidGlove& operator=(const HidGlove&) = delete;
+
+  // Each time on a node of another number: a glove is found by what it is.
+  void plug();
+  void unplug();
+  // One report; false when it is not plugged in or the host has left 64 of them unread.
+  bool say(std::span<const std::byte> report);
+  // What the host wrote to it since the last call.
+  [[nodiscard]] Bytes heard();
+
+  [[nodiscard]] const std::string& node() const { return node_; }
+
+ private:
+  // Whether this client's node is the one that the glove is plugged in at.
+  bool has_open(UMockdevIoctlClient* client) const;
+  bool answer(UMockdevIoctlClient* client);
+  bool answer_read(UMockdevIoctlClient* client);
+  bool answer_write(UMockdevIoctlClient* client);
+
+  Bench& bench_;
+  UsbIds ids_;
+  int number_ = 0;
+  std::string node_;
+  std::vector<std::string> paths_;  // children first
+
+  std::mutex mutex_;  // what follows; one thread plugs and others speak and answer
+  int bell_ = -1;     // the node is a FIFO that holds a byte for every report
+  std::deque<Bytes> reports_;
+  Bytes heard_;
+  IoctlHandler handler_;  // last: its thread uses all of the above
+};
+
+}  // namespace posed::test
