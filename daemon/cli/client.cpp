@@ -24,7 +24,7 @@ constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAIL
                         ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
                         ZMQ_EVENT_DISCONNECTED;
 
-volatile std::sig_atomic_t interrupted = 0;
+volatile std::sig_atomic_t interrupt_came = 0;
 
 // The first part of a monitor's message: event and value (zmq_socket_monitor).
 std::uint16_t read_event(void* monitor) {
@@ -156,11 +156,11 @@ Error Connection::no_answer() const {
 
 Interrupt::Interrupt() {
   struct sigaction action{};
-  action.sa_handler = [](int) { interrupted = 1; };  // no SA_RESTART: it ends a wait
+  action.sa_handler = [](int) { interrupt_came = 1; };  // no SA_RESTART: it ends a wait
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }
 
-bool Interrupt::came() { return interrupted != 0; }
+bool Interrupt::came() { return interrupt_came != 0; }
 
 }  // namespace posed::cli

@@ -107,14 +107,14 @@ void print(const ordered_json& device) {
   if (!device["trouble"].is_null()) std::printf("    %s\n", text_of(device["trouble"]).c_str());
 }
 
-int list_devices(bool json) {
+int list_devices(bool as_json) {
   const auto all = list_all();
   ordered_json devices = ordered_json::array(), known = ordered_json::array();
   for (const Plugged& one : all) devices.push_back(describe(one, all));
   for (const drivers::Driver& driver : drivers::registry()) {
     known.push_back({{"name", driver.name}, {"summary", driver.summary}});
   }
-  if (json) {
+  if (as_json) {
     std::printf("%s\n", dump({{"devices", devices}, {"drivers", known}}).c_str());
     return 0;
   }
@@ -134,10 +134,10 @@ int list_devices(bool json) {
 
 void add_devices(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("devices", "list the gloves and ports that are plugged in");
-  auto json = std::make_shared<bool>(false);
-  command->add_flag("--json", *json, "one JSON object on stdout");
+  auto as_json = std::make_shared<bool>(false);
+  command->add_flag("--json", *as_json, "one JSON object on stdout");
   command->footer(kFooter);
-  command->callback([json, &exit_code] { exit_code = list_devices(*json); });
+  command->callback([as_json, &exit_code] { exit_code = list_devices(*as_json); });
 }
 
 }  // namespace posed::cli

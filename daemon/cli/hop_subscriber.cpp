@@ -27,7 +27,7 @@ std::string read_line(int fd) {
 bool write_all(int fd, const void* data, std::size_t size) {
   const auto* bytes = static_cast<const char*>(data);
   while (size > 0) {
-    const ssize_t written = write(fd, bytes, size);
+    const ssize_t written = ::write(fd, bytes, size);
     if (written <= 0) return false;
     bytes += written;
     size -= static_cast<std::size_t>(written);

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "proto/clip/text.hpp"
 #include "proto/frame/in_quotes.hpp"
 
 namespace posed::drivers::described {
@@ -16,11 +17,6 @@ std::string listed(std::span<const std::string_view> words) {
     all += word;
   }
   return all;
-}
-
-std::string short_number(double value) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
 }  // namespace
@@ -60,8 +56,8 @@ double TomlReader::number(const toml::table& table, std::string_view key, double
   if (node == nullptr) return without;
   const auto value = node->is_number() ? node->value<double>() : std::nullopt;
   if (value && *value >= low && *value <= high) return *value;
-  blame(*node,
-        in_quotes(key) + " is a number from " + short_number(low) + " to " + short_number(high));
+  blame(*node, in_quotes(key) + " is a number from " + clip::number_text(low) + " to " +
+                   clip::number_text(high));
   return without;
 }
 

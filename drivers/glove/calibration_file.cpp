@@ -1,11 +1,11 @@
 #include "drivers/glove/calibration_file.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <sstream>
 
+#include "proto/clip/text.hpp"
 #include "proto/frame/in_quotes.hpp"
 #include "proto/frame/toml_text.hpp"
 
@@ -97,12 +97,6 @@ class FileReader : private FirstMistake {
   std::optional<std::int64_t> count_;
 };
 
-std::string digits(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  return {text.data(), end};
-}
-
 }  // namespace
 
 Result<CalibrationFile> parse_calibration(const std::string& toml,
@@ -122,12 +116,14 @@ std::string format_calibration(const CalibrationFile& file) {
       << "\nuser = " << toml::value<std::string>(file.user)
       << "\nsensor_count = " << file.sensors.size() << "  # a file cut in half is noticed\n";
   if (!file.parameters.empty()) out << "\n[parameters]\n";
-  for (const auto& [name, value] : file.parameters) out << name << " = " << digits(value) << '\n';
+  for (const auto& [name, value] : file.parameters)
+    out << name << " = " << clip::number_text(value) << '\n';
   if (!file.sensors.empty()) out << "\n[sensors]  # raw value, calibrated value\n";
   for (const auto& [name, points] : file.sensors) {
     out << name << " = [";
     for (std::size_t i = 0; i < points.size(); ++i) {
-      out << (i == 0 ? "[" : ", [") << digits(points[i][0]) << ", " << digits(points[i][1]) << ']';
+      out << (i == 0 ? "[" : ", [") << clip::number_text(points[i][0]) << ", "
+          << clip::number_text(points[i][1]) << ']';
     }
     out << "]\n";
   }

@@ -2,8 +2,10 @@
 
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <string_view>
+
+#include "proto/clip/text.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::bend {
 namespace {
@@ -11,7 +13,7 @@ namespace {
 constexpr int kMinBend = -2000;
 constexpr int kMaxBend = 12000;
 constexpr int kMaxBattery = 100;
-constexpr double kUnit_rad = 0.01 * std::numbers::pi / 180.0;
+constexpr double kUnit_rad = 0.01 * kDegree;
 constexpr std::string_view kGreeting = "BEND1 rate=";
 
 std::byte checksum(std::span<const std::byte, kPacketBytes> bytes) noexcept {
@@ -46,11 +48,7 @@ std::array<std::byte, kPacketBytes> encode_packet(const Packet& packet) noexcept
   return bytes;
 }
 
-std::string greeting(double rate_hz) {
-  std::array<char, 32> digits{};
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), rate_hz).ptr;
-  return std::string(kGreeting) + std::string(digits.data(), end);
-}
+std::string greeting(double rate_hz) { return std::string(kGreeting) + clip::number_text(rate_hz); }
 
 Result<double> parse_greeting(const std::string& text, const std::string& identity) {
   double rate_hz = 0.0;

@@ -1,7 +1,6 @@
 // The hand CSV: its header, its times, and writing one.
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 
@@ -90,11 +89,6 @@ void interpolate(std::vector<double>& time_s, double step_s) {
   }
 }
 
-std::string exact(double value) {
-  std::array<char, 64> buffer{};
-  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
-}
-
 }  // namespace
 
 Result<Draft> draft_hand_csv(std::string_view text, const std::string& name,
@@ -134,8 +128,8 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
   for (std::size_t i = 0; i < time_s.size(); ++i) {
     double& now_s = time_s[i];
     if (last < time_s.size() && now_s < last_s) {
-      return fail("frame " + std::to_string(i + 1) + ": its time " + exact(now_s) +
-                      " lies before the " + exact(last_s) + " of a frame above it",
+      return fail("frame " + std::to_string(i + 1) + ": its time " + number_text(now_s) +
+                      " lies before the " + number_text(last_s) + " of a frame above it",
                   name, draft.frames[i].line);
     }
     if (last < time_s.size() && now_s - last_s < kSameTime_s) now_s = std::nan("");
@@ -151,7 +145,7 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
   if (missing > 0) {
     warnings.push_back(std::to_string(missing) + " of " + std::to_string(time_s.size()) +
                        " frames have no time of their own; " +
-                       (steps_s.empty() ? "played at " + exact(rate_hz) + " Hz"
+                       (steps_s.empty() ? "played at " + number_text(rate_hz) + " Hz"
                                         : std::string("placed between the others")));
   }
   interpolate(time_s, 1.0 / rate_hz);
@@ -162,10 +156,10 @@ Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path)
   return write_text(path, [&clip](std::ostream& file) {
     file << header_line() << '\n';
     for (std::size_t i = 0; i < clip.angles.size(); ++i) {
-      std::string line = exact(clip.time_s[i]);
+      std::string line = number_text(clip.time_s[i]);
       for (const double angle_rad : clip.angles[i]) {
         line += ',';
-        if (std::isfinite(angle_rad)) line += exact(angle_rad);
+        if (std::isfinite(angle_rad)) line += number_text(angle_rad);
       }
       file << line << '\n';
     }

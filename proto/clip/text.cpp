@@ -23,6 +23,11 @@ bool underflows(std::string_view word) noexcept {
 
 }  // namespace
 
+std::string number_text(double value) {
+  std::array<char, 32> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
 std::optional<double> parse_number(std::string_view word) noexcept {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   double value = 0.0;

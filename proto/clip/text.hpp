@@ -18,6 +18,9 @@ namespace posed::clip {
 // one too small for a double is 0. RT-safe.
 [[nodiscard]] std::optional<double> parse_number(std::string_view word) noexcept;
 
+// The shortest text that is read back as the same number.
+[[nodiscard]] std::string number_text(double value);
+
 // The number of a joint angle or length: |value| at most 1e9. RT-safe.
 inline constexpr double kMaxValue = 1e9;
 

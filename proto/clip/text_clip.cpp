@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <map>
 
 #include "proto/clip/files.hpp"
@@ -15,11 +14,6 @@ namespace {
 // say. Its names are parts of the log format.
 constexpr std::string_view kMagic = "posed-clip";
 
-std::string exact(double value) {
-  std::array<char, 64> buffer{};
-  return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
-}
-
 constexpr std::array<std::string_view, 3> kKinds{"bvh", "amc", "csv"};  // by ClipKind
 
 std::string describe(const ClipFiles& files, const Draft& draft, const Clip& clip,
@@ -28,8 +22,8 @@ std::string describe(const ClipFiles& files, const Draft& draft, const Clip& cli
   std::string out(kMagic);
   out += ' ';
   out += kKinds[static_cast<std::size_t>(files.kind)];
-  out += " rate_hz=" + exact(clip.frame_rate_hz);
-  out += " metres_per_unit=" + exact(clip.metres_per_unit);
+  out += " rate_hz=" + number_text(clip.frame_rate_hz);
+  out += " metres_per_unit=" + number_text(clip.metres_per_unit);
   out += " root_joint=" + std::to_string(skeleton.root_joint);
   out += " asf_bytes=" + std::to_string(files.asf.size());
   if (files.kind == ClipKind::kHandCsv) {
