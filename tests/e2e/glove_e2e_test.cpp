@@ -16,6 +16,7 @@
 #include "daemon/pipeline/clock.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/events.hpp"
+#include "tests/e2e/logged_frames.hpp"
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {
@@ -63,27 +64,6 @@ class GloveStage : public Stage {
     CHECK(replay.code == 0);
   }
 };
-
-// The numbers of a stream's published frames, as the log keeps them, without a hole.
-std::uint64_t check_frames_follow(const std::string& log, const std::string& stream) {
-  auto reader = log::Reader::open(log);
-  REQUIRE(reader);
-  std::uint64_t last = 0;
-  for (const log::StreamRow& row : reader->streams()) {
-    if (row.name != stream) continue;
-    auto frames = reader->frames(row.id, false);
-    REQUIRE(frames);
-    while (true) {
-      const auto frame = frames->next();
-      REQUIRE(frame);
-      if (!*frame) break;
-      const std::uint64_t sequence = (*frame)->sequence;
-      CHECK((sequence == last + 1 || sequence == last));  // once more while it is stale
-      last = sequence;
-    }
-  }
-  return last;
-}
 
 TEST_CASE("a glove comes late, goes and comes back; the others never notice") {
   GloveStage stage;
