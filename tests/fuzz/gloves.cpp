@@ -1,0 +1,98 @@
+// Every glove's decoder on any bytes, and on its own packets with any bytes in them. A decoder
+// lives on from input to input as it would on a line, so that millions of inputs are cheap
+// (`decoders` begins anew with each). A find may thus need the inputs before it: run again with the
+// same -seed.
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "drivers/described/device_file.hpp"
+#include "drivers/driver.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
+
+namespace {
+
+using posed::drivers::Driver;
+using posed::drivers::Options;
+using Bytes = std::vector<std::byte>;
+
+constexpr std::size_t kRecords = 2;
+
+void demand(bool holds) {
+  if (!holds) std::abort();
+}
+
+class SoundSink final : public posed::Sink {
+ public:
+  void frame(posed::Frame& frame) noexcept override { demand(posed::test::is_sound(frame)); }
+  void sample(posed::Sample& sample) noexcept override { demand(posed::test::is_sound(sample)); }
+  void outcome(posed::Outcome /*outcome*/) noexcept override {}
+};
+
+struct Glove {
+  std::unique_ptr<posed::drivers::Decoder> decoder;
+  Bytes records;  // as its emulator sends them; none from one that has to be told to start
+};
+
+Glove make_glove(const Driver& driver, const Options& options) {
+  const auto description = driver.expect(options);
+  demand(description.has_value());
+  auto decoder = driver.make_decoder(*description);
+  auto emulator = driver.emulate(options);
+  demand(decoder.has_value() && emulator.has_value());
+  Glove glove{std::move(*decoder), {}};
+  for (std::size_t i = 0; i < kRecords; ++i) {
+    const std::int64_t due_ns = (*emulator)->next_due_ns();
+    if (due_ns != posed::kNoTime_ns) (*emulator)->emit(due_ns, glove.records);
+  }
+  return glove;
+}
+
+std::vector<Glove> make_gloves() {
+  const std::vector<std::pair<const char*, std::vector<std::string>>> kinds{
+      {"encoding", {"alpha", "legacy"}},
+      {"form", {"8bit", "16bit"}},
+      {"model", {"5", "5-wireless", "16", "ultra-wireless", "ultra-usb-5", "ultra-usb-14"}},
+      {"device", posed::drivers::described::shipped_devices()}};
+  std::vector<Glove> gloves;
+  for (const Driver& driver : posed::drivers::registry()) {
+    if (driver.emulate == nullptr) continue;
+    const auto takes = [&driver](const auto& kind) {
+      return std::ranges::find(driver.options, kind.first, &posed::drivers::OptionSpec::name) !=
+             driver.options.end();
+    };
+    const auto kind = std::ranges::find_if(kinds, takes);
+    if (kind == kinds.end()) gloves.push_back(make_glove(driver, {}));
+    if (kind == kinds.end()) continue;
+    for (const std::string& word : kind->second) {
+      gloves.push_back(make_glove(driver, {{kind->first, word}}));
+    }
+  }
+  return gloves;
+}
+
+// Pairs of a place and a byte that stands there instead.
+Bytes edited(const Bytes& records, std::span<const std::byte> edits) {
+  Bytes bytes = records;
+  for (; edits.size() >= 2 && !bytes.empty(); edits = edits.subspan(2)) {
+    bytes[std::to_integer<std::size_t>(edits[0]) * 3 % bytes.size()] = edits[1];
+  }
+  return bytes;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static std::vector<Glove> gloves = make_gloves();
+  const auto bytes = std::as_bytes(std::span(data, size));
+  SoundSink sink;
+  for (Glove& glove : gloves) {
+    glove.decoder->feed(bytes, 0, sink);
+    glove.decoder->feed(edited(glove.records, bytes), 0, sink);
+  }
+  return 0;
+}
