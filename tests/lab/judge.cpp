@@ -11,7 +11,7 @@ using namespace std::chrono_literals;
 
 constexpr auto kMaxReturn = 1s;
 constexpr auto kMaxSilence = 200ms;  // ten reports
-constexpr auto kUnderWay = 60ms;     // from the glove's mouth to the daemon
+constexpr auto kUnderWay = 30ms;     // from the glove's mouth to the daemon
 
 // The report of this value that was said last when it arrived.
 std::size_t number_of(const HeardSample& sample, const std::vector<Moment>& said,
