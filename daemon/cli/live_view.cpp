@@ -1,6 +1,7 @@
 #include "daemon/cli/live_view.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include <spdlog/fmt/fmt.h>
@@ -100,8 +101,9 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
                     links == 2 ? "once" : fmt::format("{} times", links - 1)));
   }
   if (stream.has_clock_offset_ns()) {
+    const float drift_ppm = std::round(stream.clock_drift_ppm() * 10.0F) / 10.0F + 0.0F;  // no -0.0
     add(fmt::format("clock {:+.3f} s, drift {:+.1f} ppm", seconds(stream.clock_offset_ns()),
-                    stream.clock_drift_ppm()));
+                    drift_ppm));
   }
   if (!stream.greeting().empty()) add(config::without_controls(stream.identity()));
   return text;

@@ -91,6 +91,9 @@ TEST_CASE("the live view tells which gloves are away, since when, and how a glov
       lines[8].starts_with("  walker2   back for 3 min, reconnected 3 times, clock -2.500 s, dri"));
   CHECK(lines[9].starts_with("  walker3   0403:6001 A9XYZ"));
   const auto wide = live_view(stats, {.title = "posed", .width = 120, .height = 0});
+  stats.mutable_stream(2)->set_clock_drift_ppm(-0.02F);
+  CHECK(live_view(stats, {.title = "posed", .width = 120, .height = 0})[8].contains(
+      "drift +0.0 ppm"));
   CHECK(wide[8].contains("drift +7.3 ppm, /dev/?[2J"));
   CHECK(live_view(stats, {.height = 0, .colour = true})[3].starts_with("\x1b[33m"));
 }
