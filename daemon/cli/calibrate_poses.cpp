@@ -66,12 +66,13 @@ class Recording {
     auto& held = recorded_[static_cast<std::size_t>(pose)];
     held = {};
     begin();
+    const double held_s = plan_.seconds[static_cast<std::size_t>(pose)];
+    const double whole_s = plan_.settle_s + held_s;  // to the user it is one time to be still
     const auto settle = [&](const Raw& raw, const Valid& valid) {
-      guide_.show(raw, valid, PosePhase::kSettling, plan_.settle_s - past_s(), plan_.settle_s);
+      guide_.show(raw, valid, PosePhase::kSettling, whole_s - past_s(), whole_s);
     };
     if (auto ok = source_.listen(plan_.settle_s, settle); !ok) return ok;
     begin();
-    const double whole_s = plan_.seconds[static_cast<std::size_t>(pose)];
     std::array<std::optional<Span>, drivers::glove::kMaxSensors> spans{};
     const auto keep = [&](const Raw& raw, const Valid& valid) {
       for (std::size_t i = 0; i < raw.size(); ++i) {
@@ -81,9 +82,9 @@ class Recording {
         spans[i]->low = std::min(spans[i]->low, raw[i]);
         spans[i]->high = std::max(spans[i]->high, raw[i]);
       }
-      guide_.show(raw, valid, PosePhase::kHeld, whole_s - past_s(), whole_s);
+      guide_.show(raw, valid, PosePhase::kHeld, held_s - past_s(), whole_s);
     };
-    if (auto ok = source_.listen(whole_s, keep); !ok) return ok;
+    if (auto ok = source_.listen(held_s, keep); !ok) return ok;
     const auto& sensors = source_.model().sensors;
     for (std::size_t i = 0; i < sensors.size(); ++i) {
       if (!spans[i] || !is_restless(*spans[i], sensors[i])) continue;

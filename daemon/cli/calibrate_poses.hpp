@@ -34,8 +34,8 @@ class PoseGuide {
   enum class Word { kNothing, kGo, kBack, kStop };
   [[nodiscard]] virtual Word hear() = 0;
 
-  // A measurement. `left_s` of a phase of `whole_s` is still to come; both 0 where the user ends
-  // it.
+  // A measurement. `left_s` of `whole_s` are still to come: of the time to get ready, or to be
+  // still, settling included; both 0 where the user ends it.
   virtual void show(const GloveSource::Raw& raw, const GloveSource::Valid& valid, PosePhase phase,
                     double left_s, double whole_s) = 0;
 

@@ -38,6 +38,7 @@ void PoseScreen::want(Pose pose) {
   while (screen_.key_pressed() != 0) {
   }
   view_.pose = static_cast<std::size_t>(std::ranges::find(view_.poses, pose) - view_.poses.begin());
+  view_.any_held = ranging_;
   view_.phase = PosePhase::kAsked;
   view_.left_s = view_.share = 0.0;
   draw();
@@ -60,13 +61,13 @@ void PoseScreen::show(const GloveSource::Raw& raw, const GloveSource::Valid& val
   view_.left_s = std::max(left_s, 0.0);
   view_.share = whole_s > 0.0 ? 1.0 - view_.left_s / whole_s : 0.0;
   if (phase != PosePhase::kAsked) view_.note.clear();  // it was about the pose before
-  const bool first_hold = phase == PosePhase::kHeld && !view_.any_held;
-  view_.any_held = view_.any_held || phase == PosePhase::kHeld;
+  const bool first_held = phase == PosePhase::kHeld && !ranging_;
+  ranging_ = ranging_ || first_held;
   for (std::size_t i = 0; i < view_.sensors.size(); ++i) {
     if (!valid[i]) continue;
     SensorView& sensor = view_.sensors[i];
     sensor.value = static_cast<double>(raw[i]);
-    if (first_hold || !sensor.there || !view_.any_held) sensor.low = sensor.high = sensor.value;
+    if (first_held || !sensor.there || !ranging_) sensor.low = sensor.high = sensor.value;
     sensor.there = true;
     sensor.low = std::min(sensor.low, sensor.value);
     sensor.high = std::max(sensor.high, sensor.value);

@@ -26,6 +26,7 @@ class PoseScreen final : public PoseGuide {
 
   LiveScreen screen_;
   CalibrateView view_;
+  bool ranging_ = false;  // a pose is, or was, held: where sensors have been counts from then on
   std::chrono::steady_clock::time_point drawn_{}, heard_{};
 };
 
