@@ -24,17 +24,30 @@ usb_f_acm
 usb_f_fs
 cdc-acm"
 
-# The kernel's package is downloaded and unpacked, never installed.
-fetch_kernel() {
-  local package
-  package=$(apt-cache depends linux-image-amd64 | sed -n 's/^ *Depends: \(linux-image-[0-9].*\)/\1/p' | head -1)
-  [ -n "$package" ] || { echo "no kernel package is known; run: apt-get update" >&2; exit 1; }
+newest_kernel() {
+  apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/^ *Depends: \(linux-image-[0-9].*\)/\1/p' | head -1
+}
+
+download_kernel() {
+  local package=$1
   mkdir -p "$lab/kernel"
   if [ ! -e "$lab/kernel/$package.ready" ]; then
-    (cd "$lab/kernel" && apt-get download -qq "$package" && dpkg-deb -x "$package"_*.deb unpacked && rm "$package"_*.deb)
+    (cd "$lab/kernel" && apt-get download -qq "$package" && dpkg-deb -x "$package"_*.deb unpacked && rm "$package"_*.deb) || return
     touch "$lab/kernel/$package.ready"
   fi
   kernel_version=${package#linux-image-}
+}
+
+# The kernel's package is downloaded and unpacked, never installed. What apt knows may be nothing, or too old
+# for the mirror: then it is told to look, which needs root.
+fetch_kernel() {
+  local package
+  package=$(newest_kernel)
+  if [ -n "$package" ] && download_kernel "$package" 2>/dev/null; then return; fi
+  apt-get update -qq
+  package=$(newest_kernel)
+  [ -n "$package" ] || { echo "apt knows no linux-image-amd64; is this Debian on amd64?" >&2; exit 1; }
+  download_kernel "$package"
 }
 
 # add_program FILE: the program and every library it needs, at the paths where it looks for them.

@@ -9,7 +9,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kMaxReturn = 1s;
+constexpr auto kMaxReturn = 1s;      // from the plug
+constexpr auto kMaxOpening = 400ms;  // from the node: the keeper's turn without news of it
 constexpr auto kMaxSilence = 200ms;  // ten reports
 constexpr auto kUnderWay = 30ms;     // from the glove's mouth to the daemon
 
@@ -92,7 +93,7 @@ class Judge {
 
 bool Verdict::good() const {
   return trouble.empty() && mixed == 0 && skipped == 0 && gaps == 0 && ours == 0 &&
-         cut_early == 0 && back < kMaxReturn && silence < kMaxSilence;
+         cut_early == 0 && back < kMaxOpening && since_plug < kMaxReturn && silence < kMaxSilence;
 }
 
 std::string Verdict::text() const {
