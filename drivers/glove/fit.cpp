@@ -60,7 +60,9 @@ Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand
   for (std::size_t i = 0; i < sensors; ++i) {
     if (count[i] > 0.0) values[i] = sum[i] / count[i];
     // A share of a finger's way is none or all of it in a pose, whatever its joints' limits are.
-    if (count[i] > 0.0 && model.sensors[i].unit == "1") values[i] = std::round(values[i]);
+    if (count[i] > 0.0 && model.sensors[i].unit == "1") {
+      values[i] = std::clamp(std::round(values[i]), -1.0, 1.0);
+    }
   }
   if (model.uncompute != nullptr) model.uncompute(values);
   return values;

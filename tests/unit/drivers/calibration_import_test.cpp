@@ -176,4 +176,19 @@ TEST_CASE("poses without a flat hand, or without any movement, fit nothing") {
   CHECK(nothing.error().message.contains("no sensor moved"));
 }
 
+TEST_CASE("in a pose a share of a finger's way is none or all of it, on every glove") {
+  for (const Driver& driver : registry()) {
+    if (driver.glove_model == nullptr || driver.name == "described") continue;
+    const auto model = driver.glove_model(driver.expect({}).value()).value();
+    for (std::size_t p = 0; p < kPoses; ++p) {
+      const auto values = values_of(model, hand_in(static_cast<Pose>(p))).value();
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        if (model.sensors[i].unit != "1" || std::isnan(values[i])) continue;
+        INFO(driver.name << " " << model.sensors[i].name << " in " << kPoseNames[p]);
+        CHECK((values[i] == 0.0 || std::abs(values[i]) == 1.0));
+      }
+    }
+  }
+}
+
 }  // namespace posed::drivers::glove
