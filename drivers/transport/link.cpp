@@ -18,6 +18,7 @@ using std::chrono::milliseconds;
 constexpr std::size_t kRead = 4096;  // bytes; a HID report and a terminal's buffer fit in one
 constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
+constexpr int kMostWaiting = 256;  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
   return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
@@ -50,7 +51,7 @@ class LinkTransport final : public Transport {
   explicit LinkTransport(Link link) : link_(std::move(link)) {}
 
   [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
-  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
 
@@ -63,6 +64,14 @@ class LinkTransport final : public Transport {
   std::array<std::byte, kRead> unsent_;
   std::size_t unsent_from_ = 0, unsent_to_ = 0;
 };
+
+// What came while other devices were opened is old, and all of it would get one arrival time: the
+// device begins with what comes now. Bounded, for one that never stops.
+Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
+  for (int i = 0; i < kMostWaiting && ::read(link_.fd(), buffer_.data(), buffer_.size()) > 0; ++i) {
+  }
+  return {};
+}
 
 // One read a call, so that one HID report is one chunk. All devices are opened such that 0 bytes
 // mean a hang-up (VMIN is 1). RT-safe but for the read.

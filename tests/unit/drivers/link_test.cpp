@@ -113,6 +113,17 @@ TEST_CASE("drain leaves nothing of what came before") {
   CHECK(text_of(*bytes) == "answer");
 }
 
+TEST_CASE("a device that was opened early begins with what comes from its start on") {
+  PseudoTerminal terminal;
+  const auto transport = make_link_transport(open_port(terminal));
+  terminal.say("old");
+  REQUIRE(readable(*transport));
+  REQUIRE(transport->start(0));
+  terminal.say("new");
+  REQUIRE(readable(*transport));
+  CHECK(text_of(transport->read(0).bytes) == "new");
+}
+
 TEST_CASE("an unplugged port is lost for the reader and an error for cold code") {
   PseudoTerminal terminal;
   const auto transport = make_link_transport(open_port(terminal));

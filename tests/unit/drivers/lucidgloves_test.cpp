@@ -273,9 +273,9 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
   auto device = driver().open(options, ports);
   if (!device) FAIL(device.error().text());
   CHECK(glove.heard() == "(ZA)Z\n");
-  glove.say("A1B2C3D4E5\n\r\nA2B2C3D4E5\n\r\n");
   CollectSink sink;
   REQUIRE(device->transport->start(0));
+  glove.say("A1B2C3D4E5\n\r\nA2B2C3D4E5\n\r\n");
   for (int i = 0; i < 1000 && sink.frames.size() < 2; ++i) {
     pollfd ready{.fd = device->transport->poll_fd(), .events = POLLIN, .revents = 0};
     (void)::poll(&ready, 1, 10);
