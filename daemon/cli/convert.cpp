@@ -1,4 +1,4 @@
-// posed convert: a clip in one format to a clip in another.
+// posed convert: a clip in one format to a clip in another, or a device log's stream to a clip.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -8,12 +8,16 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/record/log_clip.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::cli {
 namespace {
+
+constexpr const char* kUneven = "frames are not evenly spaced, but a BVH's are: its clock differs";
 
 struct Convert {
   std::string in;
@@ -21,17 +25,23 @@ struct Convert {
   clip::ReadOptions read;
   double metres_per_unit = 0.0;  // 0: not given
   std::string hand;              // "left", "right" or not given
+  std::string stream;            // of a log; empty: the only one
   bool json = false;
 };
 
-bool is_hand_csv(const std::string& path) {
-  return clip::lower(std::filesystem::path(path).extension().string()) == ".csv";
+bool ends_in(const std::string& path, const std::string& extension) {
+  return clip::lower(std::filesystem::path(path).extension().string()) == extension;
 }
 
+bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
+bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
+
 Result<> check_paths(const Convert& convert) {
-  if (!is_hand_csv(convert.out) &&
-      clip::lower(std::filesystem::path(convert.out).extension().string()) != ".bvh") {
+  if (!is_hand_csv(convert.out) && !ends_in(convert.out, ".bvh")) {
     return misuse("can write .bvh, and .csv of a hand; name OUT so", convert.out);
+  }
+  if (!convert.stream.empty() && !is_log(convert.in)) {
+    return misuse("is no device log (.plog), so --stream means nothing", convert.in);
   }
   std::error_code error;
   if (std::filesystem::equivalent(convert.in, convert.out, error)) {
@@ -40,16 +50,25 @@ Result<> check_paths(const Convert& convert) {
   return {};
 }
 
-// A hand CSV has no room for a body, a BVH none for a gap or an uneven clock.
+// A BVH has no room for a gap or an uneven clock.
+Result<clip::Clip> read_log(const Convert& convert) {
+  auto clip = record::clip_of_log(convert.in, convert.stream);
+  if (!clip || is_hand_csv(convert.out)) return clip;
+  clip::hold_missing(*clip);
+  if (clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
+    clip->warnings.emplace_back(kUneven);
+  return clip;
+}
+
+// Nor has a hand CSV room for a body.
 Result<clip::Clip> read(const Convert& convert) {
+  if (is_log(convert.in)) return read_log(convert);
   auto clip = clip::read_clip(convert.in, convert.read);
   if (!clip || !is_hand_csv(convert.in) || is_hand_csv(convert.out)) return clip;
   auto hand = clip::hand_of(*clip, convert.read);
   if (!hand) return std::unexpected(hand.error());
   clip::fill_gaps(*hand);
-  if (clip::has_uneven_times(*hand)) {
-    hand->warnings.emplace_back("frames are not evenly spaced, but a BVH's are: its clock differs");
-  }
+  if (clip::has_uneven_times(hand->time_s, hand->rate_hz)) hand->warnings.emplace_back(kUneven);
   return clip::clip_of_hand(*hand, convert.read.hand_shape);
 }
 
@@ -93,9 +112,11 @@ int run(Convert& convert) {
 }  // namespace
 
 void add_convert(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("convert", "Write a clip in another format");
+  CLI::App* command =
+      app.add_subcommand("convert", "Write a clip, or a log's stream, in another format");
   auto convert = std::make_shared<Convert>();
-  command->add_option("IN", convert->in, "Clip to read: .bvh, .amc or a hand as .csv")->required();
+  command->add_option("IN", convert->in, "To read: .bvh, .amc, a hand as .csv, or a log (.plog)")
+      ->required();
   command->add_option("--out", convert->out, "Clip to write: .bvh, or .csv of a hand")->required();
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
@@ -107,6 +128,8 @@ void add_convert(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1e-6, 1e6));
   command->add_option("--profile", convert->read.profile,
                       "Skeleton profile (default: found by the joints' names)");
+  command->add_option("--stream", convert->stream,
+                      "Which of a log's streams (default: the only one)");
   command->add_option("--hand", convert->hand, "Whose a hand CSV is, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH")
@@ -116,11 +139,14 @@ void add_convert(CLI::App& app, int& exit_code) {
       "A BVH keeps its names, hierarchy, channel order and unit. An AMC becomes a BVH in\n"
       "centimetres with Z, Y, X rotations on every joint. A hand CSV\n"
       "holds 45 angles a frame; any BVH with the fifteen finger joints of a hand can become "
-      "one.\n\n"
+      "one.\n"
+      "A log gives the frames that were published, styled as they were; its BVH is in "
+      "centimetres.\n\n"
       "Examples:\n"
       "  posed convert 07_01.amc --out walk.bvh\n"
       "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
-      "  posed convert glove.csv --hand left --out glove.bvh");
+      "  posed convert glove.csv --hand left --out glove.bvh\n"
+      "  posed convert take1.plog --stream walker --out walker.bvh");
   command->callback([convert, &exit_code] { exit_code = run(*convert); });
 }
 

@@ -71,12 +71,6 @@ class ChannelWriter {
   clip::Clip& clip_;
 };
 
-bool is_acclaim(const Skeleton& skeleton) {
-  return std::ranges::any_of(skeleton.joints, [](const Joint& joint) {
-    return !joint.channel_frame.isApprox(Eigen::Quaterniond::Identity());
-  });
-}
-
 }  // namespace
 
 Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
@@ -88,7 +82,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   StyleFilter filter(&ready, options.filter);
   if (!options.cold) filter.settle(clip.frame(0), settled_heading_rad(clip, ready.space));
 
-  Applied applied{.clip = is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip};
+  Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip};
   ChannelWriter writer(applied.clip);
   std::bitset<kMaxJoints> changed;
   double sum = 0.0;

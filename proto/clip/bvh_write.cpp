@@ -104,13 +104,6 @@ class Writer {
   std::string out_;
 };
 
-bool is_acclaim(const Skeleton& skeleton) {
-  for (const Joint& joint : skeleton.joints) {
-    if (!joint.channel_frame.isApprox(Eigen::Quaterniond::Identity())) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 
 #include "proto/clip/clip.hpp"
@@ -9,6 +10,12 @@ constexpr std::array kZyx{Axis::kZ, Axis::kY, Axis::kX};
 constexpr double kCentimetre_m = 0.01;
 
 }  // namespace
+
+bool is_acclaim(const Skeleton& skeleton) {
+  return std::ranges::any_of(skeleton.joints, [](const Joint& joint) {
+    return !joint.channel_frame.isApprox(Eigen::Quaterniond::Identity());
+  });
+}
 
 Clip with_zyx_channels(const Clip& clip) {
   auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);

@@ -1,5 +1,7 @@
 #include "proto/clip/clip.hpp"
 
+#include <cmath>
+
 #include "proto/clip/files.hpp"
 
 namespace posed::clip {
@@ -13,6 +15,14 @@ Frame Clip::frame(int index) const {
   const auto row = channels.row(index);
   pose_from_channels(*skeleton, {row.data(), static_cast<std::size_t>(row.size())}, frame);
   return frame;
+}
+
+bool has_uneven_times(const std::vector<double>& time_s, double rate_hz) {
+  for (std::size_t i = 0; i < time_s.size(); ++i) {
+    const double even_s = time_s.front() + static_cast<double>(i) / rate_hz;
+    if (std::abs(time_s[i] - even_s) * rate_hz > 0.1) return true;
+  }
+  return false;
 }
 
 Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& options) {

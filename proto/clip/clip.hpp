@@ -46,6 +46,12 @@ struct ReadOptions {
 [[nodiscard]] Result<Clip> read_clip(const std::filesystem::path& path,
                                      const ReadOptions& options = {});
 
+// Some frame is more than a tenth of a step off the even clock at `rate_hz` that a BVH has.
+[[nodiscard]] bool has_uneven_times(const std::vector<double>& time_s, double rate_hz);
+
+// Its channels turn in frames that a BVH has not.
+[[nodiscard]] bool is_acclaim(const Skeleton& skeleton);
+
 // The same motion with Z, Y, X rotation channels on every joint (Z outermost), in centimetres, so
 // that a rotation that an Acclaim joint's few degrees of freedom could not make can be written.
 [[nodiscard]] Clip with_zyx_channels(const Clip& clip);

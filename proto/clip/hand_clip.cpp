@@ -135,14 +135,6 @@ Result<Clip> clip_of_hand(const HandClip& hand, const std::string& hand_shape) {
   return clip;
 }
 
-bool has_uneven_times(const HandClip& clip) {
-  for (std::size_t i = 0; i < clip.time_s.size(); ++i) {
-    const double even_s = clip.time_s.front() + static_cast<double>(i) / clip.rate_hz;
-    if (std::abs(clip.time_s[i] - even_s) * clip.rate_hz > 0.1) return true;
-  }
-  return false;
-}
-
 void fill_gaps(HandClip& clip) {
   std::size_t filled = 0;
   const std::size_t frames = clip.angles.size();

@@ -44,9 +44,6 @@ struct HandClip {
 // channel has none at all. Says in `warnings` how much. For formats that cannot leave a gap.
 void fill_gaps(HandClip& clip);
 
-// Some frame is more than a tenth of a step off the even clock at rate_hz.
-[[nodiscard]] bool has_uneven_times(const HandClip& clip);
-
 // Writes the hand CSV; what is not finite becomes an empty field.
 [[nodiscard]] Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path);
 

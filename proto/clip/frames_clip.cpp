@@ -1,0 +1,159 @@
+#include "proto/clip/frames_clip.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "proto/frame/rotation.hpp"
+
+namespace posed::clip {
+namespace {
+
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
+
+std::shared_ptr<const Skeleton> writable(std::shared_ptr<const Skeleton> skeleton) {
+  if (!is_acclaim(*skeleton)) return skeleton;
+  Clip none;
+  none.skeleton = std::move(skeleton);
+  none.channels.resize(0, std::ssize(none.skeleton->channels));
+  return with_zyx_channels(none).skeleton;
+}
+
+int moving_joint(const Skeleton& skeleton) {
+  for (int j = skeleton.root_joint; j >= 0; j = skeleton.joints[j].parent) {
+    for (const Channel& channel : skeleton.channels) {
+      if (channel.translation && channel.joint == j) return j;
+    }
+  }
+  return -1;
+}
+
+Eigen::Quaterniond rotation_of(const Frame& frame, int joint) {
+  return to_eigen_double(frame.rotation_xyzw[static_cast<std::size_t>(joint)]);
+}
+
+double median_step_s(const std::vector<double>& time_s) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
+  const auto middle = steps.begin() + std::ssize(steps) / 2;
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+}  // namespace
+
+FramesClip::FramesClip(std::shared_ptr<const Skeleton> skeleton)
+    : skeleton_(writable(skeleton)),
+      exact_(skeleton_ == skeleton),
+      moving_(moving_joint(*skeleton_)),
+      row_(skeleton_->channels.size()) {
+  for (std::size_t c = 0; c < row_.size(); ++c) {
+    const Channel& channel = skeleton_->channels[c];
+    if (channel.translation) {
+      row_[c] = skeleton_->joints[channel.joint].offset_m[static_cast<int>(channel.axis)];
+    }
+  }
+}
+
+void FramesClip::add(const Frame& frame) {
+  add_angles(frame);
+  add_root_position(frame);
+  values_.insert(values_.end(), row_.begin(), row_.end());
+}
+
+void FramesClip::add_angles(const Frame& frame) {
+  std::size_t angle = 0;
+  for (std::size_t c = 0; c < row_.size();) {
+    if (skeleton_->channels[c].translation) {
+      ++c;
+      continue;
+    }
+    const int joint = skeleton_->channels[c].joint;
+    const std::size_t first = c;
+    while (c < row_.size() && skeleton_->channels[c].joint == joint &&
+           !skeleton_->channels[c].translation) {
+      ++c;
+    }
+    const std::span<double> angles(row_.data() + first, c - first);
+    if (exact_ && frame.angle_count > 0) {
+      for (double& value : angles) value = static_cast<double>(frame.angle_rad[angle++]);
+      continue;
+    }
+    std::array<double, 3> near_rad{};
+    std::ranges::transform(angles, near_rad.begin(),
+                           [](double value) { return std::isfinite(value) ? value : 0.0; });
+    const auto turned =
+        channels_from_rotation(*skeleton_, joint, rotation_of(frame, joint), near_rad);
+    const bool known = frame.valid[static_cast<std::size_t>(joint)];
+    for (std::size_t i = 0; i < angles.size(); ++i) angles[i] = known ? turned[i] : kNoValue;
+  }
+}
+
+// Back from where the root joint is in the world to the position of the moving joint in its
+// parent's frame, past the bones between them.
+void FramesClip::add_root_position(const Frame& frame) {
+  if (moving_ < 0) return;
+  std::vector<int> chain;  // from the moving joint's parent up
+  for (int j = skeleton_->joints[moving_].parent; j >= 0; j = skeleton_->joints[j].parent) {
+    chain.push_back(j);
+  }
+  Eigen::Quaterniond above = Eigen::Quaterniond::Identity();  // the parent's frame to the world
+  Eigen::Vector3d parent = Eigen::Vector3d::Zero();
+  for (auto j = chain.rbegin(); j != chain.rend(); ++j) {
+    parent += above * skeleton_->joints[*j].offset_m;
+    above = above * rotation_of(frame, *j);
+  }
+  Eigen::Vector3d below = Eigen::Vector3d::Zero();  // the root joint in the moving one's frame
+  for (int j = skeleton_->root_joint; j != moving_; j = skeleton_->joints[j].parent) {
+    below = skeleton_->joints[j].offset_m + rotation_of(frame, j) * below;
+  }
+  const Eigen::Vector3d root =
+      Eigen::Map<const Eigen::Vector3f>(frame.root_position_m.data()).cast<double>();
+  const Eigen::Vector3d position =
+      above.conjugate() * (root - parent) - rotation_of(frame, moving_) * below;
+  for (std::size_t c = 0; c < row_.size(); ++c) {
+    const Channel& channel = skeleton_->channels[c];
+    if (channel.translation && channel.joint == moving_) {
+      row_[c] = position[static_cast<int>(channel.axis)];
+    }
+  }
+}
+
+Result<Clip> FramesClip::finish(const std::string& path, double rate_hz,
+                                std::vector<double> time_s) const {
+  if (time_s.size() < 2) return fail("has fewer than two frames of this stream", path);
+  Clip clip;
+  clip.path = path;
+  clip.skeleton = skeleton_;
+  clip.frame_rate_hz = rate_hz > 0.0 ? rate_hz : 1.0 / median_step_s(time_s);
+  clip.channels =
+      Eigen::Map<const ChannelMatrix>(values_.data(), std::ssize(time_s), std::ssize(row_));
+  clip.time_s = std::move(time_s);
+  return clip;
+}
+
+void hold_missing(Clip& clip) {
+  std::size_t held = 0;
+  for (Eigen::Index c = 0; c < clip.channels.cols(); ++c) {
+    auto column = clip.channels.col(c);
+    double last = 0.0;
+    for (Eigen::Index i = column.size() - 1; i >= 0; --i) {
+      if (std::isfinite(column[i])) last = column[i];  // the first of all
+    }
+    for (double& value : column) {
+      if (std::isfinite(value)) {
+        last = value;
+        continue;
+      }
+      value = last;
+      ++held;
+    }
+  }
+  if (held == 0) return;
+  clip.warnings.push_back(std::to_string(held) + " of " + std::to_string(clip.channels.size()) +
+                          " values are missing; each holds the one before it");
+}
+
+}  // namespace posed::clip
