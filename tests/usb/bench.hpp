@@ -53,7 +53,8 @@ struct FreeData {
   void operator()(UMockdevIoctlData* data) const { umockdev_ioctl_data_unref(data); }
 };
 using IoctlData = std::unique_ptr<UMockdevIoctlData, FreeData>;
-// `bytes` behind the pointer at `offset` of `from`; empty for a null pointer.
+// `bytes` behind the pointer at `offset` of `from`; empty for a null pointer and a client that has
+// gone.
 [[nodiscard]] IoctlData resolve(UMockdevIoctlData* from, std::size_t offset, std::size_t bytes);
 
 // Answers everyone who has a node open, on a thread of umockdev's.

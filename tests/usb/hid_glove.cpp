@@ -96,6 +96,7 @@ bool HidGlove::has_open(UMockdevIoctlClient* client) const {
 bool HidGlove::answer(UMockdevIoctlClient* client) {
   if (umockdev_ioctl_client_get_request(client) != HIDIOCGRAWINFO) return false;
   const auto data = resolve(umockdev_ioctl_client_get_arg(client), 0, sizeof(hidraw_devinfo));
+  if (!data) return false;  // a program that was killed meanwhile
   hidraw_devinfo info{};
   info.bustype = BUS_USB;
   info.vendor = static_cast<std::int16_t>(ids_.vendor);

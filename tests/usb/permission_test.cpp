@@ -5,68 +5,29 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <optional>
 #include <string>
-#include <vector>
+#include <thread>
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/enumerate.hpp"
 #include "drivers/transport/ports.hpp"
-#include "tests/e2e/outcome.hpp"
-#include "tests/support/shared.hpp"
+#include "tests/e2e/stage.hpp"
+#include "tests/support/permission.hpp"
 #include "tests/usb/gloves.hpp"
 #include "tests/usb/hid_glove.hpp"
 #include "tests/usb/p5_glove.hpp"
+#include "tests/usb/speaker.hpp"
 
 namespace posed::test {
 namespace {
 
 using drivers::Ports;
 
-constexpr uid_t kNobody = 65534;
-
-// root may do everything, so root is somebody else for a while.
-class AsNobody {
- public:
-  AsNobody() {
-    if (::getuid() != 0) return;
-    groups_.resize(static_cast<std::size_t>(::getgroups(0, nullptr)));
-    groups_.resize(
-        static_cast<std::size_t>(::getgroups(static_cast<int>(groups_.size()), groups_.data())));
-    REQUIRE(::setgroups(0, nullptr) == 0);
-    REQUIRE(::setresgid(kNobody, kNobody, 0) == 0);
-    REQUIRE(::setresuid(kNobody, kNobody, 0) == 0);
-    changed_ = true;
-  }
-  ~AsNobody() {
-    if (!changed_) return;
-    const bool back = ::setresuid(0, 0, 0) == 0 && ::setresgid(0, 0, 0) == 0 &&
-                      ::setgroups(groups_.size(), groups_.data()) == 0;
-    if (!back) std::abort();
-  }
-  AsNobody(const AsNobody&) = delete;
-  AsNobody& operator=(const AsNobody&) = delete;
-
- private:
-  std::vector<gid_t> groups_;
-  bool changed_ = false;
-};
-
 void forbid(const Bench& bench, const std::string& node) {
   std::filesystem::permissions(bench.file_of(node), std::filesystem::perms::none);
-}
-
-// The sentence names the node, the rule and what to do with it.
-void check_sentence(const std::string& sentence, const std::string& node) {
-  INFO(sentence);
-  CHECK(sentence.find("no permission for " + node) != std::string::npos);
-  const auto rule = sentence.find("config/udev/70-posed.rules");
-  CHECK(rule != std::string::npos);
-  CHECK(std::filesystem::exists(source_dir() / "config/udev/70-posed.rules"));
-  CHECK(sentence.find("install") != std::string::npos);
-  CHECK(sentence.find("plug the glove in again") != std::string::npos);
 }
 
 }  // namespace
@@ -130,6 +91,39 @@ TEST_CASE("a node of a group is mended by joining it, too; a node for all has no
   CHECK(drivers::list_hid_nodes().at(0).trouble.empty());
   Ports ports;
   CHECK(ports.hid({.vendor = kUltra.vendor}));
+}
+
+TEST_CASE("a daemon that may not open a glove says so, runs, and opens it once it may") {
+  Bench bench;
+  HidGlove ultra(bench, kUltra);
+  const Speaker speaker(
+      ultra,
+      drivers::find_driver("fivedt")->emulate({{"model", std::string("ultra-usb-14")}}).value());
+  ultra.plug();
+  forbid(bench, ultra.node());
+  std::optional<Stage> stage;
+  {
+    const AsNobody nobody;
+    if (::access(POSED_BINARY, X_OK) != 0) {
+      WARN("SKIPPED: nobody may not enter the folder of " << POSED_BINARY);
+      return;
+    }
+    stage.emplace();
+    stage->folder.write("posed.toml", std::string(Stage::kEndpoints) +
+                                          "[[stream]]\nname = \"ultra\"\ndriver = \"fivedt\"\n"
+                                          "hand = \"left\"\n[stream.fivedt]\n"
+                                          "model = \"ultra-usb-14\"\n");
+    stage->launch("run");
+  }
+  const std::string wanted = "no permission for " + ultra.node();
+  for (int i = 0; i < 1000 && stage->daemon->errors().find(wanted) == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  check_sentence(stage->daemon->errors(), ultra.node());
+  std::filesystem::permissions(bench.file_of(ultra.node()), std::filesystem::perms(0666));
+  const Outcome frames = posed(
+      {"monitor", "--connect", stage->publish, "--stream", "ultra", "--json", "--count", "10"});
+  CHECK(frames.code == 0);
 }
 
 }  // namespace posed::test
