@@ -55,9 +55,9 @@ Result<std::vector<unsigned>> Talk::query(char letter, std::size_t value_bytes) 
     return fail(link_.name() + " did not answer '" + question +
                 "' as a CyberGlove does; switch its box off and on again");
   }
-  std::vector<unsigned> values;
+  std::vector<unsigned> values(value_bytes);
   for (std::size_t i = 0; i < value_bytes; ++i) {
-    values.push_back(static_cast<unsigned char>((*heard)[at + question.size() + i]));
+    values[i] = static_cast<unsigned char>((*heard)[at + question.size() + i]);
   }
   return values;
 }

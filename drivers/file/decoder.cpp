@@ -22,9 +22,10 @@ Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
       return Outcome::kShort;
     case clip::FrameFault::kNotANumber: {
       double value = 0.0;
-      const char* const end = parsed.where.data() + parsed.where.size();
-      return std::from_chars(parsed.where.data(), end, value).ptr == end ? Outcome::kOutOfRange
-                                                                         : Outcome::kForeign;
+      const char* const begin = parsed.where.data();
+      const char* const end = begin + parsed.where.size();
+      return std::from_chars(begin, end, value).ptr == end ? Outcome::kOutOfRange
+                                                           : Outcome::kForeign;
     }
     default:
       return Outcome::kForeign;

@@ -165,13 +165,13 @@ std::string alpha_line(const Line& line) {
     if (line.has_info[i]) text += info_keys[i] + std::to_string(line.info[i]);
   }
   for (std::size_t f = 0; f < kFingers; ++f) {
-    const std::string finger(1, static_cast<char>('A' + f));
-    add_value(text, finger, line, kCurl + f);
+    const auto finger = static_cast<char>('A' + f);
+    add_value(text, {finger}, line, kCurl + f);
     for (std::size_t j = 0; j < kJoints; ++j) {
-      const std::string joint(1, static_cast<char>('A' + j));
-      add_value(text, "(" + finger + "A" + joint + ")", line, kJoint + f * kJoints + j);
+      const auto joint = static_cast<char>('A' + j);
+      add_value(text, {'(', finger, 'A', joint, ')'}, line, kJoint + f * kJoints + j);
     }
-    add_value(text, "(" + finger + "B)", line, kSplay + f);
+    add_value(text, {'(', finger, 'B', ')'}, line, kSplay + f);
   }
   add_value(text, "F", line, kJoyX);
   add_value(text, "G", line, kJoyY);

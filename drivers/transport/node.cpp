@@ -39,7 +39,7 @@ std::string holder_of(const std::string& path) {
     }
     std::string name;
     std::getline(std::ifstream(process->path() / "comm"), name);
-    return " by " + name + " (process " + id + ")";
+    return name.insert(0, " by ").append(" (process ").append(id).append(")");
   }
   return {};
 }
