@@ -78,9 +78,11 @@ void Outlet::report(v1::StreamStats& stats, double seconds_since) {
   stats.set_lag_ms(lag_ms);
   stats.set_label(std::string(label.begin(), std::ranges::find(label, '\0')));
   stats.set_label_probability(label_probability);
-  stats.set_away(info.comes_and_goes && !reader.connected.load());
+  const std::int64_t link_ns = reader.link_ns.load();
+  const bool begun = link_ns != kNoTime_ns;  // until the reader has, nobody is missed
+  stats.set_away(info.comes_and_goes && begun && !reader.connected.load());
   stats.set_connections(reader.connections.load());
-  stats.set_link_ns(std::max<std::int64_t>(reader.link_ns.load(), 0));
+  stats.set_link_ns(begun ? link_ns : 0);
   if (clock.valid) stats.set_clock_offset_ns(clock.offset_ns);
   stats.set_clock_drift_ppm(clock.drift_ppm);
   if (info.present) tell_device(*info.present->description(), stats);

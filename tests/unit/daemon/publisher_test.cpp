@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "daemon/pipeline/clock.hpp"
+#include "daemon/publish/outlet.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/shed_tally.hpp"
 #include "tests/unit/models/toy_style.hpp"
@@ -186,6 +187,25 @@ TEST_CASE("a flood of skipped frames is one event, and its sum when the stream e
   }
   CHECK(told == 450);
   CHECK(texts.size() < 50);  // three, unless the machine took seconds for this
+}
+
+TEST_CASE("a glove is away only once the reader has begun to look for it") {
+  pipeline::StreamCounters counters;
+  StreamInfo info;
+  info.name = "right";
+  info.comes_and_goes = true;
+  info.counters = &counters;
+  Outlet outlet(std::move(info));
+  v1::StreamStats stats;
+  outlet.report(stats, 1.0);
+  CHECK_FALSE(stats.away());
+  counters.reader.link_ns = 7;
+  outlet.report(stats, 1.0);
+  CHECK(stats.away());
+  CHECK(stats.link_ns() == 7);
+  counters.reader.connected = true;
+  outlet.report(stats, 1.0);
+  CHECK_FALSE(stats.away());
 }
 
 TEST_CASE("a busy port is one sentence that names it") {
