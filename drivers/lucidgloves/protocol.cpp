@@ -33,10 +33,10 @@ int take_number(std::string_view& text) noexcept {
 std::string_view take_key(std::string_view& text) noexcept {
   std::string_view key;
   if (text.front() == '(') {
-    const std::size_t close = text.find(')');
-    if (close == std::string_view::npos || close < 2 || close > kMaxKey) return {};
+    std::size_t close = 1;
+    while (close < text.size() && is_key(text[close])) ++close;
+    if (close == text.size() || text[close] != ')' || close < 3 || close > kMaxKey) return {};
     key = text.substr(1, close - 1);
-    if (!std::ranges::all_of(key, is_key) || key.size() < 2) return {};
     text.remove_prefix(close + 1);
   } else if (is_key(text.front())) {
     key = text.substr(0, 1);
