@@ -5,7 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/config/words.hpp"
+#include "daemon/cli/paint.hpp"
 
 namespace posed::cli {
 namespace {
@@ -14,26 +14,12 @@ using drivers::glove::kPoseHints;
 using drivers::glove::kPoseNames;
 using drivers::glove::Pose;
 
-constexpr int kLeastWidth = 40;
+constexpr int kLeastColumns = 40;
 constexpr int kCellWidth = 26;  // least of a sensor's: below it nobody sees a bar move
 constexpr int kMostCell = 60;
 constexpr int kValueWidth = 6;
 constexpr int kBesideBar = kValueWidth + 5;  // blank, frame, value, mark
 constexpr int kLeastBar = 5;
-constexpr const char* kYellow = "\x1b[33m";
-constexpr const char* kRed = "\x1b[31m";
-constexpr const char* kDim = "\x1b[2m";
-constexpr const char* kBold = "\x1b[1m";
-constexpr const char* kPlain = "\x1b[0m";
-
-std::string paint(const CalibrateView& view, const char* colour, const std::string& text) {
-  return view.colour ? colour + text + kPlain : text;
-}
-
-std::string cut(const std::string& text, int width) {
-  const auto columns = static_cast<std::size_t>(std::max(width, 1));
-  return text.size() <= columns ? text : text.substr(0, columns - 1) + "~";
-}
 
 // Sensors differ in how their names begin and end: "thumb_jo~t1".
 std::string squeezed(const std::string& name, int width) {
@@ -93,7 +79,7 @@ std::string cell(const CalibrateView& view, const SensorView& sensor, int width,
   std::string text = fmt::format("{:<{}} |{}|{:>{}.0f}", squeezed(sensor.name, name_width),
                                  name_width, sensor_bar(sensor, bar), sensor.value, kValueWidth);
   text += still ? " !" : "  ";
-  return still ? paint(view, kYellow, text) : text;
+  return still ? paint(view.colour, kYellow, text) : text;
 }
 
 // The sensors in `rows` lines, column by column.
@@ -143,23 +129,23 @@ std::string sensor_bar(const SensorView& sensor, int width) {
 }
 
 std::vector<std::string> calibrate_view(const CalibrateView& view) {
-  const int width = std::max(view.width, kLeastWidth);
+  const int width = std::max(view.width, kLeastColumns);
   const Pose pose = view.poses[view.pose];
-  std::vector<std::string> lines{paint(view, kBold, cut(view.title, width)),
-                                 paint(view, kDim, cut(steps(view), width)), ""};
+  std::vector<std::string> lines{paint(view.colour, kBold, cut(view.title, width)),
+                                 paint(view.colour, kDim, cut(steps(view), width)), ""};
   std::string hint(kPoseHints[place(pose)]);
   hint[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(hint[0])));
   for (const std::string& line : wrapped(hint + ".", width)) {
-    lines.push_back(paint(view, kBold, line));
+    lines.push_back(paint(view.colour, kBold, line));
   }
-  lines.push_back(paint(view, view.silent ? kRed : kYellow, cut(what_to_do(view), width)));
-  if (!view.note.empty()) lines.push_back(paint(view, kRed, cut(view.note, width)));
+  lines.push_back(paint(view.colour, view.silent ? kRed : kYellow, cut(what_to_do(view), width)));
+  if (!view.note.empty()) lines.push_back(paint(view.colour, kRed, cut(view.note, width)));
   lines.push_back("");
   const int rows = view.height - static_cast<int>(lines.size()) - 1;
   for (std::string& line : table(view, width, rows)) lines.push_back(std::move(line));
   const std::string legend = view.any_held ? "# now   - where it has been   ! has not moved yet"
                                            : "# now   - where it has been";
-  lines.push_back(paint(view, kDim, cut(legend, width)));
+  lines.push_back(paint(view.colour, kDim, cut(legend, width)));
   const auto most = static_cast<std::size_t>(std::max(view.height, 1));
   if (lines.size() > most) lines.resize(most);
   return lines;

@@ -6,6 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/cli/paint.hpp"
 #include "daemon/config/words.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/time.hpp"
@@ -15,17 +16,10 @@ namespace {
 
 constexpr int kLeastWidth = 80;
 constexpr int kNameWidth = 11;
-constexpr const char* kRed = "\x1b[31m";
-constexpr const char* kYellow = "\x1b[33m";
-constexpr const char* kDim = "\x1b[2m";
-constexpr const char* kBold = "\x1b[1m";
-constexpr const char* kPlain = "\x1b[0m";
 
 // Cut or padded to exactly `width` columns (names are ASCII).
 std::string fit(const std::string& text, int width) {
-  const auto columns = static_cast<std::size_t>(width);
-  if (text.size() > columns) return text.substr(0, columns - 1) + "~";
-  return fmt::format("{:<{}}", text, width);
+  return fmt::format("{:<{}}", cut(text, width), width);
 }
 
 // A count in at most 5 characters.
@@ -137,22 +131,20 @@ std::string short_duration(double microseconds) {
 
 std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {
   const int width = std::max(options.width, kLeastWidth);
-  const auto paint = [&](const char* colour, std::string text) {
-    return options.colour && *colour != 0 ? colour + text + kPlain : text;
-  };
   const std::string names =
       fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} ", fit("STREAM", kNameWidth),
                   fit("STATE", 7), "HZ", "DROP", "SHED", "DECODE", "STYLE", "PUBLISH", "ALPHA");
   const int model_width = std::max(1, width - static_cast<int>(names.size()));
   std::vector<std::string> lines{
-      paint(kBold, fit(head(stats, options.title), width)),
-      paint(kDim, fit(names + fit("MODEL", model_width), width)),
+      paint(options.colour, kBold, fit(head(stats, options.title), width)),
+      paint(options.colour, kDim, fit(names + fit("MODEL", model_width), width)),
   };
   // Streams first; what does not fit is at least counted.
   const int room = options.height == 0 ? stats.stream_size() : options.height - 3;
   const int shown = stats.stream_size() <= room ? stats.stream_size() : std::max(0, room - 1);
   for (int i = 0; i < shown; ++i) {
-    lines.push_back(paint(colour_of(stats.stream(i)), row(stats.stream(i), model_width)));
+    lines.push_back(
+        paint(options.colour, colour_of(stats.stream(i)), row(stats.stream(i), model_width)));
   }
   if (shown < stats.stream_size()) {
     lines.push_back(fmt::format("... and {} more", stats.stream_size() - shown));
@@ -162,7 +154,8 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
     if (fits) lines.push_back(fit(below, width));
   }
   lines.push_back(
-      paint(kDim, fit("stage times: p50/p99 in us (m: ms), publish counts from arrival", width)));
+      paint(options.colour, kDim,
+            fit("stage times: p50/p99 in us (m: ms), publish counts from arrival", width)));
   const std::size_t left =
       options.height == 0
           ? options.notes.size()
