@@ -167,9 +167,9 @@ Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watch
         hand.note()};
     if (screen.is_terminal() || first_drawing) {
       view.notes.insert(view.notes.end(),
-                        {"in another terminal: build/release/posed monitor",
-                         "            or: build/release/posed ctl set walker alpha 0.5",
-                         "            or: build/release/posed ctl play hand \"p 4 3 1 g\"",
+                        {"in another terminal: build/posed monitor",
+                         "            or: build/posed ctl set walker alpha 0.5",
+                         "            or: build/posed ctl play hand \"p 4 3 1 g\"",
                          "Ctrl-C ends the demo"});
     }
     screen.draw(live_view(daemon.stats(), view));
