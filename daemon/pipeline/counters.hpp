@@ -14,6 +14,8 @@ enum class StreamState : std::uint8_t { kWaiting, kLive, kStale, kEnded };
 
 struct alignas(64) ReaderCounters {
   std::atomic<std::uint64_t> newest{0};   // sequence of the last frame that went into the ring
+  std::atomic<std::uint64_t> frames{0};   // sequence of the last frame decoded
+  std::atomic<std::uint64_t> samples{0};  // sequence of the last sample decoded
   std::atomic<std::uint64_t> dropped{0};  // frames and samples that found it full
   std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
   std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet

@@ -28,6 +28,9 @@ struct Notice {
 struct Item {
   enum class Kind : std::uint8_t { kFrame, kRawFrame, kSample, kNotice };
   Kind kind = Kind::kFrame;
+  // Its place among everything that its reader handed over: frames, samples and notices of all
+  // streams, from 1. What found no room used up its number, too. 0: an engine made it.
+  std::uint64_t number = 0;
   union {
     Frame frame;
     Sample sample;
@@ -36,6 +39,13 @@ struct Item {
   Item() noexcept : frame{} {}
 };
 static_assert(std::is_trivially_copyable_v<Item>);
+
+// Where the numbering stands: what comes next of a stream, and of its reader, gets these numbers.
+struct Position {
+  std::uint64_t frame = 1;   // Header::sequence of the stream's next frame
+  std::uint64_t sample = 1;  // Header::sequence of the stream's next sample
+  std::uint64_t item = 1;    // Item::number of the reader's next item, whatever its stream
+};
 
 // control -> pipeline; takes effect at the next frame boundary of its stream.
 struct Command {
@@ -72,7 +82,10 @@ struct Ack {
 };
 
 // pipeline -> recorder: every decision that decoding alone cannot repeat. It takes effect just
-// before frame `sequence` of its stream. Order within a stream is the order in the ring.
+// before the item `item` of the reader, whatever stream that item belongs to; so the decisions of
+// all streams have one order, which is their order in the ring. What was dropped or shed is told
+// when the engine meets the gap, after the fact: kShed and kShedSamples name the sequences that
+// never reached it.
 struct Decision {
   enum class Kind : std::uint8_t {
     kAlpha = 1,
@@ -81,13 +94,16 @@ struct Decision {
     kTick = 4,
     kGesture = 5,
     kPlay = 6,
-    kStopPlaying = 7
+    kStopPlaying = 7,
+    kEnd = 8,         // the source gives no more; what waits in the stages has gone out
+    kShedSamples = 9  // as kShed, for samples
   };
   Kind kind = Kind::kAlpha;
   std::uint32_t stream = 0;
-  std::uint64_t sequence = 0;  // kShed: first sequence skipped
-  std::uint64_t count = 0;     // kShed: how many
-  std::int64_t now_ns = 0;     // kTick
+  std::uint64_t item = 0;      // filled in by the worker; engines do not know it
+  std::uint64_t sequence = 0;  // next frame of the stream; kShed, kShedSamples: the first skipped
+  std::uint64_t count = 0;     // kShed, kShedSamples: how many
+  std::int64_t now_ns = 0;     // kTick, kEnd
   float alpha = 0.0F;
   std::array<char, 65> model_hash{};
   gesture::PlayOrder play{};  // kPlay

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "daemon/pipeline/device_clock.hpp"
 #include "daemon/pipeline/hot_mark.hpp"
+#include "daemon/pipeline/intake.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
@@ -17,26 +17,28 @@ constexpr std::int64_t kPatientLook_ns = 250'000;
 
 }  // namespace
 
-// One stream: its device while there is one, and the sink that the decoder writes to.
-class Reader::Source final : public Sink {
+// One stream: its device while there is one, and what becomes of what the device sends.
+class Reader::Source final : private IntakeOut {
  public:
-  Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports, Poller& poller)
+  Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports, Poller& poller,
+         std::uint64_t& next_item)
       : read_(read),
         counters_(*read.counters),
         ports_(ports),
         poller_(poller),
         stream_(stream),
         device_(read.device),
-        calibration_(read.calibration) {
-    item_.frame.header.stream = stream;
-  }
+        calibration_(read.calibration),
+        intake_(stream, next_item, *this) {}
 
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
   // Whether a chunk may be read now: always, but for a patient source with frames under way.
   [[nodiscard]] bool may_read() const noexcept {
     return !device_->transport->patient() ||
-           frames_ - counters_.pipeline.consumed.load(std::memory_order_acquire) < kPatientFrames;
+           counters_.reader.frames.load(std::memory_order_relaxed) -
+                   counters_.pipeline.consumed.load(std::memory_order_acquire) <
+               kPatientFrames;
   }
 
   // When it has to be looked at without its descriptor saying so; kNoTime_ns: never.
@@ -57,7 +59,7 @@ class Reader::Source final : public Sink {
     calibration_ = command.calibration;
     tell_calibration();
     if (device_ != nullptr) device_->decoder->calibrate(*calibration_->calibration);
-    notify(v1::Event::KIND_CALIBRATED, command.ticket);
+    static_cast<void>(tell(v1::Event::KIND_CALIBRATED, command.ticket));
   }
 
   void send(std::span<const std::byte> bytes) noexcept {
@@ -73,9 +75,8 @@ class Reader::Source final : public Sink {
     if (device_ != nullptr && read_.slot->give_back.exchange(false)) give_back();
     static_cast<void>(read_.slot->in.consume([this](drivers::Device* device) noexcept {
       device_ = device;
-      clock_.restart();
-      jumps_ = clock_.jumps();
-      arrival_ns_ = ports_.clock();
+      intake_.new_link();
+      arrived(ports_.clock());
       tape(record::Direction::kGreeting, std::as_bytes(std::span(device->description.text)));
       use(*device);
     }));
@@ -92,33 +93,24 @@ class Reader::Source final : public Sink {
     }
   }
 
-  void frame(Frame& frame) noexcept override {
-    frame.header.stream = stream_;
-    frame.header.sequence = ++frames_;
-    frame.header.arrival_ns = arrival_ns_;
-    clock_.stamp(frame);
-    if (clock_.jumps() != jumps_) {
-      jumps_ = clock_.jumps();
-      static_cast<void>(notify(v1::Event::KIND_CLOCK_JUMPED, 0));
+  // IntakeOut: into the ring, and counted.
+  bool item(Item& item) noexcept override {
+    switch (item.kind) {
+      case Item::Kind::kSample:
+        counters_.reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
+        break;
+      case Item::Kind::kNotice:
+        return push(item);
+      default:
+        item.frame.stamps.decoded_ns = ports_.clock();
+        counters_.reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
     }
-    frame.stamps.decoded_ns = ports_.clock();
     counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
-    item_.kind = Item::Kind::kFrame;
-    item_.frame = frame;
-    if (!ports_.out->push(item_)) return count(counters_.reader.dropped);
-    counters_.reader.newest.store(frames_, std::memory_order_release);
-    ports_.pipeline->ring();
-  }
-
-  void sample(Sample& sample) noexcept override {
-    sample.header.stream = stream_;
-    sample.header.sequence = ++samples_;
-    sample.header.arrival_ns = arrival_ns_;
-    counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
-    item_.kind = Item::Kind::kSample;
-    item_.sample = sample;
-    if (!ports_.out->push(item_)) return count(counters_.reader.dropped);
-    ports_.pipeline->ring();
+    if (!push(item)) {
+      count(counters_.reader.dropped);
+      return false;
+    }
+    return true;
   }
 
   void outcome(Outcome outcome) noexcept override {
@@ -129,10 +121,10 @@ class Reader::Source final : public Sink {
   // Reads and decodes one chunk; false when none was due.
   bool read_one() noexcept {
     const drivers::Chunk chunk = read();
-    arrival_ns_ = ports_.clock();
+    arrived(ports_.clock());
     if (!chunk.bytes.empty()) {
       tape(record::Direction::kFromDevice, chunk.bytes);
-      device_->decoder->feed(chunk.bytes, arrival_ns_, *this);
+      device_->decoder->feed(chunk.bytes, arrival_ns_, intake_);
     }
     if (chunk.end) end();
     if (chunk.lost) give_back();
@@ -188,14 +180,24 @@ class Reader::Source final : public Sink {
   }
 
   // The end must be heard: without room it is tried again at the next read.
-  void end() noexcept { ended_ = notify(v1::Event::KIND_ENDED, 0); }
+  void end() noexcept { ended_ = tell(v1::Event::KIND_ENDED, 0); }
 
-  bool notify(v1::Event::Kind event, std::uint64_t ticket) noexcept {
-    item_.kind = Item::Kind::kNotice;
-    item_.notice = {stream_, static_cast<std::uint8_t>(event), arrival_ns_, frames_, 0.0, ticket};
-    const bool fitted = ports_.out->push(item_);
-    ports_.pipeline->ring();
+  bool tell(v1::Event::Kind event, std::uint64_t ticket) noexcept {
+    return intake_.tell(static_cast<std::uint8_t>(event), ticket);
+  }
+
+  bool push(const Item& item) noexcept {
+    const bool fitted = ports_.out->push(item);
+    if (fitted && item.kind == Item::Kind::kFrame) {
+      counters_.reader.newest.store(item.frame.header.sequence, std::memory_order_release);
+    }
+    if (fitted) ports_.pipeline->ring();
     return fitted;
+  }
+
+  void arrived(std::int64_t arrival_ns) noexcept {
+    arrival_ns_ = arrival_ns;
+    intake_.arrived(arrival_ns);
   }
 
   void tell_calibration() noexcept {
@@ -203,7 +205,7 @@ class Reader::Source final : public Sink {
   }
   void tape(record::Direction direction, std::span<const std::byte> bytes) noexcept {
     if (ports_.tape == nullptr) return;
-    ports_.tape->chunk(stream_, direction, arrival_ns_, frames_ + 1, bytes);
+    ports_.tape->chunk(stream_, 0, direction, arrival_ns_, intake_.next(), bytes);
   }
 
   ReadStream read_;
@@ -213,14 +215,10 @@ class Reader::Source final : public Sink {
   std::uint32_t stream_;
   drivers::Device* device_;  // null while it is away
   const drivers::glove::OwnedCalibration* calibration_;
-  DeviceClock clock_;
-  std::uint64_t jumps_ = 0;  // of the clock, told so far
   std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
-  std::uint64_t frames_ = 0;
-  std::uint64_t samples_ = 0;
   bool ended_ = false;
-  Item item_;  // kept here because it is large
+  Intake intake_;
 };
 
 Result<std::unique_ptr<Reader>> Reader::open(const ReaderPorts& ports) {
@@ -239,7 +237,7 @@ Reader::~Reader() = default;
 
 void Reader::add(const ReadStream& stream) {
   const auto index = static_cast<std::uint32_t>(sources_.size());
-  sources_.push_back(std::make_unique<Source>(index, stream, ports_, *poller_));
+  sources_.push_back(std::make_unique<Source>(index, stream, ports_, *poller_, next_item_));
 }
 
 void Reader::run() noexcept {

@@ -68,6 +68,7 @@ class Reader {
   std::unique_ptr<Wake> wake_;
   std::unique_ptr<Poller> poller_;
   std::vector<std::unique_ptr<Source>> sources_;
+  std::uint64_t next_item_ = 1;  // Item::number
   std::atomic<bool> called_{false};
   std::atomic<bool> stop_{false};
 };

@@ -28,15 +28,7 @@ float StreamEngine::alpha() const noexcept { return style_ ? style_->alpha() : 0
 
 void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   const Header& header = frame.header;
-  const std::uint64_t expected = last_sequence_ + 1;
-  if (header.sequence > expected) {
-    const std::uint64_t missing = header.sequence - expected;
-    out.decision({.kind = Decision::Kind::kShed,
-                  .stream = options_.stream,
-                  .sequence = expected,
-                  .count = missing});
-    notice(v1::Event::KIND_SHED, header.arrival_ns, expected, static_cast<double>(missing), out);
-  }
+  shed_until(header.sequence, header.arrival_ns, out);
   last_sequence_ = header.sequence;
   heard(header.arrival_ns, out);
   if (options_.publish_raw) {
@@ -51,6 +43,36 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
     generate(frame);
   }
   tell_played(header.arrival_ns, out);
+}
+
+// The frames before this one that have not come never will.
+void StreamEngine::shed_until(std::uint64_t sequence, std::int64_t time_ns,
+                              EngineOut& out) noexcept {
+  const std::uint64_t expected = last_sequence_ + 1;
+  if (sequence <= expected) return;
+  const std::uint64_t missing = sequence - expected;
+  out.decision({.kind = Decision::Kind::kShed,
+                .stream = options_.stream,
+                .sequence = expected,
+                .count = missing});
+  notice(v1::Event::KIND_SHED, time_ns, expected, static_cast<double>(missing), out);
+  last_sequence_ = sequence - 1;
+}
+
+void StreamEngine::shed_samples_until(std::uint64_t sequence, EngineOut& out) noexcept {
+  const std::uint64_t expected = last_sample_ + 1;
+  if (sequence <= expected) return;
+  out.decision({.kind = Decision::Kind::kShedSamples,
+                .stream = options_.stream,
+                .sequence = expected,
+                .count = sequence - expected});
+  last_sample_ = sequence - 1;
+}
+
+void StreamEngine::close_gaps(std::uint64_t last_frame, std::uint64_t last_sample,
+                              EngineOut& out) noexcept {
+  shed_until(last_frame + 1, last_arrival_ns_, out);
+  shed_samples_until(last_sample + 1, out);
 }
 
 void StreamEngine::generate(const Frame& frame) noexcept {
@@ -74,6 +96,8 @@ void StreamEngine::frame(const Frame& frame) noexcept {
 }
 
 void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
+  shed_samples_until(sample.header.sequence, out);
+  last_sample_ = sample.header.sequence;
   heard(sample.header.arrival_ns, out);
   other_.kind = Item::Kind::kSample;
   other_.sample = sample;
@@ -200,6 +224,10 @@ void StreamEngine::tell_played(std::int64_t time_ns, EngineOut& out) noexcept {
 }
 
 void StreamEngine::end(std::int64_t now_ns, EngineOut& out) noexcept {
+  out.decision({.kind = Decision::Kind::kEnd,
+                .stream = options_.stream,
+                .sequence = last_sequence_ + 1,
+                .now_ns = now_ns});
   flush(out);
   state_ = StreamState::kEnded;
   notice(v1::Event::KIND_ENDED, now_ns, last_sequence_, 0.0, out);

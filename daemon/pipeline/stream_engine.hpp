@@ -50,7 +50,11 @@ class StreamEngine final : private Emit {
   // A decoded frame, stamped with stream, sequence and arrival. A gap since the last sequence is a
   // shed: decided and told before the frame itself.
   void on_frame(const Frame& frame, EngineOut& out) noexcept;
+  // The same for a sample; its gaps are decided, but not told.
   void on_sample(const Sample& sample, EngineOut& out) noexcept;
+  // What was decoded last, before flush() or end(): what is missing behind the last frame and
+  // sample that came was shed, too.
+  void close_gaps(std::uint64_t last_frame, std::uint64_t last_sample, EngineOut& out) noexcept;
 
   // Says that the time is `now_ns` when nothing came. What waits in the generate stage goes out
   // after a few frames' silence, and a performance goes on at the stream's rate. Frames are missing
@@ -69,7 +73,7 @@ class StreamEngine final : private Emit {
 
   // No more frames come: those that wait go out.
   void flush(EngineOut& out) noexcept;
-  // The source will give no more: flushed; no longer stale, only ended.
+  // The source will give no more: flushed; no longer stale, only ended. A decision.
   void end(std::int64_t now_ns, EngineOut& out) noexcept;
 
   [[nodiscard]] StreamState state() const noexcept { return state_; }
@@ -92,6 +96,8 @@ class StreamEngine final : private Emit {
 
   void generate(const Frame& frame) noexcept;
   void tell_played(std::int64_t time_ns, EngineOut& out) noexcept;
+  void shed_until(std::uint64_t sequence, std::int64_t time_ns, EngineOut& out) noexcept;
+  void shed_samples_until(std::uint64_t sequence, EngineOut& out) noexcept;
   void frame(const Frame& frame) noexcept override;  // what the last stage emitted
   [[nodiscard]] std::int64_t stale_due_ns() const noexcept;
   [[nodiscard]] std::int64_t generate_due_ns() const noexcept;
@@ -108,6 +114,7 @@ class StreamEngine final : private Emit {
   StreamState state_ = StreamState::kWaiting;
   std::uint64_t last_sequence_ = 0;  // that entered
   std::uint64_t last_out_ = 0;       // that left
+  std::uint64_t last_sample_ = 0;    // that entered
   std::int64_t last_arrival_ns_ = kNoTime_ns;
   std::int64_t next_held_ns_ = kNoTime_ns;
   std::int64_t period_ns_ = 0;                  // of a performance that goes on in silence

@@ -23,8 +23,12 @@ bool is_pose(const Item& item) noexcept {
 // One stream: its engine, and where that engine's output goes.
 struct Worker::Lane final : EngineOut {
   Lane(const EngineOptions& options, double rate_hz, StreamCounters& stream_counters,
-       const WorkerPorts& around)
-      : engine(options), depth(shed_depth(rate_hz)), counters(stream_counters), ports(around) {}
+       const WorkerPorts& around, const std::uint64_t& next_item)
+      : engine(options),
+        depth(shed_depth(rate_hz)),
+        counters(stream_counters),
+        ports(around),
+        place(next_item) {}
 
   void item(const Item& item) noexcept override {
     outgoing = item;
@@ -38,7 +42,16 @@ struct Worker::Lane final : EngineOut {
   }
 
   void decision(const Decision& decision) noexcept override {
-    if (ports.tape != nullptr) ports.tape->decision(decision);
+    if (ports.tape == nullptr) return;
+    placed = decision;
+    placed.item = place;
+    ports.tape->decision(placed);
+  }
+
+  // Nothing more comes from the reader: what of the last it decoded is missing was shed.
+  void close_gaps() noexcept {
+    engine.close_gaps(counters.reader.frames.load(std::memory_order_acquire),
+                      counters.reader.samples.load(std::memory_order_acquire), *this);
   }
 
   // Newest data wins: a frame with `depth` or more newer ones behind it is skipped. The engine
@@ -61,7 +74,9 @@ struct Worker::Lane final : EngineOut {
   std::uint64_t depth;
   StreamCounters& counters;
   const WorkerPorts& ports;
-  Item outgoing;  // kept here because it is large
+  const std::uint64_t& place;
+  Item outgoing;    // kept here because it is large
+  Decision placed;  // the same
 };
 
 Result<std::unique_ptr<Worker>> Worker::open(const WorkerPorts& ports) {
@@ -77,7 +92,7 @@ Worker::Worker(const WorkerPorts& ports, std::unique_ptr<Poller> poller)
 Worker::~Worker() = default;
 
 void Worker::add(const EngineOptions& options, double rate_hz, StreamCounters& counters) {
-  lanes_.push_back(std::make_unique<Lane>(options, rate_hz, counters, ports_));
+  lanes_.push_back(std::make_unique<Lane>(options, rate_hz, counters, ports_, place_));
 }
 
 const StreamEngine& Worker::engine(std::uint32_t stream) const { return lanes_[stream]->engine; }
@@ -100,7 +115,10 @@ void Worker::run() noexcept {
     ports_.wake->awake();
   }
   drain();
-  for (const auto& lane : lanes_) lane->engine.flush(*lane);
+  for (const auto& lane : lanes_) {
+    lane->close_gaps();
+    lane->engine.flush(*lane);
+  }
 }
 
 void Worker::stop() noexcept {
@@ -128,6 +146,7 @@ void Worker::drain() noexcept {
 }
 
 void Worker::take(const Item& item) noexcept {
+  place_ = item.number;
   switch (item.kind) {
     case Item::Kind::kFrame:
     case Item::Kind::kRawFrame: {
@@ -145,6 +164,7 @@ void Worker::take(const Item& item) noexcept {
     case Item::Kind::kNotice: {
       Lane& lane = *lanes_[item.notice.stream];
       if (item.notice.event == v1::Event::KIND_ENDED) {
+        lane.close_gaps();
         lane.engine.end(item.notice.time_ns, lane);
       } else {
         pass_on(item.notice, lane);
@@ -153,6 +173,7 @@ void Worker::take(const Item& item) noexcept {
       break;
     }
   }
+  place_ = item.number + 1;
 }
 
 // What the reader did between two frames: their order is right here.

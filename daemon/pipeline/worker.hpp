@@ -59,6 +59,7 @@ class Worker {
   WorkerPorts ports_;
   std::unique_ptr<Poller> poller_;
   std::vector<std::unique_ptr<Lane>> lanes_;
+  std::uint64_t place_ = 1;  // number of the item before which a decision made now takes effect
   std::atomic<bool> stop_{false};
 };
 

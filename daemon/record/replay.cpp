@@ -41,7 +41,7 @@ std::optional<gesture::PlayOrder> play_order(const log::DecisionRow& row) {
 // A decision as the pipeline made it; one that no pipeline could have made is damage.
 Result<> check_decision(const log::DecisionRow& row, const std::string& file) {
   const bool known = row.kind >= static_cast<std::uint8_t>(Decision::Kind::kAlpha) &&
-                     row.kind <= static_cast<std::uint8_t>(Decision::Kind::kStopPlaying);
+                     row.kind <= static_cast<std::uint8_t>(Decision::Kind::kShedSamples);
   const bool plays = row.kind == static_cast<std::uint8_t>(Decision::Kind::kPlay);
   if (known && std::abs(row.alpha) <= kMostAlpha && row.count <= kEnd - row.sequence &&
       (!plays || play_order(row).has_value())) {
@@ -238,6 +238,10 @@ Result<> Replay::Lane::load_decisions(const log::Reader& reader, std::uint32_t i
   auto decisions = reader.decisions(id);
   if (!decisions) return std::unexpected(decisions.error());
   decisions_ = std::move(*decisions);
+  // Their place is not among the frames.
+  std::erase_if(decisions_, [](const log::DecisionRow& row) {
+    return row.kind == static_cast<std::uint8_t>(Decision::Kind::kShedSamples);
+  });
   for (const log::DecisionRow& row : decisions_) {
     if (auto sound = check_decision(row, file); !sound) return sound;
     const auto kind = static_cast<Decision::Kind>(row.kind);

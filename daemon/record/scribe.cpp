@@ -80,7 +80,7 @@ void Scribe::drain(std::int64_t now_ns) {
     const log::ChunkRow row{.stream = header.stream,
                             .direction = static_cast<std::uint8_t>(header.direction),
                             .arrival_ns = header.arrival_ns,
-                            .next_sequence = header.next_sequence,
+                            .next_sequence = header.next.frame,
                             .bytes = bytes};
     if (put(header.stream, GapKind::kChunks, row, now_ns)) {
       streams_[header.stream].last_chunk = writer_->last_chunk_id();

@@ -27,11 +27,13 @@ class Tape {
   Tape& operator=(const Tape&) = delete;
   virtual ~Tape() = default;
 
-  // Reader thread, before decoding. `next_sequence` is the number that the first frame decoded from
-  // this chunk will get: replay finds its place again after a gap. A full ring is counted and
-  // becomes a gap row and an event. RT-safe.
-  virtual void chunk(std::uint32_t stream, Direction direction, std::int64_t arrival_ns,
-                     std::uint64_t next_sequence, std::span<const std::byte> bytes) noexcept = 0;
+  // Reader thread, before decoding. `next` are the numbers that the first frame, sample and item
+  // made from this chunk will get: replay finds its place again after a gap. A source may have
+  // several sockets; the first is 0. A full ring is counted and becomes a gap row and an event.
+  // RT-safe.
+  virtual void chunk(std::uint32_t stream, std::uint8_t socket, Direction direction,
+                     std::int64_t arrival_ns, const pipeline::Position& next,
+                     std::span<const std::byte> bytes) noexcept = 0;
 
   // Pipeline thread. RT-safe.
   virtual void decision(const pipeline::Decision& decision) noexcept = 0;

@@ -26,14 +26,16 @@ TapeRings::TapeRings(std::size_t streams, const RingSizes& sizes)
       losses_(streams) {}
 
 // RT-safe
-void TapeRings::chunk(std::uint32_t stream, Direction direction, std::int64_t arrival_ns,
-                      std::uint64_t next_sequence, std::span<const std::byte> bytes) noexcept {
+void TapeRings::chunk(std::uint32_t stream, std::uint8_t socket, Direction direction,
+                      std::int64_t arrival_ns, const pipeline::Position& next,
+                      std::span<const std::byte> bytes) noexcept {
   Loss& lost = loss(stream, GapKind::kChunks);
   const ChunkHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
                            .stream = stream,
+                           .socket = socket,
                            .direction = direction,
                            .arrival_ns = arrival_ns,
-                           .next_sequence = next_sequence,
+                           .next = next,
                            .lost_before = pending(lost)};
   settle(lost, chunks_.push(header, bytes), header.lost_before);
 }

@@ -22,9 +22,10 @@ namespace posed::record {
 struct ChunkHeader {
   std::uint32_t bytes = 0;
   std::uint32_t stream = 0;
+  std::uint8_t socket = 0;
   Direction direction = Direction::kFromDevice;
   std::int64_t arrival_ns = 0;
-  std::uint64_t next_sequence = 0;
+  pipeline::Position next{};
   std::uint64_t lost_before = 0;
 };
 
@@ -52,8 +53,9 @@ class TapeRings final : public Tape {
   TapeRings(std::size_t streams, const RingSizes& sizes);
 
   // Tape, for the hot threads.
-  void chunk(std::uint32_t stream, Direction direction, std::int64_t arrival_ns,
-             std::uint64_t next_sequence, std::span<const std::byte> bytes) noexcept override;
+  void chunk(std::uint32_t stream, std::uint8_t socket, Direction direction,
+             std::int64_t arrival_ns, const pipeline::Position& next,
+             std::span<const std::byte> bytes) noexcept override;
   void decision(const pipeline::Decision& decision) noexcept override;
   [[nodiscard]] bool wants_published() const noexcept override { return wants_published_; }
   void published(std::uint32_t stream, std::uint64_t sequence, bool raw,

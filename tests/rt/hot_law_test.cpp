@@ -31,8 +31,8 @@ using pipeline::Command;
 // A tape that keeps the law itself; the recorder's has tests of its own.
 class CountingTape final : public record::Tape {
  public:
-  void chunk(std::uint32_t, record::Direction, std::int64_t, std::uint64_t,
-             std::span<const std::byte>) noexcept override {
+  void chunk(std::uint32_t, std::uint8_t, record::Direction, std::int64_t,
+             const pipeline::Position&, std::span<const std::byte>) noexcept override {
     ++chunks;
   }
   void decision(const pipeline::Decision&) noexcept override { ++decisions; }

@@ -67,8 +67,8 @@ std::uint64_t lost(const std::vector<log::GapRow>& rows, std::uint32_t stream, G
 }
 
 void put_chunk(Tape& tape, std::uint32_t stream, std::uint64_t sequence, const std::string& text) {
-  tape.chunk(stream, Direction::kFromDevice, static_cast<std::int64_t>(sequence), sequence,
-             bytes_of(text));
+  tape.chunk(stream, 0, Direction::kFromDevice, static_cast<std::int64_t>(sequence),
+             {.frame = sequence}, bytes_of(text));
 }
 
 }  // namespace

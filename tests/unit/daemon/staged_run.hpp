@@ -62,7 +62,7 @@ class StagedStream final : public Sink, private pipeline::EngineOut {
     arrival_ns_ = arrival_ns;
     shed_ = shed;
     const auto bytes = std::as_bytes(std::span(line));
-    tape_->chunk(id_, record::Direction::kFromDevice, arrival_ns, frames_ + 1, bytes);
+    tape_->chunk(id_, 0, record::Direction::kFromDevice, arrival_ns, {.frame = frames_ + 1}, bytes);
     device_.decoder->feed(bytes, arrival_ns, *this);
   }
 

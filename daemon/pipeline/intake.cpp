@@ -1,0 +1,45 @@
+#include "daemon/pipeline/intake.hpp"
+
+#include "posed/v1/posed.pb.h"
+
+namespace posed::pipeline {
+
+void Intake::frame(Frame& frame) noexcept {
+  frame.header.stream = stream_;
+  frame.header.sequence = ++frames_;
+  frame.header.arrival_ns = arrival_ns_;
+  clock_.stamp(frame);
+  if (clock_.jumps() != jumps_told_) {
+    jumps_told_ = clock_.jumps();
+    // Lost when there is no room, like a frame: its number is used up.
+    if (!tell(v1::Event::KIND_CLOCK_JUMPED, 0)) ++next_item_;
+  }
+  item_.kind = Item::Kind::kFrame;
+  item_.frame = frame;
+  put();
+}
+
+void Intake::sample(Sample& sample) noexcept {
+  sample.header.stream = stream_;
+  sample.header.sequence = ++samples_;
+  sample.header.arrival_ns = arrival_ns_;
+  item_.kind = Item::Kind::kSample;
+  item_.sample = sample;
+  put();
+}
+
+bool Intake::tell(std::uint8_t event, std::uint64_t ticket) noexcept {
+  item_.kind = Item::Kind::kNotice;
+  item_.number = next_item_;
+  item_.notice = {stream_, event, arrival_ns_, frames_, 0.0, ticket};
+  if (!out_.item(item_)) return false;
+  ++next_item_;
+  return true;
+}
+
+void Intake::put() noexcept {
+  item_.number = next_item_++;
+  static_cast<void>(out_.item(item_));
+}
+
+}  // namespace posed::pipeline
