@@ -30,7 +30,7 @@ namespace posed::control {
 
 inline constexpr std::size_t kLargestModel = 64 * 1024 * 1024;  // bytes of a model file
 inline constexpr std::size_t kLargestRequest = 64 * 1024;       // bytes of any other request
-inline constexpr std::size_t kMostUnderWay = 64;  // commands sent to the pipeline, not acknowledged
+using pipeline::kMostUnderWay;
 
 // A stream as control sees it.
 struct ControlledStream {

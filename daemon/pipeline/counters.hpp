@@ -16,7 +16,8 @@ struct alignas(64) ReaderCounters {
   std::atomic<std::uint64_t> newest{0};   // sequence of the last frame that went into the ring
   std::atomic<std::uint64_t> frames{0};   // sequence of the last frame decoded
   std::atomic<std::uint64_t> samples{0};  // sequence of the last sample decoded
-  std::atomic<std::uint64_t> dropped{0};  // frames and samples that found it full
+  std::atomic<std::uint64_t> newest_sample{0};  // sequence of the last sample that went in
+  std::atomic<std::uint64_t> dropped{0};        // frames and samples that found no room in it
   std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
   std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
   std::atomic<bool> connected{false};              // a link to the device is open
@@ -26,15 +27,40 @@ struct alignas(64) ReaderCounters {
 
 struct alignas(64) PipelineCounters {
   std::atomic<std::uint64_t> consumed{0};  // sequence of the last frame taken from the ring
-  std::atomic<std::uint64_t> shed{0};      // frames skipped because newer ones waited
-  std::atomic<std::uint64_t> dropped{0};   // items that found the publisher's ring full
+  std::atomic<std::uint64_t> taken{0};     // items taken from the ring
+  std::atomic<std::uint64_t> shed{0};      // frames and samples skipped because newer ones waited
+  std::atomic<std::uint64_t> dropped{0};   // items that found no room in the publisher's ring
   std::atomic<StreamState> state{StreamState::kWaiting};
   std::atomic<float> alpha{0.0F};
+};
+
+struct alignas(64) PublisherCounters {
+  std::atomic<std::uint64_t> taken{0};  // items taken from the pipeline's ring
 };
 
 struct StreamCounters {
   ReaderCounters reader;
   PipelineCounters pipeline;
+  PublisherCounters publisher;
+};
+
+// How much of a ring that all streams share one of them may fill, so that the others always find
+// room. Belongs to the producer; `taken` is the consumer's count of the stream's items.
+class RingShare {
+ public:
+  RingShare(std::size_t slots, const std::atomic<std::uint64_t>& taken) noexcept
+      : slots_(slots), taken_(taken) {}
+  // RT-safe.
+  [[nodiscard]] bool has_room() const noexcept {
+    return put_ - taken_.load(std::memory_order_acquire) < slots_;
+  }
+  // Something of the stream went in. RT-safe.
+  void add() noexcept { ++put_; }
+
+ private:
+  std::uint64_t slots_;
+  std::uint64_t put_ = 0;
+  const std::atomic<std::uint64_t>& taken_;
 };
 
 // Adds one; the counter has only this writer. RT-safe.

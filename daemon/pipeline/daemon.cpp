@@ -28,6 +28,17 @@ double rate_of(const OpenStream& stream) {
   return device.description.rate_hz > 0.0 ? device.description.rate_hz : kUnknownRate_hz;
 }
 
+// What a stream may fill of the ring to the pipeline: half a second of its frames and samples.
+std::size_t decoded_slots(const OpenStream& stream) {
+  const drivers::Description& description = stream.device.description;
+  const int kinds = (description.skeleton ? 1 : 0) + (description.samples.names.empty() ? 0 : 1);
+  return ring_slots(rate_of(stream) * std::max(kinds, 1));
+}
+// The same of the ring to the publisher, which has the unstyled frames, too.
+std::size_t finished_slots(const OpenStream& stream) {
+  return decoded_slots(stream) + (stream.config.publish_raw ? ring_slots(rate_of(stream)) : 0);
+}
+
 }  // namespace
 
 // Members stand in the order in which they are made; what uses another comes after it.
@@ -100,10 +111,15 @@ Result<> Daemon::Parts::open() {
     }
     streams.push_back(std::move(*stream));
   }
-  double frames_per_s = 0.0;
-  for (const auto& stream : streams) frames_per_s += rate_of(*stream);
-  decoded = std::make_unique<Ring<Item>>(ring_slots(frames_per_s));
-  finished = std::make_unique<Ring<Item>>(ring_slots(2.0 * frames_per_s));  // raw and styled
+  // Each stream has slots of its own, so that none can take another's, and every notice finds one.
+  std::size_t into_pipeline = kNoticeSlots + streams.size();
+  std::size_t out_of_pipeline = into_pipeline;
+  for (const auto& stream : streams) {
+    into_pipeline += decoded_slots(*stream);
+    out_of_pipeline += finished_slots(*stream);
+  }
+  decoded = std::make_unique<Ring<Item>>(into_pipeline);
+  finished = std::make_unique<Ring<Item>>(out_of_pipeline);
   commands = std::make_unique<Ring<Command>>(control::kMostUnderWay);
   device_commands = std::make_unique<Ring<DeviceCommand>>(control::kMostUnderWay);
   acks = std::make_unique<Ring<Ack>>(control::kMostUnderWay);
@@ -209,11 +225,12 @@ Result<> Daemon::Parts::open_engines() {
                          .skeleton = stream.device.description.skeleton};
     if (stream.config.style) engine.style = stream.config.style->filter;
     if (stream.config.generate) engine.generate = stream.config.generate->live;
-    worker->add(engine, rate_of(stream), stream.counters);
+    worker->add(engine, rate_of(stream), stream.counters, finished_slots(stream));
     reader->add({.device = stream.device.transport ? &stream.device : nullptr,
                  .counters = &stream.counters,
                  .slot = stream.slot.get(),
-                 .calibration = stream.calibration.get()});
+                 .calibration = stream.calibration.get(),
+                 .slots = decoded_slots(stream)});
     controlled.push_back({.name = stream.config.name,
                           .publishes_raw = stream.config.publish_raw,
                           .skeleton = stream.device.description.skeleton,

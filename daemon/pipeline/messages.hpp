@@ -40,6 +40,15 @@ struct Item {
 };
 static_assert(std::is_trivially_copyable_v<Item>);
 
+// RT-safe.
+[[nodiscard]] inline std::uint32_t stream_of(const Item& item) noexcept {
+  if (item.kind == Item::Kind::kNotice) return item.notice.stream;
+  return item.kind == Item::Kind::kSample ? item.sample.header.stream : item.frame.header.stream;
+}
+
+// Commands of both kinds that may be under way: sent, and their Ack not yet taken by control.
+inline constexpr std::size_t kMostUnderWay = 64;
+
 // Where the numbering stands: what comes next of a stream, and of its reader, gets these numbers.
 struct Position {
   std::uint64_t frame = 1;   // Header::sequence of the stream's next frame
@@ -52,7 +61,7 @@ struct Command {
   enum class Kind : std::uint8_t { kAlpha, kModel, kGesture, kPlay, kStopPlaying };
   Kind kind = Kind::kAlpha;
   std::uint32_t stream = 0;
-  std::uint64_t ticket = 0;  // comes back in the Ack
+  std::uint64_t ticket = 0;  // comes back in the Ack; 0: nobody waits for one
   float alpha = 0.0F;
   const style::BoundModel* model = nullptr;       // kModel: ready-made; the cold side owns it
   const generate::BoundModel* gesture = nullptr;  // kGesture: the same

@@ -1,6 +1,7 @@
 #include "daemon/pipeline/reader.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "daemon/pipeline/hot_mark.hpp"
 #include "daemon/pipeline/intake.hpp"
@@ -9,11 +10,14 @@
 namespace posed::pipeline {
 namespace {
 
-// A source that never runs dry must not starve the others.
-constexpr int kMaxChunksInARow = 64;
+// What one source may give in one turn; the rest waits for the next one. A source that never runs
+// dry so costs each of the others a fraction of a millisecond. No real device comes near it: USB's
+// full speed is 64 bytes a millisecond, a serial line's 11.5 KB a second.
+constexpr int kChunksATurn = 64;
+constexpr std::size_t kBytesATurn = 4096;
 // Frames of a patient source on their way through the pipeline; below what the pipeline sheds.
 constexpr std::uint64_t kPatientFrames = 2;
-constexpr std::int64_t kPatientLook_ns = 250'000;
+constexpr std::int64_t kLookAgain_ns = 250'000;
 
 }  // namespace
 
@@ -29,12 +33,15 @@ class Reader::Source final : private IntakeOut {
         stream_(stream),
         device_(read.device),
         calibration_(read.calibration),
+        share_(read.slots, counters_.pipeline.taken),
         intake_(stream, next_item, *this) {}
 
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
-  // Whether a chunk may be read now: always, but for a patient source with frames under way.
+  // Whether a chunk may be read now: whenever there is a device, but for a patient one with frames
+  // under way.
   [[nodiscard]] bool may_read() const noexcept {
+    if (device_ == nullptr || ended_) return false;
     return !device_->transport->patient() ||
            counters_.reader.frames.load(std::memory_order_relaxed) -
                    counters_.pipeline.consumed.load(std::memory_order_acquire) <
@@ -85,10 +92,13 @@ class Reader::Source final : private IntakeOut {
   void serve() noexcept {
     if (device_ == nullptr) return;
     poll();
-    for (int i = 0; i < kMaxChunksInARow && device_ != nullptr && !ended_ && may_read(); ++i) {
-      if (!read_one()) break;
+    std::size_t bytes = 0;
+    for (int i = 0; i < kChunksATurn && bytes < kBytesATurn && may_read(); ++i) {
+      const std::size_t got = read_one();
+      if (got == 0) break;
+      bytes += got;
     }
-    if (ended_ && device_->transport->poll_fd() >= 0) {
+    if (ended_ && device_ != nullptr && device_->transport->poll_fd() >= 0) {
       poller_.remove(device_->transport->poll_fd());
     }
   }
@@ -100,7 +110,7 @@ class Reader::Source final : private IntakeOut {
         counters_.reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
         break;
       case Item::Kind::kNotice:
-        return push(item);
+        return push_notice(item);
       default:
         item.frame.stamps.decoded_ns = ports_.clock();
         counters_.reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
@@ -118,8 +128,8 @@ class Reader::Source final : private IntakeOut {
   }
 
  private:
-  // Reads and decodes one chunk; false when none was due.
-  bool read_one() noexcept {
+  // Reads and decodes one chunk; returns its bytes, 0 when none was due.
+  std::size_t read_one() noexcept {
     const drivers::Chunk chunk = read();
     arrived(ports_.clock());
     if (!chunk.bytes.empty()) {
@@ -128,7 +138,7 @@ class Reader::Source final : private IntakeOut {
     }
     if (chunk.end) end();
     if (chunk.lost) give_back();
-    return !chunk.bytes.empty();
+    return chunk.bytes.size();
   }
 
   // A source that goes by time alone has nothing to ask the system.
@@ -186,13 +196,26 @@ class Reader::Source final : private IntakeOut {
     return intake_.tell(static_cast<std::uint8_t>(event), ticket);
   }
 
+  // A frame or sample: within the stream's share of the ring.
   bool push(const Item& item) noexcept {
-    const bool fitted = ports_.out->push(item);
-    if (fitted && item.kind == Item::Kind::kFrame) {
+    if (!share_.has_room() || !ports_.out->push(item)) return false;
+    share_.add();
+    if (item.kind == Item::Kind::kSample) {
+      counters_.reader.newest_sample.store(item.sample.header.sequence, std::memory_order_release);
+    } else {
       counters_.reader.newest.store(item.frame.header.sequence, std::memory_order_release);
     }
-    if (fitted) ports_.pipeline->ring();
-    return fitted;
+    ports_.pipeline->ring();
+    return true;
+  }
+
+  // What a device can cause at any rate has to fit into its stream's share, too.
+  bool push_notice(const Item& item) noexcept {
+    const bool shared = item.notice.event == v1::Event::KIND_CLOCK_JUMPED;
+    if ((shared && !share_.has_room()) || !ports_.out->push(item)) return false;
+    share_.add();
+    ports_.pipeline->ring();
+    return true;
   }
 
   void arrived(std::int64_t arrival_ns) noexcept {
@@ -218,6 +241,7 @@ class Reader::Source final : private IntakeOut {
   std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
   bool ended_ = false;
+  RingShare share_;
   Intake intake_;
 };
 
@@ -240,20 +264,26 @@ void Reader::add(const ReadStream& stream) {
   sources_.push_back(std::make_unique<Source>(index, stream, ports_, *poller_, next_item_));
 }
 
+void Reader::begin() noexcept {
+  for (const auto& source : sources_) source->begin();
+}
+
+std::int64_t Reader::turn(std::int64_t now_ns) noexcept {
+  const bool heard = hear();
+  for (const std::uint32_t stream : std::exchange(ready_, {})) sources_[stream]->serve();
+  const std::int64_t due_ns = serve_timed(now_ns);
+  return heard ? due_ns : std::min(due_ns, now_ns + kLookAgain_ns);
+}
+
 void Reader::run() noexcept {
   const HotSection hot;
-  for (const auto& source : sources_) source->begin();
+  begin();
   while (!stop_.load(std::memory_order_acquire)) {
-    hear();
-    const std::int64_t due_ns = serve_timed(ports_.clock());
+    const std::int64_t due_ns = turn(ports_.clock());
     wake_->going_to_sleep();
     if (stop_.load(std::memory_order_acquire)) break;
-    std::int64_t timeout_ns = kForever_ns;
-    if (due_ns != kForever_ns) timeout_ns = std::max<std::int64_t>(due_ns - ports_.clock(), 0);
-    if (called()) timeout_ns = 0;
-    const auto ready = poller_->wait(timeout_ns);
+    ready_ = poller_->wait(called() ? 0 : time_left_ns(due_ns, ports_.clock));
     wake_->awake();
-    for (const std::uint32_t stream : ready) sources_[stream]->serve();
   }
 }
 
@@ -267,8 +297,9 @@ void Reader::call() noexcept {
   wake_->ring();
 }
 
-void Reader::hear() noexcept {
-  if (!called_.exchange(false, std::memory_order_acq_rel)) return;
+// A calibration is answered by a notice, which must find room: without any, the commands wait.
+bool Reader::hear() noexcept {
+  if (!called_.exchange(false, std::memory_order_acq_rel) && !commands_wait_) return true;
   for (const auto& source : sources_) source->exchange();
   const auto obey = [this](const DeviceCommand& command) noexcept {
     Source& source = *sources_[command.stream];
@@ -278,8 +309,11 @@ void Reader::hear() noexcept {
       source.send(std::span(command.bytes).first(command.size));
     }
   };
-  while (ports_.commands != nullptr && ports_.commands->consume(obey)) {
+  if (ports_.commands == nullptr) return true;
+  while (ports_.out->has_room() && ports_.commands->consume(obey)) {
   }
+  commands_wait_ = !ports_.commands->empty();
+  return !commands_wait_;
 }
 
 std::int64_t Reader::serve_timed(std::int64_t now_ns) noexcept {
@@ -291,7 +325,7 @@ std::int64_t Reader::serve_timed(std::int64_t now_ns) noexcept {
       source->serve();
       due_ns = source->due_ns();
       if (due_ns == kNoTime_ns) continue;
-      if (source->patient_now()) due_ns = std::max(due_ns, now_ns + kPatientLook_ns);
+      if (source->patient_now()) due_ns = std::max(due_ns, now_ns + kLookAgain_ns);
     }
     next_ns = std::min(next_ns, due_ns);
   }

@@ -4,7 +4,9 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "daemon/pipeline/counters.hpp"
@@ -40,6 +42,7 @@ struct ReadStream {
   StreamCounters* counters = nullptr;
   DeviceSlot* slot = nullptr;  // null: a device that never comes back
   const drivers::glove::OwnedCalibration* calibration = nullptr;  // null: the device's default
+  std::size_t slots = std::numeric_limits<std::size_t>::max();    // of `out` that it may fill
 };
 
 class Reader {
@@ -50,7 +53,14 @@ class Reader {
   // Streams are numbered in the order of adding. Cold, before run().
   void add(const ReadStream& stream);
 
-  // Runs until stop(). The calling thread becomes the reader thread.
+  // Takes the first devices over; before the first turn. RT-safe but for one epoll_ctl a device.
+  void begin() noexcept;
+  // One round: obeys commands, and reads a share of what each device has sent, so that none of them
+  // keeps the others waiting. Returns when the next turn is due at the latest [ns]; kForever_ns:
+  // when called or when a device is ready. RT-safe.
+  std::int64_t turn(std::int64_t now_ns) noexcept;
+
+  // begin(), then turn after turn until stop(). The calling thread becomes the reader thread.
   void run() noexcept;
   void stop() noexcept;  // any thread
   // There is something in a slot or in the commands. Any thread.
@@ -59,16 +69,18 @@ class Reader {
  private:
   class Source;
   Reader(const ReaderPorts& ports, std::unique_ptr<Wake> wake, std::unique_ptr<Poller> poller);
-  // Reads what is due; returns when the next look at the clock is due.
+  // Reads what is due by the clock; returns when that is the case next.
   std::int64_t serve_timed(std::int64_t now_ns) noexcept;
-  void hear() noexcept;  // slots and commands
+  bool hear() noexcept;  // slots and commands; false: some must wait for room in the ring
   [[nodiscard]] bool called() const noexcept { return called_.load(std::memory_order_acquire); }
 
   ReaderPorts ports_;
   std::unique_ptr<Wake> wake_;
   std::unique_ptr<Poller> poller_;
+  std::span<const std::uint32_t> ready_;  // sources whose descriptors have something; the poller's
   std::vector<std::unique_ptr<Source>> sources_;
   std::uint64_t next_item_ = 1;  // Item::number
+  bool commands_wait_ = false;   // for room in `out`
   std::atomic<bool> called_{false};
   std::atomic<bool> stop_{false};
 };

@@ -17,6 +17,10 @@ inline constexpr double kRingDepth_s = 0.5;
   return static_cast<std::size_t>(std::ceil(std::max(items_per_s * kRingDepth_s, 64.0)));
 }
 
+// What notices need beside a stream's frames and samples: they have no share of their own, and one
+// that answers a command must never be lost.
+inline constexpr std::size_t kNoticeSlots = 128;
+
 template <typename T>
 class Ring {
  public:

@@ -2,6 +2,7 @@
 // for it and for devices until a deadline. One Wake per consuming thread.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <span>
 
 #include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
 
 namespace posed::pipeline {
 
@@ -27,17 +29,30 @@ class Wake {
   // The consumer, before its last look at its rings: from here on ring() writes.
   void going_to_sleep() noexcept { asleep_.exchange(true, std::memory_order_acq_rel); }
   // The consumer, back from its wait.
-  void awake() noexcept { asleep_.store(false, std::memory_order_relaxed); }
+  void awake() noexcept { asleep_.exchange(false, std::memory_order_acq_rel); }
 
   [[nodiscard]] int fd() const noexcept { return fd_; }
 
  private:
   explicit Wake(int fd) noexcept : fd_(fd) {}
   int fd_;
+  // No wake-up is missed, on any memory model. Every change of the flag is an exchange with acquire
+  // and release, so each one synchronizes with all before it in the flag's modification order (a
+  // chain of read-modify-writes keeps a release sequence whole). Say a producer puts an element in
+  // and its exchange finds false, so that it writes nothing. The consumer's next exchange, in
+  // awake() or going_to_sleep(), comes after the producer's and so sees the element at the look
+  // that follows it; it cannot have come before, or the producer would have found its true. A plain
+  // store in awake() would cut the chain: a second producer could find false between the first
+  // one's write and that store, and its element would be visible to nobody in particular.
   std::atomic<bool> asleep_{false};
 };
 
 inline constexpr std::int64_t kForever_ns = std::numeric_limits<std::int64_t>::max();
+
+// How long a thread may sleep whose next turn is due then; never negative. RT-safe.
+[[nodiscard]] inline std::int64_t time_left_ns(std::int64_t due_ns, Clock clock) noexcept {
+  return due_ns == kForever_ns ? kForever_ns : std::max<std::int64_t>(due_ns - clock(), 0);
+}
 
 class Poller {
  public:

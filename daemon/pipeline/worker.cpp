@@ -8,6 +8,14 @@
 
 namespace posed::pipeline {
 
+namespace {
+
+// Commands, ticks and the end get their turn however fast items come.
+constexpr int kItemsATurn = 256;
+constexpr std::int64_t kLookAgain_ns = 1'000'000;  // for room for an Ack
+
+}  // namespace
+
 std::uint64_t shed_depth(double rate_hz) noexcept {
   return static_cast<std::uint64_t>(std::max(3.0, std::ceil(rate_hz * 0.05)));
 }
@@ -18,26 +26,35 @@ bool is_pose(const Item& item) noexcept {
   return item.kind == Item::Kind::kFrame || item.kind == Item::Kind::kRawFrame;
 }
 
+// What a device can cause at any rate has to fit into its stream's share of the ring; few other
+// notices ever come at once.
+bool within_share(const Item& item) noexcept {
+  return item.kind != Item::Kind::kNotice || item.notice.event == v1::Event::KIND_SHED ||
+         item.notice.event == v1::Event::KIND_CLOCK_JUMPED;
+}
+
 }  // namespace
 
 // One stream: its engine, and where that engine's output goes.
 struct Worker::Lane final : EngineOut {
   Lane(const EngineOptions& options, double rate_hz, StreamCounters& stream_counters,
-       const WorkerPorts& around, const std::uint64_t& next_item)
+       const WorkerPorts& around, const std::uint64_t& next_item, std::size_t slots)
       : engine(options),
         depth(shed_depth(rate_hz)),
         counters(stream_counters),
         ports(around),
-        place(next_item) {}
+        place(next_item),
+        share(slots, counters.publisher.taken) {}
 
   void item(const Item& item) noexcept override {
     outgoing = item;
     if (outgoing.kind == Item::Kind::kFrame) outgoing.frame.stamps.styled_ns = ports.clock();
-    if (!ports.out->push(outgoing)) {
+    if ((within_share(outgoing) && !share.has_room()) || !ports.out->push(outgoing)) {
       if (ports.tape != nullptr && is_pose(outgoing))
         ports.tape->unpublished(outgoing.frame.header.stream);
       return count(counters.pipeline.dropped);
     }
+    share.add();
     ports.publisher->ring();
   }
 
@@ -65,6 +82,19 @@ struct Worker::Lane final : EngineOut {
     engine.on_frame(frame, *this);
   }
 
+  // The same for samples.
+  void sample(const Sample& sample) noexcept {
+    const std::uint64_t newest = counters.reader.newest_sample.load(std::memory_order_acquire);
+    if (newest >= sample.header.sequence + depth) return count(counters.pipeline.shed);
+    engine.on_sample(sample, *this);
+  }
+
+  // An item of the stream has been dealt with.
+  void taken() noexcept {
+    count(counters.pipeline.taken);
+    tell();
+  }
+
   void tell() noexcept {
     counters.pipeline.state.store(engine.state(), std::memory_order_relaxed);
     counters.pipeline.alpha.store(engine.alpha(), std::memory_order_relaxed);
@@ -75,6 +105,7 @@ struct Worker::Lane final : EngineOut {
   StreamCounters& counters;
   const WorkerPorts& ports;
   const std::uint64_t& place;
+  RingShare share;  // of ports.out
   Item outgoing;    // kept here because it is large
   Decision placed;  // the same
 };
@@ -91,34 +122,50 @@ Worker::Worker(const WorkerPorts& ports, std::unique_ptr<Poller> poller)
 
 Worker::~Worker() = default;
 
-void Worker::add(const EngineOptions& options, double rate_hz, StreamCounters& counters) {
-  lanes_.push_back(std::make_unique<Lane>(options, rate_hz, counters, ports_, place_));
+void Worker::add(const EngineOptions& options, double rate_hz, StreamCounters& counters,
+                 std::size_t slots) {
+  lanes_.push_back(std::make_unique<Lane>(options, rate_hz, counters, ports_, place_, slots));
 }
 
 const StreamEngine& Worker::engine(std::uint32_t stream) const { return lanes_[stream]->engine; }
 
-void Worker::run() noexcept {
-  const HotSection hot;
-  while (!stop_.load(std::memory_order_acquire)) {
-    drain();
-    tick(ports_.clock());
-    ports_.wake->going_to_sleep();
-    if (idle()) {
-      std::int64_t due_ns = kForever_ns;
-      for (const auto& lane : lanes_) {
-        const std::int64_t lane_due_ns = lane->engine.next_tick_ns();
-        if (lane_due_ns != kNoTime_ns) due_ns = std::min(due_ns, lane_due_ns);
-      }
-      if (due_ns != kForever_ns) due_ns = std::max<std::int64_t>(due_ns - ports_.clock(), 0);
-      static_cast<void>(poller_->wait(due_ns));
-    }
-    ports_.wake->awake();
+std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
+  send_acks();
+  obey();
+  take_items(kItemsATurn);
+  tick(now_ns);
+  return next_due_ns(now_ns);
+}
+
+std::int64_t Worker::next_due_ns(std::int64_t now_ns) const noexcept {
+  if (!ports_.in->empty()) return now_ns;
+  std::int64_t due_ns = unsent_count_ > 0 ? now_ns + kLookAgain_ns : kForever_ns;
+  for (const auto& lane : lanes_) {
+    const std::int64_t lane_due_ns = lane->engine.next_tick_ns();
+    if (lane_due_ns != kNoTime_ns) due_ns = std::min(due_ns, lane_due_ns);
   }
-  drain();
+  return due_ns;
+}
+
+void Worker::finish() noexcept {
+  send_acks();
+  obey();
+  while (!ports_.in->empty()) take_items(kItemsATurn);
   for (const auto& lane : lanes_) {
     lane->close_gaps();
     lane->engine.flush(*lane);
   }
+}
+
+void Worker::run() noexcept {
+  const HotSection hot;
+  while (!stop_.load(std::memory_order_acquire)) {
+    const std::int64_t due_ns = turn(ports_.clock());
+    ports_.wake->going_to_sleep();
+    if (idle()) static_cast<void>(poller_->wait(time_left_ns(due_ns, ports_.clock)));
+    ports_.wake->awake();
+  }
+  finish();
 }
 
 void Worker::stop() noexcept {
@@ -130,19 +177,43 @@ bool Worker::idle() const noexcept {
   return ports_.in->empty() && ports_.commands->empty() && !stop_.load(std::memory_order_acquire);
 }
 
-void Worker::drain() noexcept {
+void Worker::obey() noexcept {
   const auto apply = [this](const Command& command) noexcept {
     Lane& lane = *lanes_[command.stream];
-    const Ack ack = lane.engine.apply(command, lane);
-    // There is room: control waits for the Ack before it sends more than the ring holds.
-    static_cast<void>(ports_.acks->push(ack));
-    if (ports_.control != nullptr) ports_.control->ring();
+    acknowledge(lane.engine.apply(command, lane));
     lane.tell();
   };
-  while (ports_.acks->has_room() && ports_.commands->consume(apply)) {
+  while (ports_.commands->consume(apply)) {
   }
-  while (ports_.in->consume([this](const Item& item) noexcept { take(item); })) {
+}
+
+void Worker::take_items(int most) noexcept {
+  const auto take_one = [this](const Item& item) noexcept { take(item); };
+  for (int i = 0; i < most && ports_.in->consume(take_one); ++i) {
   }
+}
+
+// No Ack is ever lost: control counts the commands that it has sent and that no Ack has answered,
+// and refuses to send more than kMostUnderWay. So there is a place for each.
+void Worker::acknowledge(const Ack& ack) noexcept {
+  if (ack.ticket == 0) return;  // nobody waits for it
+  send_acks();
+  if (unsent_count_ > 0 || !ports_.acks->push(ack)) {
+    unsent_[unsent_count_++] = ack;
+  } else if (ports_.control != nullptr) {
+    ports_.control->ring();
+  }
+}
+
+// In the order in which the commands took effect.
+void Worker::send_acks() noexcept {
+  std::size_t sent = 0;
+  while (sent < unsent_count_ && ports_.acks->push(unsent_[sent])) ++sent;
+  if (sent == 0) return;
+  std::copy(unsent_.begin() + static_cast<std::ptrdiff_t>(sent),
+            unsent_.begin() + static_cast<std::ptrdiff_t>(unsent_count_), unsent_.begin());
+  unsent_count_ -= sent;
+  if (ports_.control != nullptr) ports_.control->ring();
 }
 
 void Worker::take(const Item& item) noexcept {
@@ -152,13 +223,13 @@ void Worker::take(const Item& item) noexcept {
     case Item::Kind::kRawFrame: {
       Lane& lane = *lanes_[item.frame.header.stream];
       lane.frame(item.frame);
-      lane.tell();
+      lane.taken();
       break;
     }
     case Item::Kind::kSample: {
       Lane& lane = *lanes_[item.sample.header.stream];
-      lane.engine.on_sample(item.sample, lane);
-      lane.tell();
+      lane.sample(item.sample);
+      lane.taken();
       break;
     }
     case Item::Kind::kNotice: {
@@ -169,7 +240,7 @@ void Worker::take(const Item& item) noexcept {
       } else {
         pass_on(item.notice, lane);
       }
-      lane.tell();
+      lane.taken();
       break;
     }
   }
@@ -178,12 +249,7 @@ void Worker::take(const Item& item) noexcept {
 
 // What the reader did between two frames: their order is right here.
 void Worker::pass_on(const Notice& notice, Lane& lane) noexcept {
-  if (notice.ticket != 0) {
-    const Ack ack{
-        .ticket = notice.ticket, .stream = notice.stream, .sequence = notice.sequence + 1};
-    static_cast<void>(ports_.acks->push(ack));  // there is room, as for every command
-    if (ports_.control != nullptr) ports_.control->ring();
-  }
+  acknowledge({.ticket = notice.ticket, .stream = notice.stream, .sequence = notice.sequence + 1});
   Item item;
   item.kind = Item::Kind::kNotice;
   item.notice = notice;

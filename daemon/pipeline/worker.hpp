@@ -3,8 +3,10 @@
 // to the publisher.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -35,12 +37,18 @@ class Worker {
   [[nodiscard]] static Result<std::unique_ptr<Worker>> open(const WorkerPorts& ports);
   ~Worker();
 
-  // Streams are numbered in the order of adding. `rate_hz` is nominal, 0 when unknown. Cold, before
-  // run().
-  void add(const EngineOptions& options, double rate_hz, StreamCounters& counters);
+  // Streams are numbered in the order of adding. `rate_hz` is nominal, 0 when unknown; `slots` is
+  // how much of `out` the stream may fill. Cold, before the first turn.
+  void add(const EngineOptions& options, double rate_hz, StreamCounters& counters,
+           std::size_t slots = std::numeric_limits<std::size_t>::max());
 
-  // Runs until stop(), then once more over what is waiting. The calling thread becomes the
-  // pipeline thread.
+  // One round: commands, a bounded number of items, and the ticks that are due. Returns when the
+  // next turn is due at the latest [ns]; kForever_ns: when there is something in a ring. RT-safe.
+  std::int64_t turn(std::int64_t now_ns) noexcept;
+  // After the reader's last turn: takes all that waits and lets out what the stages hold. RT-safe.
+  void finish() noexcept;
+
+  // Turn after turn until stop(), then finish(). The calling thread becomes the pipeline thread.
   void run() noexcept;
   void stop() noexcept;  // any thread
 
@@ -50,8 +58,12 @@ class Worker {
  private:
   struct Lane;
   Worker(const WorkerPorts& ports, std::unique_ptr<Poller> poller);
-  void drain() noexcept;
+  void obey() noexcept;
+  void take_items(int most) noexcept;
   void take(const Item& item) noexcept;
+  void acknowledge(const Ack& ack) noexcept;
+  void send_acks() noexcept;
+  [[nodiscard]] std::int64_t next_due_ns(std::int64_t now_ns) const noexcept;
   void pass_on(const Notice& notice, Lane& lane) noexcept;
   void tick(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool idle() const noexcept;
@@ -60,6 +72,9 @@ class Worker {
   std::unique_ptr<Poller> poller_;
   std::vector<std::unique_ptr<Lane>> lanes_;
   std::uint64_t place_ = 1;  // number of the item before which a decision made now takes effect
+  // Acks that found no room; at most as many as there are commands under way.
+  std::array<Ack, kMostUnderWay> unsent_{};
+  std::size_t unsent_count_ = 0;
   std::atomic<bool> stop_{false};
 };
 

@@ -184,6 +184,7 @@ void Publisher::send(std::string_view topic, const google::protobuf::MessageLite
 
 void Publisher::take(const pipeline::Item& item) {
   using Kind = pipeline::Item::Kind;
+  pipeline::count(outlets_[pipeline::stream_of(item)]->info.counters->publisher.taken);
   switch (item.kind) {
     case Kind::kFrame:
     case Kind::kRawFrame:

@@ -33,7 +33,7 @@ struct StreamInfo {
   std::string model;            // the style model's name at the start
   bool comes_and_goes = false;  // the device may be away
   std::shared_ptr<const devices::PresentDevice> present{};  // null: nothing comes from a device
-  const pipeline::StreamCounters* counters = nullptr;
+  pipeline::StreamCounters* counters = nullptr;
 };
 
 struct PublisherOptions {

@@ -1,0 +1,152 @@
+// A device that sends valid data as fast as the network takes it must not cost the streams beside
+// it anything, nor the daemon its memory.
+#include <catch2/catch.hpp>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "daemon/control/zmq_handle.hpp"
+#include "drivers/driver.hpp"
+#include "drivers/options.hpp"
+#include "posed/v1/posed.pb.h"
+#include "tests/e2e/stage.hpp"
+#include "tests/support/free_port.hpp"
+
+namespace posed::test {
+namespace {
+
+using namespace std::chrono_literals;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr double kNeighbourRate_hz = 120.0;
+
+// 2 s; POSED_FLOOD_S says otherwise.
+std::chrono::milliseconds flood_time() {
+  const char* const wanted = std::getenv("POSED_FLOOD_S");
+  return wanted == nullptr ? 2000ms : std::chrono::milliseconds(1000 * std::atoi(wanted));
+}
+
+std::string glove_lines(std::size_t bytes) {
+  const drivers::Driver& driver = *drivers::find_driver("lucidgloves");
+  const auto glove = driver.emulate(drivers::complete_options(driver, {}).value()).value();
+  drivers::Emulator::Bytes line;
+  glove->emit(0, line);
+  std::string lines;
+  while (lines.size() < bytes) {
+    lines.append(reinterpret_cast<const char*>(line.data()), line.size());  // NOLINT: as text
+  }
+  return lines;
+}
+
+// A glove that connects and sends without a pause until the time is over.
+std::uint64_t flood(std::uint16_t port, std::chrono::milliseconds time) {
+  const std::string lines = glove_lines(64 * 1024);
+  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(port);
+  const timeval patience{.tv_sec = 1, .tv_usec = 0};
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+  std::uint64_t sent = 0;
+  if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) {  // NOLINT
+    const auto end = SteadyClock::now() + time;
+    while (SteadyClock::now() < end) {
+      const ssize_t took = ::send(fd, lines.data(), lines.size(), MSG_NOSIGNAL);
+      if (took > 0) sent += static_cast<std::uint64_t>(took);
+    }
+  }
+  ::close(fd);
+  return sent;
+}
+
+std::uint64_t resident_bytes(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/statm");
+  std::uint64_t total = 0, resident = 0;
+  file >> total >> resident;
+  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+// The numbers of the frames of one stream that come to a subscriber within a time.
+std::set<std::uint64_t> frames_within(const std::string& endpoint, const std::string& stream,
+                                      std::chrono::milliseconds time) {
+  const auto context = control::open_context().value();
+  const auto socket = control::open_socket(context.get(), ZMQ_SUB).value();
+  REQUIRE(control::set_option(socket.get(), ZMQ_SUBSCRIBE, "pose/" + stream));
+  REQUIRE(control::connect_socket(socket.get(), endpoint));
+  std::set<std::uint64_t> sequences;
+  control::Message message;
+  v1::Frame frame;
+  for (const auto end = SteadyClock::now() + time; SteadyClock::now() < end;) {
+    zmq_pollitem_t wait{socket.get(), 0, ZMQ_POLLIN, 0};
+    if (zmq_poll(&wait, 1, 50) <= 0) continue;
+    while (message.receive(socket.get())) {
+      if (message.more()) continue;
+      REQUIRE(
+          frame.ParseFromArray(message.bytes().data(), static_cast<int>(message.text().size())));
+      sequences.insert(frame.sequence());
+    }
+  }
+  return sequences;
+}
+
+}  // namespace
+
+TEST_CASE("a glove that floods the daemon over TCP costs its neighbour no frame") {
+  Stage stage;
+  const std::uint16_t port = free_port();
+  stage.folder.write("posed.toml",
+                     std::string(Stage::kEndpoints) +
+                         "[[stream]]\nname = \"bend\"\ndriver = \"template\"\n[stream.template]\n"
+                         "rate_hz = 120.0\n"
+                         "[[stream]]\nname = \"flood\"\ndriver = \"lucidgloves\"\n"
+                         "[stream.lucidgloves]\nlink = \"tcp\"\nlisten = \"127.0.0.1:" +
+                         std::to_string(port) + "\"\n");
+  stage.launch("run");
+  const auto before = frames_within(stage.publish, "bend", 500ms);
+  REQUIRE(before.size() > 20);
+  const std::uint64_t memory_before = resident_bytes(stage.daemon->pid());
+
+  const auto time = flood_time();
+  std::uint64_t sent = 0;
+  std::jthread glove([&] { sent = flood(port, time + 500ms); });
+  std::this_thread::sleep_for(500ms);  // the daemon greets it
+  const auto during = frames_within(stage.publish, "bend", time);
+  const std::uint64_t memory = resident_bytes(stage.daemon->pid());
+  glove.join();
+
+  REQUIRE(!during.empty());
+  const std::uint64_t span = *during.rbegin() - *during.begin() + 1;
+  const auto status = nlohmann::json::parse(stage.ctl({"--json", "status"}).out).at("status");
+  WARN("the glove sent " << sent / 1'000'000 << " MB; " << during.size() << " of " << span
+                         << " frames of its neighbour came; memory grew by "
+                         << (static_cast<std::int64_t>(memory) -
+                             static_cast<std::int64_t>(memory_before)) /
+                                1'000'000
+                         << " MB; " << status.dump());
+  CHECK(sent > 1'000'000);
+  CHECK(static_cast<double>(span) >
+        0.8 * kNeighbourRate_hz * std::chrono::duration<double>(time).count());
+  CHECK(static_cast<double>(during.size()) >= 0.95 * static_cast<double>(span));
+  CHECK(memory < memory_before + 64U * 1024 * 1024);
+  const auto& bend = status.at("stream").at(0);
+  for (const char* counter : {"dropped", "shed"}) {
+    INFO(counter);
+    CHECK(std::stoull(bend.value(counter, "0")) == 0);
+  }
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+}
+
+}  // namespace posed::test

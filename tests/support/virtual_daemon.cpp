@@ -1,0 +1,459 @@
+#include "tests/support/virtual_daemon.hpp"
+
+#include <algorithm>
+#include <array>
+#include <random>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/devices/calibration.hpp"
+#include "daemon/pipeline/reader.hpp"
+#include "daemon/pipeline/worker.hpp"
+#include "daemon/publish/encode.hpp"
+#include "daemon/record/scribe.hpp"
+#include "models/generate/bound_model.hpp"
+#include "models/gesture/model_file.hpp"
+#include "models/style/style_model.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/log/digest.hpp"
+#include "proto/log/writer.hpp"
+
+namespace posed::test {
+namespace {
+
+constexpr std::int64_t kBegin_ns = 1'000'000'000'000;
+constexpr std::int64_t kScribeEvery_ns = 50'000'000;
+constexpr std::int64_t kLongestHoldup_ns = 400'000'000;
+constexpr int kTurnsBetweenHoldups = 400;
+constexpr int kItemsPublishedATurn = 32;
+
+thread_local std::int64_t virtual_now_ns = kBegin_ns;
+std::int64_t virtual_clock() noexcept { return virtual_now_ns; }
+
+std::int64_t at_ns(double at_s) {
+  return at_s == kNever_s ? pipeline::kForever_ns : kBegin_ns + nanoseconds(at_s);
+}
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+// Plays one link of the script.
+class ScriptedTransport final : public drivers::Transport {
+ public:
+  explicit ScriptedTransport(const ScriptedLink& link) : link_(link) {}
+
+  [[nodiscard]] int poll_fd() const noexcept override { return -1; }
+  [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
+    if (!link_.flood.empty()) return at_ns(link_.from_s);
+    const std::int64_t chunk_ns =
+        next_ < link_.chunks.size() ? at_ns(link_.chunks[next_].at_s) : pipeline::kForever_ns;
+    return std::min(chunk_ns, at_ns(link_.until_s));
+  }
+  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  [[nodiscard]] drivers::Chunk read(std::int64_t now_ns) noexcept override {
+    if (now_ns >= at_ns(link_.until_s))
+      return {.bytes = {}, .end = link_.ends, .lost = !link_.ends};
+    if (now_ns < next_due_ns()) return {};
+    const std::string& bytes = link_.flood.empty() ? link_.chunks[next_++].bytes : link_.flood;
+    return {.bytes = bytes_of(bytes)};
+  }
+
+ private:
+  const ScriptedLink& link_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace
+
+// One stream of the running daemon, with everything that its parts borrow.
+struct Lane {
+  Lane(VirtualStream script, std::uint32_t number)
+      : stream(std::move(script)), id(number), styled(stream.name), raw(stream.name + "-raw") {
+    slot.keeper = pipeline::Wake::open().value();
+    stream.settings.rate_hz = stream.description.rate_hz;
+    if (!stream.gesture_model.empty()) {
+      stream.settings.gesture_model = log::sha256_hex(bytes_of(stream.gesture_model));
+    }
+  }
+
+  const style::BoundModel* bind_style(const std::string& bytes) {
+    const auto model = style::parse_model(bytes_of(bytes), "virtual.style");
+    REQUIRE(model);
+    styles.push_back(
+        style::bind_model(*model, *stream.description.skeleton, *stream.settings.style, "virtual")
+            .value());
+    return styles.back().get();
+  }
+  const generate::BoundModel* bind_gesture(const std::string& bytes) {
+    auto model = gesture::parse_model(bytes_of(bytes), "virtual.gesture");
+    REQUIRE(model);
+    const drivers::Description& description = stream.description;
+    gestures.push_back(generate::bind_model(std::move(*model), *description.skeleton,
+                                            description.rate_hz, "virtual")
+                           .value());
+    return gestures.back().get();
+  }
+  const drivers::glove::OwnedCalibration* compile(const std::string& toml) {
+    auto compiled = devices::compile_calibration(stream.description, toml, "virtual.toml");
+    REQUIRE(compiled);
+    calibrations.push_back(std::move(*compiled));
+    return calibrations.back().get();
+  }
+
+  // The device of the next link that is there by now; null: none.
+  drivers::Device* next_device() {
+    if (device || next_link == stream.links.size()) return nullptr;
+    const ScriptedLink& link = stream.links[next_link];
+    if (at_ns(link.from_s) > virtual_now_ns) return nullptr;
+    ++next_link;
+    const drivers::Driver* driver = drivers::find_driver(stream.description.driver);
+    device = std::make_unique<drivers::Device>();
+    device->description = stream.description;
+    device->transport = std::make_unique<ScriptedTransport>(link);
+    device->decoder = driver->make_decoder(stream.description).value();
+    return device.get();
+  }
+  [[nodiscard]] std::int64_t next_device_ns() const {
+    if (device || next_link == stream.links.size()) return pipeline::kForever_ns;
+    return at_ns(stream.links[next_link].from_s);
+  }
+
+  VirtualStream stream;
+  std::uint32_t id;
+  pipeline::StreamCounters counters;
+  pipeline::DeviceSlot slot;
+  std::unique_ptr<drivers::Device> device;  // the link in use
+  std::size_t next_link = 0;
+  std::vector<std::unique_ptr<const style::BoundModel>> styles;
+  std::vector<std::unique_ptr<const generate::BoundModel>> gestures;
+  std::vector<std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
+  publish::FrameEncoder styled, raw;
+  VirtualDaemon::Published published;
+};
+
+class VirtualDaemon::Parts {
+ public:
+  explicit Parts(VirtualOptions wanted) : options(std::move(wanted)), random(options.seed) {}
+
+  void run(double until_s);
+
+  VirtualOptions options;
+  std::vector<std::unique_ptr<Lane>> lanes;
+  std::vector<VirtualCommand> script;
+  std::vector<pipeline::Ack> acks_taken;
+
+ private:
+  enum Part : std::uint8_t { kReader, kWorker, kPublisher, kScribe, kPerson, kKeeper, kParts };
+
+  void open();
+  void open_log();
+  [[nodiscard]] pipeline::EngineOptions engine_of(Lane& lane) const;
+  void take_turn(Part part);
+  [[nodiscard]] std::int64_t due_ns(Part part) const;
+  void publish(int most);
+  void publish_frame(Lane& lane, const pipeline::Item& item);
+  void speak(const VirtualCommand& command, std::uint64_t ticket);
+  void keep_devices();
+  void stop();
+  std::int64_t draw_ns(std::int64_t most_ns) {
+    return std::uniform_int_distribution<std::int64_t>(0, most_ns)(random);
+  }
+
+  std::mt19937_64 random;
+  std::unique_ptr<record::TapeRings> tape;
+  std::unique_ptr<record::Scribe> scribe;
+  std::unique_ptr<pipeline::Ring<pipeline::Item>> decoded, finished;
+  std::unique_ptr<pipeline::Ring<pipeline::Command>> commands;
+  std::unique_ptr<pipeline::Ring<pipeline::DeviceCommand>> device_commands;
+  std::unique_ptr<pipeline::Ring<pipeline::Ack>> acks;
+  std::unique_ptr<pipeline::Wake> pipeline_wake, publisher_wake;
+  std::unique_ptr<pipeline::Worker> worker;
+  std::unique_ptr<pipeline::Reader> reader;
+  std::size_t next_command = 0;
+  std::array<std::int64_t, kParts> due{};            // as the part's last turn said
+  std::array<std::int64_t, kParts> held_until_ns{};  // no turn before
+};
+
+void VirtualDaemon::Parts::open_log() {
+  if (options.log.empty()) return;
+  auto writer = log::Writer::create(options.log, {}, false);
+  REQUIRE(writer);
+  for (const auto& lane : lanes) {
+    const VirtualStream& stream = lane->stream;
+    log::StreamRow row{.id = lane->id,
+                       .name = stream.name,
+                       .driver = stream.description.driver,
+                       .text = stream.description.text,
+                       .identity = stream.description.identity,
+                       .config = record::to_json(stream.settings),
+                       .model = {}};
+    for (const std::string* model : {&stream.style_model, &stream.gesture_model}) {
+      if (model->empty()) continue;
+      const auto hash = writer->add_blob(bytes_of(*model));
+      REQUIRE(hash);
+      if (model == &stream.style_model) row.model = *hash;
+    }
+    REQUIRE(writer->add(row));
+  }
+  REQUIRE(writer->commit());
+  tape = std::make_unique<record::TapeRings>(lanes.size(), options.tape);
+  scribe = std::make_unique<record::Scribe>(*tape, std::move(*writer), options.log,
+                                            [](const record::Notice&) {});
+}
+
+pipeline::EngineOptions VirtualDaemon::Parts::engine_of(Lane& lane) const {
+  const VirtualStream& stream = lane.stream;
+  const record::StreamSettings& settings = stream.settings;
+  pipeline::EngineOptions engine;
+  engine.stream = lane.id;
+  engine.stale_after_ns = nanoseconds(settings.stale_after_s);
+  engine.publish_raw = settings.publish_raw;
+  engine.style = settings.style;
+  engine.generate = settings.generate;
+  engine.constrain = settings.constrain;
+  engine.rate_hz = stream.description.rate_hz;
+  engine.skeleton = stream.description.skeleton;
+  if (!stream.style_model.empty()) engine.model = lane.bind_style(stream.style_model);
+  if (!stream.gesture_model.empty()) engine.gesture = lane.bind_gesture(stream.gesture_model);
+  return engine;
+}
+
+void VirtualDaemon::Parts::open() {
+  virtual_now_ns = kBegin_ns;
+  open_log();
+  std::size_t slots = pipeline::kNoticeSlots + lanes.size();
+  for (const auto& lane : lanes) slots += lane->stream.slots;
+  decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
+  finished = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
+  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(pipeline::kMostUnderWay);
+  device_commands =
+      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(pipeline::kMostUnderWay);
+  acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(options.ack_slots);
+  pipeline_wake = pipeline::Wake::open().value();
+  publisher_wake = pipeline::Wake::open().value();
+  worker = pipeline::Worker::open({.in = decoded.get(),
+                                   .out = finished.get(),
+                                   .commands = commands.get(),
+                                   .acks = acks.get(),
+                                   .wake = pipeline_wake.get(),
+                                   .publisher = publisher_wake.get(),
+                                   .tape = tape.get(),
+                                   .clock = virtual_clock})
+               .value();
+  reader = pipeline::Reader::open({.out = decoded.get(),
+                                   .pipeline = pipeline_wake.get(),
+                                   .tape = tape.get(),
+                                   .clock = virtual_clock,
+                                   .commands = device_commands.get()})
+               .value();
+  for (const auto& lane : lanes) {
+    const VirtualStream& stream = lane->stream;
+    worker->add(engine_of(*lane), stream.description.rate_hz, lane->counters, stream.slots);
+    reader->add(
+        {.device = lane->next_device(),
+         .counters = &lane->counters,
+         .slot = &lane->slot,
+         .calibration = stream.calibration.empty() ? nullptr : lane->compile(stream.calibration),
+         .slots = stream.slots});
+  }
+  std::ranges::stable_sort(script, {}, &VirtualCommand::at_s);
+  reader->begin();
+  due.fill(kBegin_ns);
+  held_until_ns.fill(kBegin_ns);
+}
+
+// One turn of a part that is due, then another, chosen at random; when none is due, time passes.
+void VirtualDaemon::Parts::run(double until_s) {
+  open();
+  const std::int64_t until_ns = at_ns(until_s);
+  while (virtual_now_ns < until_ns) {
+    std::array<Part, kParts> ready{};
+    std::size_t count = 0;
+    std::int64_t next_ns = until_ns;
+    for (int i = 0; i < kParts; ++i) {
+      const auto part = static_cast<Part>(i);
+      const std::int64_t at = std::max(due_ns(part), held_until_ns[part]);
+      if (at <= virtual_now_ns) ready[count++] = part;
+      next_ns = std::min(next_ns, at);
+    }
+    if (count == 0) {
+      virtual_now_ns = next_ns;
+      continue;
+    }
+    const Part part = ready[static_cast<std::size_t>(draw_ns(static_cast<int>(count) - 1))];
+    take_turn(part);
+    virtual_now_ns += 1 + draw_ns(static_cast<std::int64_t>(options.turn_us * 1e3));
+    if (options.holdups && draw_ns(kTurnsBetweenHoldups) == 0) {
+      held_until_ns[part] = virtual_now_ns + draw_ns(kLongestHoldup_ns);
+    }
+  }
+  stop();
+}
+
+// When a part would wake: by its own word, or because something came into one of its rings.
+std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
+  std::int64_t at = due[part];
+  switch (part) {
+    case kReader:
+      if (!device_commands->empty()) at = virtual_now_ns;
+      for (const auto& lane : lanes) {
+        if (!lane->slot.in.empty()) at = virtual_now_ns;
+      }
+      break;
+    case kWorker:
+      if (!decoded->empty() || !commands->empty()) at = virtual_now_ns;
+      break;
+    case kPublisher:
+      at = finished->empty() && acks->empty() ? pipeline::kForever_ns : virtual_now_ns;
+      break;
+    case kPerson:
+      at = next_command < script.size() ? at_ns(script[next_command].at_s) : pipeline::kForever_ns;
+      break;
+    case kKeeper:
+      at = pipeline::kForever_ns;
+      for (const auto& lane : lanes) {
+        at = std::min(at, lane->slot.out.empty() ? lane->next_device_ns() : virtual_now_ns);
+      }
+      break;
+    default:
+      break;
+  }
+  return at;
+}
+
+void VirtualDaemon::Parts::take_turn(Part part) {
+  switch (part) {
+    case kReader:
+      due[part] = reader->turn(virtual_now_ns);
+      break;
+    case kWorker:
+      due[part] = worker->turn(virtual_now_ns);
+      break;
+    case kPublisher:
+      publish(kItemsPublishedATurn);
+      break;
+    case kScribe:
+      if (scribe) scribe->turn(virtual_now_ns);
+      due[part] = virtual_now_ns + kScribeEvery_ns;
+      break;
+    case kPerson:
+      // Control sends no more than may be under way.
+      if (next_command - acks_taken.size() < pipeline::kMostUnderWay) {
+        speak(script[next_command], next_command + 1);
+        ++next_command;
+      }
+      break;
+    default:
+      keep_devices();
+  }
+}
+
+void VirtualDaemon::Parts::keep_devices() {
+  for (const auto& lane : lanes) {
+    while (lane->slot.out.consume([&](drivers::Device*) { lane->device.reset(); })) {
+    }
+    if (drivers::Device* const device = lane->next_device(); device != nullptr) {
+      REQUIRE(lane->slot.in.push(device));
+      reader->call();
+    }
+  }
+}
+
+void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t ticket) {
+  using Kind = VirtualCommand::Kind;
+  Lane& lane = *lanes[wanted.stream];
+  if (wanted.kind == Kind::kCalibrate) {
+    REQUIRE(device_commands->push({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
+                                   .stream = wanted.stream,
+                                   .ticket = ticket,
+                                   .calibration = lane.compile(wanted.bytes)}));
+    return reader->call();
+  }
+  pipeline::Command command{.stream = wanted.stream, .ticket = ticket, .alpha = wanted.alpha};
+  const auto keep = [&] {
+    const std::string hash = log::sha256_hex(bytes_of(wanted.bytes));
+    hash.copy(command.model_hash.data(), hash.size());
+    if (tape) tape->keep_model(bytes_of(wanted.bytes));
+  };
+  switch (wanted.kind) {
+    case Kind::kModel:
+      command.kind = pipeline::Command::Kind::kModel;
+      command.model = lane.bind_style(wanted.bytes);
+      keep();
+      break;
+    case Kind::kGesture:
+      command.kind = pipeline::Command::Kind::kGesture;
+      command.gesture = lane.bind_gesture(wanted.bytes);
+      keep();
+      break;
+    case Kind::kPlay: {
+      command.kind = pipeline::Command::Kind::kPlay;
+      const auto order = gesture::make_play_order(
+          lane.gestures.back()->gesture(), gesture::split_labels(wanted.labels), 1.0, wanted.loop);
+      REQUIRE(order);
+      command.play = *order;
+      break;
+    }
+    case Kind::kStopPlaying:
+      command.kind = pipeline::Command::Kind::kStopPlaying;
+      break;
+    default:
+      break;
+  }
+  REQUIRE(commands->push(command));
+}
+
+void VirtualDaemon::Parts::publish(int most) {
+  const auto take = [this](const pipeline::Item& item) {
+    using Kind = pipeline::Item::Kind;
+    const bool notice = item.kind == Kind::kNotice;
+    Lane& lane = *lanes[pipeline::stream_of(item)];
+    pipeline::count(lane.counters.publisher.taken);
+    if (item.kind == Kind::kSample) ++lane.published.samples;
+    if (!notice && item.kind != Kind::kSample) publish_frame(lane, item);
+  };
+  for (int i = 0; i < most && finished->consume(take); ++i) {
+  }
+  while (acks->consume([this](const pipeline::Ack& ack) { acks_taken.push_back(ack); })) {
+  }
+}
+
+void VirtualDaemon::Parts::publish_frame(Lane& lane, const pipeline::Item& item) {
+  const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
+  ++(raw ? lane.published.raw : lane.published.frames);
+  if (!raw) lane.published.sequences.push_back(item.frame.header.sequence);
+  if (!tape) return;
+  const std::string bytes = (raw ? lane.raw : lane.styled).encode(item.frame).SerializeAsString();
+  tape->published(lane.id, item.frame.header.sequence, raw, bytes_of(bytes));
+}
+
+// From the devices to the log, as the daemon ends.
+void VirtualDaemon::Parts::stop() {
+  worker->finish();
+  while (!finished->empty() || !acks->empty()) publish(kItemsPublishedATurn);
+  if (scribe) REQUIRE(scribe->finish(virtual_now_ns));
+}
+
+VirtualDaemon::VirtualDaemon(VirtualOptions options)
+    : parts_(std::make_unique<Parts>(std::move(options))) {}
+VirtualDaemon::~VirtualDaemon() = default;
+
+void VirtualDaemon::add(VirtualStream stream) {
+  const auto id = static_cast<std::uint32_t>(parts_->lanes.size());
+  parts_->lanes.push_back(std::make_unique<Lane>(std::move(stream), id));
+}
+void VirtualDaemon::command(VirtualCommand command) {
+  parts_->script.push_back(std::move(command));
+}
+void VirtualDaemon::run(double until_s) { parts_->run(until_s); }
+
+const VirtualDaemon::Published& VirtualDaemon::published(std::uint32_t stream) const {
+  return parts_->lanes[stream]->published;
+}
+const pipeline::StreamCounters& VirtualDaemon::counters(std::uint32_t stream) const {
+  return parts_->lanes[stream]->counters;
+}
+const std::vector<pipeline::Ack>& VirtualDaemon::acks() const { return parts_->acks_taken; }
+
+}  // namespace posed::test

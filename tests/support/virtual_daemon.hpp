@@ -1,0 +1,123 @@
+// VirtualDaemon: the daemon's reader, pipeline and recorder in one thread on a clock that nobody
+// waits for. Devices follow a script; the order in which the parts get their turns, how long a turn
+// takes and when one of them is held up for a while are drawn from a seed, so a run that fails can
+// be run again. It records a real device log with the frames that it published: what `replay
+// --expect` is tested with.
+//
+//   VirtualDaemon daemon({.seed = 7, .log = folder.path() / "take.plog"});
+//   daemon.add(walking_stream("walker", 3.0));
+//   daemon.add(glove_stream("hand", 3.0));
+//   daemon.command({.at_s = 1.0, .stream = 0, .kind = VirtualCommand::Kind::kAlpha, .alpha =
+//   0.5F}); daemon.run(3.5);  // the log is closed now
+//
+// Times are seconds since the run's begin. One at a time in a thread: they share a clock.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/messages.hpp"
+#include "daemon/record/stream_settings.hpp"
+#include "daemon/record/tape_rings.hpp"
+#include "drivers/driver.hpp"
+
+namespace posed::test {
+
+inline constexpr double kNever_s = std::numeric_limits<double>::infinity();
+
+// What one read of a device gives.
+struct ScriptedChunk {
+  double at_s = 0.0;
+  std::string bytes;
+};
+
+// One link to a device, from when it is found to when it is lost. Several in order are a device
+// that is unplugged and comes back.
+struct ScriptedLink {
+  double from_s = 0.0;
+  std::vector<ScriptedChunk> chunks;  // by time
+  double until_s = kNever_s;
+  bool ends = false;  // at `until_s` the source has ended, and no other link follows
+  std::string flood;  // from `from_s` to `until_s` every read gives this: a device without a pause
+};
+
+// A stream and all that it needs; made by the functions below or by hand.
+struct VirtualStream {
+  std::string name;
+  drivers::Description description;  // of a driver in the registry
+  record::StreamSettings settings;   // rate_hz and gesture_model are filled in
+  std::string style_model;           // a model file's bytes; empty: none
+  std::string gesture_model;         // the same
+  std::string calibration;           // TOML; empty: the device's default
+  std::vector<ScriptedLink> links;
+  std::size_t slots = 64;  // of each ring that the stream may fill
+};
+
+// What a person asks for while it runs.
+struct VirtualCommand {
+  enum class Kind : std::uint8_t { kAlpha, kModel, kGesture, kPlay, kStopPlaying, kCalibrate };
+  double at_s = 0.0;
+  std::uint32_t stream = 0;
+  Kind kind = Kind::kAlpha;
+  float alpha = 0.0F;
+  std::string bytes{};   // kModel, kGesture: a model file; kCalibrate: TOML
+  std::string labels{};  // kPlay: names of labels
+  bool loop = false;     // kPlay
+};
+
+struct VirtualOptions {
+  std::uint64_t seed = 1;
+  std::filesystem::path log;   // empty: nothing is recorded
+  bool holdups = true;         // parts are held up now and then, for up to 0.4 s
+  double turn_us = 40.0;       // the longest that a turn takes
+  std::size_t ack_slots = 64;  // of the ring to control
+  record::RingSizes tape{.chunk_bytes = 8 << 20, .frame_bytes = 32 << 20, .decisions = 4096};
+};
+
+class VirtualDaemon {
+ public:
+  explicit VirtualDaemon(VirtualOptions options);
+  ~VirtualDaemon();
+
+  // Before run(); streams are numbered in the order of adding.
+  void add(VirtualStream stream);
+  void command(VirtualCommand command);
+
+  // Runs from 0 to `until_s`, stops as the daemon does and closes the log. Call once. Fails the
+  // test when something cannot be set up.
+  void run(double until_s);
+
+  struct Published {
+    std::uint64_t frames = 0, raw = 0, samples = 0;
+    std::vector<std::uint64_t> sequences;  // of the styled frames, as they came
+  };
+  [[nodiscard]] const Published& published(std::uint32_t stream) const;
+  [[nodiscard]] const pipeline::StreamCounters& counters(std::uint32_t stream) const;
+  // The answers that control got; the tickets count the commands from 1, by time.
+  [[nodiscard]] const std::vector<pipeline::Ack>& acks() const;
+
+ private:
+  class Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+// A body of five joints that walks at 60 Hz: style, generate (a lag of one frame) and raw frames.
+[[nodiscard]] VirtualStream walking_stream(const std::string& name, double length_s,
+                                           unsigned style_seed = 1);
+// A right-handed LucidGlove at 100 Hz, whose decoder gives a sample before each frame:
+// generate (a lag of two frames) with a gesture model, constrain.
+[[nodiscard]] VirtualStream glove_stream(const std::string& name, double length_s);
+
+// Silences, unplugs (on streams with a glove) and bursts, put into a stream's only link at random.
+void disturb(VirtualStream& stream, std::uint64_t seed);
+
+// A calibration of glove_stream()'s glove; another for each `variant`.
+[[nodiscard]] std::string glove_calibration(int variant);
+
+}  // namespace posed::test
