@@ -12,7 +12,7 @@ namespace {
 
 // Commands, ticks and the end get their turn however fast items come.
 constexpr int kItemsATurn = 256;
-constexpr std::int64_t kLookAgain_ns = 1'000'000;  // for room for an Ack
+constexpr std::int64_t kAcksAgain_ns = 1'000'000;  // for room for an Ack
 
 }  // namespace
 
@@ -139,7 +139,7 @@ std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
 
 std::int64_t Worker::next_due_ns(std::int64_t now_ns) const noexcept {
   if (!ports_.in->empty()) return now_ns;
-  std::int64_t due_ns = unsent_count_ > 0 ? now_ns + kLookAgain_ns : kForever_ns;
+  std::int64_t due_ns = unsent_count_ > 0 ? now_ns + kAcksAgain_ns : kForever_ns;
   for (const auto& lane : lanes_) {
     const std::int64_t lane_due_ns = lane->engine.next_tick_ns();
     if (lane_due_ns != kNoTime_ns) due_ns = std::min(due_ns, lane_due_ns);
