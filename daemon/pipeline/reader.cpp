@@ -84,7 +84,7 @@ class Reader::Source final : private IntakeOut {
       device_ = device;
       intake_.new_link();
       arrived(ports_.clock());
-      tape(record::Direction::kGreeting, std::as_bytes(std::span(device->description.text)));
+      tape(record::Direction::kDeviceInfo, std::as_bytes(std::span(device->description.text)));
       use(*device);
     }));
   }

@@ -127,10 +127,8 @@ log::DecisionRow row_of(const pipeline::Decision& decision) {
 }
 
 Result<pipeline::Decision> decision_of(const log::DecisionRow& row, const std::string& file) {
-  pipeline::Decision decision{.stream = row.stream,
-                              .item = row.item,
-                              .sequence = row.before_frame,
-                              .now_ns = row.now_ns};
+  pipeline::Decision decision{
+      .stream = row.stream, .item = row.item, .sequence = row.before_frame, .now_ns = row.now_ns};
   Value value;
   const Spelling* spelling = find(row.stage, row.name);
   if (spelling != nullptr) decision.kind = spelling->kind;

@@ -221,6 +221,14 @@ const SourceRow& Reader::source_of(const StreamRow& stream) const {
   return *std::ranges::lower_bound(state_->sources, stream.source, {}, &SourceRow::id);
 }
 
+std::optional<std::size_t> Reader::place_of_stream(std::uint32_t id) const {
+  const auto found = std::ranges::lower_bound(state_->streams, id, {}, &StreamRow::id);
+  if (found == state_->streams.end() || found->id != id) return std::nullopt;
+  return static_cast<std::size_t>(found - state_->streams.begin());
+}
+
+bool Reader::counts_items() const { return !state_->old; }
+
 Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
   auto select = state_->database.prepare("SELECT bytes FROM blob WHERE sha256=?");
   if (!select) return std::unexpected(select.error());

@@ -2,6 +2,7 @@
 // short or foreign. One thread; cold.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -39,6 +40,10 @@ class Reader {
   [[nodiscard]] const std::vector<SourceRow>& sources() const;  // by id
   [[nodiscard]] const std::vector<StreamRow>& streams() const;  // by id
   [[nodiscard]] const SourceRow& source_of(const StreamRow& stream) const;
+  // Where a stream stands in streams(); nothing when the log does not describe it.
+  [[nodiscard]] std::optional<std::size_t> place_of_stream(std::uint32_t id) const;
+  // Whether items are counted: false for formats 1 and 2.
+  [[nodiscard]] bool counts_items() const;
 
   // The bytes kept under a hash; an error when there are none or they do not match it.
   [[nodiscard]] Result<std::vector<std::byte>> blob(std::string_view sha256) const;
