@@ -71,32 +71,6 @@ Result<std::string> keep(log::Writer& writer, std::span<const std::byte> bytes) 
   return writer.add_blob(bytes);
 }
 
-// What stands in the log before the first chunk, committed.
-Result<log::Writer> make_log(const RecorderOptions& options, std::vector<RecordedStream>& streams) {
-  auto writer = log::Writer::create(options.file, meta_of(options), options.overwrite);
-  if (!writer) return writer;
-  for (std::uint32_t id = 0; id < streams.size(); ++id) {
-    RecordedStream& stream = streams[id];
-    stream.source.id = id;
-    auto style = keep(*writer, stream.style);
-    if (!style) return std::unexpected(style.error());
-    stream.settings.style_model.sha256 = std::move(*style);
-    auto gesture = keep(*writer, stream.gesture);
-    if (!gesture) return std::unexpected(gesture.error());
-    stream.settings.gesture_model.sha256 = std::move(*gesture);
-    if (auto done = writer->add(stream.source); !done) return std::unexpected(done.error());
-    const log::StreamRow row{.id = id,
-                             .source = id,
-                             .body = {},
-                             .name = stream.source.name,
-                             .stages_json = to_json(stream.settings),
-                             .first_item = 1};
-    if (auto done = writer->add(row); !done) return std::unexpected(done.error());
-  }
-  if (auto done = writer->commit(); !done) return std::unexpected(done.error());
-  return writer;
-}
-
 }  // namespace
 
 RecordedStream recorded_stream(const pipeline::OpenStream& stream) {
@@ -128,9 +102,35 @@ RecordedStream recorded_stream(const pipeline::OpenStream& stream) {
   return recorded;
 }
 
+Result<log::Writer> begin_log(const RecorderOptions& options,
+                              std::vector<RecordedStream>& streams) {
+  auto writer = log::Writer::create(options.file, meta_of(options), options.overwrite);
+  if (!writer) return writer;
+  for (std::uint32_t id = 0; id < streams.size(); ++id) {
+    RecordedStream& stream = streams[id];
+    stream.source.id = id;
+    auto style = keep(*writer, stream.style);
+    if (!style) return std::unexpected(style.error());
+    stream.settings.style_model.sha256 = std::move(*style);
+    auto gesture = keep(*writer, stream.gesture);
+    if (!gesture) return std::unexpected(gesture.error());
+    stream.settings.gesture_model.sha256 = std::move(*gesture);
+    if (auto done = writer->add(stream.source); !done) return std::unexpected(done.error());
+    const log::StreamRow row{.id = id,
+                             .source = id,
+                             .body = {},
+                             .name = stream.source.name,
+                             .stages_json = to_json(stream.settings),
+                             .first_item = 1};
+    if (auto done = writer->add(row); !done) return std::unexpected(done.error());
+  }
+  if (auto done = writer->commit(); !done) return std::unexpected(done.error());
+  return writer;
+}
+
 Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
                                                  std::vector<RecordedStream> streams) {
-  auto writer = make_log(options, streams);
+  auto writer = begin_log(options, streams);
   if (!writer) return std::unexpected(writer.error());
   return std::unique_ptr<Recorder>(new Recorder(std::move(options), streams, std::move(*writer)));
 }

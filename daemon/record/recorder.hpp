@@ -44,6 +44,10 @@ struct RecorderOptions {
   std::function<void(const Notice&)> tell = [](const Notice&) {};
 };
 
+// Makes the log and writes what stands in it before the first chunk, committed.
+[[nodiscard]] Result<log::Writer> begin_log(const RecorderOptions& options,
+                                            std::vector<RecordedStream>& streams);
+
 class Recorder {
  public:
   // Makes the log and starts the thread. Stream ids are places in `streams`.

@@ -6,12 +6,11 @@
 #include <cstdlib>
 #include <set>
 
-#include "daemon/publish/encode.hpp"
-#include "daemon/record/expectation.hpp"
 #include "daemon/record/frame_file.hpp"
 #include "daemon/record/replay.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/log_surgery.hpp"
+#include "tests/support/replayed.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/daemon/staged_run.hpp"
 
@@ -20,54 +19,13 @@ using namespace posed::test;
 
 namespace {
 
-struct Replayed {
-  std::vector<std::string> frames;  // serialized, in pipeline order
-  std::optional<Error> difference;
-  record::Expectation::Counts counts;
-};
-
-Replayed replay(const std::filesystem::path& path, bool expect = true) {
-  Replayed result;
-  auto reader = log::Reader::open(path);
-  REQUIRE(reader);
-  auto opened = record::Replay::open(*reader);
-  if (!opened) {
-    result.difference = opened.error();
-    return result;
-  }
-  record::Replay& replay = **opened;
-  std::optional<record::Expectation> expectation;
-  if (expect) expectation = record::Expectation::open(*reader).value();
-  std::vector<publish::FrameEncoder> encoders;
-  for (const char* name : {"a", "a-raw", "b", "b-raw"}) encoders.emplace_back(name);
-  const auto keep = [&](const Result<>& same) {
-    if (!same && !result.difference) result.difference = same.error();
-  };
-  const auto done = replay.run(
-      [&](const pipeline::Item& item) {
-        const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
-        if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
-        const std::uint32_t stream = item.frame.header.stream;
-        const v1::Frame& frame = encoders[2 * stream + (raw ? 1 : 0)].encode(item.frame);
-        result.frames.push_back(frame.SerializeAsString());
-        if (expect) keep(expectation->compare(stream, raw, frame, replay.broken_at(stream)));
-      },
-      [](const log::ChunkRow&) { return true; });
-  REQUIRE(done);
-  for (std::uint32_t id = 0; expect && id < 2; ++id) {
-    keep(expectation->finish(id, replay.broken_at(id)));
-  }
-  if (expect) result.counts = expectation->counts();
-  return result;
-}
-
 // What is wrong with a log after `sql`, which changes it as if its writer had.
 std::string difference_after(const std::string& sql) {
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
   write_staged_log(path, 60);
   forge(path, sql);
-  const Replayed result = replay(path);
+  const Replayed result = replayed(path);
   REQUIRE(result.difference);
   CHECK(result.difference->file == path.string());
   return result.difference->message;
@@ -111,14 +69,14 @@ TEST_CASE("two replays give the same bits, and those of the live run", "[replay]
   REQUIRE(decisions);
   for (const auto& decision : *decisions) kinds.insert(decision.stage + "/" + decision.name);
   CHECK(kinds == std::set<std::string>{"style/alpha", "style/model", "/shed", "/tick"});
-  const Replayed first = replay(path);
+  const Replayed first = replayed(path);
   INFO((first.difference ? first.difference->text() : ""));
   CHECK(!first.difference);
   CHECK(first.counts.compared == first.frames.size());
   CHECK(first.counts.lost + first.counts.after_gap + first.counts.past_end == 0);
   // Raw and styled of two streams, less what was shed, and the held poses of the ticks.
   CHECK(first.frames.size() == 4 * 120 - 2 * 5 + 4);
-  CHECK(replay(path, false).frames == first.frames);
+  CHECK(replayed(path, false).frames == first.frames);
 }
 
 TEST_CASE("the first difference is named by stream, sequence and field", "[replay]") {
@@ -167,7 +125,7 @@ TEST_CASE("what a log lacks is counted, and nothing after it is compared", "[rep
             " IN (x'15', x'16', x'17');"
             "INSERT INTO gap(kind,owner,after_chunk,lost,time_ns,crc) VALUES(2,1,0,1,0,0);"
             "DELETE FROM frame WHERE stream=1 AND raw=0 AND sequence=7;");
-  const Replayed result = replay(path);
+  const Replayed result = replayed(path);
   INFO((result.difference ? result.difference->text() : ""));
   CHECK(!result.difference);
   CHECK(result.counts.lost == 1);
@@ -189,7 +147,7 @@ TEST_CASE("the golden logs' frames come again on any machine", "[replay]") {
   const TempFolder dir;  // opening a log may write to it
   const auto copy = dir.path() / "staged.plog";
   std::filesystem::copy_file(path, copy);
-  const Replayed result = replay(copy, false);
+  const Replayed result = replayed(copy, false);
   auto reader = log::Reader::open(copy);
   REQUIRE(reader);
   std::array<std::optional<log::Reader::Frames>, 4> live;
