@@ -13,8 +13,6 @@
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/daemon.hpp"
 #include "daemon/record/recorder.hpp"
-#include "daemon/record/stream_settings.hpp"
-#include "proto/log/digest.hpp"
 
 namespace posed::cli {
 namespace {
@@ -25,40 +23,6 @@ struct RecordOptions {
   bool force = false;
   ServeOptions serve;
 };
-
-record::RecordedStream recorded(const pipeline::OpenStream& stream) {
-  const auto& description = stream.device.description;
-  const auto& config = stream.config;
-  record::StreamSettings settings{.publish_raw = config.publish_raw,
-                                  .stale_after_s = config.stale_after_s,
-                                  .rate_hz = description.rate_hz,
-                                  .style = std::nullopt,
-                                  .model_name = {},
-                                  .generate = std::nullopt,
-                                  .constrain = pipeline::bind_constrain(stream).value_or(false),
-                                  .gesture_model = {}};
-  if (config.style) {
-    settings.style = config.style->filter;
-    settings.model_name = config.style->model.filename().string();
-  }
-  const auto gesture = std::as_bytes(std::span(stream.gesture_file));
-  if (config.generate) {
-    settings.generate = config.generate->live;
-    if (!gesture.empty()) settings.gesture_model = log::sha256_hex(gesture);
-    if (!config.style) settings.model_name = config.generate->model.filename().string();
-  }
-  const auto model = std::as_bytes(std::span(stream.model_file));
-  return {.row = {.id = 0,
-                  .name = config.name,
-                  .driver = description.driver,
-                  .text = description.text,
-                  .identity = description.identity,
-                  .config = record::to_json(settings),
-                  .model = {}},
-          .rate_hz = description.rate_hz,
-          .model = {model.begin(), model.end()},
-          .gesture = {gesture.begin(), gesture.end()}};
-}
 
 // Tells what the recorder noticed on event/<stream>: a gap on its own stream, an error on all.
 void tell(pipeline::Daemon& daemon, const record::Notice& notice) {
@@ -79,7 +43,7 @@ Result<> record(const RecordOptions& options) {
   if (!opened) return std::unexpected(opened.error());
   pipeline::Daemon& daemon = **opened;
   std::vector<record::RecordedStream> streams;
-  for (const auto& stream : daemon.streams()) streams.push_back(recorded(*stream));
+  for (const auto& stream : daemon.streams()) streams.push_back(record::recorded_stream(*stream));
   auto started = std::make_shared<std::atomic<bool>>(false);
   record::RecorderOptions recorder_options{
       .file = options.out,

@@ -18,6 +18,7 @@
 #include "daemon/record/broadcast.hpp"
 #include "daemon/record/expectation.hpp"
 #include "daemon/record/frame_file.hpp"
+#include "daemon/record/pace.hpp"
 #include "daemon/record/replay.hpp"
 #include "models/gp/isa.hpp"
 #include "proto/log/reader.hpp"
@@ -39,31 +40,37 @@ struct ReplayOptions {
 // Waits until a chunk is due; false when the user has had enough.
 class Pacer {
  public:
-  explicit Pacer(double speed) : speed_(speed) {}  // 0: as fast as possible
+  Pacer(std::string log, double speed)  // 0: as fast as possible
+      : log_(std::move(log)), speed_(speed), pace_(speed) {}
 
-  bool operator()(std::int64_t arrival_ns) {
+  bool operator()(const log::ChunkRow& chunk) {
     if (speed_ == 0.0) return !Interrupt::came();
-    if (!origin_ns_) origin_ns_ = arrival_ns;
-    const std::chrono::duration<double> after(seconds(arrival_ns - *origin_ns_) / speed_);
-    while (!Interrupt::came() && Clock::now() - start_ < after) {
-      std::this_thread::sleep_for(std::min<std::chrono::duration<double>>(
-          after - (Clock::now() - start_), std::chrono::milliseconds(50)));
+    const auto step = pace_.step(chunk);
+    if (step.skipped_ns > 0) {
+      spdlog::warn("{}: nothing came for {:.0f} s before chunk {}; that silence is skipped", log_,
+                   seconds(step.skipped_ns), chunk.id);
+    }
+    const auto due = start_ + std::chrono::nanoseconds(step.due_ns);
+    while (!Interrupt::came() && Clock::now() < due) {
+      std::this_thread::sleep_until(
+          std::min<Clock::time_point>(due, Clock::now() + std::chrono::milliseconds(50)));
     }
     return !Interrupt::came();
   }
 
  private:
   using Clock = std::chrono::steady_clock;
+  std::string log_;
   double speed_;
+  record::Pace pace_;
   Clock::time_point start_ = Clock::now();
-  std::optional<std::int64_t> origin_ns_;
 };
 
 // Where the frames of a replay go: the file, the comparison, the network.
 class Outputs {
  public:
-  Outputs(const record::Replay& replay, std::size_t streams) : replay_(replay) {
-    for (std::uint32_t id = 0; id < streams; ++id) {
+  explicit Outputs(const record::Replay& replay) : replay_(replay) {
+    for (std::uint32_t id = 0; id < replay.streams(); ++id) {
       const std::string& name = replay.stream(id).name;
       encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(name + "-raw")});
     }
@@ -135,8 +142,12 @@ void warn_of_gaps(const log::Reader& reader) {
   const auto gaps = reader.gaps();
   if (!gaps) return;  // open() has read them already
   for (const log::GapRow& gap : *gaps) {
+    const bool chunks = gap.kind == log::GapRow::Kind::kChunks;
+    const auto owner =
+        chunks ? std::ranges::find(reader.sources(), gap.owner, &log::SourceRow::id)->name
+               : reader.streams()[*reader.place_of_stream(gap.owner)].name;
     const auto kind = std::min<std::size_t>(static_cast<std::size_t>(gap.kind), 2);
-    spdlog::warn("stream {}: the log lacks {} {} after chunk {}", reader.streams()[gap.stream].name,
+    spdlog::warn("{} {}: the log lacks {} {} after chunk {}", chunks ? "source" : "stream", owner,
                  gap.lost, kNames[kind], gap.after_chunk);
   }
 }
@@ -165,7 +176,7 @@ void print_summary(const ReplayOptions& options, const Outputs& outputs) {
 Result<> open_outputs(const ReplayOptions& options, const log::Reader& reader,
                       const record::Replay& replay, Outputs& outputs) {
   if (options.expect) {
-    auto expectation = record::Expectation::open(reader, options.log);
+    auto expectation = record::Expectation::open(reader);
     if (!expectation) return std::unexpected(expectation.error());
     outputs.expectation = std::move(*expectation);
   }
@@ -178,7 +189,7 @@ Result<> open_outputs(const ReplayOptions& options, const log::Reader& reader,
   const auto meta = reader.meta().find("publish_endpoint");
   std::string endpoint = meta == reader.meta().end() ? "" : meta->second;
   if (!options.endpoint.empty()) endpoint = options.endpoint;
-  auto broadcast = record::Broadcast::open(endpoint, replay, reader.streams().size());
+  auto broadcast = record::Broadcast::open(endpoint, replay);
   if (!broadcast) return std::unexpected(broadcast.error());
   outputs.broadcast = std::move(*broadcast);
   const nlohmann::ordered_json ready{{"ready", true}, {"publish", outputs.broadcast->endpoint()}};
@@ -193,14 +204,15 @@ Result<> replay(const ReplayOptions& options) {
   auto reader = log::Reader::open(options.log);
   if (!reader) return std::unexpected(reader.error());
   if (auto chosen = choose_isa(options, *reader); !chosen) return chosen;
-  auto opened = record::Replay::open(*reader, options.log);
+  auto opened = record::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   record::Replay& replay = **opened;
   warn_of_gaps(*reader);
-  Outputs outputs(replay, reader->streams().size());
+  Outputs outputs(replay);
   if (auto done = open_outputs(options, *reader, replay, outputs); !done) return done;
   const Interrupt interrupt;
-  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, Pacer(*speed));
+  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); },
+                         Pacer(options.log, *speed));
   if (!done) return done;
   if (Interrupt::came()) {
     spdlog::info("interrupted: nothing after frame {} was compared", outputs.frames);

@@ -37,14 +37,15 @@ Result<LoggedDevice> read_logged_device(const std::string& log, const std::strin
   if (wanted == nullptr) {
     return misuse("choose one of its streams with --stream: " + names, log);
   }
+  const log::SourceRow& source = reader->source_of(*wanted);
   LoggedDevice device{
-      .stream = wanted->name, .driver = wanted->driver, .text = wanted->text, .recording = {}};
+      .stream = wanted->name, .driver = source.driver, .text = source.text, .recording = {}};
   for (;;) {
     const auto chunk = reader->next_chunk();
     if (!chunk) return std::unexpected(chunk.error());
     if (!chunk->has_value()) break;
     const log::ChunkRow& row = **chunk;
-    if (row.stream != wanted->id ||
+    if (row.source != source.id ||
         row.direction != static_cast<std::uint8_t>(record::Direction::kFromDevice)) {
       continue;
     }

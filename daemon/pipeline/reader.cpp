@@ -57,6 +57,7 @@ class Reader::Source final : private IntakeOut {
 
   // Before the first read: what the first device is and how it is calibrated.
   void begin() noexcept {
+    arrived(ports_.clock());
     if (calibration_ != nullptr) tell_calibration();
     counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
     if (device_ != nullptr) use(*device_);
@@ -84,7 +85,7 @@ class Reader::Source final : private IntakeOut {
       device_ = device;
       intake_.new_link();
       arrived(ports_.clock());
-      tape(record::Direction::kGreeting, std::as_bytes(std::span(device->description.text)));
+      tape(record::Direction::kDeviceInfo, std::as_bytes(std::span(device->description.text)));
       use(*device);
     }));
   }

@@ -18,7 +18,7 @@ Broadcast::Broadcast(std::size_t streams, std::size_t slots, std::unique_ptr<pip
     : counters_(streams), ring_(slots), wake_(std::move(wake)) {}
 
 Result<std::unique_ptr<Broadcast>> Broadcast::open(const std::string& endpoint,
-                                                   const Replay& replay, std::size_t streams) {
+                                                   const Replay& replay) {
   if (!control::is_loopback(endpoint)) {
     return misuse("the log's run published on " + endpoint +
                   "; a replay knows no keys and publishes on this machine only: say --endpoint "
@@ -28,13 +28,15 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const std::string& endpoint,
   if (!wake) return std::unexpected(wake.error());
   std::vector<publish::StreamInfo> infos;
   double frames_per_s = 0.0;
+  const std::uint32_t streams = replay.streams();
   for (std::uint32_t id = 0; id < streams; ++id) {
-    const Replay::Stream& stream = replay.stream(id);
+    const ReplayStream& stream = replay.stream(id);
     infos.push_back({.name = stream.name,
                      .description = stream.description,
                      .rate_hz = stream.settings.rate_hz,
                      .raw = stream.settings.publish_raw,
-                     .model = stream.settings.model_name,
+                     .model = stream.settings.style ? stream.settings.style_model.name
+                                                    : stream.settings.gesture_model.name,
                      .counters = nullptr});
     frames_per_s += stream.settings.rate_hz * 2.0;  // raw and styled
   }

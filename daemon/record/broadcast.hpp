@@ -21,8 +21,7 @@ class Broadcast {
  public:
   // Binds and starts the publisher's thread. A log holds no keys, so only loopback is allowed.
   [[nodiscard]] static Result<std::unique_ptr<Broadcast>> open(const std::string& endpoint,
-                                                               const Replay& replay,
-                                                               std::size_t streams);
+                                                               const Replay& replay);
   ~Broadcast();  // publishes what is waiting, then ends
   Broadcast(const Broadcast&) = delete;
   Broadcast& operator=(const Broadcast&) = delete;

@@ -70,7 +70,8 @@ std::string first_difference(const v1::Frame& live, const v1::Frame& replayed) {
   return "a field this posed does not know";
 }
 
-Result<Expectation> Expectation::open(const log::Reader& reader, const std::string& file) {
+Result<Expectation> Expectation::open(const log::Reader& reader) {
+  const std::string& file = reader.file();
   const auto has_frames = reader.has_frames();
   if (!has_frames) return std::unexpected(has_frames.error());
   if (!*has_frames) {
@@ -93,7 +94,7 @@ Result<Expectation> Expectation::open(const log::Reader& reader, const std::stri
   if (!gaps) return std::unexpected(gaps.error());
   for (const log::GapRow& gap : *gaps) {
     if (gap.kind == log::GapRow::Kind::kFrames) {
-      expectation.streams_[gap.stream].may_lack += gap.lost;
+      expectation.streams_[*reader.place_of_stream(gap.owner)].may_lack += gap.lost;
     }
   }
   return expectation;

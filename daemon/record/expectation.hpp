@@ -21,10 +21,11 @@ namespace posed::record {
 class Expectation {
  public:
   // The reader outlives it. A log without frames is an error that says how to get one.
-  [[nodiscard]] static Result<Expectation> open(const log::Reader& reader, const std::string& file);
+  [[nodiscard]] static Result<Expectation> open(const log::Reader& reader);
 
-  // The next frame of the replay, in its order; `broken_at` is what Replay says of the stream. The
-  // error of the first difference names stream, sequence and field.
+  // The next frame of the replay, in its order; streams are numbered as in Replay; `broken_at` is
+  // what Replay says of the stream. The error of the first difference names stream, sequence and
+  // field.
   [[nodiscard]] Result<> compare(std::uint32_t stream, bool raw, const v1::Frame& replayed,
                                  std::optional<std::uint64_t> broken_at);
   // After the replay: every frame that was published must have come.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -15,31 +16,32 @@ namespace posed::record {
 namespace {
 
 // With a skeleton: others have no pose that a clip could hold.
-std::string names_of(const std::vector<log::StreamRow>& streams, const Replay& replay) {
+std::string names_of(const Replay& replay) {
   std::string names;
-  for (const log::StreamRow& row : streams) {
-    if (replay.stream(row.id).description.skeleton == nullptr) continue;
-    names += (names.empty() ? "" : ", ") + row.name;
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+    const ReplayStream& stream = replay.stream(id);
+    if (stream.description.skeleton == nullptr) continue;
+    names += (names.empty() ? "" : ", ") + stream.name;
   }
   return names;
 }
 
-Result<std::uint32_t> choose(const std::vector<log::StreamRow>& streams, const Replay& replay,
-                             const std::string& wanted, const std::string& path) {
-  const std::string names = names_of(streams, replay);
+Result<std::uint32_t> choose(const Replay& replay, const std::string& wanted,
+                             const std::string& path) {
+  const std::string names = names_of(replay);
   if (names.empty()) return fail("has no stream with a skeleton", path);
-  const log::StreamRow* chosen = nullptr;
-  for (const log::StreamRow& row : streams) {
-    if (replay.stream(row.id).description.skeleton == nullptr) continue;
-    if (!wanted.empty() && row.name != wanted) continue;
-    if (chosen != nullptr)
-      return misuse("has the streams " + names + "; name one by --stream", path);
-    chosen = &row;
+  std::optional<std::uint32_t> chosen;
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+    const ReplayStream& stream = replay.stream(id);
+    if (stream.description.skeleton == nullptr) continue;
+    if (!wanted.empty() && stream.name != wanted) continue;
+    if (chosen) return misuse("has the streams " + names + "; name one by --stream", path);
+    chosen = id;
   }
-  if (chosen == nullptr) {
+  if (!chosen) {
     return misuse("has no stream '" + wanted + "' with a skeleton, but " + names, path);
   }
-  return chosen->id;
+  return *chosen;
 }
 
 // The frames of one stream as they were published, each once.
@@ -89,10 +91,10 @@ class Collector {
 Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::string& stream) {
   auto reader = log::Reader::open(path);
   if (!reader) return std::unexpected(reader.error());
-  auto opened = Replay::open(*reader, path.string());
+  auto opened = Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   Replay& replay = **opened;
-  const auto id = choose(reader->streams(), replay, stream, path.string());
+  const auto id = choose(replay, stream, path.string());
   if (!id) return std::unexpected(id.error());
   const drivers::Description& description = replay.stream(*id).description;
   Collector collector(description.skeleton);
@@ -101,7 +103,7 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
       collector.take(item.frame);
     }
   };
-  const auto done = replay.run(take, [](std::int64_t) { return true; });
+  const auto done = replay.run(take, [](const log::ChunkRow&) { return true; });
   if (!done) return std::unexpected(done.error());
   auto clip = collector.finish(path.string(), description.rate_hz);
   if (const auto broken = replay.broken_at(*id); clip && broken) {

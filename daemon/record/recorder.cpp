@@ -26,10 +26,11 @@ constexpr double kDecisionsPerSecond = 200.0;  // a stream's ticks, sheds and co
 RingSizes ring_sizes(const std::vector<RecordedStream>& streams, bool frames) {
   double chunk_bytes = 0.0, frame_bytes = 0.0;
   for (const RecordedStream& stream : streams) {
-    const bool known = stream.rate_hz > 0.0;
-    chunk_bytes += known ? stream.rate_hz * kBytesPerFrame : kUnknownBytesPerSecond;
+    const bool known = stream.settings.rate_hz > 0.0;
+    chunk_bytes += known ? stream.settings.rate_hz * kBytesPerFrame : kUnknownBytesPerSecond;
     // Raw and styled.
-    frame_bytes += 2.0 * kBytesPerFrame * (known ? stream.rate_hz : kUnknownFramesPerSecond);
+    frame_bytes +=
+        2.0 * kBytesPerFrame * (known ? stream.settings.rate_hz : kUnknownFramesPerSecond);
   }
   const auto held = [](double per_second) {
     return static_cast<std::size_t>(kRing_s * per_second);
@@ -64,34 +65,72 @@ std::map<std::string, std::string> meta_of(const RecorderOptions& options) {
           {"config", options.config_text}};
 }
 
-// What stands in the log before the first chunk, committed.
-Result<log::Writer> make_log(const RecorderOptions& options, std::vector<RecordedStream>& streams) {
+// The hash under which the log keeps a model's file; empty when there is none.
+Result<std::string> keep(log::Writer& writer, std::span<const std::byte> bytes) {
+  if (bytes.empty()) return std::string();
+  return writer.add_blob(bytes);
+}
+
+}  // namespace
+
+RecordedStream recorded_stream(const pipeline::OpenStream& stream) {
+  const drivers::Description& description = stream.device.description;
+  const pipeline::StreamConfig& config = stream.config;
+  const auto style = std::as_bytes(std::span(stream.model_file));
+  const auto gesture = std::as_bytes(std::span(stream.gesture_file));
+  RecordedStream recorded{
+      .source = {.id = 0,
+                 .name = config.name,
+                 .driver = description.driver,
+                 .text = description.text,
+                 .identity = description.identity,
+                 .config = to_json(config.options)},
+      .settings = {.publish_raw = config.publish_raw,
+                   .stale_after_s = config.stale_after_s,
+                   .rate_hz = description.rate_hz,
+                   .constrain = pipeline::bind_constrain(stream).value_or(false)},
+      .style = {style.begin(), style.end()},
+      .gesture = {gesture.begin(), gesture.end()}};
+  if (config.style) {
+    recorded.settings.style = config.style->filter;
+    recorded.settings.style_model.name = config.style->model.filename().string();
+  }
+  if (config.generate) {
+    recorded.settings.generate = config.generate->live;
+    recorded.settings.gesture_model.name = config.generate->model.filename().string();
+  }
+  return recorded;
+}
+
+Result<log::Writer> begin_log(const RecorderOptions& options,
+                              std::vector<RecordedStream>& streams) {
   auto writer = log::Writer::create(options.file, meta_of(options), options.overwrite);
   if (!writer) return writer;
   for (std::uint32_t id = 0; id < streams.size(); ++id) {
     RecordedStream& stream = streams[id];
-    stream.row.id = id;
-    if (!stream.model.empty()) {
-      auto hash = writer->add_blob(stream.model);
-      if (!hash) return std::unexpected(hash.error());
-      stream.row.model = *hash;
-    }
-    if (!stream.gesture.empty()) {
-      if (auto hash = writer->add_blob(stream.gesture); !hash) {
-        return std::unexpected(hash.error());
-      }
-    }
-    if (auto done = writer->add(stream.row); !done) return std::unexpected(done.error());
+    stream.source.id = id;
+    auto style = keep(*writer, stream.style);
+    if (!style) return std::unexpected(style.error());
+    stream.settings.style_model.sha256 = std::move(*style);
+    auto gesture = keep(*writer, stream.gesture);
+    if (!gesture) return std::unexpected(gesture.error());
+    stream.settings.gesture_model.sha256 = std::move(*gesture);
+    if (auto done = writer->add(stream.source); !done) return std::unexpected(done.error());
+    const log::StreamRow row{.id = id,
+                             .source = id,
+                             .body = {},
+                             .name = stream.source.name,
+                             .stages_json = to_json(stream.settings),
+                             .first_item = 1};
+    if (auto done = writer->add(row); !done) return std::unexpected(done.error());
   }
   if (auto done = writer->commit(); !done) return std::unexpected(done.error());
   return writer;
 }
 
-}  // namespace
-
 Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
                                                  std::vector<RecordedStream> streams) {
-  auto writer = make_log(options, streams);
+  auto writer = begin_log(options, streams);
   if (!writer) return std::unexpected(writer.error());
   return std::unique_ptr<Recorder>(new Recorder(std::move(options), streams, std::move(*writer)));
 }

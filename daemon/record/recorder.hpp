@@ -12,7 +12,9 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/pipeline/open_stream.hpp"
 #include "daemon/record/scribe.hpp"
+#include "daemon/record/stream_settings.hpp"
 #include "daemon/record/tape.hpp"
 #include "daemon/record/tape_rings.hpp"
 #include "proto/frame/result.hpp"
@@ -21,13 +23,15 @@
 
 namespace posed::record {
 
-// One stream as it stands before its first chunk.
+// One stream as it stands before its first chunk: a source of the log with one body.
 struct RecordedStream {
-  log::StreamRow row;                // id and model are filled in here: its place, its model's hash
-  double rate_hz = 0.0;              // sizes the rings; 0: unknown
-  std::vector<std::byte> model;      // the bytes of the model file it begins with; may be empty
-  std::vector<std::byte> gesture{};  // the same of the gesture model, whose hash is in row.config
+  log::SourceRow source;             // its id is filled in here: its place
+  StreamSettings settings{};         // the hashes of its models are filled in here, too
+  std::vector<std::byte> style{};    // the bytes of the style model's file it begins with
+  std::vector<std::byte> gesture{};  // the same of the gesture model
 };
+// An opened stream, as a recorder needs it.
+[[nodiscard]] RecordedStream recorded_stream(const pipeline::OpenStream& stream);
 
 struct RecorderOptions {
   std::filesystem::path file;
@@ -39,6 +43,10 @@ struct RecorderOptions {
   // Called from the recorder thread.
   std::function<void(const Notice&)> tell = [](const Notice&) {};
 };
+
+// Makes the log and writes what stands in it before the first chunk, committed.
+[[nodiscard]] Result<log::Writer> begin_log(const RecorderOptions& options,
+                                            std::vector<RecordedStream>& streams);
 
 class Recorder {
  public:

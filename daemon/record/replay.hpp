@@ -10,33 +10,28 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
-#include "daemon/record/stream_settings.hpp"
-#include "drivers/driver.hpp"
+#include "daemon/record/replay_lane.hpp"
+#include "daemon/record/replay_models.hpp"
+#include "daemon/record/schedule.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/reader.hpp"
 
 namespace posed::record {
 
-class Replay {
+// Streams are numbered by their place in Reader::streams(), whatever their ids in the log are.
+class Replay final : private LaneHost {
  public:
   // Builds decoders, models and engines of all streams. The reader outlives the replay.
-  [[nodiscard]] static Result<std::unique_ptr<Replay>> open(log::Reader& reader,
-                                                            const std::string& file);
-  ~Replay();
-  Replay(const Replay&) = delete;
-  Replay& operator=(const Replay&) = delete;
+  [[nodiscard]] static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
+  ~Replay() override = default;
 
-  struct Stream {
-    std::string name;
-    drivers::Description description;
-    StreamSettings settings;
-  };
-  [[nodiscard]] const Stream& stream(std::uint32_t id) const;
+  [[nodiscard]] std::uint32_t streams() const { return static_cast<std::uint32_t>(lanes_.size()); }
+  [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
   // Items in pipeline order.
   using Out = std::function<void(const pipeline::Item&)>;
-  // Called before each chunk with its arrival time; false ends the replay there.
-  using Pace = std::function<bool(std::int64_t arrival_ns)>;
+  // Called before each chunk; false ends the replay there.
+  using Pace = std::function<bool(const log::ChunkRow&)>;
   [[nodiscard]] Result<> run(const Out& out, const Pace& pace);
 
   // While run() lasts and afterwards: the first frame number of a stream from which on the log is
@@ -44,11 +39,21 @@ class Replay {
   [[nodiscard]] std::optional<std::uint64_t> broken_at(std::uint32_t stream) const;
 
  private:
-  class Lane;
   explicit Replay(log::Reader& reader);
+  [[nodiscard]] Result<> open_lanes();
+  [[nodiscard]] Result<> load_decisions();
+  [[nodiscard]] Result<> load_gaps();
+  void apply(const Schedule::Entry& entry) noexcept;
+
+  // LaneHost
+  void before(const pipeline::Item& item, std::uint32_t lane) noexcept override;
+  void publish(const pipeline::Item& item) noexcept override { (*out_)(item); }
 
   log::Reader& reader_;
-  std::vector<std::unique_ptr<Lane>> lanes_;
+  ReplayModels models_;
+  std::vector<std::unique_ptr<ReplayLane>> lanes_;
+  Schedule schedule_;
+  const Out* out_ = nullptr;  // of the run in progress
 };
 
 }  // namespace posed::record

@@ -3,56 +3,39 @@
 #include <utility>
 
 #include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
 
 namespace posed::record {
 namespace {
 
 std::string name_of(const std::string& hash) { return "the log's model " + hash.substr(0, 12); }
 
+// The model kept under a hash, read at its first use.
+template <typename Model, typename Parse>
+Result<const Model*> find_or_read(std::map<std::string, Model>& models, const std::string& hash,
+                                  const log::Reader& reader, Parse&& parse) {
+  if (const auto found = models.find(hash); found != models.end()) return &found->second;
+  const auto bytes = reader.blob(hash);
+  if (!bytes) return std::unexpected(bytes.error());
+  auto model = parse(*bytes, name_of(hash));
+  if (!model) return std::unexpected(model.error());
+  return &models.emplace(hash, std::move(*model)).first->second;
+}
+
 }  // namespace
 
-Result<> ReplayModels::load_style(const log::Reader& reader, const std::string& hash,
-                                  const drivers::Description& description,
-                                  const style::FilterOptions& options) {
-  if (styles_.contains(hash)) return {};
-  const auto bytes = reader.blob(hash);
-  if (!bytes) return std::unexpected(bytes.error());
-  const auto model = style::parse_model(*bytes, name_of(hash));
+Result<std::unique_ptr<const style::BoundModel>> ReplayModels::style(
+    const std::string& hash, const drivers::Description& device,
+    const style::FilterOptions& options) {
+  const auto model = find_or_read(styles_, hash, reader_, style::parse_model);
   if (!model) return std::unexpected(model.error());
-  for (auto& copy : styles_[hash]) {
-    auto bound = style::bind_model(*model, *description.skeleton, options, name_of(hash));
-    if (!bound) return std::unexpected(bound.error());
-    copy = std::move(*bound);
-  }
-  return {};
+  return style::bind_model(**model, *device.skeleton, options, name_of(hash));
 }
 
-Result<> ReplayModels::load_gesture(const log::Reader& reader, const std::string& hash,
-                                    const drivers::Description& description) {
-  if (gestures_.contains(hash)) return {};
-  const auto bytes = reader.blob(hash);
-  if (!bytes) return std::unexpected(bytes.error());
-  auto model = gesture::parse_model(*bytes, name_of(hash));
+Result<std::unique_ptr<const generate::BoundModel>> ReplayModels::gesture(
+    const std::string& hash, const drivers::Description& device) {
+  const auto model = find_or_read(gestures_, hash, reader_, gesture::parse_model);
   if (!model) return std::unexpected(model.error());
-  auto bound = generate::bind_model(std::move(*model), *description.skeleton, description.rate_hz,
-                                    name_of(hash));
-  if (!bound) return std::unexpected(bound.error());
-  gestures_[hash] = std::move(*bound);
-  return {};
-}
-
-const style::BoundModel* ReplayModels::style(const std::string& hash,
-                                             const style::BoundModel* current) const {
-  const auto found = styles_.find(hash);
-  if (found == styles_.end()) return nullptr;
-  const auto& [one, other] = found->second;
-  return current == one.get() ? other.get() : one.get();
-}
-
-const generate::BoundModel* ReplayModels::gesture(const std::string& hash) const {
-  const auto found = gestures_.find(hash);
-  return found == gestures_.end() ? nullptr : found->second.get();
+  return generate::bind_model(**model, *device.skeleton, device.rate_hz, name_of(hash));
 }
 
 }  // namespace posed::record

@@ -1,16 +1,15 @@
-// ReplayModels: the models of one stream that a log's decisions name, bound before anything is
-// replayed, so that nothing can fail on the way. Cold.
+// ReplayModels: the models that a log's streams and decisions name, each read once, before anything
+// is replayed. A swap gets a freshly bound one, as live: a model may carry state of its use. Cold.
 #pragma once
 
-#include <array>
 #include <map>
 #include <memory>
 #include <string>
 
-#include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/style/style_filter.hpp"
+#include "models/style/style_model.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/reader.hpp"
 
@@ -18,21 +17,21 @@ namespace posed::record {
 
 class ReplayModels {
  public:
-  [[nodiscard]] Result<> load_style(const log::Reader& reader, const std::string& hash,
-                                    const drivers::Description& description,
-                                    const style::FilterOptions& options);
-  [[nodiscard]] Result<> load_gesture(const log::Reader& reader, const std::string& hash,
-                                      const drivers::Description& description);
+  // The reader outlives it.
+  explicit ReplayModels(const log::Reader& reader) : reader_(reader) {}
 
-  // Null when there is none of this hash. A style is another object than `current`: live, one that
-  // replaces itself is, too.
-  [[nodiscard]] const style::BoundModel* style(const std::string& hash,
-                                               const style::BoundModel* current) const;
-  [[nodiscard]] const generate::BoundModel* gesture(const std::string& hash) const;
+  // Bound to the device's skeleton, which is there. Errors name the model. What has been bound once
+  // can be bound again.
+  [[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> style(
+      const std::string& hash, const drivers::Description& device,
+      const style::FilterOptions& options);
+  [[nodiscard]] Result<std::unique_ptr<const generate::BoundModel>> gesture(
+      const std::string& hash, const drivers::Description& device);
 
  private:
-  std::map<std::string, std::array<std::unique_ptr<const style::BoundModel>, 2>> styles_;
-  std::map<std::string, std::unique_ptr<const generate::BoundModel>> gestures_;
+  const log::Reader& reader_;
+  std::map<std::string, style::StyleModel> styles_;
+  std::map<std::string, gesture::GestureModel> gestures_;
 };
 
 }  // namespace posed::record

@@ -5,6 +5,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "daemon/record/decision_code.hpp"
+
 namespace posed::record {
 namespace {
 
@@ -13,35 +15,6 @@ constexpr std::int64_t kFirstRetry_ns = 1'000'000'000;
 constexpr std::int64_t kLastRetry_ns = 16'000'000'000;
 
 constexpr std::array<const char*, 3> kKindNames{"chunks", "decisions", "published frames"};
-
-std::string labels_of(const gesture::PlayOrder& play) {
-  std::string text;
-  for (const std::uint16_t label : play.labels()) {
-    text += (text.empty() ? "" : " ") + std::to_string(label);
-  }
-  return text;
-}
-
-log::DecisionRow row_of(const pipeline::Decision& decision) {
-  if (decision.kind == pipeline::Decision::Kind::kPlay) {
-    return {.stream = decision.stream,
-            .kind = static_cast<std::uint8_t>(decision.kind),
-            .sequence = decision.sequence,
-            .count = decision.play.loop ? 1U : 0U,
-            .now_ns = decision.now_ns,
-            .alpha = decision.play.tempo,
-            .model_hash = {},
-            .labels = labels_of(decision.play)};
-  }
-  return {.stream = decision.stream,
-          .kind = static_cast<std::uint8_t>(decision.kind),
-          .sequence = decision.sequence,
-          .count = decision.count,
-          .now_ns = decision.now_ns,
-          .alpha = decision.alpha,
-          .model_hash = decision.model_hash.data(),
-          .labels = {}};
-}
 
 }  // namespace
 
@@ -77,10 +50,14 @@ void Scribe::drain(std::int64_t now_ns) {
   });
   rings_.drain_chunks([&](const ChunkHeader& header, std::span<const std::byte> bytes) {
     put_gap(header.stream, GapKind::kChunks, header.lost_before, now_ns);
-    const log::ChunkRow row{.stream = header.stream,
+    // Each source has one body.
+    const std::array places{log::StreamPlace{header.stream, header.next.frame, header.next.sample}};
+    const log::ChunkRow row{.source = header.stream,
+                            .socket = header.socket,
                             .direction = static_cast<std::uint8_t>(header.direction),
                             .arrival_ns = header.arrival_ns,
-                            .next_sequence = header.next.frame,
+                            .first_item = header.next.item,
+                            .places = places,
                             .bytes = bytes};
     if (put(header.stream, GapKind::kChunks, row, now_ns)) {
       streams_[header.stream].last_chunk = writer_->last_chunk_id();
@@ -106,7 +83,7 @@ bool Scribe::put(std::uint32_t stream, GapKind kind, const Row& row, std::int64_
 void Scribe::put_gap(std::uint32_t stream, GapKind kind, std::uint64_t lost, std::int64_t now_ns) {
   if (lost == 0) return;
   if (writer_) {
-    auto done = writer_->add(log::GapRow{stream, kind, streams_[stream].last_chunk, lost, now_ns});
+    auto done = writer_->add(log::GapRow{kind, stream, streams_[stream].last_chunk, lost, now_ns});
     if (done) {
       streams_[stream].in_gaps[index(kind)] += lost;
       return;
@@ -195,7 +172,7 @@ Result<> Scribe::write_lost(std::int64_t now_ns) {
     for (const GapKind kind : kKinds) {
       const std::uint64_t lost = streams_[id].lost[index(kind)];
       if (lost == 0) continue;
-      const log::GapRow row{id, kind, streams_[id].committed_chunk, lost, now_ns};
+      const log::GapRow row{kind, id, streams_[id].committed_chunk, lost, now_ns};
       if (auto done = writer_->add(row); !done) return done;
     }
   }

@@ -1,10 +1,17 @@
 #include "daemon/record/stream_settings.hpp"
 
+#include <utility>
+
 #include <nlohmann/json.hpp>
+
+#include "proto/log/rows.hpp"
 
 namespace posed::record {
 
 namespace {
+
+using Json = nlohmann::ordered_json;
+namespace words = log::words;
 
 bool sound(const StreamSettings& settings) {
   constexpr double kMost = 1e6;  // seconds, Hz, per second: far beyond sense, far below overflow
@@ -18,58 +25,88 @@ bool sound(const StreamSettings& settings) {
          within(live.noise_rad);
 }
 
+Json stage(const char* name, const StageModel& model, Json parameters) {
+  return {{"stage", name},
+          {"model", model.sha256},
+          {"model_name", model.name},
+          {"parameters", std::move(parameters)}};
+}
+
+StageModel model_of(const Json& stage) {
+  return {.sha256 = stage.value("model", ""), .name = stage.value("model_name", "")};
+}
+
+style::FilterOptions style_of(const Json& parameters) {
+  return {.alpha = parameters.at("alpha").get<double>(),
+          .alpha_slew_per_s = parameters.at("alpha_slew_per_s").get<double>(),
+          .gate = parameters.at("gate").get<bool>(),
+          .gate_fallback = parameters.at("gate_fallback").get<double>(),
+          .calibrate = parameters.at("calibrate").get<bool>()};
+}
+
+generate::LiveOptions generate_of(const Json& parameters) {
+  return {.lag = {.frames = parameters.at("lag_frames").get<int>(),
+                  .seconds = parameters.at("lag_s").get<double>()},
+          .noise_rad = parameters.at("noise_rad").get<double>()};
+}
+
+// False: this posed does not have the stage, or runs it at another place.
+bool add_stage(const Json& stage, StreamSettings& settings) {
+  const auto name = stage.at("stage").get<std::string>();
+  if (name == words::kStyle && !settings.style && !settings.generate && !settings.constrain) {
+    settings.style = style_of(stage.at("parameters"));
+    settings.style_model = model_of(stage);
+    return true;
+  }
+  if (name == words::kGenerate && !settings.generate && !settings.constrain) {
+    settings.generate = generate_of(stage.at("parameters"));
+    settings.gesture_model = model_of(stage);
+    return true;
+  }
+  if (name == words::kConstrain && !settings.constrain) return settings.constrain = true;
+  return false;
+}
+
 }  // namespace
 
 std::string to_json(const StreamSettings& settings) {
-  nlohmann::ordered_json json{{"publish_raw", settings.publish_raw},
-                              {"stale_after_s", settings.stale_after_s},
-                              {"rate_hz", settings.rate_hz},
-                              {"model_name", settings.model_name}};
+  Json stages = Json::array();
   if (settings.style) {
-    json["style"] = {{"alpha", settings.style->alpha},
-                     {"alpha_slew_per_s", settings.style->alpha_slew_per_s},
-                     {"gate", settings.style->gate},
-                     {"gate_fallback", settings.style->gate_fallback},
-                     {"calibrate", settings.style->calibrate}};
+    stages.push_back(stage(words::kStyle, settings.style_model,
+                           {{"alpha", settings.style->alpha},
+                            {"alpha_slew_per_s", settings.style->alpha_slew_per_s},
+                            {"gate", settings.style->gate},
+                            {"gate_fallback", settings.style->gate_fallback},
+                            {"calibrate", settings.style->calibrate}}));
   }
-  if (settings.constrain) json["constrain"] = true;
   if (settings.generate) {
-    json["generate"] = {{"lag_frames", settings.generate->lag.frames},
-                        {"lag_s", settings.generate->lag.seconds},
-                        {"noise_rad", settings.generate->noise_rad},
-                        {"model", settings.gesture_model}};
+    stages.push_back(stage(words::kGenerate, settings.gesture_model,
+                           {{"lag_frames", settings.generate->lag.frames},
+                            {"lag_s", settings.generate->lag.seconds},
+                            {"noise_rad", settings.generate->noise_rad}}));
   }
-  return json.dump();
+  if (settings.constrain) {
+    stages.push_back({{"stage", words::kConstrain}, {"parameters", Json::object()}});
+  }
+  return Json{{"publish_raw", settings.publish_raw},
+              {"stale_after_s", settings.stale_after_s},
+              {"rate_hz", settings.rate_hz},
+              {"stages", std::move(stages)}}
+      .dump();
 }
 
 Result<StreamSettings> settings_from_json(const std::string& json, const std::string& file) {
   try {
-    const auto root = nlohmann::json::parse(json);
-    StreamSettings settings{.publish_raw = root.at("publish_raw").get<bool>(),
-                            .stale_after_s = root.at("stale_after_s").get<double>(),
-                            .rate_hz = root.at("rate_hz").get<double>(),
-                            .style = std::nullopt,
-                            .model_name = root.at("model_name").get<std::string>(),
-                            .generate = std::nullopt,
-                            .constrain = false,
-                            .gesture_model = {}};
-    if (root.contains("style")) {
-      const auto& style = root.at("style");
-      settings.style =
-          style::FilterOptions{.alpha = style.at("alpha").get<double>(),
-                               .alpha_slew_per_s = style.at("alpha_slew_per_s").get<double>(),
-                               .gate = style.at("gate").get<bool>(),
-                               .gate_fallback = style.at("gate_fallback").get<double>(),
-                               .calibrate = style.at("calibrate").get<bool>()};
-    }
-    settings.constrain = root.value("constrain", false);
-    if (root.contains("generate")) {
-      const auto& generate = root.at("generate");
-      settings.generate =
-          generate::LiveOptions{.lag = {.frames = generate.at("lag_frames").get<int>(),
-                                        .seconds = generate.at("lag_s").get<double>()},
-                                .noise_rad = generate.at("noise_rad").get<double>()};
-      settings.gesture_model = generate.at("model").get<std::string>();
+    const auto root = Json::parse(json);
+    StreamSettings settings;
+    settings.publish_raw = root.at("publish_raw").get<bool>();
+    settings.stale_after_s = root.at("stale_after_s").get<double>();
+    settings.rate_hz = root.at("rate_hz").get<double>();
+    for (const Json& stage : root.at("stages")) {
+      if (add_stage(stage, settings)) continue;
+      return fail("this posed cannot run the stages of a stream as they stand in the log (" +
+                      stage.at("stage").dump() + "); update posed",
+                  file);
     }
     if (!sound(settings))
       return fail("the log is damaged (a stream's settings make no sense)", file);
@@ -78,6 +115,14 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
     return fail("the log is damaged (a stream's settings: " + std::string(error.what()) + ")",
                 file);
   }
+}
+
+std::string to_json(const drivers::Options& options) {
+  Json json = Json::object();
+  for (const auto& [name, value] : options) {
+    std::visit([&, key = name](const auto& it) { json[key] = it; }, value);
+  }
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace posed::record

@@ -11,13 +11,15 @@
 
 namespace posed::record {
 
-// What a row of the log's chunks is. A greeting (Description::text) says that a link is new and how
-// what follows is decoded; a calibration is its file's text, in use from the next chunk on.
+// What a row of the log's chunks is. A device's info (Description::text) says that a link is new
+// and how what follows is decoded; a calibration is its file's text, in use from the next chunk on;
+// a description says which bodies a source has from there on.
 enum class Direction : std::uint8_t {
   kFromDevice = 0,
   kToDevice = 1,
-  kGreeting = 2,
-  kCalibration = 3
+  kDeviceInfo = 2,
+  kCalibration = 3,
+  kDescription = 4
 };
 
 class Tape {

@@ -43,16 +43,13 @@ Statement::Statement(sqlite3_stmt* statement, std::string file)
 void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 
 Statement& Statement::bind(std::int64_t value) {
+  bound_.add(value);
   sqlite3_bind_int64(statement_.get(), next_parameter_++, value);
   return *this;
 }
 
-Statement& Statement::bind(double value) {
-  sqlite3_bind_double(statement_.get(), next_parameter_++, value);
-  return *this;
-}
-
 Statement& Statement::bind(std::string_view text) {
+  bound_.add(std::as_bytes(std::span(text)));
   const char* data = text.empty() ? "" : text.data();  // a null pointer would bind NULL
   sqlite3_bind_text64(statement_.get(), next_parameter_++, data, text.size(), SQLITE_STATIC,
                       SQLITE_UTF8);
@@ -60,8 +57,14 @@ Statement& Statement::bind(std::string_view text) {
 }
 
 Statement& Statement::bind(std::span<const std::byte> bytes) {
+  bound_.add(bytes);
   const void* data = bytes.empty() ? static_cast<const void*>("") : bytes.data();
   sqlite3_bind_blob64(statement_.get(), next_parameter_++, data, bytes.size(), SQLITE_STATIC);
+  return *this;
+}
+
+Statement& Statement::bind_checksum() {
+  sqlite3_bind_int64(statement_.get(), next_parameter_++, bound_.value());
   return *this;
 }
 
@@ -88,6 +91,7 @@ Result<> Statement::execute() {
 void Statement::reset() {
   sqlite3_reset(statement_.get());
   next_parameter_ = 1;
+  bound_ = {};
   done_ = false;
 }
 
@@ -107,6 +111,25 @@ std::span<const std::byte> Statement::bytes(int column) const {
   const auto* data = static_cast<const std::byte*>(sqlite3_column_blob(statement_.get(), column));
   if (data == nullptr) return {};
   return {data, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+bool Statement::checksum_matches() const {
+  const int last = sqlite3_column_count(statement_.get()) - 1;
+  Checksum checksum;
+  for (int column = 0; column < last; ++column) {
+    switch (sqlite3_column_type(statement_.get(), column)) {
+      case SQLITE_INTEGER:
+        checksum.add(integer(column));
+        break;
+      case SQLITE_TEXT:
+      case SQLITE_BLOB:
+        checksum.add(bytes(column));
+        break;
+      default:
+        return false;  // no column of a log is a real number or nothing
+    }
+  }
+  return checksum.value() == integer(last);
 }
 
 void Database::Close::operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "proto/frame/result.hpp"
+#include "proto/log/checksum.hpp"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -24,9 +25,10 @@ class Statement {
 
   // Binds the next parameter, from the first after each reset().
   Statement& bind(std::int64_t value);
-  Statement& bind(double value);
   Statement& bind(std::string_view text);
   Statement& bind(std::span<const std::byte> bytes);
+  // The checksum of what was bound since the last reset().
+  Statement& bind_checksum();
 
   // True: a row stands ready. False: done, and so for every call until reset().
   [[nodiscard]] Result<bool> step();
@@ -39,6 +41,9 @@ class Statement {
   [[nodiscard]] double real(int column) const;
   [[nodiscard]] std::string_view text(int column) const;
   [[nodiscard]] std::span<const std::byte> bytes(int column) const;
+  // Whether the row's last column is the checksum of all before it. Call it before the columns are
+  // read: SQLite converts them in place to what is asked for.
+  [[nodiscard]] bool checksum_matches() const;
 
  private:
   struct Finalize {
@@ -47,6 +52,7 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
   std::string file_;
   int next_parameter_ = 1;
+  Checksum bound_;
   bool done_ = false;
 };
 

@@ -1,7 +1,12 @@
 #include "proto/log/reader.hpp"
 
+#include <algorithm>
+#include <limits>
+
 #include "proto/log/database.hpp"
 #include "proto/log/digest.hpp"
+#include "proto/log/old_format.hpp"
+#include "proto/log/places.hpp"
 #include "proto/log/schema.hpp"
 
 namespace posed::log {
@@ -9,10 +14,10 @@ namespace {
 
 constexpr int kPatience_ms = 2000;
 
-std::uint64_t sequence_of(std::int64_t value) { return static_cast<std::uint64_t>(value); }
+std::uint64_t unsigned_of(std::int64_t stored) { return static_cast<std::uint64_t>(stored); }
 
-// Says whether the file is a log of a format we know, before anything in it is touched.
-Result<> check_marks(Database& database, const std::string& file) {
+// The format of a log that we know how to read, before anything in it is touched.
+Result<int> check_marks(Database& database, const std::string& file) {
   const auto application = database.value("PRAGMA application_id");
   if (!application) return std::unexpected(application.error());
   if (*application != std::to_string(kApplicationId)) {
@@ -20,12 +25,14 @@ Result<> check_marks(Database& database, const std::string& file) {
   }
   const auto version = database.value("PRAGMA user_version");
   if (!version) return std::unexpected(version.error());
-  if (std::stoi(*version) > kFormatVersion) {
+  const int format = std::stoi(*version);
+  if (format > kFormatVersion) {
     return fail("written by a newer posed (log format " + *version + ", this one reads up to " +
                     std::to_string(kFormatVersion) + "); update posed",
                 file);
   }
-  return {};
+  if (format < 1) return fail("not a device log (log format " + *version + ")", file);
+  return format;
 }
 
 // After a crash the -wal belongs to the log. Folding it in fails while another process has the log
@@ -64,44 +71,110 @@ Result<std::map<std::string, std::string>> read_meta(Database& database) {
   }
 }
 
+// The next row of a table whose first column is its id and whose last is its checksum.
+Result<bool> step_checked(Statement& select, const char* table, const std::string& file) {
+  auto row = select.step();
+  if (!row || !*row || select.checksum_matches()) return row;
+  return damaged_row(file, table, select.integer(0), "does not match its checksum");
+}
+
+Result<std::vector<SourceRow>> read_sources(Database& database, const std::string& file) {
+  auto select = database.prepare(
+      "SELECT id, name, driver, text, identity, config, crc FROM source ORDER BY id");
+  if (!select) return std::unexpected(select.error());
+  std::vector<SourceRow> sources;
+  for (;;) {
+    const auto row = step_checked(*select, "source", file);
+    if (!row) return std::unexpected(row.error());
+    if (!*row) return sources;
+    const auto text = [&](int column) { return std::string(select->text(column)); };
+    sources.push_back({static_cast<std::uint32_t>(select->integer(0)), text(1), text(2), text(3),
+                       text(4), text(5)});
+  }
+}
+
 Result<std::vector<StreamRow>> read_streams(Database& database, const std::string& file) {
   auto select = database.prepare(
-      "SELECT id, name, driver, text, identity, config, model FROM stream ORDER BY id");
+      "SELECT id, source, body, name, stages_json, first_item, crc FROM stream ORDER BY id");
   if (!select) return std::unexpected(select.error());
   std::vector<StreamRow> streams;
   for (;;) {
-    const auto row = select->step();
+    const auto row = step_checked(*select, "stream", file);
     if (!row) return std::unexpected(row.error());
     if (!*row) return streams;
-    if (select->integer(0) != static_cast<std::int64_t>(streams.size())) {
-      return fail("the log is damaged (its streams are not numbered 0, 1, 2, ...)", file);
-    }
     const auto text = [&](int column) { return std::string(select->text(column)); };
-    streams.push_back({static_cast<std::uint32_t>(streams.size()), text(1), text(2), text(3),
-                       text(4), text(5), text(6)});
+    streams.push_back({static_cast<std::uint32_t>(select->integer(0)),
+                       static_cast<std::uint32_t>(select->integer(1)), text(2), text(3), text(4),
+                       unsigned_of(select->integer(5))});
   }
+}
+
+Result<Statement> select_rows(Database& database, bool old, const char* sql,
+                              Result<Statement> (*select_old)(Database&)) {
+  return old ? select_old(database) : database.prepare(sql);
 }
 
 }  // namespace
 
+std::unexpected<Error> damaged_row(const std::string& file, const char* table, std::int64_t id,
+                                   const std::string& how) {
+  return fail("the log is damaged: row " + std::to_string(id) + " of table " + table + " " + how +
+                  "; use another copy of it",
+              file);
+}
+
 struct Reader::State {
   Database database;
   std::string file;
+  bool old = false;  // of format 1 or 2
   std::map<std::string, std::string> meta;
+  std::vector<SourceRow> sources;
   std::vector<StreamRow> streams;
   std::optional<Statement> chunks;
-  bool has_labels = true;  // nothing could be played when format 1 was written
+  std::vector<StreamPlace> places;  // of the last chunk
 
-  // A row may name only a stream that the log describes.
-  Result<std::uint32_t> stream_of(std::int64_t id) const {
-    if (id >= 0 && id < static_cast<std::int64_t>(streams.size())) {
-      return static_cast<std::uint32_t>(id);
-    }
-    return fail("the log is damaged (a row names stream " + std::to_string(id) + " of " +
-                    std::to_string(streams.size()) + ")",
-                file);
+  // Rows of the old formats carry no checksum.
+  Result<bool> step(Statement& select, const char* table) const {
+    return old ? select.step() : step_checked(select, table, file);
+  }
+
+  Result<> read_described();
+  // A row may name only what the log describes.
+  Result<> check_owner(std::int64_t id, const char* table, std::int64_t row, bool is_source) const;
+  Result<> check_stream(std::uint32_t id, const char* table, std::int64_t row) const {
+    return check_owner(id, table, row, false);
   }
 };
+
+Result<> Reader::State::read_described() {
+  if (old) {
+    auto described = old_format::read_streams(database, file);
+    if (!described) return std::unexpected(described.error());
+    sources = std::move(described->sources);
+    streams = std::move(described->streams);
+    return {};
+  }
+  auto found_sources = read_sources(database, file);
+  if (!found_sources) return std::unexpected(found_sources.error());
+  sources = std::move(*found_sources);
+  auto found_streams = read_streams(database, file);
+  if (!found_streams) return std::unexpected(found_streams.error());
+  streams = std::move(*found_streams);
+  for (const StreamRow& row : streams) {
+    if (auto known = check_owner(row.source, "stream", row.id, true); !known) return known;
+  }
+  return {};
+}
+
+Result<> Reader::State::check_owner(std::int64_t id, const char* table, std::int64_t row,
+                                    bool is_source) const {
+  const bool known = is_source ? std::ranges::binary_search(sources, id, {}, &SourceRow::id)
+                               : std::ranges::binary_search(streams, id, {}, &StreamRow::id);
+  if (known) return {};
+  return damaged_row(file, table, row,
+                     std::string("names ") + (is_source ? "source " : "stream ") +
+                         std::to_string(id) + ", which the log does not describe");
+}
 
 Reader::Reader(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Reader::Reader(Reader&&) noexcept = default;
@@ -114,27 +187,47 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path, error)) return fail("is a folder, not a log", file);
   auto database = Database::open(path, Database::Mode::kReadWrite);
   if (!database) return std::unexpected(database.error());
-  if (auto done = check_marks(*database, file); !done) return std::unexpected(done.error());
+  const auto format = check_marks(*database, file);
+  if (!format) return std::unexpected(format.error());
   fold_in_wal(*database);
   database->set_patience_ms(kPatience_ms);
   if (auto done = check_whole(*database, file); !done) return std::unexpected(done.error());
   auto meta = read_meta(*database);
   if (!meta) return std::unexpected(meta.error());
-  auto streams = read_streams(*database, file);
-  if (!streams) return std::unexpected(streams.error());
-  auto chunks = database->prepare(
-      "SELECT id, stream, direction, arrival_ns, next_sequence, bytes FROM chunk ORDER BY id");
+  auto state = std::make_unique<State>(State{.database = std::move(*database),
+                                             .file = file,
+                                             .old = *format <= kLastOldVersion,
+                                             .meta = std::move(*meta),
+                                             .sources = {},
+                                             .streams = {},
+                                             .chunks = std::nullopt,
+                                             .places = {}});
+  if (auto done = state->read_described(); !done) return std::unexpected(done.error());
+  auto chunks = select_rows(state->database, state->old,
+                            "SELECT id, source, socket, direction, arrival_ns, first_item, "
+                            "sequences, bytes, crc FROM chunk ORDER BY id",
+                            old_format::select_chunks);
   if (!chunks) return std::unexpected(chunks.error());
-  const auto labels =
-      database->value("SELECT count(*) FROM pragma_table_info('decision') WHERE name='labels'");
-  if (!labels) return std::unexpected(labels.error());
-  return Reader(
-      std::make_unique<State>(State{std::move(*database), file, std::move(*meta),
-                                    std::move(*streams), std::move(*chunks), *labels == "1"}));
+  state->chunks.emplace(std::move(*chunks));
+  return Reader(std::move(state));
 }
 
+const std::string& Reader::file() const { return state_->file; }
 const std::map<std::string, std::string>& Reader::meta() const { return state_->meta; }
+const std::vector<SourceRow>& Reader::sources() const { return state_->sources; }
 const std::vector<StreamRow>& Reader::streams() const { return state_->streams; }
+
+const SourceRow& Reader::source_of(const StreamRow& stream) const {
+  return *std::ranges::lower_bound(state_->sources, stream.source, {}, &SourceRow::id);
+}
+
+std::optional<std::size_t> Reader::place_of_stream(std::uint32_t id) const {
+  const auto found = std::ranges::lower_bound(state_->streams, id, {}, &StreamRow::id);
+  if (found == state_->streams.end() || found->id != id) return std::nullopt;
+  return static_cast<std::size_t>(found - state_->streams.begin());
+}
+
+bool Reader::counts_items() const { return !state_->old; }
 
 Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
   auto select = state_->database.prepare("SELECT bytes FROM blob WHERE sha256=?");
@@ -153,52 +246,105 @@ Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
 
 Result<std::optional<ChunkRow>> Reader::next_chunk() {
   Statement& select = *state_->chunks;
-  const auto row = select.step();
-  if (!row) return std::unexpected(row.error());
-  if (!*row) return std::nullopt;
-  const auto stream = state_->stream_of(select.integer(1));
-  if (!stream) return std::unexpected(stream.error());
-  return ChunkRow{select.integer(0),
-                  *stream,
-                  static_cast<std::uint8_t>(select.integer(2)),
-                  select.integer(3),
-                  sequence_of(select.integer(4)),
-                  select.bytes(5)};
+  const auto stepped = state_->step(select, "chunk");
+  if (!stepped) return std::unexpected(stepped.error());
+  if (!*stepped) return std::nullopt;
+  if (state_->old) {
+    const ChunkRow row = old_format::chunk(select, state_->places);
+    if (auto known = state_->check_owner(select.integer(1), "chunk", row.id, true); !known) {
+      return std::unexpected(known.error());
+    }
+    return row;
+  }
+  const std::int64_t id = select.integer(0), source = select.integer(1);
+  if (auto known = state_->check_owner(source, "chunk", id, true); !known) {
+    return std::unexpected(known.error());
+  }
+  if (!unpack_places(select.bytes(6), state_->places)) {
+    return damaged_row(state_->file, "chunk", id, "has sequences that are cut short");
+  }
+  constexpr std::int64_t kMostDirection = std::numeric_limits<std::uint8_t>::max();
+  return ChunkRow{.id = id,
+                  .source = static_cast<std::uint32_t>(source),
+                  .socket = static_cast<std::uint32_t>(select.integer(2)),
+                  .direction = static_cast<std::uint8_t>(
+                      std::clamp<std::int64_t>(select.integer(3), 0, kMostDirection)),
+                  .arrival_ns = select.integer(4),
+                  .first_item = unsigned_of(select.integer(5)),
+                  .places = state_->places,
+                  .bytes = select.bytes(7)};
 }
 
-Result<std::vector<DecisionRow>> Reader::decisions(std::uint32_t stream) const {
-  auto select =
-      state_->database.prepare("SELECT kind, sequence, count, now_ns, alpha, model_hash, " +
-                               std::string(state_->has_labels ? "labels" : "''") +
-                               " FROM decision WHERE stream=? ORDER BY id");
+Result<std::vector<DecisionRow>> Reader::decisions() const {
+  auto select = select_rows(state_->database, state_->old,
+                            "SELECT id, item, stream, stage, name, value, now_ns, crc "
+                            "FROM decision ORDER BY id",
+                            old_format::select_decisions);
   if (!select) return std::unexpected(select.error());
-  select->bind(std::int64_t{stream});
   std::vector<DecisionRow> decisions;
   for (;;) {
-    const auto row = select->step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return decisions;
-    decisions.push_back({stream, static_cast<std::uint8_t>(select->integer(0)),
-                         sequence_of(select->integer(1)), sequence_of(select->integer(2)),
-                         select->integer(3), select->real(4), std::string(select->text(5)),
-                         std::string(select->text(6))});
+    const auto stepped = state_->step(*select, "decision");
+    if (!stepped) return std::unexpected(stepped.error());
+    if (!*stepped) return decisions;
+    if (state_->old) {
+      decisions.push_back(old_format::decision(*select));
+    } else {
+      const auto value = select->bytes(5);
+      decisions.push_back({.id = select->integer(0),
+                           .item = unsigned_of(select->integer(1)),
+                           .stream = static_cast<std::uint32_t>(select->integer(2)),
+                           .stage = std::string(select->text(3)),
+                           .name = std::string(select->text(4)),
+                           .value = {reinterpret_cast<const char*>(value.data()), value.size()},
+                           .now_ns = select->integer(6)});
+    }
+    const DecisionRow& row = decisions.back();
+    if (auto known = state_->check_stream(row.stream, "decision", row.id); !known) {
+      return std::unexpected(known.error());
+    }
   }
 }
 
 Result<std::vector<GapRow>> Reader::gaps() const {
-  auto select = state_->database.prepare(
-      "SELECT stream, kind, after_chunk, lost, time_ns FROM gap "
-      "ORDER BY id");
+  auto select = select_rows(state_->database, state_->old,
+                            "SELECT id, kind, owner, after_chunk, lost, time_ns, crc FROM gap "
+                            "ORDER BY id",
+                            old_format::select_gaps);
   if (!select) return std::unexpected(select.error());
   std::vector<GapRow> gaps;
   for (;;) {
-    const auto row = select->step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return gaps;
-    const auto stream = state_->stream_of(select->integer(0));
-    if (!stream) return std::unexpected(stream.error());
-    gaps.push_back({*stream, static_cast<GapRow::Kind>(select->integer(1)), select->integer(2),
-                    sequence_of(select->integer(3)), select->integer(4)});
+    const auto stepped = state_->step(*select, "gap");
+    if (!stepped) return std::unexpected(stepped.error());
+    if (!*stepped) return gaps;
+    if (state_->old) {
+      gaps.push_back(old_format::gap(*select));
+    } else {
+      gaps.push_back({.kind = static_cast<GapRow::Kind>(select->integer(1)),
+                      .owner = static_cast<std::uint32_t>(select->integer(2)),
+                      .after_chunk = select->integer(3),
+                      .lost = unsigned_of(select->integer(4)),
+                      .time_ns = select->integer(5)});
+    }
+    const GapRow& row = gaps.back();
+    const bool is_source = row.kind == GapRow::Kind::kChunks;
+    if (auto known = state_->check_owner(row.owner, "gap", select->integer(0), is_source); !known) {
+      return std::unexpected(known.error());
+    }
+  }
+}
+
+Result<std::vector<TakeRow>> Reader::takes() const {
+  if (state_->old) return std::vector<TakeRow>{};
+  auto select =
+      state_->database.prepare("SELECT id, name, first_item, last_item, crc FROM take ORDER BY id");
+  if (!select) return std::unexpected(select.error());
+  std::vector<TakeRow> takes;
+  for (;;) {
+    const auto stepped = state_->step(*select, "take");
+    if (!stepped) return std::unexpected(stepped.error());
+    if (!*stepped) return takes;
+    takes.push_back({select->integer(0), std::string(select->text(1)),
+                     unsigned_of(select->integer(2)), unsigned_of(select->integer(3))});
   }
 }
 
@@ -206,6 +352,8 @@ struct Reader::Frames::State {
   Statement select;
   std::uint32_t stream = 0;
   bool raw = false;
+  bool old = false;
+  std::string file;
 };
 
 Reader::Frames::Frames(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -214,19 +362,22 @@ Reader::Frames& Reader::Frames::operator=(Frames&&) noexcept = default;
 Reader::Frames::~Frames() = default;
 
 Result<std::optional<FrameRow>> Reader::Frames::next() {
-  const auto row = state_->select.step();
+  Statement& select = state_->select;
+  const auto row = state_->old ? select.step() : step_checked(select, "frame", state_->file);
   if (!row) return std::unexpected(row.error());
   if (!*row) return std::nullopt;
-  return FrameRow{state_->stream, sequence_of(state_->select.integer(0)), state_->raw,
-                  state_->select.bytes(1)};
+  return FrameRow{state_->stream, unsigned_of(select.integer(2)), state_->raw, select.bytes(4)};
 }
 
 Result<Reader::Frames> Reader::frames(std::uint32_t stream, bool raw) const {
   auto select = state_->database.prepare(
-      "SELECT sequence, bytes FROM frame WHERE stream=? AND raw=? ORDER BY id");
+      state_->old ? old_format::kSelectFrames
+                  : "SELECT id, stream, sequence, raw, bytes, crc FROM frame "
+                    "WHERE stream=? AND raw=? ORDER BY id");
   if (!select) return std::unexpected(select.error());
   select->bind(std::int64_t{stream}).bind(std::int64_t{raw});
-  return Frames(std::make_unique<Frames::State>(Frames::State{std::move(*select), stream, raw}));
+  return Frames(std::make_unique<Frames::State>(
+      Frames::State{std::move(*select), stream, raw, state_->old, state_->file}));
 }
 
 Result<bool> Reader::has_frames() const {

@@ -5,6 +5,7 @@
 
 #include "proto/log/database.hpp"
 #include "proto/log/digest.hpp"
+#include "proto/log/places.hpp"
 #include "proto/log/schema.hpp"
 
 namespace posed::log {
@@ -12,17 +13,22 @@ namespace {
 
 constexpr int kPatience_ms = 2000;  // a reader folding the -wal in is quicker than that
 
-// The writer's statements, in the order of kSql.
-enum Sql { kBegin, kCommit, kStream, kChunk, kDecision, kFrame, kGap, kBlob, kSqlCount };
+// The tables whose ids the writer gives, in the order of rows.
+enum Table : std::size_t { kChunk, kDecision, kFrame, kGap, kNumbered };
+constexpr std::array<const char*, kNumbered> kNames{"chunk", "decision", "frame", "gap"};
+
+// The writer's other statements.
+enum Sql : std::size_t { kSource = kNumbered, kStream, kBlob, kBegin, kCommit, kSqlCount };
 constexpr std::array<std::string_view, kSqlCount> kSql{
+    "INSERT INTO chunk VALUES(?,?,?,?,?,?,?,?,?)",
+    "INSERT INTO decision VALUES(?,?,?,?,?,?,?,?)",
+    "INSERT INTO frame VALUES(?,?,?,?,?,?)",
+    "INSERT INTO gap VALUES(?,?,?,?,?,?,?)",
+    "INSERT INTO source VALUES(?,?,?,?,?,?,?)",
+    "INSERT INTO stream VALUES(?,?,?,?,?,?,?)",
+    "INSERT OR IGNORE INTO blob VALUES(?,?)",
     "BEGIN IMMEDIATE",
     "COMMIT",
-    "INSERT INTO stream VALUES(?,?,?,?,?,?,?)",
-    "INSERT INTO chunk VALUES(NULL,?,?,?,?,?)",
-    "INSERT INTO decision VALUES(NULL,?,?,?,?,?,?,?,?)",
-    "INSERT INTO frame VALUES(NULL,?,?,?,?)",
-    "INSERT INTO gap VALUES(NULL,?,?,?,?,?)",
-    "INSERT OR IGNORE INTO blob VALUES(?,?)",
 };
 
 // SQLite knows signed integers only; sequences keep their bits.
@@ -67,11 +73,17 @@ Result<> make_durable(Database& database) {
 }  // namespace
 
 struct Writer::State {
+  using Ids = std::array<std::int64_t, kNumbered>;
+
   Database database;
   std::vector<Statement> statements;
   bool in_transaction = false;
-  std::int64_t last_chunk_id = 0;
-  std::int64_t committed_chunk_id = 0;
+  Ids last_id{};
+  Ids committed_id{};
+  std::vector<std::byte> sequences;  // of the chunk that is being written
+
+  // A statement with the id of the next row of its table bound.
+  Statement& numbered(Table table) { return statements[table].bind(last_id[table] + 1); }
 
   // Runs a bound statement in the transaction, which the first row opens.
   Result<> insert(Statement& bound) {
@@ -84,6 +96,12 @@ struct Writer::State {
     }
     return bound.execute();
   }
+
+  Result<> insert(Table table) {
+    auto done = insert(statements[table].bind_checksum());
+    if (done) ++last_id[table];
+    return done;
+  }
 };
 
 Writer::Writer(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -92,15 +110,19 @@ Writer& Writer::operator=(Writer&&) noexcept = default;
 Writer::~Writer() = default;
 
 Result<Writer> Writer::on(Database database) {
-  auto state = std::make_unique<State>(State{.database = std::move(database), .statements = {}});
+  auto state = std::make_unique<State>(
+      State{.database = std::move(database), .statements = {}, .sequences = {}});
   for (const std::string_view sql : kSql) {
     auto statement = state->database.prepare(sql);
     if (!statement) return std::unexpected(statement.error());
     state->statements.push_back(std::move(*statement));
   }
-  const auto last = state->database.value("SELECT ifnull(max(id),0) FROM chunk");
-  if (!last) return std::unexpected(last.error());
-  state->last_chunk_id = state->committed_chunk_id = std::stoll(*last);
+  for (std::size_t table = 0; table < kNumbered; ++table) {
+    const auto last =
+        state->database.value("SELECT ifnull(max(id),0) FROM " + std::string(kNames[table]));
+    if (!last) return std::unexpected(last.error());
+    state->last_id[table] = state->committed_id[table] = std::stoll(*last);
+  }
   return Writer(std::move(state));
 }
 
@@ -121,55 +143,69 @@ Result<Writer> Writer::reopen(const std::filesystem::path& path) {
   return on(std::move(*database));
 }
 
-Result<> Writer::add(const StreamRow& row) {
-  return state_->insert(state_->statements[kStream]
+Result<> Writer::add(const SourceRow& row) {
+  return state_->insert(state_->statements[kSource]
                             .bind(std::int64_t{row.id})
                             .bind(row.name)
                             .bind(row.driver)
                             .bind(row.text)
                             .bind(row.identity)
                             .bind(row.config)
-                            .bind(row.model));
+                            .bind_checksum());
+}
+
+Result<> Writer::add(const StreamRow& row) {
+  return state_->insert(state_->statements[kStream]
+                            .bind(std::int64_t{row.id})
+                            .bind(std::int64_t{row.source})
+                            .bind(row.body)
+                            .bind(row.name)
+                            .bind(row.stages_json)
+                            .bind(stored(row.first_item))
+                            .bind_checksum());
 }
 
 Result<> Writer::add(const ChunkRow& row) {
-  auto done = state_->insert(state_->statements[kChunk]
-                                 .bind(std::int64_t{row.stream})
-                                 .bind(std::int64_t{row.direction})
-                                 .bind(row.arrival_ns)
-                                 .bind(stored(row.next_sequence))
-                                 .bind(row.bytes));
-  if (done) state_->last_chunk_id = state_->database.last_insert_id();
-  return done;
+  pack_places(row.places, state_->sequences);
+  state_->numbered(kChunk)
+      .bind(std::int64_t{row.source})
+      .bind(std::int64_t{row.socket})
+      .bind(std::int64_t{row.direction})
+      .bind(row.arrival_ns)
+      .bind(stored(row.first_item))
+      .bind(std::span<const std::byte>(state_->sequences))
+      .bind(row.bytes);
+  return state_->insert(kChunk);
 }
 
 Result<> Writer::add(const DecisionRow& row) {
-  return state_->insert(state_->statements[kDecision]
-                            .bind(std::int64_t{row.stream})
-                            .bind(std::int64_t{row.kind})
-                            .bind(stored(row.sequence))
-                            .bind(stored(row.count))
-                            .bind(row.now_ns)
-                            .bind(row.alpha)
-                            .bind(row.model_hash)
-                            .bind(row.labels));
+  state_->numbered(kDecision)
+      .bind(stored(row.item))
+      .bind(std::int64_t{row.stream})
+      .bind(row.stage)
+      .bind(row.name)
+      .bind(std::as_bytes(std::span(row.value)))
+      .bind(row.now_ns);
+  return state_->insert(kDecision);
 }
 
 Result<> Writer::add(const FrameRow& row) {
-  return state_->insert(state_->statements[kFrame]
-                            .bind(std::int64_t{row.stream})
-                            .bind(stored(row.sequence))
-                            .bind(std::int64_t{row.raw})
-                            .bind(row.bytes));
+  state_->numbered(kFrame)
+      .bind(std::int64_t{row.stream})
+      .bind(stored(row.sequence))
+      .bind(std::int64_t{row.raw})
+      .bind(row.bytes);
+  return state_->insert(kFrame);
 }
 
 Result<> Writer::add(const GapRow& row) {
-  return state_->insert(state_->statements[kGap]
-                            .bind(std::int64_t{row.stream})
-                            .bind(static_cast<std::int64_t>(row.kind))
-                            .bind(row.after_chunk)
-                            .bind(stored(row.lost))
-                            .bind(row.time_ns));
+  state_->numbered(kGap)
+      .bind(static_cast<std::int64_t>(row.kind))
+      .bind(std::int64_t{row.owner})
+      .bind(row.after_chunk)
+      .bind(stored(row.lost))
+      .bind(row.time_ns);
+  return state_->insert(kGap);
 }
 
 Result<std::string> Writer::add_blob(std::span<const std::byte> bytes) {
@@ -179,14 +215,14 @@ Result<std::string> Writer::add_blob(std::span<const std::byte> bytes) {
   return hash;
 }
 
-std::int64_t Writer::last_chunk_id() const { return state_->last_chunk_id; }
+std::int64_t Writer::last_chunk_id() const { return state_->last_id[kChunk]; }
 
 Result<> Writer::commit() {
   if (!state_->in_transaction) return {};
   auto done = state_->statements[kCommit].execute();
   if (done) {
     state_->in_transaction = false;
-    state_->committed_chunk_id = state_->last_chunk_id;
+    state_->committed_id = state_->last_id;
   }
   return done;
 }
@@ -194,7 +230,7 @@ Result<> Writer::commit() {
 void Writer::rollback() {
   state_->database.rollback();
   state_->in_transaction = false;
-  state_->last_chunk_id = state_->committed_chunk_id;
+  state_->last_id = state_->committed_id;
 }
 
 Result<> Writer::close() {

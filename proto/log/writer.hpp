@@ -31,8 +31,11 @@ class Writer {
   Writer& operator=(Writer&&) noexcept;
   ~Writer();
 
+  // Chunks, decisions, frames and gaps get the next id of their table; the row's own is not read.
+  // A source comes before its streams, a stream before what speaks of it.
+  [[nodiscard]] Result<> add(const SourceRow& row);
   [[nodiscard]] Result<> add(const StreamRow& row);
-  [[nodiscard]] Result<> add(const ChunkRow& row);  // gives the next id; row.id is not read
+  [[nodiscard]] Result<> add(const ChunkRow& row);
   [[nodiscard]] Result<> add(const DecisionRow& row);
   [[nodiscard]] Result<> add(const FrameRow& row);
   [[nodiscard]] Result<> add(const GapRow& row);

@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "daemon/control/zmq_handle.hpp"
-#include "daemon/pipeline/messages.hpp"
+#include "daemon/record/decision_code.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/outcome.hpp"
@@ -114,12 +114,12 @@ std::vector<v1::Frame> published(const log::Reader& reader) {
 
 // A starved machine sheds; from there on the live filter has seen another clip.
 std::uint64_t first_shed(const log::Reader& reader) {
-  const auto decisions = reader.decisions(0);
+  const auto decisions = reader.decisions();
   REQUIRE(decisions);
-  for (const auto& decision : *decisions) {
-    if (decision.kind == static_cast<int>(pipeline::Decision::Kind::kShed)) {
-      return decision.sequence;
-    }
+  for (const auto& row : *decisions) {
+    const auto decision = record::decision_of(row, reader.file());
+    REQUIRE(decision);
+    if (decision->kind == pipeline::Decision::Kind::kShed) return decision->sequence;
   }
   return kFrames + 1;
 }

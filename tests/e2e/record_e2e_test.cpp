@@ -65,16 +65,14 @@ class Walkers : public Stage {
     }
   }
 
-  [[nodiscard]] std::set<int> decisions() const {
-    std::set<int> kinds;
+  [[nodiscard]] std::set<std::string> decisions() const {
     const auto reader = log::Reader::open(path("take.plog"));
     REQUIRE(reader);
-    for (std::uint32_t id = 0; id < 2; ++id) {
-      const auto rows = reader->decisions(id);
-      REQUIRE(rows);
-      for (const auto& row : *rows) kinds.insert(row.kind);
-    }
-    return kinds;
+    const auto rows = reader->decisions();
+    REQUIRE(rows);
+    std::set<std::string> names;
+    for (const auto& row : *rows) names.insert(row.name);
+    return names;
   }
 };
 
@@ -91,7 +89,7 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
   stage.tell({"set", "walker", "alpha", "-0.5"});
   stage.tell({"model", "other", stage.path("two.style")});
   stage.hold_back_pipeline(true);
-  for (int i = 0; i < 10 && !stage.decisions().contains(3); ++i) {
+  for (int i = 0; i < 10 && !stage.decisions().contains("shed"); ++i) {
     stage.daemon->send(SIGSTOP);
     std::this_thread::sleep_for(700ms);
     stage.daemon->send(SIGCONT);
@@ -102,7 +100,7 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
   std::this_thread::sleep_for(300ms);
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
-  for (const int kind : {1, 2, 3}) CHECK(stage.decisions().contains(kind));
+  for (const char* name : {"alpha", "model", "shed"}) CHECK(stage.decisions().contains(name));
 
   const std::string log = stage.path("take.plog");
   for (const char* name : {"one.bin", "two.bin"}) {

@@ -37,7 +37,7 @@ void check_chunks(const std::string& log, const std::string& stream,
   std::size_t count = 0, jumps = 0;
   auto from = said.begin();
   for (auto chunk = reader->next_chunk(); chunk && *chunk; chunk = reader->next_chunk()) {
-    if ((*chunk)->stream != row->id || (*chunk)->direction != 0) continue;
+    if ((*chunk)->source != row->source || (*chunk)->direction != 0) continue;
     const auto at = std::find_if(from, said.end(), [&](const auto& report) {
       return std::ranges::equal(report, (*chunk)->bytes);
     });

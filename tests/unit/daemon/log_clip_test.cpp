@@ -18,7 +18,7 @@ constexpr std::size_t kFrames = 120;
 std::vector<Frame> published(const std::filesystem::path& log, std::uint32_t stream) {
   auto reader = log::Reader::open(log);
   REQUIRE(reader);
-  const auto replay = record::Replay::open(*reader, log.string());
+  const auto replay = record::Replay::open(*reader);
   REQUIRE(replay);
   std::vector<Frame> frames;
   const auto done = (*replay)->run(
@@ -28,7 +28,7 @@ std::vector<Frame> published(const std::filesystem::path& log, std::uint32_t str
             !frames.empty() && item.frame.header.sequence <= frames.back().header.sequence;
         if (!again) frames.push_back(item.frame);
       },
-      [](std::int64_t) { return true; });
+      [](const log::ChunkRow&) { return true; });
   REQUIRE(done);
   return frames;
 }

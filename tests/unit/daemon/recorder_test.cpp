@@ -31,7 +31,9 @@ log::Writer make_writer(const std::filesystem::path& path, std::uint32_t streams
   auto writer = log::Writer::create(path, {}, false);
   REQUIRE(writer);
   for (std::uint32_t id = 0; id < streams; ++id) {
-    REQUIRE(writer->add(log::StreamRow{id, "s" + std::to_string(id), "file", "", "", "{}", ""}));
+    const std::string name = "s" + std::to_string(id);
+    REQUIRE(writer->add(log::SourceRow{id, name, "file", "", "", "{}"}));
+    REQUIRE(writer->add(log::StreamRow{id, id, "", name, "{}", 1}));
   }
   REQUIRE(writer->commit());
   return std::move(*writer);
@@ -46,7 +48,7 @@ std::vector<std::vector<std::uint64_t>> sequences(const std::filesystem::path& p
     const auto chunk = reader->next_chunk();
     REQUIRE(chunk);
     if (!chunk->has_value()) return found;
-    found[(*chunk)->stream].push_back((*chunk)->next_sequence);
+    found[(*chunk)->source].push_back((*chunk)->places[0].next_frame);
   }
 }
 
@@ -61,7 +63,7 @@ std::vector<log::GapRow> gaps(const std::filesystem::path& path) {
 std::uint64_t lost(const std::vector<log::GapRow>& rows, std::uint32_t stream, GapKind kind) {
   std::uint64_t sum = 0;
   for (const log::GapRow& row : rows) {
-    if (row.stream == stream && row.kind == kind) sum += row.lost;
+    if (row.owner == stream && row.kind == kind) sum += row.lost;
   }
   return sum;
 }
@@ -103,7 +105,7 @@ TEST_CASE("what two hot threads put on the tape is in the log, in order, whole")
   auto log = log::Reader::open(path);
   REQUIRE(log);
   for (auto chunk = log->next_chunk(); chunk && chunk->has_value(); chunk = log->next_chunk()) {
-    REQUIRE((*chunk)->bytes.size() == (*chunk)->next_sequence % 700);
+    REQUIRE((*chunk)->bytes.size() == (*chunk)->places[0].next_frame % 700);
   }
 }
 
@@ -116,7 +118,7 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
                 [&](const Notice& notice) { notices.push_back(notice); });
   const std::string line(400, '1');
   for (std::uint64_t i = 1; i <= 6; ++i) put_chunk(rings, 0, i, line);  // two fit
-  for (std::uint64_t i = 1; i <= 5; ++i) rings.decision({.stream = 1, .sequence = i});
+  for (std::uint64_t i = 1; i <= 5; ++i) rings.decision({.stream = 1, .item = i});
   for (std::uint64_t i = 1; i <= 4; ++i) rings.published(0, i, false, bytes_of(line));
   scribe.turn(kTurn_ns);
   CHECK(notices.size() == 3);
@@ -148,7 +150,7 @@ TEST_CASE("a full disk: counted, told, and recording goes on with a gap row when
     for (int i = 0; i < count; ++i) {
       put_chunk(rings, 0, ++sequence, line);
       put_chunk(rings, 1, sequence, "short");
-      rings.decision({.stream = 1, .sequence = sequence});
+      rings.decision({.stream = 1, .item = sequence});
       scribe.turn(now_ns += kTurn_ns);
     }
   };
@@ -187,8 +189,9 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
     return std::chrono::steady_clock::now().time_since_epoch().count();
   };
   RecordedStream stream;
-  stream.row.name = "a";
-  stream.model = {std::byte{1}, std::byte{2}};
+  stream.source.name = "a";
+  stream.settings.style.emplace();
+  stream.style = {std::byte{1}, std::byte{2}};
   RecorderOptions options;
   options.file = path;
   options.frames = true;
@@ -209,7 +212,9 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   REQUIRE(reader);
   CHECK(reader->meta().at("config") == "x");
   CHECK(reader->meta().contains("isa"));
-  CHECK(reader->blob(reader->streams()[0].model)->size() == 2);
+  const auto settings = settings_from_json(reader->streams()[0].stages_json, "");
+  REQUIRE(settings);
+  CHECK(reader->blob(settings->style_model.sha256)->size() == 2);
 
   const auto again = Recorder::open(options, {stream});
   REQUIRE(!again);

@@ -10,6 +10,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "daemon/pipeline/intake.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/record/recorder.hpp"
@@ -24,15 +25,19 @@
 namespace posed::test {
 
 // One stream of the run, from chunk to published frame.
-class StagedStream final : public Sink, private pipeline::EngineOut {
+class StagedStream final : private pipeline::IntakeOut, private pipeline::EngineOut {
  public:
-  StagedStream(std::uint32_t id, std::string name, drivers::Device device, std::string model_bytes)
+  // `next_item` is shared by all streams of the run.
+  StagedStream(std::uint32_t id, std::string name, drivers::Device device, std::string model_bytes,
+               std::uint64_t& next_item)
       : id_(id),
         name_(std::move(name)),
         device_(std::move(device)),
         model_bytes_(std::move(model_bytes)),
         styled_(name_),
-        raw_(name_ + "-raw") {
+        raw_(name_ + "-raw"),
+        next_item_(next_item),
+        intake_(id, next_item, *this) {
     settings_.publish_raw = true;
     settings_.rate_hz = device_.description.rate_hz;
     settings_.style.emplace();
@@ -44,26 +49,25 @@ class StagedStream final : public Sink, private pipeline::EngineOut {
   [[nodiscard]] record::RecordedStream recorded() const {
     const auto bytes = std::as_bytes(std::span(model_bytes_));
     const drivers::Description& description = device_.description;
-    return {.row = {.id = id_,
-                    .name = name_,
-                    .driver = description.driver,
-                    .text = description.text,
-                    .identity = "toy.bvh",
-                    .config = record::to_json(settings_),
-                    .model = {}},
-            .rate_hz = description.rate_hz,
-            .model = {bytes.begin(), bytes.end()}};
+    return {.source = {.id = 0,
+                       .name = name_,
+                       .driver = description.driver,
+                       .text = description.text,
+                       .identity = "toy.bvh",
+                       .config = "{}"},
+            .settings = settings_,
+            .style = {bytes.begin(), bytes.end()}};
   }
 
   void set_tape(record::Tape& tape) { tape_ = &tape; }
 
   // The line of a clip, or a piece of it. A dropped chunk is decoded, but never reaches the engine.
   void feed(const std::string& line, std::int64_t arrival_ns, bool shed = false) {
-    arrival_ns_ = arrival_ns;
     shed_ = shed;
     const auto bytes = std::as_bytes(std::span(line));
-    tape_->chunk(id_, 0, record::Direction::kFromDevice, arrival_ns, {.frame = frames_ + 1}, bytes);
-    device_.decoder->feed(bytes, arrival_ns, *this);
+    intake_.arrived(arrival_ns);
+    tape_->chunk(id_, 0, record::Direction::kFromDevice, arrival_ns, intake_.next(), bytes);
+    device_.decoder->feed(bytes, arrival_ns, intake_);
   }
 
   void tick(std::int64_t now_ns) { CHECK(engine_->tick(now_ns, *this)); }
@@ -93,13 +97,12 @@ class StagedStream final : public Sink, private pipeline::EngineOut {
         .value();
   }
 
-  void frame(Frame& frame) noexcept override {
-    frame.header.stream = id_;
-    frame.header.sequence = ++frames_;
-    frame.header.arrival_ns = arrival_ns_;
-    if (!shed_) engine_->on_frame(frame, *this);
+  bool item(pipeline::Item& item) noexcept override {
+    place_ = item.number;
+    if (!shed_) engine_->on_frame(item.frame, *this);
+    place_ = 0;
+    return !shed_;
   }
-  void sample(Sample&) noexcept override {}
   void outcome(Outcome) noexcept override {}
 
   void item(const pipeline::Item& item) noexcept override {
@@ -108,7 +111,11 @@ class StagedStream final : public Sink, private pipeline::EngineOut {
     const std::string bytes = (raw ? raw_ : styled_).encode(item.frame).SerializeAsString();
     tape_->published(id_, item.frame.header.sequence, raw, std::as_bytes(std::span(bytes)));
   }
-  void decision(const pipeline::Decision& decision) noexcept override { tape_->decision(decision); }
+  void decision(const pipeline::Decision& decision) noexcept override {
+    pipeline::Decision placed = decision;
+    placed.item = place_ != 0 ? place_ : next_item_;
+    tape_->decision(placed);
+  }
 
   std::uint32_t id_;
   std::string name_;
@@ -116,12 +123,13 @@ class StagedStream final : public Sink, private pipeline::EngineOut {
   std::string model_bytes_;
   record::StreamSettings settings_;
   publish::FrameEncoder styled_, raw_;
+  std::uint64_t& next_item_;
+  std::uint64_t place_ = 0;  // number of the item in the engine; 0 between two
+  pipeline::Intake intake_;
   Model model_;
   std::vector<Model> swapped_;
   std::optional<pipeline::StreamEngine> engine_;
   record::Tape* tape_ = nullptr;
-  std::uint64_t frames_ = 0;
-  std::int64_t arrival_ns_ = 0;
   bool shed_ = false;
 };
 
@@ -149,11 +157,12 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
   std::vector<std::unique_ptr<StagedStream>> streams;
   std::vector<record::RecordedStream> rows;
   drivers::Ports ports;
+  std::uint64_t next_item = 1;
   for (std::uint32_t id = 0; id < 2; ++id) {
     auto device = drivers::find_driver("file")->open({{"path", bvh.string()}}, ports);
     REQUIRE(device);
-    streams.push_back(
-        std::make_unique<StagedStream>(id, id == 0 ? "a" : "b", std::move(*device), one));
+    streams.push_back(std::make_unique<StagedStream>(id, id == 0 ? "a" : "b", std::move(*device),
+                                                     one, next_item));
     rows.push_back(streams.back()->recorded());
   }
   record::RecorderOptions options;

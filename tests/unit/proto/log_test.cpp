@@ -3,19 +3,24 @@
 #include <catch2/catch.hpp>
 
 #include <fstream>
+#include <map>
 #include <string>
+#include <vector>
 
-#include <sqlite3.h>
-
+#include "posed/v1/log.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/writer.hpp"
 #include "tests/support/file_limit.hpp"
+#include "tests/support/log_surgery.hpp"
+#include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
 using namespace posed;
 using log::Reader;
 using log::Writer;
+using test::forge;
+using test::run_sql;
 
 namespace {
 
@@ -27,19 +32,28 @@ std::string text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-log::StreamRow stream_row(std::uint32_t id, const std::string& name) {
-  return {id, name, "file", "HIERARCHY\n", "walk.bvh", "name = \"" + name + "\"", ""};
+log::SourceRow source_row(std::uint32_t id, const std::string& name) {
+  return {id, name, "file", "HIERARCHY\n", "walk.bvh", "{\"path\":\"walk.bvh\"}"};
 }
 
-log::ChunkRow chunk_row(std::uint32_t stream, std::uint64_t sequence, const std::string& text) {
-  return {0, stream, 0, static_cast<std::int64_t>(sequence) * 1000, sequence, bytes_of(text)};
+log::StreamRow stream_row(std::uint32_t id, std::uint32_t source, const std::string& name) {
+  return {id, source, "", name, "{}", 1};
+}
+
+log::ChunkRow chunk_row(std::uint32_t source, std::uint64_t sequence, const std::string& text) {
+  return {.source = source,
+          .arrival_ns = static_cast<std::int64_t>(sequence) * 1000,
+          .first_item = sequence,
+          .bytes = bytes_of(text)};
 }
 
 Writer writer_with_two_streams(const std::filesystem::path& path) {
   auto writer = Writer::create(path, {{"posed_version", "0.1.0"}, {"isa", "avx2"}}, false);
   REQUIRE(writer);
-  REQUIRE(writer->add(stream_row(0, "a")));
-  REQUIRE(writer->add(stream_row(1, "b")));
+  for (const std::uint32_t id : {0U, 1U}) {
+    REQUIRE(writer->add(source_row(id, id == 0 ? "a" : "b")));
+    REQUIRE(writer->add(stream_row(id, id, id == 0 ? "a" : "b")));
+  }
   REQUIRE(writer->commit());
   return std::move(*writer);
 }
@@ -72,13 +86,6 @@ std::string refusal(const std::filesystem::path& path) {
   return reader.error().message;
 }
 
-void run_sql(const std::filesystem::path& path, const char* sql) {
-  sqlite3* handle = nullptr;
-  REQUIRE(sqlite3_open(path.c_str(), &handle) == SQLITE_OK);
-  REQUIRE(sqlite3_exec(handle, sql, nullptr, nullptr, nullptr) == SQLITE_OK);
-  sqlite3_close(handle);
-}
-
 }  // namespace
 
 TEST_CASE("sha256 names bytes as the standard does") {
@@ -90,31 +97,61 @@ TEST_CASE("sha256 names bytes as the standard does") {
 TEST_CASE("a log gives back every row it was given") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
+  constexpr std::uint32_t kLate = 3U << 16U | 5U;  // ids are names, not places
+  constexpr std::uint64_t kMost = ~std::uint64_t{0};
   Writer writer = writer_with_two_streams(path);
-  REQUIRE(writer.add(chunk_row(1, 7, "1 2 3\n")));
+  REQUIRE(writer.add(log::StreamRow{kLate, 1, "Ann", "b-ann", "{\"stages\":[]}", 40}));
+  const std::vector<log::StreamPlace> places{{1, 7, 8}, {kLate, 300, kMost}};
+  REQUIRE(writer.add(log::ChunkRow{.source = 1,
+                                   .socket = 2,
+                                   .direction = 3,
+                                   .arrival_ns = -5,
+                                   .first_item = 11,
+                                   .places = places,
+                                   .bytes = bytes_of("1 2 3\n")}));
   REQUIRE(writer.add(chunk_row(0, 1, "")));
   CHECK(writer.last_chunk_id() == 2);
-  REQUIRE(writer.add(log::DecisionRow{1, 3, ~std::uint64_t{0}, 5, -9, 0.25, "feed"}));
+  REQUIRE(writer.add(log::DecisionRow{.item = kMost,
+                                      .stream = kLate,
+                                      .stage = "style",
+                                      .name = "alpha",
+                                      .value = "v",
+                                      .now_ns = -9}));
   REQUIRE(writer.add(log::FrameRow{1, 7, true, bytes_of("raw")}));
   REQUIRE(writer.add(log::FrameRow{1, 7, false, bytes_of("styled")}));
-  REQUIRE(writer.add(log::GapRow{0, log::GapRow::Kind::kDecisions, 2, 11, 99}));
+  REQUIRE(writer.add(log::GapRow{log::GapRow::Kind::kDecisions, kLate, 2, 11, 99}));
   const auto hash = writer.add_blob(bytes_of("model"));
   REQUIRE(hash);
   CHECK(*writer.add_blob(bytes_of("model")) == *hash);
   REQUIRE(writer.close());
   CHECK(!std::filesystem::exists(path.string() + "-wal"));
+  forge(path, "INSERT INTO take VALUES(1, 'jump', 12, 40, 0)");
 
   auto reader = Reader::open(path);
   REQUIRE(reader);
   CHECK(reader->meta().at("isa") == "avx2");
-  REQUIRE(reader->streams().size() == 2);
-  CHECK(reader->streams()[1].name == "b");
-  CHECK(reader->streams()[1].text == "HIERARCHY\n");
-  CHECK(reader->streams()[1].config == "name = \"b\"");
+  REQUIRE(reader->sources().size() == 2);
+  CHECK(reader->sources()[1].text == "HIERARCHY\n");
+  CHECK(reader->sources()[1].config == "{\"path\":\"walk.bvh\"}");
+  REQUIRE(reader->streams().size() == 3);
+  const log::StreamRow& late = reader->streams()[2];
+  CHECK(late.id == kLate);
+  CHECK(late.body == "Ann");
+  CHECK(late.name == "b-ann");
+  CHECK(late.stages_json == "{\"stages\":[]}");
+  CHECK(late.first_item == 40);
+  CHECK(reader->source_of(late).name == "b");
   auto chunk = reader->next_chunk();
   REQUIRE((chunk && chunk->has_value()));
-  CHECK((*chunk)->stream == 1);
-  CHECK((*chunk)->next_sequence == 7);
+  CHECK((*chunk)->source == 1);
+  CHECK((*chunk)->socket == 2);
+  CHECK((*chunk)->direction == 3);
+  CHECK((*chunk)->arrival_ns == -5);
+  CHECK((*chunk)->first_item == 11);
+  REQUIRE((*chunk)->places.size() == 2);
+  CHECK((*chunk)->places[1].stream == kLate);
+  CHECK((*chunk)->places[1].next_frame == 300);
+  CHECK((*chunk)->places[1].next_sample == kMost);
   CHECK(text_of((*chunk)->bytes) == "1 2 3\n");
   chunk = reader->next_chunk();
   REQUIRE((chunk && chunk->has_value()));
@@ -122,13 +159,14 @@ TEST_CASE("a log gives back every row it was given") {
   CHECK(count_chunks(*reader) == 0);
   CHECK(count_chunks(*reader) == 0);  // the end stays the end
 
-  const auto decisions = reader->decisions(1);
+  const auto decisions = reader->decisions();
   REQUIRE((decisions && decisions->size() == 1));
-  CHECK(decisions->front().sequence == ~std::uint64_t{0});
+  CHECK(decisions->front().item == kMost);
+  CHECK(decisions->front().stream == kLate);
+  CHECK(decisions->front().stage == "style");
+  CHECK(decisions->front().name == "alpha");
+  CHECK(decisions->front().value == "v");
   CHECK(decisions->front().now_ns == -9);
-  CHECK(decisions->front().alpha == 0.25);
-  CHECK(decisions->front().model_hash == "feed");
-  CHECK(reader->decisions(0)->empty());
   auto frames = reader->frames(1, false);
   REQUIRE(frames);
   const auto frame = frames->next();
@@ -139,9 +177,142 @@ TEST_CASE("a log gives back every row it was given") {
   const auto gaps = reader->gaps();
   REQUIRE((gaps && gaps->size() == 1));
   CHECK(gaps->front().lost == 11);
+  CHECK(gaps->front().owner == kLate);
   CHECK(gaps->front().kind == log::GapRow::Kind::kDecisions);
+  const auto takes = reader->takes();
+  REQUIRE((takes && takes->size() == 1));
+  CHECK(takes->front().name == "jump");
+  CHECK(takes->front().last_item == 40);
   CHECK(text_of(*reader->blob(*hash)) == "model");
   CHECK(!reader->blob("none"));
+}
+
+// What the reader says when it has read everything; empty when nothing is wrong.
+std::string complaint(const std::filesystem::path& path) {
+  auto reader = Reader::open(path);
+  if (!reader) return reader.error().text();
+  for (;;) {
+    const auto chunk = reader->next_chunk();
+    if (!chunk) return chunk.error().text();
+    if (!chunk->has_value()) break;
+  }
+  if (const auto rows = reader->decisions(); !rows) return rows.error().text();
+  if (const auto rows = reader->gaps(); !rows) return rows.error().text();
+  if (const auto rows = reader->takes(); !rows) return rows.error().text();
+  auto frames = reader->frames(0, false);
+  if (!frames) return frames.error().text();
+  for (;;) {
+    const auto frame = frames->next();
+    if (!frame) return frame.error().text();
+    if (!frame->has_value()) return {};
+  }
+}
+
+TEST_CASE("a flipped bit in any column of any row is found, and log, table and row are named") {
+  const test::TempFolder dir;
+  const auto whole = dir.path() / "whole.plog", path = dir.path() / "flipped.plog";
+  Writer writer = writer_with_two_streams(whole);
+  const std::vector<log::StreamPlace> places{{0, 7, 8}};
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    log::ChunkRow chunk = chunk_row(0, i, "1 2 3\n");
+    chunk.places = places;
+    REQUIRE(writer.add(chunk));
+    REQUIRE(writer.add(log::DecisionRow{
+        .item = i, .stream = 0, .stage = "style", .name = "alpha", .value = "v", .now_ns = 1}));
+    REQUIRE(writer.add(log::FrameRow{0, i, false, bytes_of("pose")}));
+    REQUIRE(writer.add(log::GapRow{log::GapRow::Kind::kChunks, 0, 2, 11, 99}));
+  }
+  REQUIRE(writer.close());
+  forge(whole, "INSERT INTO take VALUES(2, 'jump', 12, 40, 0)");
+  CHECK(complaint(whole).empty());
+  const auto check = [&](const std::string& table, const std::string& column,
+                         const std::string& flipped) {
+    std::filesystem::copy_file(whole, path, std::filesystem::copy_options::overwrite_existing);
+    const int row = table == "source" || table == "stream" ? 0 : 2;
+    run_sql(path, "DROP INDEX frame_of_stream; UPDATE " + table + " SET " + column + "=" + flipped +
+                      " WHERE id=" + std::to_string(row));
+    const std::string said = complaint(path);
+    INFO(table << "." << column << ": " << said);
+    CHECK(said.starts_with(path.string() + ": the log is damaged: row " + std::to_string(row) +
+                           " of table " + table + " does not match its checksum"));
+  };
+  for (const char* column : {"name", "driver", "text", "identity", "config"}) {
+    check("source", column, std::string(column) + "||'x'");
+  }
+  for (const char* column : {"body", "name", "stages_json"}) check("stream", column, "'x'");
+  for (const char* column : {"source", "first_item"}) {
+    check("stream", column, std::string(column) + "+1");
+  }
+  for (const char* column : {"source", "socket", "direction", "arrival_ns", "first_item"}) {
+    check("chunk", column, std::string(column) + "+1");
+  }
+  for (const char* column : {"sequences", "bytes"}) check("chunk", column, "x'00'");
+  for (const char* column : {"item", "stream", "now_ns", "crc"}) {
+    check("decision", column, std::string(column) + "+1");
+  }
+  for (const char* column : {"stage", "name"}) check("decision", column, "'x'");
+  check("decision", "value", "x'00'");
+  check("frame", "sequence", "sequence+64");
+  check("frame", "bytes", "x'00'");
+  for (const char* column : {"kind", "owner", "after_chunk", "lost", "time_ns"}) {
+    check("gap", column, std::string(column) + "+1");
+  }
+  check("take", "name", "'x'");
+  for (const char* column : {"first_item", "last_item"}) {
+    check("take", column, std::string(column) + "+1");
+  }
+}
+
+// tests/golden/replay/staged.plog is of format 1, which lacks the column decision.labels of 2.
+TEST_CASE("a log of format 1 or 2 looks like one of format 3 that counts no items") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "old.plog";
+  std::filesystem::copy_file(test::golden("replay/staged.plog"), path);
+  const bool first = GENERATE(true, false);
+  if (!first) {
+    run_sql(path,
+            "ALTER TABLE decision ADD COLUMN labels TEXT NOT NULL DEFAULT '';"
+            "INSERT INTO decision VALUES(NULL,1,6,9,1,0,1.5,'','0 4 1'),(NULL,1,9,9,0,0,0,'','');"
+            "PRAGMA user_version=2;");
+  }
+  auto reader = Reader::open(path);
+  REQUIRE(reader);
+  REQUIRE(reader->streams().size() == 2);
+  const log::StreamRow& stream = reader->streams()[1];
+  CHECK(stream.name == "b");
+  CHECK(stream.body.empty());
+  CHECK(reader->source_of(stream).driver == "file");
+  CHECK(reader->source_of(stream).text.starts_with("HIERARCHY"));
+  CHECK(stream.stages_json.find("\"stage\":\"style\",\"model\":\"") != std::string::npos);
+  auto chunk = reader->next_chunk();
+  REQUIRE((chunk && chunk->has_value()));
+  CHECK((*chunk)->first_item == 0);
+  REQUIRE((*chunk)->places.size() == 1);
+  CHECK((*chunk)->places[0].next_frame == 1);
+  CHECK((*chunk)->places[0].next_sample == 0);
+  CHECK(count_chunks(*reader) > 50);
+  const auto decisions = reader->decisions();
+  REQUIRE(decisions);
+  std::map<std::string, v1::DecisionValue> found;  // the last of its kind
+  for (const log::DecisionRow& row : *decisions) {
+    CHECK(row.item == 0);
+    CHECK(row.before_frame > 0);
+    REQUIRE(found[row.stage + "/" + row.name].ParseFromString(row.value));
+  }
+  CHECK(found.at("style/alpha").number() == -0.5);
+  CHECK(reader->blob(found.at("style/model").sha256()));
+  CHECK(found.at("/shed").range().count() == 5);
+  CHECK(found.contains("/tick"));
+  if (!first) {
+    const auto& play = found.at("generate/play").play();
+    CHECK(std::vector<std::uint32_t>(play.label().begin(), play.label().end()) ==
+          std::vector<std::uint32_t>{0, 4, 1});
+    CHECK(play.tempo() == 1.5F);
+    CHECK(play.loop());
+    CHECK(found.contains("/unknown"));
+  }
+  CHECK(*reader->has_frames());
+  CHECK(reader->takes()->empty());
 }
 
 TEST_CASE("an existing file is kept unless the caller insists") {
@@ -219,17 +390,18 @@ TEST_CASE("a file that is no whole log of ours is refused with one sentence") {
   }
   SECTION("a newer format") {
     write_whole_log(path, 3);
-    run_sql(path, "PRAGMA user_version=3;");
+    run_sql(path, "PRAGMA user_version=4;");
     CHECK(refusal(path).find("update posed") != std::string::npos);
   }
-  SECTION("a stream that is not described") {
+  SECTION("a source that is not described") {
     write_whole_log(path, 3);
-    run_sql(path, "UPDATE chunk SET stream=-1;");
+    forge(path, "UPDATE chunk SET source=-1;");
     auto reader = Reader::open(path);
     REQUIRE(reader);
     const auto chunk = reader->next_chunk();
     REQUIRE(!chunk);
-    CHECK(chunk.error().message.find("names stream -1 of 2") != std::string::npos);
+    CHECK(chunk.error().message.find("row 1 of table chunk names source -1, which") !=
+          std::string::npos);
   }
   SECTION("cut short anywhere, or with pages overwritten: refused or read, never a crash") {
     write_whole_log(path, 60);

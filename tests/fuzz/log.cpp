@@ -1,0 +1,262 @@
+// A device log whose envelope is right (tables, types, checksums) and whose insides are anything:
+// it is refused with a sentence or replayed to its end; nothing crashes, hangs or takes memory
+// without bound. The input chooses the streams, their settings and models, and then row after row.
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fuzzer/FuzzedDataProvider.h>
+#include <unistd.h>
+
+#include "daemon/publish/encode.hpp"
+#include "daemon/record/expectation.hpp"
+#include "daemon/record/replay.hpp"
+#include "models/gesture/model_file.hpp"
+#include "models/style/style_model.hpp"
+#include "posed/v1/log.pb.h"
+#include "proto/log/digest.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/log/writer.hpp"
+#include "tests/unit/gesture/toy_gesture.hpp"
+#include "tests/unit/models/toy_style.hpp"
+
+namespace {
+
+using namespace posed;
+
+constexpr const char* kBody =
+    "HIERARCHY\nROOT Hips\n{\nOFFSET 0 90 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation "
+    "Yrotation Xrotation\nJOINT Chest\n{\nOFFSET 0 30 0\nCHANNELS 3 Zrotation Yrotation Xrotation\n"
+    "End Site\n{\nOFFSET 0 20 0\n}\n}\n}\nMOTION\nFrames: 1\nFrame Time: 0.016667\n"
+    "0 90 0 0 0 0 0 0 0\n";
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+// A log that the input writes.
+class FuzzedLog {
+ public:
+  FuzzedLog(const std::uint8_t* data, std::size_t size, const std::filesystem::path& path)
+      : input_(data, size), writer_(log::Writer::create(path, {}, true).value()) {}
+
+  bool write() {
+    static const std::string style = style::serialize_model(test::toy_model(1));
+    static const std::string gesture = gesture::serialize_model(test::toy_gesture_model());
+    hashes_ = {writer_.add_blob(bytes_of(style)).value(),
+               writer_.add_blob(bytes_of(gesture)).value(),
+               writer_.add_blob(bytes_of("no model")).value(), "feed", ""};
+    const auto streams = input_.ConsumeIntegralInRange<std::uint32_t>(1, 3);
+    for (std::uint32_t i = 0; i < streams; ++i) add_stream(i);
+    for (int rows = 0; rows < 200 && input_.remaining_bytes() > 0; ++rows) add_row();
+    return writer_.close().has_value();
+  }
+
+ private:
+  void add_stream(std::uint32_t i) {
+    const std::uint32_t id = input_.ConsumeBool() ? i : (1U << 16U | i);
+    std::string driver = input_.PickValueInArray<std::string>({"file", "lucidgloves", "labels"});
+    std::string text = driver == "file" ? kBody : "";
+    if (const auto* row = drivers::find_driver(driver); row->expect != nullptr) {
+      text = row->expect({}).value().text;
+    }
+    if (input_.ConsumeProbability<double>() < 0.1) driver = input_.ConsumeRandomLengthString(16);
+    if (input_.ConsumeProbability<double>() < 0.2) text = input_.ConsumeRandomLengthString(400);
+    ids_.push_back(id);
+    keep(writer_.add(log::SourceRow{id, "s", driver, text, "x", "{}"}));
+    keep(writer_.add(log::StreamRow{id, id, "", "s" + std::to_string(i), settings(), 1}));
+  }
+
+  std::string number() {
+    switch (input_.ConsumeIntegralInRange(0, 3)) {
+      case 0:
+        return std::to_string(input_.ConsumeIntegral<std::int8_t>());
+      case 1:
+        return std::to_string(input_.ConsumeFloatingPointInRange(-1e7, 1e7));
+      default:
+        return input_.PickValueInArray<std::string>({"0", "1", "0.5", "30", "1e6", "1e300", "-1"});
+    }
+  }
+
+  std::string settings() {
+    if (input_.ConsumeProbability<double>() < 0.1) return input_.ConsumeRandomLengthString(200);
+    std::string stages;
+    const auto add = [&](const std::string& stage) {
+      stages += (stages.empty() ? "" : ",") + stage;
+    };
+    if (input_.ConsumeBool()) {
+      add(R"({"stage":"style","model":")" + hash() + R"(","parameters":{"alpha":)" + number() +
+          R"(,"alpha_slew_per_s":)" + number() + R"(,"gate":true,"gate_fallback":)" + number() +
+          R"(,"calibrate":true}})");
+    }
+    if (input_.ConsumeBool()) {
+      add(R"({"stage":"generate","model":")" + hash() + R"(","parameters":{"lag_frames":)" +
+          number() + R"(,"lag_s":)" + number() + R"(,"noise_rad":)" + number() + "}}");
+    }
+    if (input_.ConsumeBool()) add(R"({"stage":"constrain","parameters":{}})");
+    return R"({"publish_raw":true,"stale_after_s":)" + number() + R"(,"rate_hz":)" + number() +
+           R"(,"stages":[)" + stages + "]}";
+  }
+
+  std::string hash() { return input_.PickValueInArray(hashes_); }
+  std::uint32_t id() {
+    if (input_.ConsumeProbability<double>() < 0.02) return input_.ConsumeIntegral<std::uint32_t>();
+    return ids_[input_.ConsumeIntegralInRange<std::size_t>(0, ids_.size() - 1)];
+  }
+  // Mostly what a run would count, now and then anything.
+  std::uint64_t count(std::uint64_t next) {
+    if (input_.ConsumeProbability<double>() < 0.05) return input_.ConsumeIntegral<std::uint64_t>();
+    return next + input_.ConsumeIntegralInRange<std::uint64_t>(0, 3);
+  }
+  std::int64_t time_ns() {
+    if (input_.ConsumeProbability<double>() < 0.03) return input_.ConsumeIntegral<std::int64_t>();
+    now_ns_ += input_.ConsumeIntegralInRange<std::int64_t>(-1'000'000, 700'000'000);
+    return now_ns_;
+  }
+
+  void add_row() {
+    switch (input_.ConsumeIntegralInRange(0, 9)) {
+      case 0:
+      case 1:
+      case 2:
+        return add_decision();
+      case 3:
+        return keep(writer_.add(
+            log::GapRow{static_cast<log::GapRow::Kind>(input_.ConsumeIntegralInRange(0, 3)), id(),
+                        input_.ConsumeIntegral<std::int8_t>(), count(1), time_ns()}));
+      case 4:
+        return keep(
+            writer_.add(log::FrameRow{id(), count(1), input_.ConsumeBool(),
+                                      bytes_of(bytes_ = input_.ConsumeRandomLengthString(50))}));
+      default:
+        return add_chunk();
+    }
+  }
+
+  void add_chunk() {
+    const std::uint32_t source = id();
+    const std::vector<log::StreamPlace> places{{source, count(frames_), count(frames_)}};
+    frames_ += 1;
+    items_ += 2;
+    bytes_ = input_.PickValueInArray<std::string>(
+        {"0 90 0 1 2 3 4 5 6\n", "0 90 0 9 9 9 9 9 9\n",
+         "A100B200C300D400E500F600G700H800(AAB)1000(ABB)900\n", "A4095B0C4095D0E4095\n", "x"});
+    if (input_.ConsumeBool()) bytes_ = input_.ConsumeRandomLengthString(300);
+    const auto direction = input_.ConsumeProbability<double>() < 0.8
+                               ? std::uint8_t{0}
+                               : input_.ConsumeIntegralInRange<std::uint8_t>(0, 5);
+    keep(writer_.add(log::ChunkRow{.source = source,
+                                   .direction = direction,
+                                   .arrival_ns = time_ns(),
+                                   .first_item = count(items_),
+                                   .places = places,
+                                   .bytes = bytes_of(bytes_)}));
+  }
+
+  void add_decision() {
+    v1::DecisionValue value;
+    log::DecisionRow row{.item = count(items_), .stream = id(), .now_ns = time_ns()};
+    const auto say = [&](const char* stage, const char* name) {
+      row.stage = stage;
+      row.name = name;
+    };
+    switch (input_.ConsumeIntegralInRange(0, 9)) {
+      case 0:
+        say("style", "alpha");
+        value.set_number(input_.ConsumeFloatingPointInRange(-2.1, 2.1));
+        break;
+      case 1:
+        say("style", "model");
+        value.set_sha256(hash());
+        break;
+      case 2:
+        say("generate", "model");
+        value.set_sha256(hash());
+        break;
+      case 3:
+        say("generate", "play");
+        for (int n = input_.ConsumeIntegralInRange(0, 6); n > 0; --n) {
+          value.mutable_play()->add_label(input_.ConsumeIntegralInRange<std::uint32_t>(0, 7));
+        }
+        value.mutable_play()->set_tempo(input_.ConsumeFloatingPointInRange(0.4F, 2.1F));
+        value.mutable_play()->set_loop(input_.ConsumeBool());
+        break;
+      case 4:
+        say("generate", "stop-playing");
+        break;
+      case 5:
+        say("", input_.ConsumeBool() ? "shed" : "shed-samples");
+        value.mutable_range()->set_first(count(frames_));
+        value.mutable_range()->set_count(count(1));
+        break;
+      case 6:
+      case 7:
+        say("", "tick");
+        break;
+      case 8:
+        say("", "end");
+        break;
+      default:
+        row.stage = input_.ConsumeRandomLengthString(8);
+        row.name = input_.ConsumeRandomLengthString(8);
+    }
+    row.value = value.SerializeAsString();
+    if (input_.ConsumeProbability<double>() < 0.05) {
+      row.value = input_.ConsumeRandomLengthString(40);
+    }
+    keep(writer_.add(row));
+  }
+
+  // Two streams of one id are refused already by the writer.
+  static void keep(const Result<>& done) { static_cast<void>(done); }
+
+  FuzzedDataProvider input_;
+  log::Writer writer_;
+  std::array<std::string, 5> hashes_;
+  std::vector<std::uint32_t> ids_;
+  std::string bytes_;  // of the row that is being written
+  std::uint64_t frames_ = 1, items_ = 1;
+  std::int64_t now_ns_ = 1'000'000'000;
+};
+
+void replay(const std::filesystem::path& path) {
+  auto reader = log::Reader::open(path);
+  if (!reader) return;
+  auto opened = record::Replay::open(*reader);
+  if (!opened) {
+    if (opened.error().message.empty()) std::abort();
+    return;
+  }
+  record::Replay& replay = **opened;
+  auto expectation = record::Expectation::open(*reader);
+  publish::FrameEncoder encoder("s");
+  const auto out = [&](const pipeline::Item& item) {
+    using Kind = pipeline::Item::Kind;
+    if (item.kind != Kind::kFrame && item.kind != Kind::kRawFrame) return;
+    const std::uint32_t stream = item.frame.header.stream;
+    if (stream >= replay.streams()) std::abort();
+    const v1::Frame& frame = encoder.encode(item.frame);
+    if (!expectation) return;
+    const auto same =
+        expectation->compare(stream, item.kind == Kind::kRawFrame, frame, replay.broken_at(stream));
+    static_cast<void>(same);
+  };
+  const auto done = replay.run(out, [](const log::ChunkRow&) { return true; });
+  if (!done && done.error().message.empty()) std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  // In memory where there is such a file system: a log is always a file.
+  static const std::filesystem::path folder =
+      std::filesystem::exists("/dev/shm") ? "/dev/shm" : std::filesystem::temp_directory_path();
+  static const std::filesystem::path path =
+      folder / ("posed_fuzz_log_" + std::to_string(getpid()) + ".plog");
+  if (FuzzedLog(data, size, path).write()) replay(path);
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  return 0;
+}

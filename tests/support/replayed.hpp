@@ -1,0 +1,63 @@
+// What a replay of a device log gives, in process, and whether it is what was published live.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/publish/encode.hpp"
+#include "daemon/record/expectation.hpp"
+#include "daemon/record/replay.hpp"
+#include "proto/log/reader.hpp"
+
+namespace posed::test {
+
+struct Replayed {
+  std::vector<std::string> frames;  // serialized, in pipeline order
+  std::optional<Error> difference;  // the first one, or why the log cannot be replayed
+  record::Expectation::Counts counts;
+};
+
+// `expect`: compared with the published frames that the log holds.
+inline Replayed replayed(const std::filesystem::path& path, bool expect = true) {
+  Replayed result;
+  auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  auto opened = record::Replay::open(*reader);
+  if (!opened) {
+    result.difference = opened.error();
+    return result;
+  }
+  record::Replay& replay = **opened;
+  std::optional<record::Expectation> expectation;
+  if (expect) expectation = record::Expectation::open(*reader).value();
+  std::vector<publish::FrameEncoder> encoders;  // styled and raw of each stream
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+    encoders.emplace_back(replay.stream(id).name);
+    encoders.emplace_back(replay.stream(id).name + "-raw");
+  }
+  const auto keep = [&](const Result<>& same) {
+    if (!same && !result.difference) result.difference = same.error();
+  };
+  const auto done = replay.run(
+      [&](const pipeline::Item& item) {
+        const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
+        if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
+        const std::uint32_t stream = item.frame.header.stream;
+        const v1::Frame& frame = encoders[2 * stream + (raw ? 1 : 0)].encode(item.frame);
+        result.frames.push_back(frame.SerializeAsString());
+        if (expect) keep(expectation->compare(stream, raw, frame, replay.broken_at(stream)));
+      },
+      [](const log::ChunkRow&) { return true; });
+  keep(done);
+  for (std::uint32_t id = 0; expect && !result.difference && id < replay.streams(); ++id) {
+    keep(expectation->finish(id, replay.broken_at(id)));
+  }
+  if (expect) result.counts = expectation->counts();
+  return result;
+}
+
+}  // namespace posed::test
