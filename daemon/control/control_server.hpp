@@ -20,8 +20,9 @@ namespace posed::control {
 struct ControlPorts {
   pipeline::Ring<pipeline::Ack>* acks = nullptr;  // this thread consumes
   pipeline::Wake* wake = nullptr;                 // rung when there is something in `acks`
-  const Gatekeeper* gatekeeper = nullptr;         // null: no CURVE
-  std::string secret_z85;                         // the server's key, with a gatekeeper
+  // Asked about every client; null (in tests): nobody is asked, and old ZMTP is spoken, too.
+  const Gatekeeper* gatekeeper = nullptr;
+  std::string secret_z85;  // the server's key; empty: no CURVE
 };
 
 class ControlServer {

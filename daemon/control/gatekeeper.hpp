@@ -1,11 +1,13 @@
-// Gatekeeper: the ZAP handler (ZeroMQ RFC 27) of a context. Every CURVE handshake asks it; it lets
-// in the keys of the allow-list that have the right for the socket's domain, and nobody else.
+// Gatekeeper: the ZAP handler (ZeroMQ RFC 27) of a context. Every handshake asks it. With an
+// allow-list it lets in the keys that have the right for the socket's domain, and nobody else.
+// Without one (a daemon without keys) whoever speaks ZMTP 3 without a key is welcome.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string_view>
 #include <thread>
 
@@ -18,7 +20,8 @@ class Gatekeeper {
  public:
   // Bound before it returns. Start it before the first socket of the context is made and destroy it
   // after the last is closed, else a handshake finds nobody to ask (and is refused).
-  [[nodiscard]] static Result<std::unique_ptr<Gatekeeper>> start(void* context, AccessList list);
+  [[nodiscard]] static Result<std::unique_ptr<Gatekeeper>> start(void* context,
+                                                                 std::optional<AccessList> list);
   ~Gatekeeper();
   Gatekeeper(const Gatekeeper&) = delete;
   Gatekeeper& operator=(const Gatekeeper&) = delete;
@@ -30,23 +33,25 @@ class Gatekeeper {
   struct Change {
     bool publisher_must_rebind = false;
   };
-  [[nodiscard]] Change replace(AccessList list);
+  [[nodiscard]] Change replace(AccessList list);  // a gatekeeper without a list stays as it is
 
-  // Whether the peer whose message carries this User-Id still has the right.
+  // Whether the peer whose message carries this User-Id still has the right; always without a list.
   [[nodiscard]] bool allows(std::string_view user_id, Domain domain) const;
 
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_.load(); }
 
  private:
-  Gatekeeper(Socket door, Socket stop_in, Socket stop_out, AccessList list);
+  Gatekeeper(Socket door, Socket stop_in, Socket stop_out, std::optional<AccessList> list);
   void serve();
   void answer(Message& version);
+  [[nodiscard]] bool welcomes(std::string_view mechanism, std::string_view key,
+                              Domain domain) const;
 
   Socket door_;      // REP on inproc://zeromq.zap.01, the thread's
   Socket stop_in_;   // the thread's end of the bell that ends it
   Socket stop_out_;  // ours
   mutable std::mutex mutex_;
-  AccessList list_;  // under mutex_
+  std::optional<AccessList> list_;  // under mutex_
   std::atomic<std::uint64_t> refused_{0};
   std::thread thread_;
 };

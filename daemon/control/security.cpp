@@ -41,13 +41,13 @@ bool AccessList::loses_someone(const AccessList& newer, Domain domain) const {
 }
 
 Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85) {
-  for (const Result<>& set : {set_option(socket, ZMQ_CURVE_SERVER, 1),
-                              set_option(socket, ZMQ_CURVE_SECRETKEY, secret_z85),
-                              set_option(socket, ZMQ_ZAP_DOMAIN, domain_name(domain)),
+  for (const Result<>& set : {set_option(socket, ZMQ_ZAP_DOMAIN, domain_name(domain)),
                               set_option(socket, kZapEnforceDomain, 1)}) {
     if (!set) return set;
   }
-  return {};
+  if (secret_z85.empty()) return {};
+  if (auto set = set_option(socket, ZMQ_CURVE_SERVER, 1); !set) return set;
+  return set_option(socket, ZMQ_CURVE_SECRETKEY, secret_z85);
 }
 
 Result<> secure_client(void* socket, const std::filesystem::path& key_file,

@@ -126,15 +126,16 @@ Result<> Daemon::Parts::open_sockets() {
   auto opened = control::open_context();
   if (!opened) return std::unexpected(opened.error());
   context = std::move(*opened);
+  std::optional<control::AccessList> allowed;  // none without keys
   if (!config.security.server_key.empty()) {
     auto keys = control::read_secret_key(config.security.server_key);
     if (!keys) return std::unexpected(keys.error());
     secret_z85 = keys->secret_z85;
-    auto keeper =
-        control::Gatekeeper::start(context.get(), control::AccessList(config.security.clients));
-    if (!keeper) return std::unexpected(keeper.error());
-    gatekeeper = std::move(*keeper);
+    allowed.emplace(config.security.clients);
   }
+  auto keeper = control::Gatekeeper::start(context.get(), std::move(allowed));
+  if (!keeper) return std::unexpected(keeper.error());
+  gatekeeper = std::move(*keeper);
   std::vector<publish::StreamInfo> infos;
   for (const auto& stream : streams) {
     const auto& style = stream->config.style;
@@ -153,15 +154,11 @@ Result<> Daemon::Parts::open_sockets() {
   }
   publish::PublisherOptions options{.context = context.get(),
                                     .endpoint = config.publish_endpoint,
-                                    .secure = {},
+                                    .gatekeeper = gatekeeper.get(),
+                                    .secret_z85 = secret_z85,
                                     .more_stats = hooks.more_stats,
                                     .tape = hooks.tape,
                                     .clock = monotonic_ns};
-  if (gatekeeper) {
-    options.secure = [this](void* socket) {
-      return control::secure_server(socket, control::Domain::kPublish, secret_z85);
-    };
-  }
   auto bound =
       publish::Publisher::open(std::move(options), std::move(infos), *finished, *publisher_wake);
   if (!bound) return std::unexpected(bound.error());

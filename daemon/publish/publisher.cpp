@@ -57,6 +57,21 @@ std::string sentence(const ShedTally::Sum& shed) {
   return which + " skipped: newer ones waited";
 }
 
+// What the publisher's thread waits for: new items, and what subscribers say.
+Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake, void* socket) {
+  auto poller = pipeline::Poller::open();
+  if (!poller) return poller;
+  int socket_fd = -1;
+  std::size_t size = sizeof socket_fd;
+  if (zmq_getsockopt(socket, ZMQ_FD, &socket_fd, &size) != 0) {
+    return fail("ZeroMQ names no descriptor to wait for");
+  }
+  for (const Result<>& added : {(*poller)->add(wake), (*poller)->add(socket_fd, 0)}) {
+    if (!added) return std::unexpected(added.error());
+  }
+  return poller;
+}
+
 }  // namespace
 
 // What other threads asked for or want to know. Cold: never touched by the hot threads.
@@ -74,7 +89,7 @@ struct Publisher::Told {
   std::atomic<bool> asked{false};  // one of events, models, rebind is new
 
   // The publisher thread's own, of the last report.
-  std::int64_t reported_ns = 0;
+  std::int64_t reported_ns = kNoTime_ns;
   std::int64_t cpu_ns = 0;
 };
 
@@ -102,25 +117,30 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
   if (auto set = control::set_option(socket->get(), ZMQ_XPUB_VERBOSE, 1); !set) {
     return std::unexpected(set.error());
   }
-  if (options.secure) {
-    if (auto secured = options.secure(socket->get()); !secured) {
-      return std::unexpected(secured.error());
-    }
+  if (options.gatekeeper != nullptr) {
+    auto secured =
+        control::secure_server(socket->get(), control::Domain::kPublish, options.secret_z85);
+    if (!secured) return std::unexpected(secured.error());
   }
   auto endpoint = control::bind_socket(socket->get(), options.endpoint);
   if (!endpoint) return std::unexpected(endpoint.error());
+  auto poller = open_poller(wake, socket->get());
+  if (!poller) return std::unexpected(poller.error());
   return std::unique_ptr<Publisher>(new Publisher(std::move(options), std::move(streams), in, wake,
-                                                  std::move(*socket), std::move(*endpoint)));
+                                                  std::move(*socket), std::move(*endpoint),
+                                                  std::move(*poller)));
 }
 
 Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
                      pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake,
-                     control::Socket socket, std::string endpoint)
+                     control::Socket socket, std::string endpoint,
+                     std::unique_ptr<pipeline::Poller> poller)
     : options_(std::move(options)),
       in_(in),
       wake_(wake),
       socket_(std::move(socket)),
       endpoint_(std::move(endpoint)),
+      poller_(std::move(poller)),
       told_(std::make_unique<Told>()) {
   for (StreamInfo& stream : streams) {
     outlets_.push_back(std::make_unique<Outlet>(std::move(stream)));
@@ -131,39 +151,38 @@ Publisher::~Publisher() = default;
 
 const std::string& Publisher::endpoint() const noexcept { return endpoint_; }
 
-void Publisher::run() {
-  auto poller = pipeline::Poller::open();
-  int socket_fd = -1;
-  std::size_t size = sizeof socket_fd;
-  zmq_getsockopt(socket_.get(), ZMQ_FD, &socket_fd, &size);
-  if (!poller || !(*poller)->add(wake_) || !(*poller)->add(socket_fd, 0)) {
-    spdlog::critical("the publisher cannot wait for frames; nothing is published");
-    return;
+void Publisher::take_all() {
+  while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
   }
-  told_->reported_ns = options_.clock();
-  told_->cpu_ns = cpu_time_ns();
-  every_second(told_->reported_ns);  // who asks for the status at once is told the streams
-  const auto drain = [this] {
-    while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
-    }
-  };
+}
+
+std::int64_t Publisher::turn(std::int64_t now_ns) {
+  take_all();
+  do_what_was_asked();
+  // At the first turn, too: who asks for the status at once is told the streams.
+  if (told_->reported_ns == kNoTime_ns || now_ns >= told_->reported_ns + kNanosPerSecond) {
+    every_second(now_ns);
+  }
+  hear_subscriptions();  // last: each send above may have taken in what the socket's fd announced
+  return told_->reported_ns + kNanosPerSecond;
+}
+
+void Publisher::finish(std::int64_t now_ns) {
+  take_all();
+  for (std::uint32_t i = 0; i < outlets_.size(); ++i) tell_shed(i, true);
+  every_second(now_ns);
+}
+
+void Publisher::run() {
   while (!stop_.load(std::memory_order_acquire)) {
-    drain();
-    hear_subscriptions();
-    do_what_was_asked();
-    const std::int64_t now_ns = options_.clock();
-    const std::int64_t report_ns = told_->reported_ns + kNanosPerSecond;
-    if (now_ns >= report_ns) every_second(now_ns);
+    const std::int64_t due_ns = turn(options_.clock());
     wake_.going_to_sleep();
     if (in_.empty() && !told_->asked.load() && !stop_.load(std::memory_order_acquire)) {
-      static_cast<void>((*poller)->wait(
-          std::max<std::int64_t>(told_->reported_ns + kNanosPerSecond - options_.clock(), 0)));
+      static_cast<void>(poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0)));
     }
     wake_.awake();
   }
-  drain();
-  for (std::uint32_t i = 0; i < outlets_.size(); ++i) tell_shed(i, true);
-  every_second(options_.clock());
+  finish(options_.clock());
 }
 
 void Publisher::stop() noexcept {
@@ -277,8 +296,10 @@ void Publisher::send_skeletons(const Outlet& outlet, std::string_view prefix) {
 }
 
 void Publisher::every_second(std::int64_t now_ns) {
-  const double since_s = seconds(now_ns - told_->reported_ns);
+  const bool first = told_->reported_ns == kNoTime_ns;
+  const double since_s = first ? 0.0 : seconds(now_ns - told_->reported_ns);
   const std::int64_t cpu_ns = cpu_time_ns();
+  if (first) told_->cpu_ns = cpu_ns;
   v1::Stats stats;
   stats.set_time_ns(now_ns);
   stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC));

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/zmq_handle.hpp"
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/counters.hpp"
@@ -39,9 +40,11 @@ struct StreamInfo {
 struct PublisherOptions {
   void* context = nullptr;  // ZeroMQ's; outlives the publisher
   std::string endpoint;
-  std::function<Result<>(void* socket)> secure;  // before bind; may be empty
-  std::function<void(v1::Stats&)> more_stats;    // adds what others know (recorder); may be empty
-  record::Tape* tape = nullptr;                  // null: nothing is recorded
+  // Asked about every subscriber; null (in tests): nobody is asked, and old ZMTP is spoken, too.
+  const control::Gatekeeper* gatekeeper = nullptr;
+  std::string secret_z85;                      // the server's key; empty: no CURVE
+  std::function<void(v1::Stats&)> more_stats;  // adds what others know (recorder); may be empty
+  record::Tape* tape = nullptr;                // null: nothing is recorded
   Clock clock = nullptr;
 };
 
@@ -63,8 +66,12 @@ class Publisher {
 
   [[nodiscard]] const std::string& endpoint() const noexcept;  // really bound
 
-  // Runs until stop(), then once more over what is waiting. The calling thread becomes the
-  // publisher thread.
+  // Does all that is due at `now_ns` (of the options' clock) and never waits. Returns when it must
+  // be called next at the latest; earlier when the wake rings or the socket has something to say.
+  [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
+  // The last turn: what still waits goes out, and the last counts.
+  void finish(std::int64_t now_ns);
+  // Takes turns until stop(), then finishes. The calling thread becomes the publisher thread.
   void run();
 
   // The rest is for any other thread; cold.
@@ -80,7 +87,8 @@ class Publisher {
   struct Told;
   Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
             pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake, control::Socket socket,
-            std::string endpoint);
+            std::string endpoint, std::unique_ptr<pipeline::Poller> poller);
+  void take_all();
   void take(const pipeline::Item& item);
   void take_frame(const Frame& frame, bool raw);
   void take_notice(const pipeline::Notice& notice);
@@ -100,6 +108,7 @@ class Publisher {
   pipeline::Wake& wake_;
   control::Socket socket_;
   std::string endpoint_;
+  std::unique_ptr<pipeline::Poller> poller_;
   std::vector<std::unique_ptr<Outlet>> outlets_;
   std::unique_ptr<Told> told_;
   std::string scratch_;
