@@ -27,11 +27,10 @@ class Gatekeeper {
   Gatekeeper& operator=(const Gatekeeper&) = delete;
 
   // What a new list means for those already connected. ROUTER messages are checked one by one
-  // (allows), so the control socket needs nothing; libzmq cannot disconnect one subscriber of an
-  // XPUB, so the publisher must unbind and bind again: all reconnect within about 0.1 s, those who
-  // lost their right are refused at the door.
+  // (allows), so the control socket needs nothing; the publisher must cut the subscribers off that
+  // are not allowed any more.
   struct Change {
-    bool publisher_must_rebind = false;
+    bool publisher_must_check = false;
   };
   [[nodiscard]] Change replace(AccessList list);  // a gatekeeper without a list stays as it is
 

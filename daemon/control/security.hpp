@@ -1,5 +1,5 @@
 // Who may speak to a daemon: CURVE keys on the sockets, and an allow-list with rights behind them.
-// Every listening socket names a ZAP domain and enforces it (without ZMQ_ZAP_ENFORCE_DOMAIN libzmq
+// Every secured socket names a ZAP domain and enforces it (without ZMQ_ZAP_ENFORCE_DOMAIN libzmq
 // lets strangers in when no handler runs).
 #pragma once
 
@@ -38,10 +38,8 @@ class AccessList {
   std::vector<AllowedClient> clients_;
 };
 
-// Makes `socket` one that asks the Gatekeeper about every peer, as this domain, and a CURVE server
-// unless `secret_z85` is empty. Call before bind; a Gatekeeper must be running in the same context,
-// or nobody gets in. A socket with a domain also refuses ZMTP before 3.0: libzmq 4.3.4 would frame
-// the body of a web page's HTTP POST as messages of the unversioned ZMTP 1.0.
+// Makes `socket` a CURVE server of this domain. Call before bind; a Gatekeeper must be running in
+// the same context, or nobody gets in.
 [[nodiscard]] Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85);
 
 // Makes `socket` a CURVE client with its own NAME.key and the server's NAME.pub. Call before

@@ -10,6 +10,7 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/keys.hpp"
+#include "daemon/control/peer_guard.hpp"
 #include "daemon/devices/keeper.hpp"
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/reader.hpp"
@@ -123,6 +124,7 @@ Result<> Daemon::Parts::start(DaemonHooks wanted) {
 }
 
 Result<> Daemon::Parts::open_sockets() {
+  control::raise_file_limit();
   auto opened = control::open_context();
   if (!opened) return std::unexpected(opened.error());
   context = std::move(*opened);
@@ -313,9 +315,8 @@ bool Daemon::all_ended() const noexcept {
 }
 
 void Daemon::allow(const std::vector<control::AllowedClient>& clients) {
-  if (!parts_->gatekeeper) return;
   const auto change = parts_->gatekeeper->replace(control::AccessList(clients));
-  if (change.publisher_must_rebind) parts_->publisher->rebind();
+  if (change.publisher_must_check) parts_->publisher->check_subscribers();
 }
 
 void Daemon::post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text) {
