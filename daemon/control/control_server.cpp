@@ -90,6 +90,7 @@ void ControlServer::sleep(long longest_ms) {
                                         {nullptr, ports_.wake->fd(), ZMQ_POLLIN, 0},
                                         {guard_->monitor(), 0, ZMQ_POLLIN, 0}}};
     zmq_poll(wait.data(), static_cast<int>(wait.size()), longest_ms);
+    if (wait[2].revents != 0) guard_->look_now();
     std::uint64_t rung = 0;
     [[maybe_unused]] const ssize_t cleared = read(ports_.wake->fd(), &rung, sizeof rung);
   }
@@ -105,7 +106,7 @@ bool ControlServer::take_request() {
     if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
   }
   if (envelope.size() > kLongestEnvelope) return true;  // no client of ours; it gets no answer
-  if (const int client = part.source(); guard_->knows(client)) guard_->heard(client, {});
+  if (const int client = source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.gatekeeper != nullptr &&
       !ports_.gatekeeper->allows(part.property("User-Id"), Domain::kControl)) {
     v1::ControlReply reply;

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "daemon/control/security.hpp"
+#include "daemon/control/zap_request.hpp"
 #include "daemon/control/zmq_handle.hpp"
 
 namespace posed::control {
@@ -43,8 +44,7 @@ class Gatekeeper {
   Gatekeeper(Socket door, Socket stop_in, Socket stop_out, std::optional<AccessList> list);
   void serve();
   void answer(Message& version);
-  [[nodiscard]] bool welcomes(std::string_view mechanism, std::string_view key,
-                              Domain domain) const;
+  [[nodiscard]] bool welcomes(const ZapRequest& request) const;
 
   Socket door_;      // REP on inproc://zeromq.zap.01, the thread's
   Socket stop_in_;   // the thread's end of the bell that ends it

@@ -1,7 +1,7 @@
 #include "daemon/control/peer_guard.hpp"
 
 #include <algorithm>
-#include <array>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 
@@ -35,6 +35,23 @@ std::uint64_t cookie_of(int fd) {
 }
 
 }  // namespace
+
+Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages, int buffer_bytes) {
+  const std::string_view largest(reinterpret_cast<const char*>(&part_bytes), sizeof part_bytes);
+  for (const Result<>& set :
+       {set_option(socket, ZMQ_MAXMSGSIZE, largest), set_option(socket, ZMQ_RCVHWM, messages),
+        set_option(socket, ZMQ_RCVBUF, buffer_bytes)}) {
+    if (!set) return set;
+  }
+  return {};
+}
+
+int source_of(const Message& message) {
+  const std::string_view text = message.property("__fd");  // libzmq's name for ZMQ_SRCFD
+  int fd = -1;
+  std::from_chars(text.data(), text.data() + text.size(), fd);
+  return fd;
+}
 
 Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
                                                    const PeerLimits& limits) {
@@ -70,9 +87,11 @@ PeerGuard::PeerGuard(void* socket, Socket monitor, int monitor_fd, const PeerLim
 PeerGuard::~PeerGuard() { zmq_socket_monitor(socket_, nullptr, 0); }
 
 std::int64_t PeerGuard::turn(std::int64_t now_ns) {
+  if (now_ns < due_ns_) return due_ns_;
   now_ns_ = now_ns;
   hear_monitor();
-  if (peers_.empty()) return kNoTurn_ns;
+  due_ns_ = peers_.empty() ? kNoTurn_ns : now_ns + kGuardTick_ns;
+  if (peers_.empty()) return due_ns_;
   if (const std::uint64_t resident = publish::resident_bytes();
       resident > resident_before_ + kNoticeableGrowth ||
       now_ns >= inspected_ns_ + kInspectEvery_ns) {
@@ -80,7 +99,7 @@ std::int64_t PeerGuard::turn(std::int64_t now_ns) {
     inspected_ns_ = now_ns;
     inspect_all();
   }
-  return now_ns + kGuardTick_ns;
+  return due_ns_;
 }
 
 // An event is two parts: number (16 bits) and descriptor (32), then the endpoint.

@@ -25,6 +25,13 @@
 
 namespace posed::control {
 
+// How much a peer may make libzmq keep: bytes of one part (handshakes included), whole messages
+// that wait for us, and the kernel's buffer behind them. Before bind.
+[[nodiscard]] Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages,
+                                          int buffer_bytes);
+// The descriptor of the connection that a message came through; -1 when it came through none.
+[[nodiscard]] int source_of(const Message& message);
+
 struct PeerLimits {
   const char* name = "";           // of the socket, for the log; unique in its context
   std::size_t most_peers = 0;      // a connection beyond them is cut at once
@@ -40,13 +47,14 @@ class PeerGuard {
   PeerGuard(const PeerGuard&) = delete;
   PeerGuard& operator=(const PeerGuard&) = delete;
 
-  // Becomes readable when connections come or go: then call turn().
+  // Becomes readable when connections come or go: then call look_now() before turn().
   [[nodiscard]] int fd() const noexcept { return monitor_fd_; }
+  void look_now() noexcept { due_ns_ = 0; }
   // For zmq_poll.
   [[nodiscard]] void* monitor() const noexcept { return monitor_.get(); }
 
-  // Takes note of who came and went, and cuts who must be cut. Returns when it must be called next
-  // at the latest: soon while anybody is connected, else never.
+  // Takes note of who came and went, and cuts who must be cut; costs nothing before it is due.
+  // Returns when it must be called next at the latest: soon while anybody is connected, else never.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
 
   // A whole message came through the connection `fd`, of the peer with this User-Id.
@@ -86,6 +94,7 @@ class PeerGuard {
   std::uint64_t cuts_ = 0;
   std::uint64_t untold_ = 0;  // cuts since the last line of the log
   std::int64_t now_ns_ = 0;
+  std::int64_t due_ns_ = 0;
   std::int64_t told_ns_;
   std::int64_t inspected_ns_ = 0;
   std::uint64_t resident_before_ = 0;  // bytes

@@ -44,9 +44,10 @@ Result<Uploads::Iterator> Uploads::find_or_begin(const std::string& client,
     return fail("others are sending models; try again in some seconds");
   }
   return uploads_
-      .emplace(
-          client,
-          Upload{.stream = piece.stream, .sha256 = piece.sha256, .bytes = {}, .total = piece.total})
+      .emplace(client, Upload{.stream = std::string(piece.stream),
+                              .sha256 = std::string(piece.sha256),
+                              .bytes = {},
+                              .total = piece.total})
       .first;
 }
 

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
+#include <thread>
 
 namespace posed::control {
 namespace {
@@ -33,16 +35,6 @@ Result<> set_option(void* socket, int option, std::string_view value) {
   return fail("ZeroMQ refuses socket option " + std::to_string(option) + ": " + last_error());
 }
 
-Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages, int buffer_bytes) {
-  const std::string_view largest(reinterpret_cast<const char*>(&part_bytes), sizeof part_bytes);
-  for (const Result<>& set :
-       {set_option(socket, ZMQ_MAXMSGSIZE, largest), set_option(socket, ZMQ_RCVHWM, messages),
-        set_option(socket, ZMQ_RCVBUF, buffer_bytes)}) {
-    if (!set) return set;
-  }
-  return {};
-}
-
 Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
   if (zmq_bind(socket, endpoint.c_str()) != 0) {
     if (zmq_errno() == EADDRINUSE) {
@@ -57,6 +49,20 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
   std::size_t size = bound.size();
   if (zmq_getsockopt(socket, ZMQ_LAST_ENDPOINT, bound.data(), &size) != 0) return endpoint;
   return std::string(bound.data());
+}
+
+Result<> rebind_socket(void* socket, const std::string& endpoint) {
+  if (zmq_unbind(socket, endpoint.c_str()) != 0) {
+    return fail("cannot leave " + endpoint + ": " + last_error());
+  }
+  // libzmq closes the listener in its own thread, some time after zmq_unbind has returned.
+  constexpr int kTries = 200;
+  for (int i = 0; i < kTries; ++i) {
+    if (zmq_bind(socket, endpoint.c_str()) == 0) return {};
+    if (zmq_errno() != EADDRINUSE) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return fail("cannot listen on " + endpoint + " again: " + last_error());
 }
 
 Result<> connect_socket(void* socket, const std::string& endpoint) {

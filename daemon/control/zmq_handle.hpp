@@ -50,10 +50,6 @@ class Message {
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
     return std::as_bytes(std::span(text()));
   }
-  // The descriptor of the connection that it came through; -1 when there is none.
-  [[nodiscard]] int source() const noexcept {
-    return zmq_msg_get(const_cast<zmq_msg_t*>(&message_), ZMQ_SRCFD);
-  }
   // A property of the connection, such as "User-Id"; empty when it has none.
   [[nodiscard]] std::string_view property(const char* name) const noexcept {
     const char* value = zmq_msg_gets(&message_, name);
@@ -71,14 +67,13 @@ class Message {
 
 [[nodiscard]] Result<> set_option(void* socket, int option, int value);
 [[nodiscard]] Result<> set_option(void* socket, int option, std::string_view value);
-// How much a peer may make libzmq keep: bytes of one part (handshakes included), whole messages
-// that wait for us, and the kernel's buffer behind them. Before bind.
-[[nodiscard]] Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages,
-                                          int buffer_bytes);
 
 // Binds and returns the endpoint really bound ("tcp://127.0.0.1:*" picks a free port). A busy port
 // is one sentence.
 [[nodiscard]] Result<std::string> bind_socket(void* socket, const std::string& endpoint);
+// Cuts every connection that came through `endpoint` and listens there again: everyone must pass
+// the gatekeeper anew. Subscriptions of an XPUB come again with their peers.
+[[nodiscard]] Result<> rebind_socket(void* socket, const std::string& endpoint);
 [[nodiscard]] Result<> connect_socket(void* socket, const std::string& endpoint);
 
 // Whether the part was taken; never blocks.

@@ -314,6 +314,8 @@ bool Daemon::all_ended() const noexcept {
   });
 }
 
+bool Daemon::wants_keys() const noexcept { return !parts_->secret_z85.empty(); }
+
 void Daemon::allow(const std::vector<control::AllowedClient>& clients) {
   const auto change = parts_->gatekeeper->replace(control::AccessList(clients));
   if (change.publisher_must_check) parts_->publisher->check_subscribers();

@@ -24,6 +24,8 @@ constexpr int kSubscriptionsWaiting = 1;
 constexpr int kReceiveBuffer_bytes = 8 * 1024;
 constexpr std::uint64_t kMostUnheard = 512 * 1024;  // bytes of all that ended no message
 constexpr int kSubscriptionsATurn = 64;
+constexpr std::uint32_t kSocketKey = 0;  // what woke the thread
+constexpr std::uint32_t kGuardKey = 1;
 // A skeleton is sent to all who want it when one asks; not more often than this.
 constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
 constexpr int kSendBuffer = 8 * 1024;  // bytes; the kernel's default alone hides seconds of poses
@@ -78,8 +80,8 @@ Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake
   if (zmq_getsockopt(socket, ZMQ_FD, &socket_fd, &size) != 0) {
     return fail("ZeroMQ names no descriptor to wait for");
   }
-  for (const Result<>& added :
-       {(*poller)->add(wake), (*poller)->add(socket_fd, 0), (*poller)->add(guard_fd, 1)}) {
+  for (const Result<>& added : {(*poller)->add(wake), (*poller)->add(socket_fd, kSocketKey),
+                                (*poller)->add(guard_fd, kGuardKey)}) {
     if (!added) return std::unexpected(added.error());
   }
   return poller;
@@ -208,7 +210,8 @@ void Publisher::run() {
     const std::int64_t due_ns = turn(options_.clock());
     wake_.going_to_sleep();
     if (in_.empty() && !told_->asked.load() && !stop_.load(std::memory_order_acquire)) {
-      static_cast<void>(poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0)));
+      const auto ready = poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0));
+      if (std::ranges::find(ready, kGuardKey) != ready.end()) guard_->look_now();
     }
     wake_.awake();
   }
@@ -310,7 +313,7 @@ bool Publisher::hear_subscriptions(std::int64_t now_ns) {
   for (int i = 0; i < kSubscriptionsATurn; ++i) {
     if (!message.receive(socket_.get())) return true;
     const std::string_view text = message.text();
-    const int peer = message.source();
+    const int peer = control::source_of(message);
     if (!guard_->knows(peer)) continue;  // gone meanwhile, or libzmq says what went with it
     guard_->heard(peer, message.property("User-Id"));
     if (text.empty() || static_cast<unsigned char>(text.front()) > 1) {

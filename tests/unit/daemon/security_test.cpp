@@ -65,8 +65,8 @@ struct Stage {
   void hear_subscriptions() const {
     Message message;
     while (message.receive(publisher.get())) {
-      if (guard->knows(message.source())) {
-        guard->heard(message.source(), message.property("User-Id"));
+      if (guard->knows(source_of(message))) {
+        guard->heard(source_of(message), message.property("User-Id"));
       }
     }
   }
