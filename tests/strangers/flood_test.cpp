@@ -33,8 +33,7 @@ Damage attack(const std::function<void(const Target&)>& work) {
     work(target);
     return true;
   });
-  const std::uint64_t before = innocent.frames;
-  while (innocent.frames < before + 10) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  CHECK(innocent.hears(10));
   innocent.stop();
   CHECK(target.ctl({"status"}).code == 0);
   CHECK_FALSE(target.daemon->exit_code(std::chrono::milliseconds(0)));

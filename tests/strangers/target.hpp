@@ -69,10 +69,19 @@ class Innocent {
     REQUIRE(control::set_option(socket_.get(), ZMQ_RCVTIMEO, 20));
     REQUIRE(control::connect_socket(socket_.get(), endpoint));
     thread_ = std::thread([this] { listen(); });
-    while (frames < 10) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    REQUIRE(hears(10));
     longest_ns = 0;
   }
   ~Innocent() { stop(); }
+  // Waits until that many more frames have come; false when they do not.
+  bool hears(std::uint64_t more) const {
+    const std::uint64_t wanted = frames + more;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (frames < wanted && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return frames >= wanted;
+  }
   void stop() {
     stop_ = true;
     if (thread_.joinable()) thread_.join();
