@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -12,9 +13,10 @@
 #include "daemon/cli/client.hpp"
 #include "daemon/cli/json.hpp"
 #include "daemon/cli/live_view.hpp"
-#include "daemon/control/request_handler.hpp"
+#include "daemon/control/uploads.hpp"
 #include "models/gesture/play_order.hpp"
 #include "posed/v1/control.pb.h"
+#include "proto/log/digest.hpp"
 
 namespace posed::cli {
 namespace {
@@ -32,20 +34,18 @@ struct CtlOptions {
   bool loop = false;
 };
 
-Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest& request) {
+Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
+                             const v1::ControlRequest& request) {
   using Clock = std::chrono::steady_clock;
-  const Interrupt interrupt;
-  auto connection = Connection::open(options.client, ZMQ_DEALER);
-  if (!connection) return std::unexpected(connection.error());
-  if (!control::send_part(connection->socket(), request.SerializeAsString(), false)) {
+  if (!control::send_part(connection.socket(), request.SerializeAsString(), false)) {
     return fail("the request cannot be sent");
   }
   const auto end = Clock::now() + std::chrono::duration<double>(options.timeout_s);
   while (Clock::now() < end && !Interrupt::came()) {
-    if (auto refused = connection->refusal()) return std::unexpected(*refused);
-    if (!connection->wait(kLookAround)) continue;
+    if (auto refused = connection.refusal()) return std::unexpected(*refused);
+    if (!connection.wait(kLookAround)) continue;
     control::Message message;
-    if (!message.receive(connection->socket())) continue;
+    if (!message.receive(connection.socket())) continue;
     v1::ControlReply reply;
     const auto bytes = message.bytes();
     if (message.more() || !reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
@@ -54,18 +54,50 @@ Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest
     return reply;
   }
   if (Interrupt::came()) return fail("interrupted; the request may still take effect");
-  return std::unexpected(connection->no_answer());
+  return std::unexpected(connection.no_answer());
 }
 
-// Asks, and prints the answer: JSON, or what `tell` makes of it.
+Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest& request) {
+  const Interrupt interrupt;
+  auto connection = Connection::open(options.client, ZMQ_DEALER);
+  if (!connection) return std::unexpected(connection.error());
+  return ask(*connection, options, request);
+}
+
+// Sends the model piece by piece. The answer to the last piece, or the first one that is a refusal.
+Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& model) {
+  const Interrupt interrupt;
+  auto connection = Connection::open(options.client, ZMQ_DEALER);
+  if (!connection) return std::unexpected(connection.error());
+  v1::ControlRequest request;
+  auto& part = *request.mutable_model_part();
+  part.set_stream(options.stream);
+  part.set_name(options.model.filename().string());
+  part.set_sha256(log::sha256_hex(std::as_bytes(std::span(model))));
+  part.set_total(model.size());
+  Result<v1::ControlReply> reply = fail("the model is empty", options.model);
+  for (std::size_t offset = 0; offset < model.size(); offset += control::kLargestPiece) {
+    part.set_offset(offset);
+    part.set_bytes(model.substr(offset, control::kLargestPiece));
+    reply = ask(*connection, options, request);
+    if (!reply || !reply->ok()) return reply;
+  }
+  return reply;
+}
+
+// Prints an answer: JSON, or what `tell` makes of it.
 template <typename Tell>
-int ask_and_tell(const CtlOptions& options, const v1::ControlRequest& request, Tell&& tell) {
-  const auto reply = ask(options, request);
+int show(const CtlOptions& options, const Result<v1::ControlReply>& reply, Tell&& tell) {
   if (!reply) return report(reply.error());
   if (options.json) (void)print_json(*reply);
   if (!reply->ok()) return report(Error{reply->error(), {}, 0, ExitCode::kFailed});
   if (!options.json) tell(*reply);
   return 0;
+}
+
+template <typename Tell>
+int ask_and_tell(const CtlOptions& options, const v1::ControlRequest& request, Tell&& tell) {
+  return show(options, ask(options, request), tell);
 }
 
 void tell_effect(const v1::ControlReply& reply) {
@@ -85,19 +117,14 @@ int send_model(const CtlOptions& options) {
   const auto size = std::filesystem::file_size(options.model, none);
   if (none) return report(fail("cannot read the model: " + none.message(), options.model).error());
   if (size > control::kLargestModel) {
-    return report(fail("is larger than 64 MB: no daemon takes it", options.model).error());
+    return report(fail("is larger than 16 MiB: no daemon takes it", options.model).error());
   }
   std::string bytes(size, '\0');
   std::ifstream file(options.model, std::ios::binary);
   if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
     return report(fail("cannot read the model", options.model).error());
   }
-  v1::ControlRequest request;
-  auto& wanted = *request.mutable_set_model();
-  wanted.set_stream(options.stream);
-  wanted.set_model(std::move(bytes));
-  wanted.set_name(options.model.filename().string());
-  return ask_and_tell(options, request, tell_effect);
+  return show(options, upload(options, bytes), tell_effect);
 }
 
 int play(const CtlOptions& options) {

@@ -24,13 +24,19 @@ sigset_t end_signals() {
 
 // Whether there was a list to read again; a config that is wrong leaves the old list in force.
 bool read_clients_again(pipeline::Daemon& daemon, const std::string& path) {
-  if (path.empty()) return false;
+  if (path.empty() || !daemon.wants_keys()) return false;
   const auto config = config::load_config(path, drivers::registry());
   if (!config) {
     spdlog::error("the client list stays as it was: {}", config.error().text());
     return true;
   }
-  if (config->security.server_key.empty()) return false;
+  if (config->security.server_key.empty()) {
+    spdlog::error(
+        "the client list stays as it was: {} has no [security] server_key any more; a daemon that"
+        " began with keys keeps them until it is started again",
+        path);
+    return true;
+  }
   daemon.allow(config->security.clients);
   spdlog::info("{} clients may connect now", config->security.clients.size());
   return true;

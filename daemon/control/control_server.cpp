@@ -1,29 +1,36 @@
 #include "daemon/control/control_server.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include <unistd.h>
 
+#include "daemon/pipeline/clock.hpp"
 #include "posed/v1/control.pb.h"
 
 namespace posed::control {
 namespace {
 
-constexpr int kRequestsWaiting = 16;         // per client; more wait at the client
-constexpr int kLastWords_ms = 500;           // for the answer to `stop` to leave
-constexpr int kRequestsARound = 16;          // then acknowledgements get their turn
-constexpr std::size_t kLongestEnvelope = 4;  // parts before the request
+constexpr int kRequestsWaiting = 4;  // per client; more wait at the client
+constexpr int kRepliesWaiting = 16;  // per client
+constexpr int kReceiveBuffer_bytes = 64 * 1024;
+constexpr std::int64_t kLongestPart = kLargestRequest + 1024;  // bytes
+constexpr std::uint64_t kMostUnheard = 512 * 1024;  // bytes of all clients that ended no request
+constexpr int kLastWords_ms = 500;                  // for the answer to `stop` to leave
+constexpr int kRequestsARound = 16;                 // then acknowledgements get their turn
+constexpr std::size_t kLongestEnvelope = 4;         // parts before the request
 
 Result<> set_limits(void* router) {
-  for (const auto& [option, value] : {std::pair{ZMQ_RCVHWM, kRequestsWaiting},
-                                      {ZMQ_SNDHWM, kRequestsWaiting},
+  for (const auto& [option, value] : {std::pair{ZMQ_SNDHWM, kRepliesWaiting},
                                       {ZMQ_LINGER, kLastWords_ms},
                                       {ZMQ_ROUTER_HANDOVER, 1}}) {
     if (auto set = set_option(router, option, value); !set) return set;
   }
-  const std::int64_t largest = kLargestModel + kLargestRequest;
-  return set_option(router, ZMQ_MAXMSGSIZE,
-                    {reinterpret_cast<const char*>(&largest), sizeof largest});
+  return set_receive_limits(router, kLongestPart, kRequestsWaiting, kReceiveBuffer_bytes);
+}
+
+long milliseconds_until(std::int64_t due_ns, std::int64_t now_ns) {
+  return static_cast<long>(std::max<std::int64_t>(due_ns - now_ns, 0) / 1'000'000 + 1);
 }
 
 }  // namespace
@@ -40,15 +47,20 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
       return std::unexpected(set.error());
     }
   }
+  auto guard = PeerGuard::open(
+      context, router->get(),
+      {.name = "control", .most_peers = peer_shares().control, .most_unheard = kMostUnheard});
+  if (!guard) return std::unexpected(guard.error());
   auto bound = bind_socket(router->get(), endpoint);
   if (!bound) return std::unexpected(bound.error());
   return std::unique_ptr<ControlServer>(
-      new ControlServer(std::move(*router), std::move(*bound), ports, handler));
+      new ControlServer(std::move(*router), std::move(*guard), std::move(*bound), ports, handler));
 }
 
-ControlServer::ControlServer(Socket router, std::string endpoint, const ControlPorts& ports,
-                             RequestHandler& handler)
+ControlServer::ControlServer(Socket router, std::unique_ptr<PeerGuard> guard, std::string endpoint,
+                             const ControlPorts& ports, RequestHandler& handler)
     : router_(std::move(router)),
+      guard_(std::move(guard)),
       endpoint_(std::move(endpoint)),
       ports_(ports),
       handler_(handler),
@@ -65,16 +77,20 @@ void ControlServer::serve() {
     bool busy = false;
     for (int i = 0; i < kRequestsARound && take_request(); ++i) busy = true;
     while (take_ack()) busy = true;
-    if (!busy) sleep();
+    const std::int64_t now_ns = pipeline::monotonic_ns();
+    const std::int64_t due_ns = std::min(guard_->turn(now_ns), handler_.forget_old(now_ns));
+    if (!busy) sleep(due_ns == pipeline::kForever_ns ? -1 : milliseconds_until(due_ns, now_ns));
   }
 }
 
-void ControlServer::sleep() {
+void ControlServer::sleep(long longest_ms) {
   ports_.wake->going_to_sleep();
   if (ports_.acks->empty() && !stop_.load(std::memory_order_acquire)) {
-    std::array<zmq_pollitem_t, 2> wait{
-        {{router_.get(), 0, ZMQ_POLLIN, 0}, {nullptr, ports_.wake->fd(), ZMQ_POLLIN, 0}}};
-    zmq_poll(wait.data(), static_cast<int>(wait.size()), -1);
+    std::array<zmq_pollitem_t, 3> wait{{{router_.get(), 0, ZMQ_POLLIN, 0},
+                                        {nullptr, ports_.wake->fd(), ZMQ_POLLIN, 0},
+                                        {guard_->monitor(), 0, ZMQ_POLLIN, 0}}};
+    zmq_poll(wait.data(), static_cast<int>(wait.size()), longest_ms);
+    if (wait[2].revents != 0) guard_->look_now();
     std::uint64_t rung = 0;
     [[maybe_unused]] const ssize_t cleared = read(ports_.wake->fd(), &rung, sizeof rung);
   }
@@ -90,6 +106,7 @@ bool ControlServer::take_request() {
     if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
   }
   if (envelope.size() > kLongestEnvelope) return true;  // no client of ours; it gets no answer
+  if (const int client = source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.gatekeeper != nullptr &&
       !ports_.gatekeeper->allows(part.property("User-Id"), Domain::kControl)) {
     v1::ControlReply reply;

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "daemon/control/gatekeeper.hpp"
+#include "daemon/control/peer_guard.hpp"
 #include "daemon/control/request_handler.hpp"
 #include "daemon/control/zmq_handle.hpp"
 #include "daemon/pipeline/ring.hpp"
@@ -20,8 +21,9 @@ namespace posed::control {
 struct ControlPorts {
   pipeline::Ring<pipeline::Ack>* acks = nullptr;  // this thread consumes
   pipeline::Wake* wake = nullptr;                 // rung when there is something in `acks`
-  const Gatekeeper* gatekeeper = nullptr;         // null: no CURVE
-  std::string secret_z85;                         // the server's key, with a gatekeeper
+  // Asked about every client; null (in tests): nobody is asked, and old ZMTP is spoken, too.
+  const Gatekeeper* gatekeeper = nullptr;
+  std::string secret_z85;  // the server's key; empty: no CURVE
 };
 
 class ControlServer {
@@ -38,15 +40,16 @@ class ControlServer {
   [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  // really bound
 
  private:
-  ControlServer(Socket router, std::string endpoint, const ControlPorts& ports,
-                RequestHandler& handler);
+  ControlServer(Socket router, std::unique_ptr<PeerGuard> guard, std::string endpoint,
+                const ControlPorts& ports, RequestHandler& handler);
   void serve();
-  void sleep();
+  void sleep(long longest_ms);  // negative: until something comes
   [[nodiscard]] bool take_request();
   [[nodiscard]] bool take_ack();
   void send(const Answer& answer);
 
   Socket router_;
+  std::unique_ptr<PeerGuard> guard_;
   std::string endpoint_;
   ControlPorts ports_;
   RequestHandler& handler_;

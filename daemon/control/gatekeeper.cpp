@@ -1,7 +1,6 @@
 #include "daemon/control/gatekeeper.hpp"
 
 #include <array>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,47 +10,19 @@ namespace {
 constexpr const char* kZapEndpoint = "inproc://zeromq.zap.01";
 constexpr std::size_t kLongestRequest = 16;  // parts; RFC 27 needs 7 for CURVE
 
-// version, request id, domain, address, routing id, mechanism, credentials...
-struct ZapRequest {
-  std::string version, id, domain, mechanism, credentials;
-};
-
-// Reads all parts of one message; nullopt when it is no request of RFC 27.
-std::optional<ZapRequest> read_request(void* door, Message& part) {
+// All parts of one message; those beyond the longest request are left out.
+std::vector<std::string> read_parts(void* door, Message& part) {
   std::vector<std::string> parts;
-  bool whole = true;
-  for (;;) {
+  do {
     if (parts.size() < kLongestRequest) parts.emplace_back(part.text());
-    if (!part.more()) break;
-    if (!part.receive(door, 0)) {
-      whole = false;
-      break;
-    }
-  }
-  if (!whole || parts.size() < 6) return std::nullopt;
-  ZapRequest request{parts[0], parts[1], parts[2], parts[5], {}};
-  if (parts.size() == 7) request.credentials = parts[6];
-  return request;
-}
-
-std::optional<Domain> domain_of(std::string_view name) {
-  for (const Domain domain : {Domain::kPublish, Domain::kControl}) {
-    if (name == domain_name(domain)) return domain;
-  }
-  return std::nullopt;
-}
-
-// The client key of a CURVE request in Z85; empty for any other mechanism.
-std::string key_of(const ZapRequest& request) {
-  std::array<char, 41> z85{};
-  if (request.mechanism != "CURVE" || request.credentials.size() != 32) return {};
-  const auto* raw = reinterpret_cast<const std::uint8_t*>(request.credentials.data());
-  return zmq_z85_encode(z85.data(), raw, 32) == nullptr ? std::string{} : std::string(z85.data());
+  } while (part.more() && part.receive(door, 0));
+  return parts;
 }
 
 }  // namespace
 
-Result<std::unique_ptr<Gatekeeper>> Gatekeeper::start(void* context, AccessList list) {
+Result<std::unique_ptr<Gatekeeper>> Gatekeeper::start(void* context,
+                                                      std::optional<AccessList> list) {
   auto door = open_socket(context, ZMQ_REP);
   auto stop_in = open_socket(context, ZMQ_PAIR);
   auto stop_out = open_socket(context, ZMQ_PAIR);
@@ -70,7 +41,7 @@ Result<std::unique_ptr<Gatekeeper>> Gatekeeper::start(void* context, AccessList 
       new Gatekeeper(std::move(*door), std::move(*stop_in), std::move(*stop_out), std::move(list)));
 }
 
-Gatekeeper::Gatekeeper(Socket door, Socket stop_in, Socket stop_out, AccessList list)
+Gatekeeper::Gatekeeper(Socket door, Socket stop_in, Socket stop_out, std::optional<AccessList> list)
     : door_(std::move(door)),
       stop_in_(std::move(stop_in)),
       stop_out_(std::move(stop_out)),
@@ -84,14 +55,15 @@ Gatekeeper::~Gatekeeper() {
 
 Gatekeeper::Change Gatekeeper::replace(AccessList list) {
   const std::scoped_lock lock(mutex_);
-  const Change change{list_.loses_someone(list, Domain::kPublish)};
+  if (!list_) return {};
+  const Change change{list_->loses_someone(list, Domain::kPublish)};
   list_ = std::move(list);
   return change;
 }
 
 bool Gatekeeper::allows(std::string_view user_id, Domain domain) const {
   const std::scoped_lock lock(mutex_);
-  return list_.find(user_id, domain) != nullptr;
+  return !list_ || list_->find(user_id, domain) != nullptr;
 }
 
 void Gatekeeper::serve() {
@@ -108,18 +80,23 @@ void Gatekeeper::serve() {
   }
 }
 
+bool Gatekeeper::welcomes(const ZapRequest& request) const {
+  if (!request.domain) return false;
+  const std::scoped_lock lock(mutex_);
+  if (!list_) return request.mechanism == "NULL";
+  return !request.key_z85.empty() && list_->find(request.key_z85, *request.domain) != nullptr;
+}
+
 void Gatekeeper::answer(Message& part) {
-  const auto request = read_request(door_.get(), part);
-  const auto domain = request ? domain_of(request->domain) : std::nullopt;
-  const std::string key = request ? key_of(*request) : std::string{};
-  const bool welcome = domain && !key.empty() && request->version == "1.0" && allows(key, *domain);
+  const auto request = read_zap_request(read_parts(door_.get(), part));
+  const bool welcome = request && welcomes(*request);
   if (!welcome) refused_.fetch_add(1);
   // version, request id, status, text, user id, metadata
   const std::array<std::string_view, 6> reply{"1.0",
                                               request ? std::string_view(request->id) : "",
                                               welcome ? "200" : "400",
                                               welcome ? "welcome" : "not on the allow-list",
-                                              welcome ? std::string_view(key) : "",
+                                              welcome ? std::string_view(request->key_z85) : "",
                                               ""};
   for (std::size_t i = 0; i < reply.size(); ++i) {
     (void)send_part(door_.get(), reply[i], i + 1 < reply.size());

@@ -1,15 +1,18 @@
-// Gatekeeper: the ZAP handler (ZeroMQ RFC 27) of a context. Every CURVE handshake asks it; it lets
-// in the keys of the allow-list that have the right for the socket's domain, and nobody else.
+// Gatekeeper: the ZAP handler (ZeroMQ RFC 27) of a context. Every handshake asks it. With an
+// allow-list it lets in the keys that have the right for the socket's domain, and nobody else.
+// Without one (a daemon without keys) whoever speaks ZMTP 3 without a key is welcome.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string_view>
 #include <thread>
 
 #include "daemon/control/security.hpp"
+#include "daemon/control/zap_request.hpp"
 #include "daemon/control/zmq_handle.hpp"
 
 namespace posed::control {
@@ -18,35 +21,36 @@ class Gatekeeper {
  public:
   // Bound before it returns. Start it before the first socket of the context is made and destroy it
   // after the last is closed, else a handshake finds nobody to ask (and is refused).
-  [[nodiscard]] static Result<std::unique_ptr<Gatekeeper>> start(void* context, AccessList list);
+  [[nodiscard]] static Result<std::unique_ptr<Gatekeeper>> start(void* context,
+                                                                 std::optional<AccessList> list);
   ~Gatekeeper();
   Gatekeeper(const Gatekeeper&) = delete;
   Gatekeeper& operator=(const Gatekeeper&) = delete;
 
   // What a new list means for those already connected. ROUTER messages are checked one by one
-  // (allows), so the control socket needs nothing; libzmq cannot disconnect one subscriber of an
-  // XPUB, so the publisher must unbind and bind again: all reconnect within about 0.1 s, those who
-  // lost their right are refused at the door.
+  // (allows), so the control socket needs nothing; the publisher must cut the subscribers off that
+  // are not allowed any more.
   struct Change {
-    bool publisher_must_rebind = false;
+    bool publisher_must_check = false;
   };
-  [[nodiscard]] Change replace(AccessList list);
+  [[nodiscard]] Change replace(AccessList list);  // a gatekeeper without a list stays as it is
 
-  // Whether the peer whose message carries this User-Id still has the right.
+  // Whether the peer whose message carries this User-Id still has the right; always without a list.
   [[nodiscard]] bool allows(std::string_view user_id, Domain domain) const;
 
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_.load(); }
 
  private:
-  Gatekeeper(Socket door, Socket stop_in, Socket stop_out, AccessList list);
+  Gatekeeper(Socket door, Socket stop_in, Socket stop_out, std::optional<AccessList> list);
   void serve();
   void answer(Message& version);
+  [[nodiscard]] bool welcomes(const ZapRequest& request) const;
 
   Socket door_;      // REP on inproc://zeromq.zap.01, the thread's
   Socket stop_in_;   // the thread's end of the bell that ends it
   Socket stop_out_;  // ours
   mutable std::mutex mutex_;
-  AccessList list_;  // under mutex_
+  std::optional<AccessList> list_;  // under mutex_
   std::atomic<std::uint64_t> refused_{0};
   std::thread thread_;
 };

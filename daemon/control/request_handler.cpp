@@ -32,22 +32,18 @@ Answer refusal(Asker to, const std::string& sentence) {
 
 }  // namespace
 
-RequestHandler::RequestHandler(std::vector<ControlledStream> streams, Helm& helm)
-    : streams_(std::move(streams)), helm_(helm) {}
+RequestHandler::RequestHandler(std::vector<ControlledStream> streams, Helm& helm, Clock clock)
+    : streams_(std::move(streams)), helm_(helm), clock_(clock) {}
 
 RequestHandler::~RequestHandler() = default;
 
 std::optional<Answer> RequestHandler::handle(Asker asker, std::span<const std::byte> bytes) {
   v1::ControlRequest request;
-  if (bytes.size() > kLargestModel + kLargestRequest ||
-      !request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
-    return refusal(std::move(asker), "this is no posed.v1.ControlRequest");
+  if (bytes.size() > kLargestRequest) {
+    return refusal(std::move(asker), "the request is too large: it has at most 64 KB");
   }
-  const std::size_t model_size = request.has_set_model() ? request.set_model().model().size() : 0;
-  if (model_size > kLargestModel || bytes.size() - model_size > kLargestRequest) {
-    return refusal(std::move(asker),
-                   "the request is too large: a model file has at most 64 MB,"
-                   " everything else at most 64 KB");
+  if (!request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return refusal(std::move(asker), "this is no posed.v1.ControlRequest");
   }
   Result<> done;
   v1::ControlReply reply;
@@ -56,9 +52,12 @@ std::optional<Answer> RequestHandler::handle(Asker asker, std::span<const std::b
     case v1::ControlRequest::kSetAlpha:
       done = set_alpha(request, asker);
       break;
-    case v1::ControlRequest::kSetModel:
-      done = set_model(request, asker);
+    case v1::ControlRequest::kModelPart: {
+      const auto taken = take_model_part(request, asker);
+      if (!taken) return refusal(std::move(asker), taken.error().text());
+      if (*taken) return answer(std::move(asker), reply);
       break;
+    }
     case v1::ControlRequest::kPlay:
       done = play(request, asker);
       break;
@@ -137,14 +136,32 @@ Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, const Aske
   return send(command, {.asker = asker});
 }
 
+Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
+                                             const Asker& asker) {
+  const auto& part = request.model_part();
+  if (auto stream = find_stream(part.stream()); !stream) return std::unexpected(stream.error());
+  auto whole = uploads_.take(asker.empty() ? std::string() : asker.front(),
+                             {.stream = part.stream(),
+                              .sha256 = part.sha256(),
+                              .total = part.total(),
+                              .offset = part.offset(),
+                              .bytes = part.bytes()},
+                             clock_());
+  if (!whole) return std::unexpected(whole.error());
+  if (!*whole) return true;
+  const std::string name = part.name().empty() ? "unnamed model" : config::printable(part.name());
+  const auto bytes = std::as_bytes(std::span(std::as_const(**whole)));
+  if (auto done = set_model(part.stream(), bytes, name, asker); !done) {
+    return std::unexpected(done.error());
+  }
+  return false;
+}
+
 // What kind of model it is, the file itself says.
-Result<> RequestHandler::set_model(const v1::ControlRequest& request, const Asker& asker) {
-  const auto& wanted = request.set_model();
-  const auto index = find_stream(wanted.stream());
+Result<> RequestHandler::set_model(const std::string& stream, std::span<const std::byte> bytes,
+                                   const std::string& name, const Asker& asker) {
+  const auto index = find_stream(stream);
   if (!index) return std::unexpected(index.error());
-  const std::string name =
-      wanted.name().empty() ? "unnamed model" : config::printable(wanted.name());
-  const auto bytes = std::as_bytes(std::span(wanted.model()));
   const auto file = model_file::open(bytes, name);
   if (!file) return std::unexpected(file.error());
   return file->has_gesture() ? set_gesture_model(*index, bytes, name, asker)

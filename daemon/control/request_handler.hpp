@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/control/uploads.hpp"
 #include "daemon/devices/present_device.hpp"
+#include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
@@ -28,8 +30,7 @@ class Stats;
 
 namespace posed::control {
 
-inline constexpr std::size_t kLargestModel = 64 * 1024 * 1024;  // bytes of a model file
-inline constexpr std::size_t kLargestRequest = 64 * 1024;       // bytes of any other request
+inline constexpr std::size_t kLargestRequest = 64 * 1024;  // bytes
 using pipeline::kMostUnderWay;
 
 // A stream as control sees it.
@@ -81,7 +82,8 @@ class RequestHandler {
  public:
   // `helm` outlives the handler. Destroy it after the pipeline thread has ended: it owns the models
   // in use.
-  RequestHandler(std::vector<ControlledStream> streams, Helm& helm);
+  RequestHandler(std::vector<ControlledStream> streams, Helm& helm,
+                 Clock clock = pipeline::monotonic_ns);
   ~RequestHandler();
   RequestHandler(const RequestHandler&) = delete;
   RequestHandler& operator=(const RequestHandler&) = delete;
@@ -89,6 +91,9 @@ class RequestHandler {
   // One request. The answer comes at once, or with acknowledge() when the pipeline has to act
   // first. Whatever the bytes are: an answer with a sentence, never a crash.
   [[nodiscard]] std::optional<Answer> handle(Asker asker, std::span<const std::byte> bytes);
+
+  // Forgets uploads that go on no more. Returns when to call it next at the latest.
+  [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns) { return uploads_.forget_old(now_ns); }
 
   // The pipeline has applied a command. Frees the model that it replaced.
   [[nodiscard]] std::optional<Answer> acknowledge(const pipeline::Ack& ack);
@@ -103,7 +108,10 @@ class RequestHandler {
   };
   // Nothing when the command is under way.
   [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Asker& asker);
-  [[nodiscard]] Result<> set_model(const v1::ControlRequest& request, const Asker& asker);
+  // True when the piece was not the last one: it is answered at once.
+  [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
+                                   const std::string& name, const Asker& asker);
   [[nodiscard]] Result<> set_style_model(std::uint32_t stream, std::span<const std::byte> bytes,
                                          const std::string& name, const Asker& asker);
   [[nodiscard]] Result<> set_gesture_model(std::uint32_t stream, std::span<const std::byte> bytes,
@@ -122,6 +130,8 @@ class RequestHandler {
 
   std::vector<ControlledStream> streams_;
   Helm& helm_;
+  Clock clock_;
+  Uploads uploads_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by ticket
   std::uint64_t last_ticket_ = 0;
 };

@@ -10,6 +10,7 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/keys.hpp"
+#include "daemon/control/peer_guard.hpp"
 #include "daemon/devices/keeper.hpp"
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/reader.hpp"
@@ -139,18 +140,20 @@ Result<> Daemon::Parts::start(DaemonHooks wanted) {
 }
 
 Result<> Daemon::Parts::open_sockets() {
+  control::raise_file_limit();
   auto opened = control::open_context();
   if (!opened) return std::unexpected(opened.error());
   context = std::move(*opened);
+  std::optional<control::AccessList> allowed;  // none without keys
   if (!config.security.server_key.empty()) {
     auto keys = control::read_secret_key(config.security.server_key);
     if (!keys) return std::unexpected(keys.error());
     secret_z85 = keys->secret_z85;
-    auto keeper =
-        control::Gatekeeper::start(context.get(), control::AccessList(config.security.clients));
-    if (!keeper) return std::unexpected(keeper.error());
-    gatekeeper = std::move(*keeper);
+    allowed.emplace(config.security.clients);
   }
+  auto keeper = control::Gatekeeper::start(context.get(), std::move(allowed));
+  if (!keeper) return std::unexpected(keeper.error());
+  gatekeeper = std::move(*keeper);
   std::vector<publish::StreamInfo> infos;
   for (const auto& stream : streams) {
     const auto& style = stream->config.style;
@@ -169,15 +172,11 @@ Result<> Daemon::Parts::open_sockets() {
   }
   publish::PublisherOptions options{.context = context.get(),
                                     .endpoint = config.publish_endpoint,
-                                    .secure = {},
+                                    .gatekeeper = gatekeeper.get(),
+                                    .secret_z85 = secret_z85,
                                     .more_stats = hooks.more_stats,
                                     .tape = hooks.tape,
                                     .clock = monotonic_ns};
-  if (gatekeeper) {
-    options.secure = [this](void* socket) {
-      return control::secure_server(socket, control::Domain::kPublish, secret_z85);
-    };
-  }
   auto bound =
       publish::Publisher::open(std::move(options), std::move(infos), *finished, *publisher_wake);
   if (!bound) return std::unexpected(bound.error());
@@ -332,10 +331,11 @@ bool Daemon::all_ended() const noexcept {
   });
 }
 
+bool Daemon::wants_keys() const noexcept { return !parts_->secret_z85.empty(); }
+
 void Daemon::allow(const std::vector<control::AllowedClient>& clients) {
-  if (!parts_->gatekeeper) return;
   const auto change = parts_->gatekeeper->replace(control::AccessList(clients));
-  if (change.publisher_must_rebind) parts_->publisher->rebind();
+  if (change.publisher_must_check) parts_->publisher->check_subscribers();
 }
 
 void Daemon::post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text) {

@@ -47,6 +47,7 @@ class Daemon {
   [[nodiscard]] bool asked_to_stop() const noexcept;                   // by a control message
   [[nodiscard]] bool all_ended() const noexcept;  // every source is finished and published
   [[nodiscard]] v1::Stats stats() const;          // of the last second
+  [[nodiscard]] bool wants_keys() const noexcept;  // CURVE on both sockets
   // Who may connect from now on; those who lost a right are cut off. Nothing without CURVE.
   void allow(const std::vector<control::AllowedClient>& clients);
   void post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text);

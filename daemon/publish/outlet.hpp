@@ -22,6 +22,9 @@ struct Channel {
   FrameEncoder frames;
   SampleEncoder samples;
   std::optional<v1::Skeleton> skeleton;
+  // When it is to be sent next: at once when somebody subscribes, but not over and over.
+  std::int64_t skeleton_sent_ns = 0;
+  std::int64_t skeleton_due_ns = 0;
 };
 
 struct Outlet {

@@ -7,6 +7,8 @@
 #include <spdlog/spdlog.h>
 #include <time.h>
 
+#include "daemon/control/gatekeeper.hpp"
+#include "daemon/control/peer_guard.hpp"
 #include "daemon/publish/outlet.hpp"
 #include "daemon/publish/process.hpp"
 
@@ -15,6 +17,17 @@ namespace {
 
 constexpr double kQueueDepth_s = 0.25;
 constexpr int kMinQueue = 16;
+// What a subscriber may say: a handshake with CURVE and a long name, and then topics, one at a
+// time, so that a flood of them reaches us as fast as we hear them and no faster.
+constexpr std::int64_t kLongestPart = 1024;  // bytes
+constexpr int kSubscriptionsWaiting = 1;
+constexpr int kReceiveBuffer_bytes = 8 * 1024;
+constexpr std::uint64_t kMostUnheard = 512 * 1024;  // bytes of all that ended no message
+constexpr int kSubscriptionsATurn = 64;
+constexpr std::uint32_t kSocketKey = 0;  // what woke the thread
+constexpr std::uint32_t kGuardKey = 1;
+// A skeleton is sent to all who want it when one asks; not more often than this.
+constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
 constexpr int kSendBuffer = 8 * 1024;  // bytes; the kernel's default alone hides seconds of poses
 
 std::int64_t clock_ns(clockid_t clock) {
@@ -57,6 +70,23 @@ std::string sentence(const ShedTally::Sum& shed) {
   return which + " skipped: newer ones waited";
 }
 
+// What the publisher's thread waits for: new items, and what subscribers say.
+Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake, void* socket,
+                                                      int guard_fd) {
+  auto poller = pipeline::Poller::open();
+  if (!poller) return poller;
+  int socket_fd = -1;
+  std::size_t size = sizeof socket_fd;
+  if (zmq_getsockopt(socket, ZMQ_FD, &socket_fd, &size) != 0) {
+    return fail("ZeroMQ names no descriptor to wait for");
+  }
+  for (const Result<>& added : {(*poller)->add(wake), (*poller)->add(socket_fd, kSocketKey),
+                                (*poller)->add(guard_fd, kGuardKey)}) {
+    if (!added) return std::unexpected(added.error());
+  }
+  return poller;
+}
+
 }  // namespace
 
 // What other threads asked for or want to know. Cold: never touched by the hot threads.
@@ -69,12 +99,12 @@ struct Publisher::Told {
   mutable std::mutex mutex;
   std::vector<Posted> events;
   std::vector<std::pair<std::uint32_t, std::string>> models;
-  bool rebind = false;
+  bool check = false;
   v1::Stats stats;
-  std::atomic<bool> asked{false};  // one of events, models, rebind is new
+  std::atomic<bool> asked{false};  // one of events, models, check is new
 
   // The publisher thread's own, of the last report.
-  std::int64_t reported_ns = 0;
+  std::int64_t reported_ns = kNoTime_ns;
   std::int64_t cpu_ns = 0;
 };
 
@@ -99,71 +129,93 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
   if (auto set = set_queue_options(socket->get(), messages_per_s); !set) {
     return std::unexpected(set.error());
   }
-  if (auto set = control::set_option(socket->get(), ZMQ_XPUB_VERBOSE, 1); !set) {
+  if (auto set = control::set_option(socket->get(), ZMQ_XPUB_VERBOSER, 1); !set) {
     return std::unexpected(set.error());
   }
-  if (options.secure) {
-    if (auto secured = options.secure(socket->get()); !secured) {
-      return std::unexpected(secured.error());
-    }
+  if (options.gatekeeper != nullptr) {
+    auto secured =
+        control::secure_server(socket->get(), control::Domain::kPublish, options.secret_z85);
+    if (!secured) return std::unexpected(secured.error());
   }
+  if (auto set = control::set_receive_limits(socket->get(), kLongestPart, kSubscriptionsWaiting,
+                                             kReceiveBuffer_bytes);
+      !set) {
+    return std::unexpected(set.error());
+  }
+  auto guard = control::PeerGuard::open(options.context, socket->get(),
+                                        {.name = "publish",
+                                         .most_peers = control::peer_shares().publish,
+                                         .most_unheard = kMostUnheard});
+  if (!guard) return std::unexpected(guard.error());
   auto endpoint = control::bind_socket(socket->get(), options.endpoint);
   if (!endpoint) return std::unexpected(endpoint.error());
+  auto poller = open_poller(wake, socket->get(), (*guard)->fd());
+  if (!poller) return std::unexpected(poller.error());
   return std::unique_ptr<Publisher>(new Publisher(std::move(options), std::move(streams), in, wake,
-                                                  std::move(*socket), std::move(*endpoint)));
+                                                  std::move(*socket), std::move(*endpoint),
+                                                  std::move(*poller), std::move(*guard)));
 }
 
 Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
                      pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake,
-                     control::Socket socket, std::string endpoint)
+                     control::Socket socket, std::string endpoint,
+                     std::unique_ptr<pipeline::Poller> poller,
+                     std::unique_ptr<control::PeerGuard> guard)
     : options_(std::move(options)),
       in_(in),
       wake_(wake),
       socket_(std::move(socket)),
+      guard_(std::move(guard)),
+      subscriptions_([this](std::string_view prefix) { return is_topic(prefix); }),
       endpoint_(std::move(endpoint)),
+      poller_(std::move(poller)),
       told_(std::make_unique<Told>()) {
   for (StreamInfo& stream : streams) {
     outlets_.push_back(std::make_unique<Outlet>(std::move(stream)));
   }
+  guard_->gone = [this](int peer) { subscriptions_.forget(peer); };
 }
 
 Publisher::~Publisher() = default;
 
 const std::string& Publisher::endpoint() const noexcept { return endpoint_; }
 
-void Publisher::run() {
-  auto poller = pipeline::Poller::open();
-  int socket_fd = -1;
-  std::size_t size = sizeof socket_fd;
-  zmq_getsockopt(socket_.get(), ZMQ_FD, &socket_fd, &size);
-  if (!poller || !(*poller)->add(wake_) || !(*poller)->add(socket_fd, 0)) {
-    spdlog::critical("the publisher cannot wait for frames; nothing is published");
-    return;
+void Publisher::take_all() {
+  while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
   }
-  told_->reported_ns = options_.clock();
-  told_->cpu_ns = cpu_time_ns();
-  every_second(told_->reported_ns);  // who asks for the status at once is told the streams
-  const auto drain = [this] {
-    while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
-    }
-  };
+}
+
+std::int64_t Publisher::turn(std::int64_t now_ns) {
+  take_all();
+  do_what_was_asked();
+  // At the first turn, too: who asks for the status at once is told the streams.
+  if (told_->reported_ns == kNoTime_ns || now_ns >= told_->reported_ns + kNanosPerSecond) {
+    every_second(now_ns);
+  }
+  const std::int64_t guard_ns = guard_->turn(now_ns);
+  const bool all_heard = hear_subscriptions(now_ns);
+  const std::int64_t skeleton_ns = send_skeletons(now_ns);
+  if (!all_heard) return now_ns;
+  return std::min({told_->reported_ns + kNanosPerSecond, guard_ns, skeleton_ns});
+}
+
+void Publisher::finish(std::int64_t now_ns) {
+  take_all();
+  for (std::uint32_t i = 0; i < outlets_.size(); ++i) tell_shed(i, true);
+  every_second(now_ns);
+}
+
+void Publisher::run() {
   while (!stop_.load(std::memory_order_acquire)) {
-    drain();
-    hear_subscriptions();
-    do_what_was_asked();
-    const std::int64_t now_ns = options_.clock();
-    const std::int64_t report_ns = told_->reported_ns + kNanosPerSecond;
-    if (now_ns >= report_ns) every_second(now_ns);
+    const std::int64_t due_ns = turn(options_.clock());
     wake_.going_to_sleep();
     if (in_.empty() && !told_->asked.load() && !stop_.load(std::memory_order_acquire)) {
-      static_cast<void>((*poller)->wait(
-          std::max<std::int64_t>(told_->reported_ns + kNanosPerSecond - options_.clock(), 0)));
+      const auto ready = poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0));
+      if (std::ranges::find(ready, kGuardKey) != ready.end()) guard_->look_now();
     }
     wake_.awake();
   }
-  drain();
-  for (std::uint32_t i = 0; i < outlets_.size(); ++i) tell_shed(i, true);
-  every_second(options_.clock());
+  finish(options_.clock());
 }
 
 void Publisher::stop() noexcept {
@@ -257,29 +309,72 @@ void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int6
 }
 
 // A subscription message is one byte, 1 for coming and 0 for going, then the topic's beginning.
-void Publisher::hear_subscriptions() {
+bool Publisher::hear_subscriptions(std::int64_t now_ns) {
   control::Message message;
-  while (message.receive(socket_.get())) {
+  for (int i = 0; i < kSubscriptionsATurn; ++i) {
+    if (!message.receive(socket_.get())) return true;
     const std::string_view text = message.text();
-    if (text.empty() || text.front() != 1) continue;
-    for (const auto& outlet : outlets_) send_skeletons(*outlet, text.substr(1));
+    const int peer = control::source_of(message);
+    if (!guard_->knows(peer)) continue;  // gone meanwhile, or libzmq says what went with it
+    guard_->heard(peer, message.property("User-Id"));
+    if (text.empty() || static_cast<unsigned char>(text.front()) > 1) {
+      guard_->cut(peer, "sent what is no subscription");
+    } else if (!subscriptions_.ask(peer, text.substr(1), text.front() == 1, now_ns)) {
+      guard_->cut(peer, "subscribed to too much");
+    } else if (text.front() == 1) {
+      want_skeletons(text.substr(1));
+    }
+  }
+  return false;
+}
+
+bool Publisher::is_topic(std::string_view prefix) const {
+  if (std::string_view("stats").starts_with(prefix)) return true;
+  const auto begins_one_of = [&](const Channel& channel) {
+    return channel.pose_topic.starts_with(prefix) || channel.skeleton_topic.starts_with(prefix) ||
+           channel.sensor_topic.starts_with(prefix) || channel.event_topic.starts_with(prefix);
+  };
+  return std::ranges::any_of(outlets_, [&](const auto& outlet) {
+    return begins_one_of(outlet->styled) || (outlet->raw && begins_one_of(*outlet->raw));
+  });
+}
+
+// Somebody subscribed to topics that begin with `prefix`.
+void Publisher::want_skeletons(std::string_view prefix) {
+  const auto want = [&](Channel& channel) {
+    if (!channel.skeleton_topic.starts_with(prefix)) return;
+    channel.skeleton_due_ns =
+        std::min(channel.skeleton_due_ns, channel.skeleton_sent_ns + kSkeletonPause_ns);
+  };
+  for (const auto& outlet : outlets_) {
+    want(outlet->styled);
+    if (outlet->raw) want(*outlet->raw);
   }
 }
 
-// To everyone who subscribes to topics that begin with `prefix`.
-void Publisher::send_skeletons(const Outlet& outlet, std::string_view prefix) {
-  const auto send_one = [&](const Channel& channel) {
-    if (channel.skeleton && channel.skeleton_topic.starts_with(prefix)) {
+std::int64_t Publisher::send_skeletons(std::int64_t now_ns) {
+  std::int64_t next_ns = pipeline::kForever_ns;
+  const auto send_one = [&](Channel& channel) {
+    if (!channel.skeleton) return;
+    if (now_ns >= channel.skeleton_due_ns) {
       send(channel.skeleton_topic, *channel.skeleton);
+      channel.skeleton_sent_ns = now_ns;
+      channel.skeleton_due_ns = now_ns + kNanosPerSecond;
     }
+    next_ns = std::min(next_ns, channel.skeleton_due_ns);
   };
-  send_one(outlet.styled);
-  if (outlet.raw) send_one(*outlet.raw);
+  for (const auto& outlet : outlets_) {
+    send_one(outlet->styled);
+    if (outlet->raw) send_one(*outlet->raw);
+  }
+  return next_ns;
 }
 
 void Publisher::every_second(std::int64_t now_ns) {
-  const double since_s = seconds(now_ns - told_->reported_ns);
+  const bool first = told_->reported_ns == kNoTime_ns;
+  const double since_s = first ? 0.0 : seconds(now_ns - told_->reported_ns);
   const std::int64_t cpu_ns = cpu_time_ns();
+  if (first) told_->cpu_ns = cpu_ns;
   v1::Stats stats;
   stats.set_time_ns(now_ns);
   stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC));
@@ -288,7 +383,6 @@ void Publisher::every_second(std::int64_t now_ns) {
       static_cast<float>(100.0 * seconds(cpu_ns - told_->cpu_ns) / std::max(since_s, 1e-3)));
   for (std::uint32_t i = 0; i < outlets_.size(); ++i) {
     outlets_[i]->report(*stats.add_stream(), since_s);
-    send_skeletons(*outlets_[i], {});
     tell_shed(i, false);
   }
   if (options_.more_stats) options_.more_stats(stats);
@@ -302,21 +396,21 @@ void Publisher::every_second(std::int64_t now_ns) {
 void Publisher::do_what_was_asked() {
   if (!told_->asked.exchange(false)) return;
   std::vector<Told::Posted> events;
-  bool rebind = false;
+  bool check = false;
   {
     const std::scoped_lock lock(told_->mutex);
     events.swap(told_->events);
     for (auto& [stream, name] : told_->models) outlets_[stream]->info.model = std::move(name);
     told_->models.clear();
-    rebind = std::exchange(told_->rebind, false);
+    check = std::exchange(told_->check, false);
   }
   for (const Told::Posted& event : events) {
     send_event(event.stream, event.kind, options_.clock(), 0, event.text);
   }
-  if (!rebind) return;
-  if (auto again = control::rebind_socket(socket_.get(), endpoint_); !again) {
-    spdlog::error("{}", again.error().text());
-  }
+  if (!check || options_.gatekeeper == nullptr) return;
+  guard_->cut_unless([this](std::string_view user) {
+    return options_.gatekeeper->allows(user, control::Domain::kPublish);
+  });
 }
 
 template <typename Change>
@@ -337,8 +431,8 @@ void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::stri
   ask([&](Told& told) { told.events.push_back({stream, kind, std::move(text)}); });
 }
 
-void Publisher::rebind() {
-  ask([](Told& told) { told.rebind = true; });
+void Publisher::check_subscribers() {
+  ask([](Told& told) { told.check = true; });
 }
 
 v1::Stats Publisher::stats() const {

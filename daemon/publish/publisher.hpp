@@ -1,5 +1,5 @@
 // Publisher: the one thread that turns what the pipeline made into messages and sends them on a
-// ZeroMQ XPUB socket. Topics: pose/<stream>, skeleton/<stream> (on each subscription and every
+// ZeroMQ XPUB socket. Topics: pose/<stream>, skeleton/<stream> (soon after a subscription and every
 // second), sensor/<stream>, event/<stream>, stats (every second). A slow subscriber costs the
 // others nothing: its queue is a quarter of a second deep and what does not fit is dropped for it
 // alone.
@@ -18,10 +18,16 @@
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/pipeline/wake.hpp"
+#include "daemon/publish/subscriptions.hpp"
 #include "daemon/record/tape.hpp"
 #include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
+
+namespace posed::control {
+class Gatekeeper;
+class PeerGuard;
+}  // namespace posed::control
 
 namespace posed::publish {
 
@@ -39,9 +45,11 @@ struct StreamInfo {
 struct PublisherOptions {
   void* context = nullptr;  // ZeroMQ's; outlives the publisher
   std::string endpoint;
-  std::function<Result<>(void* socket)> secure;  // before bind; may be empty
-  std::function<void(v1::Stats&)> more_stats;    // adds what others know (recorder); may be empty
-  record::Tape* tape = nullptr;                  // null: nothing is recorded
+  // Asked about every subscriber; null (in tests): nobody is asked, and old ZMTP is spoken, too.
+  const control::Gatekeeper* gatekeeper = nullptr;
+  std::string secret_z85;                      // the server's key; empty: no CURVE
+  std::function<void(v1::Stats&)> more_stats;  // adds what others know (recorder); may be empty
+  record::Tape* tape = nullptr;                // null: nothing is recorded
   Clock clock = nullptr;
 };
 
@@ -63,8 +71,12 @@ class Publisher {
 
   [[nodiscard]] const std::string& endpoint() const noexcept;  // really bound
 
-  // Runs until stop(), then once more over what is waiting. The calling thread becomes the
-  // publisher thread.
+  // Does all that is due at `now_ns` (of the options' clock) and never waits. Returns when it must
+  // be called next at the latest; earlier when the wake rings or the socket has something to say.
+  [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
+  // The last turn: what still waits goes out, and the last counts.
+  void finish(std::int64_t now_ns);
+  // Takes turns until stop(), then finishes. The calling thread becomes the publisher thread.
   void run();
 
   // The rest is for any other thread; cold.
@@ -72,23 +84,29 @@ class Publisher {
   void set_model_name(std::uint32_t stream, std::string name);
   // Says something a person should know on event/<stream>.
   void post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text);
-  // Cuts all subscribers off and lets them in again through the gatekeeper (a key was withdrawn).
-  void rebind();
+  // Cuts off who is not allowed any more (a key was withdrawn); needs a gatekeeper.
+  void check_subscribers();
   [[nodiscard]] v1::Stats stats() const;  // as last published
 
  private:
   struct Told;
   Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
             pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake, control::Socket socket,
-            std::string endpoint);
+            std::string endpoint, std::unique_ptr<pipeline::Poller> poller,
+            std::unique_ptr<control::PeerGuard> guard);
+  void take_all();
   void take(const pipeline::Item& item);
   void take_frame(const Frame& frame, bool raw);
   void take_notice(const pipeline::Notice& notice);
   void tell_shed(std::uint32_t stream, bool at_end);
   void send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
                   std::uint64_t sequence, const std::string& text);
-  void send_skeletons(const Outlet& outlet, std::string_view prefix);
-  void hear_subscriptions();
+  // Sends the skeletons that are due; returns when the next is.
+  [[nodiscard]] std::int64_t send_skeletons(std::int64_t now_ns);
+  void want_skeletons(std::string_view prefix);
+  // False when there may be more to hear.
+  [[nodiscard]] bool hear_subscriptions(std::int64_t now_ns);
+  [[nodiscard]] bool is_topic(std::string_view prefix) const;
   void every_second(std::int64_t now_ns);
   void do_what_was_asked();
   template <typename Change>
@@ -99,7 +117,10 @@ class Publisher {
   pipeline::Ring<pipeline::Item>& in_;
   pipeline::Wake& wake_;
   control::Socket socket_;
+  std::unique_ptr<control::PeerGuard> guard_;
+  Subscriptions subscriptions_;
   std::string endpoint_;
+  std::unique_ptr<pipeline::Poller> poller_;
   std::vector<std::unique_ptr<Outlet>> outlets_;
   std::unique_ptr<Told> told_;
   std::string scratch_;

@@ -46,7 +46,11 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const std::string& endpoint,
   auto context = control::open_context();
   if (!context) return std::unexpected(context.error());
   self->context_ = std::move(*context);
+  auto gatekeeper = control::Gatekeeper::start(self->context_.get(), std::nullopt);
+  if (!gatekeeper) return std::unexpected(gatekeeper.error());
+  self->gatekeeper_ = std::move(*gatekeeper);
   publish::PublisherOptions options;
+  options.gatekeeper = self->gatekeeper_.get();
   options.context = self->context_.get();
   options.endpoint = endpoint;
   options.clock = pipeline::monotonic_ns;

@@ -6,6 +6,7 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/zmq_handle.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
@@ -34,6 +35,7 @@ class Broadcast {
   Broadcast(std::size_t streams, std::size_t slots, std::unique_ptr<pipeline::Wake> wake);
 
   control::Context context_;
+  std::unique_ptr<control::Gatekeeper> gatekeeper_;
   std::vector<pipeline::StreamCounters> counters_;
   pipeline::Ring<pipeline::Item> ring_;
   std::unique_ptr<pipeline::Wake> wake_;

@@ -185,7 +185,14 @@ TEST_CASE("strangers get in nowhere, and a withdrawn key is cut off") {
   CHECK(has(connected.errors(), "refuses this key"));
   while (other.line(std::chrono::milliseconds(0))) {  // what it had before
   }
-  CHECK(other.line());  // reconnected by itself
+  CHECK(other.line());  // was not cut
+  // A config that lost its [security] opens no door and ends no daemon.
+  served.write_config("");
+  served.daemon->send(SIGHUP);
+  CHECK_FALSE(served.daemon->exit_code(std::chrono::milliseconds(500)));
+  CHECK(has(served.daemon->errors(), "no [security] server_key any more"));
+  CHECK(posed({"monitor", "--connect", served.publish, "--count", "1"}).code == 1);
+  CHECK(posed(as("director", {"ctl", "status"})).code == 0);
   served.daemon->send(SIGTERM);
   CHECK(served.daemon->exit_code() == 0);
 }

@@ -31,7 +31,7 @@ class Stage {
   void launch(const std::string& command, const std::vector<std::string>& options = {}) {
     std::vector<std::string> arguments{command, "--config", path("posed.toml")};
     arguments.insert(arguments.end(), options.begin(), options.end());
-    daemon.emplace(std::move(arguments));
+    daemon.emplace(std::move(arguments), most_files);
     const auto line = daemon->line();
     INFO(daemon->errors());
     REQUIRE(line);
@@ -48,6 +48,7 @@ class Stage {
   }
 
   TempFolder folder;
+  int most_files = 0;  // that the daemon may open; 0: as many as this process
   std::optional<Process> daemon;
   std::string publish, control;
 };

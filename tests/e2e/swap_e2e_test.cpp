@@ -7,6 +7,7 @@
 
 #include "daemon/control/zmq_handle.hpp"
 #include "posed/v1/control.pb.h"
+#include "proto/log/digest.hpp"
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {
@@ -93,8 +94,12 @@ struct Seen {
 v1::ControlRequest random_change(std::mt19937& random, const std::array<std::string, 2>& models) {
   v1::ControlRequest request;
   if (random() % 2 == 0) {
-    request.mutable_set_model()->set_stream("walker");
-    request.mutable_set_model()->set_model(models[random() % 2]);
+    const std::string& model = models[random() % 2];
+    auto& part = *request.mutable_model_part();
+    part.set_stream("walker");
+    part.set_sha256(log::sha256_hex(std::as_bytes(std::span(model))));
+    part.set_total(model.size());
+    part.set_bytes(model);  // small enough for one piece
     return request;
   }
   request.mutable_set_alpha()->set_stream("walker");

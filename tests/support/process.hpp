@@ -23,9 +23,13 @@ namespace posed::test {
 
 class Process {
  public:
-  // Starts `posed` with these arguments; stdin is empty.
-  explicit Process(std::vector<std::string> arguments) {
+  // Starts `posed` with these arguments; stdin is empty. It may open `most_files` (0: as we may).
+  explicit Process(std::vector<std::string> arguments, int most_files = 0) {
     arguments.insert(arguments.begin(), POSED_BINARY);
+    if (most_files > 0) {
+      const std::string limit = "ulimit -n " + std::to_string(most_files);
+      arguments.insert(arguments.begin(), {"/bin/sh", "-c", limit + "; exec \"$0\" \"$@\""});
+    }
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
@@ -81,6 +85,17 @@ class Process {
 
   void send(int signal) const { kill(pid_, signal); }
   [[nodiscard]] pid_t pid() const { return pid_; }
+
+  // CPU time it has used so far [s].
+  [[nodiscard]] double cpu_s() const {
+    std::ifstream stat("/proc/" + std::to_string(pid_) + "/stat");
+    std::string word;
+    std::vector<std::string> words;
+    while (stat >> word) words.push_back(word);
+    if (words.size() < 15) return 0.0;
+    return (std::stod(words[13]) + std::stod(words[14])) /
+           static_cast<double>(sysconf(_SC_CLK_TCK));
+  }
 
   // The exit code (128 + signal when killed); nullopt when it still runs then.
   std::optional<int> exit_code(std::chrono::milliseconds within = kPatience) {

@@ -71,11 +71,15 @@ v1::ControlRequest alpha_request(const std::string& stream, float alpha) {
   return request;
 }
 
+// A model that goes into one piece.
 v1::ControlRequest model_request(const std::string& stream, const std::string& bytes) {
   v1::ControlRequest request;
-  request.mutable_set_model()->set_stream(stream);
-  request.mutable_set_model()->set_model(bytes);
-  request.mutable_set_model()->set_name("sway.style");
+  auto& part = *request.mutable_model_part();
+  part.set_stream(stream);
+  part.set_sha256(log::sha256_hex(std::as_bytes(std::span(bytes))));
+  part.set_total(bytes.size());
+  part.set_bytes(bytes);
+  part.set_name("sway.style");
   return request;
 }
 
@@ -176,7 +180,7 @@ TEST_CASE("each refusal is one sentence") {
   CHECK(has(reply_of(desk.ask(std::string("\xff\xff\xff"))).error(), "no posed.v1"));
 
   const std::string good = style::serialize_model(test::toy_model(1, 0.3));
-  CHECK(has(desk.refused(model_request("walker", "")), "sway.style"));
+  CHECK(has(desk.refused(model_request("walker", "")), "a model file has 1 to"));
   CHECK(has(desk.refused(model_request("walker", good.substr(0, good.size() - 1))), "sway.style"));
   std::string flipped = good;
   flipped[flipped.size() / 2] = static_cast<char>(flipped[flipped.size() / 2] ^ 1);
@@ -192,8 +196,8 @@ TEST_CASE("requests are bounded in size and in number") {
   auto request = alpha_request("walker", 0.0F);
   request.mutable_set_alpha()->set_stream(std::string(kLargestRequest, 'x'));
   CHECK(has(desk.refused(request), "too large"));
-  CHECK(
-      has(desk.refused(model_request("walker", std::string(kLargestModel + 1, 'x'))), "too large"));
+  CHECK(has(desk.refused(model_request("walker", std::string(kLargestPiece + 1, 'x'))),
+            "a piece of a model has"));
   for (std::size_t i = 0; i < kMostUnderWay; ++i) {
     CHECK_FALSE(desk.ask(alpha_request("walker", 1.0F)));
   }

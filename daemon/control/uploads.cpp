@@ -1,0 +1,103 @@
+#include "daemon/control/uploads.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/frame/time.hpp"
+#include "proto/log/digest.hpp"
+
+namespace posed::control {
+namespace {
+
+constexpr std::size_t kSha256 = 64;  // hexadecimal signs
+
+// What does not depend on the pieces before it.
+Result<> check_piece(const ModelPiece& piece) {
+  if (piece.total == 0 || piece.total > kLargestModel) {
+    return fail(fmt::format("a model file has 1 to {} bytes, not {}", kLargestModel, piece.total));
+  }
+  if (piece.bytes.empty() || piece.bytes.size() > kLargestPiece) {
+    return fail(fmt::format("a piece of a model has 1 to {} bytes, not {}", kLargestPiece,
+                            piece.bytes.size()));
+  }
+  if (piece.sha256.size() != kSha256) {
+    return fail("the model's sha256 is missing: give it as 64 hexadecimal signs in every piece");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Uploads::Iterator> Uploads::find_or_begin(const std::string& client,
+                                                 const ModelPiece& piece) {
+  auto found = uploads_.find(client);
+  if (piece.offset != 0) {
+    if (found != uploads_.end()) return found;
+    return fail("no upload is under way here: it took too long, or did not begin at offset 0");
+  }
+  if (found != uploads_.end()) erase(found);
+  if (uploads_.size() >= kMostUploads) {
+    return fail("others are sending models; try again in some seconds");
+  }
+  return uploads_
+      .emplace(client, Upload{.stream = std::string(piece.stream),
+                              .sha256 = std::string(piece.sha256),
+                              .bytes = {},
+                              .total = piece.total})
+      .first;
+}
+
+Result<std::optional<std::string>> Uploads::take(const std::string& client, const ModelPiece& piece,
+                                                 std::int64_t now_ns) {
+  (void)forget_old(now_ns);
+  if (auto sound = check_piece(piece); !sound) return std::unexpected(sound.error());
+  auto found = find_or_begin(client, piece);
+  if (!found) return std::unexpected(found.error());
+  Upload& upload = (*found)->second;
+  if (piece.offset != upload.bytes.size() || piece.total != upload.total ||
+      piece.sha256 != upload.sha256 || piece.stream != upload.stream ||
+      piece.bytes.size() > upload.total - upload.bytes.size()) {
+    erase(*found);
+    return fail("this piece does not continue the one before; send the model again from offset 0");
+  }
+  if (bytes_ + piece.bytes.size() > kLargestModel) {
+    erase(*found);
+    return fail("others are sending models; try again in some seconds");
+  }
+  upload.bytes += piece.bytes;
+  upload.last_ns = now_ns;
+  bytes_ += piece.bytes.size();
+  if (upload.bytes.size() < upload.total) return std::nullopt;
+  bytes_ -= upload.bytes.size();
+  const Upload whole = std::move(upload);
+  uploads_.erase(*found);
+  if (log::sha256_hex(std::as_bytes(std::span(whole.bytes))) != whole.sha256) {
+    return fail("the model arrived damaged: its sha256 is another; send it again");
+  }
+  return std::optional(std::move(whole.bytes));
+}
+
+std::int64_t Uploads::forget_old(std::int64_t now_ns) {
+  std::int64_t next_ns = std::numeric_limits<std::int64_t>::max();
+  for (auto it = uploads_.begin(); it != uploads_.end();) {
+    const auto upload = it++;
+    const std::int64_t until_ns = upload->second.last_ns + nanoseconds(kUploadPause_s);
+    if (now_ns >= until_ns) {
+      erase(upload);
+    } else {
+      next_ns = std::min(next_ns, until_ns);
+    }
+  }
+  return next_ns;
+}
+
+void Uploads::erase(Iterator upload) {
+  bytes_ -= upload->second.bytes.size();
+  uploads_.erase(upload);
+}
+
+}  // namespace posed::control

@@ -1,0 +1,195 @@
+// Control requests that are well formed outside and broken inside: models in pieces that overlap,
+// come out of order or say absurd sizes, models with a right checksum and wrong numbers, plays,
+// calibrations with lines of TOML exchanged. Several clients beside each other.
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <fuzzer/FuzzedDataProvider.h>
+
+#include "daemon/control/request_handler.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "models/gesture/model_file.hpp"
+#include "posed/v1/control.pb.h"
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/log/digest.hpp"
+#include "tests/fuzz/model_envelope.hpp"
+#include "tests/unit/gesture/toy_gesture.hpp"
+#include "tests/unit/models/toy_style.hpp"
+
+namespace {
+
+using namespace posed;
+
+constexpr std::size_t kHeader = 24;  // of a model file, before its payload
+
+void demand(bool holds) {
+  if (!holds) std::abort();
+}
+
+class Helm final : public control::Helm {
+ public:
+  bool send(const pipeline::Command& command) override {
+    demand(std::abs(command.alpha) <= 2.0F);
+    acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
+    return true;
+  }
+  bool send(const pipeline::DeviceCommand& command) override {
+    demand(command.size <= command.bytes.size());
+    if (command.ticket != 0) {
+      acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
+    }
+    return true;
+  }
+  void keep_model(std::span<const std::byte>) override {}
+  void model_in_use(std::uint32_t stream, const std::string&) override { demand(stream <= 2); }
+  void fill(v1::Stats& stats) override { stats.set_rss_bytes(1); }
+  void stop() override {}
+
+  std::vector<pipeline::Ack> acks;
+};
+
+// A body with a style, a hand with gestures, a glove.
+std::vector<control::ControlledStream> three_streams() {
+  std::vector<control::ControlledStream> streams(3);
+  streams[0].name = "w";
+  streams[0].skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
+  streams[0].style.emplace();
+  streams[1].name = "h";
+  streams[1].skeleton = std::make_shared<const Skeleton>(hand_skeleton(Side::kRight));
+  streams[1].rate_hz = 30.0;
+  streams[1].generates = true;
+  streams[2].name = "g";
+  streams[2].skeleton = streams[1].skeleton;
+  const drivers::Driver* glove = drivers::find_driver("lucidgloves");
+  const auto description = glove->expect({});
+  demand(description.has_value());
+  streams[2].device->connected(*description);
+  return streams;
+}
+
+std::string calibration_text() {
+  const drivers::Driver* glove = drivers::find_driver("lucidgloves");
+  const auto file =
+      drivers::glove::default_calibration(glove->glove_model(glove->expect({}).value()).value());
+  return drivers::glove::format_calibration(file.value());
+}
+
+// A whole, valid model with some bytes exchanged; its checksum is right again.
+std::string broken_model(FuzzedDataProvider& data) {
+  static const std::array<std::string, 2> kWhole{
+      style::serialize_model(test::toy_model(1, 0.3)),
+      gesture::serialize_model(test::toy_gesture_model())};
+  std::string payload = data.PickValueInArray(kWhole).substr(kHeader);
+  for (int i = data.ConsumeIntegralInRange(0, 4); i > 0; --i) {
+    const auto at = data.ConsumeIntegralInRange<std::size_t>(0, payload.size() - 1);
+    payload[at] = data.ConsumeIntegral<char>();
+  }
+  if (data.ConsumeIntegralInRange(0, 7) == 0) {
+    payload.resize(data.ConsumeIntegralInRange<std::size_t>(0, payload.size()));
+  }
+  return fuzz::as_model_file(payload);
+}
+
+std::string broken_calibration(FuzzedDataProvider& data) {
+  static const std::string kWhole = calibration_text();
+  std::string text = kWhole;
+  for (int i = data.ConsumeIntegralInRange(0, 4); i > 0; --i) {
+    const auto at = data.ConsumeIntegralInRange<std::size_t>(0, text.size());
+    const auto size = data.ConsumeIntegralInRange<std::size_t>(0, 20);
+    text.replace(at, size, data.ConsumeRandomLengthString(20));
+  }
+  return text;
+}
+
+std::string stream_name(FuzzedDataProvider& data) {
+  return data.PickValueInArray({"w", "h", "g", "nobody"});
+}
+
+struct Desk {
+  Helm helm;
+  control::RequestHandler handler{three_streams(), helm};
+
+  void ask(const std::string& client, const v1::ControlRequest& request) {
+    const std::string bytes = request.SerializeAsString();
+    check(handler.handle({client}, std::as_bytes(std::span(bytes))));
+    for (const pipeline::Ack& ack : std::exchange(helm.acks, {})) {
+      const auto answer = handler.acknowledge(ack);
+      demand(answer.has_value());
+      check(answer);
+    }
+  }
+  static void check(const std::optional<control::Answer>& answer) {
+    if (!answer) return;
+    v1::ControlReply reply;
+    demand(reply.ParseFromString(answer->bytes));
+    demand(reply.ok() || !reply.error().empty());
+    demand(reply.error().find('\x1b') == std::string::npos);
+  }
+};
+
+void send_model(FuzzedDataProvider& data, Desk& desk, const std::string& client) {
+  const std::string model = broken_model(data);
+  v1::ControlRequest request;
+  auto& part = *request.mutable_model_part();
+  part.set_stream(stream_name(data));
+  part.set_name(data.ConsumeRandomLengthString(10));
+  part.set_sha256(log::sha256_hex(std::as_bytes(std::span(model))));
+  const std::size_t size =
+      data.ConsumeIntegralInRange<std::size_t>(model.size() / 8 + 1, control::kLargestPiece);
+  for (std::size_t offset = 0; offset < model.size(); offset += size) {
+    const bool wrong = data.ConsumeIntegralInRange(0, 15) == 1;
+    part.set_total(wrong ? data.ConsumeIntegral<std::uint64_t>() : model.size());
+    part.set_offset(wrong && data.ConsumeBool() ? data.ConsumeIntegral<std::uint64_t>() : offset);
+    part.set_bytes(model.substr(offset, size));
+    desk.ask(client, request);
+  }
+}
+
+void send_other(FuzzedDataProvider& data, Desk& desk, const std::string& client) {
+  v1::ControlRequest request;
+  switch (data.ConsumeIntegralInRange(0, 3)) {
+    case 0:
+      request.mutable_calibrate()->set_stream(stream_name(data));
+      request.mutable_calibrate()->set_toml(broken_calibration(data));
+      request.mutable_calibrate()->set_name(data.ConsumeRandomLengthString(10));
+      break;
+    case 1:
+      request.mutable_set_alpha()->set_stream(stream_name(data));
+      request.mutable_set_alpha()->set_alpha(data.ConsumeFloatingPoint<float>());
+      break;
+    case 2:
+      request.mutable_play()->set_stream(stream_name(data));
+      for (int i = data.ConsumeIntegralInRange(0, 300); i > 0; --i) {
+        request.mutable_play()->add_label(data.PickValueInArray({"a", "b", "rest", "\x1b"}));
+      }
+      request.mutable_play()->set_tempo(data.ConsumeFloatingPoint<float>());
+      break;
+    default:
+      request.mutable_haptics()->set_stream(stream_name(data));
+      for (int i = data.ConsumeIntegralInRange(0, 7); i > 0; --i) {
+        request.mutable_haptics()->add_force(data.ConsumeFloatingPoint<float>());
+      }
+      break;
+  }
+  desk.ask(client, request);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  static Desk desk;
+  FuzzedDataProvider data(bytes, size);
+  while (data.remaining_bytes() > 0) {
+    const std::string client = data.PickValueInArray({"1", "2", "3", "4", "5"});
+    if (data.ConsumeBool()) {
+      send_model(data, desk, client);
+    } else {
+      send_other(data, desk, client);
+    }
+  }
+  return 0;
+}

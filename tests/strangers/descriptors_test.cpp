@@ -1,0 +1,34 @@
+// A process has only so many descriptors: strangers may not take them all, nor make libzmq's
+// listener try in vain over and over to accept.
+#include <vector>
+
+#include "tests/strangers/target.hpp"
+
+namespace posed::test {
+namespace {
+
+TEST_CASE("connections beyond what the daemon has descriptors for are cut, and cost no CPU") {
+  Target target;
+  target.most_files = 64;
+  target.start();
+  Innocent innocent(target.publish);
+  std::vector<RawPeer> strangers;
+  for (int i = 0; i < 100; ++i) {
+    strangers.emplace_back(target.publish);
+    strangers.emplace_back(target.control);
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const double cpu_s = target.daemon->cpu_s();
+  const auto start = std::chrono::steady_clock::now();
+  CHECK(innocent.hears(60));
+  const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
+  const double share = (target.daemon->cpu_s() - cpu_s) / passed.count();
+  std::printf("200 strangers, 64 descriptors: cpu %.1f %%\n", 100.0 * share);
+  CHECK(share < 0.2);
+  CHECK(innocent.lost == 0);
+  strangers.clear();
+  CHECK(target.ctl({"stop"}).code == 0);
+}
+
+}  // namespace
+}  // namespace posed::test

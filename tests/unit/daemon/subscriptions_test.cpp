@@ -1,0 +1,70 @@
+#include <catch2/catch.hpp>
+
+#include "daemon/publish/subscriptions.hpp"
+#include "proto/frame/time.hpp"
+
+namespace posed::publish {
+namespace {
+
+bool is_walker(std::string_view prefix) {
+  return std::string_view("pose/walker").starts_with(prefix);
+}
+
+TEST_CASE("what could become a topic, and what could not") {
+  for (const char* prefix : {"", "p", "pose", "pose/", "pose/left-hand_2", "skeleton/x-raw",
+                             "sensor/", "event/a", "s", "stats", "sta"}) {
+    CAPTURE(prefix);
+    CHECK(could_become_topic(prefix));
+  }
+  for (const char* prefix :
+       {"x", "Pose/", "pose/A", "pose/a/b", "stats/", "statsx", "pose//", " "}) {
+    CAPTURE(prefix);
+    CHECK_FALSE(could_become_topic(prefix));
+  }
+  CHECK(could_become_topic("pose/" + std::string(36, 'a')));
+  CHECK_FALSE(could_become_topic("pose/" + std::string(37, 'a')));
+}
+
+TEST_CASE(
+    "topics that exist cost nothing; others are counted once each, and leave with their peer") {
+  Subscriptions subscriptions(is_walker);
+  CHECK(subscriptions.ask(1, "pose/walker", true, 0));
+  CHECK(subscriptions.ask(1, "", true, 0));
+  CHECK(subscriptions.wanted() == 0);
+  for (const int peer : {1, 2, 1}) CHECK(subscriptions.ask(peer, "pose/runner", true, 0));
+  CHECK(subscriptions.wanted() == 1);
+  CHECK(subscriptions.ask(1, "pose/runner", false, 0));
+  CHECK(subscriptions.wanted() == 1);                    // the second peer still waits for it
+  CHECK(subscriptions.ask(1, "pose/runner", false, 0));  // as if nothing were there
+  subscriptions.forget(2);
+  CHECK(subscriptions.wanted() == 0);
+}
+
+TEST_CASE("there is an end to subscriptions that wait, and to those that wait in vain") {
+  Subscriptions subscriptions(is_walker);
+  for (std::size_t i = 0; i < kMostWanted; ++i) {
+    const int peer = static_cast<int>(i % 2);
+    REQUIRE(subscriptions.ask(peer, "pose/" + std::to_string(i), true, 0));
+  }
+  CHECK_FALSE(subscriptions.ask(3, "pose/one-more", true, 0));
+  CHECK(subscriptions.ask(3, "pose/walker", true, 0));
+  for (std::size_t i = 0; i < kMostImpossible; ++i) {
+    REQUIRE(subscriptions.ask(4, "nonsense " + std::to_string(i), true, 0));
+  }
+  CHECK_FALSE(subscriptions.ask(4, "nonsense", true, 0));
+  subscriptions.forget(0);
+  subscriptions.forget(3);
+  CHECK(subscriptions.wanted() == kMostWanted / 2);
+}
+
+TEST_CASE("a peer that asks over and over has soon asked too often, and may again later") {
+  Subscriptions subscriptions(is_walker);
+  int asked = 0;
+  while (subscriptions.ask(1, "pose/", true, 0)) REQUIRE(++asked < 10'000);
+  CHECK(asked == 8192);
+  CHECK(subscriptions.ask(2, "pose/", true, 0));  // another is not meant
+  CHECK(subscriptions.ask(1, "pose/", true, kNanosPerSecond));
+}
+
+}  // namespace
+}  // namespace posed::publish
