@@ -10,6 +10,7 @@
 #include "daemon/record/replay.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::record {
 namespace {
@@ -37,7 +38,7 @@ Result<std::uint32_t> choose(const std::vector<log::StreamRow>& streams, const R
     chosen = &row;
   }
   if (chosen == nullptr) {
-    return misuse("has no stream '" + wanted + "' with a skeleton, but " + names, path);
+    return misuse("has no stream " + in_quotes(wanted) + " with a skeleton, but " + names, path);
   }
   return chosen->id;
 }

@@ -13,6 +13,7 @@
 #include "daemon/record/tape.hpp"
 #include "models/gesture/play_order.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::record {
 namespace {
@@ -154,8 +155,8 @@ Result<std::unique_ptr<Replay::Lane>> Replay::Lane::open(const log::Reader& read
                                                          const std::string& file) {
   const drivers::Driver* driver = drivers::find_driver(row.driver);
   if (driver == nullptr) {
-    return fail("stream '" + row.name + "' comes from driver '" + row.driver +
-                    "', which this posed does not have",
+    return fail("stream " + in_quotes(row.name) + " comes from driver " + in_quotes(row.driver) +
+                    ", which this posed does not have",
                 file);
   }
   auto lane = std::make_unique<Lane>();
@@ -173,7 +174,7 @@ Result<std::unique_ptr<Replay::Lane>> Replay::Lane::open(const log::Reader& read
   lane->decoder_ = std::move(*decoder);
   const StreamSettings& stages = lane->stream_.settings;
   if ((stages.style || stages.generate) && !lane->stream_.description.skeleton) {
-    return fail("stream '" + row.name + "' has stages but no skeleton", file);
+    return fail("stream " + in_quotes(row.name) + " has stages but no skeleton", file);
   }
   if (auto done = lane->load_decisions(reader, row.id, file); !done) {
     return std::unexpected(done.error());

@@ -12,7 +12,7 @@ Result<CalibrationFile> import_calibration(const std::filesystem::path& path, co
     return fail("calibrations are imported for driver 'cyberglove' only; calibrate this glove",
                 file);
   }
-  const auto loaded = clip::load_text(path);
+  const auto loaded = load_calibration_text(path);
   if (!loaded) return std::unexpected(loaded.error());
   const std::string_view text = clip::trim(clip::without_bom(*loaded));
   CalibrationFile made{.driver = model.driver,
