@@ -29,8 +29,8 @@ bool passes(const std::string& text) {
 TEST_CASE("TOML within its limits is read", "[toml]") {
   CHECK(passes(""));
   CHECK(passes("a = 1\nb.c.d.e = 2\n"));
-  CHECK(passes("[a.b]\nc.d = 1\n[[e.f]]\ng = [[1.5, 2.5], [3.5, 4.5]]\n"));
-  CHECK(passes("\xEF\xBB\xBF[a]\nb = {c = [1.0, {}]}\r\n"));
+  CHECK(passes("[a.b]\nc.d = 1\n[[e.f]]\ng = [1.5, 2.5]\n"));
+  CHECK(passes("\xEF\xBB\xBF[a]\nb = {c = 1.0}\r\n"));
   CHECK(passes("x = [ # a comment ]]]\n  1.5, # and {\n 2.5 ]\nt = 2020-01-01T00:00:00.5Z\n"));
 }
 
