@@ -12,7 +12,7 @@
 #include "daemon/cli/json.hpp"
 #include "daemon/cli/live_view.hpp"
 #include "daemon/control/request_handler.hpp"
-#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/text/load_file.hpp"

@@ -1,6 +1,7 @@
 #include "daemon/pipeline/open_stream.hpp"
 
 #include "daemon/devices/calibration.hpp"
+#include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/model/model_file.hpp"

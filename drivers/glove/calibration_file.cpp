@@ -5,6 +5,7 @@
 #include <optional>
 #include <sstream>
 
+#include "drivers/glove/load_calibration.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"

@@ -25,8 +25,6 @@
 
 namespace posed::drivers::glove {
 
-inline constexpr std::size_t kMaxCalibrationFile = 64 * 1024;  // bytes
-
 struct CalibrationFile {
   std::string driver, glove, user;
   Side hand = Side::kRight;
@@ -40,12 +38,9 @@ struct OwnedCalibration {
   std::string text;
 };
 
-// Errors name file and line: too large or nested too deep, cut in half, not finite, raw values that
-// do not ascend. Cold.
+// Errors name file and line: cut in half, not finite, raw values that do not ascend. Cold.
 [[nodiscard]] Result<CalibrationFile> parse_calibration(const std::string& toml,
                                                         const std::filesystem::path& file);
-// The file's text, of at most kMaxCalibrationFile. Cold.
-[[nodiscard]] Result<std::string> load_calibration_text(const std::filesystem::path& path);
 [[nodiscard]] std::string format_calibration(const CalibrationFile& file);
 
 // The model's default calibration, or what `file` makes of it (sensors it does not name keep their

@@ -39,9 +39,7 @@ class GloveDecoder : public Decoder {
                std::shared_ptr<const Calibration> default_calibration);
 
   // Emits the Sample, then the Frame (no Frame when no channel of the map is known). What is not a
-  // number of a sensible size is not valid, and zero in the Sample. An angle that no finger can
-  // have (proto/frame/plausible.hpp) is counted as out of range, and its joint is not valid.
-  // RT-safe.
+  // number of a sensible size is not valid, and zero in the Sample. RT-safe.
   void emit(const Packet& packet, Sink& sink) noexcept;
 
   // The device's formula on calibrated values, in place (relative abductions, computed joints); may

@@ -1,6 +1,7 @@
 #include "drivers/glove/import.hpp"
 
 #include "drivers/glove/import_parts.hpp"
+#include "drivers/glove/load_calibration.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::drivers::glove {
