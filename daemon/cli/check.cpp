@@ -11,6 +11,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/open_stream.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::cli {
 namespace {
@@ -51,7 +52,12 @@ Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
     if (gesture->model) told["gesture_model"] = gesture->model->name;
   }
   told["constrain"] = *constrains;
+  told["present"] = (*stream)->away.empty();
   told["warnings"] = (*stream)->device.warnings;
+  if (!(*stream)->away.empty()) {
+    told["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
+                               (*stream)->away + ")");
+  }
   return told;
 }
 
@@ -64,10 +70,11 @@ void print(const pipeline::DaemonConfig& config, const ordered_json& streams) {
   std::printf("publishes on %s, controlled on %s (%s)\n", config.publish_endpoint.c_str(),
               config.control_endpoint.c_str(), security_of(config).c_str());
   for (const ordered_json& stream : streams) {
-    std::printf("%s: %s %s, %g Hz, %d joints", stream["name"].get<std::string>().c_str(),
+    const std::string device = clean(stream["device"].get<std::string>());
+    std::printf("%s: %s%s%s, %g Hz, %d joints", stream["name"].get<std::string>().c_str(),
                 stream["driver"].get<std::string>().c_str(),
-                stream["device"].get<std::string>().c_str(), stream["rate_hz"].get<double>(),
-                stream["joints"].get<int>());
+                stream["present"].get<bool>() ? " " : " (away)", device.c_str(),
+                stream["rate_hz"].get<double>(), stream["joints"].get<int>());
     if (stream.contains("model")) {
       std::printf(", style %s at alpha %g", stream["model"].get<std::string>().c_str(),
                   stream["alpha"].get<double>());
@@ -81,7 +88,7 @@ void print(const pipeline::DaemonConfig& config, const ordered_json& streams) {
     if (stream["constrain"].get<bool>()) std::printf(", fingers held apart");
     std::puts(stream["publish_raw"].get<bool>() ? ", raw input too" : "");
     for (const auto& warning : stream["warnings"]) {
-      std::printf("  note: %s\n", warning.get<std::string>().c_str());
+      std::printf("  note: %s\n", clean(warning.get<std::string>()).c_str());
     }
   }
 }
@@ -129,7 +136,8 @@ void add_check(CLI::App& app, int& exit_code) {
   command->footer(R"(Examples:
   posed check --config config/posed.toml
   posed check --config mine.toml --json | jq .errors
-Every mistake is told, each with file and line. Exit code 0: it would run. 2: the config is wrong.
+Every mistake is told, each with file and line. Exit code 0: it would run, though a glove that is
+away is only waited for (a note says so, "present" in JSON is false). 2: the config is wrong.
 1: the config is right, but a clip, model or device that it names cannot be used.)");
   command->callback([options, &exit_code] { exit_code = check(*options); });
 }

@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,9 +13,11 @@
 #include "daemon/cli/json.hpp"
 #include "daemon/cli/live_view.hpp"
 #include "daemon/control/uploads.hpp"
+#include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::cli {
 namespace {
@@ -113,18 +114,9 @@ int set_parameter(const CtlOptions& options) {
 }
 
 int send_model(const CtlOptions& options) {
-  std::error_code none;
-  const auto size = std::filesystem::file_size(options.model, none);
-  if (none) return report(fail("cannot read the model: " + none.message(), options.model).error());
-  if (size > control::kLargestModel) {
-    return report(fail("is larger than 16 MiB: no daemon takes it", options.model).error());
-  }
-  std::string bytes(size, '\0');
-  std::ifstream file(options.model, std::ios::binary);
-  if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
-    return report(fail("cannot read the model", options.model).error());
-  }
-  return show(options, upload(options, bytes), tell_effect);
+  const auto bytes = load_file(options.model, {.what = "model", .max_bytes = control::kLargestModel});
+  if (!bytes) return report(bytes.error());
+  return show(options, upload(options, *bytes), tell_effect);
 }
 
 int play(const CtlOptions& options) {
@@ -146,13 +138,12 @@ int stop_playing(const CtlOptions& options) {
 }
 
 int calibrate(const CtlOptions& options) {
-  std::ifstream file(options.calibration, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) return report(fail("cannot read the calibration", options.calibration).error());
+  auto text = drivers::glove::load_calibration_text(options.calibration);
+  if (!text) return report(text.error());
   v1::ControlRequest request;
   auto& wanted = *request.mutable_calibrate();
   wanted.set_stream(options.stream);
-  wanted.set_toml(std::move(text));
+  wanted.set_toml(std::move(*text));
   wanted.set_name(options.calibration.filename().string());
   return ask_and_tell(options, request, tell_effect);
 }

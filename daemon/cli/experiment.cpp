@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <utility>
 
-#include <toml++/toml.h>
-
 #include "daemon/config/toml_reader.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed::cli {
 namespace {
+
+constexpr TomlLimits kLimits{
+    .what = "experiment file", .bytes = std::size_t{1024} * 1024, .depth = 4, .items = 20'000};
+constexpr std::size_t kMaxClips = 4000;
 
 // A word that must be one of a few.
 template <typename T>
@@ -50,7 +53,7 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder,
   std::string asf;
   reader.read("skeleton", asf);
   if (!asf.empty()) experiment.asf = folder / asf;
-  auto clips = reader.tables("clip");
+  auto clips = reader.tables("clip", kMaxClips);
   for (config::TableReader& clip : clips) {
     read_clip_table(clip, folder, experiment);
     clip.finish();
@@ -64,15 +67,11 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder,
 }  // namespace
 
 Result<Experiment> read_experiment(const std::filesystem::path& path) {
-  config::Findings findings{path.string(), {}, {}};
+  const auto root = load_toml(path, kLimits);
+  if (!root) return std::unexpected(root.error());
+  config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
   Experiment experiment;
-  try {
-    const toml::table root = toml::parse_file(path.string());
-    read_tables(root, path.parent_path(), findings, experiment);
-  } catch (const toml::parse_error& error) {
-    findings.blame(static_cast<int>(error.source().begin.line),
-                   "the experiment file cannot be read: " + std::string(error.description()));
-  }
+  read_tables(*root, path.parent_path(), findings, experiment);
   if (findings.errors.empty()) return experiment;
   return std::unexpected(*std::ranges::min_element(findings.errors, {}, &Error::line));
 }

@@ -8,6 +8,7 @@
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/sink.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::cli {
 namespace {
@@ -26,7 +27,7 @@ std::unexpected<Error> gone() { return fail("the glove has gone: plug it in and 
 std::unexpected<Error> no_such_stream(const std::string& stream, const v1::Stats& stats) {
   std::string names;
   for (const auto& other : stats.stream()) names += (names.empty() ? "" : ", ") + other.stream();
-  return misuse("there is no stream '" + stream + "'; there is: " + names);
+  return misuse("there is no stream " + in_quotes(stream) + "; there is: " + names);
 }
 
 std::unexpected<Error> interrupted() { return fail("stopped; no calibration was written"); }
@@ -209,7 +210,7 @@ Result<GloveSource::Glove> GloveSource::known(const drivers::Driver& driver,
                                               const drivers::Description& description) {
   const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
   if (driver.glove_model == nullptr || !hand) {
-    return misuse("driver '" + std::string(driver.name) + "' is no glove");
+    return misuse("driver " + in_quotes(driver.name) + " is no glove");
   }
   auto model = driver.glove_model(description);
   if (!model) return std::unexpected(model.error());
@@ -240,11 +241,12 @@ Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& c
     if (told == nullptr) return no_such_stream(stream, *heard->stats);
     const drivers::Driver* driver = drivers::find_driver(told->driver());
     if (driver == nullptr || told->greeting().empty()) {
-      return misuse("stream '" + stream + "' is of driver '" + told->driver() +
-                    "', which has no sensors that can be calibrated");
+      return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(told->driver()) +
+                    ", which has no sensors that can be calibrated");
     }
     if (told->away()) {
-      return fail("the glove of stream '" + stream + "' is away: plug it in and begin again");
+      return fail("the glove of stream " + in_quotes(stream) +
+                  " is away: plug it in and begin again");
     }
     const auto description = driver->describe(told->greeting(), told->identity());
     if (!description) return std::unexpected(description.error());

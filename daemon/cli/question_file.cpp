@@ -5,14 +5,15 @@
 #include <ostream>
 #include <utility>
 
-#include <toml++/toml.h>
-
 #include "daemon/config/toml_reader.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed::cli {
 namespace {
 
+constexpr TomlLimits kLimits{
+    .what = "questions file", .bytes = std::size_t{256} * 1024, .depth = 4, .items = 16384};
 constexpr std::array<const char*, gesture::kClasses> kClassNames{"A", "B", "C"};
 
 void read_fingers(const toml::table& root, config::Findings& findings, gesture::ClassLists& lists) {
@@ -43,14 +44,11 @@ std::string quoted(const std::string& name) {
 }  // namespace
 
 Result<std::vector<gesture::Label>> read_questions(const std::filesystem::path& path) {
-  config::Findings findings{path.string(), {}, {}};
+  const auto root = load_toml(path, kLimits);
+  if (!root) return std::unexpected(root.error());
+  config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
   gesture::ClassLists lists;
-  try {
-    read_fingers(toml::parse_file(path.string()), findings, lists);
-  } catch (const toml::parse_error& error) {
-    findings.blame(static_cast<int>(error.source().begin.line),
-                   "the questions file cannot be read: " + std::string(error.description()));
-  }
+  read_fingers(*root, findings, lists);
   if (!findings.errors.empty()) {
     return std::unexpected(*std::ranges::min_element(findings.errors, {}, &Error::line));
   }

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <limits>
 #include <numbers>
-#include <sstream>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -13,6 +11,9 @@
 #include "daemon/config/words.hpp"
 #include "daemon/control/keys.hpp"
 #include "models/gesture/play_order.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed::config {
 namespace {
@@ -35,7 +36,10 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;  // in a radian
 constexpr std::int64_t kMostLagFrames = 170;
 constexpr std::array<std::string_view, 3> kIdentityKeys{"port", "id", "hand"};
 constexpr std::string_view kRawSuffix = "-raw";
-constexpr std::uintmax_t kLargestConfig = 1024 * 1024;  // bytes
+constexpr TomlLimits kLimits{
+    .what = "config", .bytes = std::size_t{1024} * 1024, .depth = 8, .items = 16384};
+constexpr std::size_t kMaxStreams = 64;
+constexpr std::size_t kMaxClients = 1024;
 
 // Everything that reads the file's tables needs to know where the file is.
 class Reader {
@@ -81,7 +85,7 @@ void Reader::read(const toml::table& root_table, DaemonConfig& config) {
                               config.control_endpoint + "; give control another port");
   }
   std::vector<int> lines;
-  for (TableReader& table : root.tables("stream")) {
+  for (TableReader& table : root.tables("stream", kMaxStreams)) {
     lines.push_back(table.line());
     read_stream(table, config.streams.emplace_back());
   }
@@ -100,14 +104,14 @@ void Reader::read_endpoint(TableReader& root, const char* name, std::string& end
   table->read("insecure", insecure);
   table->finish();
   if (!endpoint.starts_with("tcp://") && !endpoint.starts_with("ipc://")) {
-    table->blame("endpoint", fmt::format("'{}' is no endpoint; it reads like tcp://127.0.0.1:5570,"
+    table->blame("endpoint", fmt::format("{} is no endpoint; it reads like tcp://127.0.0.1:5570,"
                                          " or ipc:///run/posed.sock",
-                                         endpoint));
+                                         in_quotes(endpoint)));
   } else if (!control::is_loopback(endpoint) && !secured && !insecure) {
     table->blame("endpoint",
                  fmt::format("{} can be reached from other machines by anyone; add a server_key in"
                              " [security], or say insecure = true in [{}]",
-                             endpoint, name));
+                             clean_name(endpoint), name));
   }
 }
 
@@ -120,7 +124,8 @@ void Reader::read_security(TableReader table, SecurityConfig& security) {
       table.blame("server_key", key.error().text());
     }
   }
-  for (TableReader& client : table.tables("client")) read_client(client, security.clients);
+  for (TableReader& client : table.tables("client", kMaxClients))
+    read_client(client, security.clients);
   if (key_file.empty() && !security.clients.empty()) {
     table.blame("client",
                 "clients are listed but there is no server_key, so anyone could connect;"
@@ -152,12 +157,11 @@ void Reader::read_client(TableReader table, std::vector<control::AllowedClient>&
   }
   for (const control::AllowedClient& other : clients) {
     if (other.name == client.name) {
-      table.blame("name", fmt::format("two clients are named '{}'", client.name));
+      table.blame("name", fmt::format("two clients are named {}", in_quotes(client.name)));
     } else if (other.public_z85 == client.public_z85 && !client.public_z85.empty()) {
       table.blame("public_key",
-                  fmt::format("'{}' and '{}' have the same key; make each its own with `posed"
-                              " keygen`",
-                              other.name, client.name));
+                  fmt::format("{} and {} have the same key; make each its own with `posed keygen`",
+                              in_quotes(other.name), in_quotes(client.name)));
     }
   }
   clients.push_back(std::move(client));
@@ -188,9 +192,11 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
   } else if (!stream.driver.empty()) {
     std::set<std::string> names;
     for (const drivers::Driver& known : drivers_) names.emplace(known.name);
-    table.blame("driver", fmt::format("there is no driver of this name; the nearest is '{}'"
-                                      " (`posed devices` lists them)",
-                                      nearest(stream.driver, names)));
+    const std::string near = nearest(stream.driver, names);
+    table.blame("driver", fmt::format("there is no driver of this name; {}",
+                                      near.empty() ? "`posed devices` lists them"
+                                                   : "the nearest is '" + near +
+                                                         "' (`posed devices` lists them)"));
     for (const std::string& name : names) (void)table.table(name);  // the one mistake is told
   }
   table.finish();
@@ -263,6 +269,10 @@ void Reader::read_generate(TableReader table, pipeline::GenerateConfig& generate
                    .noise_rad = noise_deg / kDegrees};
   generate.model = resolve(model);
   generate.labels = gesture::split_labels(labels);
+  if (generate.labels.size() > gesture::kMostLabels) {
+    table.blame("labels", fmt::format("{} labels are too many at once; give at most {}",
+                                      generate.labels.size(), gesture::kMostLabels));
+  }
   if (!generate.labels.empty() && model.empty()) {
     table.blame("labels", "labels need a gesture model to perform them; add model = \"H.gesture\"");
   }
@@ -273,35 +283,40 @@ void Reader::check_names(const std::vector<StreamConfig>& streams, const std::ve
   for (std::size_t i = 0; i < streams.size(); ++i) {
     const std::string raw = streams[i].name + std::string(kRawSuffix);
     if (streams[i].publish_raw && is_stream_name(streams[i].name) && !is_stream_name(raw)) {
-      findings_.blame(lines[i], fmt::format("'{}' is longer than 32 letters; shorten the name or"
+      findings_.blame(lines[i], fmt::format("{} is longer than 32 letters; shorten the name or"
                                             " leave out publish_raw",
-                                            raw));
+                                            in_quotes(raw)));
     }
     for (std::size_t j = 0; j < streams.size(); ++j) {
       if (j < i && streams[j].name == streams[i].name && !streams[i].name.empty()) {
-        findings_.blame(lines[i], fmt::format("a second stream is named '{}' (the first stands in"
+        findings_.blame(lines[i], fmt::format("a second stream is named {} (the first stands in"
                                               " line {}); every stream has its own name",
-                                              streams[i].name, lines[j]));
+                                              in_quotes(streams[i].name), lines[j]));
       }
       if (streams[i].publish_raw && streams[j].name == raw) {
-        findings_.blame(lines[j], fmt::format("'{}' is the name under which the raw input of '{}'"
+        findings_.blame(lines[j], fmt::format("{} is the name under which the raw input of {}"
                                               " is published; choose another",
-                                              raw, streams[i].name));
+                                              in_quotes(raw), in_quotes(streams[i].name)));
       }
     }
   }
 }
 
-Result<std::string> read_text(const std::filesystem::path& path) {
-  std::error_code none;
-  const auto size = std::filesystem::file_size(path, none);
-  if (none) return misuse("cannot read the config: " + none.message(), path);
-  if (size > kLargestConfig) return misuse("is larger than 1 MB: that is no config", path);
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) return misuse("cannot read the config", path);
-  return std::move(text).str();
+// Every key that a config may have, found by reading one that has every table.
+std::set<std::string> all_keys(Drivers drivers) {
+  std::string text = "[publish]\n[control]\n[security]\n[[security.client]]\n";
+  for (const drivers::Driver& driver : drivers) {
+    text += fmt::format(
+        "[[stream]]\ndriver = \"{0}\"\n[stream.{0}]\n[stream.style]\n[stream.generate]\n"
+        "[stream.constrain]\n",
+        driver.name);
+  }
+  Findings findings{.file = {}, .errors = {}, .known = {}, .all_keys = {}};
+  DaemonConfig ignored;
+  if (const auto root = parse_toml(text, {}, kLimits)) {
+    Reader({}, drivers, findings).read(*root, ignored);
+  }
+  return std::move(findings.known);
 }
 
 }  // namespace
@@ -313,14 +328,14 @@ bool is_stream_name(std::string_view name) {
 
 Reading read_config(const std::string& text, const std::filesystem::path& path, Drivers drivers) {
   Reading reading;
-  Findings findings{path.string(), {}, {}};
+  Findings findings{
+      .file = path.string(), .errors = {}, .known = {}, .all_keys = all_keys(drivers)};
   reading.config.text = text;
-  try {
-    const toml::table root = toml::parse(std::string_view(text), path.string());
-    Reader(path.parent_path(), drivers, findings).read(root, reading.config);
-  } catch (const toml::parse_error& error) {
-    findings.blame(static_cast<int>(error.source().begin.line),
-                   "not TOML: " + std::string(error.description()));
+  const auto root = parse_toml(text, path.string(), kLimits);
+  if (root) {
+    Reader(path.parent_path(), drivers, findings).read(*root, reading.config);
+  } else {
+    findings.blame(root.error().line, root.error().message);
   }
   reading.errors = std::move(findings.errors);
   reading.known = std::move(findings.known);
@@ -329,10 +344,11 @@ Reading read_config(const std::string& text, const std::filesystem::path& path, 
 }
 
 Reading read_config_file(const std::filesystem::path& path, Drivers drivers) {
-  auto text = read_text(path);
+  const auto text = load_file(path, {.what = kLimits.what, .max_bytes = kLimits.bytes});
   if (text) return read_config(*text, path, drivers);
   Reading reading;
   reading.errors.push_back(text.error());
+  reading.errors.back().exit_code = ExitCode::kWrongUse;
   return reading;
 }
 

@@ -7,6 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/words.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::config {
 namespace {
@@ -51,8 +52,11 @@ int line_of_node(const toml::node& node) { return static_cast<int>(node.source()
 
 }  // namespace
 
-void Findings::blame(int line, std::string message) {
-  errors.push_back({without_controls(std::move(message)), file, line, ExitCode::kWrongUse});
+void Findings::blame(int line, std::string_view message) {
+  if (errors.size() > kMaxErrors) return;
+  const bool last = errors.size() == kMaxErrors;
+  errors.push_back({last ? "and there are more mistakes; mend these first" : clean(message), file,
+                    line, ExitCode::kWrongUse});
 }
 
 TableReader::TableReader(const toml::table& table, std::string path, Findings& findings)
@@ -162,7 +166,7 @@ std::optional<TableReader> TableReader::table(const std::string& key) {
   return std::nullopt;
 }
 
-std::vector<TableReader> TableReader::tables(const std::string& key) {
+std::vector<TableReader> TableReader::tables(const std::string& key, std::size_t most) {
   std::vector<TableReader> readers;
   const toml::node* node = find(key);
   if (node == nullptr) return readers;
@@ -171,10 +175,39 @@ std::vector<TableReader> TableReader::tables(const std::string& key) {
     blame_type(*node, key, "a list of tables ([[" + full(key) + "]])");
     return readers;
   }
+  if (list->size() > most) {
+    blame(key, fmt::format("there are {} [[{}]] tables; posed takes at most {}", list->size(),
+                           full(key), most));
+    return readers;
+  }
   for (const toml::node& element : *list) {
     readers.emplace_back(*element.as_table(), full(key), findings_);
   }
   return readers;
+}
+
+std::string TableReader::advice(const std::string& unknown_key) const {
+  constexpr std::size_t kMaxPlaces = 3;
+  std::vector<std::string> places;
+  for (const std::string& path : findings_.all_keys) {
+    const std::size_t dot = path.rfind('.');
+    if (dot == std::string::npos || path.substr(dot + 1) != unknown_key) continue;
+    places.push_back("[" + path.substr(0, dot) + "]");
+  }
+  // Of several tables that have such a key, those that this file has are meant.
+  std::vector<std::string> present = places;
+  std::erase_if(present, [this](const std::string& place) {
+    const std::string within = place.substr(1, place.size() - 2) + ".";
+    const auto next = findings_.known.lower_bound(within);
+    return next == findings_.known.end() || !next->starts_with(within);
+  });
+  const auto& meant = present.empty() ? places : present;
+  if (!meant.empty() && meant.size() <= kMaxPlaces) {
+    return fmt::format("it belongs into {}", fmt::join(meant, " or "));
+  }
+  const std::string near = nearest(unknown_key, asked_);
+  if (!near.empty()) return fmt::format("the nearest known one here is '{}'", near);
+  return fmt::format("known here: {}", fmt::join(asked_, ", "));
 }
 
 void TableReader::finish() {
@@ -182,8 +215,7 @@ void TableReader::finish() {
     const std::string name(key.str());
     if (asked_.contains(name)) continue;
     findings_.blame(static_cast<int>(key.source().begin.line),
-                    fmt::format("unknown key '{}'; the nearest known one here is '{}'",
-                                printable(full(name)), nearest(name, asked_)));
+                    fmt::format("unknown key {}; {}", in_quotes(full(name)), advice(name)));
   }
 }
 

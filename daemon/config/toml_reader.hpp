@@ -10,19 +10,24 @@
 #include <string_view>
 #include <vector>
 
-#include <toml++/toml.h>
-
 #include "proto/frame/result.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed::config {
+
+inline constexpr std::size_t kMaxErrors = 100;  // of one file
 
 // What the reading of one file found out.
 struct Findings {
   std::string file;
   std::vector<Error> errors;    // in the order of reading
   std::set<std::string> known;  // dotted paths of all keys asked for: "stream.style.alpha"
+  // Dotted paths of every key there can be, where they are known: an unknown key that stands in the
+  // wrong table is then told the right one.
+  std::set<std::string> all_keys = {};
 
-  void blame(int line, std::string message);
+  // Beyond kMaxErrors only the first one counts, as "and more".
+  void blame(int line, std::string_view message);
 };
 
 struct Range {
@@ -49,10 +54,12 @@ class TableReader {
 
   // The table or the array of tables under `key`; nothing when absent or of another type (blamed).
   [[nodiscard]] std::optional<TableReader> table(const std::string& key);
-  [[nodiscard]] std::vector<TableReader> tables(const std::string& key);
+  // More than `most` tables are blamed and none is read.
+  [[nodiscard]] std::vector<TableReader> tables(const std::string& key, std::size_t most);
 
   void blame(std::string_view key, const std::string& message);  // at the key's line
-  // Blames every key that was never asked for, naming the nearest that was.
+  // Blames every key that was never asked for, with the table that it belongs to, the key that it
+  // is a misspelling of, or all keys of this table.
   void finish();
 
  private:
@@ -60,6 +67,7 @@ class TableReader {
   const toml::node* find(std::string_view key);
   void blame_type(const toml::node& node, std::string_view key, const std::string& wanted);
   [[nodiscard]] std::string full(std::string_view key) const;
+  [[nodiscard]] std::string advice(const std::string& unknown_key) const;
 
   const toml::table& table_;
   std::string path_;  // "stream.style"; empty for the file itself

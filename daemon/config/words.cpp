@@ -30,22 +30,9 @@ std::string nearest(std::string_view word, const std::set<std::string>& known) {
   const std::string_view start = word.substr(0, kLongest);
   const auto best = std::ranges::min_element(
       known, {}, [&](const std::string& candidate) { return edit_distance(start, candidate); });
-  return best == known.end() ? std::string{} : *best;
-}
-
-std::string without_controls(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  }
-  return text;
-}
-
-std::string printable(std::string_view text) {
-  constexpr std::size_t kLongest = 60;
-  std::size_t length = std::min(text.size(), kLongest);
-  while (length < text.size() && length > 0 && (text[length] & 0xc0) == 0x80) --length;  // UTF-8
-  std::string out = without_controls(std::string(text.substr(0, length)));
-  return length < text.size() ? out + "..." : out;
+  if (best == known.end()) return {};
+  const std::size_t mistakes = edit_distance(start, *best);
+  return mistakes <= 1 + best->size() / 4 ? *best : std::string{};
 }
 
 }  // namespace posed::config

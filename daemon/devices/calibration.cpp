@@ -1,6 +1,7 @@
 #include "daemon/devices/calibration.hpp"
 
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::devices {
 
@@ -9,8 +10,8 @@ Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
   const drivers::Driver* driver = drivers::find_driver(description.driver);
   const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
   if (driver == nullptr || driver->glove_model == nullptr || !hand) {
-    return misuse("driver '" + description.driver + "' has no sensors that can be calibrated",
-                  file);
+    return misuse(
+        "driver " + in_quotes(description.driver) + " has no sensors that can be calibrated", file);
   }
   const auto model = driver->glove_model(description);
   if (!model) return std::unexpected(model.error());

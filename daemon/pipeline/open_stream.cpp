@@ -1,21 +1,13 @@
 #include "daemon/pipeline/open_stream.hpp"
 
-#include <fstream>
-#include <iterator>
-
 #include "daemon/devices/calibration.hpp"
+#include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/model/model_file.hpp"
 
 namespace posed::pipeline {
 namespace {
-
-Result<std::string> load_bytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!file) return fail("cannot read this file", path);
-  return bytes;
-}
 
 // A device that can come later is not missed now, unless the options make no sense.
 Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
@@ -40,7 +32,14 @@ Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
 Result<> open_calibration(OpenStream& stream) {
   const std::filesystem::path& path = stream.config.calibration;
   if (path.empty()) return {};
-  const auto text = load_bytes(path);
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
+    return fail("there is no such calibration; make one with `posed calibrate --driver " +
+                    stream.config.driver + " --out " + path.filename().string() +
+                    "`, or leave out `calibration` and use the glove's defaults",
+                path.string());
+  }
+  const auto text = drivers::glove::load_calibration_text(path);
   if (!text) return std::unexpected(text.error());
   auto compiled =
       devices::compile_calibration(*stream.present->description(), *text, path.string());
@@ -79,12 +78,12 @@ Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config) {
   if (opened) opened = open_slot(*driver, *stream);
   if (!opened) return of_stream(config.name, opened.error());
   if (config.style) {
-    auto bytes = load_bytes(config.style->model);
+    auto bytes = model_file::load(config.style->model);
     if (!bytes) return of_stream(config.name, bytes.error());
     stream->model_file = std::move(*bytes);
   }
   if (config.generate && !config.generate->model.empty()) {
-    auto bytes = load_bytes(config.generate->model);
+    auto bytes = model_file::load(config.generate->model);
     if (!bytes) return of_stream(config.name, bytes.error());
     stream->gesture_file = std::move(*bytes);
   }

@@ -11,6 +11,7 @@
 #include "daemon/record/replay.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::record {
 namespace {
@@ -39,7 +40,7 @@ Result<std::uint32_t> choose(const Replay& replay, const std::string& wanted,
     chosen = id;
   }
   if (!chosen) {
-    return misuse("has no stream '" + wanted + "' with a skeleton, but " + names, path);
+    return misuse("has no stream " + in_quotes(wanted) + " with a skeleton, but " + names, path);
   }
   return *chosen;
 }

@@ -1,17 +1,18 @@
 #include "drivers/described/device_file.hpp"
 
 #include <array>
-#include <fstream>
-#include <iterator>
 
 #include "drivers/described/packet_reader.hpp"
 #include "drivers/described/toml_reader.hpp"
 #include "drivers/glove/angle_map.hpp"
 #include "proto/frame/profile_texts.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::drivers::described {
 namespace {
 
+constexpr std::string_view kWhat = "device description";
 constexpr std::array<std::string_view, 3> kLinks{"serial", "tcp", "hid"};
 constexpr std::array<std::string_view, 8> kDeviceKeys{"name",      "summary", "note",   "rate_hz",
                                                       "delimiter", "link",    "packet", "angles"};
@@ -102,8 +103,7 @@ bool describes_packets(std::string_view toml) { return toml.find("[[packet]]") !
 }  // namespace
 
 Result<Table> parse_device(const std::string& toml, const std::string& file) {
-  if (toml.size() > kMaxDeviceFile) return fail("is too long to describe a device", file);
-  const auto table = parse_toml(toml, file);
+  const auto table = parse_toml(toml, file, {.what = kWhat, .bytes = kMaxDeviceFile});
   if (!table) return std::unexpected(table.error());
   return read_device(*table, toml, file);
 }
@@ -119,12 +119,7 @@ std::vector<std::string> shipped_devices() {
 
 Result<std::string> device_text(const std::string& device) {
   if (device.ends_with(".toml")) {
-    std::ifstream file(device, std::ios::binary);
-    std::string text(kMaxDeviceFile + 1, '\0');
-    file.read(text.data(), static_cast<std::streamsize>(text.size()));
-    if (!file.is_open() || file.bad()) return fail("cannot be read; is the path right?", device);
-    text.resize(static_cast<std::size_t>(file.gcount()));
-    return text;
+    return load_file(device, {.what = kWhat, .max_bytes = kMaxDeviceFile});
   }
   // A config makes every path whole, a name among them: its last part is the name.
   const std::string name = std::filesystem::path(device).filename().string();
@@ -133,7 +128,7 @@ Result<std::string> device_text(const std::string& device) {
   }
   std::string known;
   for (const std::string& shipped : shipped_devices()) known += " " + shipped;
-  return misuse("posed knows no device '" + name + "', only" + known +
+  return misuse("posed knows no device " + in_quotes(name) + ", only" + known +
                 "; a description of your own is a path that ends in .toml");
 }
 

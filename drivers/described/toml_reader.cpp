@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "proto/clip/text.hpp"
-#include "proto/frame/in_quotes.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::drivers::described {
 namespace {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/frame/toml_text.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed::drivers::described {
 

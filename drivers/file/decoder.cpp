@@ -20,6 +20,8 @@ Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
     case clip::FrameFault::kTooFew:
     case clip::FrameFault::kMissingBone:
       return Outcome::kShort;
+    case clip::FrameFault::kImplausible:
+      return Outcome::kOutOfRange;
     case clip::FrameFault::kNotANumber: {
       double value = 0.0;
       const char* const begin = parsed.where.data();

@@ -4,11 +4,14 @@
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
+#include "proto/clip/text.hpp"
 #include "proto/clip/text_clip.hpp"
 
 namespace posed::drivers {
 namespace file {
 namespace {
+
+constexpr std::string_view kDefaultHand = "right";
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
   auto format = clip::parse_description(text, identity);
@@ -36,18 +39,45 @@ Chunks frames_of(const clip::TextClip& clip) {
   return chunks;
 }
 
+// An option that says nothing about this kind of clip is refused: it would be silently ignored.
+Result<> check_options(const std::filesystem::path& path, const Options& options) {
+  const std::string kind = clip::lower(path.extension().string());
+  const auto others = [&kind, &path](const char* name, const char* of, const char* instead) {
+    return misuse(std::string(name) + " is an option of " + of + "; " + instead, path.string());
+  };
+  if (kind != ".amc" && option<double>(options, "rate_hz") != 0.0) {
+    return others("rate_hz", "an .amc", "this clip says its own rate, and `pace` plays it faster");
+  }
+  if (kind != ".amc" && !option<std::string>(options, "skeleton").empty()) {
+    return others("skeleton", "an .amc", "leave it out");
+  }
+  if (kind != ".csv" && option<std::string>(options, "hand") != kDefaultHand) {
+    return others("hand", "a .csv", "leave it out");
+  }
+  if (kind != ".csv" && option<std::string>(options, "hand_shape") != kDefaultHandShape) {
+    return others("hand_shape", "a .csv", "leave it out");
+  }
+  if (kind == ".csv" && !option<std::string>(options, "profile").empty()) {
+    return others("profile", "a .bvh or an .amc", "leave it out");
+  }
+  return {};
+}
+
 Result<Device> open(const Options& given, Ports& /*ports*/) {
   const auto options = complete_options(file_driver(), given);
   if (!options) return std::unexpected(options.error());
   const std::string path = option<std::string>(*options, "path");
   const std::string hand = option<std::string>(*options, "hand");
   if (hand != "left" && hand != "right") return misuse("hand is left or right");
-  const clip::ReadOptions read{.asf = option<std::string>(*options, "skeleton"),
-                               .amc_rate_hz = option<double>(*options, "rate_hz"),
-                               .metres_per_unit = std::nullopt,
-                               .profile = option<std::string>(*options, "profile"),
-                               .hand = hand == "left" ? Side::kLeft : Side::kRight,
-                               .hand_shape = option<std::string>(*options, "hand_shape")};
+  if (auto ok = check_options(path, *options); !ok) return std::unexpected(ok.error());
+  const double rate_hz = option<double>(*options, "rate_hz");
+  const clip::ReadOptions read{
+      .asf = option<std::string>(*options, "skeleton"),
+      .amc_rate_hz = rate_hz == 0.0 ? clip::ReadOptions{}.amc_rate_hz : rate_hz,
+      .metres_per_unit = std::nullopt,
+      .profile = option<std::string>(*options, "profile"),
+      .hand = hand == "left" ? Side::kLeft : Side::kRight,
+      .hand_shape = option<std::string>(*options, "hand_shape")};
   const auto clip = clip::open_text_clip(path, read);
   if (!clip) return std::unexpected(clip.error());
   auto device = make_device(file_driver(), (*clip)->description, path);
@@ -82,13 +112,13 @@ std::vector<OptionSpec> options() {
        .default_value = 1.0,
        .help = "factor on the clip's own speed; 0 is as fast as possible"},
       {.name = "rate_hz",
-       .default_value = 120.0,
-       .help = "frames a second of an .amc, which does not say"},
+       .default_value = 0.0,
+       .help = "frames a second of an .amc, which does not say; 0 is 120"},
       {.name = "profile",
        .default_value = std::string(),
        .help = "skeleton profile; left out, found by the joints' names"},
       {.name = "hand",
-       .default_value = std::string("right"),
+       .default_value = std::string(kDefaultHand),
        .help = "whose hand a .csv is: left or right"},
       {.name = "hand_shape",
        .default_value = std::string(kDefaultHandShape),

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "proto/frame/degree.hpp"
-#include "proto/frame/in_quotes.hpp"
 #include "proto/frame/profile_texts.hpp"
-#include "proto/frame/toml_text.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -33,7 +33,7 @@ class MapReader : private FirstMistake {
   void read_value(std::string_view name, const toml::node& node) {
     const auto sensor = std::ranges::find(sensors_, name, &Sensor::name);
     if (sensor == sensors_.end()) {
-      return blame(node, "the glove has no value '" + std::string(name) + "'");
+      return blame(node, "the glove has no value " + in_quotes(name));
     }
     const toml::array* const shares = node.as_array();
     if (shares == nullptr) return blame(node, "a list of {channel, gain, offset_deg} is wanted");
@@ -51,7 +51,7 @@ class MapReader : private FirstMistake {
     }
     const std::string channel = share["channel"].value_or(std::string());
     const int index = hand_channel(channel);
-    if (index < 0) blame(share, "the hand has no channel '" + channel + "'");
+    if (index < 0) blame(share, "the hand has no channel " + in_quotes(channel));
     if (rows_.size() == kMaxMapRows) blame(share, "too many angles in one table");
     if (error()) return;
     rows_.push_back({.sensor = sensor,
@@ -86,7 +86,7 @@ Result<std::string> device_table(std::string_view name) {
 
 Result<std::vector<MapRow>> parse_angle_map(const std::string& toml, const std::string& file,
                                             const std::vector<Sensor>& sensors) {
-  const auto table = parse_toml(toml, file);
+  const auto table = parse_toml(toml, file, {.what = "device description"});
   if (!table) return std::unexpected(table.error());
   return MapReader(file, sensors).read(*table);
 }

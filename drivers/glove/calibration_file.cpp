@@ -5,14 +5,19 @@
 #include <optional>
 #include <sstream>
 
+#include "drivers/glove/load_calibration.hpp"
 #include "proto/clip/text.hpp"
-#include "proto/frame/in_quotes.hpp"
-#include "proto/frame/toml_text.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed::drivers::glove {
 namespace {
 
 constexpr int kFormat = 1;
+// A glove has at most 32 sensors of 8 points.
+constexpr TomlLimits kLimits{
+    .what = "calibration", .bytes = kMaxCalibrationFile, .depth = 4, .items = 2048};
 constexpr double kMaxNumber = 1e6;  // of raw values, calibrated values and parameters
 
 class FileReader : private FirstMistake {
@@ -102,9 +107,13 @@ class FileReader : private FirstMistake {
 Result<CalibrationFile> parse_calibration(const std::string& toml,
                                           const std::filesystem::path& path) {
   const std::string file = path.string();
-  const auto table = parse_toml(toml, file);
-  if (table) return FileReader(file).read(*table);
-  return fail(table.error().message + "; was the file cut off?", file, table.error().line);
+  const auto table = parse_toml(toml, file, kLimits);
+  if (!table) return std::unexpected(table.error());
+  return FileReader(file).read(*table);
+}
+
+Result<std::string> load_calibration_text(const std::filesystem::path& path) {
+  return load_file(path, {.what = kLimits.what, .max_bytes = kLimits.bytes});
 }
 
 std::string format_calibration(const CalibrationFile& file) {

@@ -6,7 +6,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/fit.hpp"
 #include "drivers/glove/greeting.hpp"
-#include "proto/frame/in_quotes.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::drivers::glove {
 namespace {

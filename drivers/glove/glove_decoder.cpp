@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/plausible.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -16,6 +18,17 @@ void drop_what_is_no_number(std::span<const float> value,
   for (std::size_t i = 0; i < value.size(); ++i) {
     if (!(std::abs(value[i]) <= kMaxValue)) valid[i] = false;
   }
+}
+
+// Takes out what no finger can do; false when there was any. RT-safe.
+bool drop_implausible(HandAngles& angles) noexcept {
+  bool plausible = true;
+  for (double& angle_rad : angles) {
+    if (!std::isfinite(angle_rad) || std::abs(angle_rad) <= kMaxHandAngle_rad) continue;
+    angle_rad = std::numeric_limits<double>::quiet_NaN();
+    plausible = false;
+  }
+  return plausible;
 }
 
 // Fills a Sample's values from the first on.
@@ -104,6 +117,8 @@ void GloveDecoder::pose(std::span<const float> value, const std::bitset<kMaxSens
   if (skeleton_ == nullptr) return;
   HandAngles angles;
   calibration_->map_to_hand(value, valid, angles);
+  // A sensor that is broken or badly calibrated costs its own joint, not the whole hand.
+  if (!drop_implausible(angles)) sink.outcome(Outcome::kOutOfRange);
   const auto mapped = std::span(calibration_->map).first(calibration_->map_rows);
   const bool any = std::ranges::any_of(
       mapped, [&](const MapRow& row) { return std::isfinite(angles[row.channel]); });

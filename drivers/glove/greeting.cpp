@@ -1,4 +1,5 @@
 #include "drivers/glove/greeting.hpp"
+#include "proto/text/clean.hpp"
 
 #include <algorithm>
 #include <array>
@@ -30,7 +31,7 @@ Greeting::Greeting(const std::string& text, std::string_view driver, std::string
     if (equals == std::string::npos || equals == 0) {
       blame("has a word that is no key=value");
     } else if (!unread_.emplace(word.substr(0, equals), word.substr(equals + 1)).second) {
-      blame("names '" + word.substr(0, equals) + "' twice");
+      blame("names " + in_quotes(word.substr(0, equals)) + " twice");
     }
   }
 }
@@ -42,12 +43,12 @@ void Greeting::blame(std::string what) {
 std::string Greeting::word(std::string_view key) {
   const auto at = unread_.find(key);
   if (at == unread_.end()) {
-    blame("lacks '" + std::string(key) + "'");
+    blame("lacks " + in_quotes(key));
     return {};
   }
   std::string value = std::move(at->second);
   unread_.erase(at);
-  if (value.empty()) blame("has nothing for '" + std::string(key) + "'");
+  if (value.empty()) blame("has nothing for " + in_quotes(key));
   return value;
 }
 
@@ -57,7 +58,7 @@ int Greeting::whole(std::string_view key, int least, int most) {
   const char* const end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, value);
   if (error == std::errc() && stop == end && value >= least && value <= most) return value;
-  blame("has '" + std::string(key) + "' outside " + std::to_string(least) + " to " +
+  blame("has " + in_quotes(key) + " outside " + std::to_string(least) + " to " +
         std::to_string(most));
   return least;
 }
@@ -66,7 +67,7 @@ std::size_t Greeting::choice(std::string_view key, std::span<const std::string_v
   const std::string text = word(key);
   const auto at = std::ranges::find(names, std::string_view(text));
   if (at != names.end()) return static_cast<std::size_t>(at - names.begin());
-  blame("has an unknown '" + std::string(key) + "'");
+  blame("has an unknown " + in_quotes(key));
   return 0;
 }
 
@@ -77,7 +78,7 @@ Result<> Greeting::finish() const {
   // Keys may be garbage from a damaged log: they are not repeated to the terminal.
   if (wrong.empty() && !unread_.empty()) wrong = "has a key that this driver does not know";
   if (wrong.empty()) return {};
-  return fail("the greeting of a '" + driver_ + "' " + wrong +
+  return fail("the greeting of a " + in_quotes(driver_) + " " + wrong +
                   "; the log is damaged or was made by another version",
               identity_);
 }

@@ -1,6 +1,7 @@
 #include "drivers/glove/import.hpp"
 
 #include "drivers/glove/import_parts.hpp"
+#include "drivers/glove/load_calibration.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::drivers::glove {
@@ -12,7 +13,7 @@ Result<CalibrationFile> import_calibration(const std::filesystem::path& path, co
     return fail("calibrations are imported for driver 'cyberglove' only; calibrate this glove",
                 file);
   }
-  const auto loaded = clip::load_text(path);
+  const auto loaded = load_calibration_text(path);
   if (!loaded) return std::unexpected(loaded.error());
   const std::string_view text = clip::trim(clip::without_bom(*loaded));
   CalibrationFile made{.driver = model.driver,

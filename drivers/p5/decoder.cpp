@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "drivers/glove/angle_map.hpp"
+#include "proto/frame/plausible.hpp"
 
 namespace posed::drivers::p5 {
 namespace {
@@ -97,7 +98,7 @@ bool P5Decoder::locate(const Report& report, Place& place) noexcept {
     unseen_[spot.led] = 0;
     seen[spot.led] = tower_->locate(now, position_m[spot.led]);
   }
-  return fit_hand(*tower_, position_m, seen, place);
+  return fit_hand(*tower_, position_m, seen, place) && place.position_m.norm() <= kMaxPosition_m;
 }
 
 // RT-safe.

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::generate {
 namespace {
@@ -17,7 +18,7 @@ Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model
                                                      const Skeleton& skeleton, double rate_hz,
                                                      std::string name) {
   if (!hand_side(skeleton)) {
-    return fail("a gesture model needs a stream of hands (hand45), not '" + skeleton.name + "'",
+    return fail("a gesture model needs a stream of hands (hand45), not " + in_quotes(skeleton.name),
                 std::move(name));
   }
   auto live = bind_live_model(model, skeleton, name);

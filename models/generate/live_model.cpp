@@ -4,6 +4,7 @@
 #include <span>
 
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::generate {
 namespace {
@@ -90,8 +91,8 @@ Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& mod
                                                          const Skeleton& skeleton,
                                                          const std::string& name) {
   if (!hand_side(skeleton)) {
-    return fail("a gesture model steadies a hand, but '" + skeleton.name +
-                    "' is none: give the stream a hand, or leave the model out",
+    return fail("a gesture model steadies a hand, but " + in_quotes(skeleton.name) +
+                    " is none: give the stream a hand, or leave the model out",
                 name);
   }
   auto live = std::make_unique<LiveModel>();

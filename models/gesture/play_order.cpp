@@ -1,18 +1,11 @@
 #include "models/gesture/play_order.hpp"
 
-#include <algorithm>
 #include <sstream>
+
+#include "proto/text/clean.hpp"
 
 namespace posed::gesture {
 namespace {
-
-// A stranger's word, fit for a terminal and a log.
-std::string shown(const std::string& name) {
-  constexpr std::size_t kLongest = 20;
-  std::string out = name.substr(0, kLongest);
-  std::ranges::replace_if(out, [](char c) { return c <= ' ' || c >= '\x7F'; }, '?');
-  return name.size() > kLongest ? out + "..." : out;
-}
 
 std::string known_labels(const GestureModel& model) {
   std::string names;
@@ -39,8 +32,8 @@ Result<PlayOrder> make_play_order(const GestureModel& model, std::span<const std
   for (std::size_t i = 0; i < names.size(); ++i) {
     const int index = model.label_index(names[i]);
     if (index < 0) {
-      return misuse("the model does not know the label '" + shown(names[i]) +
-                    "'; it knows: " + known_labels(model));
+      return misuse("the model does not know the label " + in_quotes(names[i]) +
+                    "; it knows: " + known_labels(model));
     }
     order.label[i] = static_cast<std::uint16_t>(index);
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "proto/frame/label.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::gesture {
 namespace {
@@ -84,14 +85,14 @@ Result<int> class_of(const ClassLists& lists, int finger, const std::string& nam
   for (int k = 0; k < kClasses; ++k) {
     if (std::ranges::count(lists[finger][k], name) == 0) continue;
     if (found >= 0) {
-      return fail("label '" + name + "' is in the classes " + kClassNames[found] + " and " +
-                  kClassNames[k] + " of the " + finger_word(finger) +
+      return fail("label " + in_quotes(name) + " is in the classes " + kClassNames[found] +
+                  " and " + kClassNames[k] + " of the " + finger_word(finger) +
                   "; a finger of a gesture is of one class");
     }
     found = k;
   }
   if (found < 0) {
-    return fail("label '" + name + "' is in no class of the " + finger_word(finger) +
+    return fail("label " + in_quotes(name) + " is in no class of the " + finger_word(finger) +
                 "; add it to A, B or C of [" + finger_word(finger) + "]");
   }
   return found;
@@ -105,7 +106,7 @@ Result<std::vector<Label>> labels_of(const ClassLists& lists) {
     for (const auto& names : finger) {
       for (const std::string& name : names) {
         if (!is_label_name(name)) {
-          return fail("'" + name + "' is no label; use 1 to 15 signs of ASCII without a blank");
+          return fail(in_quotes(name) + " is no label; use 1 to 15 signs of ASCII without a blank");
         }
         const auto same = [&](const Label& label) { return label.name == name; };
         if (std::ranges::none_of(labels, same)) labels.push_back({.name = name});

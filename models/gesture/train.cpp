@@ -9,6 +9,7 @@
 #include "models/gesture/context_models.hpp"
 #include "models/gesture/grow_tree.hpp"
 #include "models/gesture/train_report.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::gesture {
 namespace {
@@ -27,8 +28,8 @@ Result<> mark_trained(const std::vector<Recording>& recordings, std::vector<Labe
     for (const Segment& segment : recording.segments) {
       const auto found = std::ranges::find(labels, segment.label, &Label::name);
       if (found == labels.end()) {
-        return fail("label '" + segment.label +
-                        "' is in no class; say in a questions file what each finger does "
+        return fail("label " + in_quotes(segment.label) +
+                        " is in no class; say in a questions file what each finger does "
                         "(--questions), or let --propose-questions write one",
                     recording.file);
       }

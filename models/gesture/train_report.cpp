@@ -1,4 +1,5 @@
 #include "models/gesture/train_report.hpp"
+#include "proto/text/clean.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -105,8 +106,8 @@ std::vector<std::string> TrainReport::warnings() const {
   }
   for (const Label& label : labels_) {
     if (label.trained && gestures_of(label.name) < kFewExamples) {
-      warnings.push_back("label '" + label.name +
-                         "' was recorded once only; how it varies is a guess");
+      warnings.push_back("label " + in_quotes(label.name) +
+                         " was recorded once only; how it varies is a guess");
     }
   }
   if (const std::string mixed = mixed_warning(); !mixed.empty()) warnings.push_back(mixed);

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "models/motion/cmu43.hpp"
 #include "proto/frame/rotation.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::motion {
 namespace {
@@ -48,9 +50,15 @@ int find_joint(const PoseSpaceSpec& spec, std::size_t i, const Skeleton& skeleto
 std::unexpected<Error> missing_joints(const PoseSpaceSpec& spec,
                                       const std::vector<std::string>& missing,
                                       const Skeleton& skeleton) {
+  constexpr std::size_t kNamed = 12;
   std::string names;
-  for (const std::string& name : missing) names += (names.empty() ? "" : ", ") + name;
-  return fail("skeleton '" + skeleton.name + "' cannot serve pose space " +
+  for (const std::string& name : std::span(missing).first(std::min(missing.size(), kNamed))) {
+    names += (names.empty() ? "" : ", ") + clean_name(name);
+  }
+  if (missing.size() > kNamed) {
+    names += " and " + std::to_string(missing.size() - kNamed) + " more";
+  }
+  return fail("skeleton " + in_quotes(skeleton.name) + " cannot serve pose space " +
               std::string(space_name(spec.space)) + ": it has no joint " + names +
               "; use a source of the kind the model was trained on, or train with --pose-space "
               "humanoid");
@@ -85,8 +93,8 @@ Result<Space> space_from_name(std::string_view name) {
   for (const Space space : {Space::kNative, Space::kCmu43, Space::kHumanoid}) {
     if (name == space_name(space)) return space;
   }
-  return misuse("no pose space is called '" + std::string(name) +
-                "'; choose native, cmu43 or humanoid");
+  return misuse("no pose space is called " + in_quotes(name) +
+                "; choose native, cmu43 or humanoid");
 }
 
 int space_dims(const PoseSpaceSpec& spec) {

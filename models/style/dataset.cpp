@@ -9,6 +9,7 @@
 
 #include "models/motion/motion.hpp"
 #include "models/style/harmonics.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::style {
 namespace {
@@ -42,7 +43,7 @@ Result<> check_same_figure(const Skeleton& first, const Skeleton& other, const s
     if (offset.norm() < kMinLength_m) continue;
     const double cosine = joint.offset_m.normalized().dot(offset.normalized());
     if (std::acos(std::clamp(cosine, -1.0, 1.0)) > kSameZeroPose_rad) {
-      return fail("joint " + joint.name +
+      return fail("joint " + clean_name(joint.name) +
                       " points elsewhere in this clip's zero pose than in the "
                       "first clip's; train on clips of one kind, or use --pose-space humanoid",
                   path);

@@ -3,6 +3,7 @@
 #include "proto/clip/acclaim.hpp"
 #include "proto/clip/reader.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {

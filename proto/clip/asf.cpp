@@ -5,6 +5,7 @@
 #include <map>
 
 #include "proto/clip/asf_parts.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {

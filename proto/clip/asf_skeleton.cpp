@@ -2,6 +2,7 @@
 
 #include "proto/clip/asf_parts.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
@@ -70,7 +71,7 @@ Result<Acclaim> acclaim_of(const AsfFile& file, const std::string& name) {
   const auto lost = std::ranges::find_if(
       file.bones, [&out](const AsfBone& bone) { return out.skeleton.joint_index(bone.name) < 0; });
   if (lost != file.bones.end()) {
-    return fail("bone '" + lost->name + "' does not hang on the root in :hierarchy", name);
+    return fail("bone " + in_quotes(lost->name) + " does not hang on the root in :hierarchy", name);
   }
   return out;
 }

@@ -3,6 +3,7 @@
 #include "proto/clip/reader.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/clip/units.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {

@@ -3,6 +3,7 @@
 
 #include "proto/clip/bvh.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
@@ -49,7 +50,7 @@ class HeaderReader {
   }
   [[nodiscard]] std::vector<Joint>& joints() { return header_.skeleton.joints; }
   [[nodiscard]] std::string place() const {
-    return "joint '" + header_.skeleton.joints[open_.back().joint].name + "'";
+    return "joint " + in_quotes(header_.skeleton.joints[open_.back().joint].name);
   }
 
   Result<> entry();  // one entry of the innermost open joint

@@ -1,9 +1,13 @@
 #include "proto/clip/files.hpp"
 
 #include "proto/clip/text.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::clip {
 namespace {
+
+constexpr FileRule kClip{.what = "clip", .max_bytes = 2'000'000'000};
+constexpr std::uintmax_t kMaxSkeletonFile = 16'000'000;  // bytes; real ones have some 10 KB
 
 // NN.asf beside NN_MM.amc.
 std::filesystem::path asf_beside(const std::filesystem::path& amc) {
@@ -24,7 +28,7 @@ Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOption
   } else if (extension != ".bvh") {
     return fail("is no clip posed can read; a clip ends in .bvh, .amc or .csv", files.name);
   }
-  auto text = load_text(path);
+  auto text = load_file(path, kClip);
   if (!text) return std::unexpected(text.error());
   files.text = std::move(*text);
   if (files.kind != ClipKind::kAmc) return files;
@@ -35,7 +39,7 @@ Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOption
                 files.name);
   }
   files.asf_name = asf.string();
-  auto skeleton = load_text(asf);
+  auto skeleton = load_file(asf, {.what = "skeleton (.asf)", .max_bytes = kMaxSkeletonFile});
   if (!skeleton) return std::unexpected(skeleton.error());
   files.asf = std::move(*skeleton);
   return files;

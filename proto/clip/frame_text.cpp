@@ -3,16 +3,28 @@
 #include <algorithm>
 #include <bitset>
 #include <charconv>
+#include <cmath>
 
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/plausible.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
 
 std::string counted(std::size_t count) {
   return std::to_string(count) + (count == 1 ? " value" : " values");
+}
+
+std::vector<double> limits(const Skeleton& skeleton) {
+  std::vector<double> limit;
+  limit.reserve(skeleton.channels.size());
+  for (const Channel& channel : skeleton.channels) {
+    limit.push_back(channel.translation ? kMaxPosition_m : kMaxAngle_rad);
+  }
+  return limit;
 }
 
 std::vector<double> scales(const Skeleton& skeleton, double metres_per_unit, double radians) {
@@ -32,6 +44,10 @@ std::string FrameOutcome::sentence() const {
       return "the frame is good";
     case FrameFault::kNotANumber:
       return in_quotes(where) + " is not a number a pose can have";
+    case FrameFault::kImplausible:
+      return in_quotes(where) +
+             " is beyond what a pose can have: a position lies within 1 km, a joint turns by at "
+             "most 100 turns, a finger's by 2; is the unit right?";
     case FrameFault::kTooFew:
     case FrameFault::kTooMany:
       return (where.empty() ? std::string("the frame") : "bone " + in_quotes(where)) + " has " +
@@ -56,12 +72,14 @@ std::string FrameOutcome::sentence() const {
 FrameParser FrameParser::bvh(const Skeleton& skeleton, double metres_per_unit) {
   FrameParser parser;
   parser.scale_ = scales(skeleton, metres_per_unit, kDegree);
+  parser.limit_ = limits(skeleton);
   return parser;
 }
 
 FrameParser FrameParser::amc(const Acclaim& acclaim, bool degrees) {
   FrameParser parser;
   parser.scale_ = scales(acclaim.skeleton, acclaim.metres_per_unit, degrees ? kDegree : 1.0);
+  parser.limit_ = limits(acclaim.skeleton);
   parser.bones_ = acclaim.bones;
   std::ranges::sort(parser.bones_, {}, &AcclaimBone::name);
   parser.lines_ += static_cast<std::size_t>(std::ranges::count_if(
@@ -72,8 +90,14 @@ FrameParser FrameParser::amc(const Acclaim& acclaim, bool degrees) {
 FrameParser FrameParser::hand_csv() {
   FrameParser parser;
   parser.scale_.assign(kHandChannels, 1.0);
+  parser.limit_.assign(kHandChannels, kMaxHandAngle_rad);
   parser.timed_ = true;
   return parser;
+}
+
+bool FrameParser::keep(double value, std::size_t channel, std::span<double> values) const noexcept {
+  values[channel] = value * scale_[channel];
+  return !(std::abs(values[channel]) > limit_[channel]);  // NaN is a value that is missing
 }
 
 FrameOutcome FrameParser::parse(std::string_view text, std::span<double> values) const noexcept {
@@ -94,12 +118,11 @@ FrameOutcome FrameParser::parse_line(std::string_view text,
       return outcome;
     }
     const auto value = parse_number(word);
-    if (!value) {
-      outcome.fault = FrameFault::kNotANumber;
+    if (!value || !keep(*value, outcome.found, values)) {
+      outcome.fault = value ? FrameFault::kImplausible : FrameFault::kNotANumber;
       outcome.where = word;
       return outcome;
     }
-    values[outcome.found] = *value * scale_[outcome.found];
     ++outcome.found;
   }
   if (outcome.found < scale_.size()) outcome.fault = FrameFault::kTooFew;
@@ -133,8 +156,8 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
     if (!value) return blame(FrameFault::kNotANumber, field);
     if (outcome.found == 0) {
       outcome.time_s = *value;
-    } else {
-      values[kChannelOfAngle[outcome.found - 1]] = *value;
+    } else if (!keep(*value, kChannelOfAngle[outcome.found - 1], values)) {
+      return blame(FrameFault::kImplausible, field);
     }
   }
   return outcome.found < outcome.expected ? blame(FrameFault::kTooFew, {}) : outcome;
@@ -181,8 +204,8 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
         return blame(ends ? FrameFault::kUnknownBone : FrameFault::kNotANumber, word, word);
       }
       if (outcome.found < outcome.expected) {
-        const int channel = bone.channels[outcome.found];
-        values[channel] = *value * scale_[channel];
+        const auto channel = static_cast<std::size_t>(bone.channels[outcome.found]);
+        if (!keep(*value, channel, values)) return blame(FrameFault::kImplausible, word, word);
       }
       ++outcome.found;
     }

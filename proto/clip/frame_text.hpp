@@ -18,7 +18,8 @@ namespace posed::clip {
 
 enum class FrameFault : std::uint8_t {
   kNone,
-  kNotANumber,    // a word that is no finite, plausible number
+  kNotANumber,    // a word that is no finite number
+  kImplausible,   // a number beyond what a pose can have (proto/frame/plausible.hpp)
   kTooFew,        // values missing
   kTooMany,       // values left over
   kUnknownBone,   // AMC: a name the skeleton does not have
@@ -76,7 +77,12 @@ class FrameParser {
   FrameOutcome parse_fields(std::string_view text, std::span<double> values) const noexcept;
   [[nodiscard]] int find_bone(std::string_view name) const noexcept;
 
+  // Scales and keeps one value; false when no pose can have it. RT-safe.
+  [[nodiscard]] bool keep(double value, std::size_t channel,
+                          std::span<double> values) const noexcept;
+
   std::vector<double> scale_;       // [channel], file value to rad or m
+  std::vector<double> limit_;       // [channel], rad or m: no value is larger
   std::vector<AcclaimBone> bones_;  // sorted by name; empty for a BVH
   std::size_t lines_ = 1;
   bool timed_ = false;

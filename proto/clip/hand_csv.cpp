@@ -8,6 +8,7 @@
 #include "proto/clip/reader.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {

@@ -7,13 +7,16 @@
 
 #include "proto/clip/text.hpp"
 #include "proto/frame/label.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::clip {
 namespace {
 
 constexpr double kHtkUnit_s = 1e-7;
 constexpr double kHtkFrom = 10'000.0;  // a last time above it that is an integer is HTK's
-constexpr double kSlack_s = 1e-6;      // of the six decimals that people and tools write
+constexpr std::uintmax_t kMaxLabelFile = 64'000'000;  // bytes
+constexpr double kSlack_s = 1e-6;  // of the six decimals that people and tools write
 
 bool is_integer(std::string_view word) {
   return std::ranges::all_of(word, [](char c) { return c >= '0' && c <= '9'; });
@@ -108,7 +111,7 @@ Result<std::vector<LabelSegment>> parse_labels(std::string_view text, const std:
 
 Result<std::vector<LabelSegment>> read_labels(const std::filesystem::path& path,
                                               double recording_s) {
-  const auto text = load_text(path);
+  const auto text = load_file(path, {.what = "label file", .max_bytes = kMaxLabelFile});
   if (!text) return std::unexpected(text.error());
   return parse_labels(*text, path.string(), recording_s);
 }

@@ -6,6 +6,8 @@
 #include "proto/clip/standing.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/bone_names.hpp"
+#include "proto/frame/plausible.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
@@ -65,8 +67,8 @@ void settle_offsets(Clip& clip, Skeleton& skeleton) {
     if (std::abs(first_m - offset_m) > 0.1 * kSameLength_m) offset_m = first_m;
     if (channel.joint != told && varies(clip.channels, c)) {
       told = channel.joint;
-      clip.warnings.push_back("joint '" + joint.name +
-                              "' changes its distance from its parent; posed keeps that of the "
+      clip.warnings.push_back("joint " + in_quotes(joint.name) +
+                              " changes its distance from its parent; posed keeps that of the "
                               "first frame");
     }
   }
@@ -95,6 +97,14 @@ Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const 
     clip.warnings.emplace_back(
         "the zero pose is no T-pose and no skeleton profile fits; the T-pose is taken from the "
         "mean pose of the clip, which should walk or stand");
+  }
+  const auto far = std::ranges::find_if(skeleton.joints, [](const Joint& joint) {
+    return !(joint.offset_m.norm() <= kMaxPosition_m) ||
+           (joint.end_site_m && !(joint.end_site_m->norm() <= kMaxPosition_m));
+  });
+  if (far != skeleton.joints.end()) {
+    return fail("joint " + in_quotes(far->name) +
+                " lies more than 1 km from its parent; is the unit of length right?");
   }
   return skeleton.finish();
 }

@@ -12,8 +12,6 @@
 namespace posed::clip {
 namespace {
 
-constexpr std::uintmax_t kMaxFile = 2'000'000'000;  // bytes
-
 // from_chars gives no value for a number a double cannot hold; one too small is as good as zero.
 bool underflows(std::string_view word) noexcept {
   const std::size_t exponent = word.find_first_of("eE");
@@ -115,26 +113,6 @@ std::string_view Cursor::rest() {
   return trim(line);
 }
 
-Result<std::string> load_text(const std::filesystem::path& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    return fail("this is a folder; name a clip in it", path.string());
-  }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return fail(std::string("cannot be opened: ") + std::strerror(errno), path.string());
-  const auto size = std::filesystem::file_size(path, error);
-  if (!error && size > kMaxFile) return fail("is larger than 2 GB; cut it", path.string());
-  std::string text;
-  if (!error) text.reserve(size);
-  std::array<char, 65536> block{};
-  while (file.read(block.data(), block.size()) || file.gcount() > 0) {
-    text.append(block.data(), static_cast<std::size_t>(file.gcount()));
-    if (text.size() > kMaxFile) return fail("is larger than 2 GB; cut it", path.string());
-  }
-  if (file.bad()) return fail("cannot be read to its end", path.string());
-  return text;
-}
-
 Result<> write_text(const std::filesystem::path& path,
                     const std::function<void(std::ostream&)>& write) {
   const std::filesystem::path part = path.string() + ".part";
@@ -157,13 +135,6 @@ Result<> write_text(const std::filesystem::path& path,
 std::string_view without_bom(std::string_view text) noexcept {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   return text;
-}
-
-std::string in_quotes(std::string_view word) {
-  std::string out = "'";
-  for (const char c : word.substr(0, 40)) out.push_back(c >= ' ' && c <= '~' ? c : '?');
-  if (word.size() > 40) out += "...";
-  return out + "'";
 }
 
 }  // namespace posed::clip

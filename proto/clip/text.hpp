@@ -58,9 +58,6 @@ class Cursor {
   int line_ = 1;
 };
 
-// The whole file; an error says why it could not be read. At most 2 GB.
-[[nodiscard]] Result<std::string> load_text(const std::filesystem::path& path);
-
 // Writes a file beside the target first: a full disk leaves no half-written clip behind under its
 // name.
 [[nodiscard]] Result<> write_text(const std::filesystem::path& path,
@@ -68,8 +65,5 @@ class Cursor {
 
 // `text` without a UTF-8 byte order mark.
 [[nodiscard]] std::string_view without_bom(std::string_view text) noexcept;
-
-// A word of the file as it may stand in an error: printable, at most 40 characters.
-[[nodiscard]] std::string in_quotes(std::string_view word);
 
 }  // namespace posed::clip

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "proto/frame/degree.hpp"
-#include "proto/frame/in_quotes.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/frame/rotation.hpp"
-#include "proto/frame/toml_text.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed {
 namespace {
@@ -122,7 +122,7 @@ class HandReader : private FirstMistake {
 }  // namespace
 
 Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file) {
-  const auto table = parse_toml(text, file);
+  const auto table = parse_toml(text, file, {.what = "hand"});
   if (!table) return std::unexpected(table.error());
   return HandReader(file).read(*table);
 }
@@ -149,7 +149,7 @@ Result<const HandShape*> find_hand_shape(const std::string& name) {
     if (shape.name == name) return &shape;
     known += (known.empty() ? "" : ", ") + shape.name;
   }
-  return misuse("there is no hand '" + name + "'; there are " + known);
+  return misuse("there is no hand " + in_quotes(name) + "; there are " + known);
 }
 
 const HandShape& default_hand_shape() {

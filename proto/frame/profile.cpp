@@ -6,9 +6,9 @@
 #include <cstdlib>
 
 #include "proto/frame/degree.hpp"
-#include "proto/frame/in_quotes.hpp"
 #include "proto/frame/profile_texts.hpp"
-#include "proto/frame/toml_text.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/toml.hpp"
 
 namespace posed {
 namespace {
@@ -57,7 +57,7 @@ class ProfileReader : private FirstMistake {
       const auto bone = bone_from_name(key);
       if (!bone) return blame(value, in_quotes(key) + " is no canonical bone");
       if (!profile_.bones.emplace(text, *bone).second) {
-        blame(value, "joint '" + text + "' is given to two bones");
+        blame(value, "joint " + in_quotes(text) + " is given to two bones");
       }
     } else if (value.is_array()) {
       const auto T = from_angles(*value.as_array());
@@ -104,7 +104,7 @@ bool matches(const Profile& profile, const Skeleton& skeleton) {
 }  // namespace
 
 Result<Profile> parse_profile(std::string_view text, const std::string& name) {
-  const auto table = parse_toml(text, name);
+  const auto table = parse_toml(text, name, {.what = "skeleton profile"});
   if (!table) return std::unexpected(table.error());
   return ProfileReader(name).read(*table);
 }
@@ -132,7 +132,7 @@ Result<const Profile*> find_profile(const Skeleton& skeleton, const std::string&
     known += (known.empty() ? "" : ", ") + profile.name;
   }
   if (name.empty()) return nullptr;
-  return misuse("there is no skeleton profile '" + name + "'; there are " + known);
+  return misuse("there is no skeleton profile " + in_quotes(name) + "; there are " + known);
 }
 
 Result<> name_bones(const Profile& profile, Skeleton& skeleton) {
@@ -146,7 +146,7 @@ Result<> name_bones(const Profile& profile, Skeleton& skeleton) {
     }
   }
   if (!missing.empty()) {
-    return fail("the skeleton is not of profile '" + profile.name + "': it has no joint " +
+    return fail("the skeleton is not of profile " + in_quotes(profile.name) + ": it has no joint " +
                 missing);
   }
   return {};

@@ -1,11 +1,20 @@
 #include "proto/frame/result.hpp"
 
+#include "proto/text/clean.hpp"
+
 namespace posed {
+namespace {
+
+constexpr std::size_t kMaxPathBytes = 4096;  // of a path in Linux
+
+}  // namespace
 
 std::string Error::text() const {
-  if (file.empty()) return message;
-  if (line == 0) return file + ": " + message;
-  return file + ":" + std::to_string(line) + ": " + message;
+  const std::string sentence = clean(message);
+  if (file.empty()) return sentence;
+  const std::string place = clean(file, kMaxPathBytes);
+  if (line == 0) return place + ": " + sentence;
+  return place + ":" + std::to_string(line) + ": " + sentence;
 }
 
 }  // namespace posed

@@ -8,6 +8,7 @@
 
 #include "proto/frame/bone_names.hpp"
 #include "proto/frame/t_pose.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed {
 namespace {
@@ -79,13 +80,13 @@ Result<> check_joints(const Skeleton& skeleton) {
     const Joint& joint = skeleton.joints[j];
     if (joint.name.empty()) return fail("joint " + std::to_string(j) + " has no name");
     if (!names.insert(joint.name).second) {
-      return fail("two joints are named '" + joint.name + "'; give each its own name");
+      return fail("two joints are named " + in_quotes(joint.name) + "; give each its own name");
     }
     if (joint.parent >= j || joint.parent < -1 || (joint.parent == -1) != (j == 0)) {
-      return fail("joint '" + joint.name + "' does not stand after its parent");
+      return fail("joint " + in_quotes(joint.name) + " does not stand after its parent");
     }
     if (!joint.offset_m.allFinite() || joint.offset_m.cwiseAbs().maxCoeff() > 1e6) {
-      return fail("the offset of joint '" + joint.name + "' is not a length");
+      return fail("the offset of joint " + in_quotes(joint.name) + " is not a length");
     }
   }
   return {};
@@ -104,7 +105,8 @@ Result<> check_channels(const Skeleton& skeleton) {
     const unsigned bit =
         1U << (static_cast<unsigned>(channel.axis) + (channel.translation ? 3 : 0));
     if ((seen & bit) != 0) {
-      return fail("joint '" + skeleton.joints[channel.joint].name + "' lists a channel twice");
+      return fail("joint " + in_quotes(skeleton.joints[channel.joint].name) +
+                  " lists a channel twice");
     }
     seen |= bit;
     rotations += channel.translation ? 0 : 1;

@@ -3,10 +3,11 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <system_error>
 
 #include <zlib.h>
+
+#include "proto/text/load_file.hpp"
 
 namespace posed::model_file {
 namespace {
@@ -77,15 +78,7 @@ std::string seal(v1::ModelFile file) {
 }
 
 Result<std::string> load(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) {
-    return fail("this is a folder, not a model file", path.string());
-  }
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return fail("the model cannot be opened; check the path", path.string());
-  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) return fail("the model cannot be read", path.string());
-  return bytes;
+  return load_file(path, {.what = "model", .max_bytes = kMaxModelFile});
 }
 
 Result<> save(const std::string& bytes, const std::filesystem::path& path) {

@@ -22,7 +22,11 @@ namespace posed::model_file {
 // same bytes.
 [[nodiscard]] std::string seal(v1::ModelFile file);
 
-// A model file's bytes from and to the disk. Written whole or not at all.
+// The largest model that is read, far above what `posed train` writes.
+inline constexpr std::size_t kMaxModelFile = std::size_t{256} * 1024 * 1024;  // bytes
+
+// A model file's bytes from and to the disk. Written whole or not at all; only a regular file of at
+// most kMaxModelFile is read.
 [[nodiscard]] Result<std::string> load(const std::filesystem::path& path);
 [[nodiscard]] Result<> save(const std::string& bytes, const std::filesystem::path& path);
 

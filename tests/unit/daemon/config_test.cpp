@@ -164,6 +164,18 @@ TEST_CASE("each mistake is one sentence with file and line") {
         std::string::npos);
 }
 
+TEST_CASE("an unknown key is told where it belongs, or what is known") {
+  CHECK(complaint("", "[[stream]]\nname = \"a\"\ndriver = \"glove\"\nalpha = 0.5\n") ==
+        "stage/posed.toml:4: unknown key 'stream.alpha'; it belongs into [stream.style]");
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\npublish_raw = true\n")
+            .ends_with("unknown key 'stream.style.publish_raw'; it belongs into [stream]"));
+  CHECK(complaint("[control]\nmodel = 1\n")
+            .ends_with("it belongs into [stream.generate] or [stream.style]"));
+  CHECK(complaint("xyzzy = 1\n").ends_with("known here: first, loop, pace, path"));
+  // Nothing of a stranger's key reaches the terminal as it is.
+  CHECK(complaint("\"\\u001b[2J\" = 1\n").find("'stream.file.\\x1b[2J'") != std::string::npos);
+}
+
 TEST_CASE("generate: lags, tempo and labels are checked") {
   const std::string table = "[stream.generate]\nmodel = \"m\"\n";
   CHECK(complaint(table + "lag_frames = -1\n").find("0 to 170 frames") != std::string::npos);

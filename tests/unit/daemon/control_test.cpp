@@ -175,7 +175,7 @@ TEST_CASE("each refusal is one sentence") {
   for (const float alpha : {2.1F, -3.0F, NAN, INFINITY}) {
     CHECK(has(desk.refused(alpha_request("walker", alpha)), "out of range"));
   }
-  CHECK(has(desk.refused(alpha_request("\x1b[2J", 0.0F)), "'?[2J'"));
+  CHECK(has(desk.refused(alpha_request("\x1b[2J", 0.0F)), "'\\x1b[2J'"));
   CHECK(has(desk.refused({}), "is empty"));
   CHECK(has(reply_of(desk.ask(std::string("\xff\xff\xff"))).error(), "no posed.v1"));
 
@@ -189,6 +189,25 @@ TEST_CASE("each refusal is one sentence") {
 
   desk.helm.full = true;
   CHECK(has(desk.refused(alpha_request("walker", 0.0F)), "too many changes"));
+}
+
+TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
+  Desk desk;
+  const std::string wild = "\x1b[2J" + std::string(60'000, 'x');
+  const std::string stream = desk.refused(alpha_request(wild, 0.0F));
+  CHECK(has(stream, "there is no stream '\\x1b[2Jxxx"));
+  CHECK(stream.size() < 300);
+  auto named = model_request("walker", "no model");
+  named.mutable_set_model()->set_name(wild);
+  const std::string name = desk.refused(named);
+  CHECK(name.find('\x1b') == std::string::npos);
+  CHECK(name.size() < 300);
+  // A model's joints are named in the sentence that says which of them the stream lacks.
+  auto model = test::toy_model(1, 0.3);
+  model.space.joints.back() = "\x1b[2J" + std::string(1 << 20, 'x');
+  const std::string joints = desk.refused(model_request("walker", style::serialize_model(model)));
+  CHECK(has(joints, "it has no joint \\x1b[2Jxxx"));
+  CHECK(joints.size() < 1000);
 }
 
 TEST_CASE("requests are bounded in size and in number") {

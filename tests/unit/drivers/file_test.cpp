@@ -210,6 +210,47 @@ TEST_CASE("a frame that no pose has is counted, and the clip's clock goes on") {
   CHECK(sink.frames[1].header.device_ns == nanoseconds(7.0 / 120.0));
 }
 
+TEST_CASE("values beyond what a pose can have are counted as out of range and never published") {
+  Device device = must_open(test::scratch_file("small.bvh", test::small_bvh()));
+  const std::string good = "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
+  CollectSink sink;
+  // A position of 1,000,000 units and angles of 1e9 and 36,001 degrees; 36,000 are 100 turns.
+  feed(device, swap(good, "1 95 8", "1 1000000 8"), sink);
+  feed(device, swap(good, "-24", "1e9"), sink);
+  feed(device, swap(good, "-24", "-36001"), sink);
+  CHECK(sink.count(Outcome::kOutOfRange) == 3);
+  CHECK(sink.frames.empty());
+  feed(device, swap(good, "-24", "-36000"), sink);
+  CHECK(sink.count(Outcome::kOk) == 1);
+  CHECK(sink.frames.size() == 1);
+
+  Device amc = small_amc_device();
+  feed(amc, "1\nroot 1 2 3 4 5 6\nlfemur 1 2 3\nltibia 1e9\n", sink);
+  CHECK(sink.count(Outcome::kOutOfRange) == 4);
+  CHECK(sink.frames.size() == 1);
+
+  const auto refused =
+      open_file(test::scratch_file("far.bvh", swap(test::small_bvh(), "1 95 8", "1 9500000 8")));
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().text().find("'9500000' is beyond what a pose can have") !=
+        std::string::npos);
+}
+
+TEST_CASE("an option that says nothing about this kind of clip is refused") {
+  const auto bvh = test::scratch_file("small.bvh", test::small_bvh());
+  const auto said = [&](const char* option, const drivers::OptionValue& value) {
+    const auto device = open_file(bvh, {{option, value}});
+    REQUIRE_FALSE(device);
+    CHECK(device.error().exit_code == ExitCode::kWrongUse);
+    return device.error().message;
+  };
+  CHECK(said("rate_hz", 60.0) ==
+        "rate_hz is an option of an .amc; this clip says its own rate, and `pace` plays it faster");
+  CHECK(said("skeleton", std::string("a.asf")).starts_with("skeleton is an option of an .amc"));
+  CHECK(said("hand", std::string("left")).starts_with("hand is an option of a .csv"));
+  CHECK(must_open(bvh, {{"hand", std::string("right")}}).description.rate_hz == Approx(120.0));
+}
+
 TEST_CASE("an AMC frame is whole with its last bone, not with the next frame's number") {
   Device device = small_amc_device();
   CollectSink sink;

@@ -247,6 +247,23 @@ TEST_CASE("what is no number never leaves a glove decoder as valid") {
   CHECK(sink.frames.empty());
 }
 
+TEST_CASE("an angle that no finger can have costs its joint, and is counted") {
+  SmallDecoder decoder;
+  test::CollectSink sink;
+  // bend = 9.95, mapped to 9.95 rad on index1_x and twice that on index2_x: beyond two turns.
+  decoder.emit({.raw = std::array{1045.0F, 51.0F}, .valid = 0b11, .extra = {}}, sink);
+  CHECK(sink.count(Outcome::kOutOfRange) == 1);
+  REQUIRE(sink.frames.size() == 1);
+  const auto valid = [&](int joint) {
+    return sink.frames[0].valid[static_cast<std::size_t>(hand_joint(1, joint))];
+  };
+  CHECK(valid(0));
+  CHECK_FALSE(valid(1));
+  decoder.emit({.raw = std::array{150.0F, 51.0F}, .valid = 0b11, .extra = {}}, sink);
+  CHECK(sink.count(Outcome::kOutOfRange) == 1);
+  CHECK(sink.frames.back().valid.count() == sink.frames.back().joint_count);
+}
+
 TEST_CASE("a glove decoder uses another calibration from the next packet on, without the heap") {
   const auto file = parse_calibration(kSmallFile, "c.toml");
   REQUIRE(file);

@@ -126,6 +126,10 @@ TEST_CASE("a hand CSV that is none is refused with its line") {
     CHECK(error_of(header() + row("0", 0) + line) ==
           "h.csv:3: frame 2: '" + bad + "' is not a number a pose can have");
   }
+  std::string degrees = row("0", 0);
+  degrees.replace(degrees.find("0.000000"), 8, "90.0");
+  CHECK(error_of(header() + degrees)
+            .starts_with("h.csv:2: frame 1: '90.0' is beyond what a pose can have"));
 }
 
 TEST_CASE("a hand CSV is written as it was read, to the last bit") {

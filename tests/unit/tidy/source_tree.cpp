@@ -170,6 +170,25 @@ std::vector<Finding> check_sizes(const SourceFile& file) {
   return findings;
 }
 
+std::vector<Finding> check_guarded_input(const SourceFile& file) {
+  static const std::regex parses(R"(\btoml::parse(_file)?\b\s*\()");
+  static const std::regex reads_all(R"(\bistreambuf_iterator\b|\brdbuf\s*\()");
+  const bool is_guard = file.path == "proto/text/toml.cpp";
+  const bool is_test = first_folder(file.path) == "tests";
+  std::vector<Finding> findings;
+  for (std::size_t i = 0; i < file.code.size(); ++i) {
+    const int line = static_cast<int>(i) + 1;
+    if (!is_guard && std::regex_search(file.code[i], parses)) {
+      findings.push_back({file.path, line, "parses TOML without the guard of proto/text/toml.hpp"});
+    }
+    if (!is_test && std::regex_search(file.code[i], reads_all)) {
+      findings.push_back(
+          {file.path, line, "reads a whole file without the bounds of proto/text/load_file.hpp"});
+    }
+  }
+  return findings;
+}
+
 std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies) {
   std::vector<Finding> findings;
   for (std::size_t i = 0; i < file.lines.size(); ++i) {

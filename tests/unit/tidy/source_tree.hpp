@@ -28,6 +28,9 @@ struct Finding {
 [[nodiscard]] std::vector<Finding> check_includes(const SourceFile& file);
 // At most 500 lines a file, 100 columns a line, no left-over marks.
 [[nodiscard]] std::vector<Finding> check_sizes(const SourceFile& file);
+// TOML is parsed in proto/text/toml.cpp alone, which first looks at its depth; outside of tests a
+// whole file is read by load_file alone, which bounds it.
+[[nodiscard]] std::vector<Finding> check_guarded_input(const SourceFile& file);
 // Bodies of functions marked RT-safe neither allocate, lock, log, throw nor call the system.
 // `bodies` counts the ones that were found, so that a test can tell that the check looked at
 // something.

@@ -53,6 +53,20 @@ TEST_CASE("files and lines are short and finished", "[tidy]") {
   CHECK(findings_of(posed::tidy::check_sizes) == "");
 }
 
+TEST_CASE("TOML and whole files are read through their guards", "[tidy]") {
+  const auto bad = posed::tidy::source_from_text(
+      "daemon/a.cpp",
+      "auto a = toml::parse(text);\nauto b = toml::parse_file (path);\n"
+      "out << file.rdbuf();\nstd::string all{std::istreambuf_iterator<char>(file), {}};\n"
+      "auto c = parse_toml(text, file, limits);  // not toml::parse(text)\n"
+      "catch (const toml::parse_error& error) {}\n");
+  REQUIRE(posed::tidy::check_guarded_input(bad).size() == 4);
+  const auto guard =
+      posed::tidy::source_from_text("proto/text/toml.cpp", "return toml::parse(text, file);\n");
+  REQUIRE(posed::tidy::check_guarded_input(guard).empty());
+  CHECK(findings_of(posed::tidy::check_guarded_input) == "");
+}
+
 TEST_CASE("functions marked RT-safe neither allocate, lock, log, throw nor call the system",
           "[tidy]") {
   const auto bad = posed::tidy::source_from_text("daemon/a.cpp",

@@ -1,0 +1,75 @@
+#include "proto/text/load_file.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "proto/text/size_text.hpp"
+
+namespace posed {
+namespace {
+
+constexpr std::size_t kBlock = 65536;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+std::string reason() { return std::strerror(errno); }
+
+}  // namespace
+
+Result<std::string> load_file(const std::filesystem::path& path, const FileRule& rule) {
+  const std::string what(rule.what);
+  const auto refused = [&path](const std::string& sentence) {
+    return fail(sentence, path.string());
+  };
+  // Without O_NONBLOCK the opening of a pipe waits until somebody writes into it.
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  if (file.get() < 0) {
+    return refused("cannot read the " + what + ": " + reason() + "; check the path");
+  }
+  struct stat about{};
+  if (fstat(file.get(), &about) != 0) return refused("cannot read the " + what + ": " + reason());
+  if (S_ISDIR(about.st_mode)) return refused("this is a folder; name a " + what + " in it");
+  if (!S_ISREG(about.st_mode)) {
+    return refused("this is a device or a pipe; name a " + what + " that is a regular file");
+  }
+  const std::string too_large =
+      "is larger than " + size_text(rule.max_bytes) + ": that is no " + what;
+  const auto promised = static_cast<std::uintmax_t>(std::max<off_t>(about.st_size, 0));
+  if (promised > rule.max_bytes) return refused(too_large);
+  // One byte more than promised, to meet the end; files of the kernel (/proc) promise nothing.
+  std::string bytes;
+  std::size_t size = 0;
+  while (true) {
+    if (size == bytes.size()) {
+      bytes.resize(std::max<std::size_t>(size + kBlock, static_cast<std::size_t>(promised) + 1));
+    }
+    const ssize_t got = read(file.get(), bytes.data() + size, bytes.size() - size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return refused("cannot read the " + what + " to its end: " + reason());
+    if (got == 0) break;
+    size += static_cast<std::size_t>(got);
+    if (size > rule.max_bytes) return refused(too_large);
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+}  // namespace posed

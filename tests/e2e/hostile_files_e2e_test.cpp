@@ -1,0 +1,140 @@
+// TOML that would overflow the parser's stack and files that are none, given to the real binary by
+// every way there is: it answers with a sentence and goes on.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+
+#include <sqlite3.h>
+
+#include "tests/e2e/served.hpp"
+#include "tests/support/toml_bombs.hpp"
+
+namespace posed::test {
+namespace {
+
+// One sentence on stderr, and no signal ended it.
+void check_refused(const std::vector<std::string>& arguments, const std::string& part) {
+  const Outcome outcome = posed(arguments);
+  INFO(arguments[0] << " " << arguments[1] << ": " << outcome.err.substr(0, 500));
+  CHECK((outcome.code == 1 || outcome.code == 2));
+  CHECK(has(outcome.err, part));
+  CHECK(std::ranges::count(outcome.err, '\n') == 1);
+  CHECK(outcome.err.find('\x1b') == std::string::npos);
+}
+
+std::string stream_with(const std::string& more) {
+  return std::string(Stage::kEndpoints) + "[[stream]]\nname = \"hand\"\n" + more;
+}
+
+TEST_CASE("TOML nested 31,000 deep is one sentence, whichever file it stands in") {
+  const Served served;
+  const std::string deep = served.folder.write("deep.toml", toml_bombs()[0]).string();
+  const std::string config = served.path("posed.toml");
+  const std::string nests = "nests deeper";
+  check_refused({"check", "--config", deep}, nests);
+  served.folder.write("posed.toml", stream_with("driver = \"lucidgloves\"\nport = \"/dev/none\"\n"
+                                                "calibration = \"deep.toml\"\n"));
+  check_refused({"check", "--config", config}, nests);
+  served.folder.write("posed.toml", stream_with("driver = \"described\"\n[stream.described]\n"
+                                                "device = \"deep.toml\"\n"));
+  check_refused({"check", "--config", config}, nests);
+  check_refused({"train", "style", "--experiment", deep, "--out", served.path("a.style")}, nests);
+}
+
+TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its log readable") {
+  Served stage;
+  std::optional<Process> glove;
+  glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", stage.path("glove"),
+                                         "--set", "hand=right"});
+  REQUIRE(glove->line());
+  stage.folder.write("posed.toml", stream_with("driver = \"lucidgloves\"\nport = \"" +
+                                               stage.path("glove") + "\"\nhand = \"right\"\n"));
+  stage.record();
+  for (const std::string& bomb : toml_bombs()) {
+    const Outcome refused =
+        stage.ctl({"calibrate", "hand", stage.folder.write("deep.toml", bomb).string()});
+    CHECK(refused.code == 1);
+    CHECK(has(refused.err, "nests deeper"));
+  }
+  const auto good = stage.folder.write("ann.toml",
+                                       "format = 1\ndriver = \"lucidgloves\"\nhand = \"right\"\n"
+                                       "[sensors]\nindex_joint1 = [[0, 0.0], [2000, 1.0]]\n");
+  CHECK(stage.ctl({"calibrate", "hand", good.string()}).code == 0);
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+
+  // The same in a log that a stranger sent.
+  sqlite3* log = nullptr;
+  REQUIRE(sqlite3_open(stage.path("take.plog").c_str(), &log) == SQLITE_OK);
+  const std::string change =
+      "UPDATE chunk SET bytes=CAST('" + toml_bombs()[0] + "' AS BLOB) WHERE direction=3";
+  CHECK(sqlite3_exec(log, change.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
+  CHECK(sqlite3_changes(log) == 1);
+  sqlite3_close(log);
+  const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
+  INFO(replay.err.substr(0, 1000));
+  CHECK(replay.code == 1);
+  CHECK(replay.err.size() < 2000);
+}
+
+TEST_CASE("what is no file is one sentence, whichever option or key names it") {
+  const Served served;
+  const std::string config = served.path("posed.toml");
+  const std::string folder = served.folder.path().string();
+  const auto with_model = [](const std::string& model) {
+    return stream_with("driver = \"labels\"\n[stream.style]\nmodel = \"" + model + "\"\n");
+  };
+  const std::string is_device = "is a device or a pipe";
+  const std::string is_folder = "this is a folder";
+  for (const auto& [path, sentence] :
+       {std::pair{folder, is_folder}, {std::string("/dev/zero"), is_device}}) {
+    check_refused({"check", "--config", path}, sentence);
+    served.folder.write("posed.toml", with_model(path));
+    check_refused({"check", "--config", config}, sentence);
+    check_refused({"train", "style", "--experiment", path, "--out", served.path("a.style")},
+                  sentence);
+    check_refused({"ctl", "model", "hand", path}, sentence);
+    check_refused({"ctl", "calibrate", "hand", path}, sentence);
+    check_refused(
+        {"apply", "--model", path, served.path("walk.bvh"), "--out", served.path("out.bvh")},
+        sentence);
+  }
+}
+
+TEST_CASE(
+    "a log whose driver has a wild name is refused without a word of it reaching the terminal") {
+  Served stage;
+  stage.record();
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+  sqlite3* log = nullptr;
+  REQUIRE(sqlite3_open(stage.path("take.plog").c_str(), &log) == SQLITE_OK);
+  const std::string change =
+      "UPDATE stream SET driver=char(27)||'[2J'||hex(zeroblob(500000)), name=char(27)||'[2J'";
+  CHECK(sqlite3_exec(log, change.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(log);
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"replay", stage.path("take.plog"), "--speed", "max"},
+        {"convert", stage.path("take.plog"), stage.path("out.bvh")}}) {
+    const Outcome outcome = posed(arguments);
+    INFO(outcome.err.substr(0, 1000));
+    CHECK(outcome.code == 1);
+    CHECK(outcome.err.size() < 2000);
+    CHECK((outcome.err + outcome.out).find('\x1b') == std::string::npos);
+  }
+}
+
+TEST_CASE("check says that a glove is away, and that it would be waited for") {
+  const Served served;
+  served.folder.write("posed.toml", stream_with("driver = \"cyberglove\"\nport = \"/dev/none\"\n"));
+  const Outcome text = posed({"check", "--config", served.path("posed.toml")});
+  INFO(text.err);
+  CHECK(text.code == 0);
+  CHECK(has(text.out, "hand: cyberglove (away), 100 Hz"));
+  CHECK(has(text.out, "the device is not here now, and `posed run` waits for it (/dev/none: "));
+  const Outcome json = posed({"check", "--config", served.path("posed.toml"), "--json"});
+  CHECK(nlohmann::json::parse(json.out).at("streams")[0].at("present") == false);
+}
+
+}  // namespace
+}  // namespace posed::test

@@ -1,0 +1,45 @@
+#include "proto/text/clean.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "proto/frame/result.hpp"
+
+namespace posed {
+namespace {
+
+TEST_CASE("what a terminal would obey is written out", "[clean]") {
+  CHECK(clean("index_mcp") == "index_mcp");
+  CHECK(clean("\x1b[2J\x07") == "\\x1b[2J\\x07");
+  CHECK(clean("two\nlines\r\tof\x7f") == "two\\nlines\\r\\tof\\x7f");
+  CHECK(clean(std::string_view("a\0b", 3)) == "a\\x00b");
+  CHECK(clean("\u009b31m") == "\\u{009b}31m");  // CSI in one character
+  CHECK(clean("txt.\u202Egpj") == "txt.\\u{202e}gpj");
+}
+
+TEST_CASE("letters of any script stay, bytes that are no UTF-8 are written out", "[clean]") {
+  CHECK(clean("Gänsefüßchen 手 🖐") == "Gänsefüßchen 手 🖐");
+  CHECK(clean("\xff\xc3") == "\\xff\\xc3");               // no lead byte, cut off
+  CHECK(clean("\xc0\xaf") == "\\xc0\\xaf");               // '/' in too many bytes
+  CHECK(clean("\xed\xa0\x80") == "\\xed\\xa0\\x80");      // half of a surrogate pair
+  CHECK(clean("\xf4\x90\x80\x80x").ends_with("\\x80x"));  // beyond Unicode
+}
+
+TEST_CASE("what is too long ends in dots, between two characters", "[clean]") {
+  CHECK(clean("abcdef", 6) == "abcdef");
+  CHECK(clean("abcdefg", 6) == "abcdef...");
+  CHECK(clean("ab手", 4) == "ab...");
+  CHECK(clean("abc\x1b", 6) == "abc...");  // an escape is not cut either
+  const std::string megabyte(1 << 20, 'x');
+  CHECK(clean(megabyte).size() == kMaxLineBytes + 3);
+  CHECK(in_quotes(megabyte) == "'" + std::string(kMaxNameBytes, 'x') + "...'");
+}
+
+TEST_CASE("an error is fit for a terminal whatever it names", "[clean]") {
+  const Error error{.message = "no joint \x1b[2J", .file = "a\nb.bvh", .line = 3};
+  CHECK(error.text() == "a\\nb.bvh:3: no joint \\x1b[2J");
+  const Error huge{.message = std::string(1 << 20, 'x'), .file = {}};
+  CHECK(huge.text().size() < 3000);
+}
+
+}  // namespace
+}  // namespace posed
