@@ -72,9 +72,9 @@ void tell(pipeline::Daemon& daemon, const record::Notice& notice) {
 }
 
 Result<> record(const RecordOptions& options) {
+  prepare_to_serve();
   auto config = config::load_config(options.serve.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
-  block_end_signals();
   auto opened = pipeline::Daemon::open(*config);
   if (!opened) return std::unexpected(opened.error());
   pipeline::Daemon& daemon = **opened;

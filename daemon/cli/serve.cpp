@@ -9,9 +9,12 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/config/config.hpp"
+#include "daemon/logging/log_output.hpp"
 
 namespace posed::cli {
 namespace {
+
+constexpr std::chrono::milliseconds kReadyLineWithin{300};
 
 sigset_t end_signals() {
   sigset_t set;
@@ -44,7 +47,8 @@ void add_serve_options(CLI::App& command, ServeOptions& options) {
   command.add_flag("--until-end", options.until_end, "End when every source has ended");
 }
 
-void block_end_signals() {
+void prepare_to_serve() {
+  logging::sum_up_repeats();
   const sigset_t set = end_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit is a full disk, which the recorder tells
@@ -56,8 +60,11 @@ void print_ready(const pipeline::Daemon& daemon) {
                               {"control", daemon.control_endpoint()},
                               {"streams", nlohmann::json::array()}};
   for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
-  std::printf("%s\n", line.dump().c_str());
-  std::fflush(stdout);
+  // Not by stdio: a pipe that is full, or that nobody reads, must not hold up the stop signals.
+  if (!logging::write_within(STDOUT_FILENO, line.dump() + '\n', kReadyLineWithin)) {
+    spdlog::warn("stdout does not take the line that says where posed is to be found: {}",
+                 line.dump());
+  }
 }
 
 void serve(pipeline::Daemon& daemon, const ServeOptions& options) {

@@ -12,11 +12,13 @@ class App;
 
 namespace posed::cli {
 
-// Blocks SIGINT, SIGTERM and SIGHUP in this thread and all that it starts from now on, so that only
-// serve() hears them. Call before Daemon::start().
-void block_end_signals();
+// For the beginning of a command that serves. Blocks SIGINT, SIGTERM and SIGHUP in this thread and
+// all that it starts from now on, so that only serve() hears them: one that comes during the start
+// waits there and ends it. What strangers make the daemon say is summed up in the log.
+void prepare_to_serve();
 
-// Prints the one JSON line that says where the daemon is to be found.
+// Prints the one JSON line that says where the daemon is to be found; waits at most 0.3 s for
+// stdout, and warns when it does not take the line.
 void print_ready(const pipeline::Daemon& daemon);
 
 struct ServeOptions {

@@ -21,10 +21,16 @@
 
 namespace posed::test {
 
+// Where a child's stderr goes: a file that errors() reads, a descriptor of the test's, or nowhere.
+struct ChildStderr {
+  static constexpr int kFile = -1, kClosed = -2;
+  int descriptor = kFile;
+};
+
 class Process {
  public:
   // Starts `posed` with these arguments; stdin is empty.
-  explicit Process(std::vector<std::string> arguments) {
+  explicit Process(std::vector<std::string> arguments, ChildStderr err = {}) {
     arguments.insert(arguments.begin(), POSED_BINARY);
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -36,7 +42,13 @@ class Process {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, out[1], 1);
-    posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT, 0600);
+    if (err.descriptor == ChildStderr::kFile) {
+      posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT, 0600);
+    } else if (err.descriptor == ChildStderr::kClosed) {
+      posix_spawn_file_actions_addclose(&actions, 2);
+    } else {
+      posix_spawn_file_actions_adddup2(&actions, err.descriptor, 2);
+    }
     const int failed = posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     close(out[1]);
@@ -48,7 +60,7 @@ class Process {
       kill(pid_, SIGKILL);
       waitpid(pid_, nullptr, 0);
     }
-    close(out_);
+    hang_up();
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -77,6 +89,12 @@ class Process {
     std::string all;
     while (const auto next = line()) all += *next + "\n";
     return all;
+  }
+
+  // Nobody reads its stdout from now on.
+  void hang_up() {
+    if (out_ >= 0) close(out_);
+    out_ = -1;
   }
 
   void send(int signal) const { kill(pid_, signal); }
