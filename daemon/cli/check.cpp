@@ -26,6 +26,8 @@ struct CheckOptions {
 Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
   const auto stream = pipeline::open_stream(config);
   if (!stream) return std::unexpected(stream.error());
+  const auto missing = pipeline::try_kept_device(**stream);
+  if (!missing) return std::unexpected(missing.error());
   const auto bound = pipeline::bind_style(**stream);
   if (!bound) return std::unexpected(bound.error());
   const auto gesture = pipeline::bind_gesture(**stream);
@@ -52,6 +54,7 @@ Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
   }
   told["constrain"] = *constrains;
   told["warnings"] = (*stream)->device.warnings;
+  if (!missing->empty()) told["warnings"].push_back(*missing);
   return told;
 }
 

@@ -78,6 +78,7 @@ Result<> record(const RecordOptions& options) {
   auto opened = pipeline::Daemon::open(*config);
   if (!opened) return std::unexpected(opened.error());
   pipeline::Daemon& daemon = **opened;
+  if (auto sound = check_end(daemon, options.serve); !sound) return sound;
   std::vector<record::RecordedStream> streams;
   for (const auto& stream : daemon.streams()) streams.push_back(recorded(*stream));
   auto started = std::make_shared<std::atomic<bool>>(false);

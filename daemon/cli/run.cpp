@@ -16,6 +16,7 @@ Result<> run(const ServeOptions& options) {
   if (!config) return std::unexpected(config.error());
   auto daemon = pipeline::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
+  if (auto sound = check_end(**daemon, options); !sound) return sound;
   if (auto started = (*daemon)->start(); !started) return started;
   print_ready(**daemon);
   serve(**daemon, options);

@@ -1,5 +1,6 @@
 #include "daemon/cli/serve.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 
@@ -44,7 +45,8 @@ bool read_clients_again(pipeline::Daemon& daemon, const std::string& path) {
 void add_serve_options(CLI::App& command, ServeOptions& options) {
   command.add_option("--config", options.config, "The daemon's config, TOML")->required();
   command.add_option("--seconds", options.seconds, "End after this long");
-  command.add_flag("--until-end", options.until_end, "End when every source has ended");
+  command.add_flag("--until-end", options.until_end,
+                   "End when every source that can end has ended: not gloves or looped clips");
 }
 
 void prepare_to_serve() {
@@ -52,6 +54,14 @@ void prepare_to_serve() {
   const sigset_t set = end_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit is a full disk, which the recorder tells
+}
+
+Result<> check_end(const pipeline::Daemon& daemon, const ServeOptions& options) {
+  const auto endless = [](const auto& stream) { return stream->endless; };
+  if (!options.until_end || !std::ranges::all_of(daemon.streams(), endless)) return {};
+  return misuse(
+      "--until-end: no source of this config ever ends (gloves come and go, clips loop); leave it"
+      " out, give --seconds, or set loop = false");
 }
 
 void print_ready(const pipeline::Daemon& daemon) {

@@ -22,13 +22,16 @@ void prepare_to_serve();
 void print_ready(const pipeline::Daemon& daemon);
 
 struct ServeOptions {
-  bool until_end = false;         // also end when every source has
+  bool until_end = false;         // also end when every source that can has
   std::optional<double> seconds;  // also end after this long
   std::string config;             // the TOML file; SIGHUP reads its client list again; may be empty
 };
 
 // --config (required), --seconds and --until-end.
 void add_serve_options(CLI::App& command, ServeOptions& options);
+
+// Refuses --until-end where nothing ever ends.
+[[nodiscard]] Result<> check_end(const pipeline::Daemon& daemon, const ServeOptions& options);
 
 // Waits for SIGINT, SIGTERM, a control message or what the options say, then stops the daemon.
 // SIGHUP reads the client list again where keys are used; elsewhere it is a closed terminal and

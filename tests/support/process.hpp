@@ -29,8 +29,10 @@ struct ChildStderr {
 
 class Process {
  public:
-  // Starts `posed` with these arguments; stdin is empty.
-  explicit Process(std::vector<std::string> arguments, ChildStderr err = {}) {
+  // Starts `posed` with these arguments; stdin is empty. `stdout_descriptor` is the test's own
+  // instead of the pipe that line() reads.
+  explicit Process(std::vector<std::string> arguments, ChildStderr err = {},
+                   int stdout_descriptor = -1) {
     arguments.insert(arguments.begin(), POSED_BINARY);
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -41,7 +43,8 @@ class Process {
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions, out[1], 1);
+    posix_spawn_file_actions_adddup2(&actions, stdout_descriptor < 0 ? out[1] : stdout_descriptor,
+                                     1);
     if (err.descriptor == ChildStderr::kFile) {
       posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT, 0600);
     } else if (err.descriptor == ChildStderr::kClosed) {
