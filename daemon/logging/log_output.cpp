@@ -102,10 +102,15 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
 
   // Whether the thread has written all and ended within `patience`.
   bool end(std::chrono::milliseconds patience) {
-    std::unique_lock lock(mutex_);
-    ending_ = true;
-    changed_.notify_all();
-    return changed_.wait_for(lock, patience, [this] { return ended_; });
+    {
+      std::unique_lock lock(mutex_);
+      ending_ = true;
+      changed_.notify_all();
+      changed_.wait_for(lock, patience, [this] { return ended_; });
+    }
+    // Once more: the thread sanitizer does not see that the wait has locked it.
+    const std::scoped_lock lock(mutex_);
+    return ended_;
   }
 
  private:
