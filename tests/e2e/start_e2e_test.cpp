@@ -55,7 +55,10 @@ class SilentGloves : public Stage {
         if (word != "SigBlk:") continue;
         std::string mask;
         status >> mask;
-        return (std::stoull(mask, nullptr, 16) & (1ULL << (SIGINT - 1))) != 0;
+        const auto held = [bits = std::stoull(mask, nullptr, 16)](int signal) {
+          return (bits >> (signal - 1) & 1) != 0;
+        };
+        return held(SIGINT) && !held(SIGUSR1);  // all are, for a moment, while a thread is made
       }
       return false;
     };
