@@ -27,6 +27,8 @@ struct CheckOptions {
 Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
   const auto stream = pipeline::open_stream(config);
   if (!stream) return std::unexpected(stream.error());
+  const auto missing = pipeline::try_kept_device(**stream);
+  if (!missing) return std::unexpected(missing.error());
   const auto bound = pipeline::bind_style(**stream);
   if (!bound) return std::unexpected(bound.error());
   const auto gesture = pipeline::bind_gesture(**stream);
@@ -52,11 +54,11 @@ Result<ordered_json> try_stream(const pipeline::StreamConfig& config) {
     if (gesture->model) told["gesture_model"] = gesture->model->name;
   }
   told["constrain"] = *constrains;
-  told["present"] = (*stream)->away.empty();
+  told["present"] = missing->empty();
   told["warnings"] = (*stream)->device.warnings;
-  if (!(*stream)->away.empty()) {
+  if (!missing->empty()) {
     told["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
-                               (*stream)->away + ")");
+                               *missing + ")");
   }
   return told;
 }

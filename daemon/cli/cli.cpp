@@ -4,9 +4,15 @@
 #include <cstdio>
 
 #include <google/protobuf/stubs/logging.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
 #include <CLI/CLI.hpp>
+
+#include "daemon/logging/log_output.hpp"
 
 namespace posed::cli {
 namespace {
@@ -20,15 +26,23 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_monitor, add_top,   add_emulate, add_keygen,  add_completion, add_bench,
 });
 
-}  // namespace
-
-int report(const Error& error) {
-  std::fprintf(stderr, "posed: %s\n", error.text().c_str());
-  return static_cast<int>(error.exit_code);
+// Whether whoever read our stdout has gone (`posed monitor | head`).
+bool reader_of_stdout_has_gone() {
+  pollfd out{.fd = STDOUT_FILENO, .events = 0, .revents = 0};
+  return ::poll(&out, 1, 0) == 1 && (out.revents & (POLLERR | POLLHUP)) != 0;
 }
 
-int main_of(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("posed"));
+// The exit code, or 1 when what was to be printed could not be written (a full disk). A reader that
+// has gone has what it wanted: that is no failure, and nothing is said.
+int with_stdout_written(int exit_code) {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+  const std::string why = errno == 0 ? "" : std::string(" (") + std::strerror(errno) + ")";
+  if (exit_code != 0 || reader_of_stdout_has_gone()) return exit_code;
+  return report(fail("stdout does not take the output" + why + "; it is not complete").error());
+}
+
+int parse_and_run(int argc, char** argv) {
   // Bytes of strangers are refused in our own words; protobuf would write a line for each.
   google::protobuf::SetLogHandler(nullptr);
   CLI::App app{"posed: live poses in, another style out", "posed"};
@@ -43,6 +57,19 @@ int main_of(int argc, char** argv) {
     return static_cast<int>(asked_for_help ? ExitCode::kDone : ExitCode::kWrongUse);
   }
   return exit_code;
+}
+
+}  // namespace
+
+int report(const Error& error) {
+  logging::say("posed: " + error.text());
+  return static_cast<int>(error.exit_code);
+}
+
+int main_of(int argc, char** argv) {
+  logging::protect_standard_descriptors();
+  const logging::LogOutput log;
+  return with_stdout_written(parse_and_run(argc, argv));
 }
 
 }  // namespace posed::cli

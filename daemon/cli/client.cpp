@@ -2,6 +2,7 @@
 
 #include <array>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 
 #include <CLI/CLI.hpp>
@@ -161,6 +162,6 @@ Interrupt::Interrupt() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-bool Interrupt::came() { return interrupt_came != 0; }
+bool Interrupt::came() { return interrupt_came != 0 || std::ferror(stdout) != 0; }
 
 }  // namespace posed::cli

@@ -60,7 +60,8 @@ class Connection {
 // How long a client waits before it looks for keys, signals and refusals.
 inline constexpr std::chrono::milliseconds kLookAround{100};
 
-// From its making on SIGINT and SIGTERM only set a flag.
+// From its making on SIGINT and SIGTERM only set a flag. A stdout that nobody reads any more
+// (`posed monitor | head`) is as good a reason to end.
 class Interrupt {
  public:
   Interrupt();

@@ -114,7 +114,8 @@ int set_parameter(const CtlOptions& options) {
 }
 
 int send_model(const CtlOptions& options) {
-  const auto bytes = load_file(options.model, {.what = "model", .max_bytes = control::kLargestModel});
+  const auto bytes =
+      load_file(options.model, {.what = "model", .max_bytes = control::kLargestModel});
   if (!bytes) return report(bytes.error());
   return show(options, upload(options, *bytes), tell_effect);
 }

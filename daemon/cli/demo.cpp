@@ -24,6 +24,7 @@
 #include "daemon/cli/train_style.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/devices/performer.hpp"
+#include "daemon/logging/log_output.hpp"
 #include "daemon/pipeline/daemon.hpp"
 
 namespace posed::cli {
@@ -196,6 +197,7 @@ Result<Performers> put_on_gloves(pipeline::DaemonConfig& config,
 Result<> stream(const DemoOptions& options, const std::filesystem::path& folder) {
   auto config = config::load_config(options.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
+  logging::sum_up_repeats();
   const Interrupt interrupt;
   const auto performers = put_on_gloves(*config, folder / kDemoPerformer);
   if (!performers) return std::unexpected(performers.error());

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "drivers/transport/cold_writer.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/sink.hpp"
@@ -78,6 +79,8 @@ class OpenedGlove final : public GloveSource {
       if (polled && now - asked >= device_.poll.period_ns) {
         asked = now;
         (void)device_.transport->send(device_.poll.request);
+        auto* slow = dynamic_cast<drivers::ColdWriter*>(device_.transport.get());
+        if (slow != nullptr) slow->write_waiting();
       }
       pollfd wanted{.fd = device_.transport->poll_fd(), .events = POLLIN, .revents = 0};
       (void)::poll(&wanted, 1, polled ? 2 : static_cast<int>(kLookAround.count()));

@@ -36,12 +36,13 @@ void tell(pipeline::Daemon& daemon, const record::Notice& notice) {
 }
 
 Result<> record(const RecordOptions& options) {
+  prepare_to_serve();
   auto config = config::load_config(options.serve.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
-  block_end_signals();
   auto opened = pipeline::Daemon::open(*config);
   if (!opened) return std::unexpected(opened.error());
   pipeline::Daemon& daemon = **opened;
+  if (auto sound = check_end(daemon, options.serve); !sound) return sound;
   std::vector<record::RecordedStream> streams;
   for (const auto& stream : daemon.streams()) streams.push_back(record::recorded_stream(*stream));
   auto started = std::make_shared<std::atomic<bool>>(false);

@@ -11,11 +11,12 @@ namespace posed::cli {
 namespace {
 
 Result<> run(const ServeOptions& options) {
+  prepare_to_serve();
   auto config = config::load_config(options.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
-  block_end_signals();
   auto daemon = pipeline::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
+  if (auto sound = check_end(**daemon, options); !sound) return sound;
   if (auto started = (*daemon)->start(); !started) return started;
   print_ready(**daemon);
   serve(**daemon, options);

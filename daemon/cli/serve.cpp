@@ -1,5 +1,6 @@
 #include "daemon/cli/serve.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 
@@ -9,9 +10,12 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/config/config.hpp"
+#include "daemon/logging/log_output.hpp"
 
 namespace posed::cli {
 namespace {
+
+constexpr std::chrono::milliseconds kReadyLineWithin{300};
 
 sigset_t end_signals() {
   sigset_t set;
@@ -47,13 +51,23 @@ bool read_clients_again(pipeline::Daemon& daemon, const std::string& path) {
 void add_serve_options(CLI::App& command, ServeOptions& options) {
   command.add_option("--config", options.config, "The daemon's config, TOML")->required();
   command.add_option("--seconds", options.seconds, "End after this long");
-  command.add_flag("--until-end", options.until_end, "End when every source has ended");
+  command.add_flag("--until-end", options.until_end,
+                   "End when every source that can end has ended: not gloves or looped clips");
 }
 
-void block_end_signals() {
+void prepare_to_serve() {
+  logging::sum_up_repeats();
   const sigset_t set = end_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit is a full disk, which the recorder tells
+}
+
+Result<> check_end(const pipeline::Daemon& daemon, const ServeOptions& options) {
+  const auto endless = [](const auto& stream) { return stream->endless; };
+  if (!options.until_end || !std::ranges::all_of(daemon.streams(), endless)) return {};
+  return misuse(
+      "--until-end: no source of this config ever ends (gloves come and go, clips loop); leave it"
+      " out, give --seconds, or set loop = false");
 }
 
 void print_ready(const pipeline::Daemon& daemon) {
@@ -62,8 +76,11 @@ void print_ready(const pipeline::Daemon& daemon) {
                               {"control", daemon.control_endpoint()},
                               {"streams", nlohmann::json::array()}};
   for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
-  std::printf("%s\n", line.dump().c_str());
-  std::fflush(stdout);
+  // Not by stdio: a pipe that is full, or that nobody reads, must not hold up the stop signals.
+  if (!logging::write_within(STDOUT_FILENO, line.dump() + '\n', kReadyLineWithin)) {
+    spdlog::warn("stdout does not take the line that says where posed is to be found: {}",
+                 line.dump());
+  }
 }
 
 void serve(pipeline::Daemon& daemon, const ServeOptions& options) {

@@ -77,6 +77,9 @@ Result<> RequestHandler::send_haptics(const v1::ControlRequest& request) {
   if (!haptics) return std::unexpected(haptics.error());
   const auto bytes = driver->encode_haptics(stream.options, *haptics);
   if (!bytes) return std::unexpected(bytes.error());
+  if (stream.device->away()) {
+    return fail("the glove of stream " + stream.name + " is away: plug it in and try again");
+  }
   DeviceCommand command{.kind = DeviceCommand::Kind::kSend, .stream = *found};
   if (bytes->size() > command.bytes.size()) return fail("the device's message is too long");
   command.size = static_cast<std::uint16_t>(bytes->size());

@@ -30,24 +30,28 @@ Keeper::Keeper(pipeline::OpenStream& stream, KeeperPorts ports)
     : stream_(stream),
       ports_(std::move(ports)),
       driver_(*drivers::find_driver(stream.config.driver)),
-      away_(stream.device.transport == nullptr),
-      told_(stream.away),
       thread_([this] { run(); }) {}
 
 Keeper::~Keeper() {
-  stop_.store(true);
-  stream_.slot->keeper->ring();
+  stop();
   thread_.join();
+}
+
+void Keeper::stop() noexcept {
+  stop_.store(true);
+  stream_.ports->cancel();
+  stream_.slot->keeper->ring();
 }
 
 void Keeper::run() {
   pipeline::name_thread("keep-" + stream_.config.name);
   while (!stop_.load()) {
-    while (stream_.slot->out.consume([this](drivers::Device* device) { take_back(device); })) {
+    while (stream_.slot->out.consume([this](drivers::Device* /*device_*/) { take_back(); })) {
     }
     if (away_) {
       look_for_device();
     } else {
+      write_to_device();
       watch_silence();
     }
     sleep();
@@ -60,8 +64,9 @@ void Keeper::sleep() {
   if (stream_.slot->out.empty() && !stop_.load()) {
     // A node that comes is tried at once; where nothing tells of it, at the next turn.
     const auto turn = !away_ ? kLookEvery : settling() ? kTrySoon : kTryEvery;
-    std::array<pollfd, 2> wait{
-        {{wake.fd(), POLLIN, 0}, {away_ ? arrivals_.poll_fd() : -1, POLLIN, 0}}};
+    std::array<pollfd, 3> wait{{{wake.fd(), POLLIN, 0},
+                                {away_ ? arrivals_.poll_fd() : -1, POLLIN, 0},
+                                {writer_ != nullptr ? writer_->waiting_fd() : -1, POLLIN, 0}}};
     poll(wait.data(), wait.size(), static_cast<int>(turn.count()));
     if ((wait[0].revents & POLLIN) != 0) {
       std::uint64_t rung = 0;
@@ -77,9 +82,8 @@ void Keeper::sleep() {
 bool Keeper::settling() const { return ports_.clock() < settled_ns_; }
 
 // Closes the link: only then can the port be opened again.
-void Keeper::take_back(drivers::Device* device) {
-  device->transport.reset();
-  device->decoder.reset();
+void Keeper::take_back() {
+  writer_ = nullptr;
   device_.reset();
   away_ = true;
   stream_.present->gone();
@@ -91,27 +95,42 @@ void Keeper::take_back(drivers::Device* device) {
 }
 
 void Keeper::watch_silence() {
-  const drivers::Device& device = device_ ? *device_ : stream_.device;
-  if (device.reopen_after_s <= 0.0 || asked_back_) return;
+  if (device_->reopen_after_s <= 0.0 || asked_back_) return;
   const auto& reader = stream_.counters.reader;
   if (!reader.connected.load()) return;
   const std::int64_t silent_ns = ports_.clock() - reader.heard_ns.load();
-  if (seconds(silent_ns) < device.reopen_after_s) return;
+  if (seconds(silent_ns) < device_->reopen_after_s) return;
   asked_back_ = true;
   stream_.slot->give_back.store(true);
   ports_.reader->call();
 }
 
+// While a write takes its time the queue behind it gives old messages up, which is told.
+void Keeper::write_to_device() {
+  if (writer_ == nullptr) return;
+  writer_->write_waiting();
+  const std::uint64_t dropped = writer_->dropped();
+  if (dropped == drops_told_) return;
+  ports_.tell(v1::Event::KIND_WARNING,
+              std::to_string(dropped - std::exchange(drops_told_, dropped)) +
+                  " messages to the device were given up: it takes them too slowly; send fewer");
+}
+
 void Keeper::look_for_device() {
   auto found = try_open();
+  if (stop_.load()) return;
   if (!found) {
     const std::string text = found.error().text();
     if (text == told_ || settling()) return;  // said once, and not of a device that is just coming
     told_ = text;
-    ports_.tell(v1::Event::KIND_WARNING, text);
+    ports_.tell(v1::Event::KIND_WARNING,
+                found_once_ ? text : text + "; posed looks for it until it is there");
     return;
   }
+  found_once_ = true;
   device_ = std::move(*found);
+  writer_ = dynamic_cast<drivers::ColdWriter*>(device_->transport.get());
+  drops_told_ = 0;
   away_ = false;
   told_.clear();
   for (const std::string& warning : device_->warnings) {

@@ -14,6 +14,7 @@
 #include "daemon/pipeline/open_stream.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "drivers/transport/arrivals.hpp"
+#include "drivers/transport/cold_writer.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::devices {
@@ -30,17 +31,20 @@ class Keeper {
   // Whether a stream's device can go and come; only such streams have a keeper.
   [[nodiscard]] static bool wanted(const pipeline::OpenStream& stream);
 
-  // Starts the thread. `stream` outlives the keeper; its first device, where it has one, is with
-  // the reader already.
+  // Starts the thread, which opens the device as soon as it is there. `stream` outlives the keeper.
   Keeper(pipeline::OpenStream& stream, KeeperPorts ports);
-  ~Keeper();  // after the reader's thread has ended
+  ~Keeper();  // after the reader's thread has ended; stops first
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
+  // Tells the thread to end, a device's start-up talk included. Returns at once; any thread.
+  void stop() noexcept;
+
  private:
   void run();
-  void take_back(drivers::Device* device);
+  void take_back();
   void watch_silence();
+  void write_to_device();
   void look_for_device();
   [[nodiscard]] Result<std::unique_ptr<drivers::Device>> try_open();
   void sleep();
@@ -51,7 +55,10 @@ class Keeper {
   const drivers::Driver& driver_;
   drivers::Arrivals arrivals_;
   std::unique_ptr<drivers::Device> device_;  // the one opened here; null while it is away
-  bool away_ = false;
+  drivers::ColdWriter* writer_ = nullptr;    // its other side, where writing to it blocks
+  std::uint64_t drops_told_ = 0;             // of the writer
+  bool away_ = true;
+  bool found_once_ = false;
   bool asked_back_ = false;
   std::int64_t settled_ns_ = 0;  // when what came last should open
   std::string told_;             // why it could not be opened, as last told

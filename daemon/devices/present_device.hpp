@@ -14,17 +14,19 @@ namespace posed::devices {
 
 class PresentDevice {
  public:
-  void connected(drivers::Description description) {
-    auto now = std::make_shared<const drivers::Description>(std::move(description));
-    const std::scoped_lock lock(mutex_);
-    description_ = std::move(now);
-  }
+  void connected(drivers::Description description) { set(std::move(description), false); }
 
   // No device answers: what the stream was opened for stays, but nobody knows who comes next.
   void gone() {
     drivers::Description description = *this->description();
     description.identity.clear();
-    connected(std::move(description));
+    set(std::move(description), true);
+  }
+
+  // Whether the device is known to be away: what is sent to it reaches nobody.
+  [[nodiscard]] bool away() const {
+    const std::scoped_lock lock(mutex_);
+    return away_;
   }
 
   // Never null. The identity is empty while there is no device.
@@ -47,10 +49,18 @@ class PresentDevice {
   }
 
  private:
+  void set(drivers::Description description, bool away) {
+    auto now = std::make_shared<const drivers::Description>(std::move(description));
+    const std::scoped_lock lock(mutex_);
+    description_ = std::move(now);
+    away_ = away;
+  }
+
   mutable std::mutex mutex_;
   std::shared_ptr<const drivers::Description> description_ =
       std::make_shared<const drivers::Description>();
   CalibrationText calibration_;
+  bool away_ = false;
 };
 
 }  // namespace posed::devices

@@ -106,10 +106,6 @@ Result<> Daemon::Parts::open() {
     for (const std::string& warning : (*stream)->device.warnings) {
       spdlog::warn("{}: {}", stream_config.name, warning);
     }
-    if (!(*stream)->away.empty()) {
-      spdlog::warn("{}: {}; posed looks for it until it is there", stream_config.name,
-                   (*stream)->away);
-    }
     streams.push_back(std::move(*stream));
   }
   // Each stream has slots of its own, so that none can take another's, and every notice finds one.
@@ -294,6 +290,7 @@ Result<> Daemon::Parts::start_threads() {
 
 // From the devices to the clients, so that each thread still finds what the one before it made.
 void Daemon::Parts::halt() noexcept {
+  for (const auto& keeper : keepers) keeper->stop();  // all at once, whatever they wait for
   if (reader) reader->stop();
   if (reader_thread.joinable()) reader_thread.join();
   keepers.clear();
@@ -326,9 +323,13 @@ bool Daemon::asked_to_stop() const noexcept { return parts_->stop_asked.load(); 
 v1::Stats Daemon::stats() const { return parts_->publisher->stats(); }
 
 bool Daemon::all_ended() const noexcept {
-  return std::ranges::all_of(parts_->streams, [](const auto& stream) {
-    return stream->counters.pipeline.state.load() == StreamState::kEnded;
-  });
+  bool any = false;
+  for (const auto& stream : parts_->streams) {
+    if (stream->endless) continue;
+    any = true;
+    if (stream->counters.pipeline.state.load() != StreamState::kEnded) return false;
+  }
+  return any;
 }
 
 bool Daemon::wants_keys() const noexcept { return !parts_->secret_z85.empty(); }

@@ -45,8 +45,9 @@ class Daemon {
   [[nodiscard]] const std::string& publish_endpoint() const noexcept;  // really bound
   [[nodiscard]] const std::string& control_endpoint() const noexcept;  // really bound
   [[nodiscard]] bool asked_to_stop() const noexcept;                   // by a control message
-  [[nodiscard]] bool all_ended() const noexcept;  // every source is finished and published
-  [[nodiscard]] v1::Stats stats() const;          // of the last second
+  // Every source that can end is finished and published; false when there is none.
+  [[nodiscard]] bool all_ended() const noexcept;
+  [[nodiscard]] v1::Stats stats() const;           // of the last second
   [[nodiscard]] bool wants_keys() const noexcept;  // CURVE on both sockets
   // Who may connect from now on; those who lost a right are cut off. Nothing without CURVE.
   void allow(const std::vector<control::AllowedClient>& clients);

@@ -2,6 +2,7 @@
 
 #include "daemon/devices/calibration.hpp"
 #include "drivers/glove/load_calibration.hpp"
+#include "drivers/transport/file.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/model/model_file.hpp"
@@ -9,23 +10,24 @@
 namespace posed::pipeline {
 namespace {
 
-// A device that can come later is not missed now, unless the options make no sense.
+// A device that comes and goes is left to its keeper, so that a slow or silent one holds up neither
+// the start nor the other streams; only its options must make sense.
 Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
-  auto device = driver.open(stream.config.options, *stream.ports);
-  if (device) {
+  if (driver.expect == nullptr) {
+    auto device = driver.open(stream.config.options, *stream.ports);
+    if (!device) return std::unexpected(device.error());
     stream.device = std::move(*device);
     stream.present->connected(stream.device.description);
+    const auto* file = dynamic_cast<const drivers::FileTransport*>(stream.device.transport.get());
+    stream.endless = file != nullptr && file->loops();
     return {};
   }
-  if (driver.expect == nullptr || device.error().exit_code == ExitCode::kWrongUse) {
-    return std::unexpected(device.error());
-  }
+  stream.endless = true;
   auto description = driver.expect(stream.config.options);
   if (!description) return std::unexpected(description.error());
   stream.device.description = std::move(*description);
   stream.present->connected(stream.device.description);
   stream.present->gone();
-  stream.away = device.error().text();
   return {};
 }
 
@@ -88,6 +90,21 @@ Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config) {
     stream->gesture_file = std::move(*bytes);
   }
   return stream;
+}
+
+Result<std::string> try_kept_device(OpenStream& stream) {
+  if (!stream.slot) return std::string();
+  const drivers::Driver& driver = *drivers::find_driver(stream.config.driver);
+  auto device = driver.open(stream.config.options, *stream.ports);
+  if (!device && device.error().exit_code == ExitCode::kWrongUse) {
+    return of_stream(stream.config.name, device.error());
+  }
+  if (!device) return device.error().text();
+  stream.device = std::move(*device);
+  stream.present->connected(stream.device.description);
+  const auto fits = open_calibration(stream);
+  if (!fits) return of_stream(stream.config.name, fits.error());
+  return std::string();
 }
 
 Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream) {

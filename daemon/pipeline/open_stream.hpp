@@ -20,22 +20,27 @@ namespace posed::pipeline {
 
 struct OpenStream {
   StreamConfig config;
-  // Without transport and decoder while the device is away; the description is there from the
-  // start.
+  // Without transport and decoder for a device that comes and goes: its keeper opens it. The
+  // description is there from the start, as the options promise it.
   drivers::Device device;
   std::shared_ptr<devices::PresentDevice> present = std::make_shared<devices::PresentDevice>();
-  std::string away;  // why the device could not be opened, one sentence; empty: it is there
   std::unique_ptr<drivers::Ports> ports;
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;  // null: the default
   std::unique_ptr<DeviceSlot> slot;  // null for a device that cannot come back
-  std::string model_file;    // the bytes of the style model's file; empty without a style stage
+  bool endless = false;    // never ends by itself: a device that comes and goes, a clip that loops
+  std::string model_file;  // the bytes of the style model's file; empty without a style stage
   std::string gesture_file;  // the same of the gesture model
   StreamCounters counters;
 };
 
 // Opens the device, or finds out how it will be when it comes, and reads the files of models and
-// calibration. Errors name the stream. Cold.
+// calibration. Waits for no device that comes and goes. Errors name the stream. Cold.
 [[nodiscard]] Result<std::unique_ptr<OpenStream>> open_stream(const StreamConfig& config);
+
+// For a command that wants to know now what would come (`check`): opens the device that a keeper
+// would open, and tries the calibration on it. Returns why the device is not there now, in one
+// sentence, or nothing. May take a few seconds. Cold.
+[[nodiscard]] Result<std::string> try_kept_device(OpenStream& stream);
 
 // The style model, bound to the stream's skeleton; null without a style stage. Cold.
 [[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream);

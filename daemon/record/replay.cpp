@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/record/decision_code.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::record {
 namespace {
@@ -35,8 +36,8 @@ Result<> Replay::open_lanes() {
   for (const log::StreamRow& row : streams) {
     const log::SourceRow& source = reader_.source_of(row);
     if (std::ranges::count(streams, row.source, &log::StreamRow::source) > 1) {
-      return fail("source '" + source.name +
-                      "' has several bodies, which this posed cannot replay; update posed",
+      return fail("source " + in_quotes(source.name) +
+                      " has several bodies, which this posed cannot replay; update posed",
                   reader_.file());
     }
     const auto id = static_cast<std::uint32_t>(lanes_.size());

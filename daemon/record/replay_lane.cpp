@@ -6,6 +6,7 @@
 #include "daemon/record/tape.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::record {
 namespace {
@@ -50,8 +51,8 @@ Result<std::unique_ptr<ReplayLane>> ReplayLane::open(std::uint32_t lane,
 Result<> ReplayLane::open_decoder(const log::SourceRow& source) {
   const drivers::Driver* driver = drivers::find_driver(source.driver);
   if (driver == nullptr) {
-    return fail("stream '" + stream_.name + "' comes from driver '" + source.driver +
-                    "', which this posed does not have",
+    return fail("stream " + in_quotes(stream_.name) + " comes from driver " +
+                    in_quotes(source.driver) + ", which this posed does not have",
                 file_);
   }
   auto description = driver->describe(source.text, source.identity);
@@ -68,7 +69,7 @@ Result<> ReplayLane::open_engine() {
   const StreamSettings& settings = stream_.settings;
   const drivers::Description& device = stream_.description;
   if ((settings.style || settings.generate) && !device.skeleton) {
-    return fail("stream '" + stream_.name + "' has stages but no skeleton", file_);
+    return fail("stream " + in_quotes(stream_.name) + " has stages but no skeleton", file_);
   }
   if (settings.style && !settings.style_model.sha256.empty()) {
     auto bound = models_.style(settings.style_model.sha256, device, *settings.style);
@@ -118,8 +119,8 @@ Result<> ReplayLane::expect(const pipeline::Decision& decision) {
     }
     default:
       if (possible(decision.now_ns)) return {};
-      return fail("the log is damaged (a decision of stream '" + stream_.name +
-                      "' was made at an impossible time); use another copy of it",
+      return fail("the log is damaged (a decision of stream " + in_quotes(stream_.name) +
+                      " was made at an impossible time); use another copy of it",
                   file_);
   }
 }

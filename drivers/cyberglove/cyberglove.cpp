@@ -103,12 +103,14 @@ Result<Description> describe(const std::string& text, const std::string& identit
 }
 
 Result<Description> expect(const Options& given) {
-  const auto wish = wish_of_given(given);
+  const auto options = complete_options(cyberglove_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const auto wish = wish_of(*options);
   if (!wish) return std::unexpected(wish.error());
-  const auto id = given.find("id");
+  if (auto sound = glove::check_connection(*options); !sound) return std::unexpected(sound.error());
   return describe(
       greeting_of({.hand = wish->hand, .layout = wish->layout, .ticks = ticks_of(*wish)}),
-      id == given.end() ? std::string() : std::get<std::string>(id->second));
+      option<std::string>(*options, "id"));
 }
 
 Result<glove::Model> model_of(const Description& description) {

@@ -108,6 +108,10 @@ Result<Chosen> choose(const Options& given) {
 Result<Description> expect(const Options& given) {
   const auto chosen = choose(given);
   if (!chosen) return std::unexpected(chosen.error());
+  if (chosen->table.link.kind != LinkKind::kHid) {
+    const auto sound = glove::check_connection(chosen->options);
+    if (!sound) return std::unexpected(sound.error());
+  }
   const auto& id = option<std::string>(chosen->options, "id");
   const auto& port = option<std::string>(chosen->options, "port");
   return describe(text_of(chosen->side, chosen->toml), id.empty() ? port : id);
@@ -170,7 +174,9 @@ Result<Device> open(const Options& given, Ports& ports) {
   auto device =
       make_device(described_driver(), text_of(chosen->side, chosen->toml), link->identity());
   if (!device) return device;
-  device->transport = make_link_transport(std::move(*link));
+  const bool hid = chosen->table.link.kind == LinkKind::kHid;
+  device->transport =
+      hid ? make_hid_transport(std::move(*link)) : make_link_transport(std::move(*link));
   const double rate_hz = device->description.rate_hz;
   device->reopen_after_s =
       rate_hz > 0.0 ? std::max(kSilence_s, kSilentPeriods / rate_hz) : kSilence_s;

@@ -84,11 +84,28 @@ Result<Description> describe(const std::string& text, const std::string& identit
                      .rate_hz = 0.0};
 }
 
+// The baud of the glove's own line, for who gives none.
+std::int64_t usual_baud(Form form) {
+  if (form == Form::kFiveWireless) return 9600;
+  return form == Form::kUltraWireless ? 115200 : 19200;
+}
+
+Options with_baud(Options options, const Greeted& glove) {
+  if (option<std::int64_t>(options, "baud") == 0) {
+    options["baud"] = usual_baud(glove.settings.form);
+  }
+  return options;
+}
+
 Result<Description> expect(const Options& given) {
   const auto options = complete_options(fivedt_driver(), given);
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);
   if (!glove) return std::unexpected(glove.error());
+  if (!is_usb(glove->settings.form)) {
+    const auto sound = glove::check_connection(with_baud(*options, *glove));
+    if (!sound) return std::unexpected(sound.error());
+  }
   return describe(greeting_of(*glove), option<std::string>(*options, "id"));
 }
 
@@ -117,23 +134,14 @@ std::vector<std::uint16_t> products(const Greeted& glove) {
   return {product(0), product(0x02), product(0x06)};
 }
 
-// The baud of the glove's own line, for who gives none.
-std::int64_t usual_baud(Form form) {
-  if (form == Form::kFiveWireless) return 9600;
-  return form == Form::kUltraWireless ? 115200 : 19200;
-}
-
-Result<Link> reach(Options options, const Greeted& glove, Ports& ports) {
+Result<Link> reach(const Options& options, const Greeted& glove, Ports& ports) {
   if (is_usb(glove.settings.form)) {
     return ports.hid({.vendor = kVendor,
                       .products = products(glove),
                       .id = option<std::string>(options, "id"),
                       .path = option<std::string>(options, "port")});
   }
-  if (option<std::int64_t>(options, "baud") == 0) {
-    options["baud"] = usual_baud(glove.settings.form);
-  }
-  return glove::connect(options, ports, {});
+  return glove::connect(with_baud(options, glove), ports, {});
 }
 
 Result<Device> open(const Options& given, Ports& ports) {
@@ -147,7 +155,8 @@ Result<Device> open(const Options& given, Ports& ports) {
   if (!warnings) return std::unexpected(warnings.error());
   auto device = make_device(fivedt_driver(), greeting_of(*glove), link->identity());
   if (!device) return device;
-  device->transport = make_link_transport(std::move(*link));
+  device->transport = is_usb(glove->settings.form) ? make_hid_transport(std::move(*link))
+                                                   : make_link_transport(std::move(*link));
   device->warnings = std::move(*warnings);
   if (const auto poll_hz = option<std::int64_t>(*options, "poll_hz"); poll_hz > 0) {
     device->poll = {.request = {std::byte{'C'}}, .period_ns = 1'000'000'000 / poll_hz};

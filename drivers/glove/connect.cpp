@@ -20,6 +20,15 @@ std::vector<std::string> words_of(std::string text) {
   return found;
 }
 
+std::string link_of(const Options& options) {
+  return options.contains("link") ? option<std::string>(options, "link") : "serial";
+}
+
+ListenSettings listen_settings(const Options& options) {
+  return {.endpoint = option<std::string>(options, "listen"),
+          .peers = words_of(option<std::string>(options, "peers"))};
+}
+
 }  // namespace
 
 std::vector<OptionSpec> serial_options(std::int64_t baud) {
@@ -49,19 +58,21 @@ Result<Side> hand_option(const Options& options) {
   return parse_side(option<std::string>(options, "hand"));
 }
 
-Result<Link> connect(const Options& options, Ports& ports, std::vector<std::uint32_t> usb_ids) {
-  const bool may_listen = options.contains("link");
-  const std::string link = may_listen ? option<std::string>(options, "link") : "serial";
-  if (link == "tcp") {
-    return ports.accept({.endpoint = option<std::string>(options, "listen"),
-                         .peers = words_of(option<std::string>(options, "peers"))});
-  }
+Result<> check_connection(const Options& options) {
+  const std::string link = link_of(options);
+  if (link == "tcp") return check_listen(listen_settings(options));
   if (link != "serial") return misuse("link should be \"serial\" or \"tcp\"");
   const std::int64_t baud = option<std::int64_t>(options, "baud");
   if (baud < 1 || baud > kMaxBaud) return misuse("baud should be 1 to 4000000");
+  return {};
+}
+
+Result<Link> connect(const Options& options, Ports& ports, std::vector<std::uint32_t> usb_ids) {
+  if (auto sound = check_connection(options); !sound) return std::unexpected(sound.error());
+  if (link_of(options) == "tcp") return ports.accept(listen_settings(options));
   return ports.serial({.port = option<std::string>(options, "port"),
                        .id = option<std::string>(options, "id"),
-                       .baud = static_cast<int>(baud),
+                       .baud = static_cast<int>(option<std::int64_t>(options, "baud")),
                        .usb_ids = std::move(usb_ids)});
 }
 

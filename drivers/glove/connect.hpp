@@ -18,6 +18,11 @@ namespace posed::drivers::glove {
 // Of completed options. Cold.
 [[nodiscard]] Result<Side> hand_option(const Options& options);
 
+// Whether connect() could do with these completed options, without opening anything: what a
+// driver's expect() asks, so that options that make no sense are refused before a glove is there.
+// Cold.
+[[nodiscard]] Result<> check_connection(const Options& options);
+
 // The link that completed options lead to; without port and id one of `usb_ids`
 // (vendor << 16 | product). Cold: may wait half a second for a glove that connects to us.
 [[nodiscard]] Result<Link> connect(const Options& options, Ports& ports,

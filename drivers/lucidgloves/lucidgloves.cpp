@@ -82,6 +82,7 @@ Result<Description> expect(const Options& given) {
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);
   if (!glove) return std::unexpected(glove.error());
+  if (auto sound = glove::check_connection(*options); !sound) return std::unexpected(sound.error());
   return describe(greeting_of(*glove), option<std::string>(*options, "id"));
 }
 

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <optional>
@@ -65,13 +66,19 @@ Result<Address> parse_endpoint(const std::string& endpoint) {
   return address;
 }
 
-Result<int> listen_at(const ListenSettings& settings) {
-  const auto address = parse_endpoint(settings.endpoint);
-  if (!address) return std::unexpected(address.error());
+Result<Address> address_of(const ListenSettings& settings) {
+  auto address = parse_endpoint(settings.endpoint);
+  if (!address) return address;
   if (settings.peers.empty() && !is_loopback(host_of(*address))) {
     return misuse("to listen on " + settings.endpoint +
                   ", name the gloves' addresses in peers; without them only loopback listens");
   }
+  return address;
+}
+
+Result<int> listen_at(const ListenSettings& settings) {
+  const auto address = address_of(settings);
+  if (!address) return std::unexpected(address.error());
   const int fd =
       ::socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const int yes = 1;
@@ -102,6 +109,11 @@ bool may_connect(const std::string& host, const std::vector<std::string>& peers)
 
 }  // namespace
 
+Result<> check_listen(const ListenSettings& settings) {
+  if (const auto address = address_of(settings); !address) return std::unexpected(address.error());
+  return {};
+}
+
 Result<Link> Ports::accept(const ListenSettings& settings) {
   auto listener = listeners_.find(settings.endpoint);
   if (listener == listeners_.end()) {
@@ -109,8 +121,10 @@ Result<Link> Ports::accept(const ListenSettings& settings) {
     if (!fd) return std::unexpected(fd.error());
     listener = listeners_.emplace(settings.endpoint, *fd).first;
   }
-  pollfd wanted{.fd = listener->second, .events = POLLIN, .revents = 0};
-  ::poll(&wanted, 1, kPatience_ms);
+  std::array<pollfd, 2> wanted{{{.fd = listener->second, .events = POLLIN, .revents = 0},
+                                {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
+  ::poll(wanted.data(), wanted.size(), kPatience_ms);
+  if (cancel_->fired()) return Cancel::error();
   // Of several that wait the newest counts: a glove that started anew leaves its old one behind.
   std::optional<Link> newest;
   while (true) {
@@ -121,6 +135,7 @@ Result<Link> Ports::accept(const ListenSettings& settings) {
     if (fd < 0) break;
     const std::string host = host_of(peer);
     Link link(fd, settings.endpoint + " from " + host, "tcp " + host);
+    link.heed(cancel_);
     if (!may_connect(host, settings.peers)) {
       ++refused_;
       continue;

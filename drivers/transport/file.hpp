@@ -33,6 +33,8 @@ class FileTransport final : public Transport {
   [[nodiscard]] double rate_hz() const noexcept override {
     return patient() ? 0.0 : 1e9 / period_ns_;
   }
+  // Whether it begins again after the last chunk, so that it never ends.
+  [[nodiscard]] bool loops() const noexcept { return loop_; }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   // Ends with an empty chunk after the last. RT-safe: no system call at all.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;

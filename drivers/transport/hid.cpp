@@ -28,6 +28,7 @@ Result<Link> Ports::hid(const HidSettings& settings) {
   const auto fd = open_node(chosen.node);
   if (!fd) return std::unexpected(fd.error());
   Link link(*fd, chosen.node, chosen.identity());
+  link.heed(cancel_);
   hidraw_devinfo info{};
   if (::ioctl(*fd, HIDIOCGRAWINFO, &info) != 0) {
     return fail(chosen.node + " is no HID device; see `posed devices` for those that are");

@@ -36,11 +36,6 @@ milliseconds left_until(Clock::time_point deadline) {
   return std::max(left, milliseconds{0});
 }
 
-void wait_for(int fd, short events, milliseconds patience) {
-  pollfd wanted{.fd = fd, .events = events, .revents = 0};
-  ::poll(&wanted, 1, static_cast<int>(patience.count()));
-}
-
 std::string gone(const std::string& name, int error) {
   return name + " has gone (" + (error == 0 ? "hung up" : std::strerror(error)) +
          "); plug it in again or switch it on";
@@ -118,7 +113,8 @@ Link::~Link() {
 Link::Link(Link&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
       name_(std::move(other.name_)),
-      identity_(std::move(other.identity_)) {}
+      identity_(std::move(other.identity_)),
+      cancel_(std::move(other.cancel_)) {}
 
 Link& Link::operator=(Link&& other) noexcept {
   if (this == &other) return *this;
@@ -126,12 +122,21 @@ Link& Link::operator=(Link&& other) noexcept {
   fd_ = std::exchange(other.fd_, -1);
   name_ = std::move(other.name_);
   identity_ = std::move(other.identity_);
+  cancel_ = std::move(other.cancel_);
   return *this;
+}
+
+void Link::wait_for(short events, milliseconds patience) const {
+  std::array<pollfd, 2> wanted{
+      {{.fd = fd_, .events = events, .revents = 0},
+       {.fd = cancel_ ? cancel_->fd() : -1, .events = POLLIN, .revents = 0}}};
+  ::poll(wanted.data(), wanted.size(), static_cast<int>(patience.count()));
 }
 
 Result<> Link::write(std::span<const std::byte> bytes) {
   const auto deadline = Clock::now() + kWritePatience;
   while (!bytes.empty()) {
+    if (cancelled()) return Cancel::error();
     const ssize_t sent = write_some(fd_, bytes);
     if (sent > 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
@@ -142,7 +147,7 @@ Result<> Link::write(std::span<const std::byte> bytes) {
     if (left.count() == 0) {
       return fail(name_ + " takes no bytes; check that a glove is on it and switched on");
     }
-    wait_for(fd_, POLLOUT, left);
+    wait_for(POLLOUT, left);
   }
   return {};
 }
@@ -153,11 +158,12 @@ Result<std::vector<std::byte>> Link::read(std::chrono::milliseconds patience) {
   const auto deadline = Clock::now() + patience;
   std::vector<std::byte> bytes(kRead);
   while (true) {
+    if (cancelled()) return Cancel::error();
     const ssize_t got = ::read(fd_, bytes.data(), bytes.size());
     if (got < 0 && not_now(errno)) {
       const auto left = left_until(deadline);
       if (left.count() == 0) return std::vector<std::byte>{};
-      wait_for(fd_, POLLIN, left);
+      wait_for(POLLIN, left);
       continue;
     }
     if (got <= 0) return fail(gone(name_, got == 0 ? 0 : errno));

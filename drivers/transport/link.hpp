@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "drivers/driver.hpp"
+#include "drivers/transport/cancel.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::drivers {
@@ -31,6 +32,9 @@ class Link {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const std::string& identity() const noexcept { return identity_; }
 
+  // Every wait of the cold functions below ends with an error once this is fired.
+  void heed(std::shared_ptr<const Cancel> cancel) noexcept { cancel_ = std::move(cancel); }
+
   // Cold. All bytes, within a second; an error says what happened to the device.
   [[nodiscard]] Result<> write(std::span<const std::byte> bytes);
   [[nodiscard]] Result<> write(std::string_view text);
@@ -40,11 +44,18 @@ class Link {
   [[nodiscard]] Result<> drain(std::chrono::milliseconds quiet);
 
  private:
+  void wait_for(short events, std::chrono::milliseconds patience) const;
+  [[nodiscard]] bool cancelled() const noexcept { return cancel_ && cancel_->fired(); }
+
   int fd_ = -1;
   std::string name_, identity_;
+  std::shared_ptr<const Cancel> cancel_;
 };
 
 // Reads what the link has, at most 4 KB a call; a hang-up or an error of the descriptor is `lost`.
+// For serial ports and sockets, whose writes do not block.
 [[nodiscard]] std::unique_ptr<Transport> make_link_transport(Link link);
+// The same for a link of Ports::hid(), whose writes block: it is a ColdWriter, too.
+[[nodiscard]] std::unique_ptr<Transport> make_hid_transport(Link link);
 
 }  // namespace posed::drivers

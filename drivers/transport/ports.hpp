@@ -36,6 +36,9 @@ struct HidSettings {
   std::string path{};                     // "/dev/hidraw0" instead of all of the above
 };
 
+// Whether these settings make sense, without listening. Cold.
+[[nodiscard]] Result<> check_listen(const ListenSettings& settings);
+
 class Ports {
  public:
   Ports() = default;
@@ -57,10 +60,15 @@ class Ports {
   // A USB device without a node of its own kind, its interface claimed. Cold.
   [[nodiscard]] Result<UsbLink> usb(const UsbSettings& settings);
 
+  // Ends what is waited for now and later, here and on the links that came from here: for whoever
+  // stops while a device is opened. Any thread.
+  void cancel() noexcept { cancel_->fire(); }
+
   // Connections dropped so far because no peer in the list made them.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
+  std::shared_ptr<Cancel> cancel_ = std::make_shared<Cancel>();
   std::uint64_t refused_ = 0;
   std::map<std::string, int> listeners_;  // by endpoint
 };

@@ -85,6 +85,7 @@ Result<Link> Ports::serial(const SerialSettings& settings) {
   const auto fd = open_node(port->node);
   if (!fd) return std::unexpected(fd.error());
   Link link(*fd, port->node, port->identity());
+  link.heed(cancel_);
   if (auto ok = set_raw(*fd, port->node, settings.baud); !ok) return std::unexpected(ok.error());
   // flock keeps a second posed out; this keeps out the programs that know nothing of flock. Not on
   // a pseudo-terminal: there it would outlast us while the other side keeps the node open.

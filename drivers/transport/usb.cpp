@@ -94,6 +94,7 @@ const std::string& UsbLink::name() const noexcept { return impl_->name(); }
 const std::string& UsbLink::identity() const noexcept { return impl_->identity(); }
 
 Result<std::vector<std::byte>> UsbLink::feature(std::uint8_t report, std::size_t bytes) {
+  if (impl_->cancelled()) return Cancel::error();
   std::vector<unsigned char> answer(bytes);
   const int got =
       libusb_control_transfer(impl_->handle(), kDeviceToHost | kClassInterface, kGetReport,
@@ -109,6 +110,7 @@ Result<std::vector<std::byte>> UsbLink::feature(std::uint8_t report, std::size_t
 }
 
 Result<> UsbLink::set_feature(std::span<const std::byte> report) {
+  if (impl_->cancelled()) return Cancel::error();
   std::vector<unsigned char> bytes(report.size());
   std::memcpy(bytes.data(), report.data(), report.size());
   const auto number = bytes.empty() ? 0U : bytes.front();
@@ -129,7 +131,8 @@ Result<UsbLink> Ports::usb(const UsbSettings& settings) {
   if (!chosen) return std::unexpected(chosen.error());
   const auto node = open_node(chosen->node);
   if (!node) return std::unexpected(node.error());
-  auto impl = std::make_unique<UsbLink::Impl>(*node, settings, chosen->node, chosen->identity());
+  auto impl =
+      std::make_unique<UsbLink::Impl>(*node, settings, chosen->node, chosen->identity(), cancel_);
   if (auto ok = impl->claim(); !ok) return std::unexpected(ok.error());
   return UsbLink(std::move(impl));
 }

@@ -4,24 +4,31 @@
 
 #include <libusb.h>
 
+#include <memory>
 #include <string>
 
+#include "drivers/transport/cancel.hpp"
 #include "drivers/transport/usb.hpp"
 
 namespace posed::drivers {
 
 class UsbLink::Impl {
  public:
-  Impl(int node, UsbSettings settings, std::string name, std::string identity)
+  Impl(int node, UsbSettings settings, std::string name, std::string identity,
+       std::shared_ptr<const Cancel> cancel)
       : node_(node),
         settings_(std::move(settings)),
         name_(std::move(name)),
-        identity_(std::move(identity)) {}
+        identity_(std::move(identity)),
+        cancel_(std::move(cancel)) {}
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
   [[nodiscard]] Result<> claim();
+
+  // A transfer that has begun takes up to a second; after a cancel none is begun.
+  [[nodiscard]] bool cancelled() const noexcept { return cancel_->fired(); }
 
   [[nodiscard]] libusb_context* context() const noexcept { return context_; }
   [[nodiscard]] std::uint8_t endpoint() const noexcept { return endpoint_; }
@@ -34,6 +41,7 @@ class UsbLink::Impl {
   int node_;
   UsbSettings settings_;
   std::string name_, identity_;
+  std::shared_ptr<const Cancel> cancel_;
   libusb_context* context_ = nullptr;
   libusb_device_handle* handle_ = nullptr;
   std::uint8_t endpoint_ = 0;

@@ -95,8 +95,12 @@ TEST_CASE("a glove comes late, goes and comes back; the others never notice") {
 TEST_CASE("a live calibration and haptics reach the glove, and the log repeats them") {
   GloveStage stage;
   std::optional<Process> right;
-  stage.plug_in("right", right);
   stage.record();
+  CHECK(has(stage.ctl({"haptics", "right", "--force", "1"}).err,
+            "the glove of stream right is away"));
+  stage.plug_in("right", right);
+  CHECK(posed({"monitor", "--connect", stage.publish, "--stream", "right", "--count", "1"}).code ==
+        0);
   const auto calibration =
       stage.folder.write("ann.toml",
                          "format = 1\ndriver = \"lucidgloves\"\n"

@@ -28,10 +28,11 @@ class Stage {
 
   // Starts `posed COMMAND --config posed.toml` with these options, too, and waits until it is
   // ready.
-  void launch(const std::string& command, const std::vector<std::string>& options = {}) {
+  void launch(const std::string& command, const std::vector<std::string>& options = {},
+              ChildStderr err = {}) {
     std::vector<std::string> arguments{command, "--config", path("posed.toml")};
     arguments.insert(arguments.end(), options.begin(), options.end());
-    daemon.emplace(std::move(arguments), most_files);
+    daemon.emplace(std::move(arguments), err, -1, most_files);
     const auto line = daemon->line();
     INFO(daemon->errors());
     REQUIRE(line);

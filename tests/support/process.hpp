@@ -21,10 +21,18 @@
 
 namespace posed::test {
 
+// Where a child's stderr goes: a file that errors() reads, a descriptor of the test's, or nowhere.
+struct ChildStderr {
+  static constexpr int kFile = -1, kClosed = -2;
+  int descriptor = kFile;
+};
+
 class Process {
  public:
-  // Starts `posed` with these arguments; stdin is empty. It may open `most_files` (0: as we may).
-  explicit Process(std::vector<std::string> arguments, int most_files = 0) {
+  // Starts `posed` with these arguments; stdin is empty. `stdout_descriptor` is the test's own
+  // instead of the pipe that line() reads. It may open `most_files` (0: as we may).
+  explicit Process(std::vector<std::string> arguments, ChildStderr err = {},
+                   int stdout_descriptor = -1, int most_files = 0) {
     arguments.insert(arguments.begin(), POSED_BINARY);
     if (most_files > 0) {
       const std::string limit = "ulimit -n " + std::to_string(most_files);
@@ -39,8 +47,15 @@ class Process {
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions, out[1], 1);
-    posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT, 0600);
+    posix_spawn_file_actions_adddup2(&actions, stdout_descriptor < 0 ? out[1] : stdout_descriptor,
+                                     1);
+    if (err.descriptor == ChildStderr::kFile) {
+      posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT, 0600);
+    } else if (err.descriptor == ChildStderr::kClosed) {
+      posix_spawn_file_actions_addclose(&actions, 2);
+    } else {
+      posix_spawn_file_actions_adddup2(&actions, err.descriptor, 2);
+    }
     const int failed = posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     close(out[1]);
@@ -52,7 +67,7 @@ class Process {
       kill(pid_, SIGKILL);
       waitpid(pid_, nullptr, 0);
     }
-    close(out_);
+    hang_up();
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -81,6 +96,12 @@ class Process {
     std::string all;
     while (const auto next = line()) all += *next + "\n";
     return all;
+  }
+
+  // Nobody reads its stdout from now on.
+  void hang_up() {
+    if (out_ >= 0) close(out_);
+    out_ = -1;
   }
 
   void send(int signal) const { kill(pid_, signal); }

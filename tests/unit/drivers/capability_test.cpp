@@ -296,4 +296,56 @@ TEST_CASE("wrong options are refused in a sentence that names them") {
   }
 }
 
+// A stream whose device may come later is opened by its keeper, long after the start: whatever is
+// wrong with its options has to be found without opening it.
+TEST_CASE("what open() would refuse as wrong use, expect() refuses in the same sentence") {
+  const std::vector<std::pair<std::string, OptionValue>> wrong_values{
+      {"hand", std::string("middle")},
+      {"link", std::string("bluetooth")},
+      {"baud", std::int64_t{-1}},
+      {"baud", std::int64_t{5'000'000}},
+      {"model", std::string("17")},
+      {"encoding", std::string("morse")},
+      {"form", std::string("9bit")},
+      {"rate_hz", -1.0},
+      {"poll_hz", std::int64_t{1000}},
+      {"max_analog_value", std::int64_t{0}},
+      {"kit_port", std::string("c")},
+      {"mode", std::string("wait")},
+      {"device", std::string("nothing.toml")}};
+  int refused = 0;
+  const auto compare = [&](const Driver& driver, const Options& options) {
+    Ports ports;
+    ports.cancel();  // nothing is waited for
+    const auto opened = driver.open(options, ports);
+    if (opened || opened.error().exit_code != ExitCode::kWrongUse) return;
+    const auto expected = driver.expect(options);
+    INFO(driver.name << ": " << opened.error().text());
+    REQUIRE_FALSE(expected);
+    CHECK(expected.error().text() == opened.error().text());
+    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
+    ++refused;
+  };
+  for (const Driver& driver : registry()) {
+    if (driver.expect == nullptr) continue;
+    Options required;
+    if (driver.name == "described") required["device"] = std::string("opencyberglove");
+    for (const auto& [name, value] : wrong_values) {
+      if (std::ranges::find(driver.options, name, &OptionSpec::name) == driver.options.end()) {
+        continue;
+      }
+      Options options = required;
+      options[name] = value;
+      compare(driver, options);
+    }
+    for (const char* endpoint : {"nonsense", "0.0.0.0:5200"}) {
+      if (std::ranges::find(driver.options, "link", &OptionSpec::name) == driver.options.end()) {
+        continue;
+      }
+      compare(driver, {{"link", std::string("tcp")}, {"listen", std::string(endpoint)}});
+    }
+  }
+  CHECK(refused >= 20);
+}
+
 }  // namespace posed::drivers

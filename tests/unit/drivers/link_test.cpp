@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <numeric>
+#include <thread>
 
 #include "drivers/transport/ports.hpp"
 #include "tests/support/free_port.hpp"
@@ -233,6 +234,22 @@ TEST_CASE("only peers may connect, and without peers only loopback listens") {
   const Client stranger(port);
   CHECK_FALSE(ports.accept(others));
   CHECK(ports.refused() == 1);
+}
+
+TEST_CASE("whoever stops while a device is opened waits for nothing, then or later") {
+  using std::chrono::hours;
+  const PseudoTerminal silent;
+  Ports ports;
+  auto link = ports.serial({.port = silent.port()});
+  REQUIRE(link);
+  std::thread stopper([&] { ports.cancel(); });
+  const auto bytes = link->read(hours(1));
+  stopper.join();
+  REQUIRE_FALSE(bytes);
+  CHECK(bytes.error().message.find("posed stops") != std::string::npos);
+  CHECK_FALSE(link->drain(hours(1)));
+  CHECK_FALSE(link->write("x"));
+  CHECK_FALSE(ports.accept({.endpoint = loopback(free_port())}));
 }
 
 TEST_CASE("an endpoint that is none or taken is refused in a sentence") {

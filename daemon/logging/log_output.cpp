@@ -1,0 +1,238 @@
+#include "daemon/logging/log_output.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <climits>
+#include <condition_variable>
+#include <csignal>
+#include <deque>
+#include <mutex>
+#include <thread>
+
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/sink.h>
+#include <spdlog/spdlog.h>
+
+#include "daemon/logging/line_limiter.hpp"
+
+namespace posed::logging {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::size_t kMostWaiting = 1024;  // lines
+constexpr std::chrono::milliseconds kLastLinesWithin{200};
+constexpr std::chrono::milliseconds kForEver = std::chrono::milliseconds::max();
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(SteadyClock::now().time_since_epoch())
+      .count();
+}
+
+// What a terminal shows the level in; the same colours as spdlog's own sinks.
+std::string_view colour_of(spdlog::level::level_enum level) {
+  switch (level) {
+    case spdlog::level::info:
+      return "\033[32m";
+    case spdlog::level::warn:
+      return "\033[33m\033[1m";
+    case spdlog::level::err:
+      return "\033[31m\033[1m";
+    case spdlog::level::critical:
+      return "\033[1m\033[41m";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+// The sink and all that the thread uses: it outlives the LogOutput when the thread is left behind.
+class LogOutput::Queue final : public spdlog::sinks::sink {
+ public:
+  explicit Queue(int descriptor) : descriptor_(descriptor), coloured_(::isatty(descriptor) == 1) {}
+
+  void log(const spdlog::details::log_msg& message) override {
+    const std::scoped_lock lock(mutex_);
+    const std::string_view text(message.payload.data(), message.payload.size());
+    if (!limits_ || limiter_.admit(now_ns(), message.level, text)) push(format(message));
+    changed_.notify_all();  // a line waits, or one was held back whose time will come
+  }
+  void flush() override {}
+  void set_pattern(const std::string& /*pattern*/) override {}
+  void set_formatter(std::unique_ptr<spdlog::formatter> formatter) override {
+    const std::scoped_lock lock(mutex_);
+    formatter_ = std::move(formatter);
+  }
+
+  void say(std::string_view line) {
+    const std::scoped_lock lock(mutex_);
+    push(std::string(line) + '\n');
+    changed_.notify_all();
+  }
+
+  void limit() {
+    const std::scoped_lock lock(mutex_);
+    limits_ = true;
+  }
+
+  // The thread.
+  void run() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      sum_up();
+      if (!lines_.empty()) {
+        write_next(lock);
+      } else if (ending_) {
+        break;
+      } else if (const std::int64_t due_ns = limiter_.next_due_ns(); due_ns == kNoTime_ns) {
+        changed_.wait(lock);
+      } else {
+        changed_.wait_until(lock, SteadyClock::time_point(std::chrono::nanoseconds(due_ns)));
+      }
+    }
+    ended_ = true;
+    changed_.notify_all();
+  }
+
+  // Whether the thread has written all and ended within `patience`.
+  bool end(std::chrono::milliseconds patience) {
+    {
+      std::unique_lock lock(mutex_);
+      ending_ = true;
+      changed_.notify_all();
+      changed_.wait_for(lock, patience, [this] { return ended_; });
+    }
+    // Once more: the thread sanitizer does not see that the wait has locked it.
+    const std::scoped_lock lock(mutex_);
+    return ended_;
+  }
+
+ private:
+  // All below: with the lock held.
+  void push(std::string line) {
+    if (lines_.size() >= kMostWaiting) {
+      lines_.pop_front();
+      ++lost_;
+    }
+    lines_.push_back(std::move(line));
+  }
+
+  void sum_up() {
+    while (const auto line = limiter_.take_due(now_ns(), ending_)) {
+      push(format_text(static_cast<spdlog::level::level_enum>(line->level), line->text));
+    }
+  }
+
+  void write_next(std::unique_lock<std::mutex>& lock) {
+    const std::uint64_t lost = std::exchange(lost_, 0);
+    std::string text;
+    if (lost > 0) {
+      text = format_text(spdlog::level::warn,
+                         std::to_string(lost) + " lines of the log were lost here: nobody read it");
+    }
+    text += lines_.front();
+    lines_.pop_front();
+    lock.unlock();
+    const bool written = write_within(descriptor_, text, kForEver);
+    lock.lock();
+    if (!written) lost_ += lost + 1;
+  }
+
+  std::string format_text(spdlog::level::level_enum level, const std::string& text) {
+    return format(spdlog::details::log_msg("posed", level, text));
+  }
+
+  std::string format(const spdlog::details::log_msg& message) {
+    spdlog::memory_buf_t buffer;
+    formatter_->format(message, buffer);
+    std::string line(buffer.data(), buffer.size());
+    if (coloured_ && message.color_range_end > message.color_range_start) {
+      line.insert(message.color_range_end, "\033[m");
+      line.insert(message.color_range_start, colour_of(message.level));
+    }
+    return line;
+  }
+
+  const int descriptor_;
+  const bool coloured_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::unique_ptr<spdlog::formatter> formatter_ = std::make_unique<spdlog::pattern_formatter>();
+  LineLimiter limiter_;
+  bool limits_ = false;
+  std::deque<std::string> lines_;
+  std::uint64_t lost_ = 0;  // lines that nobody will read, not told yet
+  bool ending_ = false, ended_ = false;
+};
+
+namespace {
+
+std::shared_ptr<LogOutput::Queue> queue_in_use() {
+  const auto logger = spdlog::default_logger();
+  if (!logger || logger->sinks().empty()) return nullptr;
+  return std::dynamic_pointer_cast<LogOutput::Queue>(logger->sinks().front());
+}
+
+}  // namespace
+
+LogOutput::LogOutput(int descriptor) : queue_(std::make_shared<Queue>(descriptor)) {
+  // Signals are for the thread that waits for them, and this one is started before any is blocked.
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  std::thread([queue = queue_] {
+    pthread_setname_np(pthread_self(), "posed-log");
+    queue->run();
+  }).detach();
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("posed", queue_));
+}
+
+LogOutput::~LogOutput() { queue_->end(kLastLinesWithin); }
+
+void sum_up_repeats() {
+  if (const auto queue = queue_in_use()) queue->limit();
+}
+
+void say(std::string_view line) {
+  if (const auto queue = queue_in_use()) return queue->say(line);
+  write_within(STDERR_FILENO, std::string(line) + '\n', kLastLinesWithin);
+}
+
+bool write_within(int descriptor, std::string_view text, std::chrono::milliseconds patience) {
+  const bool for_ever = patience == kForEver;
+  const auto deadline = SteadyClock::now() + (for_ever ? std::chrono::milliseconds(0) : patience);
+  while (!text.empty()) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - SteadyClock::now());
+    pollfd wait{.fd = descriptor, .events = POLLOUT, .revents = 0};
+    const int timeout_ms = for_ever ? -1 : static_cast<int>(std::max<long>(left.count(), 0));
+    if (::poll(&wait, 1, timeout_ms) == 0) return false;
+    // A pipe that is ready takes so much without blocking.
+    const ssize_t wrote =
+        ::write(descriptor, text.data(), std::min<std::size_t>(text.size(), PIPE_BUF));
+    if (wrote > 0) {
+      text.remove_prefix(static_cast<std::size_t>(wrote));
+    } else if (wrote < 0 && errno != EAGAIN && errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void protect_standard_descriptors() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
+    // The lowest free number is this one. Opened the wrong way round, its use fails as before.
+    [[maybe_unused]] const int opened =
+        ::open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
+}  // namespace posed::logging

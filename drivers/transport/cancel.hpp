@@ -1,0 +1,45 @@
+// Cancel: ends every wait of a device's opening (its start-up talk, a glove that may connect) when
+// the daemon is told to stop. Once fired it stays fired.
+#pragma once
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdint>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::drivers {
+
+class Cancel {
+ public:
+  Cancel() noexcept : fd_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+  ~Cancel() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Cancel(const Cancel&) = delete;
+  Cancel& operator=(const Cancel&) = delete;
+
+  // Any thread.
+  void fire() noexcept {
+    fired_.store(true);
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t written = ::write(fd_, &one, sizeof one);
+  }
+  [[nodiscard]] bool fired() const noexcept { return fired_.load(); }
+
+  // Readable once it is fired; -1 without a descriptor left: then waits end in their own time.
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+
+  // What a wait that was ended says; nobody is told.
+  [[nodiscard]] static std::unexpected<Error> error() {
+    return fail("posed stops: the device is left as it is");
+  }
+
+ private:
+  int fd_;
+  std::atomic<bool> fired_{false};
+};
+
+}  // namespace posed::drivers

@@ -1,0 +1,52 @@
+// HidTransport: a hidraw node's reports, one a read, and one a write, which the device's keeper
+// does (cold_writer.hpp says why).
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include <boost/lockfree/spsc_queue.hpp>
+
+#include "drivers/driver.hpp"
+#include "drivers/transport/cold_writer.hpp"
+#include "drivers/transport/link.hpp"
+
+namespace posed::drivers {
+
+class HidTransport final : public Transport, public ColdWriter {
+ public:
+  explicit HidTransport(Link link);
+  ~HidTransport() override;
+  HidTransport(const HidTransport&) = delete;
+  HidTransport& operator=(const HidTransport&) = delete;
+
+  [[nodiscard]] int poll_fd() const noexcept override { return reader_->poll_fd(); }
+  [[nodiscard]] Result<> start(std::int64_t now_ns) override { return reader_->start(now_ns); }
+  [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override { return reader_->read(now_ns); }
+  // Queues the report and tells the keeper with one write to an eventfd. RT-safe but for that.
+  [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
+
+  [[nodiscard]] int waiting_fd() const noexcept override { return waiting_; }
+  void write_waiting() noexcept override;
+  [[nodiscard]] std::uint64_t dropped() const noexcept override { return dropped_.load(); }
+
+ private:
+  static constexpr std::size_t kMaxReport = 1024;  // bytes; full speed has 64
+  static constexpr std::size_t kQueue = 16;        // reports
+  static constexpr std::size_t kBacklog = 4;       // reports that are still worth sending
+  struct Report {
+    std::size_t size = 0;
+    std::array<std::byte, kMaxReport> bytes;
+  };
+
+  int fd_;
+  int waiting_;
+  std::unique_ptr<Transport> reader_;
+  boost::lockfree::spsc_queue<Report, boost::lockfree::capacity<kQueue>> queue_;
+  Report sending_;  // the reader's: kept here because it is large
+  std::atomic<std::uint64_t> dropped_{0};
+};
+
+}  // namespace posed::drivers

@@ -1,0 +1,176 @@
+// The beginning and the end of the real binary beside gloves that do not answer: it streams what is
+// there, opens the rest beside it, and hears a signal at every moment.
+#include <catch2/catch.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "daemon/devices/emulated_port.hpp"
+#include "tests/e2e/served.hpp"
+#include "tests/support/pipe.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+using SteadyClock = std::chrono::steady_clock;
+
+// What an idle machine does in a tenth of it; opening eight silent gloves in a row took 16.6 s.
+constexpr auto kAtOnce = 5s;
+
+double ms_since(SteadyClock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(SteadyClock::now() - begin).count();
+}
+
+// A walker and eight gloves that are plugged in, but never say a word.
+class SilentGloves : public Stage {
+ public:
+  SilentGloves() {
+    REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
+    std::string config = std::string(kEndpoints) +
+                         "[[stream]]\nname = \"walker\"\ndriver = \"file\"\n[stream.file]\n"
+                         "path = \"walk.bvh\"\nloop = true\n";
+    const std::vector<std::string> drivers{"cyberglove", "lucidgloves", "fivedt"};
+    for (std::size_t i = 0; i < 8; ++i) {
+      gloves_.push_back(devices::EmulatedPort::open_pty().value());
+      config += "[[stream]]\nname = \"glove" + std::to_string(i) + "\"\ndriver = \"" +
+                drivers[i % drivers.size()] + "\"\nport = \"" + gloves_.back().name() + "\"\n";
+    }
+    folder.write("posed.toml", config);
+  }
+
+  // Starts a command and waits until it holds its stop signals back, which is the first it does.
+  void start_and_catch(const std::string& command, const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments{command, "--config", path("posed.toml")};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    daemon.emplace(std::move(arguments));
+    const auto holds_signals = [this] {
+      std::ifstream status("/proc/" + std::to_string(daemon->pid()) + "/status");
+      for (std::string word; status >> word;) {
+        if (word != "SigBlk:") continue;
+        std::string mask;
+        status >> mask;
+        const auto held = [bits = std::stoull(mask, nullptr, 16)](int signal) {
+          return (bits >> (signal - 1) & 1) != 0;
+        };
+        return held(SIGINT) && !held(SIGUSR1);  // all are, for a moment, while a thread is made
+      }
+      return false;
+    };
+    const auto begin = SteadyClock::now();
+    while (!holds_signals() && SteadyClock::now() - begin < 30s) std::this_thread::sleep_for(1ms);
+  }
+
+  void expect_end(int signal) {
+    const auto begin = SteadyClock::now();
+    daemon->send(signal);
+    CHECK(daemon->exit_code(kAtOnce) == 0);
+    WARN("signal to the end: " << ms_since(begin) << " ms");
+    INFO(daemon->errors());
+    CHECK_FALSE(daemon->errors().contains("posed stops"));
+  }
+
+ private:
+  std::vector<devices::EmulatedPort> gloves_;
+};
+
+}  // namespace
+
+TEST_CASE("eight silent gloves hold up neither the start, nor the walker, nor the end") {
+  SilentGloves stage;
+  const auto begin = SteadyClock::now();
+  stage.launch("run");
+  const double ready_ms = ms_since(begin);
+  WARN("start to ready: " << ready_ms << " ms");
+  CHECK(ready_ms < 1e3 * std::chrono::duration<double>(kAtOnce).count());
+  CHECK(
+      posed({"monitor", "--connect", stage.publish, "--stream", "walker", "--count", "30"}).code ==
+      0);
+  const auto status = json::parse(stage.ctl({"--json", "status"}).out).at("status");
+  REQUIRE(status.at("stream").size() == 9);
+  for (std::size_t i = 1; i < 9; ++i) CHECK(status.at("stream").at(i).at("away") == true);
+  stage.expect_end(SIGINT);  // while all eight are in their start-up talk
+}
+
+TEST_CASE("a signal that comes while posed starts ends it cleanly") {
+  for (const std::string command : {"run", "record"}) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+      SilentGloves stage;
+      const std::vector<std::string> options{"--out", stage.path("take.plog")};
+      stage.start_and_catch(command, command == "record" ? options : std::vector<std::string>{});
+      stage.expect_end(signal);
+      if (command == "run") continue;
+      const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
+      INFO(replay.err);
+      CHECK(replay.code == 0);  // short, but whole
+    }
+  }
+}
+
+TEST_CASE("a second signal changes nothing") {
+  SilentGloves stage;
+  stage.launch("record", {"--out", stage.path("take.plog")});
+  stage.daemon->send(SIGTERM);
+  stage.daemon->send(SIGINT);
+  stage.expect_end(SIGTERM);
+  CHECK(posed({"replay", stage.path("take.plog"), "--speed", "max"}).code == 0);
+}
+
+TEST_CASE("options of a glove that make no sense are refused at the start, glove or not") {
+  Stage stage;
+  for (const auto& [options, sentence] : std::vector<std::pair<std::string, std::string>>{
+           {"baud = -1\n", "stream 'right': baud should be 1 to 4000000"},
+           {"link = \"radio\"\n", "stream 'right': link should be \"serial\" or \"tcp\""},
+           {"link = \"tcp\"\nlisten = \"0.0.0.0:5200\"\n", "name the gloves' addresses in peers"},
+           {"hand = \"middle\"\n", "hand"}}) {
+    stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +
+                                         "[[stream]]\nname = \"right\"\ndriver = \"cyberglove\"\n"
+                                         "[stream.cyberglove]\n" +
+                                         options);
+    for (const char* command : {"run", "check"}) {
+      const Outcome refused = posed({command, "--config", stage.path("posed.toml")});
+      CHECK(refused.code == 2);
+      CHECK(has(refused.err, sentence));
+    }
+  }
+}
+
+TEST_CASE("--until-end waits for what can end, and is refused where nothing can") {
+  SilentGloves stage;
+  const Outcome refused = posed({"run", "--config", stage.path("posed.toml"), "--until-end"});
+  CHECK(refused.code == 2);
+  CHECK(has(refused.err, "--until-end: no source of this config ever ends"));
+  std::ifstream file(stage.path("posed.toml"));
+  std::string config{std::istreambuf_iterator<char>(file), {}};
+  config.replace(config.find("loop = true"), 11, "loop = false");
+  stage.folder.write("posed.toml", config);
+  const Outcome ended = posed({"record", "--config", stage.path("posed.toml"), "--out",
+                               stage.path("take.plog"), "--frames", "--until-end"});
+  INFO(ended.err);
+  CHECK(ended.code == 0);
+  const Outcome replay =
+      posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect", "--json"});
+  INFO(replay.err);
+  CHECK(replay.code == 0);
+  CHECK(json::parse(replay.out).at("compared") > 100);
+}
+
+TEST_CASE("a stdout that is full holds up neither the start nor the end") {
+  SilentGloves stage;
+  Pipe out;
+  out.fill();
+  stage.daemon.emplace(std::vector<std::string>{"run", "--config", stage.path("posed.toml")},
+                       ChildStderr{}, out.write_end());
+  for (int i = 0; i < 1000 && !stage.daemon->errors().contains("stdout does not take"); ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
+  CHECK(has(stage.daemon->errors(), "tcp://127.0.0.1:"));  // the log has the endpoints instead
+  stage.expect_end(SIGTERM);
+}
+
+}  // namespace posed::test
