@@ -98,7 +98,7 @@ TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
   for (const char* figure : {"jerk", "ldlj", "sparc"}) CHECK(told["performed"][figure].is_number());
   const auto& curve = told["curve"];
   REQUIRE(curve.size() > 5);
-  CHECK(curve.back()["rms_deg"] < curve.front()["rms_deg"]);
+  CHECK(curve.back()["channel_rms_deg"] < curve.front()["channel_rms_deg"]);
   CHECK(bytes_of(glove.file("lag.svg")).find("<svg") == 0);
   CHECK(bytes_of(glove.file("t.dot")).find("digraph") != std::string::npos);
   CHECK(one_sentence(eval({"--labels", "wave"}), 2, "wave"));
