@@ -9,6 +9,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/output_files.hpp"
+#include "daemon/cli/waiting.hpp"
 #include "daemon/record/log_clip.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frames_clip.hpp"
@@ -103,7 +104,10 @@ int run(Convert& convert) {
   if (!convert.hand.empty()) {
     convert.read.hand = convert.hand == "left" ? Side::kLeft : Side::kRight;
   }
-  const auto clip = read(convert);
+  const auto clip = [&] {
+    const Waiting waiting("reading " + convert.in);
+    return read(convert);
+  }();
   if (!clip) return report(clip.error());
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());

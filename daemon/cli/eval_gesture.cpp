@@ -14,6 +14,7 @@
 #include "daemon/cli/lag_curve.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/tree_options.hpp"
+#include "daemon/cli/waiting.hpp"
 #include "models/generate/constrain.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/motion/naturalness.hpp"
@@ -227,7 +228,10 @@ void add_eval_gesture(CLI::App& eval, int& exit_code) {
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const auto made = evaluate_gesture(*options);
+    const auto made = [&] {
+      const Waiting waiting("performing at every look-ahead");
+      return evaluate_gesture(*options);
+    }();
     exit_code = made ? finish(*made, options->json) : report(made.error());
   });
 }

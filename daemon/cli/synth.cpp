@@ -10,6 +10,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/output_files.hpp"
+#include "daemon/cli/waiting.hpp"
 #include "models/generate/constrain.hpp"
 #include "models/generate/perform.hpp"
 #include "models/generate/tempo.hpp"
@@ -158,7 +159,10 @@ void add_synth(CLI::App& app, int& exit_code) {
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const auto made = synth(*options);
+    const auto made = [&] {
+      const Waiting waiting("performing");
+      return synth(*options);
+    }();
     if (!made) {
       exit_code = report(made.error());
     } else if (options->json) {
