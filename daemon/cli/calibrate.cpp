@@ -1,6 +1,4 @@
 // `posed calibrate`: a user's glove from a few poses, or from another program's file.
-#include <unistd.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -14,13 +12,11 @@
 #include "daemon/cli/calibrate_poses.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/driver_options.hpp"
+#include "daemon/cli/good_poses.hpp"
 #include "daemon/cli/output_files.hpp"
-#include "daemon/cli/pose_screen.hpp"
-#include "daemon/config/words.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/greeting.hpp"
 #include "drivers/glove/import.hpp"
-#include "drivers/glove/pose_check.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::cli {
@@ -129,61 +125,12 @@ CalibrationFile blank_file(const GloveSource& source) {
           .sensors = {}};
 }
 
-bool on_terminal() { return ::isatty(STDIN_FILENO) != 0 && ::isatty(STDOUT_FILENO) != 0; }
-
-// On a terminal a screen leads the user; it is gone before anything else is printed. `note` says
-// why poses are asked for again; empty at first.
-Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
-                                      const CalibrateOptions& options, const std::string& note) {
-  if (!on_terminal()) {
-    PoseLines lines(plan);
-    return record_poses(source, plan, lines);
-  }
-  std::string title = "posed calibrate: " + source.model().driver + ", " +
-                      std::string(drivers::glove::side_name(source.hand())) + " hand of " +
-                      options.user;
-  if (!source.identity().empty()) title += ", " + source.identity();
-  PoseScreen screen(source.model(), plan, config::without_controls(title), note);
-  return record_poses(source, plan, screen);
-}
-
-// Goes through the poses; on a terminal those that failed are asked for again, until the user gives
-// up.
-Result<drivers::glove::Recorded> good_poses(GloveSource& source, PosePlan plan,
-                                            const CalibrateOptions& options) {
-  auto recorded = lead(source, plan, options, {});
-  while (recorded) {
-    const auto check = drivers::glove::check_poses(source.model(), *recorded);
-    if (!check) return std::unexpected(check.error());
-    if (check->usable() || options.force) {
-      std::fprintf(stderr, "posed: %s%s\n",
-                   check->usable() ? "" : "warning: ", check->verdict().c_str());
-      return recorded;
-    }
-    if (!on_terminal()) {
-      return fail(check->verdict() +
-                  "; no calibration was written (--force writes it all the same)");
-    }
-    PosePlan again = plan;
-    again.seconds.fill(0.0);
-    for (const auto pose : check->failed()) {
-      again.seconds[static_cast<std::size_t>(pose)] = plan.seconds[static_cast<std::size_t>(pose)];
-    }
-    const auto more = lead(source, again, options, check->verdict());
-    if (!more) return more;
-    for (const auto pose : again.poses()) {
-      (*recorded)[static_cast<std::size_t>(pose)] = (*more)[static_cast<std::size_t>(pose)];
-    }
-  }
-  return recorded;
-}
-
 Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   const auto plan = plan_of(options);
   if (!plan) return std::unexpected(plan.error());
   const auto source = open_glove(options);
   if (!source) return std::unexpected(source.error());
-  const auto recorded = good_poses(**source, *plan, options);
+  const auto recorded = good_poses(**source, *plan, options.user, options.force);
   if (!recorded) return std::unexpected(recorded.error());
   auto fitted = drivers::glove::fit_poses((*source)->model(), *recorded);
   if (!fitted) return std::unexpected(fitted.error());
