@@ -31,12 +31,13 @@ Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
 
 }  // namespace
 
-Result<drivers::glove::Recorded> good_poses(GloveSource& source, PosePlan plan,
+Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan& plan,
                                             const std::string& user, bool force) {
   auto recorded = lead(source, plan, user, {});
   while (recorded) {
     const auto check = drivers::glove::check_poses(source.model(), *recorded);
     if (!check) return std::unexpected(check.error());
+    if (check->sensors == 0) return recorded;  // nothing came: the fit says so
     if (check->usable() || force) {
       std::fprintf(stderr, "posed: %s%s\n",
                    check->usable() ? "" : "warning: ", check->verdict().c_str());
