@@ -5,17 +5,15 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <numbers>
 
 #include "models/style/harmonics.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::style {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 // Measured on 124 recordings of dataset 1 and 2 and 11 of CMU: legs that walk or run swing by 12 to
 // 50 deg rms and fit strides to 0.06; standing people's legs sway by 0.1 to 1.3 deg, a jump's by
@@ -45,7 +43,7 @@ double difference_squares(const Dataset& dataset, const MatrixXd& coefficients) 
 }
 
 double degrees_rms(double squares_sum, int count) {
-  return count == 0 ? 0.0 : kDegrees * std::sqrt(squares_sum / count);
+  return count == 0 ? 0.0 : std::sqrt(squares_sum / count) / kDegree;
 }
 
 void measure_cycles(const Dataset& dataset, const std::string& target, TrainingCheck& check) {
@@ -72,7 +70,7 @@ void measure_cycles(const Dataset& dataset, const std::string& target, TrainingC
 }
 
 double swing_deg(const VectorXd& leg) {
-  return kDegrees * std::sqrt((leg.array() - leg.mean()).square().mean());
+  return std::sqrt((leg.array() - leg.mean()).square().mean()) / kDegree;
 }
 
 // Phases rest on strides: without them a cycle is an average of unrelated poses.
