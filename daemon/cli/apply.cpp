@@ -4,28 +4,65 @@
 #include <memory>
 #include <string>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
+#include "models/style/walker_fit.hpp"
 #include "proto/clip/clip.hpp"
 
 namespace posed::cli {
 namespace {
 
-constexpr int kLongClip = 20'000;  // frames from which on waiting is felt
-
 struct Options {
   std::filesystem::path model, in, out;
   clip::ReadOptions read;
   style::ApplyOptions apply;
-  bool json = false;
+  bool overwrite = false, json = false;
 };
 
+Result<> check_files(const Options& options) {
+  if (!options.read.asf.empty() && !is_amc(options.in)) {
+    return misuse("--skeleton is for an AMC, and this is none; leave it out", options.in.string());
+  }
+  return OutputFiles(options.overwrite)
+      .reads(options.model)
+      .reads(options.in)
+      .reads(options.read.asf)
+      .writes(options.out, {".bvh"})
+      .check();
+}
+
+// How far training moved its own walkers [deg rms]; 0 where the model does not say.
+double training_difference_deg(const style::StyleModel& model) {
+  const auto report = nlohmann::json::parse(model.report_json, nullptr, false);
+  return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;
+}
+
+std::string verdict(const style::WalkerFit& fit, double rms_deg, double training_deg) {
+  if (!fit.is_far()) {
+    return fmt::format(
+        "this walker is like those of the training ({:.1f} deg rms from the nearest "
+        "pose it learnt from)",
+        fit.distance_deg);
+  }
+  std::string text = fmt::format(
+      "this walker is far from the training ({:.1f} deg rms from the nearest pose it "
+      "learnt from; its own walkers are within {:.0f}): the change is a guess",
+      fit.distance_deg, style::WalkerFit::kFar_deg);
+  if (training_deg > 0.0) {
+    text += fmt::format(", {:.1f} deg rms where its training had {:.1f}", rms_deg, training_deg);
+  }
+  return text;
+}
+
 Result<> run(Options options) {
+  if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
   const auto clip = clip::read_clip(options.in, options.read);
@@ -33,20 +70,20 @@ Result<> run(Options options) {
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
   }
-  std::unique_ptr<ProgressBar> bar;
-  if (clip->frames() >= kLongClip) {
-    bar = std::make_unique<ProgressBar>();
-    options.apply.progress = [&bar](int done, int total) {
-      return bar->show("styling", static_cast<double>(done) / total);
-    };
-  }
+  ProgressBar bar(kQuietFor_s);
+  options.apply.progress = [&bar](int done, int total) {
+    return bar.show("styling", static_cast<double>(done) / total);
+  };
   const auto applied = style::apply_to_clip(*model, options.model.string(), *clip, options.apply);
-  bar.reset();
   if (!applied) return std::unexpected(applied.error());
+  const auto fit = style::fit_of_walker(*model, options.model.string(), *clip);
+  if (!fit) return std::unexpected(fit.error());
   if (auto written = clip::write_bvh(applied->clip, options.out); !written) return written;
+  bar.finish();
 
   const double rms_deg = applied->rms_change_rad * kDegrees;
   const double max_deg = applied->max_change_rad * kDegrees;
+  const std::string sentence = verdict(*fit, rms_deg, training_difference_deg(*model));
   if (options.json) {
     const nlohmann::json report{{"out", options.out.string()},
                                 {"frames", clip->frames()},
@@ -57,12 +94,17 @@ Result<> run(Options options) {
                                 {"cold", options.apply.cold},
                                 {"joints_changed", applied->joints_changed},
                                 {"rms_change_deg", rms_deg},
-                                {"max_change_deg", max_deg}};
+                                {"max_change_deg", max_deg},
+                                {"distance_deg", fit->distance_deg},
+                                {"far_from_training", fit->is_far()},
+                                {"verdict", sentence}};
     std::printf("%s\n", report.dump(2).c_str());
   } else {
-    std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f at most\n",
+    std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f deg at most\n",
                 options.out.c_str(), clip->frames(), applied->joints_changed, rms_deg, max_deg);
   }
+  std::fflush(stdout);
+  std::fprintf(stderr, "posed: %s%s\n", fit->is_far() ? "warning: " : "", sentence.c_str());
   return {};
 }
 
@@ -85,13 +127,16 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
   command->add_flag("--gate", filter.gate, "Fade to the mean change where the model knows nothing");
   command->add_flag("--calibrate", filter.calibrate, "Learn the walker's own carriage first");
+  add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
   posed apply --model walk.style walk_03.bvh --out styled.bvh
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
-rotations. Without --cold the style is there in full from the first frame.)");
+rotations. Without --cold the style is there in full from the first frame. The last line says how
+far the walker is from those that the model learnt from. "deg rms" is the angle between the rotations
+before and after, over frames and changed joints.)");
   command->callback([options, &exit_code] {
     if (auto done = run(*options); !done) exit_code = report(done.error());
   });

@@ -6,6 +6,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/train_gesture.hpp"
+#include "daemon/cli/waiting.hpp"
 #include "models/gesture/auto_label.hpp"
 #include "proto/clip/lab.hpp"
 
@@ -15,7 +16,10 @@ int auto_label(const AutoLabelOptions& options) {
   const auto recording =
       load_recording(options.clip, options.examples, options.rate_hz, options.read);
   if (!recording) return report(recording.error());
-  const auto proposed = gesture::propose_segments(*recording);
+  const auto proposed = [&] {
+    const Waiting waiting("proposing labels");
+    return gesture::propose_segments(*recording);
+  }();
   if (!proposed) return report(proposed.error());
   std::vector<clip::LabelSegment> labels;
   for (const gesture::Segment& segment : *proposed) {

@@ -1,6 +1,4 @@
 // `posed calibrate`: a user's glove from a few poses, or from another program's file.
-#include <unistd.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -14,8 +12,8 @@
 #include "daemon/cli/calibrate_poses.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/driver_options.hpp"
-#include "daemon/cli/pose_screen.hpp"
-#include "daemon/config/words.hpp"
+#include "daemon/cli/good_poses.hpp"
+#include "daemon/cli/output_files.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/greeting.hpp"
 #include "drivers/glove/import.hpp"
@@ -39,6 +37,9 @@ struct CalibrateOptions {
   double ready_s = 3.0;            // to go from pose to pose without a key
   ClientOptions client;
   bool live = false;
+  bool ready_given = false;
+  bool overwrite = false;
+  bool force = false;  // write what the check calls unusable
 };
 
 Result<const drivers::Driver*> named_driver(const std::string& name) {
@@ -124,27 +125,12 @@ CalibrationFile blank_file(const GloveSource& source) {
           .sensors = {}};
 }
 
-// On a terminal a screen leads the user; it is gone before anything else is printed.
-Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
-                                      const CalibrateOptions& options) {
-  if (::isatty(STDIN_FILENO) == 0 || ::isatty(STDOUT_FILENO) == 0) {
-    PoseLines lines(plan);
-    return record_poses(source, plan, lines);
-  }
-  std::string title = "posed calibrate: " + source.model().driver + ", " +
-                      std::string(drivers::glove::side_name(source.hand())) + " hand of " +
-                      options.user;
-  if (!source.identity().empty()) title += ", " + source.identity();
-  PoseScreen screen(source.model(), plan, config::without_controls(title));
-  return record_poses(source, plan, screen);
-}
-
 Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   const auto plan = plan_of(options);
   if (!plan) return std::unexpected(plan.error());
   const auto source = open_glove(options);
   if (!source) return std::unexpected(source.error());
-  const auto recorded = lead(**source, *plan, options);
+  const auto recorded = good_poses(**source, *plan, options.user, options.force);
   if (!recorded) return std::unexpected(recorded.error());
   auto fitted = drivers::glove::fit_poses((*source)->model(), *recorded);
   if (!fitted) return std::unexpected(fitted.error());
@@ -178,18 +164,25 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   return drivers::glove::import_calibration(options.import, *model, hand);
 }
 
-// Before anybody has gone through the poses.
-Result<> check_out(const std::filesystem::path& out) {
-  const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
-  if (std::filesystem::is_directory(out)) return misuse("--out is a folder; name a file", out);
-  if (::access(folder.c_str(), W_OK) == 0) return {};
-  return misuse("cannot write there; name another --out, or make its folder", out);
+// Before anybody has gone through the poses. An option that would mean nothing is refused.
+Result<> check_options(const CalibrateOptions& options) {
+  if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
+  const bool timed = options.seconds > 0.0;
+  if (!options.import.empty() && (timed || !options.poses.empty())) {
+    return misuse("--import goes through no poses; leave out --seconds and --pose");
+  }
+  if (!timed && options.ready_given) {
+    return misuse("--ready is the time between poses that begin by themselves; add --seconds");
+  }
+  return OutputFiles(options.overwrite)
+      .reads(options.import)
+      .writes_any_but_other(options.out, {".toml"})
+      .check();
 }
 
 Result<> calibrate(const CalibrateOptions& options) {
   const Interrupt interrupt;
-  if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
-  if (auto ok = check_out(options.out); !ok) return ok;
+  if (auto ok = check_options(options); !ok) return ok;
   auto file = options.import.empty() ? from_poses(options) : from_file(options);
   if (!file) return std::unexpected(file.error());
   file->user = options.user;
@@ -232,9 +225,12 @@ void add_calibrate(CLI::App& app, int& exit_code) {
   command
       ->add_option("--seconds", options->seconds, "Hold each pose this long; it begins by itself")
       ->check(CLI::Range(0.1, kMostSeconds));
-  command->add_option("--ready", options->ready_s, "With --seconds: the time from pose to pose")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, kMostSeconds));
+  auto* ready =
+      command->add_option("--ready", options->ready_s, "With --seconds: the time from pose to pose")
+          ->capture_default_str()
+          ->check(CLI::Range(0.0, kMostSeconds));
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--force", options->force, "Write the calibration even if poses failed");
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")
       ->type_name("POSE=SECONDS");
   command->add_option("--out", options->out, "The calibration to write")
@@ -242,12 +238,15 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->required();
   command->footer(
       R"(Poses: flat, fist, thumb, spread. On a terminal a screen leads through them; elsewhere
-a line on stdout names each pose and a line on stdin begins it, or --seconds does. Examples:
+a line on stdout names each pose and a line on stdin begins it, or --seconds does. A pose in which
+the hand moved, or whose sensors hardly moved from the flat hand, fails: the screen asks for it
+again, a script gets exit code 1 and no file. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml
   posed calibrate --driver cyberglove --import old.cal --user ann --out ann.toml)");
-  command->callback([options, connect, &exit_code] {
+  command->callback([options, connect, ready, &exit_code] {
     options->live = connect->count() > 0;
+    options->ready_given = ready->count() > 0;
     if (auto done = calibrate(*options); !done) exit_code = report(done.error());
   });
 }

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/cli/waiting.hpp"
 #include "daemon/record/log_clip.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frames_clip.hpp"
@@ -26,7 +28,8 @@ struct Convert {
   double metres_per_unit = 0.0;  // 0: not given
   std::string hand;              // "left", "right" or not given
   std::string stream;            // of a log; empty: the only one
-  bool json = false;
+  bool overwrite = false, json = false;
+  bool rate_given = false, shape_given = false;
 };
 
 bool ends_in(const std::string& path, const std::string& extension) {
@@ -36,18 +39,34 @@ bool ends_in(const std::string& path, const std::string& extension) {
 bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
 bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
 
-Result<> check_paths(const Convert& convert) {
-  if (!is_hand_csv(convert.out) && !ends_in(convert.out, ".bvh")) {
-    return misuse("can write .bvh, and .csv of a hand; name OUT so", convert.out);
+// An option that would mean nothing for this input or output is a mistake.
+Result<> check_options(const Convert& convert) {
+  const auto useless = [&](bool given, bool means_something, const char* what) -> Result<> {
+    if (!given || means_something) return {};
+    return misuse(what, convert.in);
+  };
+  const bool csv_in = is_hand_csv(convert.in);
+  const bool bvh_in = ends_in(convert.in, ".bvh");
+  const bool to_csv = is_hand_csv(convert.out);
+  for (const auto& checked :
+       {useless(!convert.stream.empty(), is_log(convert.in),
+                "is no device log (.plog), so --stream means nothing"),
+        useless(!convert.read.asf.empty(), is_amc(convert.in),
+                "is no AMC, so --skeleton means nothing"),
+        useless(convert.rate_given, is_amc(convert.in), "is no AMC, so --rate means nothing"),
+        useless(convert.metres_per_unit != 0.0, bvh_in,
+                "is no BVH, so --metres-per-unit means nothing"),
+        useless(!convert.hand.empty(), csv_in || to_csv,
+                "neither IN nor OUT is a hand CSV, so --hand means nothing"),
+        useless(convert.shape_given, csv_in && !to_csv,
+                "--hand-shape is for a hand CSV that becomes a BVH, and means nothing here")}) {
+    if (!checked) return checked;
   }
-  if (!convert.stream.empty() && !is_log(convert.in)) {
-    return misuse("is no device log (.plog), so --stream means nothing", convert.in);
-  }
-  std::error_code error;
-  if (std::filesystem::equivalent(convert.in, convert.out, error)) {
-    return misuse("is the file to read; name another OUT, so that nothing is lost", convert.out);
-  }
-  return {};
+  return OutputFiles(convert.overwrite)
+      .reads(convert.in)
+      .reads(convert.read.asf)
+      .writes(convert.out, {".bvh", ".csv"})
+      .check();
 }
 
 // A BVH has no room for a gap or an uneven clock.
@@ -80,12 +99,15 @@ Result<> write(const Convert& convert, const clip::Clip& clip) {
 }
 
 int run(Convert& convert) {
-  if (auto ok = check_paths(convert); !ok) return report(ok.error());
+  if (auto ok = check_options(convert); !ok) return report(ok.error());
   if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
   if (!convert.hand.empty()) {
     convert.read.hand = convert.hand == "left" ? Side::kLeft : Side::kRight;
   }
-  const auto clip = read(convert);
+  const auto clip = [&] {
+    const Waiting waiting("reading " + convert.in);
+    return read(convert);
+  }();
   if (!clip) return report(clip.error());
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());
@@ -120,8 +142,9 @@ void add_convert(CLI::App& app, int& exit_code) {
   command->add_option("--out", convert->out, "Clip to write: .bvh, or .csv of a hand")->required();
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
-  command->add_option("--rate", convert->read.amc_rate_hz, "Frames a second of an AMC")
-      ->capture_default_str();
+  auto* rate =
+      command->add_option("--rate", convert->read.amc_rate_hz, "Frames a second of an AMC");
+  rate->capture_default_str();
   command
       ->add_option("--metres-per-unit", convert->metres_per_unit,
                    "Unit of a BVH (default: the profile's, else by the figure's height)")
@@ -132,8 +155,10 @@ void add_convert(CLI::App& app, int& exit_code) {
                       "Which of a log's streams (default: the only one)");
   command->add_option("--hand", convert->hand, "Whose a hand CSV is, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
-  command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH")
-      ->capture_default_str();
+  auto* shape =
+      command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH");
+  shape->capture_default_str();
+  add_overwrite_option(*command, convert->overwrite);
   command->add_flag("--json", convert->json, "Print a summary as JSON on stdout");
   command->footer(
       "A BVH keeps its names, hierarchy, channel order and unit. An AMC becomes a BVH in\n"
@@ -147,7 +172,11 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
       "  posed convert glove.csv --hand left --out glove.bvh\n"
       "  posed convert take1.plog --stream walker --out walker.bvh");
-  command->callback([convert, &exit_code] { exit_code = run(*convert); });
+  command->callback([convert, rate, shape, &exit_code] {
+    convert->rate_given = rate->count() > 0;
+    convert->shape_given = shape->count() > 0;
+    exit_code = run(*convert);
+  });
 }
 
 }  // namespace posed::cli

@@ -1,10 +1,9 @@
 // The demo: makes two families of walkers and a performer's glove recording, learns the style
 // between the families and the gestures of the glove, streams a walker it has not seen through the
 // daemon and watches it as any client would, over ZeroMQ.
+#include <cerrno>  // program_invocation_name
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,8 +17,11 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/client.hpp"
 #include "daemon/cli/demo_clips.hpp"
+#include "daemon/cli/demo_folder.hpp"
 #include "daemon/cli/demo_hand.hpp"
+#include "daemon/cli/demo_watcher.hpp"
 #include "daemon/cli/live_view.hpp"
+#include "daemon/cli/output_files.hpp"
 #include "daemon/cli/train_gesture.hpp"
 #include "daemon/cli/train_style.hpp"
 #include "daemon/config/config.hpp"
@@ -37,65 +39,27 @@ constexpr double kFirstFrameWithin_s = 10.0;
 constexpr double kHandRate_hz = 30.0;
 
 struct DemoOptions {
-  std::filesystem::path config = "config/demo.toml";
-  std::filesystem::path prepare;  // only make clips and model there
+  std::filesystem::path config;   // empty: the demo's own
+  std::filesystem::path folder;   // of clips and models; empty: the user's cache
+  std::filesystem::path prepare;  // only make clips and models there
   std::optional<double> seconds;
+  bool overwrite = false;
 };
 
-// Angle between two rotations [deg].
-double turn_deg(const float* a, const float* b) {
-  double dot = 0.0;
-  for (int k = 0; k < 4; ++k) dot += static_cast<double>(a[k]) * static_cast<double>(b[k]);
-  return 2.0 * std::acos(std::min(1.0, std::abs(dot))) * 57.295779513;
+// How this program was called, for the commands that people may copy.
+std::string own_name() {
+  const std::string name = program_invocation_name;
+  return name.contains('/') ? name : "posed";
 }
 
-// What the demo sees as a client: raw and styled frames of the same instant, compared.
-class Watcher {
- public:
-  explicit Watcher(DemoHand& hand) : hand_(hand) {}
-
-  void take(const std::string& topic, const void* body, std::size_t size) {
-    if (!frame_.ParseFromArray(body, static_cast<int>(size))) return;
-    if (frame_.stream() == kDemoHandStream) return hand_.take(frame_);
-    if (topic.ends_with("-raw")) {
-      raw_[frame_.sequence()].assign(frame_.rotation_xyzw().begin(), frame_.rotation_xyzw().end());
-      while (raw_.size() > kKept) raw_.erase(raw_.begin());
-      return;
-    }
-    ++styled_;
-    gaps_ += last_ != 0 && frame_.sequence() > last_ ? frame_.sequence() - last_ - 1 : 0;
-    last_ = frame_.sequence();
-    compare();
+// Makes what the demo needs, unless this program made it before.
+Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
+  const DemoFolder kept(folder);
+  if (auto own = kept.check_is_own(demo_file_names(), overwrite); !own) return own;
+  if (kept.is_up_to_date()) {
+    std::fprintf(stderr, "1-3/4 using what was made and learnt before, in %s\n", folder.c_str());
+    return {};
   }
-
-  [[nodiscard]] std::uint64_t styled() const { return styled_; }
-  [[nodiscard]] std::uint64_t gaps() const { return gaps_; }
-  [[nodiscard]] double change_deg() const { return change_deg_; }
-
- private:
-  static constexpr std::size_t kKept = 64;
-
-  void compare() {
-    const auto found = raw_.find(frame_.sequence());
-    if (found == raw_.end()) return;
-    const std::vector<float>& raw = found->second;
-    if (static_cast<int>(raw.size()) != frame_.rotation_xyzw_size() || raw.empty()) return;
-    double sum = 0.0;
-    for (std::size_t j = 0; j + 3 < raw.size(); j += 4) {
-      const double turn = turn_deg(&raw[j], frame_.rotation_xyzw().data() + j);
-      sum += turn * turn;
-    }
-    change_deg_ = std::sqrt(sum / (static_cast<double>(raw.size()) / 4.0));
-  }
-
-  DemoHand& hand_;
-  v1::Frame frame_;
-  std::map<std::uint64_t, std::vector<float>> raw_;
-  std::uint64_t styled_ = 0, gaps_ = 0, last_ = 0;
-  double change_deg_ = 0.0;
-};
-
-Result<> prepare(const std::filesystem::path& folder) {
   std::fprintf(stderr, "1/4 making synthetic walkers and a synthetic performer in %s\n",
                folder.c_str());
   const auto clips = make_demo_clips(folder);
@@ -110,14 +74,17 @@ Result<> prepare(const std::filesystem::path& folder) {
   for (const auto& file : clips->to) {
     experiment.clips.push_back({file, "sway", file.stem().string(), "walk", 0});
   }
-  const auto report = train_and_save(experiment, 0, folder / kDemoModel);
+  const auto report = train_and_save(experiment, 0, folder / kDemoModel, false);
   if (!report) return std::unexpected(report.error());
+  const std::string verdict = (*report)["verdict"].get<std::string>();
+  if (!(*report)["written"].get<bool>()) return fail("the demo's own model is " + verdict);
+  std::fprintf(stderr, "    %s\n", verdict.c_str());
   std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
   const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);
   if (!recording) return std::unexpected(recording.error());
   const auto hand = train_gesture_and_save({*recording}, {}, folder / kDemoHand);
   if (!hand) return std::unexpected(hand.error());
-  return {};
+  return kept.finish();
 }
 
 // Takes every message that waits.
@@ -164,14 +131,15 @@ Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watch
     screen.measure(view);
     view.notes = {
         fmt::format("received {} styled frames, {} missing; {:.1f} deg rms from the raw pose",
-                    watcher.styled(), watcher.gaps(), watcher.change_deg()),
+                    watcher.styled(), watcher.gaps(), watcher.change_lately_deg()),
         hand.note()};
     if (screen.is_terminal() || first_drawing) {
-      view.notes.insert(view.notes.end(),
-                        {"in another terminal: build/posed monitor",
-                         "            or: build/posed ctl set walker alpha 0.5",
-                         "            or: build/posed ctl play hand \"p 4 3 1 g\"",
-                         "Ctrl-C ends the demo"});
+      view.notes.insert(
+          view.notes.end(),
+          {fmt::format("in another terminal: {} monitor", own_name()),
+           fmt::format("            or: {} ctl set walker alpha 0.5", own_name()),
+           fmt::format("            or: {} ctl play hand \"p 4 3 1 g\"", own_name()),
+           "Ctrl-C ends the demo"});
     }
     screen.draw(live_view(daemon.stats(), view));
   }
@@ -195,7 +163,9 @@ Result<Performers> put_on_gloves(pipeline::DaemonConfig& config,
 }
 
 Result<> stream(const DemoOptions& options, const std::filesystem::path& folder) {
-  auto config = config::load_config(options.config, drivers::registry());
+  const auto own = folder / kDemoConfig;
+  auto config =
+      config::load_config(options.config.empty() ? own : options.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
   logging::sum_up_repeats();
   const Interrupt interrupt;
@@ -214,7 +184,7 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   (*daemon)->stop();
   if (!watched) return watched;
   std::printf(
-      "\nreceived %llu styled frames over ZeroMQ, %llu missing; last pose %.1f deg rms from raw\n",
+      "\nreceived %llu styled frames over ZeroMQ, %llu missing; %.1f deg rms from the raw poses\n",
       static_cast<unsigned long long>(watcher.styled()),
       static_cast<unsigned long long>(watcher.gaps()), watcher.change_deg());
   if (const std::string told = hand->summary(); !told.empty()) std::puts(told.c_str());
@@ -228,13 +198,39 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   return {};
 }
 
+// Clips and models lie where the config looks for them.
+Result<std::filesystem::path> folder_of(const DemoOptions& options) {
+  if (!options.folder.empty()) return std::filesystem::absolute(options.folder);
+  if (options.config.empty()) return demo_cache_folder();
+  const auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  for (const pipeline::StreamConfig& stream : config->streams) {
+    if (!stream.style || stream.style->model.filename() != kDemoModel) continue;
+    return std::filesystem::absolute(stream.style->model).lexically_normal().parent_path();
+  }
+  return misuse("no stream has the demo's model, " + std::string(kDemoModel) +
+                    "; `posed run --config` streams any other config",
+                options.config.string());
+}
+
+Result<> check_options(const DemoOptions& options) {
+  if (!options.prepare.empty() &&
+      (!options.config.empty() || !options.folder.empty() || options.seconds)) {
+    return misuse("--prepare streams nothing; leave out --config, --folder and --seconds");
+  }
+  if (!options.config.empty() && !options.folder.empty()) {
+    return misuse("--config says where its files are; leave out --folder");
+  }
+  return {};
+}
+
 Result<> demo(const DemoOptions& options) {
-  if (!options.prepare.empty()) return prepare(options.prepare);
-  // The clips and the model lie where the demo's config looks for them.
-  const auto beside = std::filesystem::absolute(options.config).parent_path() / "../build/demo";
-  const auto folder = beside.lexically_normal();
-  if (auto prepared = prepare(folder); !prepared) return prepared;
-  return stream(options, folder);
+  if (auto ok = check_options(options); !ok) return ok;
+  if (!options.prepare.empty()) return prepare(options.prepare, options.overwrite);
+  const auto folder = folder_of(options);
+  if (!folder) return std::unexpected(folder.error());
+  if (auto prepared = prepare(*folder, options.overwrite); !prepared) return prepared;
+  return stream(options, *folder);
 }
 
 }  // namespace
@@ -243,15 +239,25 @@ void add_demo(CLI::App& app, int& exit_code) {
   auto* command =
       app.add_subcommand("demo", "Learn a style from synthetic walkers and stream a new one");
   const auto options = std::make_shared<DemoOptions>();
-  command->add_option("--config", options->config, "What to stream")->capture_default_str();
-  command->add_option("--prepare", options->prepare,
-                      "Only make the clips and the model in this folder");
+  command->add_option("--config", options->config, "What to stream (default: the demo's own)")
+      ->type_name("FILE.toml");
+  command
+      ->add_option("--folder", options->folder,
+                   "Where clips and models are kept (default: ~/.cache/posed/demo)")
+      ->type_name("DIR");
+  command
+      ->add_option("--prepare", options->prepare,
+                   "Only make the clips and the models in this folder")
+      ->type_name("DIR");
+  add_overwrite_option(*command, options->overwrite);
   command->add_option("--seconds", options->seconds, "End so long after the first frame")
       ->check(CLI::PositiveNumber);
   command->footer(R"(Examples:
-  posed demo                      # from the source folder, after ./run build
+  posed demo                      # from anywhere
   posed demo --seconds 10
-  posed demo --prepare build/demo # what ./run build does)");
+  posed demo --prepare build/demo # what ./run build does
+What was learnt is kept in $XDG_CACHE_HOME/posed/demo (~/.cache/posed/demo), with a demo.toml that
+`posed run --config` streams, too; another build of posed learns anew.)");
   command->callback([options, &exit_code] {
     if (auto done = demo(*options); !done) exit_code = report(done.error());
   });

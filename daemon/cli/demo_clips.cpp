@@ -13,6 +13,8 @@ namespace {
 constexpr std::uint32_t kPeople = 6;  // of each family
 constexpr std::uint32_t kNewPerson = 21;
 constexpr double kNewWalkSeconds = 20.0;
+constexpr const char* kGlove = "glove_train.csv";
+constexpr const char* kGloveLabels = "glove_train.lab";
 
 Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
                                            const motion::WalkerOptions& options) {
@@ -26,8 +28,8 @@ Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
 
 // The glove that is learnt from, with labels, and a new person who performs g, c, p.
 Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
-  clips.glove = folder / "glove_train.csv";
-  clips.labels = folder / "glove_train.lab";
+  clips.glove = folder / kGlove;
+  clips.labels = folder / kGloveLabels;
   const auto learnt = gesture::make_performance({});
   if (!learnt) return std::unexpected(learnt.error());
   if (auto done = clip::write_hand_csv(learnt->clip, clips.glove); !done) return done;
@@ -39,6 +41,16 @@ Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
 }
 
 }  // namespace
+
+std::vector<std::string> demo_file_names() {
+  std::vector<std::string> names{kDemoModel,     kDemoWalker, kDemoHand,
+                                 kDemoPerformer, kGlove,      kGloveLabels};
+  for (std::uint32_t person = 1; person <= kPeople; ++person) {
+    names.push_back(fmt::format("march_{}.bvh", person));
+    names.push_back(fmt::format("sway_{}.bvh", person));
+  }
+  return names;
+}
 
 Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
   std::error_code made;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "proto/frame/result.hpp"
@@ -22,6 +23,9 @@ struct DemoClips {
   std::vector<std::filesystem::path> from, to;  // walks of the two families
   std::filesystem::path glove, labels;          // 100 gestures of one performer
 };
+
+// The files that make_demo_clips() and the training write into the folder.
+[[nodiscard]] std::vector<std::string> demo_file_names();
 
 // Writes the clips of both families and the new walker, the glove recording with its labels and the
 // new performer into `folder`, which is made.

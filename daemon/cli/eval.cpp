@@ -1,13 +1,19 @@
 #include <cstdio>
 #include <memory>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/degrees.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
 #include "models/style/evaluate.hpp"
 #include "models/style/style_model.hpp"
+#include "models/style/training_check.hpp"
+#include "models/style/walker_fit.hpp"
 #include "proto/clip/clip.hpp"
 
 namespace posed::cli {
@@ -20,8 +26,15 @@ constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
 
 The source goes through the same stage as live. cycle_ratio: how far the styled walk's average cycle
-is from the target's, over how far the unstyled one was (0 is the target, 1 is no change); ratio:
-the same frame by frame; jerk_ratio: roughness of the styled walk over the unstyled one's.)";
+is from the target's, over how far the unstyled one was (0 is the target, 1 is no change);
+constant_cycle_ratio: the same for the model's average change alone, added to every frame; ratio:
+cycle_ratio frame by frame; jerk_ratio: roughness of the styled walk over the unstyled one's;
+moved_rms_deg: the angle between the rotations before and after, rms over frames and changed joints,
+as `apply` reports it; component_rms_deg: the same change per component of the rotation vectors,
+source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure.
+The last line is the verdict; the exit code is 1 when the model is worse than nothing.)";
+
+constexpr double kRough = 1.5;  // jerk_ratio from which on people see it
 
 struct EvalOptions {
   std::string model, source, target, skeleton;
@@ -31,28 +44,99 @@ struct EvalOptions {
 
 Result<clip::Clip> read(const std::string& path, const std::string& skeleton) {
   clip::ReadOptions options;
-  if (path.ends_with(".amc")) options.asf = skeleton;
+  if (is_amc(path)) options.asf = skeleton;
   return clip::read_clip(path, options);
 }
 
-Result<json> evaluate(const EvalOptions& options) {
+struct Evaluation {
+  style::StyleScore score, constant;
+  double moved_rms_deg = 0.0;
+  style::WalkerFit fit;
+
+  [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0; }
+};
+
+std::string verdict(const Evaluation& e) {
+  const double closes = 1.0 - e.score.cycle_ratio;
+  const double constant = 1.0 - e.constant.cycle_ratio;
+  std::string text =
+      e.helps() ? style::closing_text(closes) + " of the way to the target"
+                : "worse than nothing: " + style::closing_text(closes) + " from the target";
+  text += "; a constant offset " + style::closing_text(constant);
+  if (e.helps() && constant > closes) text += ", which is better";
+  if (e.score.jerk_ratio > kRough) {
+    text +=
+        fmt::format("; the styled walk is {:.1f} times as rough as the source", e.score.jerk_ratio);
+  }
+  if (e.fit.is_far()) {
+    text +=
+        fmt::format("; this walker is far from the training ({:.1f} deg rms)", e.fit.distance_deg);
+  }
+  return text;
+}
+
+json report_of(const Evaluation& e, double alpha) {
+  const style::StyleScore& score = e.score;
+  return json{{"cycle_ratio", score.cycle_ratio},
+              {"constant_cycle_ratio", e.constant.cycle_ratio},
+              {"ratio", score.ratio},
+              {"jerk_ratio", score.jerk_ratio},
+              {"moved_rms_deg", e.moved_rms_deg},
+              {"component_rms_deg", score.component_rms_deg},
+              {"source_component_rms_deg", score.source_component_rms_deg},
+              {"source_period_s", score.source_period_s},
+              {"target_period_s", score.target_period_s},
+              {"distance_deg", e.fit.distance_deg},
+              {"far_from_training", e.fit.is_far()},
+              {"alpha", alpha},
+              {"helps", e.helps()},
+              {"verdict", verdict(e)}};
+}
+
+Result<Evaluation> evaluate(const EvalOptions& options) {
+  if (!options.skeleton.empty() && !is_amc(options.source) && !is_amc(options.target)) {
+    return misuse("--skeleton is for AMC clips, and there is none; leave it out");
+  }
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
   const auto source = read(options.source, options.skeleton);
   if (!source) return std::unexpected(source.error());
   const auto target = read(options.target, options.skeleton);
   if (!target) return std::unexpected(target.error());
-  style::ApplyOptions apply;
-  apply.filter.alpha = options.alpha;
-  const auto styled = style::apply_to_clip(*model, options.model, *source, apply);
-  if (!styled) return std::unexpected(styled.error());
-  const auto score = style::evaluate_style(*source, styled->clip, *target);
-  if (!score) return std::unexpected(score.error());
-  return json{
-      {"cycle_ratio", score->cycle_ratio},         {"ratio", score->ratio},
-      {"jerk_ratio", score->jerk_ratio},           {"moved_rms_deg", score->moved_rms_deg},
-      {"source_rms_deg", score->source_rms_deg},   {"source_period_s", score->source_period_s},
-      {"target_period_s", score->target_period_s}, {"alpha", options.alpha}};
+  const auto fit = style::fit_of_walker(*model, options.model, *source);
+  if (!fit) return std::unexpected(fit.error());
+  const style::StyleModel constant = style::with_constant_change(*model, fit->mean_change);
+  ProgressBar bar(kQuietFor_s);
+  Evaluation evaluation{.score = {}, .constant = {}, .fit = *fit};
+  for (const bool full : {false, true}) {
+    style::ApplyOptions apply;
+    apply.filter.alpha = options.alpha;
+    apply.progress = [&](int done, int total) {
+      return bar.show("styling", 0.5 * full + 0.5 * done / total);
+    };
+    const auto styled =
+        style::apply_to_clip(full ? *model : constant, options.model, *source, apply);
+    if (!styled) return std::unexpected(styled.error());
+    const auto score = style::evaluate_style(*source, styled->clip, *target);
+    if (!score) return std::unexpected(score.error());
+    (full ? evaluation.score : evaluation.constant) = *score;
+    evaluation.moved_rms_deg = styled->rms_change_rad * kDegrees;
+  }
+  return evaluation;
+}
+
+int finish(const Evaluation& evaluation, const EvalOptions& options) {
+  const json figures = report_of(evaluation, options.alpha);
+  if (options.json) {
+    std::printf("%s\n", figures.dump(2).c_str());
+  } else {
+    for (const auto& [name, value] : figures.items()) {
+      if (value.is_number()) std::printf("%-24s %8.3f\n", name.c_str(), value.get<double>());
+    }
+  }
+  std::fflush(stdout);
+  std::fprintf(stderr, "posed: %s\n", verdict(evaluation).c_str());
+  return static_cast<int>(evaluation.helps() ? ExitCode::kDone : ExitCode::kFailed);
 }
 
 }  // namespace
@@ -73,16 +157,8 @@ void add_eval(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   style->add_flag("--json", options->json, "One JSON object on stdout");
   style->callback([options, &exit_code] {
-    const auto score = evaluate(*options);
-    if (!score) {
-      exit_code = report(score.error());
-    } else if (options->json) {
-      std::printf("%s\n", score->dump(2).c_str());
-    } else {
-      for (const auto& [name, value] : score->items()) {
-        std::printf("%-16s %8.3f\n", name.c_str(), value.get<double>());
-      }
-    }
+    const auto evaluation = evaluate(*options);
+    exit_code = evaluation ? finish(*evaluation, *options) : report(evaluation.error());
   });
 }
 

@@ -5,13 +5,16 @@
 #include <memory>
 #include <ostream>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
 #include "daemon/cli/lag_curve.hpp"
+#include "daemon/cli/output_files.hpp"
 #include "daemon/cli/tree_options.hpp"
+#include "daemon/cli/waiting.hpp"
 #include "models/generate/constrain.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/motion/naturalness.hpp"
@@ -29,14 +32,14 @@ constexpr const char* kEvalGestureFooter = R"(Examples:
   posed eval gesture --model hand.gesture --svg lag.svg --tree-svg tree.svg --trees middle:4
 
 jerk: rms third difference, deg/frame^3; ldlj and sparc: smoothness of the speed, closer to 0 is
-smoother; nearest_reference_deg: rms over the performed frames of the distance to the nearest
-recorded frame; frechet: distance of the Gaussians of windows of 30 frames [deg^2]; min_gap_cm:
+smoother; nearest_reference_deg: distance to the nearest recorded frame, rms over the performed
+frames and the angles that move; frechet: distance of the Gaussians of windows of 30 frames [deg^2]; min_gap_cm:
 between any two bones, before and after the constraint stage. The curve says what a performance
 loses that knows its script only so many frames ahead.)";
 
 struct EvalGestureOptions {
   std::string model, reference, labels, svg;
-  bool json = false;
+  bool overwrite = false, json = false;
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
@@ -106,17 +109,37 @@ json curve_json(const std::vector<LagPoint>& curve) {
   json points = json::array();
   for (const LagPoint& point : curve) {
     points.push_back({{"lookahead", point.frames},
-                      {"rms_deg", point.rms_deg},
-                      {"max_deg", point.max_deg},
+                      {"channel_rms_deg", point.rms_deg},
+                      {"channel_max_deg", point.max_deg},
                       {"jerk_ratio", point.jerk_ratio}});
   }
   return points;
 }
 
+// The last line: whether the performance can be shown to anybody.
+std::string verdict(const json& report) {
+  const double gap_cm = report["min_gap_cm"].get<double>();
+  std::string text = gap_cm >= 0.0 ? "fingers never overlap" : "fingers overlap";
+  if (report.contains("reference")) {
+    const json& reference = report["reference"];
+    text += fmt::format(
+        "; the motion is {:.1f} deg (rms of an angle) from the nearest recorded "
+        "pose and {:.2f} times as rough as the recording",
+        reference["nearest_reference_deg"].get<double>(),
+        report["performed"]["jerk"].get<double>() / reference["jerk"].get<double>());
+  } else {
+    text += "; --reference RECORDING tells how near it is to a real hand";
+  }
+  return text;
+}
+
 Result<json> evaluate_gesture(const EvalGestureOptions& options) {
-  if (auto checked = check_tree_options(*options.trees); !checked) {
+  OutputFiles files(options.overwrite);
+  if (auto checked = check_tree_options(*options.trees, files); !checked) {
     return std::unexpected(checked.error());
   }
+  files.reads(options.model).reads(options.reference).writes_any_but_other(options.svg, {".svg"});
+  if (auto checked = files.check(); !checked) return std::unexpected(checked.error());
   auto model = gesture::load_model(options.model);
   if (!model) return std::unexpected(model.error());
   if (auto drawn = draw_trees(*model, *options.trees); !drawn) {
@@ -152,6 +175,7 @@ Result<json> evaluate_gesture(const EvalGestureOptions& options) {
     if (!written) return std::unexpected(written.error());
     report["svg"] = options.svg;
   }
+  report["verdict"] = verdict(report);
   return report;
 }
 
@@ -169,12 +193,25 @@ void print_report(const json& report) {
   std::printf("fingers    %.3f cm apart at least, %.3f before the constraints\n",
               report["min_gap_cm"].get<double>(), report["min_gap_before_cm"].get<double>());
   std::printf("leaves     %d in 25 trees\n\n", report["leaves"]["total"].get<int>());
-  std::printf("%10s %10s %10s %6s\n", "look-ahead", "rms deg", "max deg", "jerk");
+  std::printf("error of an angle at a look-ahead of so many frames:\n");
+  std::printf("%10s %10s %10s %10s\n", "look-ahead", "rms deg", "max deg", "jerk ratio");
   for (const json& point : report["curve"]) {
-    std::printf("%10d %10.4f %10.4f %6.3f\n", point["lookahead"].get<int>(),
-                point["rms_deg"].get<double>(), point["max_deg"].get<double>(),
+    std::printf("%10d %10.4f %10.4f %10.3f\n", point["lookahead"].get<int>(),
+                point["channel_rms_deg"].get<double>(), point["channel_max_deg"].get<double>(),
                 point["jerk_ratio"].get<double>());
   }
+}
+
+int finish(const json& report, bool as_json) {
+  if (as_json) {
+    std::printf("%s\n", report.dump(2).c_str());
+  } else {
+    print_report(report);
+  }
+  std::fflush(stdout);
+  std::fprintf(stderr, "posed: %s\n", report["verdict"].get<std::string>().c_str());
+  return static_cast<int>(report["min_gap_cm"].get<double>() >= 0.0 ? ExitCode::kDone
+                                                                    : ExitCode::kFailed);
 }
 
 }  // namespace
@@ -188,16 +225,14 @@ void add_eval_gesture(CLI::App& eval, int& exit_code) {
   command->add_option("--reference", options->reference, "A recording to be held against");
   command->add_option("--svg", options->svg, "Where to draw look-ahead against error");
   add_tree_options(*command, options->trees);
+  add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const auto made = evaluate_gesture(*options);
-    if (!made) {
-      exit_code = report(made.error());
-    } else if (options->json) {
-      std::printf("%s\n", made->dump(2).c_str());
-    } else {
-      print_report(*made);
-    }
+    const auto made = [&] {
+      const Waiting waiting("performing at every look-ahead");
+      return evaluate_gesture(*options);
+    }();
+    exit_code = made ? finish(*made, options->json) : report(made.error());
   });
 }
 

@@ -20,9 +20,10 @@ constexpr double kNoiseShare = 0.04;  // of a sensor's range
 
 }  // namespace
 
-PoseScreen::PoseScreen(const drivers::glove::Model& model, const PosePlan& plan,
-                       std::string title) {
+PoseScreen::PoseScreen(const drivers::glove::Model& model, const PosePlan& plan, std::string title,
+                       std::string note) {
   view_.title = std::move(title);
+  view_.note = std::move(note);
   view_.poses = plan.poses();
   for (const drivers::glove::Sensor& sensor : model.sensors) {
     view_.sensors.push_back({.name = sensor.name,

@@ -13,7 +13,9 @@ namespace posed::cli {
 // On the terminal, which is as it was once this is gone.
 class PoseScreen final : public PoseGuide {
  public:
-  PoseScreen(const drivers::glove::Model& model, const PosePlan& plan, std::string title);
+  // `note` stands on the screen from the start; may be empty.
+  PoseScreen(const drivers::glove::Model& model, const PosePlan& plan, std::string title,
+             std::string note);
 
   void want(drivers::glove::Pose pose) override;
   [[nodiscard]] Word hear() override;

@@ -26,8 +26,10 @@ std::string time_left(double fraction, double elapsed_s) {
 
 }  // namespace
 
-ProgressBar::ProgressBar()
-    : start_(std::chrono::steady_clock::now()), terminal_(isatty(STDERR_FILENO) == 1) {
+ProgressBar::ProgressBar(double quiet_for_s)
+    : start_(std::chrono::steady_clock::now()),
+      quiet_for_s_(quiet_for_s),
+      terminal_(isatty(STDERR_FILENO) == 1) {
   g_interrupted = 0;
   struct sigaction action{};
   action.sa_handler = interrupt;
@@ -36,12 +38,18 @@ ProgressBar::ProgressBar()
   sigaction(SIGINT, &action, &before_);
 }
 
-ProgressBar::~ProgressBar() {
+void ProgressBar::finish() {
   if (terminal_ && !last_step_.empty()) std::fprintf(stderr, "\r\033[K");
+  last_step_.clear();
+}
+
+ProgressBar::~ProgressBar() {
+  finish();
   sigaction(SIGINT, &before_, nullptr);
 }
 
 bool ProgressBar::show(std::string_view step, double fraction) {
+  if (elapsed_s() < quiet_for_s_) return g_interrupted == 0;
   fraction = std::clamp(fraction, 0.0, 1.0);
   const int quarter = static_cast<int>(fraction * 4.0);
   if (terminal_) {

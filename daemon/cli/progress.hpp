@@ -9,9 +9,12 @@
 
 namespace posed::cli {
 
+inline constexpr double kQuietFor_s = 1.0;  // from which on waiting is felt
+
 class ProgressBar {
  public:
-  ProgressBar();
+  // Draws nothing before the work has taken `quiet_for_s`: short work needs no bar.
+  explicit ProgressBar(double quiet_for_s = 0.0);
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
   ~ProgressBar();
@@ -19,12 +22,16 @@ class ProgressBar {
   // How far the whole work is, 0..1, and what is being done. False once Ctrl-C was pressed.
   bool show(std::string_view step, double fraction);
 
+  // Takes the bar off the terminal, before anything else is printed.
+  void finish();
+
   [[nodiscard]] double elapsed_s() const;
 
  private:
   void draw(std::string_view step, double fraction) const;
 
   std::chrono::steady_clock::time_point start_;
+  double quiet_for_s_;
   bool terminal_;
   std::string last_step_;
   int last_quarter_ = -1;

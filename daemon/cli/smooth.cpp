@@ -11,6 +11,8 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/cli/progress.hpp"
 #include "models/generate/live_smoother.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/clip/hand_clip.hpp"
@@ -21,10 +23,12 @@ namespace {
 
 using nlohmann::json;
 
+constexpr std::size_t kProgressEvery = 1000;  // frames
+
 struct SmoothOptions {
   std::string in, out, model, lag = "1", hand;
   double noise_deg = 0.0;
-  bool json = false;
+  bool overwrite = false, json = false;
 };
 
 // Puts what comes out into the clip's rows, and counts.
@@ -90,6 +94,12 @@ Result<generate::LiveOptions> live_options(const SmoothOptions& options, double 
 }
 
 Result<> smooth(const SmoothOptions& options) {
+  const auto files = OutputFiles(options.overwrite)
+                         .reads(options.in)
+                         .reads(options.model)
+                         .writes(options.out, {".csv"})
+                         .check();
+  if (!files) return files;
   clip::ReadOptions read;
   if (!options.hand.empty()) read.hand = options.hand == "left" ? Side::kLeft : Side::kRight;
   auto clip = clip::read_hand_clip(options.in, read);
@@ -110,7 +120,12 @@ Result<> smooth(const SmoothOptions& options) {
   generate::LiveSmoother smoother(skeleton, *live, model.get());
   const std::vector<HandAngles> measured = clip->angles;
   Rows rows(*clip);
+  ProgressBar bar(kQuietFor_s);
   for (std::size_t t = 0; t < measured.size(); ++t) {
+    const bool tell = t % kProgressEvery == 0;
+    if (tell && !bar.show("smoothing", static_cast<double>(t) / measured.size())) {
+      return fail("stopped; nothing was written", options.in);
+    }
     Frame frame;
     set_hand_angles(skeleton, measured[t], frame);
     frame.header.sequence = t + 1;
@@ -119,14 +134,15 @@ Result<> smooth(const SmoothOptions& options) {
   }
   smoother.flush(rows);
   if (auto written = clip::write_hand_csv(*clip, options.out); !written) return written;
+  bar.finish();
 
   const int lag_frames = generate::lag_frames(live->lag, 1.0 / clip->rate_hz);
   const double lag_ms = 1e3 * lag_frames / clip->rate_hz;
   const double noise_deg = smoother.noise_rad() * kDegrees;
   if (!options.json) {
     std::printf(
-        "%s: %zu frames, %d behind (%.0f ms at %g Hz), sensor noise %.2f deg%s, "
-        "%ld missing values bridged\n",
+        "%s: %zu frames, %d behind (%.0f ms at %g Hz), sensor noise %.2f deg%s (standard "
+        "deviation of an angle), %ld missing values bridged\n",
         options.out.c_str(), measured.size(), lag_frames, lag_ms, clip->rate_hz, noise_deg,
         options.noise_deg > 0.0 ? "" : " (estimated)", rows.bridged_values);
     return {};
@@ -165,6 +181,7 @@ void add_smooth(CLI::App& app, int& exit_code) {
       ->type_name("H.gesture");
   command->add_option("--hand", options->hand, "Whose a hand CSV is, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
+  add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
   posed smooth glove.csv --out smooth.csv                     # lag 1 frame, noise estimated

@@ -1,18 +1,23 @@
 // posed synth: a hand performs a string of labels, into a file.
 #include <charconv>
+#include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/cli/waiting.hpp"
 #include "models/generate/constrain.hpp"
 #include "models/generate/perform.hpp"
 #include "models/generate/tempo.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/clip/bvh.hpp"
 #include "proto/clip/hand_clip.hpp"
+#include "proto/clip/text.hpp"
 #include "proto/frame/hand_shape.hpp"
 
 namespace posed::cli {
@@ -33,7 +38,7 @@ struct SynthOptions {
   double tempo = 1.0;
   std::string lookahead = "full", hand = "right";
   std::string shape{kDefaultHandShape};
-  bool global_variance = false, unconstrained = false, json = false;
+  bool global_variance = false, unconstrained = false, overwrite = false, json = false;
 };
 
 Result<generate::PerformOptions> perform_options(const SynthOptions& options) {
@@ -54,7 +59,8 @@ Result<generate::PerformOptions> perform_options(const SynthOptions& options) {
 }
 
 Result<> write(const clip::HandClip& hand, const SynthOptions& options) {
-  if (options.out.ends_with(".csv")) return clip::write_hand_csv(hand, options.out);
+  if (clip::lower(std::filesystem::path(options.out).extension().string()) == ".csv")
+    return clip::write_hand_csv(hand, options.out);
   const auto clip = clip::clip_of_hand(hand, options.shape);
   if (!clip) return std::unexpected(clip.error());
   return clip::write_bvh(*clip, options.out);
@@ -75,9 +81,11 @@ json states_json(const gesture::GestureModel& model, const generate::Performance
 }
 
 Result<json> synth(const SynthOptions& options) {
-  if (!options.out.ends_with(".csv") && !options.out.ends_with(".bvh")) {
-    return misuse("can write a hand as .csv or .bvh; name --out so", options.out);
-  }
+  const auto files = OutputFiles(options.overwrite)
+                         .reads(options.model)
+                         .writes(options.out, {".csv", ".bvh"})
+                         .check();
+  if (!files) return std::unexpected(files.error());
   const auto perform_as = perform_options(options);
   if (!perform_as) return std::unexpected(perform_as.error());
   auto model = gesture::load_model(options.model);
@@ -118,9 +126,11 @@ void print_summary(const json& report) {
     std::printf("%-8s %6d %6d\n", first["label"].get<std::string>().c_str(),
                 first["start"].get<int>(), frames);
   }
-  std::printf("%d frames at %g Hz, fingers at least %.2f cm apart, written to %s\n",
+  const double gap_cm = report["min_gap_cm"].get<double>();
+  std::printf("%d frames at %g Hz, fingers %s %.2f cm %s, written to %s\n",
               report["frames"].get<int>(), report["rate_hz"].get<double>(),
-              report["min_gap_cm"].get<double>(), report["out"].get<std::string>().c_str());
+              gap_cm < 0.0 ? "overlap by" : "at least", std::abs(gap_cm),
+              gap_cm < 0.0 ? "at worst" : "apart", report["out"].get<std::string>().c_str());
 }
 
 }  // namespace
@@ -146,9 +156,13 @@ void add_synth(CLI::App& app, int& exit_code) {
   command->add_flag("--unconstrained", options->unconstrained,
                     "Leave out joint limits and collisions: the model's bare trajectory");
   command->add_option("--out", options->out, "Where to write: .csv or .bvh")->required();
+  add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const auto made = synth(*options);
+    const auto made = [&] {
+      const Waiting waiting("performing");
+      return synth(*options);
+    }();
     if (!made) {
       exit_code = report(made.error());
     } else if (options->json) {

@@ -9,6 +9,7 @@
 
 #include "daemon/cli/auto_label.hpp"
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/cli/question_file.hpp"
 #include "daemon/cli/tree_options.hpp"
@@ -39,9 +40,25 @@ struct TrainGestureOptions {
   double rate_hz = 30.0;
   int embedded_rounds = 0;
   bool auto_label = false;
-  bool json = false;
+  bool overwrite = false, json = false;
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
+
+// It trains nothing, so whatever is about the training means nothing.
+Result<> check_auto_label(const TrainGestureOptions& options) {
+  if (options.clips.size() != 1) {
+    return misuse("--auto-label proposes labels for one clip at a time");
+  }
+  const bool draws =
+      !options.trees->text.empty() || !options.trees->dot.empty() || !options.trees->svg.empty();
+  if (draws || !options.questions.empty() || !options.propose.empty() || !options.shows.empty() ||
+      options.embedded_rounds > 0) {
+    return misuse(
+        "--auto-label only proposes labels; leave out --questions, --propose-questions, --show, "
+        "--embedded-rounds and --tree-...");
+  }
+  return {};
+}
 
 Result<> check(const TrainGestureOptions& options) {
   if (options.clips.size() != options.labels.size()) {
@@ -50,10 +67,17 @@ Result<> check(const TrainGestureOptions& options) {
   if (!options.questions.empty() && !options.propose.empty()) {
     return misuse("--propose-questions makes the classes that --questions reads; name one of them");
   }
-  if (options.auto_label && options.clips.size() != 1) {
-    return misuse("--auto-label proposes labels for one clip at a time");
+  OutputFiles files(options.overwrite);
+  if (auto trees = check_tree_options(*options.trees, files); !trees) return trees;
+  files.reads_all(options.clips).reads_all(options.labels).reads(options.questions);
+  for (const std::string& show : options.shows) files.reads(show.substr(show.find('=') + 1));
+  if (options.auto_label) {
+    if (auto useful = check_auto_label(options); !useful) return useful;
+    return files.writes_any_but_other(options.out, {".lab"}).check();
   }
-  return check_tree_options(*options.trees);
+  return files.writes_any_but_other(options.propose, {".toml"})
+      .writes_any_but_other(options.out, {".gesture"})
+      .check();
 }
 
 clip::ReadOptions read_options(const std::string& hand) {
@@ -145,6 +169,10 @@ Result<json> train_gesture(const TrainGestureOptions& options) {
   json report = json::parse(training->model.report_json);
   report["seconds"] = training->seconds;
   report["out"] = options.out;
+  const std::size_t warnings = report["warnings"].size();
+  report["verdict"] = warnings == 0 ? "good: nothing in these recordings speaks against the model"
+                                    : "usable with care: " + std::to_string(warnings) +
+                                          " warnings above say what to record more of";
   return report;
 }
 
@@ -164,6 +192,8 @@ int train_or_report(const TrainGestureOptions& options) {
   } else {
     print_gesture_summary(*trained, options.out);
   }
+  std::fflush(stdout);
+  std::fprintf(stderr, "posed: %s\n", (*trained)["verdict"].get<std::string>().c_str());
   return 0;
 }
 
@@ -230,6 +260,7 @@ void add_train_gesture(CLI::App& train_command, int& exit_code) {
                     "Train nothing: propose labels from few examples and write them to --out");
   add_tree_options(*command, options->trees);
   command->add_option("--out", options->out, "Where to write the model")->required();
+  add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] { exit_code = train_or_report(*options); });
 }

@@ -25,13 +25,22 @@ void add_tree_options(CLI::App& command, const std::shared_ptr<TreeOptions>& opt
   command.add_option("--tree-text", options->text, "Write the trees as text here; - is stdout");
   command.add_option("--tree-dot", options->dot, "Write them as Graphviz source");
   command.add_option("--tree-svg", options->svg, "Write them as a picture");
-  command.add_option("--trees", options->which, "Which: all, middle, 4 (a state) or middle:4")
-      ->capture_default_str();
+  auto* which =
+      command.add_option("--trees", options->which, "Which: all, middle, 4 (a state) or middle:4");
+  which->capture_default_str()->each(
+      [options](const std::string&) { options->which_given = true; });
 }
 
-Result<> check_tree_options(const TreeOptions& options) {
+Result<> check_tree_options(const TreeOptions& options, OutputFiles& files) {
   auto choice = gesture::tree_choice(options.which);
   if (!choice) return std::unexpected(choice.error());
+  if (options.which_given && options.text.empty() && options.dot.empty() && options.svg.empty()) {
+    return misuse("--trees says which trees to draw; add --tree-text, --tree-dot or --tree-svg");
+  }
+  const auto file = [](const std::string& name) { return name == "-" ? std::string() : name; };
+  files.writes_any_but_other(file(options.text), {".txt"})
+      .writes_any_but_other(file(options.dot), {".dot", ".gv"})
+      .writes_any_but_other(file(options.svg), {".svg"});
   return {};
 }
 

@@ -68,37 +68,60 @@ Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand
   return values;
 }
 
-Result<Fitted> fit_poses(const Model& model, const Recorded& recorded) {
+double Held::deviation() const {
+  if (count == 0) return 0.0;
+  return std::sqrt(std::max(0.0, squares / static_cast<double>(count) - mean() * mean()));
+}
+
+double SensorPoses::span() const { return std::abs(pose_raw - flat_raw); }
+
+Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Recorded& recorded) {
   std::array<std::vector<double>, kPoses> wanted;
   for (std::size_t p = 0; p < kPoses; ++p) {
     auto values = values_of(model, hand_in(static_cast<Pose>(p)));
     if (!values) return std::unexpected(values.error());
     wanted[p] = std::move(*values);
   }
-  Fitted fitted;
-  bool flat_seen = false;
+  std::vector<SensorPoses> found;
   for (std::size_t i = 0; i < model.sensors.size(); ++i) {
-    const Sensor& sensor = model.sensors[i];
     const Held& flat = recorded[0][i];
     if (flat.count == 0) continue;  // a sensor that this glove lacks
-    flat_seen = true;
     std::size_t most = 0;
     for (std::size_t p = 1; p < kPoses; ++p) {
       const double moves = std::abs(wanted[p][i] - wanted[0][i]);
       if (recorded[p][i].count > 0 && moves > std::abs(wanted[most][i] - wanted[0][i])) most = p;
     }
     if (!(std::abs(wanted[most][i] - wanted[0][i]) > kSame)) continue;
-    const double raw = recorded[most][i].mean();
-    if (!(std::abs(raw - flat.mean()) >= least_span(sensor))) {
+    found.push_back({.sensor = i,
+                     .pose = static_cast<Pose>(most),
+                     .flat_raw = flat.mean(),
+                     .pose_raw = recorded[most][i].mean(),
+                     .flat_value = wanted[0][i],
+                     .pose_value = wanted[most][i]});
+  }
+  return found;
+}
+
+Result<Fitted> fit_poses(const Model& model, const Recorded& recorded) {
+  const auto sensors = poses_of_sensors(model, recorded);
+  if (!sensors) return std::unexpected(sensors.error());
+  if (std::ranges::all_of(recorded[0], [](const Held& flat) { return flat.count == 0; })) {
+    return fail("no raw values came while the hand was flat: is the glove sending?");
+  }
+  Fitted fitted;
+  for (const SensorPoses& at : *sensors) {
+    const Sensor& sensor = model.sensors[at.sensor];
+    if (!(at.span() >= least_span(sensor))) {
       fitted.warnings.push_back("sensor " + sensor.name + " hardly moved from flat to " +
-                                std::string(kPoseNames[most]) + ": it keeps its default");
+                                std::string(kPoseNames[static_cast<std::size_t>(at.pose)]) +
+                                ": it keeps its default");
       continue;
     }
-    std::vector<std::array<double, 2>> points{{flat.mean(), wanted[0][i]}, {raw, wanted[most][i]}};
+    std::vector<std::array<double, 2>> points{{at.flat_raw, at.flat_value},
+                                              {at.pose_raw, at.pose_value}};
     std::ranges::sort(points);
     fitted.sensors[sensor.name] = std::move(points);
   }
-  if (!flat_seen) return fail("no raw values came while the hand was flat: is the glove sending?");
   if (fitted.sensors.empty()) {
     return fail("no sensor moved between the poses: is the glove worn, and its cable in?");
   }

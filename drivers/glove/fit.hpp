@@ -35,13 +35,31 @@ inline constexpr std::array<std::string_view, kPoses> kPoseHints{
 struct Held {
   double sum = 0.0;
   std::size_t count = 0;
+  double squares = 0.0;
   void add(float raw) {
     sum += static_cast<double>(raw);
+    squares += static_cast<double>(raw) * static_cast<double>(raw);
     ++count;
   }
   [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
+  // Standard deviation: how still the sensor was.
+  [[nodiscard]] double deviation() const;
 };
 using Recorded = std::array<std::array<Held, kMaxSensors>, kPoses>;  // [pose][sensor]
+
+// The two poses that a sensor's calibration rests on: the flat hand and the one that moves it most.
+struct SensorPoses {
+  std::size_t sensor = 0;
+  Pose pose = Pose::kFist;
+  double flat_raw = 0.0, pose_raw = 0.0;
+  double flat_value = 0.0, pose_value = 0.0;  // calibrated values wanted there
+
+  [[nodiscard]] double span() const;  // of the raw values
+};
+
+// Of each sensor that was measured while the hand was flat and that a recorded pose moves.
+[[nodiscard]] Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model,
+                                                                const Recorded& recorded);
 
 struct Fitted {
   std::map<std::string, std::vector<std::array<double, 2>>> sensors;  // for CalibrationFile

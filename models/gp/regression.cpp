@@ -105,6 +105,12 @@ Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
   return trained;
 }
 
+Eigen::MatrixXd posterior_mean(const Trained& process, const Eigen::MatrixXd& queries) {
+  const Eigen::MatrixXd E = rbf(process.inputs, queries, process.lambda, process.mu);
+  const Eigen::MatrixXd k = E.array() + process.b;
+  return (k.transpose() * process.weights).rowwise() + process.offset.transpose();
+}
+
 Posterior posterior(const Trained& process, const Eigen::MatrixXd& queries) {
   const Eigen::MatrixXd E = rbf(process.inputs, queries, process.lambda, process.mu);
   const Eigen::MatrixXd k = E.array() + process.b;
@@ -114,7 +120,7 @@ Posterior posterior(const Trained& process, const Eigen::MatrixXd& queries) {
     return std::exp(process.lambda) + b - v.colwise().squaredNorm().transpose().array();
   };
   Posterior result;
-  result.mean = (k.transpose() * process.weights).rowwise() + process.offset.transpose();
+  result.mean = posterior_mean(process, queries);
   result.variance = variance(k, process.b);
   result.variance_rbf = variance(E, 0.0);
   return result;

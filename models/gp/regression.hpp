@@ -58,6 +58,11 @@ struct Posterior {
   Eigen::VectorXd variance_rbf;  // the same for the RBF part alone: e^lambda - E'(E_xx + s2 I)^-1 E
 };
 
+// The mean alone at the rows of `queries` [Q x D], offset included: [Q x D_out]. Without the
+// variance there is nothing to factorise.
+[[nodiscard]] Eigen::MatrixXd posterior_mean(const Trained& process,
+                                             const Eigen::MatrixXd& queries);
+
 // At the rows of `queries` [Q x D]. The reference that the float32 predictor is measured against.
 [[nodiscard]] Posterior posterior(const Trained& process, const Eigen::MatrixXd& queries);
 

@@ -1,9 +1,8 @@
 #include "models/style/apply.hpp"
 
 #include <algorithm>
-#include <bitset>
-#include <cmath>
 
+#include "models/motion/turn_sum.hpp"
 #include "models/style/heading.hpp"
 #include "proto/frame/rotation.hpp"
 
@@ -84,8 +83,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
 
   Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip};
   ChannelWriter writer(applied.clip);
-  std::bitset<kMaxJoints> changed;
-  double sum = 0.0;
+  motion::TurnSum turned;
   Catch out;
   for (int i = 0; i < clip.frames(); ++i) {
     const Frame in = clip.frame(i);
@@ -93,20 +91,17 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
     for (std::size_t j = 0; j < in.joint_count; ++j) {
       const Quatf& styled = out.get().rotation_xyzw[j];
       if (styled == in.rotation_xyzw[j]) continue;
-      changed.set(j);
+      turned.add(j, in.rotation_xyzw[j], styled);
       writer.write(i, static_cast<int>(j), styled);
-      const double angle_rad =
-          angle_between_rad(to_eigen_double(in.rotation_xyzw[j]), to_eigen_double(styled));
-      sum += angle_rad * angle_rad;
-      applied.max_change_rad = std::max(applied.max_change_rad, angle_rad);
     }
+    turned.end_frame();
     if (options.progress && i % kProgressEvery == 0 && !options.progress(i, clip.frames())) {
       return fail("stopped before its end", clip.path);
     }
   }
-  applied.joints_changed = static_cast<int>(changed.count());
-  const auto terms = static_cast<double>(changed.count()) * clip.frames();
-  applied.rms_change_rad = terms > 0.0 ? std::sqrt(sum / terms) : 0.0;
+  applied.joints_changed = turned.joints();
+  applied.rms_change_rad = turned.rms_rad();
+  applied.max_change_rad = turned.max_rad();
   return applied;
 }
 

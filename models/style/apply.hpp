@@ -24,7 +24,7 @@ struct Applied {
   // clip comes back with Z, Y, X rotation channels on every joint.
   clip::Clip clip;
   int joints_changed = 0;
-  double rms_change_rad = 0.0;  // over frames and changed joints
+  double rms_change_rad = 0.0;  // motion::TurnSum: over frames and changed joints
   double max_change_rad = 0.0;
 };
 

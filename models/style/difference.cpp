@@ -84,26 +84,56 @@ Result<gp::Trained> fit_paper(const MatrixXd& X, const MatrixXd& Y) {
   return gp::fit(X, Y, VectorXd::Zero(Y.cols()), gp::Hyper::of(best.x));
 }
 
+double Way::closes() const { return 1.0 - std::sqrt(after / before); }
+double Way::constant_closes() const { return 1.0 - std::sqrt(constant / before); }
+
+void Way::add(const Way& other) {
+  before += other.before;
+  after += other.after;
+  constant += other.constant;
+}
+
+Way way_of(const MatrixXd& q, const VectorXd& phase, const MatrixXd& goal, const MatrixXd& change,
+           const Eigen::RowVectorXd& constant) {
+  const MatrixXd grid = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const auto squares = [&](const MatrixXd& frames) {
+    return (grid * (fit_harmonics(phase, frames, kCycleHarmonics) - goal)).squaredNorm();
+  };
+  return {squares(q), squares(q + change), squares(q.rowwise() + constant)};
+}
+
 FoldError fold_error(const Fold& fold, double length_rad, double noise) {
   const auto process = fit_difference(fold.train, length_rad, noise);
   const double truth = fold.truth.squaredNorm();
-  if (!process) return {std::numeric_limits<double>::infinity(), truth};
-  return {(gp::posterior(*process, fold.q).mean - fold.truth).squaredNorm(), truth};
+  if (!process) return {std::numeric_limits<double>::infinity(), truth, {}};
+  const MatrixXd change = gp::posterior_mean(*process, fold.q);
+  FoldError found{(change - fold.truth).squaredNorm(), truth, {}};
+  if (fold.phase.size() > 0) {
+    found.way = way_of(fold.q, fold.phase, fold.goal, change, fold.constant);
+  }
+  return found;
 }
 
-double choose_length_rad(const std::vector<Fold>& folds, const std::vector<double>& candidates_rad,
-                         double noise, double fallback_rad) {
+ChosenLength choose_length_rad(const std::vector<Fold>& folds,
+                               const std::vector<double>& candidates_rad, double noise,
+                               double fallback_rad, const FoldProgress& progress) {
   double best = std::numeric_limits<double>::infinity();
-  double chosen = fallback_rad;
+  ChosenLength chosen{fallback_rad, {}};
+  const auto total = static_cast<double>(folds.size() * candidates_rad.size());
+  double done = 0.0;
   for (const double length_rad : candidates_rad) {
     double error = 0.0;
+    Way way;
     for (const Fold& fold : folds) {
       // Each fold counts alike, whatever its clip's length.
-      error += fold_error(fold, length_rad, noise).error / static_cast<double>(fold.q.rows());
+      const FoldError found = fold_error(fold, length_rad, noise);
+      error += found.error / static_cast<double>(fold.q.rows());
+      way.add(found.way);
+      if (progress && !progress(++done / total)) return chosen;
     }
     if (!folds.empty() && error < best) {
       best = error;
-      chosen = length_rad;
+      chosen = {length_rad, way};
     }
   }
   return chosen;

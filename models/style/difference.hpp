@@ -3,6 +3,7 @@
 // 8). Cold.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -27,7 +28,30 @@ struct Fold {
   std::vector<Pairing> train;
   Eigen::MatrixXd q;      // frames of the walker [T x D]
   Eigen::MatrixXd truth;  // what the process should say there [T x D]
+  // For the way that is left to the target: the frames' phases, the target's mean cycle and the
+  // constant part of the difference that the others teach (one row). No phases: not measured.
+  Eigen::VectorXd phase{};
+  Eigen::MatrixXd goal{};
+  Eigen::RowVectorXd constant{};
 };
+
+// How far walkers' average cycles are from the target's, as sums of squares over walkers, phases
+// and dimensions: as they walk, with the process's change, with a constant one.
+struct Way {
+  double before = 0.0, after = 0.0, constant = 0.0;
+
+  [[nodiscard]] bool measured() const { return before > 0.0; }
+  // The share of the way that the change closes: 1 arrives, 0 helps nothing, below 0 leads away.
+  [[nodiscard]] double closes() const;
+  [[nodiscard]] double constant_closes() const;
+  void add(const Way& other);
+};
+
+// Of frames q [T x D] at these phases; `change` [T x D] is what is added to them, `constant` [D]
+// what a constant offset would add, `goal` the target's cycle as harmonic coefficients.
+[[nodiscard]] Way way_of(const Eigen::MatrixXd& q, const Eigen::VectorXd& phase,
+                         const Eigen::MatrixXd& goal, const Eigen::MatrixXd& change,
+                         const Eigen::RowVectorXd& constant);
 
 // Kernel lengths to choose from [rad]: 30, 50, 75, 100 degrees for 63 dimensions, scaled by
 // sqrt(D / 63) because distances grow so.
@@ -45,12 +69,23 @@ struct Fold {
 // Sum of squared errors on the fold's frames, and of the truth itself.
 struct FoldError {
   double error = 0.0, truth = 0.0;
+  Way way;
 };
 [[nodiscard]] FoldError fold_error(const Fold& fold, double length_rad, double noise);
 
-// The candidate with the least error over all folds; `fallback_rad` when there is no fold.
-[[nodiscard]] double choose_length_rad(const std::vector<Fold>& folds,
-                                       const std::vector<double>& candidates_rad, double noise,
-                                       double fallback_rad);
+struct ChosenLength {
+  double length_rad = 0.0;
+  Way way;  // of the walkers held out, with this length
+};
+
+// Called after each fold with the share of the work that is done; false stops it.
+using FoldProgress = std::function<bool(double fraction)>;
+
+// The candidate with the least error over all folds; `fallback_rad` when there is no fold. Stopped
+// early, it is the best so far.
+[[nodiscard]] ChosenLength choose_length_rad(const std::vector<Fold>& folds,
+                                             const std::vector<double>& candidates_rad,
+                                             double noise, double fallback_rad,
+                                             const FoldProgress& progress = {});
 
 }  // namespace posed::style

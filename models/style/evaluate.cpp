@@ -105,8 +105,8 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
   score.cycle_ratio = rms(grid * after->coefficients() - goal_cycle) / apart;
   score.ratio = rms(after->q - at(*after)) / rms(before->q - at(*before));
   score.jerk_ratio = jerk(after->q) / source_jerk;
-  score.moved_rms_deg = kDegrees * rms(after->q - before->q);
-  score.source_rms_deg = kDegrees * apart;
+  score.component_rms_deg = kDegrees * rms(after->q - before->q);
+  score.source_component_rms_deg = kDegrees * apart;
   score.source_period_s = before->period_s;
   score.target_period_s = goal->period_s;
   return score;

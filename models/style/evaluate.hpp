@@ -12,8 +12,10 @@ struct StyleScore {
       0.0;                  // rms of styled - target average cycle (28 phases) over source - target
   double ratio = 0.0;       // the same per frame against the target's cycle at the frame's phase
   double jerk_ratio = 0.0;  // rms third difference of styled over source
-  double moved_rms_deg = 0.0;   // per rotation vector component, styled - source
-  double source_rms_deg = 0.0;  // what 1.0 of cycle_ratio is
+  // Per component of the rotation vectors, so not the angle of motion::TurnSum: styled - source of
+  // the frames, and source - target of the average cycles, which is what 1.0 of cycle_ratio is.
+  double component_rms_deg = 0.0;
+  double source_component_rms_deg = 0.0;
   double source_period_s = 0.0, target_period_s = 0.0;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -85,6 +86,20 @@ Stride find_stride(const VectorXd& signal, double rate_hz) {
   const double coarse = best.dtheta;
   for (int i = -kFineSteps; i <= kFineSteps; ++i) try_rate(coarse + step * i / kFineSteps);
   return best;
+}
+
+double stride_misfit(const VectorXd& signal, double rate_hz) {
+  constexpr double kWindow_s = 3.5;  // two of the longest strides
+  const auto frames = signal.size();
+  const auto window = std::min(frames, static_cast<Eigen::Index>(kWindow_s * rate_hz));
+  const auto step = std::max<Eigen::Index>(1, window / 2);
+  std::vector<double> scores;
+  for (Eigen::Index begin = 0; begin + window <= frames; begin += step) {
+    scores.push_back(find_stride(signal.segment(begin, window), rate_hz).score);
+  }
+  const auto middle = scores.begin() + std::ssize(scores) / 2;
+  std::ranges::nth_element(scores, middle);
+  return *middle;
 }
 
 }  // namespace posed::style

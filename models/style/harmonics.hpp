@@ -35,6 +35,12 @@ struct Stride {
 // which keeps two strides from being taken for one (style-science 0.1). Needs has_stride().
 [[nodiscard]] Stride find_stride(const Eigen::VectorXd& signal, double rate_hz);
 
+// How badly strides fit a leg signal, 0 to about 1.2: the median of find_stride's scores over
+// windows of 3.5 s, so that a cadence which changes over a long clip counts as one that does not.
+// Walks and runs are below 0.06, a jump is 0.67, waving while standing 0.2 to 0.85. Needs
+// has_stride().
+[[nodiscard]] double stride_misfit(const Eigen::VectorXd& signal, double rate_hz);
+
 // Whether `frames` at `rate_hz` can hold a stride at all.
 [[nodiscard]] bool has_stride(int frames, double rate_hz);
 inline constexpr double kShortestStride_s = 0.6;

@@ -41,7 +41,7 @@ std::vector<Fold> subject_folds(const Dataset& dataset, const std::vector<Subjec
     }
     const MatrixXd delta = goal - group_cycle(dataset, others, clip.group, clip.motion);
     folds.push_back({make_pairings(dataset, others, target, first_source), clip.q,
-                     taught(delta, clip.phase())});
+                     taught(delta, clip.phase()), clip.phase(), goal, delta.row(0)});
   }
   return folds;
 }
@@ -88,7 +88,8 @@ std::vector<Fold> half_folds(const Dataset& dataset, const std::string& target,
       const MatrixXd goal = group_cycle(halves, cycles, target, test.motion);
       if (goal.size() == 0) continue;
       const MatrixXd delta = goal - group_cycle(halves, cycles, test.group, test.motion);
-      folds.push_back({pairings, test.q, taught(delta, test.phase())});
+      folds.push_back(
+          {pairings, test.q, taught(delta, test.phase()), test.phase(), goal, delta.row(0)});
     }
   }
   return folds;

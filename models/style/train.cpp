@@ -11,6 +11,7 @@
 
 #include "models/style/harmonics.hpp"
 #include "models/style/pairings.hpp"
+#include "models/style/training_check.hpp"
 
 namespace posed::style {
 namespace {
@@ -27,6 +28,7 @@ struct Learnt {
   gp::Trained process;
   MatrixXd differences;  // all that was taught [N x D]
   json kernel;
+  Way way{};  // of walkers held out; not measured where none could be
 };
 
 // Clips of a motion that lacks the target or a source teach nothing; every group must teach.
@@ -78,18 +80,19 @@ bool several_subjects(const Dataset& dataset, const std::string& target) {
   });
 }
 
-Result<Learnt> learn_default(const Dataset& dataset, const std::string& target) {
+Result<Learnt> learn_default(const Dataset& dataset, const std::string& target,
+                             const FoldProgress& progress) {
   const std::string first = first_source_of(dataset, target);
   const auto pairings = make_pairings(dataset, subject_cycles(dataset), target, first);
   const double noise = several_subjects(dataset, target) ? kPersonNoise : kMeanCycleNoise;
   const auto folds = make_folds(dataset, target, first);
   const auto candidates = candidate_lengths_rad(dataset.dims());
   const bool is_union = dataset.motions.size() > 1 || pairings.size() > 2;
-  const double length_rad =
-      choose_length_rad(folds, candidates, noise, candidates[is_union ? 2 : 1]);
-  auto process = fit_difference(pairings, length_rad, noise);
+  const ChosenLength chosen =
+      choose_length_rad(folds, candidates, noise, candidates[is_union ? 2 : 1], progress);
+  auto process = fit_difference(pairings, chosen.length_rad, noise);
   if (!process) return std::unexpected(process.error());
-  Learnt learnt{std::move(*process), {}, {}};
+  Learnt learnt{std::move(*process), {}, {}, chosen.way};
   const MatrixXd basis = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
   learnt.differences.resize(learnt.process.inputs.rows(), dataset.dims());
   for (Eigen::Index i = 0; i < std::ssize(pairings); ++i) {
@@ -144,6 +147,47 @@ Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
   return Learnt{std::move(*process), Y, {{"length_chosen_by", "evidence"}}};
 }
 
+// The way that the finished process closes on the very clips it was learnt from.
+Way way_on_training(const Dataset& dataset, const Learnt& learnt, const std::string& target) {
+  const auto cycles = subject_cycles(dataset);
+  Way way;
+  for (const AlignedClip& clip : dataset.clips) {
+    const MatrixXd goal = group_cycle(dataset, cycles, target, clip.motion);
+    if (clip.group == target || goal.size() == 0) continue;
+    const MatrixXd own = group_cycle(dataset, cycles, clip.group, clip.motion);
+    way.add(way_of(clip.q, clip.phase(), goal, gp::posterior_mean(learnt.process, clip.q),
+                   goal.row(0) - own.row(0)));
+  }
+  return way;
+}
+
+TrainingCheck check_learnt(const Dataset& dataset, const Learnt& learnt,
+                           const std::string& target) {
+  if (learnt.way.measured()) {
+    return check_training(dataset, target, learnt.way, ClosingBy::kLeaveOut);
+  }
+  return check_training(dataset, target, way_on_training(dataset, learnt, target),
+                        ClosingBy::kTraining);
+}
+
+json check_json(const TrainingCheck& check, const std::string& target) {
+  json out{{"difference_deg", check.difference_deg},
+           {"scatter_deg", check.scatter_deg},
+           {"closes", nullptr},
+           {"constant_closes", nullptr},
+           {"problems", check.problems},
+           {"warnings", check.warnings},
+           {"usable", check.usable()},
+           {"verdict", check.verdict(target)}};
+  if (check.way.measured()) {
+    out["closes"] = check.way.closes();
+    out["constant_closes"] = check.way.constant_closes();
+    out["closes_measured_on"] =
+        check.closing_by == ClosingBy::kLeaveOut ? "held-out clips" : "training clips";
+  }
+  return out;
+}
+
 json report_of(const Dataset& dataset, const Learnt& learnt) {
   json report;
   report["subjects"] = json::array();
@@ -161,6 +205,7 @@ json report_of(const Dataset& dataset, const Learnt& learnt) {
                                {"frames", clip.q.rows()},
                                {"dropped_first_frame", clip.dropped_first},
                                {"period_frames", 2.0 * std::numbers::pi / clip.dtheta},
+                               {"stride_misfit", stride_misfit(clip.leg, dataset.rate_hz)},
                                {"theta0", clip.theta0}});
   }
   for (std::size_t m = 0; m < dataset.motions.size(); ++m) {
@@ -232,6 +277,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   if (auto checked = check_groups(clips, options.target); !checked) {
     return std::unexpected(checked.error());
   }
+  if (auto checked = check_recordings(clips); !checked) return std::unexpected(checked.error());
   if (!tell("reading poses", 0.0)) return stopped();
   auto dataset = make_dataset(clips, options.target, options.dataset);
   if (!dataset) return std::unexpected(dataset.error());
@@ -239,16 +285,24 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   if (auto aligned = align(*dataset, options.dataset); !aligned) {
     return std::unexpected(aligned.error());
   }
-  if (!tell("learning the difference", 0.0)) return stopped();
-  auto learnt = options.mode == TrainMode::kPaper ? learn_paper(*dataset, options.target)
-                                                  : learn_default(*dataset, options.target);
+  bool wanted = tell("learning the difference", 0.0);
+  const auto progress = [&](double fraction) {
+    return wanted = wanted && tell("learning the difference", fraction);
+  };
+  if (!wanted) return stopped();
+  auto learnt = options.mode == TrainMode::kPaper
+                    ? learn_paper(*dataset, options.target)
+                    : learn_default(*dataset, options.target, progress);
   if (!learnt) return std::unexpected(learnt.error());
+  if (!wanted) return stopped();
 
   StyleModel model;
   model.to = options.target;
   model.from = joined_sources(*dataset, options.target);
   model.rate_hz = dataset->rate_hz;
-  model.report_json = report_of(*dataset, *learnt).dump();
+  json report = report_of(*dataset, *learnt);
+  report.update(check_json(check_learnt(*dataset, *learnt, options.target), options.target));
+  model.report_json = report.dump();
   model.limit_rad = kLimitFactor * learnt->differences.cwiseAbs().colwise().maxCoeff().transpose();
   set_input_statistics(*dataset, model);
   model.space = std::move(dataset->spec);

@@ -23,7 +23,8 @@ struct TrainOptions {
 };
 
 // Refuses clips that cannot be learnt from with one sentence naming the clip. The report (what
-// `train --json` prints, less the seconds) is in the model.
+// `train --json` prints, less the seconds) is in the model; its `usable`, `problems`, `warnings`
+// and `verdict` say whether the model is any good (training_check.hpp).
 [[nodiscard]] Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
                                              const TrainOptions& options);
 

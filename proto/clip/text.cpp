@@ -9,6 +9,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "proto/frame/whole_file.hpp"
+
 namespace posed::clip {
 namespace {
 
@@ -115,21 +117,7 @@ std::string_view Cursor::rest() {
 
 Result<> write_text(const std::filesystem::path& path,
                     const std::function<void(std::ostream&)>& write) {
-  const std::filesystem::path part = path.string() + ".part";
-  const auto why = [] { return std::string(std::strerror(errno)); };
-  std::ofstream file(part, std::ios::binary | std::ios::trunc);
-  if (!file) return fail("cannot be written: " + why(), path.string());
-  write(file);
-  file.close();
-  std::error_code error;
-  if (!file) {
-    const std::string reason = why();
-    std::filesystem::remove(part, error);
-    return fail("could not be written to its end: " + reason, path.string());
-  }
-  std::filesystem::rename(part, path, error);
-  if (error) return fail("cannot be written: " + error.message(), path.string());
-  return {};
+  return write_whole_file(path, write);
 }
 
 std::string_view without_bom(std::string_view text) noexcept {

@@ -7,6 +7,7 @@
 
 #include <zlib.h>
 
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/load_file.hpp"
 
 namespace posed::model_file {
@@ -82,27 +83,9 @@ Result<std::string> load(const std::filesystem::path& path) {
 }
 
 Result<> save(const std::string& bytes, const std::filesystem::path& path) {
-  // Written beside its place and then moved there: whoever opens the file sees all of it or none.
-  const std::filesystem::path part = path.string() + ".part";
-  {
-    std::ofstream stream(part, std::ios::binary | std::ios::trunc);
+  return write_whole_file(path, [&](std::ostream& stream) {
     stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    stream.close();
-    if (!stream) {
-      std::error_code ignored;
-      std::filesystem::remove(part, ignored);
-      return fail("the model cannot be written; check the folder and the disk's free space",
-                  path.string());
-    }
-  }
-  std::error_code error;
-  std::filesystem::rename(part, path, error);
-  if (error) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    return fail("the model cannot be put in its place: " + error.message(), path.string());
-  }
-  return {};
+  });
 }
 
 }  // namespace posed::model_file

@@ -10,6 +10,8 @@
 #include <iterator>
 #include <optional>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "tests/e2e/served.hpp"
 #include "tests/support/free_port.hpp"
@@ -142,6 +144,52 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
                                   stage.path("frames.bin"), "--expect"});
   INFO(replayed.err);
   CHECK(replayed.code == 0);
+}
+
+TEST_CASE("a hand that moved, or never took a pose, makes no calibration") {
+  CalibrationStage stage;
+  stage.launch("run");
+  stage.put_on();
+  stage.wait_for_frame();
+  const std::vector<std::string> quick{"--stream", "right", "--seconds", "1",
+                                       "--ready",  "0.2",   "--pose",    "spread=0"};
+  {
+    const std::jthread restless([&](const std::stop_token& stop) {
+      for (bool fist = false; !stop.stop_requested(); fist = !fist) {
+        stage.glove->hold(fist ? Pose::kFist : Pose::kFlat);
+        std::this_thread::sleep_for(100ms);
+      }
+    });
+    const Outcome moved = stage.calibrate(quick);
+    CHECK(moved.code == 1);
+    CHECK(has(moved.err, "fist failed: "));
+    CHECK(has(moved.err, "moved while it was held"));
+    CHECK(has(moved.err, "hold it again"));
+  }
+  CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
+
+  // A hand that lies flat whatever is asked.
+  {
+    const std::jthread lazy([&](const std::stop_token& stop) {
+      for (; !stop.stop_requested(); std::this_thread::sleep_for(2ms)) {
+        stage.glove->hold(Pose::kFlat);
+      }
+    });
+    const Outcome flat = stage.calibrate(quick);
+    CHECK(flat.code == 1);
+    CHECK(has(flat.err, "hardly moved from the flat hand"));
+  }
+  CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
+
+  // What is there is not replaced unasked, and an option that means nothing is told.
+  stage.folder.write("ann.toml", "mine");
+  const Outcome there = stage.calibrate(quick);
+  CHECK(there.code == 2);
+  CHECK(has(there.err, "add --overwrite"));
+  CHECK(stage.read("ann.toml") == "mine");
+  const Outcome useless = stage.calibrate({"--stream", "right", "--ready", "1", "--overwrite"});
+  CHECK(useless.code == 2);
+  CHECK(has(useless.err, "add --seconds"));
 }
 
 TEST_CASE("calibrate --connect says what is wrong with what was asked") {

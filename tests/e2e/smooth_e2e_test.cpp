@@ -1,6 +1,7 @@
 // `posed smooth` on the real binary: the live stage offline, gaps filled, wrong use told.
 #include <cmath>
 #include <fstream>
+#include <iterator>
 
 #include <nlohmann/json.hpp>
 
@@ -57,6 +58,26 @@ TEST_CASE("a recorded hand is smoothed and its gaps filled", "[smooth]") {
       REQUIRE(std::abs(smooth->angles[t][c] - whole.angles[t][c]) < 0.1);
     }
   }
+}
+
+TEST_CASE("smooth never destroys a recording", "[smooth]") {
+  const TempFolder folder;
+  const std::string in = folder.path() / "in.csv";
+  REQUIRE(clip::write_hand_csv(waving(), in));
+  const auto bytes = [&](const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return std::string{std::istreambuf_iterator<char>(file), {}};
+  };
+  const std::string before = bytes(in);
+  const auto onto_itself = posed({"smooth", in, "--out", in, "--overwrite"});
+  CHECK(onto_itself.code == 2);
+  CHECK(onto_itself.err.find("is read by this command") != std::string::npos);
+  CHECK(bytes(in) == before);
+  const std::string other = folder.write("other.csv", "mine");
+  CHECK(posed({"smooth", in, "--out", other}).code == 2);
+  CHECK(bytes(other) == "mine");
+  CHECK(posed({"smooth", in, "--out", folder.path() / "out.bvh"}).code == 2);
+  CHECK(posed({"smooth", in, "--out", other, "--overwrite"}).code == 0);
 }
 
 TEST_CASE("wrong use of smooth is one sentence", "[smooth]") {

@@ -102,6 +102,9 @@ TEST_CASE("synth refuses what it cannot perform with one sentence and exit code 
   CHECK(studio.synth("g", "hand.csv", {"--lookahead", "soon"}).code == 2);
   CHECK(studio.synth("g", "hand.csv", {"--tempo", "0"}).code == 2);
   CHECK(studio.synth("g", "hand.csv", {"--lookahead", "15", "--tempo", "2"}).code == 0);
+  // The same name again is not replaced unasked.
+  CHECK(studio.synth("g", "hand.csv").code == 2);
+  CHECK(studio.synth("g", "hand.csv", {"--overwrite"}).code == 0);
 }
 
 }  // namespace

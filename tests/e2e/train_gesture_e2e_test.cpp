@@ -98,7 +98,7 @@ TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
   for (const char* figure : {"jerk", "ldlj", "sparc"}) CHECK(told["performed"][figure].is_number());
   const auto& curve = told["curve"];
   REQUIRE(curve.size() > 5);
-  CHECK(curve.back()["rms_deg"] < curve.front()["rms_deg"]);
+  CHECK(curve.back()["channel_rms_deg"] < curve.front()["channel_rms_deg"]);
   CHECK(bytes_of(glove.file("lag.svg")).find("<svg") == 0);
   CHECK(bytes_of(glove.file("t.dot")).find("digraph") != std::string::npos);
   CHECK(one_sentence(eval({"--labels", "wave"}), 2, "wave"));
@@ -142,6 +142,12 @@ TEST_CASE("What cannot be trained from is refused", "[train_gesture]") {
   CHECK(one_sentence(with("0 1 wave\n1 2 g\n"), 1, "label 'wave' is in no class"));
   CHECK(one_sentence(glove.train("x.gesture", {"--questions", "none.toml"}), 2, "none.toml"));
   CHECK(one_sentence(glove.train("x.gesture", {"--trees", "toe"}), 2, "names no tree"));
+  CHECK(one_sentence(glove.train("x.gesture", {"--trees", "middle"}), 2, "add --tree-text"));
+  CHECK(one_sentence(glove.train("x.lab", {"--auto-label", "--questions", "q.toml"}), 2,
+                     "--auto-label only proposes labels"));
+  CHECK(one_sentence(glove.train("take.csv"), 2, "what is written here is .gesture"));
+  CHECK(one_sentence(glove.train("take.lab", {"--auto-label", "--overwrite"}), 2,
+                     "is read by this command"));
   CHECK(one_sentence(glove.train("x.gesture", {"--show", "three"}), 2, "shows no pose"));
   CHECK(one_sentence(glove.train("x.gesture", {"--clip", "b.csv"}), 2, "one label file"));
   CHECK(

@@ -104,7 +104,7 @@ void ask(const style::Dataset& dataset, const std::vector<style::SubjectCycle>& 
   }
   const auto candidates = style::candidate_lengths_rad(dataset.dims());
   const double length_rad =
-      style::choose_length_rad(folds, candidates, kPersonNoise, candidates[2]);
+      style::choose_length_rad(folds, candidates, kPersonNoise, candidates[2]).length_rad;
   const auto fold = fold_of(dataset, lessons(cycles, delta, {a, b, asked}), delta, asked);
   const auto values = static_cast<double>(fold.truth.size());
   const auto found = style::fold_error(fold, length_rad, kPersonNoise);

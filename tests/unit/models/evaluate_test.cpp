@@ -17,11 +17,11 @@ TEST_CASE("a walk left alone scores one, the target's own walk scores zero", "[s
   CHECK(alone->cycle_ratio == 1.0);
   CHECK(alone->ratio == 1.0);
   CHECK(alone->jerk_ratio == 1.0);
-  CHECK(alone->moved_rms_deg == 0.0);
+  CHECK(alone->component_rms_deg == 0.0);
   const auto reached = style::evaluate_style(march, sway, sway);
   REQUIRE(reached);
   CHECK(reached->cycle_ratio == Approx(0.0).margin(1e-9));
-  CHECK(reached->moved_rms_deg > 1.0);
+  CHECK(reached->component_rms_deg > 1.0);
 }
 
 TEST_CASE("a target that is the source itself, or a source that stands still, has no score",

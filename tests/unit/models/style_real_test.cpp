@@ -125,8 +125,8 @@ TEST_CASE("a normal walk among the sources is styled; a walk in the style is lef
   const auto normal = score(model, take("walk_normal_002"), target);
   CHECK(normal.cycle_ratio <= 0.21);
   const auto already = score(model, target, take("walk_feminine_001"));
-  CHECK(already.moved_rms_deg <= 2.0);
-  CHECK(score(taught_walk(), target, take("walk_feminine_001")).moved_rms_deg <= 2.0);
+  CHECK(already.component_rms_deg <= 2.0);
+  CHECK(score(taught_walk(), target, take("walk_feminine_001")).component_rms_deg <= 2.0);
 }
 
 TEST_CASE("a model taught at 30 Hz serves the same walk at 120 Hz, frame by frame",

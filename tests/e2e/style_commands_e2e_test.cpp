@@ -1,0 +1,209 @@
+// train, apply and eval of a style through the real binary: no option is silent, nonsense is
+// refused, the last line is a verdict, and the exit code can be trusted.
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "models/motion/synthetic_walker.hpp"
+#include "tests/e2e/outcome.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::test {
+namespace {
+
+using motion::WalkerFamily;
+using nlohmann::json;
+
+bool has(const std::string& text, const std::string& what) {
+  UNSCOPED_INFO(text);
+  return text.contains(what);
+}
+
+// Two made-up walkers of each family, and an experiment file of the first of each.
+struct Studio {
+  TempFolder folder;
+
+  Studio() {
+    for (const std::uint32_t person : {1U, 2U}) {
+      write("march_" + std::to_string(person), WalkerFamily::kMarch, person);
+      write("sway_" + std::to_string(person), WalkerFamily::kSway, person);
+    }
+    folder.write(
+        "exp.toml",
+        "target = \"sway\"\n[[clip]]\nfile = \"march_1.bvh\"\ngroup = \"march\"\nmotion = "
+        "\"walk\"\n[[clip]]\nfile = \"sway_1.bvh\"\ngroup = \"sway\"\nmotion = \"walk\"\n");
+  }
+
+  void write(const std::string& name, WalkerFamily family, std::uint32_t person) const {
+    const auto clip = motion::make_walker({.family = family, .person = person});
+    REQUIRE(clip::write_bvh(*clip, folder.path() / (name + ".bvh")));
+  }
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return (folder.path() / name).string();
+  }
+  [[nodiscard]] std::string bytes(const std::string& name) const {
+    std::ifstream file(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  [[nodiscard]] bool there(const std::string& name) const {
+    return std::filesystem::exists(path(name));
+  }
+
+  // train style with `what`, into `out`.
+  [[nodiscard]] Outcome train(std::vector<std::string> what, const std::string& out) const {
+    what.insert(what.begin(), {"train", "style"});
+    what.insert(what.end(), {"--out", path(out), "--json"});
+    return posed(std::move(what));
+  }
+  [[nodiscard]] Outcome experiment(std::vector<std::string> more, const std::string& out) const {
+    more.insert(more.begin(), {"--experiment", path("exp.toml")});
+    return train(std::move(more), out);
+  }
+  [[nodiscard]] Outcome eval(const std::string& source, const std::string& target) const {
+    return posed({"eval", "style", "--model", path("m.style"), "--source", path(source), "--target",
+                  path(target), "--json"});
+  }
+};
+
+}  // namespace
+
+TEST_CASE("what the command line says beside an experiment file overrides it or is refused",
+          "[train_style]") {
+  const Studio studio;
+  const auto usual = studio.experiment({}, "default.style");
+  REQUIRE(usual.code == 0);
+  CHECK(json::parse(usual.out)["mode"] == "default");
+  const auto paper = studio.experiment({"--mode", "paper"}, "paper.style");
+  REQUIRE(paper.code == 0);
+  CHECK(json::parse(paper.out)["mode"] == "paper");
+  CHECK(json::parse(paper.out)["kernel"]["length_chosen_by"] == "evidence");
+  const auto other =
+      studio.experiment({"--rate", "60", "--pose-space", "humanoid"}, "humanoid.style");
+  REQUIRE(other.code == 0);
+  CHECK(json::parse(other.out)["rate_hz"] == 60.0);
+  CHECK(json::parse(other.out)["pose_space"] == "humanoid");
+
+  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
+    const auto done = studio.experiment(std::move(more), "x.style");
+    return done.code == 2 && has(done.err, why) && !studio.there("x.style");
+  };
+  CHECK(refused({"--mode", "papr"}, "choose default or paper"));
+  CHECK(refused({"--pose-space", "humanoids"}, "humanoid"));
+  CHECK(refused({"--motion", "walk"}, "leave out --motion"));
+  CHECK(refused({"--skeleton", "02.asf"}, "for AMC clips"));
+  const auto help = posed({"train", "style", "--help"});
+  for (const char* key : {"mode = ", "rate_hz = ", "pose_space = ", "skeleton = "}) {
+    CHECK(has(help.out, key));
+  }
+}
+
+TEST_CASE("nothing is trained from nonsense", "[train_style]") {
+  const Studio studio;
+  const auto refused = [&](const std::string& from, const std::string& to, const std::string& why) {
+    const auto done =
+        studio.train({"--from", studio.path(from), "--to", studio.path(to)}, "x.style");
+    return done.code == 1 && has(done.err, why) && !studio.there("x.style");
+  };
+  CHECK(refused("march_1.bvh", "march_1.bvh", "is the same recording as march_1.bvh"));
+  const auto longer =
+      motion::make_walker({.family = WalkerFamily::kMarch, .person = 1, .seconds = 7.0});
+  REQUIRE(clip::write_bvh(*longer, studio.folder.path() / "again.bvh"));
+  CHECK(refused("march_1.bvh", "again.bvh", "there is no difference to learn"));
+  // --force writes it all the same, and says so.
+  const auto forced = studio.train(
+      {"--from", studio.path("march_1.bvh"), "--to", studio.path("again.bvh"), "--force"},
+      "x.style");
+  CHECK(forced.code == 0);
+  CHECK(has(forced.err, "written, because of --force"));
+  CHECK(studio.there("x.style"));
+}
+
+TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figure",
+          "[train_style][apply][eval_style]") {
+  const Studio studio;
+  const auto trained = studio.train(
+      {"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")}, "m.style");
+  REQUIRE(trained.code == 0);
+  CHECK(has(trained.err, "of the way to 'to'"));
+  CHECK(has(trained.err, "a constant offset "));
+  CHECK(json::parse(trained.out)["closes"] > 0.5);
+
+  const auto applied =
+      posed({"apply", "--model", studio.path("m.style"), studio.path("march_1.bvh"), "--out",
+             studio.path("out.bvh"), "--json"});
+  REQUIRE(applied.code == 0);
+  const auto change = json::parse(applied.out);
+  CHECK(change["far_from_training"] == false);
+  CHECK(has(applied.err, "this walker is like those of the training"));
+
+  const auto judged = studio.eval("march_1.bvh", "sway_1.bvh");
+  REQUIRE(judged.code == 0);
+  const auto score = json::parse(judged.out);
+  CHECK(score["moved_rms_deg"].get<double>() ==
+        Approx(change["rms_change_deg"].get<double>()).epsilon(1e-9));
+  CHECK(score["component_rms_deg"] < score["moved_rms_deg"]);
+  CHECK(score["constant_cycle_ratio"] > score["cycle_ratio"]);
+  CHECK(has(judged.err, "of the way to the target; a constant offset"));
+
+  // Towards another march the sway only leads away.
+  const auto worse = studio.eval("march_1.bvh", "march_2.bvh");
+  CHECK(worse.code == 1);
+  CHECK(json::parse(worse.out)["helps"] == false);
+  CHECK(has(worse.err, "worse than nothing"));
+}
+
+TEST_CASE("apply says that a walker is far from the training", "[apply]") {
+  const Studio studio;
+  REQUIRE(studio
+              .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
+                     "m.style")
+              .code == 0);
+  auto bent = motion::make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
+  bent.channels.rightCols(bent.channels.cols() - 6).array() += 0.4;
+  REQUIRE(clip::write_bvh(bent, studio.folder.path() / "bent.bvh"));
+  const auto applied = posed({"apply", "--model", studio.path("m.style"), studio.path("bent.bvh"),
+                              "--out", studio.path("out.bvh"), "--json"});
+  CHECK(applied.code == 0);
+  CHECK(json::parse(applied.out)["far_from_training"] == true);
+  CHECK(has(applied.err, "warning: this walker is far from the training ("));
+}
+
+TEST_CASE("no command destroys a file: wrong names, inputs and files that exist are refused",
+          "[output]") {
+  const Studio studio;
+  REQUIRE(studio
+              .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
+                     "m.style")
+              .code == 0);
+  const std::string model = studio.bytes("m.style");
+  const std::string walk = studio.bytes("march_1.bvh");
+  const auto apply = [&](const std::string& out, std::vector<std::string> more = {}) {
+    more.insert(more.begin(), {"apply", "--model", studio.path("m.style"),
+                               studio.path("march_1.bvh"), "--out", studio.path(out)});
+    return posed(std::move(more));
+  };
+  const auto refused = [&](const Outcome& done, const std::string& why) {
+    return done.code == 2 && has(done.err, why);
+  };
+  CHECK(refused(apply("out.csv"), "what is written here is .bvh"));
+  CHECK_FALSE(studio.there("out.csv"));
+  CHECK(refused(apply("march_1.bvh", {"--overwrite"}), "is read by this command"));
+  CHECK(refused(apply("sway_1.bvh"), "add --overwrite"));
+  CHECK(apply("sway_1.bvh", {"--overwrite"}).code == 0);
+  CHECK(refused(studio.experiment({}, "m.style"), "add --overwrite"));
+  CHECK(refused(studio.experiment({"--overwrite"}, "exp.toml"), "what is written here is .style"));
+  CHECK(refused(posed({"convert", studio.path("march_1.bvh"), "--out", studio.path("march_1.bvh"),
+                       "--overwrite"}),
+                "is read by this command"));
+  CHECK(refused(
+      posed({"convert", studio.path("march_1.bvh"), "--rate", "60", "--out", studio.path("c.bvh")}),
+      "--rate means nothing"));
+  CHECK(studio.bytes("m.style") == model);
+  CHECK(studio.bytes("march_1.bvh") == walk);
+}
+
+}  // namespace posed::test

@@ -1,0 +1,155 @@
+// What training says about its own clips: made-up walkers here, real recordings where they are.
+#include "models/style/training_check.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/train.hpp"
+#include "models/style/walker_fit.hpp"
+#include "tests/support/shared.hpp"
+
+using namespace posed;
+using motion::WalkerFamily;
+using nlohmann::json;
+
+namespace {
+
+clip::Clip walker(WalkerFamily family, std::uint32_t person) {
+  auto clip = motion::make_walker({.family = family, .person = person}).value();
+  clip.path = (family == WalkerFamily::kMarch ? "march_" : "sway_") + std::to_string(person);
+  return clip;
+}
+
+style::TrainingClip lesson(clip::Clip clip, const std::string& group,
+                           const std::string& motion = "walk") {
+  const std::string subject = clip.path;
+  return {std::move(clip), group, subject, motion};
+}
+
+Result<style::StyleModel> trained(const std::vector<style::TrainingClip>& clips) {
+  style::TrainOptions options;
+  options.target = "to";
+  return style::train_style(clips, options);
+}
+
+json report_of(const std::vector<style::TrainingClip>& clips) {
+  const auto model = trained(clips);
+  REQUIRE(model);
+  return json::parse(model->report_json);
+}
+
+bool has_problem(const json& report, const std::string& what) {
+  UNSCOPED_INFO(report["problems"].dump());
+  return report["usable"] == false && report["problems"].dump().contains(what) &&
+         report["verdict"].get<std::string>().starts_with("unusable: ");
+}
+
+clip::Clip real(const std::string& name) {
+  auto clip = clip::read_clip(*test::shared("data/styles/dataset-" + name + ".bvh"));
+  REQUIRE(clip);
+  return *std::move(clip);
+}
+
+json real_report(const std::string& from, const std::string& to, const std::string& motion) {
+  return report_of({lesson(real(from), "from", motion), lesson(real(to), "to", motion)});
+}
+
+}  // namespace
+
+TEST_CASE("two styles are learnt, and the verdict says how much of the way is closed",
+          "[style][check]") {
+  const json report = report_of({lesson(walker(WalkerFamily::kMarch, 1), "from"),
+                                 lesson(walker(WalkerFamily::kMarch, 2), "from"),
+                                 lesson(walker(WalkerFamily::kSway, 3), "to")});
+  CHECK(report["usable"] == true);
+  CHECK(report["closes"] > 0.5);
+  CHECK(report["closes"] > report["constant_closes"]);
+  CHECK(report["closes_measured_on"] == "held-out clips");
+  CHECK(report["difference_deg"] > 5.0);
+  const auto verdict = report["verdict"].get<std::string>();
+  CHECK(verdict.starts_with("closes "));
+  CHECK(verdict.contains("a constant offset "));
+}
+
+TEST_CASE("one recording in two groups is refused by name", "[style][check]") {
+  const auto march = walker(WalkerFamily::kMarch, 1);
+  const auto model = trained({lesson(march, "from"), lesson(march, "to")});
+  REQUIRE_FALSE(model);
+  CHECK(model.error().message.contains("is the same recording as march_1"));
+}
+
+TEST_CASE("two takes of one style are no difference to learn", "[style][check]") {
+  auto again = motion::make_walker({.family = WalkerFamily::kMarch, .person = 1, .seconds = 7.0});
+  CHECK(has_problem(
+      report_of({lesson(walker(WalkerFamily::kMarch, 1), "from"), lesson(std::move(*again), "to")}),
+      "no difference to learn"));
+}
+
+TEST_CASE("a clip whose legs stand is no walk; another motion's name makes that a warning",
+          "[style][check]") {
+  auto standing = walker(WalkerFamily::kSway, 2);
+  for (std::size_t c = 0; c < standing.skeleton->channels.size(); ++c) {
+    const auto& name = standing.skeleton->joints[standing.skeleton->channels[c].joint].name;
+    const auto column = static_cast<Eigen::Index>(c);
+    if (!name.contains("Leg") && !name.contains("Hips")) continue;
+    standing.channels.col(column).setConstant(standing.channels(0, column));
+  }
+  const auto march = walker(WalkerFamily::kMarch, 1);
+  CHECK(has_problem(report_of({lesson(march, "from"), lesson(standing, "to")}),
+                    "sway_2 is no walk: the legs swing by"));
+  const json other = report_of({lesson(march, "from", "wave"), lesson(standing, "to", "wave")});
+  CHECK(other["warnings"].dump().contains("sway_2: the legs swing by"));
+}
+
+TEST_CASE("gaits are walks and runs of all kinds", "[style][check]") {
+  for (const char* gait : {"walk", "run", "walk-turn-left", "jog"}) CHECK(style::is_gait(gait));
+  for (const char* other : {"wave", "jump", "crosswalk", ""}) CHECK_FALSE(style::is_gait(other));
+}
+
+TEST_CASE("a walker in another carriage is far from the training", "[style][check]") {
+  const auto model = trained({lesson(walker(WalkerFamily::kMarch, 1), "from"),
+                              lesson(walker(WalkerFamily::kSway, 1), "to")})
+                         .value();
+  const auto own = style::fit_of_walker(model, "m", walker(WalkerFamily::kMarch, 1)).value();
+  CHECK_FALSE(own.is_far());
+  auto bent = walker(WalkerFamily::kMarch, 1);
+  bent.channels.rightCols(bent.channels.cols() - 6).array() += 0.4;
+  const auto far = style::fit_of_walker(model, "m", bent).value();
+  CHECK(far.is_far());
+  CHECK(far.distance_deg > own.distance_deg);
+}
+
+TEST_CASE("styles of real walks and runs pass, nonsense does not", "[style][check][real]") {
+  if (!test::shared("data/styles/dataset-2_walk_masculine_001.bvh")) SKIP_WITHOUT_SHARED();
+  const json good = real_report("2_walk_masculine_001", "2_walk_feminine_001", "walk");
+  CHECK(good["usable"] == true);
+  CHECK(good["closes"].get<double>() == Approx(0.88).margin(0.02));
+  CHECK(good["constant_closes"].get<double>() == Approx(0.64).margin(0.02));
+  CHECK(real_report("2_walk_normal_001", "2_walk_exhausted_001", "walk")["usable"] == true);
+  CHECK(real_report("2_run_masculine_001", "2_run_feminine_001", "run")["usable"] == true);
+  CHECK(real_report("1_walk_normal_001", "1_walk_feminine_001", "walk")["usable"] == true);
+
+  CHECK(has_problem(real_report("2_walk_normal_001", "2_walk_normal_002", "walk"),
+                    "no difference to learn"));
+  CHECK(has_problem(real_report("2_walk_normal_001", "2_walk_normal_013", "walk"),
+                    "no difference to learn"));
+  CHECK(has_problem(
+      real_report("2_wave-right-hand_normal_001", "2_raise-up-left-hand_normal_001", "walk"),
+      "is no walk"));
+}
+
+TEST_CASE("a real walker of the training is near, another actor far", "[style][check][real]") {
+  if (!test::shared("data/styles/dataset-2_walk_masculine_001.bvh")) SKIP_WITHOUT_SHARED();
+  const auto model = trained({lesson(real("2_walk_masculine_001"), "from"),
+                              lesson(real("2_walk_feminine_001"), "to")})
+                         .value();
+  const auto is_far = [&](const std::string& name) {
+    return style::fit_of_walker(model, "m", real(name)).value().is_far();
+  };
+  CHECK_FALSE(is_far("2_walk_masculine_002"));
+  CHECK_FALSE(is_far("2_walk_feminine_002"));
+  CHECK(is_far("1_walk_normal_001"));
+  CHECK(is_far("2_run_masculine_001"));
+}
