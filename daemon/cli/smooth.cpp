@@ -123,7 +123,8 @@ Result<> smooth(const SmoothOptions& options) {
   ProgressBar bar(kQuietFor_s);
   for (std::size_t t = 0; t < measured.size(); ++t) {
     const bool tell = t % kProgressEvery == 0;
-    if (tell && !bar.show("smoothing", static_cast<double>(t) / measured.size())) {
+    if (tell &&
+        !bar.show("smoothing", static_cast<double>(t) / static_cast<double>(measured.size()))) {
       return fail("stopped; nothing was written", options.in);
     }
     Frame frame;
