@@ -74,7 +74,7 @@ TEST_CASE("an independent program solves the model file to the same trajectory")
   REQUIRE(studio.synth(kString, "hand.csv", {"--unconstrained"}).code == 0);
   const auto ours = clip::read_hand_clip(studio.path("hand.csv"));
   REQUIRE(ours.has_value());
-  const auto schema = std::filesystem::path(POSED_BINARY).parent_path() / "python";
+  const auto schema = posed_binary().parent_path() / "python";
   std::istringstream theirs(output_of("timeout 120 /usr/bin/python3 " +
                                       (source_dir() / "tests/e2e/solve_gesture.py").string() + " " +
                                       schema.string() + " " + studio.model + " '" + kString + "'"));

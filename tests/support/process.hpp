@@ -17,6 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
@@ -33,7 +34,7 @@ class Process {
   // instead of the pipe that line() reads. It may open `most_files` (0: as we may).
   explicit Process(std::vector<std::string> arguments, ChildStderr err = {},
                    int stdout_descriptor = -1, int most_files = 0) {
-    arguments.insert(arguments.begin(), POSED_BINARY);
+    arguments.insert(arguments.begin(), posed_binary().string());
     if (most_files > 0) {
       const std::string limit = "ulimit -n " + std::to_string(most_files);
       arguments.insert(arguments.begin(), {"/bin/sh", "-c", limit + "; exec \"$0\" \"$@\""});

@@ -8,7 +8,8 @@
 
 namespace posed::test {
 
-inline std::filesystem::path source_dir() { return POSED_SOURCE_DIR; }
+std::filesystem::path source_dir();    // of this checkout
+std::filesystem::path posed_binary();  // the program that end-to-end tests start
 inline std::filesystem::path golden(const std::string& name) {
   return source_dir() / "tests/golden" / name;
 }

@@ -16,6 +16,7 @@
 #include "drivers/transport/ports.hpp"
 #include "tests/e2e/stage.hpp"
 #include "tests/support/permission.hpp"
+#include "tests/support/shared.hpp"
 #include "tests/usb/gloves.hpp"
 #include "tests/usb/hid_glove.hpp"
 #include "tests/usb/p5_glove.hpp"
@@ -52,7 +53,7 @@ TEST_CASE("a glove that may not be opened says which rule mends that") {
   }
   check_sentence(usb_trouble, p5.node());
 
-  if (::access(POSED_BINARY, X_OK) == 0) {  // nobody may not enter every home
+  if (::access(posed_binary().c_str(), X_OK) == 0) {  // nobody may not enter every home
     const Outcome listed = posed({"devices"});
     CHECK(listed.out.find(nodes[0].trouble + "\n") != std::string::npos);
     CHECK(listed.out.find(usb_trouble + "\n") != std::string::npos);
@@ -104,8 +105,8 @@ TEST_CASE("a daemon that may not open a glove says so, runs, and opens it once i
   std::optional<Stage> stage;
   {
     const AsNobody nobody;
-    if (::access(POSED_BINARY, X_OK) != 0) {
-      WARN("SKIPPED: nobody may not enter the folder of " << POSED_BINARY);
+    if (::access(posed_binary().c_str(), X_OK) != 0) {
+      WARN("SKIPPED: nobody may not enter the folder of " << posed_binary());
       return;
     }
     stage.emplace();

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "drivers/known_usb.hpp"
+#include "tests/support/shared.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -55,7 +56,7 @@ TEST_CASE("an adapter and a stranger do not say what is behind them") {
 }
 
 TEST_CASE("the udev rules open every glove that is known") {
-  const auto path = std::filesystem::path(POSED_SOURCE_DIR) / "config/udev/70-posed.rules";
+  const auto path = test::source_dir() / "config/udev/70-posed.rules";
   std::ifstream file(path);
   REQUIRE(file);
   std::stringstream rules;
