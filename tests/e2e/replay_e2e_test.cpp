@@ -14,6 +14,7 @@
 #include "posed/v1/posed.pb.h"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
+#include "tests/support/log_surgery.hpp"
 #include "tests/support/shared.hpp"
 
 namespace posed::test {
@@ -68,6 +69,32 @@ TEST_CASE("a replay keeps the take's own pace and publishes as the run did") {
   const double take_s = seconds(frames.back().arrival_ns() - frames.front().arrival_ns());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   CHECK(took.count() >= 10.0 * take_s);
+}
+
+TEST_CASE("one far time in a log keeps a paced replay from nothing: it is skipped and told") {
+  const TempFolder folder;
+  const std::string log = staged_log(folder);
+  run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 86400000000000 WHERE id = 20");
+  const Outcome paced = posed({"replay", log, "--out", (folder.path() / "paced.bin").string()});
+  INFO(paced.err);
+  CHECK(paced.code == 0);
+  CHECK(has(paced.err, "staged.plog: nothing came for 86400 s before chunk 20"));
+  const Outcome fast =
+      posed({"replay", log, "--speed", "max", "--out", (folder.path() / "fast.bin").string()});
+  CHECK(fast.code == 0);
+  CHECK_FALSE(has(fast.err, "nothing came"));
+  CHECK(frames_of(folder.path() / "paced.bin").size() ==
+        frames_of(folder.path() / "fast.bin").size());
+}
+
+TEST_CASE("a row that does not match its checksum ends a replay, with log, table and row") {
+  const TempFolder folder;
+  const auto log = folder.path() / "staged.plog";
+  std::filesystem::copy_file(golden("replay/staged-3.plog"), log);
+  run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 1 WHERE id = 20");
+  const Outcome replay = posed({"replay", log.string(), "--speed", "max"});
+  CHECK(replay.code == 1);
+  CHECK(has(replay.err, "staged.plog: the log is damaged: row 20 of table chunk does not match"));
 }
 
 TEST_CASE("a replay on another instruction set differs in the last bits at most") {

@@ -10,13 +10,12 @@
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/publish/encode.hpp"
-#include "daemon/record/scribe.hpp"
+#include "daemon/record/recorder.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/digest.hpp"
-#include "proto/log/writer.hpp"
 
 namespace posed::test {
 namespace {
@@ -72,9 +71,6 @@ struct Lane {
       : stream(std::move(script)), id(number), styled(stream.name), raw(stream.name + "-raw") {
     slot.keeper = pipeline::Wake::open().value();
     stream.settings.rate_hz = stream.description.rate_hz;
-    if (!stream.gesture_model.empty()) {
-      stream.settings.gesture_model = log::sha256_hex(bytes_of(stream.gesture_model));
-    }
   }
 
   const style::BoundModel* bind_style(const std::string& bytes) {
@@ -177,26 +173,25 @@ class VirtualDaemon::Parts {
 
 void VirtualDaemon::Parts::open_log() {
   if (options.log.empty()) return;
-  auto writer = log::Writer::create(options.log, {}, false);
-  REQUIRE(writer);
+  std::vector<record::RecordedStream> streams;
   for (const auto& lane : lanes) {
     const VirtualStream& stream = lane->stream;
-    log::StreamRow row{.id = lane->id,
-                       .name = stream.name,
-                       .driver = stream.description.driver,
-                       .text = stream.description.text,
-                       .identity = stream.description.identity,
-                       .config = record::to_json(stream.settings),
-                       .model = {}};
-    for (const std::string* model : {&stream.style_model, &stream.gesture_model}) {
-      if (model->empty()) continue;
-      const auto hash = writer->add_blob(bytes_of(*model));
-      REQUIRE(hash);
-      if (model == &stream.style_model) row.model = *hash;
-    }
-    REQUIRE(writer->add(row));
+    const auto style = bytes_of(stream.style_model), gesture = bytes_of(stream.gesture_model);
+    streams.push_back({.source = {.id = 0,
+                                  .name = stream.name,
+                                  .driver = stream.description.driver,
+                                  .text = stream.description.text,
+                                  .identity = stream.description.identity,
+                                  .config = "{}"},
+                       .settings = stream.settings,
+                       .style = {style.begin(), style.end()},
+                       .gesture = {gesture.begin(), gesture.end()}});
   }
-  REQUIRE(writer->commit());
+  record::RecorderOptions recorder;
+  recorder.file = options.log;
+  recorder.clock = virtual_clock;
+  auto writer = record::begin_log(recorder, streams);
+  REQUIRE(writer);
   tape = std::make_unique<record::TapeRings>(lanes.size(), options.tape);
   scribe = std::make_unique<record::Scribe>(*tape, std::move(*writer), options.log,
                                             [](const record::Notice&) {});

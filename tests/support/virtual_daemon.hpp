@@ -51,7 +51,7 @@ struct ScriptedLink {
 struct VirtualStream {
   std::string name;
   drivers::Description description;  // of a driver in the registry
-  record::StreamSettings settings;   // rate_hz and gesture_model are filled in
+  record::StreamSettings settings;   // rate_hz and the models are filled in
   std::string style_model;           // a model file's bytes; empty: none
   std::string gesture_model;         // the same
   std::string calibration;           // TOML; empty: the device's default

@@ -263,6 +263,59 @@ TEST_CASE("a flipped bit in any column of any row is found, and log, table and r
   }
 }
 
+// Everything that a replay computes from, as the reader gives it.
+Result<std::string> contents(const std::filesystem::path& path) {
+  auto reader = Reader::open(path);
+  if (!reader) return std::unexpected(reader.error());
+  std::string all;
+  const auto add = [&](const auto&... parts) { ((all += parts, all += '\n'), ...); };
+  for (const auto& row : reader->sources()) add(row.name, row.driver, row.text, row.identity);
+  for (const auto& row : reader->streams()) add(row.name, row.stages_json);
+  for (;;) {
+    const auto chunk = reader->next_chunk();
+    if (!chunk) return std::unexpected(chunk.error());
+    if (!chunk->has_value()) break;
+    add(std::to_string((*chunk)->id), std::to_string((*chunk)->arrival_ns),
+        text_of((*chunk)->bytes));
+  }
+  const auto decisions = reader->decisions();
+  if (!decisions) return std::unexpected(decisions.error());
+  for (const auto& row : *decisions) add(std::to_string(row.item), row.stage, row.name, row.value);
+  return all;
+}
+
+TEST_CASE("whichever bit of a log is flipped, it is told or changes nothing") {
+  const test::TempFolder dir;
+  const auto whole = dir.path() / "whole.plog", path = dir.path() / "flipped.plog";
+  Writer writer = writer_with_two_streams(whole);
+  for (std::uint64_t i = 1; i <= 200; ++i) {
+    const std::string line = "1.5 2.25 " + std::to_string(i) + "\n";
+    REQUIRE(writer.add(chunk_row(0, i, line)));
+    REQUIRE(writer.add(log::DecisionRow{
+        .item = i, .stream = 0, .stage = "style", .name = "alpha", .value = "v", .now_ns = 1}));
+  }
+  REQUIRE(writer.close());
+  const auto expected = contents(whole);
+  REQUIRE(expected);
+  const auto bits = 8 * std::filesystem::file_size(whole);
+  int told = 0;
+  for (std::uintmax_t bit = 0; bit < bits; bit += bits / 400) {
+    std::filesystem::copy_file(whole, path, std::filesystem::copy_options::overwrite_existing);
+    {
+      std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+      const auto at = static_cast<std::streamoff>(bit / 8);
+      const int byte = file.seekg(at).get();
+      file.seekp(at).put(static_cast<char>(byte ^ (1 << (bit % 8))));
+    }
+    const auto found = contents(path);
+    INFO("bit " << bit);
+    if (found) CHECK(*found == *expected);
+    if (!found) CHECK(found.error().file == path.string());
+    told += found ? 0 : 1;
+  }
+  CHECK(told > 100);
+}
+
 // tests/golden/replay/staged.plog is of format 1, which lacks the column decision.labels of 2.
 TEST_CASE("a log of format 1 or 2 looks like one of format 3 that counts no items") {
   const test::TempFolder dir;
