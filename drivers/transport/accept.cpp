@@ -21,6 +21,7 @@ namespace {
 
 constexpr int kPatience_ms = 500;
 constexpr int kBacklog = 8;
+constexpr int kMostAtOnce = 64;  // connections in one call: a stranger may open them without end
 
 struct Address {
   sockaddr_storage storage{};
@@ -102,6 +103,12 @@ void make_prompt(int fd) {
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &tries, sizeof(tries));
 }
 
+// The glove waits in the listener's queue meanwhile, so it is taken as soon as there is one.
+std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
+  return fail("a glove has connected to " + settings.endpoint +
+              ", but posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
+}
+
 bool may_connect(const std::string& host, const std::vector<std::string>& peers) {
   if (peers.empty()) return is_loopback(host);
   return std::ranges::find(peers, host) != peers.end();
@@ -127,11 +134,12 @@ Result<Link> Ports::accept(const ListenSettings& settings) {
   if (cancel_->fired()) return Cancel::error();
   // Of several that wait the newest counts: a glove that started anew leaves its old one behind.
   std::optional<Link> newest;
-  while (true) {
+  for (int i = 0; i < kMostAtOnce; ++i) {
     Address peer;
     const int fd =
         ::accept4(listener->second, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0 && (errno == EINTR || errno == ECONNABORTED)) continue;
+    if (fd < 0 && (errno == EMFILE || errno == ENFILE) && !newest) return no_descriptor(settings);
     if (fd < 0) break;
     const std::string host = host_of(peer);
     Link link(fd, settings.endpoint + " from " + host, "tcp " + host);

@@ -1,7 +1,9 @@
 // Links over pseudo-terminals and loopback sockets: bytes unchanged, hang-ups told, mistakes named.
 #include <arpa/inet.h>
 #include <poll.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <chrono>
@@ -220,6 +222,25 @@ TEST_CASE("a glove that hangs up is lost, and may come again") {
     REQUIRE(readable(*transport));
     CHECK(transport->read(0).lost);
   }
+}
+
+TEST_CASE("without a descriptor left the glove is told to be there, and waits for one") {
+  const std::uint16_t port = free_port();
+  Ports ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  const Client glove(port);
+  rlimit before{};
+  REQUIRE(getrlimit(RLIMIT_NOFILE, &before) == 0);
+  const int lowest = ::dup(0);  // the next descriptor that anyone would get
+  REQUIRE(lowest >= 0);
+  ::close(lowest);
+  const rlimit none{static_cast<rlim_t>(lowest), before.rlim_max};
+  REQUIRE(setrlimit(RLIMIT_NOFILE, &none) == 0);
+  const auto refused = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(setrlimit(RLIMIT_NOFILE, &before) == 0);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().message.find("LimitNOFILE") != std::string::npos);
+  CHECK(ports.accept({.endpoint = loopback(port)}));
 }
 
 TEST_CASE("only peers may connect, and without peers only loopback listens") {
