@@ -179,7 +179,7 @@ void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& all
 void PeerGuard::tell(const char* why) {
   ++cuts_;
   ++untold_;
-  if (now_ns_ < told_ns_ + kNanosPerSecond) return;
+  if (now_ns_ < told_ns_ + kNanosPerSecond) return;  // a flood is one line a second
   told_ns_ = now_ns_;
   if (untold_ == 1) {
     spdlog::warn("a connection to the {} socket was cut: it {}", limits_.name, why);
