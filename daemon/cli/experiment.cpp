@@ -10,7 +10,7 @@
 namespace posed::cli {
 namespace {
 
-constexpr TomlLimits kLimits{
+constexpr TomlLimits kExperimentLimits{
     .what = "experiment file", .bytes = std::size_t{1024} * 1024, .depth = 4, .items = 20'000};
 constexpr std::size_t kMaxClips = 4000;
 
@@ -67,7 +67,7 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder,
 }  // namespace
 
 Result<Experiment> read_experiment(const std::filesystem::path& path) {
-  const auto root = load_toml(path, kLimits);
+  const auto root = load_toml(path, kExperimentLimits);
   if (!root) return std::unexpected(root.error());
   config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
   Experiment experiment;

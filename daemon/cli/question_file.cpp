@@ -12,7 +12,7 @@
 namespace posed::cli {
 namespace {
 
-constexpr TomlLimits kLimits{
+constexpr TomlLimits kQuestionLimits{
     .what = "questions file", .bytes = std::size_t{256} * 1024, .depth = 4, .items = 16384};
 constexpr std::array<const char*, gesture::kClasses> kClassNames{"A", "B", "C"};
 
@@ -44,7 +44,7 @@ std::string quoted(const std::string& name) {
 }  // namespace
 
 Result<std::vector<gesture::Label>> read_questions(const std::filesystem::path& path) {
-  const auto root = load_toml(path, kLimits);
+  const auto root = load_toml(path, kQuestionLimits);
   if (!root) return std::unexpected(root.error());
   config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
   gesture::ClassLists lists;

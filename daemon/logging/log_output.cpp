@@ -19,6 +19,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/logging/line_limiter.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::logging {
 namespace {
@@ -58,9 +59,12 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
   explicit Queue(int descriptor) : descriptor_(descriptor), coloured_(::isatty(descriptor) == 1) {}
 
   void log(const spdlog::details::log_msg& message) override {
+    // Names that files, devices and clients chose come by here; none may act on a terminal.
+    const std::string text = clean({message.payload.data(), message.payload.size()});
+    spdlog::details::log_msg shown = message;
+    shown.payload = text;
     const std::scoped_lock lock(mutex_);
-    const std::string_view text(message.payload.data(), message.payload.size());
-    if (!limits_ || limiter_.admit(now_ns(), message.level, text)) push(format(message));
+    if (!limits_ || limiter_.admit(now_ns(), message.level, text)) push(format(shown));
     changed_.notify_all();  // a line waits, or one was held back whose time will come
   }
   void flush() override {}

@@ -94,7 +94,7 @@ TEST_CASE("the live view tells which gloves are away, since when, and how a glov
   stats.mutable_stream(2)->set_clock_drift_ppm(-0.02F);
   CHECK(live_view(stats, {.title = "posed", .width = 120, .height = 0})[8].contains(
       "drift +0.0 ppm"));
-  CHECK(wide[8].contains("drift +7.3 ppm, /dev/?[2J"));
+  CHECK(wide[8].contains("drift +7.3 ppm, /dev/\\x1b[2J"));
   CHECK(live_view(stats, {.height = 0, .colour = true})[3].starts_with("\x1b[33m"));
 }
 

@@ -146,4 +146,19 @@ TEST_CASE("repeated lines are summed up when a command asks for it") {
   CHECK(log.find("posed: first\nposed: first\n") != std::string::npos);
 }
 
+TEST_CASE("what a line names cannot act on the terminal, nor fill it") {
+  const DefaultLoggerKept kept;
+  test::Pipe pipe;
+  {
+    const LogOutput output(pipe.write_end());
+    spdlog::warn("stream {} is away", "\x1b[2J\nforged: all is well");
+    spdlog::warn("joint {}", std::string(1 << 20, 'x'));
+  }
+  const std::string log = pipe.take();
+  CHECK(log.find("stream \\x1b[2J\\nforged: all is well is away\n") != std::string::npos);
+  CHECK(log.find('\x1b') == std::string::npos);
+  CHECK(std::ranges::count(log, '\n') == 2);
+  CHECK(log.size() < 5000);
+}
+
 }  // namespace posed::logging
