@@ -104,13 +104,25 @@ Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
   return source;
 }
 
+// A glove that a daemon has can be calibrated through that daemon; nothing has to be ended.
+Error with_way_through(Error error) {
+  if (error.message.contains(" is in use")) {
+    error.message +=
+        "; or, if a posed daemon has it, go through that: posed calibrate --connect "
+        "tcp://127.0.0.1:5570 --stream NAME (`posed top` shows the names)";
+  }
+  return error;
+}
+
 Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options) {
   if (options.live) return connect(options);
   const auto driver = named_driver(options.driver);
   if (!driver) return std::unexpected(driver.error());
   const auto completed = driver_options(**driver, options);
   if (!completed) return std::unexpected(completed.error());
-  return GloveSource::open(**driver, *completed);
+  auto source = GloveSource::open(**driver, *completed);
+  if (!source) return std::unexpected(with_way_through(source.error()));
+  return source;
 }
 
 // What a calibration is for. A port's path is no glove's identity: the same glove may be plugged in

@@ -5,7 +5,10 @@
 #include <cstdio>
 #include <cstring>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
+
+#include "daemon/pipeline/clock.hpp"
 
 namespace posed::cli {
 namespace {
@@ -146,13 +149,66 @@ Error Connection::wants_key() const {
 
 Error Connection::no_answer() const {
   if (established_) {
-    return fail("the daemon at " + options_.endpoint +
-                " does not answer; is this its control endpoint?")
+    return fail("the daemon at " + options_.endpoint + " does not answer; is this its " +
+                (domain_ == Domain::kControl ? "control" : "publish") + " endpoint?")
         .error();
   }
+  const char* const hint = domain_ == Domain::kControl
+                               ? " (a replay publishes, but takes no control)"
+                               : " (by default 5570 publishes, 5571 takes control)";
   return fail("nobody answers at " + options_.endpoint +
-              "; is `posed run` going, and is this its endpoint?")
+              "; is `posed run` going, and is this its endpoint?" + hint)
       .error();
+}
+
+std::string Connection::silence(double silence_s) const {
+  return fmt::format("no answer for {:.0f} s: {}", silence_s,
+                     established_ ? "the connection stands, but the daemon is stopped or stuck"
+                                  : "the daemon has ended, or cannot be reached");
+}
+
+SilenceWatch::SilenceWatch(const Connection& connection, double timeout_s)
+    : connection_(connection), timeout_s_(timeout_s), heart_(pipeline::monotonic_ns()) {}
+
+void SilenceWatch::heard() { heart_.heard(pipeline::monotonic_ns()); }
+
+std::string SilenceWatch::sentence(double silence_s) const {
+  if (!heart_.ever_heard()) return connection_.no_answer().message;
+  return connection_.endpoint() + ": " + connection_.silence(silence_s);
+}
+
+std::optional<std::string> SilenceWatch::silence() const {
+  const auto silence_s = heart_.silent_s(pipeline::monotonic_ns());
+  if (!silence_s) return std::nullopt;
+  return heart_.ever_heard() ? connection_.silence(*silence_s) : connection_.no_answer().message;
+}
+
+std::optional<Error> SilenceWatch::tell() {
+  const std::int64_t now_ns = pipeline::monotonic_ns();
+  const auto silence_s = heart_.silent_s(now_ns);
+  if (timeout_s_ > 0.0 && silence_s && *silence_s >= timeout_s_) {
+    return fail(fmt::format("{}; gave up after {} s (--timeout)", sentence(*silence_s), timeout_s_))
+        .error();
+  }
+  const auto news_s = heart_.silence_to_tell(now_ns);
+  if (news_s && prints_) {
+    std::fprintf(stderr, "posed: %s%s\n",
+                 heart_.ever_heard() ? "" : "waiting: ", sentence(*news_s).c_str());
+  }
+  if (const auto back_s = heart_.return_to_tell(); back_s && prints_) {
+    std::fprintf(stderr, "posed: %s answers again, after %.0f s\n", connection_.endpoint().c_str(),
+                 *back_s);
+  }
+  return std::nullopt;
+}
+
+void add_timeout_option(CLI::App& command, double& timeout_s) {
+  command
+      .add_option("--timeout", timeout_s,
+                  "End with exit code 1 when the daemon has not answered for so many seconds;"
+                  " without it, wait")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(2.0, 1e6));
 }
 
 Interrupt::Interrupt() {

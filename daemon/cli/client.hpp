@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "daemon/cli/heartbeat.hpp"
 #include "daemon/control/security.hpp"
 #include "daemon/control/zmq_handle.hpp"
 #include "proto/frame/result.hpp"
@@ -33,6 +34,7 @@ class Connection {
   // and again if need be.
   [[nodiscard]] static Result<Connection> open(const ClientOptions& options, int type);
 
+  [[nodiscard]] const std::string& endpoint() const { return options_.endpoint; }
   [[nodiscard]] void* socket() const { return socket_.get(); }
   // Waits for a message; false on timeout or a signal.
   [[nodiscard]] bool wait(std::chrono::milliseconds timeout);
@@ -42,6 +44,8 @@ class Connection {
   // Whether the connection stands, as far as refusal() has seen.
   [[nodiscard]] bool established() const { return established_; }
   [[nodiscard]] Error no_answer() const;  // the sentence for nobody being there
+  // The same for a daemon that has answered before, and not for so long.
+  [[nodiscard]] std::string silence(double silence_s) const;
 
  private:
   Connection(ClientOptions options, control::Domain domain, control::Context context,
@@ -56,6 +60,33 @@ class Connection {
   bool established_ = false;
   int hang_ups_ = 0;  // in a row, before the handshake
 };
+
+// Listens for the daemon's heartbeat, its stats, and says on stderr when it falls silent and when
+// it is back.
+class SilenceWatch {
+ public:
+  // `connection` outlives it. `timeout_s`: silence after which to give up; 0: never.
+  SilenceWatch(const Connection& connection, double timeout_s);
+
+  void heard();  // any message
+  // Call now and then: says what is new. The error when it is time to give up.
+  [[nodiscard]] std::optional<Error> tell();
+  // The sentence to show while the daemon is silent; nothing while it answers.
+  [[nodiscard]] std::optional<std::string> silence() const;
+  // Whether tell() prints; a drawn screen shows silence() instead.
+  void print(bool yes) { prints_ = yes; }
+
+ private:
+  [[nodiscard]] std::string sentence(double silence_s) const;
+
+  const Connection& connection_;
+  double timeout_s_;
+  bool prints_ = true;
+  Heartbeat heart_;
+};
+
+// --timeout: how long to wait for a daemon that does not answer; 0, the default, for ever.
+void add_timeout_option(CLI::App& command, double& timeout_s);
 
 // How long a client waits before it looks for keys, signals and refusals.
 inline constexpr std::chrono::milliseconds kLookAround{100};

@@ -5,14 +5,20 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 
+#include <unistd.h>
+
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/client.hpp"
+#include "daemon/cli/file_kind.hpp"
 #include "daemon/cli/json.hpp"
 #include "daemon/cli/live_view.hpp"
 #include "daemon/control/uploads.hpp"
+#include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
 #include "posed/v1/control.pb.h"
@@ -55,7 +61,9 @@ Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
     return reply;
   }
   if (Interrupt::came()) return fail("interrupted; the request may still take effect");
-  return std::unexpected(connection.no_answer());
+  Error silence = connection.no_answer();
+  silence.message += fmt::format("; waited {} s", options.timeout_s);
+  return std::unexpected(std::move(silence));
 }
 
 Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest& request) {
@@ -101,23 +109,34 @@ int ask_and_tell(const CtlOptions& options, const v1::ControlRequest& request, T
   return show(options, ask(options, request), tell);
 }
 
-void tell_effect(const v1::ControlReply& reply) {
-  std::printf("%s: in effect from frame %llu\n", reply.stream().c_str(),
-              static_cast<unsigned long long>(reply.sequence()));
+// Says of which stream what is in effect from when on.
+int show_change(const CtlOptions& options, const Result<v1::ControlReply>& reply,
+                const std::string& what) {
+  return show(options, reply, [&](const v1::ControlReply& told) {
+    std::printf("%s: in effect from frame %llu: %s\n", told.stream().c_str(),
+                static_cast<unsigned long long>(told.sequence()), what.c_str());
+  });
+}
+
+int change(const CtlOptions& options, const v1::ControlRequest& request, const std::string& what) {
+  return show_change(options, ask(options, request), what);
 }
 
 int set_parameter(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_set_alpha()->set_stream(options.stream);
   request.mutable_set_alpha()->set_alpha(options.value);
-  return ask_and_tell(options, request, tell_effect);
+  return change(options, request, fmt::format("alpha {:.2f}", options.value));
 }
 
 int send_model(const CtlOptions& options) {
+  const auto fits = expect_kind(options.model, FileKind::kModel, options.stream);
+  if (!fits) return report(fits.error());
   const auto bytes =
       load_file(options.model, {.what = "model", .max_bytes = control::kLargestModel});
   if (!bytes) return report(bytes.error());
-  return show(options, upload(options, *bytes), tell_effect);
+  return show_change(options, upload(options, *bytes),
+                     "model " + options.model.filename().string());
 }
 
 int play(const CtlOptions& options) {
@@ -129,27 +148,42 @@ int play(const CtlOptions& options) {
   }
   wanted.set_tempo(options.tempo);
   wanted.set_loop(options.loop);
-  return ask_and_tell(options, request, tell_effect);
+  return change(options, request, "performs " + options.labels + " (after those that wait)");
 }
 
 int stop_playing(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_stop_playing()->set_stream(options.stream);
-  return ask_and_tell(options, request, tell_effect);
+  return change(options, request, "performs no more");
+}
+
+// Everything about the file itself is found here; whether it fits the glove, the daemon knows.
+Result<std::string> read_calibration(const CtlOptions& options) {
+  const auto& path = options.calibration;
+  const auto fits = expect_kind(path, FileKind::kCalibration, options.stream);
+  if (!fits) return std::unexpected(fits.error());
+  auto text = drivers::glove::load_calibration_text(path);
+  if (!text) return text;
+  const auto parsed = drivers::glove::parse_calibration(*text, path);
+  if (!parsed) return std::unexpected(parsed.error());
+  return text;
 }
 
 int calibrate(const CtlOptions& options) {
-  auto text = drivers::glove::load_calibration_text(options.calibration);
+  auto text = read_calibration(options);
   if (!text) return report(text.error());
   v1::ControlRequest request;
   auto& wanted = *request.mutable_calibrate();
   wanted.set_stream(options.stream);
   wanted.set_toml(std::move(*text));
   wanted.set_name(options.calibration.filename().string());
-  return ask_and_tell(options, request, tell_effect);
+  return change(options, request, "calibration " + options.calibration.filename().string());
 }
 
 int haptics(const CtlOptions& options) {
+  if (options.force.empty() && options.vibration.empty()) {
+    return report(misuse("say what is to be felt: --force, --vibrate or both").error());
+  }
   v1::ControlRequest request;
   auto& wanted = *request.mutable_haptics();
   wanted.set_stream(options.stream);
@@ -169,6 +203,7 @@ int show_status(const CtlOptions& options) {
   request.mutable_status();
   return ask_and_tell(options, request, [&](const v1::ControlReply& reply) {
     LiveViewOptions view{.title = "posed " + options.client.endpoint, .height = 0};
+    if (isatty(STDOUT_FILENO) == 0) view.width = 0;  // a script wants whole names
     for (const std::string& line : live_view(reply.status(), view)) std::puts(line.c_str());
   });
 }
@@ -180,6 +215,87 @@ int stop_daemon(const CtlOptions& options) {
                       [](const v1::ControlReply&) { std::puts("the daemon is ending"); });
 }
 
+constexpr const char* kExamples = R"(Examples:
+  posed ctl set walker alpha 0.5
+  posed ctl status
+  posed ctl --connect tcp://stage:5571 --key me.key --server-key stage.pub stop
+`posed ctl COMMAND --help` has examples of each. Exit code 0: it is in effect; 1: the daemon refused
+or did not answer; 2: wrong use.)";
+
+// One thing that a daemon can be asked for; the options of `ctl` itself go with each.
+class Actions {
+ public:
+  Actions(CLI::App& command, std::shared_ptr<CtlOptions> options, int& exit_code)
+      : command_(command), options_(std::move(options)), exit_code_(exit_code) {}
+
+  CLI::App* add(const char* name, const char* help, int (*run)(const CtlOptions&),
+                const std::string& footer) {
+    CLI::App* action = command_.add_subcommand(name, help);
+    action->footer(
+        footer + "\n--connect, --key, --server-key, --timeout and --json: see `posed ctl --help`.");
+    action->callback(
+        [options = options_, run, &exit_code = exit_code_] { exit_code = run(*options); });
+    return action;
+  }
+  CLI::App* add_for_stream(const char* name, const char* help, int (*run)(const CtlOptions&),
+                           const std::string& footer) {
+    CLI::App* action = add(name, help, run, footer);
+    action->add_option("stream", options_->stream, "The stream, as its config names it")
+        ->required();
+    return action;
+  }
+
+ private:
+  CLI::App& command_;
+  std::shared_ptr<CtlOptions> options_;
+  int& exit_code_;
+};
+
+void add_style_actions(Actions& actions, CtlOptions& options) {
+  CLI::App* set = actions.add_for_stream("set", "Change a stream's parameter", set_parameter,
+                                         R"(Example:
+  posed ctl set walker alpha 0.5     # half the style; alpha slides there
+alpha: 0 none of the style, 1 as it was learnt, 2 twice as much, -1 the other way.)");
+  set->add_option("parameter", options.parameter, "alpha: how much style")
+      ->required()
+      ->check(CLI::IsMember({"alpha"}));
+  set->add_option("value", options.value, "The new value, -2 to 2")->required();
+  CLI::App* model = actions.add_for_stream("model", "Give a stream another style or gesture model",
+                                           send_model, R"(Examples:
+  posed ctl model walker march.style   # another style, from the next frame on
+  posed ctl model hand ours.gesture    # another gesture model: the file says what it is)");
+  model->add_option("model", options.model, "The model file (M.style, H.gesture)")->required();
+}
+
+void add_hand_actions(Actions& actions, CtlOptions& options) {
+  CLI::App* perform = actions.add_for_stream("play", "Perform labels on a hand", play, R"(Examples:
+  posed ctl play hand "g 1 c 3 4 p"    # after those that still wait
+  posed ctl play hand "g c p" --tempo 1.5 --loop)");
+  perform->add_option("labels", options.labels, "Names that the gesture model knows: \"g 1 c\"")
+      ->required();
+  perform->add_option("--tempo", options.tempo, "0.5 to 2 times the learnt one; 2 is twice as fast")
+      ->capture_default_str();
+  perform->add_flag("--loop", options.loop, "Begin again after the last, until others come");
+  static_cast<void>(actions.add_for_stream("stop-playing", "Back to the live hand", stop_playing,
+                                           "Example:\n  posed ctl stop-playing hand"));
+}
+
+void add_glove_actions(Actions& actions, CtlOptions& options) {
+  CLI::App* fit = actions.add_for_stream("calibrate", "Give a glove another calibration", calibrate,
+                                         R"(Example:
+  posed ctl calibrate right ann.toml   # from the next packet on)");
+  fit->add_option("calibration", options.calibration, "What `posed calibrate` wrote")->required();
+  CLI::App* feel = actions.add_for_stream("haptics", "Let a glove with motors be felt", haptics,
+                                          R"(Examples:
+  posed ctl haptics right --force 0 0.5 0.5 0 0
+  posed ctl haptics right --vibrate 80 0.2 0.5    # 80 Hz for 0.2 s at half the strength)");
+  feel->add_option("--force", options.force,
+                   "Thumb to little: 0 free to 1 blocked; negative leaves a finger as it is")
+      ->expected(1, kFingers);
+  feel->add_option("--vibrate", options.vibration, "Frequency [Hz], time [s], amplitude 0 to 1")
+      ->expected(3);
+}
+
 }  // namespace
 
 void add_ctl(CLI::App& app, int& exit_code) {
@@ -188,55 +304,22 @@ void add_ctl(CLI::App& app, int& exit_code) {
   command->require_subcommand(1)->fallthrough();
   add_client_options(*command, options->client, "tcp://127.0.0.1:5571");
   command->add_option("--timeout", options->timeout_s, "Seconds to wait for the answer")
+      ->type_name("SECONDS")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   command->add_flag("--json", options->json, "The answer as proto3 JSON (posed.v1.ControlReply)");
-  command->footer(R"(Examples:
-  posed ctl set walker alpha 0.5            # half the style; alpha slides there, -2 to 2
-  posed ctl model walker march.style        # another style, from the next frame on
-  posed ctl model hand ours.gesture         # another gesture model: the file says what it is
-  posed ctl play hand "g 1 c 3 4 p"         # perform these labels, after those that still wait
-  posed ctl play hand "g c p" --tempo 1.5 --loop
-  posed ctl stop-playing hand               # back to the live hand
-  posed ctl calibrate right ann.toml        # another calibration, from the next packet on
-  posed ctl haptics right --force 0 0.5 0.5 0 0   # thumb to little: 0 free, 1 blocked
-  posed ctl status
-  posed ctl --connect tcp://stage:5571 --key me.key --server-key stage.pub stop)");
-  const auto add = [&](const char* name, const char* help, int (*run)(const CtlOptions&)) {
-    CLI::App* action = command->add_subcommand(name, help);
-    action->callback([options, run, &exit_code] { exit_code = run(*options); });
-    return action;
-  };
-  CLI::App* set = add("set", "Change a stream's parameter", set_parameter);
-  set->add_option("stream", options->stream, "The stream")->required();
-  set->add_option("parameter", options->parameter, "alpha: how much style, -2 to 2")
-      ->required()
-      ->check(CLI::IsMember({"alpha"}));
-  set->add_option("value", options->value, "The new value")->required();
-  CLI::App* model = add("model", "Give a stream another style or gesture model", send_model);
-  model->add_option("stream", options->stream, "The stream")->required();
-  model->add_option("model", options->model, "The model file (M.style, H.gesture)")->required();
-  CLI::App* perform = add("play", "Perform labels on a hand", play);
-  perform->add_option("stream", options->stream, "The stream")->required();
-  perform->add_option("labels", options->labels, "Names that the gesture model knows: \"g 1 c\"")
-      ->required();
-  perform->add_option("--tempo", options->tempo, "0.5 to 2; 2 takes half the time")
-      ->capture_default_str();
-  perform->add_flag("--loop", options->loop, "Begin again after the last, until others come");
-  CLI::App* stop = add("stop-playing", "Back to the live hand", stop_playing);
-  stop->add_option("stream", options->stream, "The stream")->required();
-  CLI::App* fit = add("calibrate", "Give a glove another calibration", calibrate);
-  fit->add_option("stream", options->stream, "The stream")->required();
-  fit->add_option("calibration", options->calibration, "What `posed calibrate` wrote")->required();
-  CLI::App* feel = add("haptics", "Let a glove with motors be felt", haptics);
-  feel->add_option("stream", options->stream, "The stream")->required();
-  feel->add_option("--force", options->force,
-                   "Thumb to little: 0 free to 1 blocked; negative leaves a finger as it is")
-      ->expected(1, kFingers);
-  feel->add_option("--vibrate", options->vibration, "Frequency [Hz], time [s], amplitude 0 to 1")
-      ->expected(3);
-  add("status", "Print the daemon's state once", show_status);
-  add("stop", "End the daemon cleanly", stop_daemon);
+  command->footer(kExamples);
+  Actions actions(*command, options, exit_code);
+  add_style_actions(actions, *options);
+  add_hand_actions(actions, *options);
+  add_glove_actions(actions, *options);
+  static_cast<void>(actions.add("status", "Print the daemon's state once", show_status,
+                                std::string("Examples:\n  posed ctl status\n  posed ctl --json "
+                                            "status | jq .status.stream[0].state\n") +
+                                    kColumnsHelp));
+  static_cast<void>(actions.add("stop", "End the daemon cleanly", stop_daemon,
+                                "Example:\n  posed ctl stop\nIt answers at once; a recording is "
+                                "finished before the daemon ends."));
 }
 
 }  // namespace posed::cli

@@ -13,6 +13,7 @@
 #include "drivers/driver.hpp"
 #include "drivers/known_usb.hpp"
 #include "drivers/transport/enumerate.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::cli {
 namespace {
@@ -91,8 +92,9 @@ std::string dump(const ordered_json& value) {
   return value.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
+// For people: what a device calls itself may hold anything.
 std::string text_of(const ordered_json& value) {
-  return value.is_null() ? "-" : value.get<std::string>();
+  return value.is_null() ? "-" : clean(value.get<std::string>());
 }
 
 void print(const ordered_json& device) {
@@ -101,7 +103,7 @@ void print(const ordered_json& device) {
     fitting += (fitting.empty() ? "" : ", ") + driver["name"].get<std::string>() +
                (driver["certain"].get<bool>() ? "" : "?");
   }
-  std::printf("%-16s %-18s %-16s %-6s %s\n", device["node"].get<std::string>().c_str(),
+  std::printf("%-16s %-18s %-16s %-6s %s\n", text_of(device["node"]).c_str(),
               text_of(device["id"]).c_str(), fitting.empty() ? "-" : fitting.c_str(),
               text_of(device["hand"]).c_str(), text_of(device["name"]).c_str());
   if (!device["trouble"].is_null()) std::printf("    %s\n", text_of(device["trouble"]).c_str());

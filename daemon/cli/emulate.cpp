@@ -67,8 +67,12 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
 
 Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& options) {
   if (!std::filesystem::is_regular_file(options.what)) {
+    if (!options.stream.empty()) {
+      return misuse("--stream chooses from a log's streams; '" + options.what + "' is no log here");
+    }
     return make_emulator(options.what, options.set);
   }
+  if (!options.clip.empty()) return misuse("a log brings its own motion: leave out --clip");
   auto device = devices::read_logged_device(options.what, options.stream);
   if (!device) return std::unexpected(device.error());
   std::unique_ptr<drivers::Emulator> speaker;
@@ -77,6 +81,9 @@ Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& o
     auto made = make_emulator(device->driver, options.set);
     if (!made) return std::unexpected(made.error());
     speaker = std::move(*made);
+  } else if (!options.set.empty()) {
+    return misuse("the log's device (driver '" + device->driver +
+                  "') takes no options: leave out --set");
   }
   return std::make_unique<devices::LogEmulator>(std::move(device->recording), std::move(speaker));
 }
@@ -134,7 +141,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
   command->add_option("--link", options->link, "Also a link to the pseudo-terminal, by this name")
       ->type_name("PATH")
       ->excludes(tcp);
-  command->add_option("--speed", options->speed, "Times the device's own pace")
+  command->add_option("--speed", options->speed, "Times the device's own pace, 0.01 to 1000")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
   command
@@ -142,12 +149,16 @@ void add_emulate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command->add_option("--set", options->set, "An option of the driver, like hand=left")
       ->type_name("KEY=VALUE");
-  command->add_option("--fault", options->faults, "A fault of the line, so many a byte or packet")
-      ->type_name("KIND:RATE");
+  auto* fault =
+      command
+          ->add_option("--fault", options->faults, "A fault of the line, so many a byte or packet")
+          ->type_name("KIND:RATE");
   command->add_option("--seed", options->seed, "Of the faults: the same seed, the same faults")
+      ->needs(fault)
       ->capture_default_str();
   command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");
-  command->add_option("--seconds", options->seconds, "End after this long")
+  command->add_option("--seconds", options->seconds, "End after so many seconds")
+      ->type_name("SECONDS")
       ->check(CLI::PositiveNumber);
   command->footer(R"(Prints one JSON line {"port": ...} when it can be opened. Examples:
   posed emulate cyberglove --link /tmp/glove   # and a stream with port = "/tmp/glove"

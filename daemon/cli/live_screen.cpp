@@ -40,6 +40,7 @@ LiveScreen::~LiveScreen() {
 void LiveScreen::measure(LiveViewOptions& options) const {
   options.colour = terminal_ && std::getenv("NO_COLOR") == nullptr;
   if (!terminal_) {
+    options.width = 0;
     options.height = 0;
     return;
   }

@@ -13,9 +13,12 @@ namespace posed::cli {
 
 struct LiveViewOptions {
   std::string title{};  // first words of the first line
-  int width = 80;       // columns; at least 80 are used
+  int width = 80;       // columns; at least 80 are used. 0: as many as the words need, none cut
   int height = 24;      // lines at most; 0: no limit
   bool colour = false;
+  // Why nothing is known of the present, as one sentence; empty while the daemon answers. Then the
+  // stats are old, and what of them describes the present is not shown.
+  std::string silence{};
   std::vector<std::string> notes{};  // recent events, newest last; shown while there is room
 };
 
@@ -24,6 +27,9 @@ struct LiveViewOptions {
 // came back or has a clock of its own; a hand's label and lag. Last the notes.
 [[nodiscard]] std::vector<std::string> live_view(const v1::Stats& stats,
                                                  const LiveViewOptions& options);
+
+// What the columns mean, for --help.
+extern const char* const kColumnsHelp;
 
 // Duration in at most 4 characters: "31", "850", "1.2m" (milliseconds), "2.5s".
 [[nodiscard]] std::string short_duration(double microseconds);

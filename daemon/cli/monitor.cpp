@@ -1,8 +1,10 @@
-#include <array>
+// `posed monitor`: what a running daemon publishes, line by line.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
@@ -11,80 +13,22 @@
 #include "daemon/cli/client.hpp"
 #include "daemon/cli/clock_time.hpp"
 #include "daemon/cli/json.hpp"
-#include "daemon/config/words.hpp"
+#include "daemon/cli/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::cli {
 namespace {
 
-constexpr std::chrono::seconds kPatience{3};  // then we say that we are still waiting
+constexpr std::chrono::seconds kPatience{3};  // for a message of a topic of a daemon that is there
 
 struct MonitorOptions {
   ClientOptions client;
   std::string stream;
   std::string topic = "pose";
   int count = 0;
+  double timeout_s = 0.0;
   bool json = false;
 };
-
-// "QUALITY_HELD" -> "held"
-std::string short_name(const std::string& name) {
-  std::string out;
-  for (const char c : name.substr(name.find('_') + 1)) out += static_cast<char>(c | 0x20);
-  return out;
-}
-
-std::string line(const v1::Frame& frame) {
-  std::string out = fmt::format("{} {:<16} {:>8} {:<9}", clock_time(), frame.stream(),
-                                frame.sequence(), short_name(v1::Quality_Name(frame.quality())));
-  if (frame.has_published_ns()) {
-    out += fmt::format(" {:>6.0f} us",
-                       static_cast<double>(frame.published_ns() - frame.arrival_ns()) * 1e-3);
-  }
-  if (frame.root_position_m_size() == 3) {
-    out += fmt::format("  root {:7.3f} {:7.3f} {:7.3f} m", frame.root_position_m(0),
-                       frame.root_position_m(1), frame.root_position_m(2));
-  }
-  if (!frame.label().empty()) {
-    out += fmt::format("  {} {:.2f}", config::printable(frame.label()), frame.label_probability());
-  }
-  if (frame.lag_frames() > 0) {
-    out += fmt::format("  lag {} ({:.0f} ms)", frame.lag_frames(), frame.lag_ms());
-  }
-  return out;
-}
-
-std::string line(const v1::Sample& sample) {
-  std::string out = fmt::format("{} {:<16} {:>8} {:<9}", clock_time(), sample.stream(),
-                                sample.sequence(), short_name(v1::Quality_Name(sample.quality())));
-  for (int i = 0; i < sample.value_size() && i < sample.name_size(); ++i) {
-    out += fmt::format(" {}={:.3f}", sample.name(i), sample.value(i));
-  }
-  return out;
-}
-
-std::string line(const v1::Event& event) {
-  return fmt::format("{} {:<16} {:>8} {:<9} {}", clock_time(), event.stream(), event.sequence(),
-                     short_name(v1::Event::Kind_Name(event.kind())).substr(5),
-                     config::without_controls(event.text()));
-}
-
-std::string line(const v1::Skeleton& skeleton) {
-  return fmt::format("{} {:<16} skeleton {:08x} {} {} joints, {} channels", clock_time(),
-                     skeleton.stream(), skeleton.id(), config::printable(skeleton.name()),
-                     skeleton.joint_name_size(), skeleton.channel_joint_size());
-}
-
-std::string line(const v1::Stats& stats) {
-  std::string out = fmt::format("{} cpu {:.1f} %, rss {:.1f} MB", clock_time(), stats.cpu_percent(),
-                                static_cast<double>(stats.rss_bytes()) / 1e6);
-  for (const auto& stream : stats.stream()) {
-    out += fmt::format("; {} {} {:.1f} Hz, {} dropped, {} shed", stream.stream(),
-                       stream.away() ? "away" : stream.state(), stream.rate_hz(), stream.dropped(),
-                       stream.shed());
-  }
-  return out;
-}
 
 // False when stdout is gone or the bytes are none of ours.
 template <typename Message>
@@ -92,7 +36,7 @@ bool show(std::span<const std::byte> bytes, bool as_json) {
   Message message;
   if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return false;
   if (as_json) return print_json(message);
-  std::puts(line(message).c_str());
+  std::printf("%s %s\n", clock_time().c_str(), monitor_line(message).c_str());
   return std::fflush(stdout) == 0;
 }
 
@@ -104,7 +48,7 @@ bool show_topic(std::string_view topic, std::span<const std::byte> bytes, bool a
   return topic == "stats" && show<v1::Stats>(bytes, as_json);
 }
 
-// The topics to ask for. Beside poses, people also want to see what happens to the stream.
+// What to print. Beside poses, people also want to see what happens to the stream.
 std::vector<std::string> topics(const MonitorOptions& options) {
   if (options.topic == "stats") return {"stats"};
   std::vector<std::string> asked{options.topic + "/" + options.stream};
@@ -112,41 +56,110 @@ std::vector<std::string> topics(const MonitorOptions& options) {
   return asked;
 }
 
+// Runs until someone wants to go; an error is why it must end. It listens to `stats`, too: they
+// come every second from a daemon that lives, whatever the topic.
+class Monitor {
+ public:
+  Monitor(const MonitorOptions& options, Connection connection)
+      : options_(options),
+        connection_(std::move(connection)),
+        asked_(topics(options)),
+        watch_(connection_, options.timeout_s) {}
+
+  Result<> run() {
+    for (const std::string& topic : asked_) {
+      if (auto set = control::set_option(connection_.socket(), ZMQ_SUBSCRIBE, topic); !set) {
+        return set;
+      }
+    }
+    const std::string_view stats = "stats";
+    if (auto set = control::set_option(connection_.socket(), ZMQ_SUBSCRIBE, stats); !set) {
+      return set;
+    }
+    while (!Interrupt::came() && !finished_) {
+      if (auto refused = connection_.refusal()) return std::unexpected(*refused);
+      if (auto given_up = watch_.tell()) return std::unexpected(*given_up);
+      if (connection_.wait(kLookAround)) {
+        if (auto taken = take(); !taken) return taken;
+      } else {
+        tell_quiet_topic();
+      }
+    }
+    if (options_.count > 0 && shown_ < options_.count) {
+      return fail(fmt::format("interrupted after {} of {} messages", shown_, options_.count));
+    }
+    return {};
+  }
+
+ private:
+  Result<> take() {
+    control::Message topic, body;
+    if (!topic.receive(connection_.socket()) || !topic.more()) return {};
+    if (!body.receive(connection_.socket(), 0)) return {};
+    watch_.heard();
+    if (topic.text() == "stats") {
+      if (auto known = look_at(body.bytes()); !known) return known;
+    }
+    // A subscription is a prefix: walker also brings walker-raw.
+    const bool all = options_.stream.empty() && topic.text() != "stats";
+    if (!all && std::ranges::find(asked_, topic.text()) == asked_.end()) return {};
+    if (!show_topic(topic.text(), body.bytes(), options_.json)) {
+      finished_ = std::ferror(stdout) != 0;  // whoever read us has gone
+      if (finished_) shown_ = options_.count;
+      return {};
+    }
+    finished_ = topic.text().starts_with(options_.topic) && ++shown_ == options_.count;
+    return {};
+  }
+
+  // The first stats say which streams there are, and whether this is a replay.
+  Result<> look_at(std::span<const std::byte> bytes) {
+    v1::Stats stats;
+    const auto size = static_cast<int>(bytes.size());
+    if (looked_ || !stats.ParseFromArray(bytes.data(), size) || stats.stream().empty()) return {};
+    looked_ = true;
+    if (!stats.replay_file().empty()) {
+      std::fprintf(stderr, "posed: %s\n", replay_words(stats).c_str());
+    }
+    std::string names;
+    for (const auto& stream : stats.stream()) {
+      const std::string& name = stream.stream();
+      if (options_.stream.empty() || options_.stream == name || options_.stream == name + "-raw") {
+        return {};
+      }
+      names += (names.empty() ? "" : ", ") + name;
+    }
+    return fail(fmt::format("the daemon at {} has no stream '{}'; it has: {}",
+                            options_.client.endpoint, options_.stream, names));
+  }
+
+  void tell_quiet_topic() {
+    if (told_quiet_ || shown_ > 0 || !looked_) return;
+    if (std::chrono::steady_clock::now() - start_ < kPatience) return;
+    told_quiet_ = true;
+    std::fprintf(stderr, "posed: waiting: %s answers, but nothing of %s comes yet\n",
+                 options_.client.endpoint.c_str(), asked_.front().c_str());
+  }
+
+  const MonitorOptions& options_;
+  Connection connection_;
+  std::vector<std::string> asked_;
+  SilenceWatch watch_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  int shown_ = 0;
+  bool looked_ = false;
+  bool told_quiet_ = false;
+  bool finished_ = false;
+};
+
 Result<> watch(const MonitorOptions& options) {
+  if (options.topic == "stats" && !options.stream.empty()) {
+    return misuse("stats are of all streams: leave out --stream, or choose another --topic");
+  }
   const Interrupt interrupt;
   auto connection = Connection::open(options.client, ZMQ_SUB);
   if (!connection) return std::unexpected(connection.error());
-  const auto asked = topics(options);
-  for (const std::string& topic : asked) {
-    auto set = control::set_option(connection->socket(), ZMQ_SUBSCRIBE, topic);
-    if (!set) return set;
-  }
-  const auto start = std::chrono::steady_clock::now();
-  bool said = false;
-  for (int shown = 0; !Interrupt::came();) {
-    if (auto refused = connection->refusal()) return std::unexpected(*refused);
-    if (!connection->wait(kLookAround)) {
-      if (!said && shown == 0 && std::chrono::steady_clock::now() - start > kPatience) {
-        said = true;
-        std::fprintf(stderr, "posed: waiting: %s\n",
-                     connection->established() ? "connected, but nothing of this topic comes yet"
-                                               : connection->no_answer().message.c_str());
-      }
-      continue;
-    }
-    control::Message topic, body;
-    if (!topic.receive(connection->socket()) || !topic.more()) continue;
-    if (!body.receive(connection->socket(), 0)) continue;
-    // A subscription is a prefix: walker also brings walker-raw.
-    const bool wanted = options.stream.empty() || options.topic == "stats" ||
-                        std::ranges::find(asked, topic.text()) != asked.end();
-    if (!wanted || !show_topic(topic.text(), body.bytes(), options.json)) {
-      if (std::ferror(stdout) != 0) return {};  // whoever read us has gone
-      continue;
-    }
-    if (topic.text().starts_with(options.topic) && ++shown == options.count) return {};
-  }
-  return {};
+  return Monitor(options, std::move(*connection)).run();
 }
 
 }  // namespace
@@ -162,13 +175,18 @@ void add_monitor(CLI::App& app, int& exit_code) {
   command->add_option("--count", options->count, "End after so many messages")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
+  add_timeout_option(*command, options->timeout_s);
   command->add_flag("--json", options->json, "One proto3 JSON object a line");
   command->footer(R"(Examples:
   posed monitor                    # time, stream, sequence, quality, latency, root, label, lag
   posed monitor --stream walker --json --count 10  # 10 posed.v1.Frame objects
+  posed monitor --topic event      # what happens: a glove lost, alpha changed, labels performed
   posed monitor --topic stats --json | jq .stream[0].rateHz
-The latency runs from arrival in the daemon to its publishing. A reader too slow for the stream
-misses frames; it never sees old ones.)");
+The quality is measured, predicted (computed for a moment without a measurement), held (the same
+measurement again), stale (the source is silent) or performed (made from labels). The latency runs
+from arrival in the daemon to its publishing; a replay as fast as possible has none. A reader too
+slow for the stream misses frames; it never sees old ones. A daemon that falls silent is told on
+stderr. With --count the exit code is 1 unless so many came.)");
   command->callback([options, &exit_code] {
     if (auto done = watch(*options); !done) exit_code = report(done.error());
   });

@@ -1,11 +1,14 @@
 // `posed record`: `run` with the recorder on the tape.
 #include <atomic>
+#include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/serve.hpp"
@@ -20,7 +23,8 @@ namespace {
 struct RecordOptions {
   std::string out;
   bool frames = false;
-  bool force = false;
+  bool overwrite = false;
+  bool json = false;
   ServeOptions serve;
 };
 
@@ -33,6 +37,39 @@ void tell(pipeline::Daemon& daemon, const record::Notice& notice) {
   for (std::uint32_t id = 0; id < daemon.streams().size(); ++id) {
     daemon.post_event(id, v1::Event::KIND_RECORDING_ERROR, notice.text);
   }
+}
+
+// What there is now. What is missing in it has been told as it happened; here is the sum.
+void tell_result(const RecordOptions& options, const v1::Stats& stats,
+                 const record::Recorder& recorder, double took_s) {
+  std::error_code ignored;
+  const auto bytes = std::filesystem::file_size(options.out, ignored);
+  std::uint64_t frames = 0, samples = 0;
+  nlohmann::ordered_json streams = nlohmann::ordered_json::array();
+  for (const v1::StreamStats& stream : stats.stream()) {
+    frames += stream.frames();
+    samples += stream.samples();
+    streams.push_back(
+        {{"stream", stream.stream()}, {"frames", stream.frames()}, {"samples", stream.samples()}});
+  }
+  const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
+  if (options.json) {
+    const nlohmann::ordered_json line{{"file", options.out},    {"seconds", took_s},
+                                      {"bytes", bytes},         {"frames", frames},
+                                      {"samples", samples},     {"streams", streams},
+                                      {"missing_chunks", lost}, {"write_errors", errors}};
+    std::printf("%s\n", line.dump().c_str());
+    std::fflush(stdout);
+  }
+  spdlog::log(lost + errors > 0 ? spdlog::level::warn : spdlog::level::info,
+              "{}: {:.1f} s of {} stream{}, {} frames and {} samples published, {:.1f} MB; {}",
+              options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s", frames,
+              samples, static_cast<double>(bytes) / 1e6,
+              lost + errors == 0
+                  ? "nothing is missing"
+                  : fmt::format("{} chunks are missing after {} write errors; `posed replay` says "
+                                "where",
+                                lost, errors));
 }
 
 Result<> record(const RecordOptions& options) {
@@ -48,7 +85,7 @@ Result<> record(const RecordOptions& options) {
   auto started = std::make_shared<std::atomic<bool>>(false);
   record::RecorderOptions recorder_options{
       .file = options.out,
-      .overwrite = options.force,
+      .overwrite = options.overwrite,
       .frames = options.frames,
       .config_text = config->text,
       .publish_endpoint = config->publish_endpoint,
@@ -74,11 +111,11 @@ Result<> record(const RecordOptions& options) {
   }
   *started = true;
   print_ready(daemon);
+  const std::int64_t start_ns = pipeline::monotonic_ns();
   serve(daemon, options.serve);
+  const double took_s = seconds(pipeline::monotonic_ns() - start_ns);
   auto finished = (*recorder)->finish();
-  const std::uint64_t lost = (*recorder)->lost_chunks();
-  if (lost > 0)
-    spdlog::warn("{}: {} chunks are missing; its gap rows say where", options.out, lost);
+  tell_result(options, daemon.stats(), **recorder, took_s);
   return finished;
 }
 
@@ -88,9 +125,13 @@ void add_record(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("record", "Stream like `run` and keep a device log");
   auto options = std::make_shared<RecordOptions>();
   add_serve_options(*command, options->serve);
-  command->add_option("--out", options->out, "The log to write, by habit NAME.plog")->required();
+  command->add_option("--out", options->out, "The log to write, by habit NAME.plog")
+      ->type_name("FILE")
+      ->required();
   command->add_flag("--frames", options->frames, "Keep the published frames, too (for --expect)");
-  command->add_flag("--force", options->force, "Replace the log if it is there already");
+  command->add_flag("--overwrite,--force", options->overwrite,
+                    "Replace the log if it is there already");
+  command->add_flag("--json", options->json, "At the end print what was written as JSON");
   command->footer(
       "The log is one SQLite file: what each device sent, and every decision that decoding cannot\n"
       "repeat. kill -9 or a power cut costs at most the last 0.5 s. A full disk stops recording,\n"

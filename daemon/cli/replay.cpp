@@ -2,11 +2,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include <unistd.h>
 
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
@@ -14,6 +17,8 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/client.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/cli/progress.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/record/broadcast.hpp"
 #include "daemon/record/expectation.hpp"
@@ -34,6 +39,7 @@ struct ReplayOptions {
   std::string isa;
   bool publish = false;
   bool expect = false;
+  bool overwrite = false;
   bool json = false;
 };
 
@@ -64,6 +70,32 @@ class Pacer {
   double speed_;
   record::Pace pace_;
   Clock::time_point start_ = Clock::now();
+};
+
+// Says how far the replay is, once it takes long enough for someone to wonder.
+class ReplayProgress {
+ public:
+  explicit ReplayProgress(const std::optional<log::Reader::Extent>& extent) : extent_(extent) {}
+
+  [[nodiscard]] double elapsed_s() const { return bar_.elapsed_s(); }
+
+  void show(std::int64_t arrival_ns) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!extent_ || now - shown_ < kEvery || now - start_ < kQuiet) return;
+    shown_ = now;
+    const double whole_s = seconds(extent_->last_ns - extent_->first_ns);
+    const double done_s = seconds(arrival_ns - extent_->first_ns);
+    bar_.show(fmt::format("replayed {:.0f} of {:.0f} s", std::clamp(done_s, 0.0, whole_s), whole_s),
+              whole_s > 0.0 ? done_s / whole_s : 1.0);
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kQuiet{1000};
+  const std::chrono::milliseconds kEvery{isatty(STDERR_FILENO) == 1 ? 200 : 5000};
+  std::optional<log::Reader::Extent> extent_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point shown_{};
+  ProgressBar bar_;
 };
 
 // Where the frames of a replay go: the file, the comparison, the network.
@@ -118,7 +150,8 @@ Result<double> speed_of(const std::string& text) {
   char* end = nullptr;
   const double speed = std::strtod(text.c_str(), &end);
   if (*end == '\0' && speed > 0.0 && speed <= 1000.0) return speed;
-  return misuse("--speed is a factor such as 1, or max, not '" + text + "'");
+  return misuse("--speed is a factor above 0 and up to 1000 such as 1 or 0.5, or max, not '" +
+                text + "'");
 }
 
 // Bits are promised on one instruction set: by default the log's own.
@@ -152,8 +185,9 @@ void warn_of_gaps(const log::Reader& reader) {
   }
 }
 
-void print_summary(const ReplayOptions& options, const Outputs& outputs) {
-  nlohmann::ordered_json line{{"frames", outputs.frames}, {"isa", gp::isa_name()}};
+void print_summary(const ReplayOptions& options, const Outputs& outputs, double took_s) {
+  nlohmann::ordered_json line{
+      {"frames", outputs.frames}, {"isa", gp::isa_name()}, {"took_s", took_s}};
   if (outputs.expectation) {
     const auto& counts = outputs.expectation->counts();
     line["compared"] = counts.compared;
@@ -169,11 +203,11 @@ void print_summary(const ReplayOptions& options, const Outputs& outputs) {
   if (options.json) {
     std::printf("%s\n", line.dump().c_str());
   } else {
-    spdlog::info("{} frames replayed on {}", outputs.frames, gp::isa_name());
+    spdlog::info("{} frames replayed in {:.1f} s on {}", outputs.frames, took_s, gp::isa_name());
   }
 }
 
-Result<> open_outputs(const ReplayOptions& options, const log::Reader& reader,
+Result<> open_outputs(const ReplayOptions& options, double speed, const log::Reader& reader,
                       const record::Replay& replay, Outputs& outputs) {
   if (options.expect) {
     auto expectation = record::Expectation::open(reader);
@@ -189,18 +223,43 @@ Result<> open_outputs(const ReplayOptions& options, const log::Reader& reader,
   const auto meta = reader.meta().find("publish_endpoint");
   std::string endpoint = meta == reader.meta().end() ? "" : meta->second;
   if (!options.endpoint.empty()) endpoint = options.endpoint;
-  auto broadcast = record::Broadcast::open(endpoint, replay);
+  const auto extent = reader.extent();
+  if (!extent) return std::unexpected(extent.error());
+  auto broadcast =
+      record::Broadcast::open({.endpoint = endpoint,
+                               .log = std::filesystem::path(options.log).filename().string(),
+                               .speed = speed,
+                               .begin_ns = *extent ? (*extent)->first_ns : 0},
+                              replay);
   if (!broadcast) return std::unexpected(broadcast.error());
   outputs.broadcast = std::move(*broadcast);
-  const nlohmann::ordered_json ready{{"ready", true}, {"publish", outputs.broadcast->endpoint()}};
+  nlohmann::ordered_json ready{{"ready", true},
+                               {"publish", outputs.broadcast->endpoint()},
+                               {"replay", options.log},
+                               {"streams", nlohmann::json::array()}};
+  for (const log::StreamRow& row : reader.streams()) ready["streams"].push_back(row.name);
   std::printf("%s\n", ready.dump().c_str());
   std::fflush(stdout);
+  return {};
+}
+
+// Just watching may end at any time; a file or a comparison that is not whole is a failure.
+Result<> ended_early(const ReplayOptions& options, const Outputs& outputs) {
+  const std::string what = fmt::format("interrupted after {} frames", outputs.frames);
+  if (options.expect) return fail(what + ": those after them were not compared");
+  if (!options.out.empty()) return fail(what + ": " + options.out + " holds only those");
+  spdlog::info("{}", what);
   return {};
 }
 
 Result<> replay(const ReplayOptions& options) {
   const auto speed = speed_of(options.speed);
   if (!speed) return std::unexpected(speed.error());
+  const auto files = OutputFiles(options.overwrite)
+                         .reads(options.log)
+                         .writes_any_but_other(options.out, {".bin"})
+                         .check();
+  if (!files) return files;
   auto reader = log::Reader::open(options.log);
   if (!reader) return std::unexpected(reader.error());
   if (auto chosen = choose_isa(options, *reader); !chosen) return chosen;
@@ -209,17 +268,26 @@ Result<> replay(const ReplayOptions& options) {
   record::Replay& replay = **opened;
   warn_of_gaps(*reader);
   Outputs outputs(replay);
-  if (auto done = open_outputs(options, *reader, replay, outputs); !done) return done;
-  const Interrupt interrupt;
-  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); },
-                         Pacer(options.log, *speed));
+  if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
+  const auto extent = reader->extent();
+  if (!extent) return std::unexpected(extent.error());
+  ReplayProgress progress(*extent);
+  const Interrupt interrupt;  // after the progress, whose Ctrl-C it takes over
+  Pacer pacer(options.log, *speed);
+  const auto pace = [&](const log::ChunkRow& chunk) {
+    if (!pacer(chunk)) return false;
+    if (static_cast<record::Direction>(chunk.direction) != record::Direction::kFromDevice) {
+      return true;  // only what a device sent has a time of its own
+    }
+    progress.show(chunk.arrival_ns);
+    if (outputs.broadcast) outputs.broadcast->clock().reached(chunk.arrival_ns);
+    return true;
+  };
+  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, pace);
   if (!done) return done;
-  if (Interrupt::came()) {
-    spdlog::info("interrupted: nothing after frame {} was compared", outputs.frames);
-    return {};
-  }
+  if (Interrupt::came()) return ended_early(options, outputs);
   done = outputs.finish();
-  if (done) print_summary(options, outputs);
+  if (done) print_summary(options, outputs, progress.elapsed_s());
   return done;
 }
 
@@ -229,23 +297,30 @@ void add_replay(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("replay", "Compute a device log's frames again");
   auto options = std::make_shared<ReplayOptions>();
   command->add_option("log", options->log, "The device log")->required();
-  command->add_option("--speed", options->speed, "1: as it came; max: as fast as possible")
+  command
+      ->add_option("--speed", options->speed,
+                   "Times the recording's pace: 1 as it came; max: as fast as possible")
       ->capture_default_str();
-  command->add_flag("--publish", options->publish, "Publish where the recorded run did");
-  command->add_option("--endpoint", options->endpoint, "Publish there instead");
-  command->add_option("--out", options->out, "Write FRAMES.bin: {u32 length, posed.v1.Frame}...");
+  auto* publish =
+      command->add_flag("--publish", options->publish, "Publish where the recorded run did");
+  command->add_option("--endpoint", options->endpoint, "With --publish: publish there instead")
+      ->type_name("ENDPOINT")
+      ->needs(publish);
+  command->add_option("--out", options->out, "Write FRAMES.bin: {u32 length, posed.v1.Frame}...")
+      ->type_name("FILE");
+  add_overwrite_option(*command, options->overwrite);
   command->add_flag("--expect", options->expect, "Compare with the frames in the log, bit for bit");
   command->add_option("--isa", options->isa, "portable, avx2 or avx512; default: the log's own");
   command->add_flag("--json", options->json, "Print the counts as JSON");
   command->footer(
-      "Nothing but the log is needed: it holds what the devices sent, the models, the settings "
-      "and\n"
-      "every decision. The same log gives the same bits on one instruction set. --expect ends "
-      "with\n"
-      "1 and names stream, sequence and field of the first difference. Examples:\n"
-      "  posed replay take1.plog --speed max --expect\n"
-      "  posed replay take1.plog --speed max --out FRAMES.bin\n"
-      "  posed replay take1.plog --publish     # and watch it: posed monitor");
+      R"(Nothing but the log is needed: it holds what the devices sent, the models, the settings
+and every decision. The same log gives the same bits on one instruction set. --expect ends
+with 1 and names stream, sequence and field of the first difference. A published replay says
+in its stats that it is one; its times are the recording's, on the recording's clock. Nobody
+can control it. Examples:
+  posed replay take1.plog --speed max --expect
+  posed replay take1.plog --speed max --out FRAMES.bin
+  posed replay take1.plog --publish     # and watch it: posed top)");
   command->callback([options, &exit_code] {
     const auto done = replay(*options);
     exit_code = done ? 0 : report(done.error());

@@ -50,7 +50,9 @@ bool read_clients_again(pipeline::Daemon& daemon, const std::string& path) {
 
 void add_serve_options(CLI::App& command, ServeOptions& options) {
   command.add_option("--config", options.config, "The daemon's config, TOML")->required();
-  command.add_option("--seconds", options.seconds, "End after this long");
+  command.add_option("--seconds", options.seconds, "End after so many seconds")
+      ->type_name("SECONDS")
+      ->check(CLI::PositiveNumber);
   command.add_flag("--until-end", options.until_end,
                    "End when every source that can end has ended: not gloves or looped clips");
 }

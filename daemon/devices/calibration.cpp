@@ -1,5 +1,7 @@
 #include "daemon/devices/calibration.hpp"
 
+#include <filesystem>
+
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/clean.hpp"
 
@@ -19,7 +21,8 @@ Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
   if (!parsed) return std::unexpected(parsed.error());
   auto compiled = drivers::glove::make_calibration(*model, *parsed, *hand, description.identity);
   if (!compiled) return std::unexpected(compiled.error());
-  return std::make_unique<const OwnedCalibration>(OwnedCalibration{std::move(*compiled), toml});
+  return std::make_unique<const OwnedCalibration>(OwnedCalibration{
+      std::move(*compiled), toml, std::filesystem::path(file).filename().string()});
 }
 
 }  // namespace posed::devices

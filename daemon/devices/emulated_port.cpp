@@ -23,12 +23,18 @@ namespace {
 
 std::string reason() { return std::error_code(errno, std::generic_category()).message(); }
 
+// Takes the place of a link that an emulated glove left behind, and of nothing else.
 Result<> make_link(const std::filesystem::path& link, const std::string& target) {
   std::error_code failed;
-  if (std::filesystem::is_symlink(link, failed)) std::filesystem::remove(link, failed);
+  const auto before = std::filesystem::read_symlink(link, failed);
+  if (!failed && before.string().starts_with("/dev/pts/")) std::filesystem::remove(link, failed);
   std::filesystem::create_symlink(target, link, failed);
-  if (failed) return misuse("cannot link to the port: " + failed.message(), link.string());
-  return {};
+  if (!failed) return {};
+  if (failed == std::errc::file_exists) {
+    return misuse("exists already and is no emulated glove's link; choose another name for --link",
+                  link.string());
+  }
+  return misuse("cannot link to the port: " + failed.message(), link.string());
 }
 
 }  // namespace
@@ -89,7 +95,10 @@ EmulatedPort::EmulatedPort(EmulatedPort&& other) noexcept
 
 EmulatedPort::~EmulatedPort() {
   std::error_code ignored;
-  if (!link_.empty()) std::filesystem::remove(link_, ignored);
+  // Another emulated glove may have taken over the link.
+  if (!link_.empty() && std::filesystem::read_symlink(link_, ignored) == name_) {
+    std::filesystem::remove(link_, ignored);
+  }
   if (other_side_ >= 0) ::close(other_side_);
   if (fd_ >= 0) ::close(fd_);
 }

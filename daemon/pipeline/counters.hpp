@@ -31,7 +31,8 @@ struct alignas(64) PipelineCounters {
   std::atomic<std::uint64_t> shed{0};      // frames and samples skipped because newer ones waited
   std::atomic<std::uint64_t> dropped{0};   // items that found no room in the publisher's ring
   std::atomic<StreamState> state{StreamState::kWaiting};
-  std::atomic<float> alpha{0.0F};
+  std::atomic<float> alpha{0.0F};         // where the slew is
+  std::atomic<float> alpha_target{0.0F};  // where it goes
 };
 
 struct alignas(64) PublisherCounters {

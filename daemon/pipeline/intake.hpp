@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "daemon/pipeline/device_clock.hpp"
 #include "daemon/pipeline/messages.hpp"
@@ -51,8 +52,9 @@ class Intake final : public Sink {
   }
 
   // A notice of the reader, between two chunks. It takes a number only when there was room, so it
-  // may be tried again until there is.
-  [[nodiscard]] bool tell(std::uint8_t event, std::uint64_t ticket) noexcept;
+  // may be tried again until there is. `name`: of the calibration that the notice is about.
+  [[nodiscard]] bool tell(std::uint8_t event, std::uint64_t ticket,
+                          std::string_view name = {}) noexcept;
 
   // Sink, for the decoder.
   void frame(Frame& frame) noexcept override;

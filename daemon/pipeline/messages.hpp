@@ -2,8 +2,11 @@
 // boost::lockfree::spsc_queue rings by value.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <type_traits>
 
 #include "drivers/glove/calibration_file.hpp"
@@ -14,6 +17,31 @@
 
 namespace posed::pipeline {
 
+// Words for people that cross a ring by value: as much of them as fits. RT-safe.
+class ShortText {
+ public:
+  ShortText() = default;
+  explicit ShortText(std::string_view text) noexcept { add(text); }
+
+  void add(std::string_view text) noexcept {
+    std::size_t fits = std::min(text.size(), bytes_.size() - size_);
+    cut_ = cut_ || fits < text.size();
+    while (fits > 0 && fits < text.size() && (text[fits] & 0xc0) == 0x80) --fits;  // whole UTF-8
+    std::copy_n(text.begin(), fits, bytes_.begin() + size_);
+    size_ = static_cast<std::uint8_t>(size_ + fits);
+  }
+  [[nodiscard]] std::string_view text() const noexcept { return {bytes_.data(), size_}; }
+  [[nodiscard]] bool cut() const noexcept { return cut_; }  // there was more
+
+ private:
+  std::array<char, 94> bytes_{};
+  std::uint8_t size_ = 0;
+  bool cut_ = false;
+};
+
+// What a KIND_CONTROL notice is about.
+enum class Change : std::uint8_t { kAlpha, kStyleModel, kGestureModel, kStopPlaying };
+
 // Something that happened to a stream, on its way to event/<stream>.
 struct Notice {
   std::uint32_t stream;
@@ -22,6 +50,10 @@ struct Notice {
   std::uint64_t sequence;
   double value;
   std::uint64_t ticket = 0;  // of the command that it answers; 0: nobody asked
+  // What was changed from what into what, so that it can be told.
+  Change change = Change::kAlpha;  // of KIND_CONTROL
+  float alpha_before = 0.0F;    // kAlpha: where alpha was going until now; `value` is the new one
+  ShortText before{}, after{};  // models' and calibrations' names, labels to be performed
 };
 
 // reader -> pipeline -> publisher

@@ -67,7 +67,7 @@ class Reader::Source final : private IntakeOut {
     calibration_ = command.calibration;
     tell_calibration();
     if (device_ != nullptr) device_->decoder->calibrate(*calibration_->calibration);
-    static_cast<void>(tell(v1::Event::KIND_CALIBRATED, command.ticket));
+    static_cast<void>(tell(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
   }
 
   void send(std::span<const std::byte> bytes) noexcept {
@@ -193,8 +193,8 @@ class Reader::Source final : private IntakeOut {
   // The end must be heard: without room it is tried again at the next read.
   void end() noexcept { ended_ = tell(v1::Event::KIND_ENDED, 0); }
 
-  bool tell(v1::Event::Kind event, std::uint64_t ticket) noexcept {
-    return intake_.tell(static_cast<std::uint8_t>(event), ticket);
+  bool tell(v1::Event::Kind event, std::uint64_t ticket, std::string_view name = {}) noexcept {
+    return intake_.tell(static_cast<std::uint8_t>(event), ticket, name);
   }
 
   // A frame or sample: within the stream's share of the ring.

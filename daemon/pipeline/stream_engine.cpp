@@ -12,6 +12,15 @@ constexpr std::int64_t kHeldEvery_ns = kNanosPerSecond;
 constexpr std::int64_t kSilence_ns = 100'000'000;
 constexpr std::int64_t kSilentFrames = 4;
 
+void add_labels(const gesture::GestureModel& model, const gesture::PlayOrder& order,
+                   ShortText& text) noexcept {
+  for (const std::uint16_t label : order.labels()) {
+    if (label >= model.labels.size() || text.cut()) return;
+    if (!text.text().empty()) text.add(" ");
+    text.add(model.labels[label].name);
+  }
+}
+
 }  // namespace
 
 StreamEngine::StreamEngine(const EngineOptions& options) noexcept
@@ -25,6 +34,8 @@ StreamEngine::StreamEngine(const EngineOptions& options) noexcept
 }
 
 float StreamEngine::alpha() const noexcept { return style_ ? style_->alpha() : 0.0F; }
+
+float StreamEngine::alpha_target() const noexcept { return style_ ? style_->alpha_target() : 0.0F; }
 
 void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   const Header& header = frame.header;
@@ -172,7 +183,8 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
 Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   Ack ack{.ticket = command.ticket, .stream = options_.stream, .sequence = last_sequence_ + 1};
   Decision decision{.stream = options_.stream, .sequence = ack.sequence};
-  double value = command.alpha;
+  Notice told{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
+  describe(command, told);
   switch (command.kind) {
     case Command::Kind::kAlpha:
       decision.kind = Decision::Kind::kAlpha;
@@ -196,7 +208,6 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
       ack.refused = !generate_ || !generate_->play(command.play);
       performs_ = performs_ || !ack.refused;
       ack.sequence = last_out_ + 1;
-      value = command.play.size;
       break;
     case Command::Kind::kStopPlaying:
       decision.kind = Decision::Kind::kStopPlaying;
@@ -206,10 +217,39 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   }
   out.decision(decision);
   if (ack.refused) return ack;
-  const auto event =
-      command.kind == Command::Kind::kPlay ? v1::Event::KIND_PLAYING : v1::Event::KIND_CONTROL;
-  notice(static_cast<std::uint8_t>(event), last_arrival_ns_, ack.sequence, value, out);
+  told.sequence = ack.sequence;
+  other_.kind = Item::Kind::kNotice;
+  other_.notice = told;
+  out.item(other_);
   return ack;
+}
+
+// What the command is about to change, for people.
+void StreamEngine::describe(const Command& command, Notice& notice) const noexcept {
+  switch (command.kind) {
+    case Command::Kind::kAlpha:
+      notice.alpha_before = alpha_target();
+      notice.value = command.alpha;
+      break;
+    case Command::Kind::kModel:
+      notice.change = Change::kStyleModel;
+      if (model_ != nullptr) notice.before = ShortText(model_->name);
+      if (command.model != nullptr) notice.after = ShortText(command.model->name);
+      break;
+    case Command::Kind::kGesture:
+      notice.change = Change::kGestureModel;
+      if (gesture() != nullptr) notice.before = ShortText(gesture()->name);
+      if (command.gesture != nullptr) notice.after = ShortText(command.gesture->name);
+      break;
+    case Command::Kind::kPlay:
+      notice.event = v1::Event::KIND_PLAYING;
+      notice.value = command.play.size;
+      if (gesture() != nullptr) add_labels(gesture()->gesture(), command.play, notice.after);
+      break;
+    case Command::Kind::kStopPlaying:
+      notice.change = Change::kStopPlaying;
+      break;
+  }
 }
 
 void StreamEngine::flush(EngineOut& out) noexcept {

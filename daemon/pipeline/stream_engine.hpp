@@ -77,7 +77,8 @@ class StreamEngine final : private Emit {
   void end(std::int64_t now_ns, EngineOut& out) noexcept;
 
   [[nodiscard]] StreamState state() const noexcept { return state_; }
-  [[nodiscard]] float alpha() const noexcept;  // where the slew is
+  [[nodiscard]] float alpha() const noexcept;         // where the slew is
+  [[nodiscard]] float alpha_target() const noexcept;  // where it goes
   [[nodiscard]] const style::BoundModel* model() const noexcept { return model_; }
   [[nodiscard]] const generate::BoundModel* gesture() const noexcept {
     return generate_ ? generate_->model() : nullptr;
@@ -104,6 +105,7 @@ class StreamEngine final : private Emit {
   void heard(std::int64_t arrival_ns, EngineOut& out) noexcept;
   void notice(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
               EngineOut& out) noexcept;
+  void describe(const Command& command, Notice& notice) const noexcept;
 
   EngineOptions options_;
   std::optional<style::StyleFilter> style_;

@@ -98,6 +98,7 @@ struct Worker::Lane final : EngineOut {
   void tell() noexcept {
     counters.pipeline.state.store(engine.state(), std::memory_order_relaxed);
     counters.pipeline.alpha.store(engine.alpha(), std::memory_order_relaxed);
+    counters.pipeline.alpha_target.store(engine.alpha_target(), std::memory_order_relaxed);
   }
 
   StreamEngine engine;
@@ -180,8 +181,9 @@ bool Worker::idle() const noexcept {
 void Worker::obey() noexcept {
   const auto apply = [this](const Command& command) noexcept {
     Lane& lane = *lanes_[command.stream];
-    acknowledge(lane.engine.apply(command, lane));
-    lane.tell();
+    const Ack ack = lane.engine.apply(command, lane);
+    lane.tell();  // before the answer: whoever has it may ask for the status at once
+    acknowledge(ack);
   };
   while (ports_.commands->consume(apply)) {
   }

@@ -45,47 +45,78 @@ Channel::Channel(const std::string& name, const StreamInfo& info)
 
 Outlet::Outlet(StreamInfo stream_info) : info(std::move(stream_info)), styled(info.name, info) {
   if (info.raw) raw.emplace(info.name + "-raw", info);
+  now_.model = info.model;
 }
 
 void Outlet::measure(const Frame& frame, const StageStamps& stamps) noexcept {
   if (frame.quality == Quality::kStale) return;
   const std::int64_t arrival_ns = frame.header.arrival_ns;
-  add_between(decode, arrival_ns, stamps.decoded_ns);
-  add_between(style, stamps.decoded_ns, stamps.styled_ns);
-  add_between(publish, arrival_ns, stamps.published_ns);
+  add_between(decode_, arrival_ns, stamps.decoded_ns);
+  add_between(style_, stamps.decoded_ns, stamps.styled_ns);
+  add_between(publish_, arrival_ns, stamps.published_ns);
 }
 
-void Outlet::report(v1::StreamStats& stats, double seconds_since) {
+void Outlet::count(const Frame& frame, const StageStamps& stamps) {
+  measure(frame, stamps);
+  const std::scoped_lock lock(mutex_);
+  ++now_.frames;
+  now_.lag_frames = frame.lag_frames;
+  now_.lag_ms = frame.lag_ms;
+  now_.label = frame.label;
+  now_.label_probability = frame.label_probability;
+  now_.source = frame.source;
+  now_.clock = frame.header.clock;
+}
+
+void Outlet::count_sample() {
+  const std::scoped_lock lock(mutex_);
+  ++now_.samples;
+}
+
+void Outlet::set_model(std::string name) {
+  const std::scoped_lock lock(mutex_);
+  now_.model = std::move(name);
+}
+
+void Outlet::fill(v1::StreamStats& stats) const {
   const auto& reader = info.counters->reader;
   const auto& pipeline = info.counters->pipeline;
   stats.set_stream(info.name);
   stats.set_driver(info.description.driver);
   stats.set_state(kStateNames[static_cast<std::size_t>(pipeline.state.load())]);
-  stats.set_frames(frames);
-  stats.set_samples(samples);
-  stats.set_rate_hz(static_cast<float>(static_cast<double>(frames - frames_reported) /
-                                       std::max(seconds_since, 1e-3)));
-  frames_reported = frames;
   stats.set_dropped(reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
+  stats.clear_outcome();
   for (const auto& outcome : reader.outcome) stats.add_outcome(outcome.load());
-  *stats.mutable_decode() = percentiles(decode);
-  *stats.mutable_style() = percentiles(style);
-  *stats.mutable_publish() = percentiles(publish);
   stats.set_alpha(pipeline.alpha.load());
-  stats.set_model(info.model);
-  stats.set_lag_frames(lag_frames);
-  stats.set_lag_ms(lag_ms);
-  stats.set_label(std::string(label.begin(), std::ranges::find(label, '\0')));
-  stats.set_label_probability(label_probability);
+  stats.set_alpha_target(pipeline.alpha_target.load());
   const std::int64_t link_ns = reader.link_ns.load();
   const bool begun = link_ns != kNoTime_ns;  // until the reader has, nobody is missed
   stats.set_away(info.comes_and_goes && begun && !reader.connected.load());
   stats.set_connections(reader.connections.load());
   stats.set_link_ns(begun ? link_ns : 0);
-  if (clock.valid) stats.set_clock_offset_ns(clock.offset_ns);
-  stats.set_clock_drift_ppm(clock.drift_ppm);
   if (info.present) tell_device(*info.present->description(), stats);
+  const std::scoped_lock lock(mutex_);
+  stats.set_frames(now_.frames);
+  stats.set_samples(now_.samples);
+  stats.set_model(now_.model);
+  stats.set_lag_frames(now_.lag_frames);
+  stats.set_lag_ms(now_.lag_ms);
+  stats.set_label(std::string(now_.label.begin(), std::ranges::find(now_.label, '\0')));
+  stats.set_label_probability(now_.label_probability);
+  stats.set_source(static_cast<v1::Source>(now_.source));
+  if (now_.clock.valid) stats.set_clock_offset_ns(now_.clock.offset_ns);
+  stats.set_clock_drift_ppm(now_.clock.drift_ppm);
+}
+
+void Outlet::report(v1::StreamStats& stats, double seconds_since) {
+  fill(stats);
+  stats.set_rate_hz(static_cast<float>(static_cast<double>(stats.frames() - frames_reported_) /
+                                       std::max(seconds_since, 1e-3)));
+  frames_reported_ = stats.frames();
+  *stats.mutable_decode() = percentiles(decode_);
+  *stats.mutable_style() = percentiles(style_);
+  *stats.mutable_publish() = percentiles(publish_);
 }
 
 }  // namespace posed::publish

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,29 +28,48 @@ struct Channel {
   std::int64_t skeleton_due_ns = 0;
 };
 
-struct Outlet {
+// Publisher thread, but for set_model() and fill(): any thread.
+class Outlet {
+ public:
   explicit Outlet(StreamInfo stream_info);
 
-  // Adds the frame's times, which its stamps hold, to the percentiles of this second. Stale frames
-  // repeat old times and are left out.
-  void measure(const Frame& frame, const StageStamps& stamps) noexcept;
-  // Fills `stats` and begins the next second.
+  // A styled frame goes out with these stamps. Its times go into the percentiles of this second;
+  // those of stale frames are old and are left out.
+  void count(const Frame& frame, const StageStamps& stamps);
+  void count_sample();
+  void set_model(std::string name);
+
+  // What is so at this moment: all of `stats` but rates and percentiles, which are a second's.
+  void fill(v1::StreamStats& stats) const;
+  // The same with the rates and percentiles of the second that ends here; begins the next one.
   void report(v1::StreamStats& stats, double seconds_since);
 
   StreamInfo info;
   Channel styled;
   std::optional<Channel> raw;
-  std::uint64_t frames = 0;
-  std::uint64_t samples = 0;
-  std::uint64_t frames_reported = 0;
-  // Of the last frame.
-  std::uint16_t lag_frames = 0;
-  float lag_ms = 0.0F;
-  std::array<char, kMaxLabel> label{};
-  float label_probability = 0.0F;
-  ClockMapping clock;
-  LatencyHistogram decode, style, publish;
   ShedTally shed;
+
+ private:
+  // What fill() reads while the publisher goes on.
+  struct Now {
+    std::uint64_t frames = 0;
+    std::uint64_t samples = 0;
+    std::string model;
+    // Of the last frame.
+    std::uint16_t lag_frames = 0;
+    float lag_ms = 0.0F;
+    std::array<char, kMaxLabel> label{};
+    float label_probability = 0.0F;
+    Source source = Source::kDevice;
+    ClockMapping clock;
+  };
+
+  void measure(const Frame& frame, const StageStamps& stamps) noexcept;
+
+  mutable std::mutex mutex_;
+  Now now_;  // under mutex_
+  std::uint64_t frames_reported_ = 0;
+  LatencyHistogram decode_, style_, publish_;
 };
 
 }  // namespace posed::publish

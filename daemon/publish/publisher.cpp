@@ -9,6 +9,7 @@
 
 #include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/peer_guard.hpp"
+#include "daemon/publish/notice_text.hpp"
 #include "daemon/publish/outlet.hpp"
 #include "daemon/publish/process.hpp"
 
@@ -34,40 +35,6 @@ std::int64_t clock_ns(clockid_t clock) {
   timespec now{};
   clock_gettime(clock, &now);
   return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
-
-// What the pipeline's notices say to people.
-std::string sentence(const pipeline::Notice& notice) {
-  switch (notice.event) {
-    case v1::Event::KIND_STARTED:
-      return "the first data came";
-    case v1::Event::KIND_STALE:
-      return fmt::format("nothing came for {:.2f} s", notice.value);
-    case v1::Event::KIND_RECOVERED:
-      return "data comes again";
-    case v1::Event::KIND_ENDED:
-      return fmt::format("the source has ended after {} frames", notice.sequence);
-    case v1::Event::KIND_CONTROL:
-      return fmt::format("control takes effect at frame {}", notice.sequence);
-    case v1::Event::KIND_CALIBRATED:
-      return fmt::format("a calibration takes effect at frame {}", notice.sequence + 1);
-    case v1::Event::KIND_CLOCK_JUMPED:
-      return "the device's own time jumped (did it restart?); it is mapped to the host's anew";
-    case v1::Event::KIND_PLAYING:
-      return fmt::format("performs {:.0f} labels from frame {} on, or after those that wait",
-                         notice.value, notice.sequence);
-    case v1::Event::KIND_PLAYED:
-      return "all labels are performed";
-    default:
-      return {};
-  }
-}
-
-std::string sentence(const ShedTally::Sum& shed) {
-  const std::string which = shed.frames == 1 ? fmt::format("frame {} was", shed.first)
-                                             : fmt::format("{} frames, {} to {}, were", shed.frames,
-                                                           shed.first, shed.last);
-  return which + " skipped: newer ones waited";
 }
 
 // What the publisher's thread waits for: new items, and what subscribers say.
@@ -98,10 +65,9 @@ struct Publisher::Told {
   };
   mutable std::mutex mutex;
   std::vector<Posted> events;
-  std::vector<std::pair<std::uint32_t, std::string>> models;
   bool check = false;
   v1::Stats stats;
-  std::atomic<bool> asked{false};  // one of events, models, check is new
+  std::atomic<bool> asked{false};  // one of events, check is new
 
   // The publisher thread's own, of the last report.
   std::int64_t reported_ns = kNoTime_ns;
@@ -170,6 +136,7 @@ Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
       endpoint_(std::move(endpoint)),
       poller_(std::move(poller)),
       told_(std::make_unique<Told>()) {
+  if (!options_.data_clock) options_.data_clock = options_.clock;
   for (StreamInfo& stream : streams) {
     outlets_.push_back(std::make_unique<Outlet>(std::move(stream)));
   }
@@ -244,7 +211,7 @@ void Publisher::take(const pipeline::Item& item) {
       break;
     case Kind::kSample: {
       Outlet& outlet = *outlets_[item.sample.header.stream];
-      ++outlet.samples;
+      outlet.count_sample();
       send(outlet.styled.sensor_topic, outlet.styled.samples.encode(item.sample));
       break;
     }
@@ -267,7 +234,8 @@ void Publisher::take_notice(const pipeline::Notice& notice) {
 void Publisher::tell_shed(std::uint32_t stream, bool at_end) {
   const std::int64_t now_ns = options_.clock();
   const auto sum = outlets_[stream]->shed.take(now_ns, at_end);
-  if (sum) send_event(stream, v1::Event::KIND_SHED, now_ns, sum->first, sentence(*sum));
+  if (!sum) return;
+  send_event(stream, v1::Event::KIND_SHED, options_.data_clock(), sum->first, sentence(*sum));
 }
 
 void Publisher::take_frame(const Frame& frame, bool raw) {
@@ -281,16 +249,9 @@ void Publisher::take_frame(const Frame& frame, bool raw) {
                              std::as_bytes(std::span(scratch_)));
   }
   StageStamps stamps = frame.stamps;
-  stamps.published_ns = options_.clock();
+  if (options_.stamps) stamps.published_ns = options_.data_clock();
   send(channel.pose_topic, channel.frames.stamp(stamps));
-  if (raw) return;
-  ++outlet.frames;
-  outlet.measure(frame, stamps);
-  outlet.lag_frames = frame.lag_frames;
-  outlet.lag_ms = frame.lag_ms;
-  outlet.label = frame.label;
-  outlet.clock = frame.header.clock;
-  outlet.label_probability = frame.label_probability;
+  if (!raw) outlet.count(frame, stamps);
 }
 
 void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
@@ -376,8 +337,9 @@ void Publisher::every_second(std::int64_t now_ns) {
   const std::int64_t cpu_ns = cpu_time_ns();
   if (first) told_->cpu_ns = cpu_ns;
   v1::Stats stats;
-  stats.set_time_ns(now_ns);
-  stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC));
+  const std::int64_t data_ns = options_.data_clock();
+  stats.set_time_ns(data_ns);
+  stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - data_ns);
   stats.set_rss_bytes(resident_bytes());
   stats.set_cpu_percent(
       static_cast<float>(100.0 * seconds(cpu_ns - told_->cpu_ns) / std::max(since_s, 1e-3)));
@@ -400,12 +362,10 @@ void Publisher::do_what_was_asked() {
   {
     const std::scoped_lock lock(told_->mutex);
     events.swap(told_->events);
-    for (auto& [stream, name] : told_->models) outlets_[stream]->info.model = std::move(name);
-    told_->models.clear();
     check = std::exchange(told_->check, false);
   }
   for (const Told::Posted& event : events) {
-    send_event(event.stream, event.kind, options_.clock(), 0, event.text);
+    send_event(event.stream, event.kind, options_.data_clock(), 0, event.text);
   }
   if (!check || options_.gatekeeper == nullptr) return;
   guard_->cut_unless([this](std::string_view user) {
@@ -424,7 +384,7 @@ void Publisher::ask(Change&& change) {
 }
 
 void Publisher::set_model_name(std::uint32_t stream, std::string name) {
-  ask([&](Told& told) { told.models.emplace_back(stream, std::move(name)); });
+  outlets_[stream]->set_model(std::move(name));
 }
 
 void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {
@@ -436,8 +396,18 @@ void Publisher::check_subscribers() {
 }
 
 v1::Stats Publisher::stats() const {
-  const std::scoped_lock lock(told_->mutex);
-  return told_->stats;
+  v1::Stats stats;
+  {
+    const std::scoped_lock lock(told_->mutex);
+    stats = told_->stats;
+  }
+  for (int i = 0; i < static_cast<int>(outlets_.size()); ++i) {
+    if (i == stats.stream_size()) stats.add_stream();  // nothing has been reported yet
+    outlets_[static_cast<std::size_t>(i)]->fill(*stats.mutable_stream(i));
+  }
+  stats.set_time_ns(options_.data_clock());
+  if (options_.more_stats) options_.more_stats(stats);
+  return stats;
 }
 
 }  // namespace posed::publish

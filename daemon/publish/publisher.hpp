@@ -50,7 +50,11 @@ struct PublisherOptions {
   std::string secret_z85;                      // the server's key; empty: no CURVE
   std::function<void(v1::Stats&)> more_stats;  // adds what others know (recorder); may be empty
   record::Tape* tape = nullptr;                // null: nothing is recorded
-  Clock clock = nullptr;
+  Clock clock = nullptr;                       // the host's: paces what is said every second
+  // The clock of what is published: frames', events' and stats' own times. Empty: `clock`. A replay
+  // publishes on the clock of its recording.
+  std::function<std::int64_t()> data_clock{};
+  bool stamps = true;  // false: published_ns is left out, because it would mean nothing
 };
 
 // A message queue a quarter of a second deep, for all streams together.
@@ -58,7 +62,7 @@ struct PublisherOptions {
 // That depth, and a small kernel buffer behind it. Before bind.
 [[nodiscard]] Result<> set_queue_options(void* socket, double messages_per_s);
 
-struct Outlet;
+class Outlet;
 
 class Publisher {
  public:
@@ -86,7 +90,8 @@ class Publisher {
   void post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text);
   // Cuts off who is not allowed any more (a key was withdrawn); needs a gatekeeper.
   void check_subscribers();
-  [[nodiscard]] v1::Stats stats() const;  // as last published
+  // Rates and percentiles are the last full second's; all else is so at this moment.
+  [[nodiscard]] v1::Stats stats() const;
 
  private:
   struct Told;

@@ -1,11 +1,13 @@
 #include "daemon/record/broadcast.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 #include <utility>
 
 #include "daemon/control/security.hpp"
 #include "daemon/pipeline/clock.hpp"
+#include "daemon/record/pace.hpp"
 
 namespace posed::record {
 namespace {
@@ -14,11 +16,38 @@ constexpr auto kLookAgain = std::chrono::milliseconds(1);
 
 }  // namespace
 
-Broadcast::Broadcast(std::size_t streams, std::size_t slots, std::unique_ptr<pipeline::Wake> wake)
-    : counters_(streams), ring_(slots), wake_(std::move(wake)) {}
+TakeClock::TakeClock(double speed, std::int64_t begin_ns, Clock host)
+    : speed_(speed), host_(host), take_ns_(begin_ns), host_ns_(host()) {}
 
-Result<std::unique_ptr<Broadcast>> Broadcast::open(const std::string& endpoint,
+std::int64_t TakeClock::at(std::int64_t host_ns) const {
+  return take_ns_ + nanoseconds(seconds(host_ns - host_ns_) * speed_);
+}
+
+void TakeClock::reached(std::int64_t arrival_ns) {
+  const std::int64_t host_ns = host_();
+  const std::scoped_lock lock(mutex_);
+  const std::int64_t now_ns = at(host_ns);
+  const bool back = arrival_ns < now_ns - Pace::kLongestSilence_ns;  // a wrong time is over
+  take_ns_ = back ? arrival_ns : std::max(arrival_ns, now_ns);
+  host_ns_ = host_ns;
+}
+
+std::int64_t TakeClock::now_ns() const {
+  const std::scoped_lock lock(mutex_);
+  return at(host_());
+}
+
+Broadcast::Broadcast(const BroadcastOptions& options, const Replay& replay, std::size_t slots,
+                     std::unique_ptr<pipeline::Wake> wake)
+    : replay_(replay),
+      clock_(options.speed, options.begin_ns, pipeline::monotonic_ns),
+      counters_(replay.streams()),
+      ring_(slots),
+      wake_(std::move(wake)) {}
+
+Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& options,
                                                    const Replay& replay) {
+  const std::string& endpoint = options.endpoint;
   if (!control::is_loopback(endpoint)) {
     return misuse("the log's run published on " + endpoint +
                   "; a replay knows no keys and publishes on this machine only: say --endpoint "
@@ -41,21 +70,31 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const std::string& endpoint,
     frames_per_s += stream.settings.rate_hz * 2.0;  // raw and styled
   }
   std::unique_ptr<Broadcast> self(
-      new Broadcast(streams, pipeline::ring_slots(frames_per_s), std::move(*wake)));
-  for (std::uint32_t id = 0; id < streams; ++id) infos[id].counters = &self->counters_[id];
+      new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(*wake)));
+  for (std::uint32_t id = 0; id < streams; ++id) {
+    infos[id].counters = &self->counters_[id];
+    const auto& style = replay.stream(id).settings.style;
+    if (style) self->counters_[id].pipeline.alpha_target.store(static_cast<float>(style->alpha));
+  }
   auto context = control::open_context();
   if (!context) return std::unexpected(context.error());
   self->context_ = std::move(*context);
   auto gatekeeper = control::Gatekeeper::start(self->context_.get(), std::nullopt);
   if (!gatekeeper) return std::unexpected(gatekeeper.error());
   self->gatekeeper_ = std::move(*gatekeeper);
-  publish::PublisherOptions options;
-  options.gatekeeper = self->gatekeeper_.get();
-  options.context = self->context_.get();
-  options.endpoint = endpoint;
-  options.clock = pipeline::monotonic_ns;
+  publish::PublisherOptions published;
+  published.gatekeeper = self->gatekeeper_.get();
+  published.context = self->context_.get();
+  published.endpoint = endpoint;
+  published.clock = pipeline::monotonic_ns;
+  published.data_clock = [clock = &self->clock_] { return clock->now_ns(); };
+  published.stamps = options.speed != 0.0;  // as fast as possible, no frame has a right moment
+  published.more_stats = [file = options.log, speed = options.speed](v1::Stats& stats) {
+    stats.set_replay_file(file);
+    stats.set_replay_speed(speed);
+  };
   auto publisher =
-      publish::Publisher::open(std::move(options), std::move(infos), self->ring_, *self->wake_);
+      publish::Publisher::open(std::move(published), std::move(infos), self->ring_, *self->wake_);
   if (!publisher) return std::unexpected(publisher.error());
   self->publisher_ = std::move(*publisher);
   self->thread_ = std::jthread([publisher = self->publisher_.get()] { publisher->run(); });
@@ -67,8 +106,44 @@ Broadcast::~Broadcast() {
 }
 
 void Broadcast::add(const pipeline::Item& item) {
+  if (item.kind == pipeline::Item::Kind::kNotice) note(item.notice);
+  if (item.kind == pipeline::Item::Kind::kFrame) {
+    const std::uint32_t stream = item.frame.header.stream;
+    counters_[stream].pipeline.alpha.store(replay_.alpha(stream));
+  }
   while (!ring_.push(item)) std::this_thread::sleep_for(kLookAgain);
   wake_->ring();
+}
+
+// What the pipeline's counters and the control thread knew in the live run.
+void Broadcast::note(const pipeline::Notice& notice) {
+  using pipeline::Change;
+  using pipeline::StreamState;
+  auto& counters = counters_[notice.stream].pipeline;
+  switch (notice.event) {
+    case v1::Event::KIND_STARTED:
+    case v1::Event::KIND_RECOVERED:
+      counters.state.store(StreamState::kLive);
+      break;
+    case v1::Event::KIND_STALE:
+      counters.state.store(StreamState::kStale);
+      break;
+    case v1::Event::KIND_ENDED:
+      counters.state.store(StreamState::kEnded);
+      break;
+    case v1::Event::KIND_SHED:
+      pipeline::count(counters.shed, static_cast<std::uint64_t>(notice.value));
+      break;
+    case v1::Event::KIND_CONTROL:
+      if (notice.change == Change::kAlpha) {
+        counters.alpha_target.store(static_cast<float>(notice.value));
+      } else if (notice.change != Change::kStopPlaying) {
+        publisher_->set_model_name(notice.stream, std::string(notice.after.text()));
+      }
+      break;
+    default:
+      break;
+  }
 }
 
 }  // namespace posed::record

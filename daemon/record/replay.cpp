@@ -90,6 +90,8 @@ void Replay::apply(const Schedule::Entry& entry) noexcept {
   if (const auto decision = decision_of(entry.row, {})) lanes_[entry.stream]->apply(*decision);
 }
 
+float Replay::alpha(std::uint32_t stream) const { return lanes_[stream]->alpha(); }
+
 Result<> Replay::run(const Out& out, const Pace& pace) {
   out_ = &out;
   const auto& streams = reader_.streams();

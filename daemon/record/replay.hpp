@@ -28,6 +28,9 @@ class Replay final : private LaneHost {
   [[nodiscard]] std::uint32_t streams() const { return static_cast<std::uint32_t>(lanes_.size()); }
   [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
+  // Where the slew of the stream's style is, while run() lasts and afterwards; 0 without a style.
+  [[nodiscard]] float alpha(std::uint32_t stream) const;
+
   // Items in pipeline order.
   using Out = std::function<void(const pipeline::Item&)>;
   // Called before each chunk; false ends the replay there.

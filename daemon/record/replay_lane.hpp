@@ -72,6 +72,7 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
 
   [[nodiscard]] const ReplayStream& stream() const noexcept { return stream_; }
   [[nodiscard]] std::optional<std::uint64_t> broken_at() const noexcept { return broken_at_; }
+  [[nodiscard]] float alpha() const noexcept { return engine_->alpha(); }
 
  private:
   [[nodiscard]] Result<> open_decoder(const log::SourceRow& source);

@@ -36,6 +36,7 @@ struct CalibrationFile {
 struct OwnedCalibration {
   std::shared_ptr<const Calibration> calibration;
   std::string text;
+  std::string name{};  // of its file, for people
 };
 
 // Errors name file and line: cut in half, not finite, raw values that do not ascend. Cold.

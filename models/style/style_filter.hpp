@@ -74,6 +74,7 @@ class StyleFilter final : public Stage {
   void settle(const Frame& frame, double heading_rad) noexcept;
 
   [[nodiscard]] float alpha() const noexcept;  // where the slew is now
+  [[nodiscard]] float alpha_target() const noexcept { return static_cast<float>(alpha_target_); }
 
  private:
   using Dims = std::array<float, motion::kMaxPoseDims>;

@@ -275,6 +275,24 @@ Result<std::optional<ChunkRow>> Reader::next_chunk() {
                   .bytes = select.bytes(7)};
 }
 
+Result<std::optional<Reader::Extent>> Reader::extent() const {
+  const auto arrival = [this](const char* order) -> Result<std::optional<std::int64_t>> {
+    auto select = state_->database.prepare(
+        std::string("SELECT arrival_ns FROM chunk WHERE direction=0 ORDER BY id ") + order +
+        " LIMIT 1");
+    if (!select) return std::unexpected(select.error());
+    const auto row = select->step();
+    if (!row) return std::unexpected(row.error());
+    if (!*row) return std::nullopt;
+    return select->integer(0);
+  };
+  const auto first = arrival("ASC"), last = arrival("DESC");
+  if (!first) return std::unexpected(first.error());
+  if (!last) return std::unexpected(last.error());
+  if (!*first || !*last) return std::nullopt;
+  return Extent{**first, **last};
+}
+
 Result<std::vector<DecisionRow>> Reader::decisions() const {
   auto select = select_rows(state_->database, state_->old,
                             "SELECT id, item, stream, stage, name, value, now_ns, crc "

@@ -52,6 +52,13 @@ class Reader {
   // valid until the next call.
   [[nodiscard]] Result<std::optional<ChunkRow>> next_chunk();
 
+  // How much there is to go through: when the first and the last chunk came that a device sent.
+  // Nothing when none was logged. Cheap.
+  struct Extent {
+    std::int64_t first_ns = 0, last_ns = 0;
+  };
+  [[nodiscard]] Result<std::optional<Extent>> extent() const;
+
   // Of all streams, in log order.
   [[nodiscard]] Result<std::vector<DecisionRow>> decisions() const;
   [[nodiscard]] Result<std::vector<GapRow>> gaps() const;

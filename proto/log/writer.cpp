@@ -37,7 +37,7 @@ std::int64_t stored(std::uint64_t value) { return static_cast<std::int64_t>(valu
 Result<> make_room_for(const std::filesystem::path& path, bool overwrite) {
   std::error_code error;
   if (std::filesystem::exists(path, error) && !overwrite) {
-    return fail("exists already; choose another name or say --force", path.string());
+    return fail("exists already; choose another name or say --overwrite", path.string());
   }
   for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
     std::filesystem::remove(path.string() + suffix, error);

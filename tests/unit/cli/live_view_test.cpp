@@ -18,6 +18,7 @@ v1::Stats stats_of(int streams) {
     stream.set_state("live");
     stream.set_rate_hz(120.0F);
     stream.set_alpha(-0.5F);
+    stream.set_alpha_target(-0.5F);
     stream.set_model("march-to-sway.style");
     stream.mutable_style()->set_p50_us(31.4F);
     stream.mutable_style()->set_p99_us(1234.0F);
@@ -96,6 +97,59 @@ TEST_CASE("the live view tells which gloves are away, since when, and how a glov
       "drift +0.0 ppm"));
   CHECK(wide[8].contains("drift +7.3 ppm, /dev/\\x1b[2J"));
   CHECK(live_view(stats, {.height = 0, .colour = true})[3].starts_with("\x1b[33m"));
+}
+
+TEST_CASE("a daemon that does not answer is not shown as live") {
+  v1::Stats stats = stats_of(2);
+  stats.mutable_stream(0)->set_label("g");
+  LiveViewOptions options{.title = "posed tcp://a:1", .height = 0, .colour = true};
+  options.silence = "no answer for 20 s: the daemon has ended, or cannot be reached";
+  const auto lines = live_view(stats, options);
+  CHECK(lines[0].starts_with("\x1b[31mno answer for 20 s: the daemon has ended"));
+  std::string all;
+  for (const std::string& line : lines) all += line + "\n";
+  INFO(all);
+  CHECK_FALSE(all.contains("live"));
+  CHECK_FALSE(all.contains("120.0"));
+  CHECK_FALSE(all.contains("31/"));
+  CHECK_FALSE(all.contains("cpu"));
+  CHECK_FALSE(all.contains("recognised"));
+  CHECK(all.contains("walker1"));
+}
+
+TEST_CASE("on no terminal names are whole and lines end with their words") {
+  v1::Stats stats = stats_of(2);
+  const std::string name = "a-model-with-quite-a-long-name-indeed-yes.style";
+  stats.mutable_stream(0)->set_model(name);
+  stats.mutable_stream(1)->set_stream(std::string(32, 'w'));
+  stats.mutable_stream(1)->clear_model();
+  stats.mutable_stream(1)->set_label("g");
+  const auto lines = live_view(stats, {.title = "posed", .width = 0, .height = 0});
+  CHECK(lines[2].ends_with(" " + name));
+  CHECK(lines[3].starts_with(std::string(32, 'w') + " "));
+  CHECK(lines[4] == "  " + std::string(32, 'w') + " recognised g 0 %");
+  for (const std::string& line : lines) CHECK_FALSE(line.ends_with(' '));
+}
+
+TEST_CASE("what a stream does is told: performed, recognised, sliding, replayed") {
+  v1::Stats stats = stats_of(1);
+  auto& stream = *stats.mutable_stream(0);
+  stream.set_alpha_target(-0.5F);
+  stream.set_label("g");
+  stream.set_label_probability(0.83F);
+  const auto below = [&] {
+    return live_view(stats, {.title = "posed", .width = 0, .height = 0})[3];
+  };
+  CHECK(below() == "  walker0   recognised g 83 %");
+  stream.set_source(v1::SOURCE_LABELS);
+  CHECK(below() == "  walker0   performs g");
+  stream.set_alpha_target(1.0F);
+  CHECK(below() == "  walker0   performs g, alpha slides to 1.00");
+  stats.set_replay_file("take1.plog");
+  stats.set_replay_speed(1.0);
+  CHECK(below() == "  a replay of take1.plog, 1 x its pace; all times are the recording's");
+  // A stage that no frame passed has no times.
+  CHECK(live_view(stats, {.width = 0, .height = 0})[2].contains(" -   31/1.2m         - "));
 }
 
 TEST_CASE("streams that do not fit are counted, notes fill what is left") {

@@ -208,6 +208,33 @@ TEST_CASE("a glove is away only once the reader has begun to look for it") {
   CHECK_FALSE(stats.away());
 }
 
+TEST_CASE("the status is of this moment, though stats go out once a second") {
+  Rig rig;
+  REQUIRE(rig.receive("stats", 1));
+  rig.counters.pipeline.alpha_target = 0.5F;
+  rig.counters.pipeline.state = pipeline::StreamState::kLive;
+  rig.publisher->set_model_name(0, "other.style");
+  v1::Stats stats = rig.publisher->stats();
+  REQUIRE(stats.stream_size() == 1);
+  CHECK(stats.stream(0).alpha_target() == 0.5F);
+  CHECK(stats.stream(0).state() == "live");
+  CHECK(stats.stream(0).model() == "other.style");
+  CHECK(stats.stream(0).outcome_size() == kOutcomes);
+  Item item = frame_item(41);
+  item.frame.source = Source::kLabels;
+  item.frame.label = {'g'};
+  rig.put(item);
+  REQUIRE(rig.receive("pose/toy", 1));
+  const std::int64_t until_ns = pipeline::monotonic_ns() + 10 * kNanosPerSecond;
+  while (rig.publisher->stats().stream(0).frames() == 0 && pipeline::monotonic_ns() < until_ns) {
+  }
+  stats = rig.publisher->stats();
+  CHECK(stats.stream(0).frames() == 1);
+  CHECK(stats.stream(0).label() == "g");
+  CHECK(stats.stream(0).source() == v1::SOURCE_LABELS);
+  CHECK(stats.stream(0).outcome_size() == kOutcomes);
+}
+
 TEST_CASE("a busy port is one sentence that names it") {
   Rig rig;
   pipeline::Ring<Item> ring(64);

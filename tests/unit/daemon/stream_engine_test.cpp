@@ -77,6 +77,32 @@ TEST_CASE("the raw input goes out before the styled frame") {
   CHECK(out.items[2].kind == Item::Kind::kFrame);
 }
 
+TEST_CASE("a notice of a change carries what was before and what is now") {
+  const auto model = test::toy_model(1);
+  const auto skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
+  EngineOptions options = plain();
+  options.style = style::FilterOptions{};
+  const auto one = style::bind_model(model, *skeleton, *options.style, "one.style").value();
+  const auto two = style::bind_model(model, *skeleton, *options.style, "two.style").value();
+  options.model = one.get();
+  StreamEngine engine(options);
+  Collected out;
+  static_cast<void>(engine.apply({.kind = Command::Kind::kAlpha, .alpha = 0.5F}, out));
+  REQUIRE(out.items.size() == 1);
+  Notice told = out.items[0].notice;
+  CHECK(told.event == v1::Event::KIND_CONTROL);
+  CHECK(told.change == Change::kAlpha);
+  CHECK(told.alpha_before == 1.0F);
+  CHECK(told.value == 0.5);
+  CHECK(engine.alpha_target() == 0.5F);
+  CHECK(engine.alpha() == 0.0F);  // it slides there with the frames
+  static_cast<void>(engine.apply({.kind = Command::Kind::kModel, .model = two.get()}, out));
+  told = out.items[1].notice;
+  CHECK(told.change == Change::kStyleModel);
+  CHECK(told.before.text() == "one.style");
+  CHECK(told.after.text() == "two.style");
+}
+
 TEST_CASE("a gap in the sequence is a shed, decided before the frame behind it") {
   StreamEngine engine(plain());
   Collected out;

@@ -1,0 +1,269 @@
+// The live commands tell the truth: about a daemon that died, about what was changed and since
+// when, about a replay, about the file that was written, about what they wait for.
+#include <catch2/catch.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/e2e/outcome.hpp"
+#include "tests/e2e/served.hpp"
+#include "tests/support/shared.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+// Waits until the process has said this on stderr; false after half a minute.
+bool comes_to_say(const Process& process, const std::string& part) {
+  for (int i = 0; i < 600; ++i) {
+    if (process.errors().contains(part)) return true;
+    std::this_thread::sleep_for(50ms);
+  }
+  return false;
+}
+
+std::string line_with(Process& process, const std::string& part) {
+  while (auto line = process.line()) {
+    if (line->contains(part)) return *line;
+  }
+  return {};
+}
+
+constexpr const char* kNobody = "tcp://127.0.0.1:9";
+
+TEST_CASE("monitor prints a glove's loss and return, and lives on") {
+  Stage stage;
+  stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +
+                                       "[[stream]]\nname = \"right\"\ndriver = \"lucidgloves\"\n"
+                                       "port = \"" +
+                                       stage.path("right") + "\"\nhand = \"right\"\n");
+  stage.launch("run");
+  Process monitor({"monitor", "--connect", stage.publish, "--topic", "event"});
+  std::optional<Process> glove;
+  for (int i = 0; i < 2; ++i) {
+    glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", stage.path("right"),
+                                           "--set", "hand=right"});
+    REQUIRE(glove->line());
+    CHECK(has(line_with(monitor, " found "), "right"));
+    glove->send(SIGKILL);
+    CHECK(glove->exit_code());
+    CHECK(has(line_with(monitor, " lost "), "right"));
+  }
+  monitor.send(SIGINT);
+  CHECK(monitor.exit_code() == 0);
+}
+
+TEST_CASE("a daemon that is gone is not shown as live") {
+  Served served;
+  served.start();
+  Process top({"top", "--connect", served.publish});
+  Process monitor({"monitor", "--connect", served.publish, "--topic", "stats"});
+  Process patient({"monitor", "--connect", served.publish, "--json", "--timeout", "4"});
+  REQUIRE(top.line());
+  REQUIRE(monitor.line());
+  REQUIRE(patient.line());
+  served.daemon->send(SIGSTOP);
+  CHECK(comes_to_say(monitor, "s: the connection stands, but the daemon is stopped or stuck"));
+  CHECK(patient.exit_code() == 1);
+  CHECK(has(patient.errors(), "gave up after 4 s (--timeout)"));
+  served.daemon->send(SIGCONT);
+  CHECK(comes_to_say(monitor, "answers again, after "));
+  served.daemon->send(SIGKILL);
+  for (const Process* one : {&top, &monitor}) {
+    INFO(one->errors());
+    CHECK(comes_to_say(*one, "posed: " + served.publish + ": no answer for "));
+    CHECK(comes_to_say(*one, "the daemon has ended, or cannot be reached"));
+  }
+  for (Process* one : {&top, &monitor}) {
+    one->send(SIGTERM);
+    CHECK(one->exit_code() == 0);
+  }
+}
+
+TEST_CASE("whoever waits for a daemon is told what for") {
+  for (const char* command : {"top", "monitor"}) {
+    Process waits({command, "--connect", kNobody, "--json"});
+    CHECK(comes_to_say(waits, "posed: waiting: nobody answers at tcp://127.0.0.1:9"));
+    waits.send(SIGINT);
+    CHECK(waits.exit_code() == 0);
+    const Outcome gives_up =
+        posed({command, "--connect", kNobody, "--count", "1", "--timeout", "2"});
+    CHECK(gives_up.code == 1);
+    CHECK(has(gives_up.err, "gave up after 2 s"));
+  }
+  const Outcome ctl = posed({"ctl", "--connect", kNobody, "--timeout", "0.3", "status"});
+  CHECK(ctl.code == 1);
+  CHECK(has(ctl.err, "waited 0.3 s"));
+  CHECK(has(ctl.err, "a replay publishes, but takes no control"));
+}
+
+TEST_CASE("a status is as new as the acknowledgement before it, and events say what changed") {
+  Served served;
+  served.start();
+  Process events({"monitor", "--connect", served.publish, "--topic", "event", "--json"});
+  Process all({"monitor", "--connect", served.publish, "--topic", "stats"});
+  REQUIRE(all.line());  // subscriptions take a moment; this one came later
+  const auto stream = [&] {
+    return json::parse(served.ctl({"--json", "status"}).out).at("status").at("stream").at(0);
+  };
+  for (const double alpha : {0.5, -0.25, 1.5, 0.0}) {
+    const Outcome set = served.ctl({"set", "walker", "alpha", std::to_string(alpha)});
+    REQUIRE(set.code == 0);
+    CHECK(has(set.out, ": alpha "));
+    CHECK(stream().at("alphaTarget") == alpha);
+  }
+  CHECK(line_with(events, "alpha 1.00 -> 0.50 from frame ") != "");
+  CHECK(line_with(events, "alpha 0.50 -> -0.25 from frame ") != "");
+  const std::uint64_t before = std::stoull(stream().at("frames").get<std::string>());
+  for (const char* model : {"two.style", "one.style", "two.style"}) {
+    REQUIRE(served.ctl({"model", "walker", served.path(model)}).code == 0);
+    CHECK(stream().at("model") == model);
+  }
+  CHECK(line_with(events, "style model one.style -> two.style from frame ") != "");
+  CHECK(std::stoull(stream().at("frames").get<std::string>()) > before);
+}
+
+TEST_CASE("a published replay says that it is one, and its times make sense") {
+  const TempFolder folder;
+  const auto log = (folder.path() / "staged.plog").string();
+  std::filesystem::copy_file(golden("replay/staged.plog"), log);
+  Process replay({"replay", log, "--speed", "0.1", "--publish", "--endpoint", "tcp://127.0.0.1:*"});
+  const auto line = replay.line();
+  INFO(replay.errors());
+  REQUIRE(line);
+  const json ready = json::parse(*line);
+  CHECK(ready.at("replay") == log);
+  const std::string endpoint = ready.at("publish");
+
+  Process stats({"monitor", "--connect", endpoint, "--topic", "stats", "--json"});
+  const Outcome frames = posed({"monitor", "--connect", endpoint, "--json", "--count", "20"});
+  REQUIRE(frames.code == 0);
+  CHECK(has(frames.err, "a replay of staged.plog, 0.1 x its pace; all times are the recording's"));
+  const json frame = json::parse(frames.out.substr(0, frames.out.find('\n')));
+  const auto ns = [](const json& value) { return std::stoll(value.get<std::string>()); };
+  const double age_s = seconds(ns(frame.at("publishedNs")) - ns(frame.at("arrivalNs")));
+  CHECK(age_s >= 0.0);
+  CHECK(age_s < 1.0);
+  bool live = false;
+  while (const auto text = stats.line()) {
+    const json one = json::parse(*text);
+    CHECK(one.at("replayFile") == "staged.plog");
+    for (const json& stream : one.at("stream")) {
+      live = live || stream.at("state") == "live";
+      CHECK(stream.at("publish").at("maxUs").get<double>() < 1e6);
+    }
+    if (live) break;
+  }
+  CHECK(live);
+  replay.send(SIGINT);
+  CHECK(replay.exit_code() == 0);
+
+  const Outcome unheard = posed({"replay", log, "--endpoint", "tcp://127.0.0.1:*"});
+  CHECK(unheard.code == 2);
+  CHECK(has(unheard.err, "--publish"));
+  Process cut({"replay", log, "--speed", "0.05", "--out", (folder.path() / "cut").string()});
+  std::this_thread::sleep_for(2500ms);
+  cut.send(SIGINT);
+  CHECK(cut.exit_code() == 1);
+  CHECK(has(cut.errors(), "holds only those"));
+  CHECK(has(cut.errors(), "replayed 0 of "));  // it was not silent
+}
+
+TEST_CASE("a recording ends with what was written") {
+  Served served;
+  served.launch("record", {"--out", served.path("take.plog"), "--json"});
+  std::this_thread::sleep_for(700ms);
+  served.daemon->send(SIGTERM);
+  CHECK(served.daemon->exit_code() == 0);
+  const auto line = served.daemon->line();
+  REQUIRE(line);
+  const json told = json::parse(*line);
+  CHECK(told.at("file") == served.path("take.plog"));
+  CHECK(told.at("bytes") == std::filesystem::file_size(served.path("take.plog")));
+  CHECK(told.at("frames") > 10);
+  CHECK(told.at("streams").at(0).at("stream") == "walker");
+  CHECK(told.at("missing_chunks") == 0);
+  CHECK(told.at("seconds") >= 0.7);
+  CHECK(has(served.daemon->errors(), "take.plog: "));
+  CHECK(has(served.daemon->errors(), "nothing is missing"));
+}
+
+TEST_CASE("ctl knows the file it is given before it sends it") {
+  Served served;
+  served.start();
+  const auto fit =
+      served.folder.write("ann.toml",
+                          "format = 1\ndriver = \"lucidgloves\"\nhand = \"right\"\n[sensors]\n"
+                          "index_joint1 = [[0, 0.0], [2000, 1.0]]\n");
+  const Outcome style = served.ctl({"calibrate", "walker", served.path("one.style")});
+  CHECK(style.code == 1);
+  CHECK(has(style.err,
+            "one.style: is a model, not a glove's calibration; send it with `posed ctl "
+            "model walker "));
+  const Outcome toml = served.ctl({"model", "walker", fit.string()});
+  CHECK(toml.code == 1);
+  CHECK(has(toml.err,
+            "ann.toml: is a glove's calibration, not a model; send it with `posed ctl "
+            "calibrate walker "));
+  CHECK(has(served.ctl({"model", "walker", served.path("walk.bvh")}).err, "is a clip"));
+  const Outcome broken = served.ctl(
+      {"calibrate", "walker", served.folder.write("half.toml", "format = 1\ndriver = ").string()});
+  CHECK(broken.code != 0);
+  CHECK(has(broken.err, "half.toml:2"));
+  CHECK(served.ctl({"haptics", "walker"}).code == 2);
+}
+
+TEST_CASE("a piped status has whole names, and no line ends in blanks") {
+  Served served;
+  const std::string name = "a-style-with-a-rather-long-name-that-was-cut-before.style";
+  std::filesystem::copy_file(served.path("one.style"), served.path(name));
+  served.start();
+  REQUIRE(served.ctl({"model", "walker", served.path(name)}).code == 0);
+  const Outcome status = served.ctl({"status"});
+  CHECK(has(status.out, name + "\n"));
+  CHECK_FALSE(status.out.contains(" \n"));
+}
+
+TEST_CASE("each command explains its own options, and refuses those without an effect") {
+  const Outcome set = posed({"ctl", "set", "--help"});
+  CHECK(set.code == 0);
+  CHECK(has(set.out, "posed ctl set walker alpha 0.5"));
+  CHECK_FALSE(set.out.contains("posed ctl haptics"));
+  CHECK_FALSE(set.out.contains("posed ctl play"));
+  const std::string help = posed({"top", "--help"}).out;
+  for (const char* column : {"DROP ", "SHED ", "PUBLISH ", "microseconds"})
+    CHECK(has(help, column));
+  CHECK(posed({"monitor", "--topic", "stats", "--stream", "walker"}).code == 2);
+  CHECK(posed({"emulate", "lucidgloves", "--stream", "right"}).code == 2);
+  CHECK(posed({"emulate", "lucidgloves", "--seed", "3", "--seconds", "1"}).code == 2);
+  CHECK(posed({"run", "--config", "none.toml", "--seconds", "-1"}).code == 2);
+  const TempFolder folder;
+  const auto mine = folder.write("mine", "precious");
+  const auto link = folder.path() / "link";
+  std::filesystem::create_symlink(mine, link);
+  const Outcome taken = posed({"emulate", "lucidgloves", "--link", link.string()});
+  CHECK(taken.code == 2);
+  CHECK(has(taken.err, "choose another name for --link"));
+  CHECK(std::filesystem::read_symlink(link) == mine);
+
+  Served served;
+  served.start();
+  const Outcome misnamed = posed({"monitor", "--connect", served.publish, "--stream", "walkr"});
+  CHECK(misnamed.code == 1);
+  CHECK(has(misnamed.err, "has no stream 'walkr'; it has: walker"));
+  Process counting({"monitor", "--connect", served.publish, "--count", "100000"});
+  REQUIRE(counting.line());
+  counting.send(SIGINT);
+  CHECK(counting.exit_code() == 1);
+  CHECK(has(counting.errors(), "of 100000 messages"));
+}
+
+}  // namespace
+}  // namespace posed::test
