@@ -56,6 +56,8 @@ Result<> check_options(const Convert& convert) {
         useless(convert.rate_given, is_amc(convert.in), "is no AMC, so --rate means nothing"),
         useless(convert.metres_per_unit != 0.0, bvh_in,
                 "is no BVH, so --metres-per-unit means nothing"),
+        useless(!convert.read.profile.empty(), bvh_in || is_amc(convert.in),
+                "is no BVH or AMC, so --profile means nothing"),
         useless(!convert.hand.empty(), csv_in || to_csv,
                 "neither IN nor OUT is a hand CSV, so --hand means nothing"),
         useless(convert.shape_given, csv_in && !to_csv,

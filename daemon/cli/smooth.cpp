@@ -142,10 +142,10 @@ Result<> smooth(const SmoothOptions& options) {
   const double noise_deg = smoother.noise_rad() * kDegrees;
   if (!options.json) {
     std::printf(
-        "%s: %zu frames, %d behind (%.0f ms at %g Hz), sensor noise %.2f deg%s (standard "
-        "deviation of an angle), %ld missing values bridged\n",
+        "%s: %zu frames, %d behind (%.0f ms at %g Hz), sensor noise %.2f deg (standard "
+        "deviation of an angle%s), %ld missing values bridged\n",
         options.out.c_str(), measured.size(), lag_frames, lag_ms, clip->rate_hz, noise_deg,
-        options.noise_deg > 0.0 ? "" : " (estimated)", rows.bridged_values);
+        options.noise_deg > 0.0 ? "" : ", estimated", rows.bridged_values);
     return {};
   }
   json report{{"out", options.out},
