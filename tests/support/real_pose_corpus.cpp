@@ -5,8 +5,8 @@
 #include <stdexcept>
 
 #include "models/random.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/frame/hand.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::test {
 namespace {
@@ -65,7 +65,8 @@ double minimum_jerk(double t) { return t * t * t * (10.0 - 15.0 * t + 6.0 * t * 
 }  // namespace
 
 FeatureMatrix libras_poses(const std::filesystem::path& folder, const std::string& sign) {
-  const std::string text = clip::load_text(folder / (sign + ".csv")).value();
+  const std::string text =
+      load_file(folder / (sign + ".csv"), {"recording", std::uintmax_t{1} << 30}).value();
   std::vector<RowVectorXd> rows;
   for (std::string_view left = text; !left.empty();) {
     std::vector<double> sensors = numbers_of(clip::next_line(left));

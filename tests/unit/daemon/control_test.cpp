@@ -198,7 +198,7 @@ TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
   CHECK(has(stream, "there is no stream '\\x1b[2Jxxx"));
   CHECK(stream.size() < 300);
   auto named = model_request("walker", "no model");
-  named.mutable_set_model()->set_name(wild);
+  named.mutable_model_part()->set_name(wild);
   const std::string name = desk.refused(named);
   CHECK(name.find('\x1b') == std::string::npos);
   CHECK(name.size() < 300);

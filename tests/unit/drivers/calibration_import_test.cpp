@@ -4,8 +4,8 @@
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/glove/fit.hpp"
 #include "drivers/glove/import.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/text/load_file.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/specimens.hpp"
 
@@ -107,7 +107,7 @@ TEST_CASE("asr's real calibrations are imported, and cut ones refused") {
   CHECK(value_at(*right, "index_mcp", 117) == Approx(0.0));
   CHECK(value_at(*right, "index_mcp", 185) == Approx(-1.5));
   CHECK(value_at(*right, "wrist_yaw", 46) == Approx(0.3));
-  check_every_cut(clip::load_text(*folder / "GloveCalibrationRight.cal").value());
+  check_every_cut(load_file(*folder / "GloveCalibrationRight.cal", {"file", 1 << 20}).value());
 }
 
 TEST_CASE("Shadow's real calibration is imported, and a cut one refused") {
@@ -119,7 +119,7 @@ TEST_CASE("Shadow's real calibration is imported, and a cut one refused") {
   CHECK(file->sensors.size() == 22);
   CHECK(value_at(*file, "index_pip", 1 + 254 * 0.653543293476) == Approx(-90 * kDegree));
   CHECK(value_at(*file, "index_pip", 1 + 254 * 0.181102365255) == Approx(0).margin(1e-9));
-  check_every_cut(clip::load_text(path).value());
+  check_every_cut(load_file(path, {"file", 1 << 20}).value());
 }
 
 TEST_CASE("what is no calibration, and a sensor that hardly moved, are refused") {
