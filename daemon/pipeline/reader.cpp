@@ -34,6 +34,7 @@ class Reader::Source final : private IntakeOut {
         device_(read.device),
         calibration_(read.calibration),
         share_(read.slots, counters_.pipeline.taken),
+        half_(read.slots - read.slots / 2, counters_.pipeline.taken),
         intake_(stream, next_item, *this) {}
 
   [[nodiscard]] bool ended() const noexcept { return ended_; }
@@ -197,26 +198,38 @@ class Reader::Source final : private IntakeOut {
     return intake_.tell(static_cast<std::uint8_t>(event), ticket, name);
   }
 
+  // Once full, the stream's share takes nothing until half of it is free. A device that floods then
+  // loses long runs and not every other item: each run is a decision in the log.
+  bool share_is_open() noexcept {
+    if (!share_.has_room()) open_ = false;
+    if (!open_) open_ = half_.has_room();
+    return open_;
+  }
+
+  // Into the ring, whose slot the stream's share pays for.
+  bool put(const Item& item) noexcept {
+    if (!ports_.out->push(item)) return false;
+    share_.add();
+    half_.add();
+    ports_.pipeline->ring();
+    return true;
+  }
+
   // A frame or sample: within the stream's share of the ring.
   bool push(const Item& item) noexcept {
-    if (!share_.has_room() || !ports_.out->push(item)) return false;
-    share_.add();
+    if (!share_is_open() || !put(item)) return false;
     if (item.kind == Item::Kind::kSample) {
       counters_.reader.newest_sample.store(item.sample.header.sequence, std::memory_order_release);
     } else {
       counters_.reader.newest.store(item.frame.header.sequence, std::memory_order_release);
     }
-    ports_.pipeline->ring();
     return true;
   }
 
   // What a device can cause at any rate has to fit into its stream's share, too.
   bool push_notice(const Item& item) noexcept {
     const bool shared = item.notice.event == v1::Event::KIND_CLOCK_JUMPED;
-    if ((shared && !share_.has_room()) || !ports_.out->push(item)) return false;
-    share_.add();
-    ports_.pipeline->ring();
-    return true;
+    return (!shared || share_is_open()) && put(item);
   }
 
   void arrived(std::int64_t arrival_ns) noexcept {
@@ -242,7 +255,8 @@ class Reader::Source final : private IntakeOut {
   std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
   bool ended_ = false;
-  RingShare share_;
+  RingShare share_, half_;  // of the ring to the pipeline
+  bool open_ = true;
   Intake intake_;
 };
 

@@ -130,21 +130,14 @@ TEST_CASE("a glove that floods the daemon over TCP costs its neighbour no frame"
   const std::uint64_t span = *during.rbegin() - *during.begin() + 1;
   const auto status = nlohmann::json::parse(stage.ctl({"--json", "status"}).out).at("status");
   WARN("the glove sent " << sent / 1'000'000 << " MB; " << during.size() << " of " << span
-                         << " frames of its neighbour came; memory grew by "
-                         << (static_cast<std::int64_t>(memory) -
-                             static_cast<std::int64_t>(memory_before)) /
-                                1'000'000
-                         << " MB; " << status.dump());
+                         << " frames of its neighbour came; posed had " << memory_before / 1'000'000
+                         << " MB, then " << memory / 1'000'000);
   CHECK(sent > 1'000'000);
   CHECK(static_cast<double>(span) >
         0.8 * kNeighbourRate_hz * std::chrono::duration<double>(time).count());
   CHECK(static_cast<double>(during.size()) >= 0.95 * static_cast<double>(span));
   CHECK(memory < memory_before + 64U * 1024 * 1024);
-  const auto& bend = status.at("stream").at(0);
-  for (const char* counter : {"dropped", "shed"}) {
-    INFO(counter);
-    CHECK(std::stoull(bend.value(counter, "0")) == 0);
-  }
+  CHECK(std::stoull(status.at("stream").at(0).value("dropped", "0")) == 0);
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
 }

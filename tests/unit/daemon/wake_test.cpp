@@ -2,6 +2,8 @@
 // Under the thread sanitizer, too; the argument for weak memory stands at Wake.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <thread>
@@ -17,35 +19,52 @@ TEST_CASE("a consumer that sleeps is woken for each element of two producers") {
   const auto wake = Wake::open().value();
   const auto poller = Poller::open().value();
   REQUIRE(poller->add(*wake));
-  std::atomic<std::uint64_t> put[2] = {0, 0};
-  std::atomic<std::uint64_t> taken{0};
-  const auto produce = [&](std::atomic<std::uint64_t>& mine) {
+  struct Producer {
+    std::atomic<std::uint64_t> put{0}, taken{0};
+  };
+  std::array<Producer, 2> producers;
+  const auto produce = [&](Producer& mine) {
     for (std::uint64_t i = 1; i <= kEach; ++i) {
-      mine.store(i, std::memory_order_release);
+      mine.put.store(i, std::memory_order_release);
       wake->ring();
       // In step with the consumer every now and then, so that it falls asleep.
-      while (i % 4 == 0 && taken.load(std::memory_order_acquire) < i) std::this_thread::yield();
+      while (i % 4 == 0 && mine.taken.load(std::memory_order_acquire) < i) {
+        std::this_thread::yield();
+      }
     }
   };
-  const auto there = [&] {
-    return put[0].load(std::memory_order_acquire) + put[1].load(std::memory_order_acquire);
+  // Whether something is there that has not been taken.
+  const auto more = [&] {
+    return std::ranges::any_of(producers, [](const Producer& producer) {
+      return producer.put.load(std::memory_order_acquire) !=
+             producer.taken.load(std::memory_order_relaxed);
+    });
   };
-  std::jthread first([&] { produce(put[0]); });
-  std::jthread second([&] { produce(put[1]); });
+  const auto take = [&] {
+    std::uint64_t sum = 0;
+    for (Producer& producer : producers) {
+      const std::uint64_t put = producer.put.load(std::memory_order_acquire);
+      producer.taken.store(put, std::memory_order_release);
+      sum += put;
+    }
+    return sum;
+  };
+  std::jthread first([&] { produce(producers[0]); });
+  std::jthread second([&] { produce(producers[1]); });
+  int missed = 0, sleeps = 0;
   std::uint64_t seen = 0;
-  int missed = 0;
-  while (seen < 2 * kEach && missed == 0) {
-    seen = there();
-    taken.store(seen, std::memory_order_release);
+  while ((seen = take()) < 2 * kEach && missed == 0) {
     wake->going_to_sleep();
-    if (there() == seen && seen < 2 * kEach) {
+    if (!more()) {
       const std::int64_t before_ns = monotonic_ns();
       static_cast<void>(poller->wait(kPatience_ns));
       if (monotonic_ns() - before_ns >= kPatience_ns) ++missed;
+      ++sleeps;
     }
     wake->awake();
   }
-  taken.store(2 * kEach, std::memory_order_release);  // lets the producers end
+  for (Producer& producer : producers) producer.taken.store(kEach);  // lets them end
+  CHECK(sleeps > 0);
   CHECK(missed == 0);
   CHECK(seen == 2 * kEach);
 }
