@@ -3,9 +3,12 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cstdint>
+#include <span>
 
 #include <sqlite3.h>
 
+#include "proto/log/checksum.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/toml_bombs.hpp"
 
@@ -24,6 +27,46 @@ void check_refused(const std::vector<std::string>& arguments, const std::string&
 
 std::string stream_with(const std::string& more) {
   return std::string(Stage::kEndpoints) + "[[stream]]\nname = \"hand\"\n" + more;
+}
+
+// Puts `value` into a column of each row of a log's table where `where` holds, with a checksum that
+// is right, as a stranger who sends a log would. Returns how many rows there were.
+int forge(const std::string& path, const std::string& table, const std::string& column,
+          const std::string& value, const std::string& where = "1") {
+  sqlite3* log = nullptr;
+  REQUIRE(sqlite3_open(path.c_str(), &log) == SQLITE_OK);
+  sqlite3_stmt* rows = nullptr;
+  const std::string select = "SELECT * FROM " + table + " WHERE " + where;
+  REQUIRE(sqlite3_prepare_v2(log, select.c_str(), -1, &rows, nullptr) == SQLITE_OK);
+  std::vector<std::pair<std::int64_t, std::int64_t>> forged;  // id, checksum
+  while (sqlite3_step(rows) == SQLITE_ROW) {
+    log::Checksum sum;
+    for (int c = 0; c + 1 < sqlite3_column_count(rows); ++c) {
+      const auto* blob = static_cast<const char*>(sqlite3_column_blob(rows, c));
+      std::string text(blob, blob + sqlite3_column_bytes(rows, c));
+      if (sqlite3_column_name(rows, c) == column) text = value;
+      if (sqlite3_column_type(rows, c) == SQLITE_INTEGER) {
+        sum.add(sqlite3_column_int64(rows, c));
+      } else {
+        sum.add(std::as_bytes(std::span(text)));
+      }
+    }
+    forged.emplace_back(sqlite3_column_int64(rows, 0), sum.value());
+  }
+  sqlite3_finalize(rows);
+  for (const auto& [id, crc] : forged) {
+    sqlite3_stmt* update = nullptr;
+    const std::string change = "UPDATE " + table + " SET " + column + "=CAST(? AS " +
+                               (column == "bytes" ? "BLOB" : "TEXT") + "), crc=? WHERE id=?";
+    REQUIRE(sqlite3_prepare_v2(log, change.c_str(), -1, &update, nullptr) == SQLITE_OK);
+    sqlite3_bind_blob(update, 1, value.data(), static_cast<int>(value.size()), SQLITE_STATIC);
+    sqlite3_bind_int64(update, 2, crc);
+    sqlite3_bind_int64(update, 3, id);
+    CHECK(sqlite3_step(update) == SQLITE_DONE);
+    sqlite3_finalize(update);
+  }
+  sqlite3_close(log);
+  return static_cast<int>(forged.size());
 }
 
 TEST_CASE("TOML nested 31,000 deep is one sentence, whichever file it stands in") {
@@ -64,16 +107,11 @@ TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its l
   CHECK(stage.daemon->exit_code() == 0);
 
   // The same in a log that a stranger sent.
-  sqlite3* log = nullptr;
-  REQUIRE(sqlite3_open(stage.path("take.plog").c_str(), &log) == SQLITE_OK);
-  const std::string change =
-      "UPDATE chunk SET bytes=CAST('" + toml_bombs()[0] + "' AS BLOB) WHERE direction=3";
-  CHECK(sqlite3_exec(log, change.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
-  CHECK(sqlite3_changes(log) == 1);
-  sqlite3_close(log);
+  CHECK(forge(stage.path("take.plog"), "chunk", "bytes", toml_bombs()[0], "direction=3") == 1);
   const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
   INFO(replay.err.substr(0, 1000));
   CHECK(replay.code == 1);
+  CHECK(has(replay.err, "nests deeper"));
   CHECK(replay.err.size() < 2000);
 }
 
@@ -107,15 +145,11 @@ TEST_CASE(
   stage.record();
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
-  sqlite3* log = nullptr;
-  REQUIRE(sqlite3_open(stage.path("take.plog").c_str(), &log) == SQLITE_OK);
-  const std::string change =
-      "UPDATE stream SET driver=char(27)||'[2J'||hex(zeroblob(500000)), name=char(27)||'[2J'";
-  CHECK(sqlite3_exec(log, change.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK);
-  sqlite3_close(log);
+  const std::string wild = "\x1b[2J" + std::string(1'000'000, 'x');
+  CHECK(forge(stage.path("take.plog"), "source", "driver", wild) == 1);
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"replay", stage.path("take.plog"), "--speed", "max"},
-        {"convert", stage.path("take.plog"), stage.path("out.bvh")}}) {
+        {"convert", stage.path("take.plog"), "--out", stage.path("out.bvh")}}) {
     const Outcome outcome = posed(arguments);
     INFO(outcome.err.substr(0, 1000));
     CHECK(outcome.code == 1);
@@ -131,7 +165,8 @@ TEST_CASE("check says that a glove is away, and that it would be waited for") {
   INFO(text.err);
   CHECK(text.code == 0);
   CHECK(has(text.out, "hand: cyberglove (away), 100 Hz"));
-  CHECK(has(text.out, "the device is not here now, and `posed run` waits for it (/dev/none: "));
+  CHECK(has(text.out,
+            "the device is not here now, and `posed run` waits for it (/dev/none is not there"));
   const Outcome json = posed({"check", "--config", served.path("posed.toml"), "--json"});
   CHECK(nlohmann::json::parse(json.out).at("streams")[0].at("present") == false);
 }
