@@ -143,7 +143,7 @@ TEST_CASE("a published replay says that it is one, and its times make sense") {
   const std::string endpoint = ready.at("publish");
 
   Process stats({"monitor", "--connect", endpoint, "--topic", "stats", "--json"});
-  const Outcome frames = posed({"monitor", "--connect", endpoint, "--json", "--count", "20"});
+  const Outcome frames = posed({"monitor", "--connect", endpoint, "--json", "--count", "10"});
   REQUIRE(frames.code == 0);
   CHECK(has(frames.err, "a replay of staged.plog, 0.1 x its pace; all times are the recording's"));
   const json frame = json::parse(frames.out.substr(0, frames.out.find('\n')));
