@@ -59,9 +59,14 @@ struct Evaluation {
 std::string verdict(const Evaluation& e) {
   const double closes = 1.0 - e.score.cycle_ratio;
   const double constant = 1.0 - e.constant.cycle_ratio;
-  std::string text =
-      e.helps() ? style::closing_text(closes) + " of the way to the target"
-                : "worse than nothing: " + style::closing_text(closes) + " from the target";
+  std::string text = style::closing_text(closes);
+  if (e.helps()) {
+    text += " of the way to the target";
+  } else if (closes > -0.005) {
+    text = "no better than nothing: the styled walk is as far from the target as the source";
+  } else {
+    text = "worse than nothing: " + text + " from the target";
+  }
   text += "; a constant offset " + style::closing_text(constant);
   if (e.helps() && constant > closes) text += ", which is better";
   if (e.score.jerk_ratio > kRough) {
