@@ -134,8 +134,9 @@ TEST_CASE("what a log lacks is counted, and nothing after it is compared", "[rep
 }
 
 // tests/golden/replay/staged.plog: 30 frames of the staged run, recorded with --frames by a posed
-// that wrote format 1, and kept for it. staged-3.plog is the same of format 3, made by this test
-// with POSED_MAKE_GOLDEN set; a new one needs its reason in the commit message.
+// that wrote format 1, and kept for it. staged-3.plog is the same in format 3, converted row by row
+// by a program that knew only what proto/README.md says; this test with POSED_MAKE_GOLDEN set
+// writes it anew. A new one needs its reason in the commit message.
 TEST_CASE("the golden logs' frames come again on any machine", "[replay]") {
   const std::string name = GENERATE("replay/staged.plog", "replay/staged-3.plog");
   const auto path = golden(name);
