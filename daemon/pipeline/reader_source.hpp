@@ -1,0 +1,264 @@
+// Reader::Source: one stream of the reader. Private to reader.cpp. RT-safe throughout, but for the
+// reads, writes and wake-ups that it marks as allowed.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "daemon/pipeline/hot_mark.hpp"
+#include "daemon/pipeline/intake.hpp"
+#include "daemon/pipeline/reader.hpp"
+#include "posed/v1/posed.pb.h"
+
+namespace posed::pipeline {
+
+// One stream: its device while there is one, and what becomes of what the device sends.
+class Reader::Source final : private IntakeOut {
+  // What one source may give in one turn; the rest waits for the next one. A source that never runs
+  // dry so costs each of the others a fraction of a millisecond. No real device comes near it:
+  // USB's full speed is 64 bytes a millisecond, a serial line's 11.5 KB a second.
+  static constexpr int kChunksATurn = 64;
+  static constexpr std::size_t kBytesATurn = 4096;
+  // Frames of a patient source on their way through the pipeline; below what the pipeline sheds.
+  static constexpr std::uint64_t kPatientFrames = 2;
+
+ public:
+  Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports, Poller& poller,
+         std::uint64_t& next_item)
+      : read_(read),
+        counters_(*read.counters),
+        ports_(ports),
+        poller_(poller),
+        stream_(stream),
+        device_(read.device),
+        calibration_(read.calibration),
+        share_(read.slots, counters_.pipeline.taken),
+        half_(read.slots - read.slots / 2, counters_.pipeline.taken),
+        intake_(stream, next_item, *this) {}
+
+  [[nodiscard]] bool ended() const noexcept { return ended_; }
+
+  // Whether a chunk may be read now: whenever there is a device, but for a patient one with frames
+  // under way.
+  [[nodiscard]] bool may_read() const noexcept {
+    if (device_ == nullptr || ended_) return false;
+    return !device_->transport->patient() ||
+           counters_.reader.frames.load(std::memory_order_relaxed) -
+                   counters_.pipeline.consumed.load(std::memory_order_acquire) <
+               kPatientFrames;
+  }
+
+  // When it has to be looked at without its descriptor saying so; kNoTime_ns: never.
+  [[nodiscard]] std::int64_t due_ns() const noexcept {
+    if (device_ == nullptr || ended_) return kNoTime_ns;
+    return poll_due_ns_ != kNoTime_ns ? poll_due_ns_ : device_->transport->next_due_ns();
+  }
+  [[nodiscard]] bool patient_now() const noexcept { return device_ != nullptr && !may_read(); }
+
+  // Before the first read: what the first device is and how it is calibrated.
+  void begin() noexcept {
+    arrived(ports_.clock());
+    if (calibration_ != nullptr) tell_calibration();
+    counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
+    if (device_ != nullptr) use(*device_);
+  }
+
+  void calibrate(const DeviceCommand& command) noexcept {
+    calibration_ = command.calibration;
+    tell_calibration();
+    if (device_ != nullptr) device_->decoder->calibrate(*calibration_->calibration);
+    static_cast<void>(tell(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
+  }
+
+  void send(std::span<const std::byte> bytes) noexcept {
+    if (device_ == nullptr) return;
+    const AllowedCall the_write;
+    if (!device_->transport->send(bytes)) return;
+    tape(record::Direction::kToDevice, bytes);
+  }
+
+  // Takes a device from the slot, and gives back the one that is asked for.
+  void exchange() noexcept {
+    if (read_.slot == nullptr) return;
+    if (device_ != nullptr && read_.slot->give_back.exchange(false)) give_back();
+    static_cast<void>(read_.slot->in.consume([this](drivers::Device* device) noexcept {
+      device_ = device;
+      intake_.new_link();
+      arrived(ports_.clock());
+      tape(record::Direction::kDeviceInfo, std::as_bytes(std::span(device->description.text)));
+      use(*device);
+    }));
+  }
+
+  void serve() noexcept {
+    if (device_ == nullptr) return;
+    poll();
+    std::size_t bytes = 0;
+    for (int i = 0; i < kChunksATurn && bytes < kBytesATurn && may_read(); ++i) {
+      const std::size_t got = read_one();
+      if (got == 0) break;
+      bytes += got;
+    }
+    if (ended_ && device_ != nullptr && device_->transport->poll_fd() >= 0) {
+      poller_.remove(device_->transport->poll_fd());
+    }
+  }
+
+  // IntakeOut: into the ring, and counted.
+  bool item(Item& item) noexcept override {
+    switch (item.kind) {
+      case Item::Kind::kSample:
+        counters_.reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
+        break;
+      case Item::Kind::kNotice:
+        return push_notice(item);
+      default:
+        item.frame.stamps.decoded_ns = ports_.clock();
+        counters_.reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
+    }
+    counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
+    if (!push(item)) {
+      count(counters_.reader.dropped);
+      return false;
+    }
+    return true;
+  }
+
+  void outcome(Outcome outcome) noexcept override {
+    count(counters_.reader.outcome[static_cast<std::size_t>(outcome)]);
+  }
+
+ private:
+  // Reads and decodes one chunk; returns its bytes, 0 when none was due.
+  std::size_t read_one() noexcept {
+    const drivers::Chunk chunk = read();
+    arrived(ports_.clock());
+    if (!chunk.bytes.empty()) {
+      tape(record::Direction::kFromDevice, chunk.bytes);
+      device_->decoder->feed(chunk.bytes, arrival_ns_, intake_);
+    }
+    if (chunk.end) end();
+    if (chunk.lost) give_back();
+    return chunk.bytes.size();
+  }
+
+  // A source that goes by time alone has nothing to ask the system.
+  drivers::Chunk read() noexcept {
+    drivers::Transport& transport = *device_->transport;
+    if (transport.poll_fd() < 0) return transport.read(ports_.clock());
+    const AllowedCall the_read;
+    return transport.read(ports_.clock());
+  }
+
+  // A device that answers instead of streaming is asked at its own pace; what was late once does
+  // not stay late.
+  void poll() noexcept {
+    if (poll_due_ns_ == kNoTime_ns) return;
+    const std::int64_t now_ns = ports_.clock();
+    if (now_ns < poll_due_ns_) return;
+    send(device_->poll.request);
+    poll_due_ns_ += device_->poll.period_ns;
+    if (poll_due_ns_ < now_ns) poll_due_ns_ = now_ns + device_->poll.period_ns;
+  }
+
+  void use(drivers::Device& device) noexcept {
+    if (calibration_ != nullptr) device.decoder->calibrate(*calibration_->calibration);
+    poll_due_ns_ = device.poll.request.empty() ? kNoTime_ns : ports_.clock();
+    const std::int64_t now_ns = ports_.clock();
+    counters_.reader.heard_ns.store(now_ns, std::memory_order_relaxed);
+    counters_.reader.link_ns.store(now_ns, std::memory_order_relaxed);
+    counters_.reader.connected.store(true, std::memory_order_release);
+    count(counters_.reader.connections);
+    if (device.transport->poll_fd() < 0) return;
+    const AllowedCall the_call;  // once a connection, and nothing flows yet
+    static_cast<void>(poller_.add(device.transport->poll_fd(), stream_));
+  }
+
+  // A device without a keeper that is lost has ended.
+  void give_back() noexcept {
+    if (read_.slot == nullptr) return end();
+    if (device_->transport->poll_fd() >= 0) {
+      const AllowedCall the_call;
+      poller_.remove(device_->transport->poll_fd());
+    }
+    poll_due_ns_ = kNoTime_ns;
+    counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
+    counters_.reader.connected.store(false, std::memory_order_release);
+    static_cast<void>(read_.slot->out.push(device_));  // holds more than there are devices
+    device_ = nullptr;
+    const AllowedCall the_wake;
+    read_.slot->keeper->ring();
+  }
+
+  // The end must be heard: without room it is tried again at the next read.
+  void end() noexcept { ended_ = tell(v1::Event::KIND_ENDED, 0); }
+
+  bool tell(v1::Event::Kind event, std::uint64_t ticket, std::string_view name = {}) noexcept {
+    return intake_.tell(static_cast<std::uint8_t>(event), ticket, name);
+  }
+
+  // Once full, the stream's share takes nothing until half of it is free. A device that floods then
+  // loses long runs and not every other item: each run is a decision in the log.
+  bool share_is_open() noexcept {
+    if (!share_.has_room()) open_ = false;
+    if (!open_) open_ = half_.has_room();
+    return open_;
+  }
+
+  // Into the ring, whose slot the stream's share pays for.
+  bool put(const Item& item) noexcept {
+    if (!ports_.out->push(item)) return false;
+    share_.add();
+    half_.add();
+    ports_.pipeline->ring();
+    return true;
+  }
+
+  // A frame or sample: within the stream's share of the ring.
+  bool push(const Item& item) noexcept {
+    if (!share_is_open() || !put(item)) return false;
+    if (item.kind == Item::Kind::kSample) {
+      counters_.reader.newest_sample.store(item.sample.header.sequence, std::memory_order_release);
+    } else {
+      counters_.reader.newest.store(item.frame.header.sequence, std::memory_order_release);
+    }
+    return true;
+  }
+
+  // What a device can cause at any rate has to fit into its stream's share, too.
+  bool push_notice(const Item& item) noexcept {
+    const bool shared = item.notice.event == v1::Event::KIND_CLOCK_JUMPED;
+    return (!shared || share_is_open()) && put(item);
+  }
+
+  void arrived(std::int64_t arrival_ns) noexcept {
+    arrival_ns_ = arrival_ns;
+    intake_.arrived(arrival_ns);
+  }
+
+  void tell_calibration() noexcept {
+    tape(record::Direction::kCalibration, std::as_bytes(std::span(calibration_->text)));
+  }
+  void tape(record::Direction direction, std::span<const std::byte> bytes) noexcept {
+    if (ports_.tape == nullptr) return;
+    ports_.tape->chunk(stream_, 0, direction, arrival_ns_, intake_.next(), bytes);
+  }
+
+  ReadStream read_;
+  StreamCounters& counters_;
+  const ReaderPorts& ports_;
+  Poller& poller_;
+  std::uint32_t stream_;
+  drivers::Device* device_;  // null while it is away
+  const drivers::glove::OwnedCalibration* calibration_;
+  std::int64_t poll_due_ns_ = kNoTime_ns;
+  std::int64_t arrival_ns_ = 0;
+  bool ended_ = false;
+  RingShare share_, half_;  // of the ring to the pipeline
+  bool open_ = true;
+  Intake intake_;
+};
+
+}  // namespace posed::pipeline
