@@ -47,9 +47,11 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
       return std::unexpected(set.error());
     }
   }
-  auto guard = PeerGuard::open(
-      context, router->get(),
-      {.name = "control", .most_peers = peer_shares().control, .most_unheard = kMostUnheard});
+  auto guard = PeerGuard::open(context, router->get(),
+                               {.name = "control",
+                                .most_peers = peer_shares().control,
+                                .most_unheard = kMostUnheard,
+                                .most_unheard_of_all = kMostUnheard});
   if (!guard) return std::unexpected(guard.error());
   auto bound = bind_socket(router->get(), endpoint);
   if (!bound) return std::unexpected(bound.error());
@@ -104,7 +106,7 @@ bool ControlServer::take_request() {
     if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
   }
   if (envelope.size() > kLongestEnvelope) return true;  // no client of ours; it gets no answer
-  (void)guard_->take_gone();  // nothing is kept for a connection here
+  (void)guard_->take_gone();                            // nothing is kept for a connection here
   if (const int client = source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.gatekeeper != nullptr &&
       !ports_.gatekeeper->allows(part.property("User-Id"), Domain::kControl)) {

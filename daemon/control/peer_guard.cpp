@@ -173,7 +173,7 @@ void PeerGuard::inspect_all() {
       most_fd = fd;
     }
   }
-  if (unheard <= limits_.most_unheard) return;
+  if (most <= limits_.most_unheard && unheard <= limits_.most_unheard_of_all) return;
   cut_now(most_fd, "sent much and ended no message");
   malloc_trim(0);
   resident_before_ = 0;  // it may not have been the only one: look again at the next tick

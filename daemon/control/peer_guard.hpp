@@ -39,9 +39,11 @@ namespace posed::control {
 [[nodiscard]] int source_of(const Message& message);
 
 struct PeerLimits {
-  const char* name = "";           // of the socket, for the log; unique in its context
-  std::size_t most_peers = 0;      // a connection beyond them is cut at once
-  std::uint64_t most_unheard = 0;  // bytes of all peers together that came to no whole message yet
+  const char* name = "";       // of the socket, for the log; unique in its context
+  std::size_t most_peers = 0;  // a connection beyond them is cut at once
+  // Bytes that came to no whole message yet: of one peer, and of all together.
+  std::uint64_t most_unheard = 0;
+  std::uint64_t most_unheard_of_all = 0;
 };
 
 class PeerGuard {

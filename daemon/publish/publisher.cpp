@@ -23,7 +23,8 @@ constexpr int kMinQueue = 16;
 constexpr std::int64_t kLongestPart = 1024;  // bytes
 constexpr int kSubscriptionsWaiting = 1;
 constexpr int kReceiveBuffer_bytes = 8 * 1024;
-constexpr std::uint64_t kMostUnheard = 512 * 1024;  // bytes of all that ended no message
+constexpr std::uint64_t kMostUnheard = 64 * 1024;  // bytes of one that came to no message
+constexpr std::uint64_t kMostUnheardOfAll = 512 * 1024;
 constexpr int kSubscriptionsATurn = 64;
 // A skeleton is sent to all who want it when one asks; not more often than this.
 constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
@@ -107,7 +108,8 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
   auto guard = control::PeerGuard::open(options.context, socket->get(),
                                         {.name = "publish",
                                          .most_peers = control::peer_shares().publish,
-                                         .most_unheard = kMostUnheard});
+                                         .most_unheard = kMostUnheard,
+                                         .most_unheard_of_all = kMostUnheardOfAll});
   if (!guard) return std::unexpected(guard.error());
   auto endpoint = control::bind_socket(socket->get(), options.endpoint);
   if (!endpoint) return std::unexpected(endpoint.error());
