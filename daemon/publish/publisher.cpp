@@ -20,10 +20,11 @@ constexpr double kQueueDepth_s = 0.25;
 constexpr int kMinQueue = 16;
 // What a subscriber may say: a handshake with CURVE and a long name, and then topics, one at a
 // time, so that a flood of them reaches us as fast as we hear them and no faster.
-constexpr std::int64_t kLongestPart = 1024;  // bytes
+constexpr std::int64_t kLongestPart = 512;  // bytes
 constexpr int kSubscriptionsWaiting = 1;
 constexpr int kReceiveBuffer_bytes = 8 * 1024;
-constexpr std::uint64_t kMostUnheard = 64 * 1024;  // bytes of one that came to no message
+// Bytes of one peer that came to no message: the kernel and libzmq hold up to 16 KB before we hear.
+constexpr std::uint64_t kMostUnheard = 24 * 1024;
 constexpr std::uint64_t kMostUnheardOfAll = 512 * 1024;
 constexpr int kSubscriptionsATurn = 64;
 // A skeleton is sent to all who want it when one asks; not more often than this.
