@@ -57,7 +57,8 @@ int source_of(const Message& message) {
 
 Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
                                                    const PeerLimits& limits) {
-  const std::string endpoint = std::string("inproc://posed.peers.") + limits.name;
+  static std::atomic<unsigned> number{0};  // a context may have several guards
+  const std::string endpoint = fmt::format("inproc://posed.peers.{}", ++number);
   if (zmq_socket_monitor(socket, endpoint.c_str(), ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED) !=
       0) {
     return fail(std::string("cannot watch connections: ") + zmq_strerror(zmq_errno()));

@@ -39,7 +39,7 @@ namespace posed::control {
 [[nodiscard]] int source_of(const Message& message);
 
 struct PeerLimits {
-  const char* name = "";       // of the socket, for the log; unique in its context
+  const char* name = "";       // of the socket, for the log
   std::size_t most_peers = 0;  // a connection beyond them is cut at once
   // Bytes that came to no whole message yet: of one peer, and of all together.
   std::uint64_t most_unheard = 0;

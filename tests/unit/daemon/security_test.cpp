@@ -35,6 +35,7 @@ struct Stage {
   std::string pose_endpoint, control_endpoint;
 
   Stage() {
+    REQUIRE(set_option(publisher.get(), ZMQ_XPUB_VERBOSER, 1));  // as the publisher hears them
     REQUIRE(secure_server(publisher.get(), Domain::kPublish, server.secret_z85));
     REQUIRE(secure_server(router.get(), Domain::kControl, server.secret_z85));
     pose_endpoint = *bind_socket(publisher.get(), "tcp://127.0.0.1:*");
