@@ -47,9 +47,11 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
       return std::unexpected(set.error());
     }
   }
-  auto guard = PeerGuard::open(
-      context, router->get(),
-      {.name = "control", .most_peers = peer_shares().control, .most_unheard = kMostUnheard});
+  auto guard = PeerGuard::open(context, router->get(),
+                               {.name = "control",
+                                .most_peers = peer_shares().control,
+                                .most_unheard = kMostUnheard,
+                                .most_unheard_of_all = kMostUnheard});
   if (!guard) return std::unexpected(guard.error());
   auto bound = bind_socket(router->get(), endpoint);
   if (!bound) return std::unexpected(bound.error());
@@ -78,7 +80,7 @@ void ControlServer::serve() {
     for (int i = 0; i < kRequestsARound && take_request(); ++i) busy = true;
     while (take_ack()) busy = true;
     const std::int64_t now_ns = pipeline::monotonic_ns();
-    const std::int64_t due_ns = std::min(guard_->turn(now_ns), handler_.forget_old(now_ns));
+    const std::int64_t due_ns = handler_.forget_old(now_ns);
     if (!busy) sleep(due_ns == pipeline::kForever_ns ? -1 : milliseconds_until(due_ns, now_ns));
   }
 }
@@ -86,11 +88,9 @@ void ControlServer::serve() {
 void ControlServer::sleep(long longest_ms) {
   ports_.wake->going_to_sleep();
   if (ports_.acks->empty() && !stop_.load(std::memory_order_acquire)) {
-    std::array<zmq_pollitem_t, 3> wait{{{router_.get(), 0, ZMQ_POLLIN, 0},
-                                        {nullptr, ports_.wake->fd(), ZMQ_POLLIN, 0},
-                                        {guard_->monitor(), 0, ZMQ_POLLIN, 0}}};
+    std::array<zmq_pollitem_t, 2> wait{
+        {{router_.get(), 0, ZMQ_POLLIN, 0}, {nullptr, ports_.wake->fd(), ZMQ_POLLIN, 0}}};
     zmq_poll(wait.data(), static_cast<int>(wait.size()), longest_ms);
-    if (wait[2].revents != 0) guard_->look_now();
     std::uint64_t rung = 0;
     [[maybe_unused]] const ssize_t cleared = read(ports_.wake->fd(), &rung, sizeof rung);
   }
@@ -106,6 +106,7 @@ bool ControlServer::take_request() {
     if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
   }
   if (envelope.size() > kLongestEnvelope) return true;  // no client of ours; it gets no answer
+  (void)guard_->take_gone();                            // nothing is kept for a connection here
   if (const int client = source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.gatekeeper != nullptr &&
       !ports_.gatekeeper->allows(part.property("User-Id"), Domain::kControl)) {

@@ -5,22 +5,24 @@
 #include <cstring>
 #include <filesystem>
 
+#include <malloc.h>
+#include <pthread.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 
 #include "daemon/control/received_bytes.hpp"
+#include "daemon/pipeline/clock.hpp"
 #include "daemon/publish/process.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::control {
 namespace {
 
-constexpr std::int64_t kNoTurn_ns = std::numeric_limits<std::int64_t>::max();
-// A flood of empty parts fills about 0.7 GB a second. Looking at the process' memory is one small
-// read; the peers are looked at when it has grown, and now and then in any case.
+// A flood of empty parts fills about 0.7 GB a second, so peers are looked at often: 64 a tick, all
+// of them when the process' memory has grown.
 constexpr std::int64_t kGuardTick_ns = kNanosPerSecond / 100;
-constexpr std::int64_t kInspectEvery_ns = kNanosPerSecond / 5;
+constexpr std::int64_t kPeersATick = 64;
 constexpr std::uint64_t kNoticeableGrowth = 4 * 1024 * 1024;  // bytes
 
 constexpr std::size_t kMostSubscribers = 1024;
@@ -55,7 +57,8 @@ int source_of(const Message& message) {
 
 Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
                                                    const PeerLimits& limits) {
-  const std::string endpoint = std::string("inproc://posed.peers.") + limits.name;
+  static std::atomic<unsigned> number{0};  // a context may have several guards
+  const std::string endpoint = fmt::format("inproc://posed.peers.{}", ++number);
   if (zmq_socket_monitor(socket, endpoint.c_str(), ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED) !=
       0) {
     return fail(std::string("cannot watch connections: ") + zmq_strerror(zmq_errno()));
@@ -74,32 +77,63 @@ Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
   if (zmq_getsockopt(monitor->get(), ZMQ_FD, &fd, &size) != 0) {
     return fail("ZeroMQ names no descriptor to wait for");
   }
-  return std::unique_ptr<PeerGuard>(new PeerGuard(socket, std::move(*monitor), fd, limits));
+  auto wake = pipeline::Wake::open();
+  if (!wake) return std::unexpected(wake.error());
+  auto poller = pipeline::Poller::open();
+  if (!poller) return std::unexpected(poller.error());
+  for (const Result<>& added : {(*poller)->add(**wake), (*poller)->add(fd, 0)}) {
+    if (!added) return std::unexpected(added.error());
+  }
+  return std::unique_ptr<PeerGuard>(
+      new PeerGuard(socket, std::move(*monitor), std::move(*wake), std::move(*poller), limits));
 }
 
-PeerGuard::PeerGuard(void* socket, Socket monitor, int monitor_fd, const PeerLimits& limits)
+PeerGuard::PeerGuard(void* socket, Socket monitor, std::unique_ptr<pipeline::Wake> wake,
+                     std::unique_ptr<pipeline::Poller> poller, const PeerLimits& limits)
     : socket_(socket),
       monitor_(std::move(monitor)),
-      monitor_fd_(monitor_fd),
+      wake_(std::move(wake)),
+      poller_(std::move(poller)),
       limits_(limits),
-      told_ns_(std::numeric_limits<std::int64_t>::min() / 2) {}
+      told_ns_(std::numeric_limits<std::int64_t>::min() / 2),
+      thread_([this] { serve(); }) {}
 
-PeerGuard::~PeerGuard() { zmq_socket_monitor(socket_, nullptr, 0); }
+PeerGuard::~PeerGuard() {
+  stop_.store(true);
+  wake_->ring();
+  thread_.join();
+  zmq_socket_monitor(socket_, nullptr, 0);
+}
+
+void PeerGuard::serve() {
+  pthread_setname_np(pthread_self(), "posed-guard");
+  while (!stop_.load()) {
+    wake_->going_to_sleep();
+    std::int64_t wait_ns = pipeline::kForever_ns;
+    {
+      const std::scoped_lock lock(mutex_);
+      const std::int64_t now_ns = pipeline::monotonic_ns();
+      const std::int64_t due_ns = turn(now_ns);
+      if (due_ns != pipeline::kForever_ns) wait_ns = due_ns - now_ns;
+    }
+    if (!stop_.load()) static_cast<void>(poller_->wait(wait_ns));
+    wake_->awake();
+  }
+}
 
 std::int64_t PeerGuard::turn(std::int64_t now_ns) {
-  if (now_ns < due_ns_) return due_ns_;
-  now_ns_ = now_ns;
   hear_monitor();
-  due_ns_ = peers_.empty() ? kNoTurn_ns : now_ns + kGuardTick_ns;
-  if (peers_.empty()) return due_ns_;
+  if (peers_.empty()) return pipeline::kForever_ns;
+  // Memory that was freed stays resident for a while, so its growth alone does not tell.
+  const std::int64_t pause_ns =
+      kGuardTick_ns * (1 + static_cast<std::int64_t>(peers_.size()) / kPeersATick);
   if (const std::uint64_t resident = publish::resident_bytes();
-      resident > resident_before_ + kNoticeableGrowth ||
-      now_ns >= inspected_ns_ + kInspectEvery_ns) {
+      resident > resident_before_ + kNoticeableGrowth || now_ns >= inspected_ns_ + pause_ns) {
     resident_before_ = resident;
     inspected_ns_ = now_ns;
     inspect_all();
   }
-  return due_ns_;
+  return now_ns + kGuardTick_ns;
 }
 
 // An event is two parts: number (16 bits) and descriptor (32), then the endpoint.
@@ -116,14 +150,14 @@ void PeerGuard::hear_monitor() {
     while (part.more() && part.receive(monitor_.get(), 0)) {
     }
     if (event != ZMQ_EVENT_ACCEPTED && event != ZMQ_EVENT_DISCONNECTED) continue;
-    if (peers_.erase(fd) > 0) gone(fd);
+    if (peers_.erase(fd) > 0) gone_.push_back(fd);
     if (event == ZMQ_EVENT_ACCEPTED) admit(fd);
   }
 }
 
 void PeerGuard::admit(int fd) {
   peers_[fd].cookie = cookie_of(fd);
-  if (peers_.size() > limits_.most_peers) cut(fd, "came when there were too many");
+  if (peers_.size() > limits_.most_peers) cut_now(fd, "came when there were too many");
 }
 
 void PeerGuard::inspect_all() {
@@ -140,17 +174,22 @@ void PeerGuard::inspect_all() {
       most_fd = fd;
     }
   }
-  if (unheard <= limits_.most_unheard) return;
-  cut(most_fd, "sent much and ended no message");
-  inspected_ns_ = now_ns_ - kInspectEvery_ns;  // it may not have been the only one
+  if (most <= limits_.most_unheard && unheard <= limits_.most_unheard_of_all) return;
+  cut_now(most_fd, "sent much and ended no message");
+  malloc_trim(0);
+  resident_before_ = 0;  // it may not have been the only one: look again at the next tick
 }
 
 bool PeerGuard::knows(int fd) {
-  if (fd >= 0 && !peers_.contains(fd)) hear_monitor();  // it may have come since the last turn
+  const std::scoped_lock lock(mutex_);
+  if (fd < 0 || peers_.contains(fd)) return fd >= 0;
+  hear_monitor();  // it may have come just now
+  wake_->ring();
   return peers_.contains(fd);
 }
 
 void PeerGuard::heard(int fd, std::string_view user) {
+  const std::scoped_lock lock(mutex_);
   const auto found = peers_.find(fd);
   if (found == peers_.end()) return;
   Peer& peer = found->second;
@@ -159,7 +198,27 @@ void PeerGuard::heard(int fd, std::string_view user) {
   peer.spoke = true;
 }
 
+std::vector<int> PeerGuard::take_gone() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(gone_, {});
+}
+
+std::size_t PeerGuard::peers() const {
+  const std::scoped_lock lock(mutex_);
+  return peers_.size();
+}
+
+std::uint64_t PeerGuard::cuts() const {
+  const std::scoped_lock lock(mutex_);
+  return cuts_;
+}
+
 void PeerGuard::cut(int fd, const char* why) {
+  const std::scoped_lock lock(mutex_);
+  cut_now(fd, why);
+}
+
+void PeerGuard::cut_now(int fd, const char* why) {
   const auto found = peers_.find(fd);
   if (found == peers_.end() || found->second.is_cut) return;
   found->second.is_cut = true;
@@ -170,17 +229,21 @@ void PeerGuard::cut(int fd, const char* why) {
 }
 
 void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& allowed) {
+  const std::scoped_lock lock(mutex_);
   hear_monitor();
   for (const auto& [fd, peer] : peers_) {
-    if (!peer.spoke || !allowed(peer.user)) cut(fd, "has lost its right, or did not say its name");
+    if (!peer.spoke || !allowed(peer.user)) {
+      cut_now(fd, "has lost its right, or did not say its name");
+    }
   }
 }
 
 void PeerGuard::tell(const char* why) {
   ++cuts_;
   ++untold_;
-  if (now_ns_ < told_ns_ + kNanosPerSecond) return;  // a flood is one line a second
-  told_ns_ = now_ns_;
+  const std::int64_t now_ns = pipeline::monotonic_ns();
+  if (now_ns < told_ns_ + kNanosPerSecond) return;  // a flood is one line a second
+  told_ns_ = now_ns;
   if (untold_ == 1) {
     spdlog::warn("a connection to the {} socket was cut: it {}", limits_.name, why);
   } else {

@@ -10,17 +10,23 @@
 // either: a client that sends one a second is cut once in some hours.)
 //
 // Connections by ipc:// have no such count in the kernel; the file's permission guards them.
-// Cold, not thread-safe: belongs to the thread that owns the socket.
+// A thread of its own looks: libzmq takes subscriptions in for as long as they come, and may hold
+// the publisher's thread meanwhile. Cold; every call from any thread.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <vector>
 
 #include "daemon/control/zmq_handle.hpp"
+#include "daemon/pipeline/wake.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::control {
@@ -33,9 +39,11 @@ namespace posed::control {
 [[nodiscard]] int source_of(const Message& message);
 
 struct PeerLimits {
-  const char* name = "";           // of the socket, for the log; unique in its context
-  std::size_t most_peers = 0;      // a connection beyond them is cut at once
-  std::uint64_t most_unheard = 0;  // bytes of all peers together that came to no whole message yet
+  const char* name = "";       // of the socket, for the log
+  std::size_t most_peers = 0;  // a connection beyond them is cut at once
+  // Bytes that came to no whole message yet: of one peer, and of all together.
+  std::uint64_t most_unheard = 0;
+  std::uint64_t most_unheard_of_all = 0;
 };
 
 class PeerGuard {
@@ -47,16 +55,6 @@ class PeerGuard {
   PeerGuard(const PeerGuard&) = delete;
   PeerGuard& operator=(const PeerGuard&) = delete;
 
-  // Becomes readable when connections come or go: then call look_now() before turn().
-  [[nodiscard]] int fd() const noexcept { return monitor_fd_; }
-  void look_now() noexcept { due_ns_ = 0; }
-  // For zmq_poll.
-  [[nodiscard]] void* monitor() const noexcept { return monitor_.get(); }
-
-  // Takes note of who came and went, and cuts who must be cut; costs nothing before it is due.
-  // Returns when it must be called next at the latest: soon while anybody is connected, else never.
-  [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
-
   // A whole message came through the connection `fd`, of the peer with this User-Id.
   void heard(int fd, std::string_view user);
   // Ends the connection; `why` completes "a connection was cut: it ...".
@@ -65,12 +63,12 @@ class PeerGuard {
   // nobody knows who they are, and who is still allowed comes back.
   void cut_unless(const std::function<bool(std::string_view user)>& allowed);
 
-  [[nodiscard]] std::size_t peers() const noexcept { return peers_.size(); }
   // Whether `fd` is one of our connections now.
   [[nodiscard]] bool knows(int fd);
-  [[nodiscard]] std::uint64_t cuts() const noexcept { return cuts_; }
-  // Called with the descriptor of each connection that ended, before another can have it.
-  std::function<void(int fd)> gone = [](int) {};
+  // The descriptors of the connections that ended since the last call.
+  [[nodiscard]] std::vector<int> take_gone();
+  [[nodiscard]] std::size_t peers() const;
+  [[nodiscard]] std::uint64_t cuts() const;
 
  private:
   struct Peer {
@@ -80,24 +78,32 @@ class PeerGuard {
     bool spoke = false;
     bool is_cut = false;
   };
-  PeerGuard(void* socket, Socket monitor, int monitor_fd, const PeerLimits& limits);
+  PeerGuard(void* socket, Socket monitor, std::unique_ptr<pipeline::Wake> wake,
+            std::unique_ptr<pipeline::Poller> poller, const PeerLimits& limits);
+  void serve();
+  // The rest under mutex_.
+  [[nodiscard]] std::int64_t turn(std::int64_t now_ns);  // returns when the next is due
   void hear_monitor();
   void admit(int fd);
   void inspect_all();
+  void cut_now(int fd, const char* why);
   void tell(const char* why);
 
   void* socket_;
   Socket monitor_;
-  int monitor_fd_;
+  std::unique_ptr<pipeline::Wake> wake_;
+  std::unique_ptr<pipeline::Poller> poller_;
   PeerLimits limits_;
+  mutable std::mutex mutex_;
   std::map<int, Peer> peers_;  // by descriptor
+  std::vector<int> gone_;
   std::uint64_t cuts_ = 0;
   std::uint64_t untold_ = 0;  // cuts since the last line of the log
-  std::int64_t now_ns_ = 0;
-  std::int64_t due_ns_ = 0;
   std::int64_t told_ns_;
   std::int64_t inspected_ns_ = 0;
   std::uint64_t resident_before_ = 0;  // bytes
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
 };
 
 // How many connections each socket may have, of the process' limit of open files: a reserve stays

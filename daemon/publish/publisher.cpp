@@ -20,13 +20,13 @@ constexpr double kQueueDepth_s = 0.25;
 constexpr int kMinQueue = 16;
 // What a subscriber may say: a handshake with CURVE and a long name, and then topics, one at a
 // time, so that a flood of them reaches us as fast as we hear them and no faster.
-constexpr std::int64_t kLongestPart = 1024;  // bytes
+constexpr std::int64_t kLongestPart = 512;  // bytes
 constexpr int kSubscriptionsWaiting = 1;
 constexpr int kReceiveBuffer_bytes = 8 * 1024;
-constexpr std::uint64_t kMostUnheard = 512 * 1024;  // bytes of all that ended no message
+// Bytes of one peer that came to no message: the kernel and libzmq hold up to 16 KB before we hear.
+constexpr std::uint64_t kMostUnheard = 24 * 1024;
+constexpr std::uint64_t kMostUnheardOfAll = 512 * 1024;
 constexpr int kSubscriptionsATurn = 64;
-constexpr std::uint32_t kSocketKey = 0;  // what woke the thread
-constexpr std::uint32_t kGuardKey = 1;
 // A skeleton is sent to all who want it when one asks; not more often than this.
 constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
 constexpr int kSendBuffer = 8 * 1024;  // bytes; the kernel's default alone hides seconds of poses
@@ -38,8 +38,7 @@ std::int64_t clock_ns(clockid_t clock) {
 }
 
 // What the publisher's thread waits for: new items, and what subscribers say.
-Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake, void* socket,
-                                                      int guard_fd) {
+Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake, void* socket) {
   auto poller = pipeline::Poller::open();
   if (!poller) return poller;
   int socket_fd = -1;
@@ -47,8 +46,7 @@ Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake
   if (zmq_getsockopt(socket, ZMQ_FD, &socket_fd, &size) != 0) {
     return fail("ZeroMQ names no descriptor to wait for");
   }
-  for (const Result<>& added : {(*poller)->add(wake), (*poller)->add(socket_fd, kSocketKey),
-                                (*poller)->add(guard_fd, kGuardKey)}) {
+  for (const Result<>& added : {(*poller)->add(wake), (*poller)->add(socket_fd, 0)}) {
     if (!added) return std::unexpected(added.error());
   }
   return poller;
@@ -111,11 +109,12 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
   auto guard = control::PeerGuard::open(options.context, socket->get(),
                                         {.name = "publish",
                                          .most_peers = control::peer_shares().publish,
-                                         .most_unheard = kMostUnheard});
+                                         .most_unheard = kMostUnheard,
+                                         .most_unheard_of_all = kMostUnheardOfAll});
   if (!guard) return std::unexpected(guard.error());
   auto endpoint = control::bind_socket(socket->get(), options.endpoint);
   if (!endpoint) return std::unexpected(endpoint.error());
-  auto poller = open_poller(wake, socket->get(), (*guard)->fd());
+  auto poller = open_poller(wake, socket->get());
   if (!poller) return std::unexpected(poller.error());
   return std::unique_ptr<Publisher>(new Publisher(std::move(options), std::move(streams), in, wake,
                                                   std::move(*socket), std::move(*endpoint),
@@ -140,7 +139,6 @@ Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
   for (StreamInfo& stream : streams) {
     outlets_.push_back(std::make_unique<Outlet>(std::move(stream)));
   }
-  guard_->gone = [this](int peer) { subscriptions_.forget(peer); };
 }
 
 Publisher::~Publisher() = default;
@@ -159,11 +157,10 @@ std::int64_t Publisher::turn(std::int64_t now_ns) {
   if (told_->reported_ns == kNoTime_ns || now_ns >= told_->reported_ns + kNanosPerSecond) {
     every_second(now_ns);
   }
-  const std::int64_t guard_ns = guard_->turn(now_ns);
   const bool all_heard = hear_subscriptions(now_ns);
   const std::int64_t skeleton_ns = send_skeletons(now_ns);
   if (!all_heard) return now_ns;
-  return std::min({told_->reported_ns + kNanosPerSecond, guard_ns, skeleton_ns});
+  return std::min(told_->reported_ns + kNanosPerSecond, skeleton_ns);
 }
 
 void Publisher::finish(std::int64_t now_ns) {
@@ -177,8 +174,7 @@ void Publisher::run() {
     const std::int64_t due_ns = turn(options_.clock());
     wake_.going_to_sleep();
     if (in_.empty() && !told_->asked.load() && !stop_.load(std::memory_order_acquire)) {
-      const auto ready = poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0));
-      if (std::ranges::find(ready, kGuardKey) != ready.end()) guard_->look_now();
+      static_cast<void>(poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0)));
     }
     wake_.awake();
   }
@@ -271,6 +267,7 @@ void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int6
 
 // A subscription message is one byte, 1 for coming and 0 for going, then the topic's beginning.
 bool Publisher::hear_subscriptions(std::int64_t now_ns) {
+  for (const int peer : guard_->take_gone()) subscriptions_.forget(peer);
   control::Message message;
   for (int i = 0; i < kSubscriptionsATurn; ++i) {
     if (!message.receive(socket_.get())) return true;

@@ -17,10 +17,10 @@ TEST_CASE("the body of a web page's POST is no message: nobody is stopped by it"
   target.start();
   v1::ControlRequest stop;
   stop.mutable_stop();
-  // "POST" reads as a frame of 79 bytes that names the peer; where it ends, the page's own frames
+  // "POST" reads as a frame of 80 bytes that names the peer; where it ends, the page's own frames
   // begin. libzmq reads on for as long as they are well formed.
   std::string post = "POST /" + std::string(60, 'x') + " HTTP/1.1\r\n";
-  post.resize(80, 'y');
+  post.resize(81, 'y');
   for (int i = 0; i < 4; ++i) {
     post += old_frame("", true) + old_frame(stop.SerializeAsString(), false);
   }

@@ -108,6 +108,18 @@ struct Desk {
     CHECK(helm.sent.empty());
     return reply.error();
   }
+  // The sentence of the refusal of a model that takes several pieces.
+  std::string refused_in_pieces(const std::string& stream, const std::string& model) {
+    auto request = model_request(stream, model);
+    auto& part = *request.mutable_model_part();
+    for (std::size_t offset = 0; offset < model.size(); offset += kLargestPiece) {
+      part.set_offset(offset);
+      part.set_bytes(model.substr(offset, kLargestPiece));
+      const auto reply = reply_of(ask(request));
+      if (!reply.ok()) return reply.error();
+    }
+    return {};
+  }
   v1::ControlReply acknowledge(std::uint64_t sequence) {
     const Command command = helm.sent.front();
     helm.sent.pop_front();
@@ -205,7 +217,7 @@ TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
   // A model's joints are named in the sentence that says which of them the stream lacks.
   auto model = test::toy_model(1, 0.3);
   model.space.joints.back() = "\x1b[2J" + std::string(1 << 20, 'x');
-  const std::string joints = desk.refused(model_request("walker", style::serialize_model(model)));
+  const std::string joints = desk.refused_in_pieces("walker", style::serialize_model(model));
   CHECK(has(joints, "it has no joint \\x1b[2Jxxx"));
   CHECK(joints.size() < 1000);
 }

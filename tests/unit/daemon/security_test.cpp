@@ -29,11 +29,13 @@ struct Stage {
   std::unique_ptr<Gatekeeper> gatekeeper = *Gatekeeper::start(here.get(), full_list());
   Socket publisher = *open_socket(here.get(), ZMQ_XPUB);
   std::unique_ptr<PeerGuard> guard = *PeerGuard::open(
-      here.get(), publisher.get(), {.name = "test", .most_peers = 10, .most_unheard = 100'000});
+      here.get(), publisher.get(),
+      {.name = "test", .most_peers = 10, .most_unheard = 100'000, .most_unheard_of_all = 100'000});
   Socket router = *open_socket(here.get(), ZMQ_ROUTER);
   std::string pose_endpoint, control_endpoint;
 
   Stage() {
+    REQUIRE(set_option(publisher.get(), ZMQ_XPUB_VERBOSER, 1));  // as the publisher hears them
     REQUIRE(secure_server(publisher.get(), Domain::kPublish, server.secret_z85));
     REQUIRE(secure_server(router.get(), Domain::kControl, server.secret_z85));
     pose_endpoint = *bind_socket(publisher.get(), "tcp://127.0.0.1:*");
