@@ -25,6 +25,12 @@ Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
   stream.endless = true;
   auto description = driver.expect(stream.config.options);
   if (!description) return std::unexpected(description.error());
+  stream.ports->only_prepare(true);
+  const auto prepared = driver.open(stream.config.options, *stream.ports);
+  stream.ports->only_prepare(false);
+  if (!prepared && prepared.error().exit_code == ExitCode::kWrongUse) {
+    return std::unexpected(prepared.error());
+  }
   stream.device.description = std::move(*description);
   stream.present->connected(stream.device.description);
   stream.present->gone();

@@ -128,6 +128,7 @@ Result<Link> Ports::accept(const ListenSettings& settings) {
     if (!fd) return std::unexpected(fd.error());
     listener = listeners_.emplace(settings.endpoint, *fd).first;
   }
+  if (only_prepare_) return not_opened();
   std::array<pollfd, 2> wanted{{{.fd = listener->second, .events = POLLIN, .revents = 0},
                                 {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
   ::poll(wanted.data(), wanted.size(), kPatience_ms);

@@ -13,6 +13,7 @@
 namespace posed::drivers {
 
 Result<Link> Ports::hid(const HidSettings& settings) {
+  if (only_prepare_) return not_opened();
   const auto nodes = list_hid_nodes();
   auto chosen = find_node(nodes, settings.path);
   if (settings.path.empty()) {

@@ -64,11 +64,19 @@ class Ports {
   // stops while a device is opened. Any thread.
   void cancel() noexcept { cancel_->fire(); }
 
+  // While it is on, nothing is opened or waited for: the functions above check their settings,
+  // begin to listen and return an error. So a daemon finds at its start what makes no sense, and a
+  // glove that connects at once is kept. Cold.
+  void only_prepare(bool on) noexcept { only_prepare_ = on; }
+
   // Connections dropped so far because no peer in the list made them.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
   std::shared_ptr<Cancel> cancel_ = std::make_shared<Cancel>();
+  [[nodiscard]] static std::unexpected<Error> not_opened() { return fail("not opened yet"); }
+
+  bool only_prepare_ = false;
   std::uint64_t refused_ = 0;
   std::map<std::string, int> listeners_;  // by endpoint
 };

@@ -80,6 +80,7 @@ Result<Plugged> find_port(const SerialSettings& settings) {
 
 Result<Link> Ports::serial(const SerialSettings& settings) {
   if (settings.baud <= 0) return misuse("baud should be more than 0");
+  if (only_prepare_) return not_opened();
   const auto port = find_port(settings);
   if (!port) return std::unexpected(port.error());
   const auto fd = open_node(port->node);

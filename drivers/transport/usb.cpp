@@ -124,6 +124,7 @@ Result<> UsbLink::set_feature(std::span<const std::byte> report) {
 }
 
 Result<UsbLink> Ports::usb(const UsbSettings& settings) {
+  if (only_prepare_) return not_opened();
   const auto wanted = [&](const Plugged& one) {
     return one.vendor == settings.vendor && one.product == settings.product;
   };

@@ -58,6 +58,7 @@ class GloveStage : public Stage {
   }
 
   void expect_replay() const {
+    std::filesystem::remove(path("frames.bin"));  // of the replay before: replay overwrites nothing
     const auto replay = posed(
         {"replay", path("take.plog"), "--speed", "max", "--out", path("frames.bin"), "--expect"});
     INFO(replay.err);

@@ -122,7 +122,7 @@ TEST_CASE("what the log could not say while nobody read it comes once somebody d
   CHECK(log.size() >= held);
   stop(served);
   log += err.take();
-  CHECK(has(log.substr(held), "takes effect"));
+  CHECK(has(log.substr(held), "walker: alpha "));
   CHECK(has(log.substr(held), "ending"));
 }
 

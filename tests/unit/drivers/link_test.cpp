@@ -273,6 +273,22 @@ TEST_CASE("whoever stops while a device is opened waits for nothing, then or lat
   CHECK_FALSE(ports.accept({.endpoint = loopback(free_port())}));
 }
 
+TEST_CASE("ports that only prepare listen already, open nothing and still refuse wrong use") {
+  const PseudoTerminal terminal;
+  const std::uint16_t port = free_port();
+  Ports ports;
+  ports.only_prepare(true);
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  CHECK_FALSE(ports.serial({.port = terminal.port()}));
+  CHECK(ports.serial({.port = terminal.port(), .baud = 0}).error().exit_code ==
+        ExitCode::kWrongUse);
+  CHECK(ports.accept({.endpoint = "nonsense"}).error().exit_code == ExitCode::kWrongUse);
+  const Client early(port);  // is kept until the ports are used in earnest
+  ports.only_prepare(false);
+  CHECK(ports.accept({.endpoint = loopback(port)}));
+  CHECK(ports.serial({.port = terminal.port()}));
+}
+
 TEST_CASE("an endpoint that is none or taken is refused in a sentence") {
   Ports ports;
   for (const char* wrong : {"", "5200", ":5200", "127.0.0.1:", "glove:5200", "127.0.0.1:x"}) {
