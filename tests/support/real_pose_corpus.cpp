@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "models/random.hpp"
+#include "proto/clip/text.hpp"
 #include "proto/frame/hand.hpp"
 #include "proto/text/load_file.hpp"
 
