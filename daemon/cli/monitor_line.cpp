@@ -14,7 +14,9 @@ namespace {
 std::string short_name(const std::string& name, std::string_view prefix) {
   if (!name.starts_with(prefix)) return "unknown";
   std::string out;
-  for (const char c : name.substr(prefix.size())) out += static_cast<char>(c | 0x20);
+  for (const char c : name.substr(prefix.size())) {
+    out += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  }
   return out;
 }
 

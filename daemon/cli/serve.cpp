@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <string>
 
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
@@ -52,7 +54,11 @@ void add_serve_options(CLI::App& command, ServeOptions& options) {
   command.add_option("--config", options.config, "The daemon's config, TOML")->required();
   command.add_option("--seconds", options.seconds, "End after so many seconds")
       ->type_name("SECONDS")
-      ->check(CLI::PositiveNumber);
+      ->check([](const std::string& text) {
+        return std::strtod(text.c_str(), nullptr) > 0.0
+                   ? std::string()
+                   : "'" + text + "' is no time to run: give seconds above 0";
+      });
   command.add_flag("--until-end", options.until_end,
                    "End when every source that can end has ended: not gloves or looped clips");
 }

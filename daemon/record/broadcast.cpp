@@ -17,9 +17,11 @@ constexpr auto kLookAgain = std::chrono::milliseconds(1);
 }  // namespace
 
 TakeClock::TakeClock(double speed, std::int64_t begin_ns, Clock host)
-    : speed_(speed), host_(host), take_ns_(begin_ns), host_ns_(host()) {}
+    : speed_(speed), host_(host), take_ns_(begin_ns), host_ns_(kNoTime_ns) {}
 
+// Until the first chunk is reached it stands: how long a log takes to open is no age of its frames.
 std::int64_t TakeClock::at(std::int64_t host_ns) const {
+  if (host_ns_ == kNoTime_ns) return take_ns_;
   return take_ns_ + nanoseconds(seconds(host_ns - host_ns_) * speed_);
 }
 

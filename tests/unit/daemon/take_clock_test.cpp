@@ -12,6 +12,9 @@ std::int64_t host() noexcept { return host_ns; }
 TEST_CASE("the recording's clock runs at the replay's speed from its first chunk") {
   host_ns = 5'000;
   TakeClock clock(2.0, 1'000'000, host);
+  host_ns += 34'000'000;  // the log is still being opened
+  CHECK(clock.now_ns() == 1'000'000);
+  clock.reached(1'000'000);
   CHECK(clock.now_ns() == 1'000'000);
   host_ns += 100;
   CHECK(clock.now_ns() == 1'000'200);
