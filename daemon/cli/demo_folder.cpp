@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <ostream>
 #include <span>
 
@@ -13,6 +11,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/log/digest.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed {
 
@@ -25,13 +24,13 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kStamp = "demo.json";
+constexpr std::uintmax_t kMaxStamp = 64 * 1024;      // bytes of the stamp
+constexpr std::uintmax_t kMaxBytes = 1'000'000'000;  // of the program, or of what it has learnt
 
 // Empty when it cannot be read.
 std::string digest_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return {};
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  return log::sha256_hex(std::as_bytes(std::span(bytes)));
+  const auto bytes = load_file(file, {.what = "file", .max_bytes = kMaxBytes});
+  return bytes ? log::sha256_hex(std::as_bytes(std::span(*bytes))) : std::string();
 }
 
 // The program itself, to the last bit: another build may learn otherwise.
@@ -78,8 +77,9 @@ Result<fs::path> demo_cache_folder() {
 }
 
 bool DemoFolder::is_up_to_date() const {
-  std::ifstream stream(path_ / kStamp);
-  const json stamp = json::parse(stream, nullptr, false);
+  const auto text = load_file(path_ / kStamp, {.what = "stamp", .max_bytes = kMaxStamp});
+  if (!text) return false;
+  const json stamp = json::parse(*text, nullptr, false);
   if (!stamp.is_object() || !stamp.contains("files") || !stamp["files"].is_object()) return false;
   if (stamp.value("program", "") != program_digest()) return false;
   return std::ranges::all_of(stamp["files"].items(), [&](const auto& file) {

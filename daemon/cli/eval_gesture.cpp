@@ -33,9 +33,9 @@ constexpr const char* kEvalGestureFooter = R"(Examples:
 
 jerk: rms third difference, deg/frame^3; ldlj and sparc: smoothness of the speed, closer to 0 is
 smoother; nearest_reference_deg: distance to the nearest recorded frame, rms over the performed
-frames and the angles that move; frechet: distance of the Gaussians of windows of 30 frames [deg^2]; min_gap_cm:
-between any two bones, before and after the constraint stage. The curve says what a performance
-loses that knows its script only so many frames ahead.)";
+frames and the angles that move; frechet: distance of the Gaussians of windows of 30 frames
+[deg^2]; min_gap_cm: between any two bones, before and after the constraint stage. The curve says
+what a performance loses that knows its script only so many frames ahead.)";
 
 struct EvalGestureOptions {
   std::string model, reference, labels, svg;
