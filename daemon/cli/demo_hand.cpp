@@ -6,8 +6,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <zmq.h>
 
-#include "daemon/config/words.hpp"
 #include "posed/v1/control.pb.h"
+#include "proto/text/clean.hpp"
 
 namespace posed::cli {
 namespace {
@@ -72,11 +72,11 @@ std::string DemoHand::note() const {
   if (frames_ == 0) return "hand: waiting";
   if (last_.source() == v1::SOURCE_LABELS) {
     return fmt::format("hand: performs {} (1, 3 and 4 are not in its training data): {}",
-                       joined(kLabels), config::printable(last_.label()));
+                       joined(kLabels), clean_name(last_.label()));
   }
   const std::string label = last_.label().empty()
                                 ? "no gesture that it knows"
-                                : fmt::format("{} ({:.0f} %)", config::printable(last_.label()),
+                                : fmt::format("{} ({:.0f} %)", clean_name(last_.label()),
                                               100.0F * last_.label_probability());
   return fmt::format("hand: a live performer's, smoothed {} frame behind: {}", last_.lag_frames(),
                      label);

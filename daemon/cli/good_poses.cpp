@@ -5,9 +5,9 @@
 #include <cstdio>
 
 #include "daemon/cli/pose_screen.hpp"
-#include "daemon/config/words.hpp"
 #include "drivers/glove/greeting.hpp"
 #include "drivers/glove/pose_check.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::cli {
 namespace {
@@ -25,7 +25,7 @@ Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
   std::string title = "posed calibrate: " + source.model().driver + ", " +
                       std::string(drivers::glove::side_name(source.hand())) + " hand of " + user;
   if (!source.identity().empty()) title += ", " + source.identity();
-  PoseScreen screen(source.model(), plan, config::without_controls(title), note);
+  PoseScreen screen(source.model(), plan, clean(title), note);
   return record_poses(source, plan, screen);
 }
 

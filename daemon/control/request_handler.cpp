@@ -6,12 +6,12 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/config/words.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/model/model_file.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::control {
 namespace {
@@ -97,7 +97,7 @@ Result<std::uint32_t> RequestHandler::find_stream(const std::string& name) const
     }
     names += (names.empty() ? "" : ", ") + stream.name;
   }
-  return fail(fmt::format("there is no stream '{}'; there is: {}", config::printable(name), names));
+  return fail(fmt::format("there is no stream {}; there is: {}", in_quotes(name), names));
 }
 
 Result<std::uint32_t> RequestHandler::styled_stream(const std::string& name) const {
@@ -149,7 +149,7 @@ Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
                              clock_());
   if (!whole) return std::unexpected(whole.error());
   if (!*whole) return true;
-  const std::string name = part.name().empty() ? "unnamed model" : config::printable(part.name());
+  const std::string name = part.name().empty() ? "unnamed model" : clean_name(part.name());
   const auto bytes = std::as_bytes(std::span(std::as_const(**whole)));
   if (auto done = set_model(part.stream(), bytes, name, asker); !done) {
     return std::unexpected(done.error());
