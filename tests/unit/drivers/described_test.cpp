@@ -360,7 +360,8 @@ TEST_CASE("an unknown device is refused with the known ones, a missing file by i
         std::string::npos);
   const auto missing = driver().expect({{"device", std::string("/nowhere/own.toml")}});
   REQUIRE_FALSE(missing);
-  CHECK(missing.error().text().starts_with("/nowhere/own.toml: cannot be read"));
+  CHECK(missing.error().text().starts_with(
+      "/nowhere/own.toml: cannot read the device description: No such file or directory"));
   const auto path = test::scratch_file("own.toml", kOwnGlove);
   const auto expected = driver().expect({{"device", path.string()}, {"hand", std::string("left")}});
   REQUIRE(expected);
