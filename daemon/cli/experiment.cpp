@@ -68,7 +68,7 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder,
 
 Result<Experiment> read_experiment(const std::filesystem::path& path) {
   const auto root = load_toml(path, kExperimentLimits);
-  if (!root) return std::unexpected(root.error());
+  if (!root) return misuse(root.error().message, root.error().file, root.error().line);
   config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
   Experiment experiment;
   read_tables(*root, path.parent_path(), findings, experiment);

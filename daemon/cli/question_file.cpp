@@ -45,7 +45,7 @@ std::string quoted(const std::string& name) {
 
 Result<std::vector<gesture::Label>> read_questions(const std::filesystem::path& path) {
   const auto root = load_toml(path, kQuestionLimits);
-  if (!root) return std::unexpected(root.error());
+  if (!root) return misuse(root.error().message, root.error().file, root.error().line);
   config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
   gesture::ClassLists lists;
   read_fingers(*root, findings, lists);

@@ -64,6 +64,6 @@ TEST_CASE("Questions that cannot be asked are refused", "[questions]") {
         std::string::npos);
   CHECK(refusal("\"g\"", "\"no label\"").message.find("is no label") != std::string::npos);
   CHECK(refusal("A = \\[\"g\"", "A = \\[7").line > 0);
-  CHECK(refusal("A = ", "A = = ").message.find("cannot be read") != std::string::npos);
+  CHECK(refusal("A = ", "A = = ").message.find("not TOML") != std::string::npos);
   CHECK_FALSE(read_questions("none.toml").has_value());
 }
