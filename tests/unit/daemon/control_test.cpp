@@ -216,13 +216,8 @@ TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
   CHECK(name.size() < 300);
   // A model's joints are named in the sentence that says which of them the stream lacks.
   auto model = test::toy_model(1, 0.3);
-<<<<<<< HEAD
   model.space.joints.back() = "\x1b[2J" + std::string(1 << 20, 'x');
   const std::string joints = desk.refused_in_pieces("walker", style::serialize_model(model));
-=======
-  model.space.joints.back() = "\x1b[2J" + std::string(20'000, 'x');
-  const std::string joints = desk.refused(model_request("walker", style::serialize_model(model)));
->>>>>>> toml
   CHECK(has(joints, "it has no joint \\x1b[2Jxxx"));
   CHECK(joints.size() < 1000);
 }
