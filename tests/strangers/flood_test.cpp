@@ -151,6 +151,23 @@ TEST_CASE("skeletons asked for over and over cost the others nothing") {
                 [&](const Target& target) { peer.send(target.publish, asked); });
 }
 
+TEST_CASE("requests with damaged texts write no flood of lines") {
+  Target target;
+  target.start();
+  v1::ControlRequest request;
+  request.mutable_set_alpha()->set_stream("walker");
+  std::string damaged = request.SerializeAsString();
+  damaged[damaged.find("walker")] = '\xff';
+  const RawPeer peer(target.control);
+  REQUIRE(peer.shake_hands("DEALER"));
+  for (int i = 0; i < 300; ++i) {
+    INFO(target.daemon->errors());
+    REQUIRE(peer.send(zmtp::frame(damaged)));
+    REQUIRE_FALSE(peer.receive(1).empty());  // refused, with a sentence to the one who asked
+  }
+  CHECK(target.daemon->errors().size() < 2000);
+}
+
 TEST_CASE("requests whose answers nobody reads fill no memory") {
   Persistent peer("DEALER");
   v1::ControlRequest status;

@@ -2,6 +2,7 @@
 // an attack is made of. Bounded: every call ends after `kPatience` at the latest. Loopback only.
 #pragma once
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -97,8 +99,9 @@ class RawPeer {
     while (all.size() < size && std::chrono::steady_clock::now() < end) {
       if (!wait(POLLIN, std::chrono::milliseconds(10))) continue;
       char buffer[4096];
-      const ssize_t got = recv(fd_, buffer, sizeof buffer, MSG_DONTWAIT);
-      if (got == 0 || (got < 0 && errno != EAGAIN)) break;
+      const ssize_t got =
+          recv(fd_, buffer, std::min(sizeof buffer, size - all.size()), MSG_DONTWAIT);
+      if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) break;
       if (got > 0) all.append(buffer, static_cast<std::size_t>(got));
     }
     return all;
