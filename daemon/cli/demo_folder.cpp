@@ -83,7 +83,8 @@ bool DemoFolder::is_up_to_date() const {
   if (!stamp.is_object() || !stamp.contains("files") || !stamp["files"].is_object()) return false;
   if (stamp.value("program", "") != program_digest()) return false;
   return std::ranges::all_of(stamp["files"].items(), [&](const auto& file) {
-    return file.value().is_string() && digest_of(path_ / file.key()) == file.value();
+    return file.value().is_string() &&
+           digest_of(path_ / file.key()) == file.value().template get<std::string>();
   });
 }
 

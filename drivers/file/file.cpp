@@ -42,7 +42,7 @@ Chunks frames_of(const clip::TextClip& clip) {
 // An option that says nothing about this kind of clip is refused: it would be silently ignored.
 Result<> check_options(const std::filesystem::path& path, const Options& options) {
   const std::string kind = clip::lower(path.extension().string());
-  const auto others = [&kind, &path](const char* name, const char* of, const char* instead) {
+  const auto others = [&path](const char* name, const char* of, const char* instead) {
     return misuse(std::string(name) + " is an option of " + of + "; " + instead, path.string());
   };
   if (kind != ".amc" && option<double>(options, "rate_hz") != 0.0) {
