@@ -19,14 +19,14 @@
 namespace posed::cli {
 namespace {
 
-struct ApplyOptions {
+struct ApplyArguments {
   std::filesystem::path model, in, out;
   clip::ReadOptions read;
   style::ApplyOptions apply;
   bool overwrite = false, json = false;
 };
 
-Result<> check_files(const ApplyOptions& options) {
+Result<> check_files(const ApplyArguments& options) {
   if (!options.read.asf.empty() && !is_amc(options.in)) {
     return misuse("--skeleton is for an AMC, and this is none; leave it out", options.in.string());
   }
@@ -61,7 +61,7 @@ std::string verdict(const style::WalkerFit& fit, double rms_deg, double training
   return text;
 }
 
-Result<> run(ApplyOptions options) {
+Result<> run(ApplyArguments options) {
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
@@ -112,7 +112,7 @@ Result<> run(ApplyOptions options) {
 
 void add_apply(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("apply", "Style a recorded clip: the code of the live filter");
-  auto options = std::make_shared<ApplyOptions>();
+  auto options = std::make_shared<ApplyArguments>();
   style::FilterOptions& filter = options->apply.filter;
   command->add_option("--model", options->model, "What `posed train style` wrote")
       ->required()
