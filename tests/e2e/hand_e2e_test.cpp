@@ -10,6 +10,7 @@
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/unit/gesture/toy_gesture.hpp"
@@ -126,7 +127,8 @@ TEST_CASE("a play that cannot be is one sentence and an exit code") {
       has(refusal({"play", "hand", "g x"}), "does not know the label 'x'; it knows: g c p 1 3 4"));
   CHECK(has(refusal({"play", "hand", " "}), "no label"));
   CHECK(has(refusal({"play", "hand", "g", "--tempo", "3"}), "0.5 to 2"));
-  CHECK(has(refusal({"play", "hand", std::string(600, 'g')}), "'gggggggggggggggggggg...'"));
+  CHECK(has(refusal({"play", "hand", std::string(600, 'g')}),
+            "'" + std::string(kMaxNameBytes, 'g') + "...'"));
   std::string many;
   for (int i = 0; i < 257; ++i) many += "g ";
   CHECK(has(refusal({"play", "hand", many}), "at most 256"));
