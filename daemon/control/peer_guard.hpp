@@ -7,7 +7,8 @@
 // ZMQ_SRCFD). The guard asks the kernel how much came in there since the last whole message, and
 // shuts the connection down when that is too much; libzmq then closes it like one that was lost.
 // An honest client reconnects by itself within about 0.1 s. (ZMTP heartbeats come to no message
-// either: a client that sends one a second is cut once in some hours.)
+// either: a client that sends one a second is cut about every
+// 45 minutes.)
 //
 // Connections by ipc:// have no such count in the kernel; the file's permission guards them.
 // A thread of its own looks: libzmq takes subscriptions in for as long as they come, and may hold

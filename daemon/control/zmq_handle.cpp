@@ -2,8 +2,6 @@
 
 #include <array>
 #include <cerrno>
-#include <chrono>
-#include <thread>
 
 namespace posed::control {
 namespace {
@@ -49,20 +47,6 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
   std::size_t size = bound.size();
   if (zmq_getsockopt(socket, ZMQ_LAST_ENDPOINT, bound.data(), &size) != 0) return endpoint;
   return std::string(bound.data());
-}
-
-Result<> rebind_socket(void* socket, const std::string& endpoint) {
-  if (zmq_unbind(socket, endpoint.c_str()) != 0) {
-    return fail("cannot leave " + endpoint + ": " + last_error());
-  }
-  // libzmq closes the listener in its own thread, some time after zmq_unbind has returned.
-  constexpr int kTries = 200;
-  for (int i = 0; i < kTries; ++i) {
-    if (zmq_bind(socket, endpoint.c_str()) == 0) return {};
-    if (zmq_errno() != EADDRINUSE) break;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return fail("cannot listen on " + endpoint + " again: " + last_error());
 }
 
 Result<> connect_socket(void* socket, const std::string& endpoint) {

@@ -71,9 +71,6 @@ class Message {
 // Binds and returns the endpoint really bound ("tcp://127.0.0.1:*" picks a free port). A busy port
 // is one sentence.
 [[nodiscard]] Result<std::string> bind_socket(void* socket, const std::string& endpoint);
-// Cuts every connection that came through `endpoint` and listens there again: everyone must pass
-// the gatekeeper anew. Subscriptions of an XPUB come again with their peers.
-[[nodiscard]] Result<> rebind_socket(void* socket, const std::string& endpoint);
 [[nodiscard]] Result<> connect_socket(void* socket, const std::string& endpoint);
 
 // Whether the part was taken; never blocks.

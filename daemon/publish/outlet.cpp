@@ -111,8 +111,8 @@ void Outlet::fill(v1::StreamStats& stats) const {
 
 void Outlet::report(v1::StreamStats& stats, double seconds_since) {
   fill(stats);
-  stats.set_rate_hz(static_cast<float>(static_cast<double>(stats.frames() - frames_reported_) /
-                                       std::max(seconds_since, 1e-3)));
+  const auto frames = static_cast<double>(stats.frames() - frames_reported_);
+  stats.set_rate_hz(seconds_since > 0.0 ? static_cast<float>(frames / seconds_since) : 0.0F);
   frames_reported_ = stats.frames();
   *stats.mutable_decode() = percentiles(decode_);
   *stats.mutable_style() = percentiles(style_);

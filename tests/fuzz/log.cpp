@@ -157,7 +157,10 @@ class FuzzedLog {
 
   void add_decision() {
     v1::DecisionValue value;
-    log::DecisionRow row{.item = count(items_), .stream = id(), .now_ns = time_ns()};
+    log::DecisionRow row;
+    row.item = count(items_);
+    row.stream = id();
+    row.now_ns = time_ns();
     const auto say = [&](const char* stage, const char* name) {
       row.stage = stage;
       row.name = name;
