@@ -134,12 +134,11 @@ Result<> watch(const pipeline::Daemon& daemon, const DemoOptions& options, Watch
                     watcher.styled(), watcher.gaps(), watcher.change_lately_deg()),
         hand.note()};
     if (screen.is_terminal() || first_drawing) {
-      view.notes.insert(
-          view.notes.end(),
-          {fmt::format("in another terminal: {} monitor", own_name()),
-           fmt::format("            or: {} ctl set walker alpha 0.5", own_name()),
-           fmt::format("            or: {} ctl play hand \"p 4 3 1 g\"", own_name()),
-           "Ctrl-C ends the demo"});
+      view.notes.insert(view.notes.end(),
+                        {fmt::format("in another terminal: {} monitor", own_name()),
+                         fmt::format("            or: {} ctl set walker alpha 0.5", own_name()),
+                         fmt::format("            or: {} ctl play hand \"p 4 3 1 g\"", own_name()),
+                         "Ctrl-C ends the demo"});
     }
     screen.draw(live_view(daemon.stats(), view));
   }

@@ -13,7 +13,7 @@ constexpr std::int64_t kSilence_ns = 100'000'000;
 constexpr std::int64_t kSilentFrames = 4;
 
 void add_labels(const gesture::GestureModel& model, const gesture::PlayOrder& order,
-                   ShortText& text) noexcept {
+                ShortText& text) noexcept {
   for (const std::uint16_t label : order.labels()) {
     if (label >= model.labels.size() || text.cut()) return;
     if (!text.text().empty()) text.add(" ");

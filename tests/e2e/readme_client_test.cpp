@@ -29,8 +29,7 @@ TEST_CASE("the README's Python client receives poses") {
   Served served;
   served.start();
   replace(code, "tcp://127.0.0.1:5570", served.publish);
-  replace(code, "build/python",
-          (posed_binary().parent_path() / "python").string());
+  replace(code, "build/python", (posed_binary().parent_path() / "python").string());
   served.folder.write("client.py", code);
   // Debian's own python3 has the zmq and protobuf packages that `run` installs.
   const std::string command =
