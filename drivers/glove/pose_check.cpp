@@ -7,8 +7,8 @@ namespace posed::drivers::glove {
 namespace {
 
 // Measured on three real CyberGlove recordings of grasps (GraspDB14), windows of 2 s: a hand that
-// holds still moves no sensor by more than 0.10 of its way (standard deviation; median 0.02), one
-// that grasps moves 0.38 to all of them by more (median 0.2 to 0.4).
+// holds still moves no sensor by more than 0.10 of its way (standard deviation; median 0.02), but
+// for one window with 0.12; one that grasps moves 0.38 to all of them by more (median 0.2 to 0.4).
 constexpr double kMovedShare = 0.1;
 // A sensor whose way is shorter than this share of its range is judged by the range: noise.
 constexpr double kShortestWay = 0.04;
