@@ -15,6 +15,7 @@
 #include "models/style/apply.hpp"
 #include "models/style/walker_fit.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -98,7 +99,7 @@ Result<> run(ApplyArguments options) {
                                 {"distance_deg", fit->distance_deg},
                                 {"far_from_training", fit->is_far()},
                                 {"verdict", sentence}};
-    std::printf("%s\n", report.dump(2).c_str());
+    std::printf("%s\n", json_text(report, 2).c_str());
   } else {
     std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f deg at most\n",
                 options.out.c_str(), clip->frames(), applied->joints_changed, rms_deg, max_deg);

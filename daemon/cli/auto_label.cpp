@@ -9,6 +9,7 @@
 #include "daemon/cli/waiting.hpp"
 #include "models/gesture/auto_label.hpp"
 #include "proto/clip/lab.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 
@@ -33,7 +34,7 @@ int auto_label(const AutoLabelOptions& options) {
   if (options.json) {
     const nlohmann::json told{
         {"examples", examples}, {"segments", labels.size()}, {"out", options.out.string()}};
-    std::printf("%s\n", told.dump(2).c_str());
+    std::printf("%s\n", json_text(told, 2).c_str());
   } else {
     std::printf(
         "%zu segments proposed from %zu examples, written to %s; look through them, two "

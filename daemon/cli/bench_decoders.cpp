@@ -25,6 +25,7 @@
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "drivers/transport/ports.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -192,7 +193,7 @@ Result<> bench_decoders(const std::string& only, int samples, bool as_json) {
   }
   if (report.empty())
     return misuse("there is no glove '" + only + "'; leave --glove out to see them");
-  if (as_json) std::printf("%s\n", report.dump(2).c_str());
+  if (as_json) std::printf("%s\n", json_text(report, 2).c_str());
   return {};
 }
 

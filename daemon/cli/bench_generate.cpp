@@ -14,6 +14,7 @@
 #include "models/gesture/model_file.hpp"
 #include "models/gesture/synthetic_performer.hpp"
 #include "models/gesture/train.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -106,7 +107,7 @@ Result<json> bench(const BenchGenerateOptions& options) {
 }
 
 void print_missing(const json& part) {
-  if (part.contains("missing")) std::printf("  left out: %s\n", part["missing"].dump().c_str());
+  if (part.contains("missing")) std::printf("  left out: %s\n", json_text(part["missing"]).c_str());
 }
 
 void print_streaming(const json& part) {

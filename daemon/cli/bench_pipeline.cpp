@@ -26,6 +26,7 @@
 #include "models/gp/made_up.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_model.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -360,7 +361,7 @@ void add_bench_pipeline(CLI::App& bench, int& exit_code) {
     if (!watched) {
       exit_code = report(watched.error());
     } else if (options->json) {
-      std::printf("%s\n", to_json(*options, *watched).dump(2).c_str());
+      std::printf("%s\n", json_text(to_json(*options, *watched), 2).c_str());
     } else {
       print(*options, *watched);
     }

@@ -25,6 +25,7 @@
 #include "models/gp/made_up.hpp"
 #include "models/gp/predictor.hpp"
 #include "models/gp/regression.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -242,7 +243,7 @@ void add_bench_predict(CLI::App& bench, int& exit_code) {
                         {"hot_calls_per_sample", kHotCalls},
                         {"samples", options->samples},
                         {"cases", cases}};
-      std::printf("%s\n", report.dump(2).c_str());
+      std::printf("%s\n", json_text(report, 2).c_str());
     }
     exit_code = static_cast<int>(same ? ExitCode::kDone : ExitCode::kFailed);
   });

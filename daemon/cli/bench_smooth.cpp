@@ -22,6 +22,7 @@
 #include "models/gesture/synthetic_performer.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -260,7 +261,7 @@ Result<> bench_smooth(const BenchSmoothOptions& options) {
     report["accuracy"] = accuracy(*truths, options.seed);
   }
   if (options.json) {
-    std::printf("%s\n", report.dump(2).c_str());
+    std::printf("%s\n", json_text(report, 2).c_str());
   } else {
     print(report);
   }

@@ -12,6 +12,7 @@
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/open_stream.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -119,7 +120,7 @@ int check(const CheckOptions& options) {
                            {"control", reading.config.control_endpoint},
                            {"streams", streams},
                            {"errors", errors}};
-    std::printf("%s\n", all.dump(-1, ' ', false, ordered_json::error_handler_t::replace).c_str());
+    std::printf("%s\n", json_text(all).c_str());
   } else if (errors.empty()) {
     print(reading.config, streams);
   }

@@ -15,6 +15,7 @@
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -128,8 +129,7 @@ int run(Convert& convert) {
                                {"metres_per_unit", clip->metres_per_unit},
                                {"warnings", clip->warnings}};
   // Names may hold any bytes; what is no UTF-8 is replaced rather than thrown at.
-  std::printf("%s\n",
-              summary.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  std::printf("%s\n", json_text(summary).c_str());
   return static_cast<int>(ExitCode::kDone);
 }
 

@@ -11,6 +11,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/log/digest.hpp"
+#include "proto/text/json_text.hpp"
 #include "proto/text/load_file.hpp"
 
 namespace posed {
@@ -105,7 +106,8 @@ Result<> DemoFolder::finish() const {
   auto written = clip::write_text(path_ / kDemoConfig, [&](std::ostream& out) { out << config; });
   if (!written) return written;
   const json stamp{{"program", program_digest()}, {"files", digests_of_files(path_)}};
-  return clip::write_text(path_ / kStamp, [&](std::ostream& out) { out << stamp.dump(2) << "\n"; });
+  return clip::write_text(path_ / kStamp,
+                          [&](std::ostream& out) { out << json_text(stamp, 2) << "\n"; });
 }
 
 }  // namespace cli

@@ -14,6 +14,7 @@
 #include "drivers/known_usb.hpp"
 #include "drivers/transport/enumerate.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -87,11 +88,6 @@ ordered_json describe(const Plugged& one, const std::vector<Plugged>& all) {
           {"trouble", or_null(one.trouble)}};
 }
 
-// A device sends its strings in any encoding; what is no UTF-8 is replaced.
-std::string dump(const ordered_json& value) {
-  return value.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
-
 // For people: what a device calls itself may hold anything.
 std::string text_of(const ordered_json& value) {
   return value.is_null() ? "-" : clean(value.get<std::string>());
@@ -117,7 +113,7 @@ int list_devices(bool as_json) {
     known.push_back({{"name", driver.name}, {"summary", driver.summary}});
   }
   if (as_json) {
-    std::printf("%s\n", dump({{"devices", devices}, {"drivers", known}}).c_str());
+    std::printf("%s\n", json_text(ordered_json{{"devices", devices}, {"drivers", known}}).c_str());
     return 0;
   }
   if (devices.empty()) std::printf("no serial port, HID device or USB glove is plugged in\n");

@@ -17,6 +17,7 @@
 #include "daemon/devices/emulated_glove.hpp"
 #include "daemon/devices/log_emulator.hpp"
 #include "models/gesture/synthetic_performer.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -107,7 +108,7 @@ Result<> emulate(const EmulateOptions& options) {
       {"port", options.link.empty() ? port->name() : options.link.string()}};
   devices::EmulatedGlove glove(std::move(*emulator), std::move(*port), std::move(*moves),
                                std::move(settings));
-  std::printf("%s\n", ready.dump().c_str());
+  std::printf("%s\n", json_text(ready).c_str());
   std::fflush(stdout);
   std::atomic<bool> ended{false};
   std::jthread thread([&](const std::stop_token& stop) {

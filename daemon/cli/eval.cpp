@@ -15,6 +15,7 @@
 #include "models/style/training_check.hpp"
 #include "models/style/walker_fit.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -133,7 +134,7 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
 int finish(const Evaluation& evaluation, const EvalOptions& options) {
   const json figures = report_of(evaluation, options.alpha);
   if (options.json) {
-    std::printf("%s\n", figures.dump(2).c_str());
+    std::printf("%s\n", json_text(figures, 2).c_str());
   } else {
     for (const auto& [name, value] : figures.items()) {
       if (value.is_number()) std::printf("%-24s %8.3f\n", name.c_str(), value.get<double>());

@@ -20,6 +20,7 @@
 #include "models/motion/naturalness.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -204,7 +205,7 @@ void print_report(const json& report) {
 
 int finish(const json& report, bool as_json) {
   if (as_json) {
-    std::printf("%s\n", report.dump(2).c_str());
+    std::printf("%s\n", json_text(report, 2).c_str());
   } else {
     print_report(report);
   }

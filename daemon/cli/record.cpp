@@ -11,11 +11,14 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/output_files.hpp"
 #include "daemon/cli/serve.hpp"
+#include "daemon/cli/set_aside.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/daemon.hpp"
 #include "daemon/record/recorder.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -58,7 +61,7 @@ void tell_result(const RecordOptions& options, const v1::Stats& stats,
                                       {"bytes", bytes},         {"frames", frames},
                                       {"samples", samples},     {"streams", streams},
                                       {"missing_chunks", lost}, {"write_errors", errors}};
-    std::printf("%s\n", line.dump().c_str());
+    std::printf("%s\n", json_text(line).c_str());
     std::fflush(stdout);
   }
   spdlog::log(lost + errors > 0 ? spdlog::level::warn : spdlog::level::info,
@@ -72,10 +75,26 @@ void tell_result(const RecordOptions& options, const v1::Stats& stats,
                                 lost, errors));
 }
 
+// The log must be none of the files that the daemon reads.
+Result<> check_out(const RecordOptions& options, const pipeline::DaemonConfig& config) {
+  OutputFiles files(options.overwrite);
+  files.reads(options.serve.config).writes_any_but_other(options.out, {".plog"});
+  for (const pipeline::StreamConfig& stream : config.streams) {
+    files.reads(stream.calibration);
+    if (stream.style) files.reads(stream.style->model);
+    if (stream.generate) files.reads(stream.generate->model);
+    if (const auto path = stream.options.find("path"); path != stream.options.end()) {
+      if (const auto* clip = std::get_if<std::string>(&path->second)) files.reads(*clip);
+    }
+  }
+  return files.check();
+}
+
 Result<> record(const RecordOptions& options) {
   prepare_to_serve();
   auto config = config::load_config(options.serve.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
+  if (auto fine = check_out(options, *config); !fine) return fine;
   auto opened = pipeline::Daemon::open(*config);
   if (!opened) return std::unexpected(opened.error());
   pipeline::Daemon& daemon = **opened;
@@ -93,6 +112,8 @@ Result<> record(const RecordOptions& options) {
       .tell = [&daemon, started](const record::Notice& notice) {
         if (*started) tell(daemon, notice);
       }};
+  auto replaced = SetAside::move(options.out);
+  if (!replaced) return std::unexpected(replaced.error());
   auto recorder = record::Recorder::open(std::move(recorder_options), std::move(streams));
   if (!recorder) return std::unexpected(recorder.error());
   pipeline::DaemonHooks hooks;
@@ -109,6 +130,7 @@ Result<> record(const RecordOptions& options) {
     std::filesystem::remove(options.out, ignored);  // nothing was recorded
     return done;
   }
+  replaced->let_go();
   *started = true;
   print_ready(daemon);
   const std::int64_t start_ns = pipeline::monotonic_ns();

@@ -27,6 +27,7 @@
 #include "daemon/record/replay.hpp"
 #include "models/gp/isa.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -201,7 +202,7 @@ void print_summary(const ReplayOptions& options, const Outputs& outputs, double 
     spdlog::info("{} frames are as published, bit for bit", counts.compared);
   }
   if (options.json) {
-    std::printf("%s\n", line.dump().c_str());
+    std::printf("%s\n", json_text(line).c_str());
   } else {
     spdlog::info("{} frames replayed in {:.1f} s on {}", outputs.frames, took_s, gp::isa_name());
   }
@@ -238,7 +239,7 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
                                {"replay", options.log},
                                {"streams", nlohmann::json::array()}};
   for (const log::StreamRow& row : reader.streams()) ready["streams"].push_back(row.name);
-  std::printf("%s\n", ready.dump().c_str());
+  std::printf("%s\n", json_text(ready).c_str());
   std::fflush(stdout);
   return {};
 }

@@ -13,6 +13,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/logging/log_output.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -85,9 +86,9 @@ void print_ready(const pipeline::Daemon& daemon) {
                               {"streams", nlohmann::json::array()}};
   for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
   // Not by stdio: a pipe that is full, or that nobody reads, must not hold up the stop signals.
-  if (!logging::write_within(STDOUT_FILENO, line.dump() + '\n', kReadyLineWithin)) {
+  if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kReadyLineWithin)) {
     spdlog::warn("stdout does not take the line that says where posed is to be found: {}",
-                 line.dump());
+                 json_text(line));
   }
 }
 

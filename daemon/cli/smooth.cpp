@@ -17,6 +17,7 @@
 #include "models/gesture/model_file.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -157,7 +158,7 @@ Result<> smooth(const SmoothOptions& options) {
               {"noise_given", options.noise_deg > 0.0},
               {"bridged_values", rows.bridged_values}};
   if (model) report["labels"] = told(rows, *clip);
-  std::printf("%s\n", report.dump(2, ' ', false, json::error_handler_t::replace).c_str());
+  std::printf("%s\n", json_text(report, 2).c_str());
   return {};
 }
 

@@ -13,6 +13,7 @@
 #include "daemon/cli/progress.hpp"
 #include "daemon/cli/train_style.hpp"
 #include "models/style/train.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -149,7 +150,7 @@ Result<json> train_style(const TrainStyleOptions& options) {
 // Sentences go to stderr: what to beware of, and the verdict last.
 int finish(const json& report, const TrainStyleOptions& options) {
   if (options.json) {
-    std::printf("%s\n", report.dump(2).c_str());
+    std::printf("%s\n", json_text(report, 2).c_str());
   } else {
     print_style_summary(report, options.out);
   }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 
 #include "proto/frame/sink.hpp"
@@ -46,20 +47,21 @@ struct StreamCounters {
 };
 
 // How much of a ring that all streams share one of them may fill, so that the others always find
-// room. Belongs to the producer; `taken` is the consumer's count of the stream's items.
+// room, in items or in bytes. Belongs to the producer; `taken` is the consumer's count of what the
+// stream had in it.
 class RingShare {
  public:
-  RingShare(std::size_t slots, const std::atomic<std::uint64_t>& taken) noexcept
-      : slots_(slots), taken_(taken) {}
+  RingShare(std::size_t size, const std::atomic<std::uint64_t>& taken) noexcept
+      : size_(size), taken_(taken) {}
   // RT-safe.
-  [[nodiscard]] bool has_room() const noexcept {
-    return put_ - taken_.load(std::memory_order_acquire) < slots_;
+  [[nodiscard]] bool has_room(std::size_t amount = 1) const noexcept {
+    return put_ - taken_.load(std::memory_order_acquire) + amount <= size_;
   }
   // Something of the stream went in. RT-safe.
-  void add() noexcept { ++put_; }
+  void add(std::size_t amount = 1) noexcept { put_ += amount; }
 
  private:
-  std::uint64_t slots_;
+  std::uint64_t size_;
   std::uint64_t put_ = 0;
   const std::atomic<std::uint64_t>& taken_;
 };

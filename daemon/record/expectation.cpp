@@ -83,7 +83,7 @@ Result<Expectation> Expectation::open(const log::Reader& reader) {
     for (const bool raw : {false, true}) {
       auto frames = reader.frames(row.id, raw);
       if (!frames) return std::unexpected(frames.error());
-      stream.channels[raw].emplace(Channel{std::move(*frames), std::nullopt});
+      stream.channels[raw].emplace(Channel{std::move(*frames), std::nullopt, {}});
       if (auto done = expectation.advance(*stream.channels[raw]); !done) {
         return std::unexpected(done.error());
       }
@@ -100,7 +100,14 @@ Result<Expectation> Expectation::open(const log::Reader& reader) {
   return expectation;
 }
 
+// Of a live frame that was not met. One sequence may come twice (a pose is repeated), so a replayed
+// frame that differs from it may have been another that the log lacks, or not.
+std::string Expectation::how_it_lacks(const Channel& channel) {
+  return channel.difference.empty() ? "published live, but not replayed" : channel.difference;
+}
+
 Result<> Expectation::advance(Channel& channel) const {
+  channel.difference.clear();
   const auto row = channel.frames.next();
   if (!row) return std::unexpected(row.error());
   if (!row->has_value()) {
@@ -137,11 +144,11 @@ Result<> Expectation::compare(std::uint32_t id, bool raw, const v1::Frame& repla
     return {};
   }
   if (channel.live->sequence() < sequence) {
-    return differs(stream, raw, channel.live->sequence(), "published live, but not replayed");
+    return differs(stream, raw, channel.live->sequence(), how_it_lacks(channel));
   }
   const bool same_frame = channel.live->sequence() == sequence;
-  const std::string difference = same_frame ? first_difference(*channel.live, replayed) : "";
-  if (same_frame && difference.empty()) {
+  if (same_frame) channel.difference = first_difference(*channel.live, replayed);
+  if (same_frame && channel.difference.empty()) {
     ++counts_.compared;
     return advance(channel);
   }
@@ -151,7 +158,7 @@ Result<> Expectation::compare(std::uint32_t id, bool raw, const v1::Frame& repla
     return {};
   }
   return differs(stream, raw, sequence,
-                 same_frame ? difference : "replayed, but not published live");
+                 same_frame ? channel.difference : "replayed, but not published live");
 }
 
 Result<> Expectation::finish(std::uint32_t id, std::optional<std::uint64_t> broken_at) {
@@ -160,7 +167,7 @@ Result<> Expectation::finish(std::uint32_t id, std::optional<std::uint64_t> brok
     Channel& channel = *stream.channels[raw];
     while (channel.live) {
       if (!broken_at || channel.live->sequence() < *broken_at) {
-        return differs(stream, raw, channel.live->sequence(), "published live, but not replayed");
+        return differs(stream, raw, channel.live->sequence(), how_it_lacks(channel));
       }
       ++counts_.after_gap;
       if (auto done = advance(channel); !done) return done;

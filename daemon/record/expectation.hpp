@@ -43,6 +43,7 @@ class Expectation {
   struct Channel {
     log::Reader::Frames frames;
     std::optional<v1::Frame> live;  // the next one; nothing after the last
+    std::string difference;         // between it and a replayed frame of the same sequence
   };
   struct Stream {
     std::string name;
@@ -50,6 +51,7 @@ class Expectation {
     std::uint64_t may_lack = 0;                      // frames that gap rows still explain
   };
   explicit Expectation(std::string file) : file_(std::move(file)) {}
+  [[nodiscard]] static std::string how_it_lacks(const Channel& channel);
   [[nodiscard]] Result<> advance(Channel& channel) const;
   [[nodiscard]] Result<> differs(const Stream& stream, bool raw, std::uint64_t sequence,
                                  const std::string& how) const;

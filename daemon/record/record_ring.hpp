@@ -27,9 +27,14 @@ class RecordRing {
     ring_.reset();
   }
 
+  // What a record takes of the capacity.
+  [[nodiscard]] static std::size_t size_of(const Header& header) noexcept {
+    return sizeof(Header) + header.bytes;
+  }
+
   // Producer. False: full, nothing was written. RT-safe.
   [[nodiscard]] bool push(const Header& header, std::span<const std::byte> bytes) noexcept {
-    if (ring_.write_available() < sizeof(Header) + bytes.size()) return false;
+    if (ring_.write_available() < size_of(header)) return false;
     std::array<std::byte, sizeof(Header)> image;
     std::memcpy(image.data(), &header, sizeof(Header));
     ring_.push(image.data(), image.size());

@@ -17,27 +17,29 @@ namespace {
 
 constexpr auto kWakeEvery = std::chrono::milliseconds(50);
 constexpr double kRing_s = 5.0;                       // what the rings hold at the nominal rates
-constexpr std::size_t kLeast = 8 * 1024 * 1024;       // bytes; for sources faster than they say
+constexpr std::size_t kLeast = 8 * 1024 * 1024;       // bytes of all; for sources faster than told
 constexpr double kBytesPerFrame = 4096.0;             // a text clip's line of 96 joints is shorter
 constexpr double kUnknownBytesPerSecond = 1'000'000;  // more than any glove sends
 constexpr double kUnknownFramesPerSecond = 1000.0;
 constexpr double kDecisionsPerSecond = 200.0;  // a stream's ticks, sheds and control together
 
-RingSizes ring_sizes(const std::vector<RecordedStream>& streams, bool frames) {
-  double chunk_bytes = 0.0, frame_bytes = 0.0;
-  for (const RecordedStream& stream : streams) {
-    const bool known = stream.settings.rate_hz > 0.0;
-    chunk_bytes += known ? stream.settings.rate_hz * kBytesPerFrame : kUnknownBytesPerSecond;
-    // Raw and styled.
-    frame_bytes +=
-        2.0 * kBytesPerFrame * (known ? stream.settings.rate_hz : kUnknownFramesPerSecond);
-  }
-  const auto held = [](double per_second) {
-    return static_cast<std::size_t>(kRing_s * per_second);
+// What each stream may have in the recorder's rings.
+std::vector<RingSizes> ring_shares(const std::vector<RecordedStream>& streams, bool frames) {
+  const std::size_t least = kLeast / std::max<std::size_t>(streams.size(), 1);
+  const auto held = [&](double bytes_per_s) {
+    return std::max(static_cast<std::size_t>(kRing_s * bytes_per_s), least);
   };
-  return {.chunk_bytes = std::max(held(chunk_bytes), kLeast),
-          .frame_bytes = frames ? std::max(held(frame_bytes), kLeast) : 0,
-          .decisions = held(kDecisionsPerSecond * static_cast<double>(streams.size()))};
+  std::vector<RingSizes> shares;
+  for (const RecordedStream& stream : streams) {
+    const double rate_hz = stream.settings.rate_hz;
+    const bool known = rate_hz > 0.0;
+    const double frames_per_s = 2.0 * (known ? rate_hz : kUnknownFramesPerSecond);  // raw, styled
+    shares.push_back(
+        {.chunk_bytes = held(known ? rate_hz * kBytesPerFrame : kUnknownBytesPerSecond),
+         .frame_bytes = frames ? held(frames_per_s * kBytesPerFrame) : 0,
+         .decisions = static_cast<std::size_t>(kRing_s * kDecisionsPerSecond)});
+  }
+  return shares;
 }
 
 std::string utc_text(std::time_t seconds) {
@@ -138,7 +140,7 @@ Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
 Recorder::Recorder(RecorderOptions options, const std::vector<RecordedStream>& streams,
                    log::Writer writer)
     : options_(std::move(options)),
-      rings_(streams.size(), ring_sizes(streams, options_.frames)),
+      rings_(ring_shares(streams, options_.frames)),
       scribe_(rings_, std::move(writer), options_.file, options_.tell),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 

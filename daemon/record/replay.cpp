@@ -1,6 +1,7 @@
 #include "daemon/record/replay.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "daemon/record/decision_code.hpp"
@@ -100,11 +101,13 @@ Result<> Replay::run(const Out& out, const Pace& pace) {
     if (!chunk) return std::unexpected(chunk.error());
     if (!chunk->has_value()) break;
     if (!pace(**chunk)) return {};
+    for (const auto& lane : lanes_) lane->notice_gap((*chunk)->id);
     const auto stream = std::ranges::find(streams, (*chunk)->source, &log::StreamRow::source);
     if (stream == streams.end()) continue;  // a source without a body
     ReplayLane& lane = *lanes_[static_cast<std::size_t>(stream - streams.begin())];
     if (auto fed = lane.feed(**chunk); !fed) return fed;
   }
+  for (const auto& lane : lanes_) lane->notice_gap(std::numeric_limits<std::int64_t>::max());
   while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry);
   for (const auto& lane : lanes_) {
     if (auto done = lane->finish(!reader_.counts_items()); !done) return done;

@@ -129,8 +129,10 @@ void ReplayLane::set_gap(std::int64_t after_chunk) {
   gap_after_ = std::min(gap_after_.value_or(after_chunk), after_chunk);
 }
 
+// Frames that a stage still holds back depend on what comes next, and the last one may be repeated:
+// they are not to be trusted either.
 void ReplayLane::notice_gap(std::int64_t chunk) {
-  if (gap_after_ && !broken_at_ && chunk > *gap_after_) broken_at_ = intake_.next().frame;
+  if (gap_after_ && !broken_at_ && chunk > *gap_after_) broken_at_ = last_out_;
 }
 
 // Formats 1 and 2 count frames only; the rest goes on by itself.
@@ -150,7 +152,6 @@ Result<> ReplayLane::find_place(const log::ChunkRow& chunk) {
 }
 
 Result<> ReplayLane::feed(const log::ChunkRow& chunk) {
-  notice_gap(chunk.id);
   if (auto found = find_place(chunk); !found) return found;
   switch (static_cast<Direction>(chunk.direction)) {
     case Direction::kFromDevice:
@@ -272,7 +273,6 @@ void ReplayLane::close_gaps() noexcept {
 }
 
 Result<> ReplayLane::finish(bool ends) {
-  notice_gap(std::numeric_limits<std::int64_t>::max());
   close_gaps();
   if (ends) {
     engine_->end(arrival_ns_, *this);

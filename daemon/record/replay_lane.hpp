@@ -64,6 +64,10 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
     shed_samples_.finish();
   }
 
+  // Before the chunk of this id is fed to any lane: decisions that follow a gap of this stream may
+  // come with the chunks of another.
+  void notice_gap(std::int64_t chunk);
+
   [[nodiscard]] Result<> feed(const log::ChunkRow& chunk);
   void apply(const pipeline::Decision& decision) noexcept;
   // After the last chunk and decision. `ends`: the log is of a format that does not say whether the
@@ -84,14 +88,16 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
   void swap_gesture(const pipeline::Decision& decision) noexcept;
   void command(const pipeline::Command& command) noexcept;
   void close_gaps() noexcept;
-  void notice_gap(std::int64_t chunk);
   [[nodiscard]] Result<> outcome_so_far();
 
   // IntakeOut
   bool item(pipeline::Item& item) noexcept override;
   void outcome(Outcome) noexcept override {}
   // EngineOut: the engine decides again what the log made it decide.
-  void item(const pipeline::Item& item) noexcept override { host_.publish(item); }
+  void item(const pipeline::Item& item) noexcept override {
+    if (item.kind == pipeline::Item::Kind::kFrame) last_out_ = item.frame.header.sequence;
+    host_.publish(item);
+  }
   void decision(const pipeline::Decision&) noexcept override {}
 
   std::uint32_t lane_;
@@ -110,6 +116,7 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
   std::optional<pipeline::StreamEngine> engine_;
   ShedRanges shed_frames_, shed_samples_;
   std::int64_t arrival_ns_ = 0;
+  std::uint64_t last_out_ = 0;  // sequence of the last frame that left the engine
   std::optional<std::int64_t> gap_after_;
   std::optional<std::uint64_t> broken_at_;
   std::optional<Error> error_;  // the first that could not be returned at once

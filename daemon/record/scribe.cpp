@@ -43,11 +43,7 @@ void Scribe::drain(std::int64_t now_ns) {
     const log::FrameRow row{header.stream, header.sequence, header.raw, bytes};
     put(header.stream, GapKind::kFrames, row, now_ns);
   });
-  rings_.drain_decisions([&](const DecisionRecord& record) {
-    const std::uint32_t stream = record.decision.stream;
-    put_gap(stream, GapKind::kDecisions, record.lost_before, now_ns);
-    put(stream, GapKind::kDecisions, row_of(record.decision), now_ns);
-  });
+  rings_.drain_decisions([&](const DecisionRecord& record) { put_decision(record, now_ns); });
   rings_.drain_chunks([&](const ChunkHeader& header, std::span<const std::byte> bytes) {
     put_gap(header.stream, GapKind::kChunks, header.lost_before, now_ns);
     // Each source has one body.
@@ -80,17 +76,43 @@ bool Scribe::put(std::uint32_t stream, GapKind kind, const Row& row, std::int64_
   return false;
 }
 
-void Scribe::put_gap(std::uint32_t stream, GapKind kind, std::uint64_t lost, std::int64_t now_ns) {
+void Scribe::put_decision(const DecisionRecord& record, std::int64_t now_ns) {
+  const std::uint32_t id = record.decision.stream;
+  put_gap(id, GapKind::kDecisions, record.lost_before, now_ns, record.lost_from_frame);
+  StreamState& stream = streams_[id];
+  const bool written = put(id, GapKind::kDecisions, row_of(record.decision), now_ns);
+  auto& from = written ? stream.uncommitted_from_frame : stream.lost_from_frame;
+  from = std::min(from, first_frame_of(record.decision));
+}
+
+void Scribe::put_gap(std::uint32_t id, GapKind kind, std::uint64_t lost, std::int64_t now_ns,
+                     std::uint64_t from_frame) {
   if (lost == 0) return;
+  StreamState& stream = streams_[id];
   if (writer_) {
-    auto done = writer_->add(log::GapRow{kind, stream, streams_[stream].last_chunk, lost, now_ns});
+    const auto row = gap_row(id, kind, lost, now_ns, from_frame);
+    auto done = row ? writer_->add(*row) : std::unexpected(row.error());
     if (done) {
-      streams_[stream].in_gaps[index(kind)] += lost;
+      stream.in_gaps[index(kind)] += lost;
+      stream.uncommitted_from_frame = std::min(stream.uncommitted_from_frame, from_frame);
       return;
     }
     fail(done.error(), now_ns);
   }
-  streams_[stream].lost[index(kind)] += lost;  // the rings have counted them already
+  stream.lost[index(kind)] += lost;  // the rings have counted them already
+  stream.lost_from_frame = std::min(stream.lost_from_frame, from_frame);
+}
+
+// Decisions come later than the chunks that they concern: where some are lost, the log is sound
+// only up to the chunk before.
+Result<log::GapRow> Scribe::gap_row(std::uint32_t id, GapKind kind, std::uint64_t lost,
+                                    std::int64_t now_ns, std::uint64_t from_frame) const {
+  log::GapRow row{kind, id, streams_[id].last_chunk, lost, now_ns};
+  if (kind != GapKind::kDecisions || from_frame == kNoFrame) return row;
+  const auto before = writer_->chunk_before_frame(id, id, from_frame);
+  if (!before) return std::unexpected(before.error());
+  row.after_chunk = *before;
+  return row;
 }
 
 Result<> Scribe::commit(std::int64_t now_ns) {
@@ -102,6 +124,7 @@ Result<> Scribe::commit(std::int64_t now_ns) {
   for (StreamState& stream : streams_) {
     stream.uncommitted = {};
     stream.in_gaps = {};
+    stream.uncommitted_from_frame = kNoFrame;
     stream.committed_chunk = stream.last_chunk;
   }
   last_commit_ns_ = now_ns;
@@ -129,6 +152,8 @@ void Scribe::fail(const Error& error, std::int64_t now_ns) {
       lose(id, kind, std::exchange(stream.uncommitted[index(kind)], 0));
       stream.lost[index(kind)] += std::exchange(stream.in_gaps[index(kind)], 0);
     }
+    stream.lost_from_frame =
+        std::min(stream.lost_from_frame, std::exchange(stream.uncommitted_from_frame, kNoFrame));
     stream.last_chunk = stream.committed_chunk;
   }
   const std::string text = "recording stopped, streaming goes on: " + error.text();
@@ -156,6 +181,7 @@ void Scribe::resume(std::int64_t now_ns) {
   spdlog::warn("recording goes on: {}", path_.string());
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     const Counts lost = std::exchange(streams_[id].lost, {});
+    streams_[id].lost_from_frame = kNoFrame;
     for (const GapKind kind : kKinds) {
       if (lost[index(kind)] == 0) continue;
       tell_({.kind = Notice::Kind::kGap,
@@ -172,8 +198,9 @@ Result<> Scribe::write_lost(std::int64_t now_ns) {
     for (const GapKind kind : kKinds) {
       const std::uint64_t lost = streams_[id].lost[index(kind)];
       if (lost == 0) continue;
-      const log::GapRow row{kind, id, streams_[id].committed_chunk, lost, now_ns};
-      if (auto done = writer_->add(row); !done) return done;
+      const auto row = gap_row(id, kind, lost, now_ns, streams_[id].lost_from_frame);
+      if (!row) return std::unexpected(row.error());
+      if (auto done = writer_->add(*row); !done) return done;
     }
   }
   return {};
@@ -198,7 +225,9 @@ Result<> Scribe::finish(std::int64_t now_ns) {
   drain(now_ns);
   tell_overflows(now_ns);
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
-    for (const GapKind kind : kKinds) put_gap(id, kind, rings_.uncarried(id, kind), now_ns);
+    for (const GapKind kind : kKinds) {
+      put_gap(id, kind, rings_.uncarried(id, kind), now_ns, rings_.uncarried_from_frame(id));
+    }
   }
   if (writer_) {
     if (auto done = commit(now_ns); !done) fail(done.error(), now_ns);

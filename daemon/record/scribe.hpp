@@ -51,6 +51,10 @@ class Scribe {
     Counts in_gaps{};      // what gap rows since then speak of
     Counts lost{};         // in no gap row yet
     Counts told{};         // overflows already told
+    // The first frame that a decision concerns which was added, or told of in a gap row, since the
+    // last commit; which is lost and in no gap row yet.
+    std::uint64_t uncommitted_from_frame = kNoFrame;
+    std::uint64_t lost_from_frame = kNoFrame;
     std::int64_t last_chunk = 0;
     std::int64_t committed_chunk = 0;
   };
@@ -60,7 +64,12 @@ class Scribe {
   // Adds a row of a stream, or counts it as lost while writing fails.
   template <typename Row>
   bool put(std::uint32_t stream, GapKind kind, const Row& row, std::int64_t now_ns);
-  void put_gap(std::uint32_t stream, GapKind kind, std::uint64_t lost, std::int64_t now_ns);
+  void put_decision(const DecisionRecord& record, std::int64_t now_ns);
+  // `from_frame`: the first that the lost decisions may concern.
+  void put_gap(std::uint32_t stream, GapKind kind, std::uint64_t lost, std::int64_t now_ns,
+               std::uint64_t from_frame = kNoFrame);
+  [[nodiscard]] Result<log::GapRow> gap_row(std::uint32_t stream, GapKind kind, std::uint64_t lost,
+                                            std::int64_t now_ns, std::uint64_t from_frame) const;
   [[nodiscard]] Result<> write_lost(std::int64_t now_ns);
   [[nodiscard]] Result<> commit(std::int64_t now_ns);
   void lose(std::uint32_t stream, GapKind kind, std::uint64_t count);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/log/rows.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::record {
 
@@ -88,11 +89,10 @@ std::string to_json(const StreamSettings& settings) {
   if (settings.constrain) {
     stages.push_back({{"stage", words::kConstrain}, {"parameters", Json::object()}});
   }
-  return Json{{"publish_raw", settings.publish_raw},
-              {"stale_after_s", settings.stale_after_s},
-              {"rate_hz", settings.rate_hz},
-              {"stages", std::move(stages)}}
-      .dump();
+  return json_text(Json{{"publish_raw", settings.publish_raw},
+                        {"stale_after_s", settings.stale_after_s},
+                        {"rate_hz", settings.rate_hz},
+                        {"stages", std::move(stages)}});
 }
 
 Result<StreamSettings> settings_from_json(const std::string& json, const std::string& file) {
@@ -105,7 +105,7 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
     for (const Json& stage : root.at("stages")) {
       if (add_stage(stage, settings)) continue;
       return fail("this posed cannot run the stages of a stream as they stand in the log (" +
-                      stage.at("stage").dump() + "); update posed",
+                      json_text(stage.at("stage")) + "); update posed",
                   file);
     }
     if (!sound(settings))
@@ -122,7 +122,7 @@ std::string to_json(const drivers::Options& options) {
   for (const auto& [name, value] : options) {
     std::visit([&, key = name](const auto& it) { json[key] = it; }, value);
   }
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_text(json);
 }
 
 }  // namespace posed::record

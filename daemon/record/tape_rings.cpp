@@ -1,68 +1,85 @@
 #include "daemon/record/tape_rings.hpp"
 
+#include <algorithm>
+
 namespace posed::record {
 namespace {
 
-std::uint64_t pending(const auto& loss) noexcept {
-  return loss.total.load(std::memory_order_relaxed) - loss.carried.load(std::memory_order_relaxed);
+constexpr auto kRelaxed = std::memory_order_relaxed;
+
+std::uint64_t pending(const auto& lane) noexcept {
+  return lane.total.load(kRelaxed) - lane.carried.load(kRelaxed);
 }
 
-// After a push: the record took `lost_before` with it, or is itself lost.
-void settle(auto& loss, bool fitted, std::uint64_t lost_before) noexcept {
-  if (fitted) {
-    if (lost_before != 0) loss.carried.fetch_add(lost_before, std::memory_order_relaxed);
-  } else {
-    loss.total.fetch_add(1, std::memory_order_relaxed);
+// Puts a record into its stream's share by `push`. It takes `lost_before` with it, or is itself
+// lost; false then.
+bool put(auto& lane, std::size_t amount, std::uint64_t lost_before, auto&& push) noexcept {
+  if (lane.share.has_room(amount) && push()) {
+    lane.share.add(amount);
+    if (lost_before != 0) lane.carried.fetch_add(lost_before, kRelaxed);
+    return true;
   }
+  lane.total.fetch_add(1, kRelaxed);
+  return false;
+}
+
+std::size_t sum_of(const std::vector<RingSizes>& shares, std::size_t RingSizes::* size) {
+  std::size_t sum = 0;
+  for (const RingSizes& share : shares) sum += share.*size;
+  return sum;
 }
 
 }  // namespace
 
-TapeRings::TapeRings(std::size_t streams, const RingSizes& sizes)
-    : chunks_(sizes.chunk_bytes),
-      frames_(sizes.frame_bytes),
-      decisions_(sizes.decisions),
-      wants_published_(sizes.frame_bytes != 0),
-      losses_(streams) {}
+TapeRings::TapeRings(const std::vector<RingSizes>& shares)
+    : chunks_(sum_of(shares, &RingSizes::chunk_bytes)),
+      frames_(sum_of(shares, &RingSizes::frame_bytes)),
+      decisions_(sum_of(shares, &RingSizes::decisions)),
+      wants_published_(sum_of(shares, &RingSizes::frame_bytes) != 0) {
+  for (const RingSizes& share : shares) lanes_.emplace_back(share);
+}
 
 // RT-safe
 void TapeRings::chunk(std::uint32_t stream, std::uint8_t socket, Direction direction,
                       std::int64_t arrival_ns, const pipeline::Position& next,
                       std::span<const std::byte> bytes) noexcept {
-  Loss& lost = loss(stream, GapKind::kChunks);
+  Lane& to = lane(stream, GapKind::kChunks);
   const ChunkHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
                            .stream = stream,
                            .socket = socket,
                            .direction = direction,
                            .arrival_ns = arrival_ns,
                            .next = next,
-                           .lost_before = pending(lost)};
-  settle(lost, chunks_.push(header, bytes), header.lost_before);
+                           .lost_before = pending(to)};
+  put(to, chunks_.size_of(header), header.lost_before, [&] { return chunks_.push(header, bytes); });
 }
 
 // RT-safe
 void TapeRings::decision(const pipeline::Decision& decision) noexcept {
-  Loss& lost = loss(decision.stream, GapKind::kDecisions);
-  const DecisionRecord record{.decision = decision, .lost_before = pending(lost)};
-  settle(lost, decisions_.push(record), record.lost_before);
+  Lane& to = lane(decision.stream, GapKind::kDecisions);
+  const DecisionRecord record{.decision = decision,
+                              .lost_before = pending(to),
+                              .lost_from_frame = to.lost_from_frame.load(kRelaxed)};
+  if (put(to, 1, record.lost_before, [&] { return decisions_.push(record); })) return;
+  const std::uint64_t before = record.lost_before == 0 ? kNoFrame : record.lost_from_frame;
+  to.lost_from_frame.store(std::min(before, first_frame_of(decision)), kRelaxed);
 }
 
 // RT-safe
 void TapeRings::published(std::uint32_t stream, std::uint64_t sequence, bool raw,
                           std::span<const std::byte> bytes) noexcept {
-  Loss& lost = loss(stream, GapKind::kFrames);
+  Lane& to = lane(stream, GapKind::kFrames);
   const FrameHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
                            .stream = stream,
                            .raw = raw,
                            .sequence = sequence,
-                           .lost_before = pending(lost)};
-  settle(lost, frames_.push(header, bytes), header.lost_before);
+                           .lost_before = pending(to)};
+  put(to, frames_.size_of(header), header.lost_before, [&] { return frames_.push(header, bytes); });
 }
 
 // RT-safe
 void TapeRings::unpublished(std::uint32_t stream) noexcept {
-  if (wants_published_)
-    loss(stream, GapKind::kFrames).total.fetch_add(1, std::memory_order_relaxed);
+  if (wants_published_) lane(stream, GapKind::kFrames).total.fetch_add(1, kRelaxed);
 }
 
 void TapeRings::keep_model(std::span<const std::byte> bytes) {
@@ -76,11 +93,15 @@ std::vector<std::vector<std::byte>> TapeRings::take_models() {
 }
 
 std::uint64_t TapeRings::overflowed(std::uint32_t stream, GapKind kind) const noexcept {
-  return losses_[stream][static_cast<std::size_t>(kind)].total.load(std::memory_order_relaxed);
+  return lane(stream, kind).total.load(kRelaxed);
 }
 
 std::uint64_t TapeRings::uncarried(std::uint32_t stream, GapKind kind) const noexcept {
-  return pending(losses_[stream][static_cast<std::size_t>(kind)]);
+  return pending(lane(stream, kind));
+}
+
+std::uint64_t TapeRings::uncarried_from_frame(std::uint32_t stream) const noexcept {
+  return lane(stream, GapKind::kDecisions).lost_from_frame.load(kRelaxed);
 }
 
 }  // namespace posed::record

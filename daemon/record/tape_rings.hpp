@@ -1,18 +1,22 @@
 // The rings behind Tape: the hot threads' end puts records in, the recorder thread takes them out.
-// What does not fit is counted, and the next record of the same stream that does fit carries the
-// count, so that the gap stands in the log where it happened.
+// Each stream has a share of every ring, so that none can cost another its records. What does not
+// fit is counted, and the next record of the same stream that does fit carries the count, so that
+// the gap stands in the log where it happened.
 #pragma once
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <deque>
+#include <limits>
 #include <mutex>
 #include <span>
 #include <vector>
 
 #include <boost/lockfree/spsc_queue.hpp>
 
+#include "daemon/pipeline/counters.hpp"
 #include "daemon/record/record_ring.hpp"
 #include "daemon/record/tape.hpp"
 #include "proto/log/rows.hpp"
@@ -37,11 +41,22 @@ struct FrameHeader {
   std::uint64_t lost_before = 0;
 };
 
+// Stands for no frame: a later one than any.
+inline constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
+
+// The first frame of its stream that a decision concerns. RT-safe.
+[[nodiscard]] inline std::uint64_t first_frame_of(const pipeline::Decision& decision) noexcept {
+  using Kind = pipeline::Decision::Kind;
+  return decision.kind == Kind::kShedSamples ? kNoFrame : decision.sequence;
+}
+
 struct DecisionRecord {
   pipeline::Decision decision;
   std::uint64_t lost_before = 0;
+  std::uint64_t lost_from_frame = 0;  // the first frame that one of them may concern
 };
 
+// What one stream may have in the rings.
 struct RingSizes {
   std::size_t chunk_bytes = 0;
   std::size_t frame_bytes = 0;  // 0: published frames are not wanted
@@ -50,7 +65,8 @@ struct RingSizes {
 
 class TapeRings final : public Tape {
  public:
-  TapeRings(std::size_t streams, const RingSizes& sizes);
+  // A share for each stream, in their order. Frames are wanted of all streams or of none.
+  explicit TapeRings(const std::vector<RingSizes>& shares);
 
   // Tape, for the hot threads.
   void chunk(std::uint32_t stream, std::uint8_t socket, Direction direction,
@@ -66,16 +82,25 @@ class TapeRings final : public Tape {
   // The recorder thread's end: each(header, bytes) or each(record) for what is there now.
   template <typename Each>
   void drain_chunks(Each&& each) {
-    chunks_.drain(each);
+    chunks_.drain([&](const ChunkHeader& header, std::span<const std::byte> bytes) {
+      give_back(header.stream, GapKind::kChunks, chunks_.size_of(header));
+      each(header, bytes);
+    });
   }
   template <typename Each>
   void drain_frames(Each&& each) {
-    frames_.drain(each);
+    frames_.drain([&](const FrameHeader& header, std::span<const std::byte> bytes) {
+      give_back(header.stream, GapKind::kFrames, frames_.size_of(header));
+      each(header, bytes);
+    });
   }
   template <typename Each>
   void drain_decisions(Each&& each) {
     DecisionRecord record;
-    for (auto n = decisions_.read_available(); n > 0 && decisions_.pop(record); --n) each(record);
+    for (auto n = decisions_.read_available(); n > 0 && decisions_.pop(record); --n) {
+      give_back(record.decision.stream, GapKind::kDecisions, 1);
+      each(record);
+    }
   }
   [[nodiscard]] std::vector<std::vector<std::byte>> take_models();
 
@@ -84,25 +109,43 @@ class TapeRings final : public Tape {
   [[nodiscard]] std::uint64_t overflowed(std::uint32_t stream, GapKind kind) const noexcept;
   // Those of them that no later record carries; meaningful once the producers have stopped.
   [[nodiscard]] std::uint64_t uncarried(std::uint32_t stream, GapKind kind) const noexcept;
-  [[nodiscard]] std::size_t streams() const noexcept { return losses_.size(); }
+  // The first frame that a decision which no later one carries may concern.
+  [[nodiscard]] std::uint64_t uncarried_from_frame(std::uint32_t stream) const noexcept;
+  [[nodiscard]] std::size_t streams() const noexcept { return lanes_.size(); }
 
  private:
-  // Carried is written by the one producer of its kind; total by any; both read by any.
-  struct Loss {
-    std::atomic<std::uint64_t> total{0};
-    std::atomic<std::uint64_t> carried{0};
+  // One stream's end of one ring. The share, carried and lost_from_frame belong to the one
+  // producer of its kind; total is written by any; taken by the recorder; all but the share are
+  // read by any.
+  struct Lane {
+    explicit Lane(std::size_t size) noexcept : share(size, taken) {}
+    std::atomic<std::uint64_t> taken{0};
+    pipeline::RingShare share;
+    std::atomic<std::uint64_t> total{0};            // records that did not fit
+    std::atomic<std::uint64_t> carried{0};          // of them, those that a later record tells of
+    std::atomic<std::uint64_t> lost_from_frame{0};  // of decisions, see DecisionRecord
   };
-  using Losses = std::array<Loss, 3>;  // by GapKind
+  struct Lanes {
+    explicit Lanes(const RingSizes& sizes) noexcept
+        : by_kind{Lane(sizes.chunk_bytes), Lane(sizes.decisions), Lane(sizes.frame_bytes)} {}
+    std::array<Lane, 3> by_kind;  // by GapKind
+  };
 
-  [[nodiscard]] Loss& loss(std::uint32_t stream, GapKind kind) noexcept {
-    return losses_[stream][static_cast<std::size_t>(kind)];
+  [[nodiscard]] Lane& lane(std::uint32_t stream, GapKind kind) noexcept {
+    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  }
+  [[nodiscard]] const Lane& lane(std::uint32_t stream, GapKind kind) const noexcept {
+    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  }
+  void give_back(std::uint32_t stream, GapKind kind, std::size_t amount) noexcept {
+    lane(stream, kind).taken.fetch_add(amount, std::memory_order_release);
   }
 
   RecordRing<ChunkHeader> chunks_;
   RecordRing<FrameHeader> frames_;
   boost::lockfree::spsc_queue<DecisionRecord> decisions_;
   bool wants_published_ = false;
-  std::vector<Losses> losses_;
+  std::deque<Lanes> lanes_;  // by stream
   std::mutex models_mutex_;
   std::vector<std::vector<std::byte>> models_;
 };

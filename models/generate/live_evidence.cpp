@@ -68,6 +68,7 @@ void LiveEvidence::measure_fit(const AdaptiveWindow& window) noexcept {
   std::array<double, kFingers> frames{};
   fit_.fill(0.0);
   for (int back = window.frames() - 1; back > 0; --back) {
+    if (!recogniser_.knows(back)) continue;
     believe(back);
     measure_distance(window, back);
     for (std::size_t f = 0; f < kFingers; ++f) {
@@ -115,6 +116,7 @@ void LiveEvidence::add(AdaptiveWindow& window) noexcept {
   for (int back = 0; back < window.frames(); ++back) gap = gap || !window.whole(back);
   if (gap) measure_fit(window);
   for (int back = window.frames() - 1; back > 0; --back) {
+    if (!recogniser_.knows(back)) continue;
     believe(back);
     measure_distance(window, back);
     for (int c = 0; c < kHandChannels; ++c) {

@@ -220,7 +220,10 @@ void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
 // RT-safe.
 void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
   const Recogniser::Answer answer = recogniser.label(back);
-  frame.label = recogniser.model()->labels[static_cast<std::size_t>(answer.label)];
+  frame.label.fill('\0');
+  if (answer.label >= 0) {
+    frame.label = recogniser.model()->labels[static_cast<std::size_t>(answer.label)];
+  }
   frame.label_probability = static_cast<float>(answer.probability);
 }
 

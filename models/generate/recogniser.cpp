@@ -48,6 +48,7 @@ void Recogniser::set_model(const LiveModel* model) noexcept {
 // RT-safe.
 void Recogniser::reset() noexcept {
   pushed_ = 0;
+  swept_frames_ = 0;
   even_frames_ = 0;
   for (auto& row : past_) row.fill(kMissing);
   if (states_ == 0) return;
@@ -176,7 +177,8 @@ void Recogniser::sweep(int frames) noexcept {
   const auto states = static_cast<std::size_t>(states_);
   Row backward;
   std::fill_n(backward.begin(), states_, 1.0);
-  for (int back = 0; back < std::min<long>(frames, pushed_); ++back) {
+  swept_frames_ = static_cast<int>(std::min<long>(frames, pushed_));
+  for (int back = 0; back < swept_frames_; ++back) {
     const auto at = static_cast<std::size_t>((pushed_ - 1 - back) % max_window_);
     Row& belief = swept_[static_cast<std::size_t>(back)];
     double sum = 0.0;
@@ -227,6 +229,7 @@ std::span<const double> Recogniser::states(int back) const noexcept {
 // RT-safe.
 Recogniser::Answer Recogniser::label(int back) const noexcept {
   Answer answer;
+  if (!knows(back)) return answer;
   const auto belief = states(back);
   LabelRow probability;
   std::fill_n(probability.begin(), model_->labels.size(), 0.0);

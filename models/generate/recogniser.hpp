@@ -8,6 +8,7 @@
 // measures describes the frame before it. RT-safe but for construction.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
@@ -33,13 +34,19 @@ class Recogniser {
   // Sweeps back over the last `frames` pushed frames. RT-safe.
   void sweep(int frames) noexcept;
 
-  // What the last sweep believes of the frame `back` before the newest: [states], sums to 1. The
-  // newest frame is believed to be as the one before. RT-safe.
+  // Whether the last sweep knows the frame `back` before the newest: not when it came before the
+  // model did. RT-safe.
+  [[nodiscard]] bool knows(int back) const noexcept {
+    return std::max(back - 1, 0) < swept_frames_;
+  }
+
+  // What the last sweep believes of that frame, which it knows: [states], sums to 1. The newest
+  // frame is believed to be as the one before. RT-safe.
   [[nodiscard]] std::span<const double> states(int back) const noexcept;
 
   // The likeliest label of that frame, its index and probability. RT-safe.
   struct Answer {
-    int label = -1;
+    int label = -1;  // -1: nothing is known of the frame
     double probability = 0.0;
   };
   [[nodiscard]] Answer label(int back) const noexcept;
@@ -80,6 +87,7 @@ class Recogniser {
   Row log_now_{};                                            // forward filter, sums to 1
   std::vector<Row> forward_, likelihood_;                    // rings [max_window], linear
   std::vector<Row> swept_;                                   // [max_window], by frames back
+  int swept_frames_ = 0;                                     // of them, those of the last sweep
 };
 
 }  // namespace posed::generate

@@ -1,5 +1,6 @@
 #include "models/gesture/train_report.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/json_text.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -157,7 +158,7 @@ std::string TrainReport::json_of(const GestureModel& model) const {
   report["duration_leaves"] = model.durations.leaves.size();
   report["log_likelihood_per_frame"] = contexts_.log_likelihood / frames;
   report["warnings"] = warnings();
-  return report.dump();
+  return json_text(report);
 }
 
 }  // namespace posed::gesture

@@ -12,6 +12,7 @@
 #include "models/style/harmonics.hpp"
 #include "models/style/pairings.hpp"
 #include "models/style/training_check.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::style {
 namespace {
@@ -302,7 +303,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   model.rate_hz = dataset->rate_hz;
   json report = report_of(*dataset, *learnt);
   report.update(check_json(check_learnt(*dataset, *learnt, options.target), options.target));
-  model.report_json = report.dump();
+  model.report_json = json_text(report);
   model.limit_rad = kLimitFactor * learnt->differences.cwiseAbs().colwise().maxCoeff().transpose();
   set_input_statistics(*dataset, model);
   model.space = std::move(dataset->spec);

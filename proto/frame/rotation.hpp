@@ -90,11 +90,8 @@ template <typename T>
 }
 
 // The smallest rotation that turns `from` onto `to`; identity when either has no length.
-[[nodiscard]] inline Eigen::Quaterniond minimal_rotation(const Eigen::Vector3d& from,
-                                                         const Eigen::Vector3d& to) noexcept {
-  if (from.norm() < 1e-12 || to.norm() < 1e-12) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond::FromTwoVectors(from, to);
-}
+[[nodiscard]] Eigen::Quaterniond minimal_rotation(const Eigen::Vector3d& from,
+                                                  const Eigen::Vector3d& to) noexcept;
 
 // Angle between two rotations [rad], 0 to pi; accurate for small angles, unlike acos of the dot.
 [[nodiscard]] inline double angle_between_rad(const Eigen::Quaterniond& a,

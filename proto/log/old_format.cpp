@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "posed/v1/log.pb.h"
+#include "proto/text/json_text.hpp"
 
 namespace posed::log::old_format {
 namespace {
@@ -63,11 +64,10 @@ Result<std::string> stages_json(const std::string& config, const std::string& st
                                 const std::string& file) {
   try {
     const auto old = ordered_json::parse(config);
-    return ordered_json{{"publish_raw", old.at("publish_raw")},
-                        {"stale_after_s", old.at("stale_after_s")},
-                        {"rate_hz", old.at("rate_hz")},
-                        {"stages", stages_of(old, style_model)}}
-        .dump();
+    return json_text(ordered_json{{"publish_raw", old.at("publish_raw")},
+                                  {"stale_after_s", old.at("stale_after_s")},
+                                  {"rate_hz", old.at("rate_hz")},
+                                  {"stages", stages_of(old, style_model)}});
   } catch (const nlohmann::json::exception& error) {
     return fail("the log is damaged (a stream's settings: " + std::string(error.what()) + ")",
                 file);

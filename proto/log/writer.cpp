@@ -1,5 +1,6 @@
 #include "proto/log/writer.hpp"
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -213,6 +214,24 @@ Result<std::string> Writer::add_blob(std::span<const std::byte> bytes) {
   auto done = state_->insert(state_->statements[kBlob].bind(hash).bind(bytes));
   if (!done) return std::unexpected(done.error());
   return hash;
+}
+
+Result<std::int64_t> Writer::chunk_before_frame(std::uint32_t source, std::uint32_t stream,
+                                                std::uint64_t frame) const {
+  auto backwards =
+      state_->database.prepare("SELECT id, sequences FROM chunk WHERE source=? ORDER BY id DESC");
+  if (!backwards) return std::unexpected(backwards.error());
+  backwards->bind(std::int64_t{source});
+  std::vector<StreamPlace> places;
+  for (bool holds_frame = false;;) {
+    const auto row = backwards->step();
+    if (!row) return std::unexpected(row.error());
+    if (!*row) return 0;
+    if (holds_frame) return backwards->integer(0);
+    if (!unpack_places(backwards->bytes(1), places)) continue;
+    const auto place = std::ranges::find(places, stream, &StreamPlace::stream);
+    holds_frame = place != places.end() && place->next_frame <= frame;
+  }
 }
 
 std::int64_t Writer::last_chunk_id() const { return state_->last_id[kChunk]; }

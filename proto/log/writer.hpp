@@ -43,6 +43,10 @@ class Writer {
   [[nodiscard]] Result<std::string> add_blob(std::span<const std::byte> bytes);
 
   [[nodiscard]] std::int64_t last_chunk_id() const;  // 0 before the first
+  // The chunk of the source that comes before the one with this frame of its stream; 0 when there
+  // is none. Searches from the end of the log.
+  [[nodiscard]] Result<std::int64_t> chunk_before_frame(std::uint32_t source, std::uint32_t stream,
+                                                        std::uint64_t frame) const;
 
   // Makes everything so far survive kill -9 and power loss.
   [[nodiscard]] Result<> commit();

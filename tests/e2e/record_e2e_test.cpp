@@ -150,7 +150,7 @@ TEST_CASE("record and replay refuse what they must with one sentence") {
   stage.folder.write("take.plog", "not a log, but somebody's");
   const Outcome kept =
       posed({"record", "--config", stage.path("posed.toml"), "--out", stage.path("take.plog")});
-  CHECK(kept.code == 1);
+  CHECK(kept.code == 2);
   CHECK(kept.err.find("take.plog: exists already") != std::string::npos);
   const Outcome foreign = posed({"replay", stage.path("take.plog")});
   CHECK(foreign.code == 1);
@@ -159,8 +159,34 @@ TEST_CASE("record and replay refuse what they must with one sentence") {
   CHECK(posed({"replay", stage.path("take.plog"), "--speed", "fast"}).code == 2);
   const Outcome nowhere =
       posed({"record", "--config", stage.path("posed.toml"), "--out", stage.path("no/take.plog")});
-  CHECK(nowhere.code == 1);
-  CHECK(nowhere.err.find("cannot be opened") != std::string::npos);
+  CHECK(nowhere.code == 2);
+  CHECK(nowhere.err.find("its folder is not there") != std::string::npos);
+  const Outcome own = posed({"record", "--config", stage.path("posed.toml"), "--out",
+                             stage.path("one.style"), "--overwrite"});
+  CHECK(own.code == 2);
+  CHECK(style::load_model(stage.path("one.style")));
+}
+
+TEST_CASE("a log is replaced only once its replacement is being written") {
+  Walkers busy;
+  busy.launch("run");
+  Walkers stage;
+  stage.record();
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+  const std::string before = bytes_of(stage.path("take.plog"));
+  std::ifstream config(stage.path("posed.toml"));
+  std::string text{std::istreambuf_iterator<char>(config), {}};
+  stage.folder.write("taken.toml", text.replace(text.find("tcp://127.0.0.1:*"), 17, busy.publish));
+  const Outcome refused = posed({"record", "--config", stage.path("taken.toml"), "--out",
+                                 stage.path("take.plog"), "--overwrite"});
+  CHECK(refused.code == 1);
+  CHECK(bytes_of(stage.path("take.plog")) == before);
+  stage.launch("record", {"--out", stage.path("take.plog"), "--overwrite"});
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+  CHECK(bytes_of(stage.path("take.plog")) != before);
+  CHECK_FALSE(std::filesystem::exists(stage.path("take.plog.replaced")));
 }
 
 }  // namespace posed::test

@@ -33,7 +33,14 @@ inline Replayed replayed(const std::filesystem::path& path, bool expect = true) 
   }
   record::Replay& replay = **opened;
   std::optional<record::Expectation> expectation;
-  if (expect) expectation = record::Expectation::open(*reader).value();
+  if (expect) {
+    auto live = record::Expectation::open(*reader);
+    if (!live) {
+      result.difference = live.error();
+      return result;
+    }
+    expectation = std::move(*live);
+  }
   std::vector<publish::FrameEncoder> encoders;  // styled and raw of each stream
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     encoders.emplace_back(replay.stream(id).name);

@@ -192,7 +192,8 @@ void VirtualDaemon::Parts::open_log() {
   recorder.clock = virtual_clock;
   auto writer = record::begin_log(recorder, streams);
   REQUIRE(writer);
-  tape = std::make_unique<record::TapeRings>(lanes.size(), options.tape);
+  tape = std::make_unique<record::TapeRings>(
+      std::vector<record::RingSizes>(lanes.size(), options.tape));
   scribe = std::make_unique<record::Scribe>(*tape, std::move(*writer), options.log,
                                             [](const record::Notice&) {});
 }

@@ -77,7 +77,8 @@ struct VirtualOptions {
   bool holdups = true;         // parts are held up now and then, for up to 0.4 s
   double turn_us = 40.0;       // the longest that a turn takes
   std::size_t ack_slots = 64;  // of the ring to control
-  record::RingSizes tape{.chunk_bytes = 8 << 20, .frame_bytes = 32 << 20, .decisions = 4096};
+  // What each stream may have in the recorder's rings.
+  record::RingSizes tape{.chunk_bytes = 4 << 20, .frame_bytes = 16 << 20, .decisions = 2048};
 };
 
 class VirtualDaemon {

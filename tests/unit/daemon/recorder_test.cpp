@@ -78,7 +78,8 @@ void put_chunk(Tape& tape, std::uint32_t stream, std::uint64_t sequence, const s
 TEST_CASE("what two hot threads put on the tape is in the log, in order, whole") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  TapeRings rings(2, {.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 64});
+  TapeRings rings(
+      std::vector<RingSizes>(2, {.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 64}));
   Scribe scribe(rings, make_writer(path, 2), path, [](const Notice&) {});
   constexpr std::uint64_t kChunks = 5000;
   std::atomic<bool> running{true};
@@ -112,7 +113,8 @@ TEST_CASE("what two hot threads put on the tape is in the log, in order, whole")
 TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  TapeRings rings(2, {.chunk_bytes = 1024, .frame_bytes = 1024, .decisions = 2});
+  TapeRings rings(
+      std::vector<RingSizes>(2, {.chunk_bytes = 1024, .frame_bytes = 1024, .decisions = 2}));
   std::vector<Notice> notices;
   Scribe scribe(rings, make_writer(path, 2), path,
                 [&](const Notice& notice) { notices.push_back(notice); });
@@ -135,10 +137,60 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
   CHECK(lost(rows, 0, GapKind::kFrames) == 2);
 }
 
+TEST_CASE("a stream that fills its share of the rings costs its neighbour nothing") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  TapeRings rings(
+      std::vector<RingSizes>(2, {.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 8}));
+  Scribe scribe(rings, make_writer(path, 2), path, [](const Notice&) {});
+  const std::string line(40, '1');
+  constexpr std::uint64_t kTurns = 20;
+  for (std::uint64_t turn = 1; turn <= kTurns; ++turn) {
+    for (std::uint64_t i = 0; i < 500; ++i) {
+      put_chunk(rings, 0, 500 * turn + i, line);
+      rings.decision({.stream = 0, .item = 501 * turn + i});
+      rings.published(0, 500 * turn + i, false, bytes_of(line));
+    }
+    put_chunk(rings, 1, turn, line);
+    rings.decision({.stream = 1, .item = 501 * turn + 500});
+    rings.published(1, turn, false, bytes_of(line));
+    scribe.turn(static_cast<std::int64_t>(turn) * kTurn_ns);
+  }
+  REQUIRE(scribe.finish(static_cast<std::int64_t>(kTurns) * kTurn_ns));
+  CHECK(sequences(path)[1].size() == kTurns);
+  const auto rows = gaps(path);
+  for (const GapKind kind : {GapKind::kChunks, GapKind::kDecisions, GapKind::kFrames}) {
+    CHECK(lost(rows, 0, kind) > 1000);
+    CHECK(lost(rows, 1, kind) == 0);
+  }
+}
+
+// The pipeline decides later than the reader reads: the chunk that a lost decision concerns may be
+// in the log long before.
+TEST_CASE("the gap of a lost decision begins before the chunk that it concerns") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  TapeRings rings({{.chunk_bytes = 4096, .frame_bytes = 0, .decisions = 1}});
+  Scribe scribe(rings, make_writer(path, 1), path, [](const Notice&) {});
+  for (std::uint64_t frame = 1; frame <= 10; ++frame) put_chunk(rings, 0, frame, "1\n");
+  scribe.turn(kTurn_ns);
+  rings.decision({.stream = 0, .item = 3, .sequence = 3});
+  rings.decision({.stream = 0, .item = 5, .sequence = 5});  // does not fit
+  rings.decision({.stream = 0, .item = 7, .sequence = 7});  // nor this one
+  scribe.turn(2 * kTurn_ns);
+  rings.decision({.stream = 0, .item = 9, .sequence = 9});
+  REQUIRE(scribe.finish(3 * kTurn_ns));
+  const auto rows = gaps(path);
+  REQUIRE(rows.size() == 1);
+  CHECK(rows[0].lost == 2);
+  CHECK(rows[0].after_chunk == 4);
+}
+
 TEST_CASE("a full disk: counted, told, and recording goes on with a gap row when there is room") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  TapeRings rings(2, {.chunk_bytes = 1 << 20, .frame_bytes = 0, .decisions = 64});
+  TapeRings rings(
+      std::vector<RingSizes>(2, {.chunk_bytes = 1 << 20, .frame_bytes = 0, .decisions = 64}));
   std::vector<Notice> notices;
   Scribe scribe(rings, make_writer(path, 2), path,
                 [&](const Notice& notice) { notices.push_back(notice); });

@@ -155,6 +155,44 @@ TEST_CASE("a model comes and goes while the hand moves, without the heap", "[liv
   }
 }
 
+// The model knows nothing of the frames that came before it: they keep the pose that the window
+// gives them, without a label.
+TEST_CASE("a model that comes while frames wait neither names nor bends them", "[live]") {
+  const Skeleton skeleton = hand_skeleton(Side::kRight);
+  const generate::LiveModel* const model = &made_up_model();
+  const MadeUpHand hand = made_up_hand(6, 3);
+  for (const int lag : {2, 3, 8}) {
+    INFO("lag " << lag);
+    generate::LiveSmoother plain(skeleton, with(lag, 1.0)), swapped(skeleton, with(lag, 1.0));
+    LastFrame without, with_model;
+    const auto step = [&](int t) {
+      HandAngles angles{};
+      for (Eigen::Index c = 0; c < kHandChannels; ++c) {
+        angles[static_cast<std::size_t>(c)] = hand.angles(t, c) * kDegree;
+      }
+      Frame frame;
+      set_hand_angles(skeleton, angles, frame);
+      frame.header.device_ns = nanoseconds(t / 30.0);
+      plain.step(&frame, 0, without);
+      swapped.step(&frame, 0, with_model);
+    };
+    for (int t = 0; t < 60; ++t) step(t);
+    REQUIRE(swapped.set_model(model) == nullptr);
+    step(60);
+    CHECK(with_model.out.label[0] == '\0');
+    CHECK(with_model.out.label_probability == 0.0F);
+    swapped.set_model(model);  // and again: nothing at all has come since
+    plain.flush(without);
+    swapped.flush(with_model);
+    CHECK(with_model.count == without.count);
+    CHECK(with_model.out.label[0] == '\0');
+    for (std::size_t c = 0; c < kHandChannels; ++c) {
+      REQUIRE(std::isfinite(with_model.out.angle_rad[c]));
+      CHECK(with_model.out.angle_rad[c] == Approx(without.out.angle_rad[c]).margin(1e-3));
+    }
+  }
+}
+
 TEST_CASE("a model without a hand, or without labels, is refused", "[live]") {
   const auto model = gesture::train_gesture({recording_of(made_up_hand(100, 1))}, {}).value();
   const auto body = generate::bind_live_model(model, body_with_channels(45), "H.gesture");

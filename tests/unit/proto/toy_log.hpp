@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "proto/log/rows.hpp"
@@ -15,7 +16,7 @@
 
 namespace posed::test {
 
-inline std::span<const std::byte> bytes_of(const std::string& text) {
+inline std::span<const std::byte> bytes_of(std::string_view text) {
   return std::as_bytes(std::span(text));
 }
 
@@ -31,8 +32,9 @@ inline log::StreamRow stream_row(std::uint32_t id, std::uint32_t source, const s
   return {id, source, "", name, "{}", 1};
 }
 
+// The row points into `text`, which must outlive it.
 inline log::ChunkRow chunk_row(std::uint32_t source, std::uint64_t sequence,
-                               const std::string& text) {
+                               std::string_view text) {
   return {.source = source,
           .arrival_ns = static_cast<std::int64_t>(sequence) * 1000,
           .first_item = sequence,
