@@ -46,8 +46,8 @@ inline constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::ma
 
 // The first frame of its stream that a decision concerns. RT-safe.
 [[nodiscard]] inline std::uint64_t first_frame_of(const pipeline::Decision& decision) noexcept {
-  using Kind = pipeline::Decision::Kind;
-  return decision.kind == Kind::kShedSamples ? kNoFrame : decision.sequence;
+  const bool of_samples = decision.kind == pipeline::Decision::Kind::kShedSamples;
+  return of_samples ? kNoFrame : decision.sequence;
 }
 
 struct DecisionRecord {
