@@ -272,7 +272,7 @@ TEST_CASE("bad input is one sentence that says what to do, and the exit code say
       {config_of("", walk, "foreign.style"), 1, {"foreign.style: ", "walker"}},
       {config_of("", "path = \"renamed.bvh\""), 1, {"no joint LeftLeg, RightLeg", "train with"}},
       {config_of("stale_after = 1.0", walk), 2, {"bad.toml:9: ", "stale_after_s"}},
-      {config_of("", walk), 1, {"take.plog: exists already"}},
+      {config_of("", walk), 2, {"take.plog: exists already"}},
   };
   for (const Row& row : rows) {
     served.folder.write("bad.toml", row.config);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <fuzzer/FuzzedDataProvider.h>
+#include <google/protobuf/stubs/logging.h>
 
 #include "daemon/control/request_handler.hpp"
 #include "drivers/glove/calibration_file.hpp"
@@ -184,6 +185,11 @@ void send_other(FuzzedDataProvider& data, Desk& desk, const std::string& client)
 }
 
 }  // namespace
+
+extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
+  google::protobuf::SetLogHandler(nullptr);  // as in the daemon: no line for each broken string
+  return 0;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   static Desk desk;
