@@ -51,7 +51,8 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
                                {.name = "control",
                                 .most_peers = peer_shares().control,
                                 .most_unheard = kMostUnheard,
-                                .most_unheard_of_all = kMostUnheard});
+                                .most_unheard_of_all = kMostUnheard,
+                                .gatekeeper = ports.gatekeeper});
   if (!guard) return std::unexpected(guard.error());
   auto bound = bind_socket(router->get(), endpoint);
   if (!bound) return std::unexpected(bound.error());

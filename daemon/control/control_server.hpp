@@ -22,7 +22,7 @@ struct ControlPorts {
   pipeline::Ring<pipeline::Ack>* acks = nullptr;  // this thread consumes
   pipeline::Wake* wake = nullptr;                 // rung when there is something in `acks`
   // Asked about every client; null (in tests): nobody is asked, and old ZMTP is spoken, too.
-  const Gatekeeper* gatekeeper = nullptr;
+  Gatekeeper* gatekeeper = nullptr;
   std::string secret_z85;  // the server's key; empty: no CURVE
 };
 

@@ -4,10 +4,14 @@
 #include <string>
 #include <vector>
 
+#include "daemon/pipeline/clock.hpp"
+#include "proto/frame/time.hpp"
+
 namespace posed::control {
 namespace {
 
 constexpr const char* kZapEndpoint = "inproc://zeromq.zap.01";
+constexpr long kPause_ms = 50;
 constexpr std::size_t kLongestRequest = 16;  // parts; RFC 27 needs 7 for CURVE
 
 // All parts of one message; those beyond the longest request are left out.
@@ -76,8 +80,22 @@ void Gatekeeper::serve() {
     }
     if ((wait[1].revents & ZMQ_POLLIN) != 0) return;
     Message part;
-    if ((wait[0].revents & ZMQ_POLLIN) != 0 && part.receive(door_.get())) answer(part);
+    if ((wait[0].revents & ZMQ_POLLIN) != 0 && part.receive(door_.get())) {
+      answer(part);
+      pause();
+    }
   }
+}
+
+void Gatekeeper::slow_down() noexcept {
+  slow_until_ns_.store(pipeline::monotonic_ns() + kNanosPerSecond);
+}
+
+// What comes meanwhile waits in the socket; only the bell that ends the thread is heard.
+void Gatekeeper::pause() {
+  if (pipeline::monotonic_ns() >= slow_until_ns_.load()) return;
+  zmq_pollitem_t bell{stop_in_.get(), 0, ZMQ_POLLIN, 0};
+  zmq_poll(&bell, 1, kPause_ms);
 }
 
 bool Gatekeeper::welcomes(const ZapRequest& request) const {

@@ -38,11 +38,18 @@ class Gatekeeper {
   // Whether the peer whose message carries this User-Id still has the right; always without a list.
   [[nodiscard]] bool allows(std::string_view user_id, Domain domain) const;
 
+  // A peer was cut off for what it sent. It will be back at once, and each time it costs a socket's
+  // thread some milliseconds: for the next second handshakes are answered one by one with a pause
+  // between them, in the order of their coming, so that whoever is connected is not kept waiting.
+  // Any thread.
+  void slow_down() noexcept;
+
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_.load(); }
 
  private:
   Gatekeeper(Socket door, Socket stop_in, Socket stop_out, std::optional<AccessList> list);
   void serve();
+  void pause();
   void answer(Message& version);
   [[nodiscard]] bool welcomes(const ZapRequest& request) const;
 
@@ -52,6 +59,7 @@ class Gatekeeper {
   mutable std::mutex mutex_;
   std::optional<AccessList> list_;  // under mutex_
   std::atomic<std::uint64_t> refused_{0};
+  std::atomic<std::int64_t> slow_until_ns_{0};
   std::thread thread_;
 };
 

@@ -11,6 +11,7 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 
+#include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/received_bytes.hpp"
 #include "daemon/pipeline/clock.hpp"
 #include "daemon/publish/process.hpp"
@@ -176,6 +177,7 @@ void PeerGuard::inspect_all() {
   }
   if (most <= limits_.most_unheard && unheard <= limits_.most_unheard_of_all) return;
   cut_now(most_fd, "sent much and ended no message");
+  if (limits_.gatekeeper != nullptr) limits_.gatekeeper->slow_down();
   malloc_trim(0);
   resident_before_ = 0;  // it may not have been the only one: look again at the next tick
 }
@@ -216,6 +218,7 @@ std::uint64_t PeerGuard::cuts() const {
 void PeerGuard::cut(int fd, const char* why) {
   const std::scoped_lock lock(mutex_);
   cut_now(fd, why);
+  if (limits_.gatekeeper != nullptr) limits_.gatekeeper->slow_down();
 }
 
 void PeerGuard::cut_now(int fd, const char* why) {

@@ -39,12 +39,15 @@ namespace posed::control {
 // The descriptor of the connection that a message came through; -1 when it came through none.
 [[nodiscard]] int source_of(const Message& message);
 
+class Gatekeeper;
+
 struct PeerLimits {
   const char* name = "";       // of the socket, for the log
   std::size_t most_peers = 0;  // a connection beyond them is cut at once
   // Bytes that came to no whole message yet: of one peer, and of all together.
   std::uint64_t most_unheard = 0;
   std::uint64_t most_unheard_of_all = 0;
+  Gatekeeper* gatekeeper = nullptr;  // slowed down when a peer is cut for what it sent
 };
 
 class PeerGuard {

@@ -111,7 +111,8 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
                                         {.name = "publish",
                                          .most_peers = control::peer_shares().publish,
                                          .most_unheard = kMostUnheard,
-                                         .most_unheard_of_all = kMostUnheardOfAll});
+                                         .most_unheard_of_all = kMostUnheardOfAll,
+                                         .gatekeeper = options.gatekeeper});
   if (!guard) return std::unexpected(guard.error());
   auto endpoint = control::bind_socket(socket->get(), options.endpoint);
   if (!endpoint) return std::unexpected(endpoint.error());

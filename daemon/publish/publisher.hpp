@@ -46,7 +46,7 @@ struct PublisherOptions {
   void* context = nullptr;  // ZeroMQ's; outlives the publisher
   std::string endpoint;
   // Asked about every subscriber; null (in tests): nobody is asked, and old ZMTP is spoken, too.
-  const control::Gatekeeper* gatekeeper = nullptr;
+  control::Gatekeeper* gatekeeper = nullptr;
   std::string secret_z85;                      // the server's key; empty: no CURVE
   std::function<void(v1::Stats&)> more_stats;  // adds what others know (recorder); may be empty
   record::Tape* tape = nullptr;                // null: nothing is recorded

@@ -19,10 +19,10 @@
 
 namespace posed::publish {
 
-inline constexpr std::size_t kMostWanted = 4096;    // distinct ones that could become a topic
-inline constexpr std::size_t kMostImpossible = 64;  // of one peer, that could never
-inline constexpr double kMostAtOnce = 8192.0;       // messages of one peer at once
-inline constexpr double kMostPerSecond = 256.0;     // and over time
+inline constexpr std::size_t kMostWanted = 4096;   // distinct ones that could become a topic
+inline constexpr std::size_t kMostImpossible = 8;  // of one peer, that could never
+inline constexpr double kMostAtOnce = 8192.0;      // messages of one peer at once
+inline constexpr double kMostPerSecond = 256.0;    // and over time
 
 // Whether topics of a posed may begin so: "", "po", "pose/", "pose/left-han", "stats".
 [[nodiscard]] bool could_become_topic(std::string_view prefix);

@@ -246,8 +246,7 @@ TEST_CASE("an acknowledgement of nothing is nothing") {
 // A daemon reduced to its control side: a socket, and a pipeline that acknowledges.
 class Booth final : public Helm {
  public:
-  explicit Booth(const Gatekeeper* gatekeeper = nullptr, std::string secret = {},
-                 void* context = nullptr)
+  explicit Booth(Gatekeeper* gatekeeper = nullptr, std::string secret = {}, void* context = nullptr)
       : context_(*open_context()) {
     server_ =
         *ControlServer::start(context == nullptr ? context_.get() : context, "tcp://127.0.0.1:*",
