@@ -1,5 +1,5 @@
-// SetAside: a file that is about to be replaced, kept under another name until its replacement is
-// sure to come. Cold.
+// SetAside: a device log that is about to be replaced, kept under another name until its
+// replacement is sure to come. Cold.
 #pragma once
 
 #include <filesystem>
@@ -21,6 +21,9 @@ class SetAside {
 
  private:
   explicit SetAside(std::filesystem::path file) : file_(std::move(file)) {}
+  static void rename(const std::filesystem::path& from, const std::filesystem::path& to,
+                     const char* suffix);
+  static void remove(const std::filesystem::path& file, const char* suffix);
   [[nodiscard]] std::filesystem::path aside() const { return file_.string() + ".replaced"; }
 
   std::filesystem::path file_;  // empty: there is nothing to put back

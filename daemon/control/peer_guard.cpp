@@ -176,8 +176,7 @@ void PeerGuard::inspect_all() {
     }
   }
   if (most <= limits_.most_unheard && unheard <= limits_.most_unheard_of_all) return;
-  cut_now(most_fd, "sent much and ended no message");
-  if (limits_.gatekeeper != nullptr) limits_.gatekeeper->slow_down();
+  cut_offender(most_fd, "sent much and ended no message");
   malloc_trim(0);
   resident_before_ = 0;  // it may not have been the only one: look again at the next tick
 }
@@ -217,6 +216,10 @@ std::uint64_t PeerGuard::cuts() const {
 
 void PeerGuard::cut(int fd, const char* why) {
   const std::scoped_lock lock(mutex_);
+  cut_offender(fd, why);
+}
+
+void PeerGuard::cut_offender(int fd, const char* why) {
   cut_now(fd, why);
   if (limits_.gatekeeper != nullptr) limits_.gatekeeper->slow_down();
 }

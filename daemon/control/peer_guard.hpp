@@ -91,6 +91,7 @@ class PeerGuard {
   void admit(int fd);
   void inspect_all();
   void cut_now(int fd, const char* why);
+  void cut_offender(int fd, const char* why);  // and slows down whoever comes next
   void tell(const char* why);
 
   void* socket_;

@@ -6,6 +6,7 @@
 
 #include "proto/log/database.hpp"
 #include "proto/log/digest.hpp"
+#include "proto/log/files.hpp"
 #include "proto/log/places.hpp"
 #include "proto/log/schema.hpp"
 
@@ -40,7 +41,7 @@ Result<> make_room_for(const std::filesystem::path& path, bool overwrite) {
   if (std::filesystem::exists(path, error) && !overwrite) {
     return fail("exists already; choose another name or say --overwrite", path.string());
   }
-  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+  for (const char* suffix : kFileSuffixes) {
     std::filesystem::remove(path.string() + suffix, error);
     if (error) return fail("cannot be replaced: " + error.message(), path.string());
   }

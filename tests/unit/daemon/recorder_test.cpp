@@ -27,6 +27,9 @@ std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text));
 }
 
+// The shares of two streams.
+std::vector<RingSizes> for_two(const RingSizes& each) { return {each, each}; }
+
 log::Writer make_writer(const std::filesystem::path& path, std::uint32_t streams) {
   auto writer = log::Writer::create(path, {}, false);
   REQUIRE(writer);
@@ -78,8 +81,7 @@ void put_chunk(Tape& tape, std::uint32_t stream, std::uint64_t sequence, const s
 TEST_CASE("what two hot threads put on the tape is in the log, in order, whole") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  TapeRings rings(
-      std::vector<RingSizes>(2, {.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 64}));
+  TapeRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 64}));
   Scribe scribe(rings, make_writer(path, 2), path, [](const Notice&) {});
   constexpr std::uint64_t kChunks = 5000;
   std::atomic<bool> running{true};
@@ -113,8 +115,7 @@ TEST_CASE("what two hot threads put on the tape is in the log, in order, whole")
 TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  TapeRings rings(
-      std::vector<RingSizes>(2, {.chunk_bytes = 1024, .frame_bytes = 1024, .decisions = 2}));
+  TapeRings rings(for_two({.chunk_bytes = 1024, .frame_bytes = 1024, .decisions = 2}));
   std::vector<Notice> notices;
   Scribe scribe(rings, make_writer(path, 2), path,
                 [&](const Notice& notice) { notices.push_back(notice); });
@@ -140,8 +141,7 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
 TEST_CASE("a stream that fills its share of the rings costs its neighbour nothing") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  TapeRings rings(
-      std::vector<RingSizes>(2, {.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 8}));
+  TapeRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 8}));
   Scribe scribe(rings, make_writer(path, 2), path, [](const Notice&) {});
   const std::string line(40, '1');
   constexpr std::uint64_t kTurns = 20;
@@ -189,8 +189,7 @@ TEST_CASE("the gap of a lost decision begins before the chunk that it concerns")
 TEST_CASE("a full disk: counted, told, and recording goes on with a gap row when there is room") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  TapeRings rings(
-      std::vector<RingSizes>(2, {.chunk_bytes = 1 << 20, .frame_bytes = 0, .decisions = 64}));
+  TapeRings rings(for_two({.chunk_bytes = 1 << 20, .frame_bytes = 0, .decisions = 64}));
   std::vector<Notice> notices;
   Scribe scribe(rings, make_writer(path, 2), path,
                 [&](const Notice& notice) { notices.push_back(notice); });
