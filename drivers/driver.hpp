@@ -24,7 +24,7 @@
 
 namespace posed::drivers {
 
-class Ports;  // drivers/transport/ports.hpp
+class TransportFactory;  // drivers/transport/transport_factory.hpp
 
 inline constexpr std::size_t kMaxChunk =
     64 * 1024;  // bytes; a longer one is an error of the transport
@@ -54,7 +54,7 @@ class Transport {
 
   // Whether the source would rather wait than lose frames (a file played as fast as possible): it
   // is read only when the pipeline has caught up.
-  [[nodiscard]] virtual bool patient() const noexcept { return false; }
+  [[nodiscard]] virtual bool lossless() const noexcept { return false; }
 
   // Chunks a second to be expected of a source that goes by time; 0 where only the device knows.
   [[nodiscard]] virtual double rate_hz() const noexcept { return 0.0; }
@@ -148,7 +148,7 @@ struct Driver {
   std::string_view summary;
   std::vector<OptionSpec> options;
   // Finds the device, speaks with it and starts it; may take a few seconds. Files open at once.
-  Result<Device> (*open)(const Options& options, Ports& ports);
+  Result<Device> (*open)(const Options& options, TransportFactory& ports);
   // The decoder alone, from what a log kept of the description's text; replay uses it.
   Result<std::unique_ptr<Decoder>> (*make_decoder)(const Description& description);
   // Skeleton, samples and rate again from driver + text + identity.

@@ -21,14 +21,14 @@ constexpr std::array kKnown{
 
 }  // namespace
 
-bool KnownUsb::fits(const Plugged& plugged) const noexcept {
-  return plugged.is_usb && plugged.bus == bus && plugged.vendor == vendor &&
-         ((plugged.product ^ product) & product_mask) == 0;
+bool KnownUsb::fits(const DeviceInfo& device) const noexcept {
+  return device.is_usb && device.bus == bus && device.vendor == vendor &&
+         ((device.product ^ product) & product_mask) == 0;
 }
 
-std::string_view KnownUsb::hand(const Plugged& plugged) const noexcept {
+std::string_view KnownUsb::hand(const DeviceInfo& device) const noexcept {
   if (left_bit == 0) return {};
-  return (plugged.product & left_bit) != 0 ? "left" : "right";
+  return (device.product & left_bit) != 0 ? "left" : "right";
 }
 
 std::span<const KnownUsb> known_usb() { return kKnown; }

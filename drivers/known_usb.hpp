@@ -19,9 +19,9 @@ struct KnownUsb {
   bool adapter = false;                 // anything may be behind it
   std::uint16_t left_bit = 0;           // of the product: set for a left glove; 0: not told
 
-  [[nodiscard]] bool fits(const Plugged& plugged) const noexcept;
+  [[nodiscard]] bool fits(const DeviceInfo& device) const noexcept;
   // "right", "left", or empty where the ids do not tell.
-  [[nodiscard]] std::string_view hand(const Plugged& plugged) const noexcept;
+  [[nodiscard]] std::string_view hand(const DeviceInfo& device) const noexcept;
 };
 
 [[nodiscard]] std::span<const KnownUsb> known_usb();

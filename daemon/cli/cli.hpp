@@ -44,8 +44,6 @@ void add_eval_gesture(CLI::App& eval, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
 void add_bench_decoders(CLI::App& bench, int& exit_code);
 void add_bench_pipeline(CLI::App& bench, int& exit_code);
-void add_bench_generate(CLI::App& bench, int& exit_code);
 void add_bench_predict(CLI::App& bench, int& exit_code);
-void add_bench_smooth(CLI::App& bench, int& exit_code);
 
 }  // namespace posed::cli

@@ -8,25 +8,25 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/toml_reader.hpp"
-#include "daemon/config/words.hpp"
-#include "daemon/control/keys.hpp"
+#include "daemon/net/keys.hpp"
 #include "models/gesture/play_order.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
+#include "proto/text/nearest_word.hpp"
 #include "proto/text/toml.hpp"
 
 namespace posed::config {
 namespace {
 
-using pipeline::DaemonConfig;
-using pipeline::SecurityConfig;
-using pipeline::StreamConfig;
+using config::DaemonConfig;
+using config::SecurityConfig;
+using config::StreamConfig;
 
 constexpr Range kAlpha{-2.0, 2.0};
 constexpr Range kAlphaSlew{0.01, 1000.0};
 constexpr Range kGateFallback{0.0, 1.0};
 constexpr Range kTempo{gesture::kMinTempo, gesture::kMaxTempo};
-constexpr Range kLag_ms{0.0, generate::kMaxLag_s * 1e3};
+constexpr Range kLag_ms{0.0, smooth::kMaxLag_s * 1e3};
 constexpr Range kNoise_deg{0.0, 90.0};
 constexpr Range kStaleAfter{0.01, 3600.0};
 constexpr Range kAnyNumber{std::numeric_limits<double>::lowest(),
@@ -53,14 +53,14 @@ class Reader {
   void read_endpoint(TableReader& root, const char* table, std::string& endpoint, bool& insecure,
                      bool secured);
   void read_security(TableReader table, SecurityConfig& security);
-  void read_client(TableReader table, std::vector<control::AllowedClient>& clients);
+  void read_client(TableReader table, std::vector<net::AllowedClient>& clients);
   void read_stream(TableReader table, StreamConfig& stream);
   void read_options(TableReader& stream_table, const drivers::Driver& driver,
                     drivers::Options& options);
   void read_option(TableReader& table, const drivers::OptionSpec& spec,
                    drivers::OptionValue& value);
-  void read_style(TableReader table, pipeline::StyleConfig& style);
-  void read_generate(TableReader table, pipeline::GenerateConfig& generate);
+  void read_style(TableReader table, config::StyleConfig& style);
+  void read_generate(TableReader table, config::GenerateConfig& generate);
   void check_names(const std::vector<StreamConfig>& streams, const std::vector<int>& lines);
 
   [[nodiscard]] std::filesystem::path resolve(const std::string& path) const {
@@ -81,8 +81,8 @@ void Reader::read(const toml::table& root_table, DaemonConfig& config) {
   read_endpoint(root, "control", config.control_endpoint, config.control_insecure, secured);
   if (config.publish_endpoint == config.control_endpoint &&
       !config.publish_endpoint.ends_with(":*")) {
-    root.blame("control", "publish and control cannot share the endpoint " +
-                              config.control_endpoint + "; give control another port");
+    root.add_error("control", "publish and control cannot share the endpoint " +
+                                  config.control_endpoint + "; give control another port");
   }
   std::vector<int> lines;
   for (TableReader& table : root.tables("stream", kMaxStreams)) {
@@ -90,7 +90,7 @@ void Reader::read(const toml::table& root_table, DaemonConfig& config) {
     read_stream(table, config.streams.emplace_back());
   }
   if (!root_table.contains("stream")) {
-    findings_.blame(0, "there is no stream; add a [[stream]] table with a name and a driver");
+    findings_.add_error(0, "there is no stream; add a [[stream]] table with a name and a driver");
   }
   check_names(config.streams, lines);
   root.finish();
@@ -104,14 +104,16 @@ void Reader::read_endpoint(TableReader& root, const char* name, std::string& end
   table->read("insecure", insecure);
   table->finish();
   if (!endpoint.starts_with("tcp://") && !endpoint.starts_with("ipc://")) {
-    table->blame("endpoint", fmt::format("{} is no endpoint; it reads like tcp://127.0.0.1:5570,"
-                                         " or ipc:///run/posed.sock",
-                                         in_quotes(endpoint)));
-  } else if (!control::is_loopback(endpoint) && !secured && !insecure) {
-    table->blame("endpoint",
-                 fmt::format("{} can be reached from other machines by anyone; add a server_key in"
-                             " [security], or say insecure = true in [{}]",
-                             clean_name(endpoint), name));
+    table->add_error("endpoint",
+                     fmt::format("{} is no endpoint; it reads like tcp://127.0.0.1:5570,"
+                                 " or ipc:///run/posed.sock",
+                                 in_quotes(endpoint)));
+  } else if (!net::is_loopback(endpoint) && !secured && !insecure) {
+    table->add_error(
+        "endpoint",
+        fmt::format("{} can be reached from other machines by anyone; add a server_key in"
+                    " [security], or say insecure = true in [{}]",
+                    clean_name(endpoint), name));
   }
 }
 
@@ -120,22 +122,22 @@ void Reader::read_security(TableReader table, SecurityConfig& security) {
   table.read("server_key", key_file);
   security.server_key = resolve(key_file);
   if (!key_file.empty()) {
-    if (auto key = control::read_secret_key(security.server_key); !key) {
-      table.blame("server_key", key.error().text());
+    if (auto key = net::read_secret_key(security.server_key); !key) {
+      table.add_error("server_key", key.error().text());
     }
   }
   for (TableReader& client : table.tables("client", kMaxClients))
     read_client(client, security.clients);
   if (key_file.empty() && !security.clients.empty()) {
-    table.blame("client",
-                "clients are listed but there is no server_key, so anyone could connect;"
-                " make one with `posed keygen server` and name server.key here");
+    table.add_error("client",
+                    "clients are listed but there is no server_key, so anyone could connect;"
+                    " make one with `posed keygen server` and name server.key here");
   }
   table.finish();
 }
 
-void Reader::read_client(TableReader table, std::vector<control::AllowedClient>& clients) {
-  control::AllowedClient client;
+void Reader::read_client(TableReader table, std::vector<net::AllowedClient>& clients) {
+  net::AllowedClient client;
   std::string key;
   std::vector<std::string> rights{"subscribe"};
   table.require("name", client.name);
@@ -146,22 +148,23 @@ void Reader::read_client(TableReader table, std::vector<control::AllowedClient>&
   client.may_control = std::ranges::find(rights, "control") != rights.end();
   for (const std::string& right : rights) {
     if (right == "subscribe" || right == "control") continue;
-    table.blame("rights", "there are two rights, \"subscribe\" and \"control\"");
+    table.add_error("rights", "there are two rights, \"subscribe\" and \"control\"");
   }
-  if (control::is_key(key)) {
+  if (net::is_key(key)) {
     client.public_z85 = key;
   } else if (!key.empty()) {
-    auto read = control::read_public_key(resolve(key));
+    auto read = net::read_public_key(resolve(key));
     if (read) client.public_z85 = *read;
-    if (!read) table.blame("public_key", read.error().text());
+    if (!read) table.add_error("public_key", read.error().text());
   }
-  for (const control::AllowedClient& other : clients) {
+  for (const net::AllowedClient& other : clients) {
     if (other.name == client.name) {
-      table.blame("name", fmt::format("two clients are named {}", in_quotes(client.name)));
+      table.add_error("name", fmt::format("two clients are named {}", in_quotes(client.name)));
     } else if (other.public_z85 == client.public_z85 && !client.public_z85.empty()) {
-      table.blame("public_key",
-                  fmt::format("{} and {} have the same key; make each its own with `posed keygen`",
-                              in_quotes(other.name), in_quotes(client.name)));
+      table.add_error(
+          "public_key",
+          fmt::format("{} and {} have the same key; make each its own with `posed keygen`",
+                      in_quotes(other.name), in_quotes(client.name)));
     }
   }
   clients.push_back(std::move(client));
@@ -184,7 +187,7 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
     constrain->finish();
   }
   if (!stream.name.empty() && !is_stream_name(stream.name)) {
-    table.blame("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
+    table.add_error("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }
   const auto driver = std::ranges::find(drivers_, stream.driver, &drivers::Driver::name);
   if (driver != drivers_.end()) {
@@ -193,10 +196,10 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
     std::set<std::string> names;
     for (const drivers::Driver& known : drivers_) names.emplace(known.name);
     const std::string near = nearest(stream.driver, names);
-    table.blame("driver", fmt::format("there is no driver of this name; {}",
-                                      near.empty() ? "`posed devices` lists them"
-                                                   : "the nearest is '" + near +
-                                                         "' (`posed devices` lists them)"));
+    table.add_error("driver", fmt::format("there is no driver of this name; {}",
+                                          near.empty() ? "`posed devices` lists them"
+                                                       : "the nearest is '" + near +
+                                                             "' (`posed devices` lists them)"));
     for (const std::string& name : names) (void)table.table(name);  // the one mistake is told
   }
   table.finish();
@@ -215,8 +218,8 @@ void Reader::read_options(TableReader& stream_table, const drivers::Driver& driv
     if (beside) read_option(stream_table, spec, value);
     if (!beside && table) read_option(*table, spec, value);
     if (spec.required && !(beside ? stream_table.has(key) : table && table->has(key))) {
-      findings_.blame(table ? table->line() : stream_table.line(),
-                      fmt::format("stream.{}.{} is missing: {}", name, key, spec.help));
+      findings_.add_error(table ? table->line() : stream_table.line(),
+                          fmt::format("stream.{}.{} is missing: {}", name, key, spec.help));
     }
     options[key] = std::move(value);
   }
@@ -235,7 +238,7 @@ void Reader::read_option(TableReader& table, const drivers::OptionSpec& spec,
   }
 }
 
-void Reader::read_style(TableReader table, pipeline::StyleConfig& style) {
+void Reader::read_style(TableReader table, config::StyleConfig& style) {
   std::string model;
   table.require("model", model);
   style.model = resolve(model);
@@ -247,16 +250,16 @@ void Reader::read_style(TableReader table, pipeline::StyleConfig& style) {
   table.finish();
 }
 
-void Reader::read_generate(TableReader table, pipeline::GenerateConfig& generate) {
+void Reader::read_generate(TableReader table, config::GenerateConfig& generate) {
   std::int64_t lag_frames = generate.live.lag.frames;
   double lag_ms = generate.live.lag.seconds * 1e3;
   double noise_deg = generate.live.noise_rad * kDegrees;
   std::string model, labels;
   table.read("lag_frames", lag_frames);
   if (lag_frames < 0 || lag_frames > kMostLagFrames) {
-    table.blame("lag_frames", fmt::format("stream.generate.lag_frames = {} is out of range: it"
-                                          " takes 0 to {} frames",
-                                          lag_frames, kMostLagFrames));
+    table.add_error("lag_frames", fmt::format("stream.generate.lag_frames = {} is out of range: it"
+                                              " takes 0 to {} frames",
+                                              lag_frames, kMostLagFrames));
     lag_frames = generate.live.lag.frames;
   }
   table.read("lag_ms", lag_ms, kLag_ms);
@@ -270,11 +273,12 @@ void Reader::read_generate(TableReader table, pipeline::GenerateConfig& generate
   generate.model = resolve(model);
   generate.labels = gesture::split_labels(labels);
   if (generate.labels.size() > gesture::kMostLabels) {
-    table.blame("labels", fmt::format("{} labels are too many at once; give at most {}",
-                                      generate.labels.size(), gesture::kMostLabels));
+    table.add_error("labels", fmt::format("{} labels are too many at once; give at most {}",
+                                          generate.labels.size(), gesture::kMostLabels));
   }
   if (!generate.labels.empty() && model.empty()) {
-    table.blame("labels", "labels need a gesture model to perform them; add model = \"H.gesture\"");
+    table.add_error("labels",
+                    "labels need a gesture model to perform them; add model = \"H.gesture\"");
   }
   table.finish();
 }
@@ -283,20 +287,20 @@ void Reader::check_names(const std::vector<StreamConfig>& streams, const std::ve
   for (std::size_t i = 0; i < streams.size(); ++i) {
     const std::string raw = streams[i].name + std::string(kRawSuffix);
     if (streams[i].publish_raw && is_stream_name(streams[i].name) && !is_stream_name(raw)) {
-      findings_.blame(lines[i], fmt::format("{} is longer than 32 letters; shorten the name or"
-                                            " leave out publish_raw",
-                                            in_quotes(raw)));
+      findings_.add_error(lines[i], fmt::format("{} is longer than 32 letters; shorten the name or"
+                                                " leave out publish_raw",
+                                                in_quotes(raw)));
     }
     for (std::size_t j = 0; j < streams.size(); ++j) {
       if (j < i && streams[j].name == streams[i].name && !streams[i].name.empty()) {
-        findings_.blame(lines[i], fmt::format("a second stream is named {} (the first stands in"
-                                              " line {}); every stream has its own name",
-                                              in_quotes(streams[i].name), lines[j]));
+        findings_.add_error(lines[i], fmt::format("a second stream is named {} (the first stands in"
+                                                  " line {}); every stream has its own name",
+                                                  in_quotes(streams[i].name), lines[j]));
       }
       if (streams[i].publish_raw && streams[j].name == raw) {
-        findings_.blame(lines[j], fmt::format("{} is the name under which the raw input of {}"
-                                              " is published; choose another",
-                                              in_quotes(raw), in_quotes(streams[i].name)));
+        findings_.add_error(lines[j], fmt::format("{} is the name under which the raw input of {}"
+                                                  " is published; choose another",
+                                                  in_quotes(raw), in_quotes(streams[i].name)));
       }
     }
   }
@@ -335,7 +339,7 @@ Reading read_config(const std::string& text, const std::filesystem::path& path, 
   if (root) {
     Reader(path.parent_path(), drivers, findings).read(*root, reading.config);
   } else {
-    findings.blame(root.error().line, root.error().message);
+    findings.add_error(root.error().line, root.error().message);
   }
   reading.errors = std::move(findings.errors);
   reading.known = std::move(findings.known);
@@ -352,7 +356,7 @@ Reading read_config_file(const std::filesystem::path& path, Drivers drivers) {
   return reading;
 }
 
-Result<pipeline::DaemonConfig> load_config(const std::filesystem::path& path, Drivers drivers) {
+Result<config::DaemonConfig> load_config(const std::filesystem::path& path, Drivers drivers) {
   Reading reading = read_config_file(path, drivers);
   if (!reading.errors.empty()) return std::unexpected(reading.errors.front());
   return std::move(reading.config);

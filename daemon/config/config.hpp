@@ -1,5 +1,5 @@
 // Reads the daemon's TOML file into a DaemonConfig. Cold. The file is described, key by key, in
-// config/posed.toml; every default is a member's initialiser in daemon/pipeline/daemon_config.hpp
+// config/posed.toml; every default is a member's initialiser in daemon/config/daemon_config.hpp
 // or, for a driver's own table, in the driver's OptionSpec list.
 #pragma once
 
@@ -10,17 +10,17 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/control/security.hpp"
-#include "daemon/pipeline/daemon_config.hpp"
+#include "daemon/config/daemon_config.hpp"
+#include "daemon/net/security.hpp"
 #include "drivers/driver.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::config {
 
 struct Reading {
-  pipeline::DaemonConfig config;  // to be used only when there are no errors
-  std::vector<Error> errors;      // all of them, each one sentence with file and line, exit code 2
-  std::set<std::string> known;    // every key that was looked for: "stream.style.alpha"
+  config::DaemonConfig config;  // to be used only when there are no errors
+  std::vector<Error> errors;    // all of them, each one sentence with file and line, exit code 2
+  std::set<std::string> known;  // every key that was looked for: "stream.style.alpha"
 };
 
 using Drivers = std::span<const drivers::Driver>;
@@ -35,8 +35,8 @@ using Drivers = std::span<const drivers::Driver>;
 [[nodiscard]] Reading read_config_file(const std::filesystem::path& path, Drivers drivers);
 
 // The file, or its first error.
-[[nodiscard]] Result<pipeline::DaemonConfig> load_config(const std::filesystem::path& path,
-                                                         Drivers drivers);
+[[nodiscard]] Result<config::DaemonConfig> load_config(const std::filesystem::path& path,
+                                                       Drivers drivers);
 
 [[nodiscard]] bool is_stream_name(std::string_view name);  // [a-z0-9_-]{1,32}
 

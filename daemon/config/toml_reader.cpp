@@ -6,8 +6,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/config/words.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/nearest_word.hpp"
 
 namespace posed::config {
 namespace {
@@ -52,7 +52,7 @@ int line_of_node(const toml::node& node) { return static_cast<int>(node.source()
 
 }  // namespace
 
-void Findings::blame(int line, std::string_view message) {
+void Findings::add_error(int line, std::string_view message) {
   if (errors.size() > kMaxErrors) return;
   const bool last = errors.size() == kMaxErrors;
   errors.push_back({last ? "and there are more mistakes; mend these first" : clean(message), file,
@@ -79,14 +79,14 @@ const toml::node* TableReader::find(std::string_view key) {
   return table_.get(key);
 }
 
-void TableReader::blame(std::string_view key, const std::string& message) {
-  findings_.blame(line_of(key), message);
+void TableReader::add_error(std::string_view key, const std::string& message) {
+  findings_.add_error(line_of(key), message);
 }
 
 void TableReader::blame_type(const toml::node& node, std::string_view key,
                              const std::string& wanted) {
-  findings_.blame(line_of_node(node),
-                  fmt::format("{} must be {}, not {}", full(key), wanted, kind_of(node)));
+  findings_.add_error(line_of_node(node),
+                      fmt::format("{} must be {}, not {}", full(key), wanted, kind_of(node)));
 }
 
 void TableReader::read(const char* key, bool& value) {
@@ -121,8 +121,8 @@ void TableReader::read(const char* key, double& value, Range range) {
   const bool bounded = std::isfinite(range.min) && std::isfinite(range.max);
   const std::string wanted =
       bounded ? fmt::format("from {} to {}", range.min, range.max) : std::string("finite");
-  blame(key, fmt::format("{} = {} is out of range: it takes a number{} {}", full(key), number,
-                         unit_of(key), wanted));
+  add_error(key, fmt::format("{} = {} is out of range: it takes a number{} {}", full(key), number,
+                             unit_of(key), wanted));
 }
 
 void TableReader::read(const char* key, std::string& value) {
@@ -152,7 +152,7 @@ void TableReader::read(const char* key, std::vector<std::string>& value) {
 
 void TableReader::require(const char* key, std::string& value) {
   if (find(key) == nullptr) {
-    findings_.blame(line(), fmt::format("{} is missing; give it a text in quotes", full(key)));
+    findings_.add_error(line(), fmt::format("{} is missing; give it a text in quotes", full(key)));
     return;
   }
   read(key, value);
@@ -176,8 +176,8 @@ std::vector<TableReader> TableReader::tables(const std::string& key, std::size_t
     return readers;
   }
   if (list->size() > most) {
-    blame(key, fmt::format("there are {} [[{}]] tables; posed takes at most {}", list->size(),
-                           full(key), most));
+    add_error(key, fmt::format("there are {} [[{}]] tables; posed takes at most {}", list->size(),
+                               full(key), most));
     return readers;
   }
   for (const toml::node& element : *list) {
@@ -214,8 +214,8 @@ void TableReader::finish() {
   for (const auto& [key, node] : table_) {
     const std::string name(key.str());
     if (asked_.contains(name)) continue;
-    findings_.blame(static_cast<int>(key.source().begin.line),
-                    fmt::format("unknown key {}; {}", in_quotes(full(name)), advice(name)));
+    findings_.add_error(static_cast<int>(key.source().begin.line),
+                        fmt::format("unknown key {}; {}", in_quotes(full(name)), advice(name)));
   }
 }
 

@@ -27,7 +27,7 @@ struct Findings {
   std::set<std::string> all_keys = {};
 
   // Beyond kMaxErrors only the first one counts, as "and more".
-  void blame(int line, std::string_view message);
+  void add_error(int line, std::string_view message);
 };
 
 struct Range {
@@ -57,7 +57,7 @@ class TableReader {
   // More than `most` tables are blamed and none is read.
   [[nodiscard]] std::vector<TableReader> tables(const std::string& key, std::size_t most);
 
-  void blame(std::string_view key, const std::string& message);  // at the key's line
+  void add_error(std::string_view key, const std::string& message);  // at the key's line
   // Blames every key that was never asked for, with the table that it belongs to, the key that it
   // is a misspelling of, or all keys of this table.
   void finish();

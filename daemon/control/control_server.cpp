@@ -5,7 +5,7 @@
 
 #include <unistd.h>
 
-#include "daemon/pipeline/clock.hpp"
+#include "daemon/system/clock.hpp"
 #include "posed/v1/control.pb.h"
 
 namespace posed::control {
@@ -24,9 +24,9 @@ Result<> set_limits(void* router) {
   for (const auto& [option, value] : {std::pair{ZMQ_SNDHWM, kRepliesWaiting},
                                       {ZMQ_LINGER, kLastWords_ms},
                                       {ZMQ_ROUTER_HANDOVER, 1}}) {
-    if (auto set = set_option(router, option, value); !set) return set;
+    if (auto set = net::set_option(router, option, value); !set) return set;
   }
-  return set_receive_limits(router, kLongestPart, kRequestsWaiting, kReceiveBuffer_bytes);
+  return net::set_receive_limits(router, kLongestPart, kRequestsWaiting, kReceiveBuffer_bytes);
 }
 
 long milliseconds_until(std::int64_t due_ns, std::int64_t now_ns) {
@@ -39,29 +39,31 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
                                                             const std::string& endpoint,
                                                             const ControlPorts& ports,
                                                             RequestHandler& handler) {
-  auto router = open_socket(context, ZMQ_ROUTER);
+  auto router = net::open_socket(context, ZMQ_ROUTER);
   if (!router) return std::unexpected(router.error());
   if (auto set = set_limits(router->get()); !set) return std::unexpected(set.error());
-  if (ports.gatekeeper != nullptr) {
-    if (auto set = secure_server(router->get(), Domain::kControl, ports.secret_z85); !set) {
+  if (ports.authenticator != nullptr) {
+    if (auto set = net::secure_server(router->get(), net::Domain::kControl, ports.secret_z85);
+        !set) {
       return std::unexpected(set.error());
     }
   }
-  auto guard = PeerGuard::open(context, router->get(),
-                               {.name = "control",
-                                .most_peers = peer_shares().control,
-                                .most_unheard = kMostUnheard,
-                                .most_unheard_of_all = kMostUnheard,
-                                .gatekeeper = ports.gatekeeper});
+  auto guard = net::PeerGuard::open(context, router->get(),
+                                    {.name = "control",
+                                     .most_peers = net::peer_shares().control,
+                                     .most_unheard = kMostUnheard,
+                                     .most_unheard_of_all = kMostUnheard,
+                                     .authenticator = ports.authenticator});
   if (!guard) return std::unexpected(guard.error());
-  auto bound = bind_socket(router->get(), endpoint);
+  auto bound = net::bind_socket(router->get(), endpoint);
   if (!bound) return std::unexpected(bound.error());
   return std::unique_ptr<ControlServer>(
       new ControlServer(std::move(*router), std::move(*guard), std::move(*bound), ports, handler));
 }
 
-ControlServer::ControlServer(Socket router, std::unique_ptr<PeerGuard> guard, std::string endpoint,
-                             const ControlPorts& ports, RequestHandler& handler)
+ControlServer::ControlServer(net::Socket router, std::unique_ptr<net::PeerGuard> guard,
+                             std::string endpoint, const ControlPorts& ports,
+                             RequestHandler& handler)
     : router_(std::move(router)),
       guard_(std::move(guard)),
       endpoint_(std::move(endpoint)),
@@ -71,7 +73,7 @@ ControlServer::ControlServer(Socket router, std::unique_ptr<PeerGuard> guard, st
 
 ControlServer::~ControlServer() {
   stop_.store(true, std::memory_order_release);
-  ports_.wake->ring();
+  ports_.wake->notify();
   thread_.join();
 }
 
@@ -80,9 +82,9 @@ void ControlServer::serve() {
     bool busy = false;
     for (int i = 0; i < kRequestsARound && take_request(); ++i) busy = true;
     while (take_ack()) busy = true;
-    const std::int64_t now_ns = pipeline::monotonic_ns();
+    const std::int64_t now_ns = system::monotonic_ns();
     const std::int64_t due_ns = handler_.forget_old(now_ns);
-    if (!busy) sleep(due_ns == pipeline::kForever_ns ? -1 : milliseconds_until(due_ns, now_ns));
+    if (!busy) sleep(due_ns == system::kForever_ns ? -1 : milliseconds_until(due_ns, now_ns));
   }
 }
 
@@ -99,7 +101,7 @@ void ControlServer::sleep(long longest_ms) {
 }
 
 bool ControlServer::take_request() {
-  Message part;
+  net::Message part;
   if (!part.receive(router_.get())) return false;
   Asker envelope;
   while (part.more()) {
@@ -108,9 +110,9 @@ bool ControlServer::take_request() {
   }
   if (envelope.size() > kLongestEnvelope) return true;  // no client of ours; it gets no answer
   (void)guard_->take_gone();                            // nothing is kept for a connection here
-  if (const int client = source_of(part); guard_->knows(client)) guard_->heard(client, {});
-  if (ports_.gatekeeper != nullptr &&
-      !ports_.gatekeeper->allows(part.property("User-Id"), Domain::kControl)) {
+  if (const int client = net::source_of(part); guard_->knows(client)) guard_->heard(client, {});
+  if (ports_.authenticator != nullptr &&
+      !ports_.authenticator->allows(part.property("User-Id"), net::Domain::kControl)) {
     v1::ControlReply reply;
     reply.set_error("your key may no longer control this daemon");
     send({std::move(envelope), reply.SerializeAsString()});
@@ -131,9 +133,9 @@ bool ControlServer::take_ack() {
 // A ROUTER drops what a slow or departed client does not take.
 void ControlServer::send(const Answer& answer) {
   for (const std::string& part : answer.to) {
-    if (!send_part(router_.get(), part, true)) return;
+    if (!net::send_part(router_.get(), part, true)) return;
   }
-  (void)send_part(router_.get(), answer.bytes, false);
+  (void)net::send_part(router_.get(), answer.bytes, false);
 }
 
 }  // namespace posed::control

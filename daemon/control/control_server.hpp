@@ -8,21 +8,21 @@
 #include <string>
 #include <thread>
 
-#include "daemon/control/gatekeeper.hpp"
-#include "daemon/control/peer_guard.hpp"
 #include "daemon/control/request_handler.hpp"
-#include "daemon/control/zmq_handle.hpp"
+#include "daemon/net/peer_guard.hpp"
+#include "daemon/net/zap_authenticator.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "daemon/pipeline/ring.hpp"
-#include "daemon/pipeline/wake.hpp"
+#include "daemon/system/event_fd.hpp"
 
 namespace posed::control {
 
 // All of it outlives the server.
 struct ControlPorts {
   pipeline::Ring<pipeline::Ack>* acks = nullptr;  // this thread consumes
-  pipeline::Wake* wake = nullptr;                 // rung when there is something in `acks`
+  system::EventFd* wake = nullptr;                // rung when there is something in `acks`
   // Asked about every client; null (in tests): nobody is asked, and old ZMTP is spoken, too.
-  Gatekeeper* gatekeeper = nullptr;
+  net::ZapAuthenticator* authenticator = nullptr;
   std::string secret_z85;  // the server's key; empty: no CURVE
 };
 
@@ -40,7 +40,7 @@ class ControlServer {
   [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  // really bound
 
  private:
-  ControlServer(Socket router, std::unique_ptr<PeerGuard> guard, std::string endpoint,
+  ControlServer(net::Socket router, std::unique_ptr<net::PeerGuard> guard, std::string endpoint,
                 const ControlPorts& ports, RequestHandler& handler);
   void serve();
   void sleep(long longest_ms);  // negative: until something comes
@@ -48,8 +48,8 @@ class ControlServer {
   [[nodiscard]] bool take_ack();
   void send(const Answer& answer);
 
-  Socket router_;
-  std::unique_ptr<PeerGuard> guard_;
+  net::Socket router_;
+  std::unique_ptr<net::PeerGuard> guard_;
   std::string endpoint_;
   ControlPorts ports_;
   RequestHandler& handler_;

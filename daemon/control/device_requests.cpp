@@ -54,7 +54,7 @@ Result<> RequestHandler::calibrate(const v1::ControlRequest& request, const Aske
                               .calibration = compiled->get(),
                               .size = 0,
                               .bytes = {}};
-  if (under_way_.size() >= kMostUnderWay || !helm_.send(command)) {
+  if (under_way_.size() >= kMostUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
   under_way_.emplace(
@@ -84,7 +84,8 @@ Result<> RequestHandler::send_haptics(const v1::ControlRequest& request) {
   if (bytes->size() > command.bytes.size()) return fail("the device's message is too long");
   command.size = static_cast<std::uint16_t>(bytes->size());
   std::ranges::copy(*bytes, command.bytes.begin());
-  if (!helm_.send(command)) return fail("too many messages wait for the device; send fewer");
+  if (!daemon_control_.send(command))
+    return fail("too many messages wait for the device; send fewer");
   return {};
 }
 

@@ -32,8 +32,9 @@ Answer refusal(Asker to, const std::string& sentence) {
 
 }  // namespace
 
-RequestHandler::RequestHandler(std::vector<ControlledStream> streams, Helm& helm, Clock clock)
-    : streams_(std::move(streams)), helm_(helm), clock_(clock) {}
+RequestHandler::RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
+                               Clock clock)
+    : streams_(std::move(streams)), daemon_control_(daemon_control), clock_(clock) {}
 
 RequestHandler::~RequestHandler() = default;
 
@@ -72,10 +73,10 @@ std::optional<Answer> RequestHandler::handle(Asker asker, std::span<const std::b
       if (done) return answer(std::move(asker), reply);  // the device does not answer
       break;
     case v1::ControlRequest::kStatus:
-      helm_.fill(*reply.mutable_status());
+      daemon_control_.fill(*reply.mutable_status());
       return answer(std::move(asker), reply);
     case v1::ControlRequest::kStop:
-      helm_.stop();
+      daemon_control_.stop();
       return answer(std::move(asker), reply);
     case v1::ControlRequest::REQUEST_NOT_SET:
       return refusal(std::move(asker), "the request is empty, or from a newer posed");
@@ -204,7 +205,7 @@ void RequestHandler::keep_model(std::span<const std::byte> bytes, Command& comma
   const std::string hash = log::sha256_hex(bytes);
   std::copy_n(hash.begin(), std::min(hash.size(), command.model_hash.size() - 1),
               command.model_hash.begin());
-  helm_.keep_model(bytes);
+  daemon_control_.keep_model(bytes);
 }
 
 Result<> RequestHandler::play(const v1::ControlRequest& request, const Asker& asker) {
@@ -234,7 +235,7 @@ const generate::BoundModel* RequestHandler::coming_gesture(std::uint32_t stream)
 
 Result<> RequestHandler::send(Command command, UnderWay under_way) {
   command.ticket = last_ticket_ + 1;
-  if (under_way_.size() >= kMostUnderWay || !helm_.send(command)) {
+  if (under_way_.size() >= kMostUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
   under_way.stream = command.stream;
@@ -250,7 +251,7 @@ std::optional<Answer> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   ControlledStream& stream = streams_[ack.stream];
   if (done.model) {
     stream.model = std::move(done.model);  // the one it replaces is free now
-    helm_.model_in_use(ack.stream, stream.model->name);
+    daemon_control_.model_in_use(ack.stream, stream.model->name);
   }
   if (done.calibration) {
     stream.calibration = std::move(done.calibration);
@@ -259,7 +260,7 @@ std::optional<Answer> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   }
   if (done.gesture) {
     stream.gesture = std::move(done.gesture);
-    if (!stream.style) helm_.model_in_use(ack.stream, stream.gesture->name);
+    if (!stream.style) daemon_control_.model_in_use(ack.stream, stream.gesture->name);
   }
   if (ack.refused) {
     return refusal(std::move(done.asker), "too many labels wait already on " + stream.name +

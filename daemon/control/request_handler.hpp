@@ -13,8 +13,8 @@
 
 #include "daemon/control/uploads.hpp"
 #include "daemon/devices/present_device.hpp"
-#include "daemon/pipeline/clock.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/system/clock.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "models/generate/bound_model.hpp"
@@ -52,12 +52,12 @@ struct ControlledStream {
 };
 
 // What the handler asks of the rest of the daemon; every call comes from the control thread.
-class Helm {
+class DaemonControl {
  public:
-  Helm() = default;
-  Helm(const Helm&) = delete;
-  Helm& operator=(const Helm&) = delete;
-  virtual ~Helm() = default;
+  DaemonControl() = default;
+  DaemonControl(const DaemonControl&) = delete;
+  DaemonControl& operator=(const DaemonControl&) = delete;
+  virtual ~DaemonControl() = default;
 
   // Puts the command into the pipeline's ring; false when it is full.
   [[nodiscard]] virtual bool send(const pipeline::Command& command) = 0;
@@ -80,10 +80,10 @@ struct Answer {
 
 class RequestHandler {
  public:
-  // `helm` outlives the handler. Destroy it after the pipeline thread has ended: it owns the models
-  // in use.
-  RequestHandler(std::vector<ControlledStream> streams, Helm& helm,
-                 Clock clock = pipeline::monotonic_ns);
+  // `daemon_control` outlives the handler. Destroy it after the pipeline thread has ended: it owns
+  // the models in use.
+  RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
+                 Clock clock = system::monotonic_ns);
   ~RequestHandler();
   RequestHandler(const RequestHandler&) = delete;
   RequestHandler& operator=(const RequestHandler&) = delete;
@@ -129,7 +129,7 @@ class RequestHandler {
   [[nodiscard]] Result<> send(pipeline::Command command, UnderWay under_way);
 
   std::vector<ControlledStream> streams_;
-  Helm& helm_;
+  DaemonControl& daemon_control_;
   Clock clock_;
   Uploads uploads_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by ticket

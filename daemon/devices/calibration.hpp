@@ -1,4 +1,4 @@
-// A calibration file against the glove that a stream has: shared by start, control, keeper and
+// A calibration file against the glove that a stream has: shared by start, control, supervisor and
 // replay, so that the same file means the same everywhere. Cold.
 #pragma once
 

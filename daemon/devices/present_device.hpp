@@ -1,6 +1,6 @@
 // PresentDevice: which device a stream has now and what calibration it is read by, for the threads
-// that come and ask: control checks calibrations against it, stats tell it, the keeper changes it.
-// Cold; any thread.
+// that come and ask: control checks calibrations against it, stats tell it, the supervisor changes
+// it. Cold; any thread.
 #pragma once
 
 #include <memory>

@@ -29,10 +29,10 @@ void Intake::sample(Sample& sample) noexcept {
 }
 
 bool Intake::tell(std::uint8_t event, std::uint64_t ticket, std::string_view name) noexcept {
-  item_.kind = Item::Kind::kNotice;
+  item_.kind = Item::Kind::kEvent;
   item_.number = next_item_;
-  item_.notice = {stream_, event, arrival_ns_, frames_, 0.0, ticket};
-  item_.notice.after = ShortText(name);
+  item_.stream_event = {stream_, event, arrival_ns_, frames_, 0.0, ticket};
+  item_.stream_event.after = ShortText(name);
   if (!out_.item(item_)) return false;
   ++next_item_;
   return true;

@@ -1,5 +1,5 @@
 // Intake: what one stream's decoder emits, turned into items. It stamps frames and samples with
-// stream, sequence and arrival, maps the device's clock to the host's, notices when that clock
+// stream, sequence and arrival, maps the device's clock to the host's, events when that clock
 // jumps, and gives every item its number. The live reader and `replay` use the same class, so that
 // the same chunks give the same items.
 #pragma once
@@ -51,8 +51,8 @@ class Intake final : public Sink {
     next_item_ = next.item;
   }
 
-  // A notice of the reader, between two chunks. It takes a number only when there was room, so it
-  // may be tried again until there is. `name`: of the calibration that the notice is about.
+  // A event of the reader, between two chunks. It takes a number only when there was room, so it
+  // may be tried again until there is. `name`: of the calibration that the event is about.
   [[nodiscard]] bool tell(std::uint8_t event, std::uint64_t ticket,
                           std::string_view name = {}) noexcept;
 

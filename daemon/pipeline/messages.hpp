@@ -39,13 +39,13 @@ class ShortText {
   bool cut_ = false;
 };
 
-// What a KIND_CONTROL notice is about.
+// What a KIND_CONTROL event is about.
 enum class Change : std::uint8_t { kAlpha, kStyleModel, kGestureModel, kStopPlaying };
 
 // Something that happened to a stream, on its way to event/<stream>.
-struct Notice {
+struct StreamEvent {
   std::uint32_t stream;
-  std::uint8_t event;  // posed.v1.Event.Kind
+  std::uint8_t kind;  // posed.v1.Event.Kind
   std::int64_t time_ns;
   std::uint64_t sequence;
   double value;
@@ -58,15 +58,15 @@ struct Notice {
 
 // reader -> pipeline -> publisher
 struct Item {
-  enum class Kind : std::uint8_t { kFrame, kRawFrame, kSample, kNotice };
+  enum class Kind : std::uint8_t { kFrame, kRawFrame, kSample, kEvent };
   Kind kind = Kind::kFrame;
-  // Its place among everything that its reader handed over: frames, samples and notices of all
+  // Its place among everything that its reader handed over: frames, samples and events of all
   // streams, from 1. What found no room used up its number, too. 0: an engine made it.
   std::uint64_t number = 0;
   union {
     Frame frame;
     Sample sample;
-    Notice notice;
+    StreamEvent stream_event;
   };
   Item() noexcept : frame{} {}
 };
@@ -74,7 +74,7 @@ static_assert(std::is_trivially_copyable_v<Item>);
 
 // RT-safe.
 [[nodiscard]] inline std::uint32_t stream_of(const Item& item) noexcept {
-  if (item.kind == Item::Kind::kNotice) return item.notice.stream;
+  if (item.kind == Item::Kind::kEvent) return item.stream_event.stream;
   return item.kind == Item::Kind::kSample ? item.sample.header.stream : item.frame.header.stream;
 }
 

@@ -3,27 +3,28 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/pipeline/hot_mark.hpp"
 #include "daemon/pipeline/reader_source.hpp"
+#include "daemon/system/hot_mark.hpp"
 
 namespace posed::pipeline {
 namespace {
 
-// Until a patient source, or a command that waits for room, is looked at again.
+// Until a lossless source, or a command that waits for room, is looked at again.
 constexpr std::int64_t kLookAgain_ns = 250'000;
 
 }  // namespace
 
 Result<std::unique_ptr<Reader>> Reader::open(const ReaderPorts& ports) {
-  auto wake = Wake::open();
+  auto wake = system::EventFd::open();
   if (!wake) return std::unexpected(wake.error());
-  auto poller = Poller::open();
+  auto poller = system::Poller::open();
   if (!poller) return std::unexpected(poller.error());
   if (auto added = (*poller)->add(**wake); !added) return std::unexpected(added.error());
   return std::unique_ptr<Reader>(new Reader(ports, std::move(*wake), std::move(*poller)));
 }
 
-Reader::Reader(const ReaderPorts& ports, std::unique_ptr<Wake> wake, std::unique_ptr<Poller> poller)
+Reader::Reader(const ReaderPorts& ports, std::unique_ptr<system::EventFd> wake,
+               std::unique_ptr<system::Poller> poller)
     : ports_(ports), wake_(std::move(wake)), poller_(std::move(poller)) {}
 
 Reader::~Reader() = default;
@@ -45,28 +46,28 @@ std::int64_t Reader::turn(std::int64_t now_ns) noexcept {
 }
 
 void Reader::run() noexcept {
-  const HotSection hot;
+  const system::HotSection hot;
   begin();
   while (!stop_.load(std::memory_order_acquire)) {
     const std::int64_t due_ns = turn(ports_.clock());
     wake_->going_to_sleep();
     if (stop_.load(std::memory_order_acquire)) break;
-    ready_ = poller_->wait(called() ? 0 : time_left_ns(due_ns, ports_.clock));
+    ready_ = poller_->wait(called() ? 0 : system::time_left_ns(due_ns, ports_.clock));
     wake_->awake();
   }
 }
 
 void Reader::stop() noexcept {
   stop_.store(true, std::memory_order_release);
-  wake_->ring();
+  wake_->notify();
 }
 
 void Reader::call() noexcept {
   called_.store(true, std::memory_order_release);
-  wake_->ring();
+  wake_->notify();
 }
 
-// A calibration is answered by a notice, which must find room: without any, the commands wait.
+// A calibration is answered by a event, which must find room: without any, the commands wait.
 bool Reader::hear() noexcept {
   if (!called_.exchange(false, std::memory_order_acq_rel) && !commands_wait_) return true;
   for (const auto& source : sources_) source->exchange();
@@ -86,7 +87,7 @@ bool Reader::hear() noexcept {
 }
 
 std::int64_t Reader::serve_timed(std::int64_t now_ns) noexcept {
-  std::int64_t next_ns = kForever_ns;
+  std::int64_t next_ns = system::kForever_ns;
   for (const auto& source : sources_) {
     std::int64_t due_ns = source->due_ns();
     if (due_ns == kNoTime_ns) continue;

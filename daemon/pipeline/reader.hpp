@@ -11,27 +11,27 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
-#include "daemon/pipeline/wake.hpp"
-#include "daemon/record/tape.hpp"
+#include "daemon/system/event_fd.hpp"
 #include "drivers/driver.hpp"
 
 namespace posed::pipeline {
 
-// A device that may go and come: how its keeper (daemon/devices) and the reader hand it over. Every
-// device that went in comes back once, when its link is lost or it is asked for.
+// A device that may go and come: how its supervisor (daemon/devices) and the reader hand it over.
+// Every device that went in comes back once, when its link is lost or it is asked for.
 struct DeviceSlot {
   Ring<drivers::Device*> in{kSlots}, out{kSlots};  // to and from the reader
-  std::atomic<bool> give_back{false};              // the keeper wants the device that is in use
-  std::unique_ptr<Wake> keeper;                    // rung when there is something in `out`
+  std::atomic<bool> give_back{false};              // the supervisor wants the device that is in use
+  std::unique_ptr<system::EventFd> supervisor;     // rung when there is something in `out`
   static constexpr std::size_t kSlots = 4;
 };
 
 // What the reader needs of its surroundings; all of it outlives the reader.
 struct ReaderPorts {
   Ring<Item>* out = nullptr;
-  Wake* pipeline = nullptr;      // rung when there is something in `out`
-  record::Tape* tape = nullptr;  // null: nothing is recorded
+  system::EventFd* pipeline = nullptr;          // rung when there is something in `out`
+  pipeline::RecordSink* record_sink = nullptr;  // null: nothing is recorded
   Clock clock = nullptr;
   Ring<DeviceCommand>* commands = nullptr;  // from control; may be null
 };
@@ -68,15 +68,16 @@ class Reader {
 
  private:
   class Source;
-  Reader(const ReaderPorts& ports, std::unique_ptr<Wake> wake, std::unique_ptr<Poller> poller);
+  Reader(const ReaderPorts& ports, std::unique_ptr<system::EventFd> wake,
+         std::unique_ptr<system::Poller> poller);
   // Reads what is due by the clock; returns when that is the case next.
   std::int64_t serve_timed(std::int64_t now_ns) noexcept;
   bool hear() noexcept;  // slots and commands; false: some must wait for room in the ring
   [[nodiscard]] bool called() const noexcept { return called_.load(std::memory_order_acquire); }
 
   ReaderPorts ports_;
-  std::unique_ptr<Wake> wake_;
-  std::unique_ptr<Poller> poller_;
+  std::unique_ptr<system::EventFd> wake_;
+  std::unique_ptr<system::Poller> poller_;
   std::span<const std::uint32_t> ready_;  // sources whose descriptors have something; the poller's
   std::vector<std::unique_ptr<Source>> sources_;
   std::uint64_t next_item_ = 1;  // Item::number

@@ -7,9 +7,9 @@
 #include <span>
 #include <string_view>
 
-#include "daemon/pipeline/hot_mark.hpp"
 #include "daemon/pipeline/intake.hpp"
 #include "daemon/pipeline/reader.hpp"
+#include "daemon/system/hot_mark.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
@@ -21,12 +21,12 @@ class Reader::Source final : private IntakeOut {
   // USB's full speed is 64 bytes a millisecond, a serial line's 11.5 KB a second.
   static constexpr int kChunksATurn = 64;
   static constexpr std::size_t kBytesATurn = 4096;
-  // Frames of a patient source on their way through the pipeline; below what the pipeline sheds.
+  // Frames of a lossless source on their way through the pipeline; below what the pipeline sheds.
   static constexpr std::uint64_t kPatientFrames = 2;
 
  public:
-  Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports, Poller& poller,
-         std::uint64_t& next_item)
+  Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports,
+         system::Poller& poller, std::uint64_t& next_item)
       : read_(read),
         counters_(*read.counters),
         ports_(ports),
@@ -40,11 +40,11 @@ class Reader::Source final : private IntakeOut {
 
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
-  // Whether a chunk may be read now: whenever there is a device, but for a patient one with frames
+  // Whether a chunk may be read now: whenever there is a device, but for a lossless one with frames
   // under way.
   [[nodiscard]] bool may_read() const noexcept {
     if (device_ == nullptr || ended_) return false;
-    return !device_->transport->patient() ||
+    return !device_->transport->lossless() ||
            counters_.reader.frames.load(std::memory_order_relaxed) -
                    counters_.pipeline.consumed.load(std::memory_order_acquire) <
                kPatientFrames;
@@ -74,9 +74,9 @@ class Reader::Source final : private IntakeOut {
 
   void send(std::span<const std::byte> bytes) noexcept {
     if (device_ == nullptr) return;
-    const AllowedCall the_write;
+    const system::AllowedCall the_write;
     if (!device_->transport->send(bytes)) return;
-    tape(record::Direction::kToDevice, bytes);
+    record_sink(pipeline::Direction::kToDevice, bytes);
   }
 
   // Takes a device from the slot, and gives back the one that is asked for.
@@ -87,7 +87,8 @@ class Reader::Source final : private IntakeOut {
       device_ = device;
       intake_.new_link();
       arrived(ports_.clock());
-      tape(record::Direction::kDeviceInfo, std::as_bytes(std::span(device->description.text)));
+      record_sink(pipeline::Direction::kDeviceInfo,
+                  std::as_bytes(std::span(device->description.text)));
       use(*device);
     }));
   }
@@ -112,7 +113,7 @@ class Reader::Source final : private IntakeOut {
       case Item::Kind::kSample:
         counters_.reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
         break;
-      case Item::Kind::kNotice:
+      case Item::Kind::kEvent:
         return push_notice(item);
       default:
         item.frame.stamps.decoded_ns = ports_.clock();
@@ -136,7 +137,7 @@ class Reader::Source final : private IntakeOut {
     const drivers::Chunk chunk = read();
     arrived(ports_.clock());
     if (!chunk.bytes.empty()) {
-      tape(record::Direction::kFromDevice, chunk.bytes);
+      record_sink(pipeline::Direction::kFromDevice, chunk.bytes);
       device_->decoder->feed(chunk.bytes, arrival_ns_, intake_);
     }
     if (chunk.end) end();
@@ -148,7 +149,7 @@ class Reader::Source final : private IntakeOut {
   drivers::Chunk read() noexcept {
     drivers::Transport& transport = *device_->transport;
     if (transport.poll_fd() < 0) return transport.read(ports_.clock());
-    const AllowedCall the_read;
+    const system::AllowedCall the_read;
     return transport.read(ports_.clock());
   }
 
@@ -172,15 +173,15 @@ class Reader::Source final : private IntakeOut {
     counters_.reader.connected.store(true, std::memory_order_release);
     count(counters_.reader.connections);
     if (device.transport->poll_fd() < 0) return;
-    const AllowedCall the_call;  // once a connection, and nothing flows yet
+    const system::AllowedCall the_call;  // once a connection, and nothing flows yet
     static_cast<void>(poller_.add(device.transport->poll_fd(), stream_));
   }
 
-  // A device without a keeper that is lost has ended.
+  // A device without a supervisor that is lost has ended.
   void give_back() noexcept {
     if (read_.slot == nullptr) return end();
     if (device_->transport->poll_fd() >= 0) {
-      const AllowedCall the_call;
+      const system::AllowedCall the_call;
       poller_.remove(device_->transport->poll_fd());
     }
     poll_due_ns_ = kNoTime_ns;
@@ -188,8 +189,8 @@ class Reader::Source final : private IntakeOut {
     counters_.reader.connected.store(false, std::memory_order_release);
     static_cast<void>(read_.slot->out.push(device_));  // holds more than there are devices
     device_ = nullptr;
-    const AllowedCall the_wake;
-    read_.slot->keeper->ring();
+    const system::AllowedCall the_wake;
+    read_.slot->supervisor->notify();
   }
 
   // The end must be heard: without room it is tried again at the next read.
@@ -212,7 +213,7 @@ class Reader::Source final : private IntakeOut {
     if (!ports_.out->push(item)) return false;
     share_.add();
     half_.add();
-    ports_.pipeline->ring();
+    ports_.pipeline->notify();
     return true;
   }
 
@@ -229,7 +230,7 @@ class Reader::Source final : private IntakeOut {
 
   // What a device can cause at any rate has to fit into its stream's share, too.
   bool push_notice(const Item& item) noexcept {
-    const bool shared = item.notice.event == v1::Event::KIND_CLOCK_JUMPED;
+    const bool shared = item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
     return (!shared || share_is_open()) && put(item);
   }
 
@@ -239,17 +240,17 @@ class Reader::Source final : private IntakeOut {
   }
 
   void tell_calibration() noexcept {
-    tape(record::Direction::kCalibration, std::as_bytes(std::span(calibration_->text)));
+    record_sink(pipeline::Direction::kCalibration, std::as_bytes(std::span(calibration_->text)));
   }
-  void tape(record::Direction direction, std::span<const std::byte> bytes) noexcept {
-    if (ports_.tape == nullptr) return;
-    ports_.tape->chunk(stream_, 0, direction, arrival_ns_, intake_.next(), bytes);
+  void record_sink(pipeline::Direction direction, std::span<const std::byte> bytes) noexcept {
+    if (ports_.record_sink == nullptr) return;
+    ports_.record_sink->chunk(stream_, 0, direction, arrival_ns_, intake_.next(), bytes);
   }
 
   ReadStream read_;
   StreamCounters& counters_;
   const ReaderPorts& ports_;
-  Poller& poller_;
+  system::Poller& poller_;
   std::uint32_t stream_;
   drivers::Device* device_;  // null while it is away
   const drivers::glove::OwnedCalibration* calibration_;

@@ -17,9 +17,9 @@ inline constexpr double kRingDepth_s = 0.5;
   return static_cast<std::size_t>(std::ceil(std::max(items_per_s * kRingDepth_s, 64.0)));
 }
 
-// What notices need beside a stream's frames and samples: they have no share of their own, and one
+// What events need beside a stream's frames and samples: they have no share of their own, and one
 // that answers a command must never be lost.
-inline constexpr std::size_t kNoticeSlots = 128;
+inline constexpr std::size_t kEventSlots = 128;
 
 template <typename T>
 class Ring {

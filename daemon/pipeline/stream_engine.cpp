@@ -66,7 +66,7 @@ void StreamEngine::shed_until(std::uint64_t sequence, std::int64_t time_ns,
                 .stream = options_.stream,
                 .sequence = expected,
                 .count = missing});
-  notice(v1::Event::KIND_SHED, time_ns, expected, static_cast<double>(missing), out);
+  event(v1::Event::KIND_SHED, time_ns, expected, static_cast<double>(missing), out);
   last_sequence_ = sequence - 1;
 }
 
@@ -122,9 +122,9 @@ void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
   const StreamState before = state_;
   state_ = StreamState::kLive;
   if (before == StreamState::kWaiting) {
-    notice(v1::Event::KIND_STARTED, arrival_ns, last_sequence_, 0.0, out);
+    event(v1::Event::KIND_STARTED, arrival_ns, last_sequence_, 0.0, out);
   } else if (before == StreamState::kStale) {
-    notice(v1::Event::KIND_RECOVERED, arrival_ns, last_sequence_, 0.0, out);
+    event(v1::Event::KIND_RECOVERED, arrival_ns, last_sequence_, 0.0, out);
   }
 }
 
@@ -170,7 +170,7 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
   if (!stale) return;
   if (state_ == StreamState::kLive) {
     state_ = StreamState::kStale;
-    notice(v1::Event::KIND_STALE, now_ns, last_sequence_, seconds(now_ns - last_arrival_ns_), out);
+    event(v1::Event::KIND_STALE, now_ns, last_sequence_, seconds(now_ns - last_arrival_ns_), out);
   }
   next_held_ns_ = now_ns + kHeldEvery_ns;
   if (has_pose_ && !(generate_ && generate_->performs())) {
@@ -183,7 +183,7 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
 Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   Ack ack{.ticket = command.ticket, .stream = options_.stream, .sequence = last_sequence_ + 1};
   Decision decision{.stream = options_.stream, .sequence = ack.sequence};
-  Notice told{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
+  StreamEvent told{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
   describe(command, told);
   switch (command.kind) {
     case Command::Kind::kAlpha:
@@ -218,36 +218,36 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   out.decision(decision);
   if (ack.refused) return ack;
   told.sequence = ack.sequence;
-  other_.kind = Item::Kind::kNotice;
-  other_.notice = told;
+  other_.kind = Item::Kind::kEvent;
+  other_.stream_event = told;
   out.item(other_);
   return ack;
 }
 
 // What the command is about to change, for people.
-void StreamEngine::describe(const Command& command, Notice& notice) const noexcept {
+void StreamEngine::describe(const Command& command, StreamEvent& event) const noexcept {
   switch (command.kind) {
     case Command::Kind::kAlpha:
-      notice.alpha_before = alpha_target();
-      notice.value = command.alpha;
+      event.alpha_before = alpha_target();
+      event.value = command.alpha;
       break;
     case Command::Kind::kModel:
-      notice.change = Change::kStyleModel;
-      if (model_ != nullptr) notice.before = ShortText(model_->name);
-      if (command.model != nullptr) notice.after = ShortText(command.model->name);
+      event.change = Change::kStyleModel;
+      if (model_ != nullptr) event.before = ShortText(model_->name);
+      if (command.model != nullptr) event.after = ShortText(command.model->name);
       break;
     case Command::Kind::kGesture:
-      notice.change = Change::kGestureModel;
-      if (gesture() != nullptr) notice.before = ShortText(gesture()->name);
-      if (command.gesture != nullptr) notice.after = ShortText(command.gesture->name);
+      event.change = Change::kGestureModel;
+      if (gesture() != nullptr) event.before = ShortText(gesture()->name);
+      if (command.gesture != nullptr) event.after = ShortText(command.gesture->name);
       break;
     case Command::Kind::kPlay:
-      notice.event = v1::Event::KIND_PLAYING;
-      notice.value = command.play.size;
-      if (gesture() != nullptr) add_labels(gesture()->gesture(), command.play, notice.after);
+      event.kind = v1::Event::KIND_PLAYING;
+      event.value = command.play.size;
+      if (gesture() != nullptr) add_labels(gesture()->gesture(), command.play, event.after);
       break;
     case Command::Kind::kStopPlaying:
-      notice.change = Change::kStopPlaying;
+      event.change = Change::kStopPlaying;
       break;
   }
 }
@@ -260,7 +260,7 @@ void StreamEngine::flush(EngineOut& out) noexcept {
 void StreamEngine::tell_played(std::int64_t time_ns, EngineOut& out) noexcept {
   const bool performed = performs_;
   performs_ = generate_ && generate_->performs();
-  if (performed && !performs_) notice(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);
+  if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);
 }
 
 void StreamEngine::end(std::int64_t now_ns, EngineOut& out) noexcept {
@@ -270,13 +270,13 @@ void StreamEngine::end(std::int64_t now_ns, EngineOut& out) noexcept {
                 .now_ns = now_ns});
   flush(out);
   state_ = StreamState::kEnded;
-  notice(v1::Event::KIND_ENDED, now_ns, last_sequence_, 0.0, out);
+  event(v1::Event::KIND_ENDED, now_ns, last_sequence_, 0.0, out);
 }
 
-void StreamEngine::notice(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence,
-                          double value, EngineOut& out) noexcept {
-  other_.kind = Item::Kind::kNotice;
-  other_.notice = {options_.stream, event, time_ns, sequence, value};
+void StreamEngine::event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence,
+                         double value, EngineOut& out) noexcept {
+  other_.kind = Item::Kind::kEvent;
+  other_.stream_event = {options_.stream, event, time_ns, sequence, value};
   out.item(other_);
 }
 

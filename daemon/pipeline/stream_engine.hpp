@@ -16,7 +16,7 @@
 namespace posed::pipeline {
 
 // Where an engine puts what it made. Items come in the order in which they are published; decisions
-// are what replay must be told (see record::Tape).
+// are what replay must be told (see pipeline::RecordSink).
 class EngineOut {
  public:
   EngineOut() = default;
@@ -32,12 +32,12 @@ struct EngineOptions {
   std::uint32_t stream = 0;
   std::int64_t stale_after_ns = kNanosPerSecond / 2;
   bool publish_raw = false;
-  std::optional<style::FilterOptions> style;        // the stage is there when this is
-  const style::BoundModel* model = nullptr;         // not owned; null passes frames through
-  std::optional<generate::LiveOptions> generate{};  // the stage is there when this is; hands only
-  const generate::BoundModel* gesture = nullptr;    // not owned; null: nothing can be performed
-  bool constrain = false;                           // the stage is there; hands only
-  double rate_hz = 0.0;                             // of the stream; only `generate` needs it
+  std::optional<style::FilterOptions> style;      // the stage is there when this is
+  const style::BoundModel* model = nullptr;       // not owned; null passes frames through
+  std::optional<smooth::LiveOptions> generate{};  // the stage is there when this is; hands only
+  const generate::BoundModel* gesture = nullptr;  // not owned; null: nothing can be performed
+  bool constrain = false;                         // the stage is there; hands only
+  double rate_hz = 0.0;                           // of the stream; only `generate` needs it
   std::shared_ptr<const Skeleton> skeleton{};  // of the stream; `generate` and `constrain` need it
 };
 
@@ -103,9 +103,9 @@ class StreamEngine final : private Emit {
   [[nodiscard]] std::int64_t stale_due_ns() const noexcept;
   [[nodiscard]] std::int64_t generate_due_ns() const noexcept;
   void heard(std::int64_t arrival_ns, EngineOut& out) noexcept;
-  void notice(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
-              EngineOut& out) noexcept;
-  void describe(const Command& command, Notice& notice) const noexcept;
+  void event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
+             EngineOut& out) noexcept;
+  void describe(const Command& command, StreamEvent& event) const noexcept;
 
   EngineOptions options_;
   std::optional<style::StyleFilter> style_;
@@ -125,7 +125,7 @@ class StreamEngine final : private Emit {
   bool performs_ = false;                       // as last told
   bool has_pose_ = false;                       // pose_ holds a pose that went out
   Item pose_;                                   // frames on their way out, and the last pose
-  Item other_;                                  // samples and notices on their way out
+  Item other_;                                  // samples and events on their way out
 };
 
 }  // namespace posed::pipeline

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daemon/pipeline/hot_mark.hpp"
+#include "daemon/system/hot_mark.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
@@ -27,10 +27,10 @@ bool is_pose(const Item& item) noexcept {
 }
 
 // What a device can cause at any rate has to fit into its stream's share of the ring; few other
-// notices ever come at once.
+// events ever come at once.
 bool within_share(const Item& item) noexcept {
-  return item.kind != Item::Kind::kNotice || item.notice.event == v1::Event::KIND_SHED ||
-         item.notice.event == v1::Event::KIND_CLOCK_JUMPED;
+  return item.kind != Item::Kind::kEvent || item.stream_event.kind == v1::Event::KIND_SHED ||
+         item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
 }
 
 }  // namespace
@@ -50,19 +50,19 @@ struct Worker::Lane final : EngineOut {
     outgoing = item;
     if (outgoing.kind == Item::Kind::kFrame) outgoing.frame.stamps.styled_ns = ports.clock();
     if ((within_share(outgoing) && !share.has_room()) || !ports.out->push(outgoing)) {
-      if (ports.tape != nullptr && is_pose(outgoing))
-        ports.tape->unpublished(outgoing.frame.header.stream);
+      if (ports.record_sink != nullptr && is_pose(outgoing))
+        ports.record_sink->unpublished(outgoing.frame.header.stream);
       return count(counters.pipeline.dropped);
     }
     share.add();
-    ports.publisher->ring();
+    ports.publisher->notify();
   }
 
   void decision(const Decision& decision) noexcept override {
-    if (ports.tape == nullptr) return;
+    if (ports.record_sink == nullptr) return;
     placed = decision;
     placed.item = place;
-    ports.tape->decision(placed);
+    ports.record_sink->decision(placed);
   }
 
   // Nothing more comes from the reader: what of the last it decoded is missing was shed.
@@ -112,13 +112,13 @@ struct Worker::Lane final : EngineOut {
 };
 
 Result<std::unique_ptr<Worker>> Worker::open(const WorkerPorts& ports) {
-  auto poller = Poller::open();
+  auto poller = system::Poller::open();
   if (!poller) return std::unexpected(poller.error());
   if (auto added = (*poller)->add(*ports.wake); !added) return std::unexpected(added.error());
   return std::unique_ptr<Worker>(new Worker(ports, std::move(*poller)));
 }
 
-Worker::Worker(const WorkerPorts& ports, std::unique_ptr<Poller> poller)
+Worker::Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller)
     : ports_(ports), poller_(std::move(poller)) {}
 
 Worker::~Worker() = default;
@@ -140,7 +140,7 @@ std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
 
 std::int64_t Worker::next_due_ns(std::int64_t now_ns) const noexcept {
   if (!ports_.in->empty()) return now_ns;
-  std::int64_t due_ns = unsent_count_ > 0 ? now_ns + kAcksAgain_ns : kForever_ns;
+  std::int64_t due_ns = unsent_count_ > 0 ? now_ns + kAcksAgain_ns : system::kForever_ns;
   for (const auto& lane : lanes_) {
     const std::int64_t lane_due_ns = lane->engine.next_tick_ns();
     if (lane_due_ns != kNoTime_ns) due_ns = std::min(due_ns, lane_due_ns);
@@ -159,11 +159,11 @@ void Worker::finish() noexcept {
 }
 
 void Worker::run() noexcept {
-  const HotSection hot;
+  const system::HotSection hot;
   while (!stop_.load(std::memory_order_acquire)) {
     const std::int64_t due_ns = turn(ports_.clock());
     ports_.wake->going_to_sleep();
-    if (idle()) static_cast<void>(poller_->wait(time_left_ns(due_ns, ports_.clock)));
+    if (idle()) static_cast<void>(poller_->wait(system::time_left_ns(due_ns, ports_.clock)));
     ports_.wake->awake();
   }
   finish();
@@ -171,7 +171,7 @@ void Worker::run() noexcept {
 
 void Worker::stop() noexcept {
   stop_.store(true, std::memory_order_release);
-  ports_.wake->ring();
+  ports_.wake->notify();
 }
 
 bool Worker::idle() const noexcept {
@@ -203,7 +203,7 @@ void Worker::acknowledge(const Ack& ack) noexcept {
   if (unsent_count_ > 0 || !ports_.acks->push(ack)) {
     unsent_[unsent_count_++] = ack;
   } else if (ports_.control != nullptr) {
-    ports_.control->ring();
+    ports_.control->notify();
   }
 }
 
@@ -215,7 +215,7 @@ void Worker::send_acks() noexcept {
   std::copy(unsent_.begin() + static_cast<std::ptrdiff_t>(sent),
             unsent_.begin() + static_cast<std::ptrdiff_t>(unsent_count_), unsent_.begin());
   unsent_count_ -= sent;
-  if (ports_.control != nullptr) ports_.control->ring();
+  if (ports_.control != nullptr) ports_.control->notify();
 }
 
 void Worker::take(const Item& item) noexcept {
@@ -234,13 +234,13 @@ void Worker::take(const Item& item) noexcept {
       lane.taken();
       break;
     }
-    case Item::Kind::kNotice: {
-      Lane& lane = *lanes_[item.notice.stream];
-      if (item.notice.event == v1::Event::KIND_ENDED) {
+    case Item::Kind::kEvent: {
+      Lane& lane = *lanes_[item.stream_event.stream];
+      if (item.stream_event.kind == v1::Event::KIND_ENDED) {
         lane.close_gaps();
-        lane.engine.end(item.notice.time_ns, lane);
+        lane.engine.end(item.stream_event.time_ns, lane);
       } else {
-        pass_on(item.notice, lane);
+        pass_on(item.stream_event, lane);
       }
       lane.taken();
       break;
@@ -250,11 +250,11 @@ void Worker::take(const Item& item) noexcept {
 }
 
 // What the reader did between two frames: their order is right here.
-void Worker::pass_on(const Notice& notice, Lane& lane) noexcept {
-  acknowledge({.ticket = notice.ticket, .stream = notice.stream, .sequence = notice.sequence + 1});
+void Worker::pass_on(const StreamEvent& event, Lane& lane) noexcept {
+  acknowledge({.ticket = event.ticket, .stream = event.stream, .sequence = event.sequence + 1});
   Item item;
-  item.kind = Item::Kind::kNotice;
-  item.notice = notice;
+  item.kind = Item::Kind::kEvent;
+  item.stream_event = event;
   lane.item(item);
 }
 

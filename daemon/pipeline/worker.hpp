@@ -12,10 +12,10 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
-#include "daemon/pipeline/wake.hpp"
-#include "daemon/record/tape.hpp"
+#include "daemon/system/event_fd.hpp"
 
 namespace posed::pipeline {
 
@@ -25,10 +25,10 @@ struct WorkerPorts {
   Ring<Item>* out = nullptr;
   Ring<Command>* commands = nullptr;
   Ring<Ack>* acks = nullptr;
-  Wake* wake = nullptr;       // its own
-  Wake* publisher = nullptr;  // rung when there is something in `out`
-  Wake* control = nullptr;    // rung when there is something in `acks`; may be null
-  record::Tape* tape = nullptr;
+  system::EventFd* wake = nullptr;       // its own
+  system::EventFd* publisher = nullptr;  // rung when there is something in `out`
+  system::EventFd* control = nullptr;    // rung when there is something in `acks`; may be null
+  pipeline::RecordSink* record_sink = nullptr;
   Clock clock = nullptr;
 };
 
@@ -57,19 +57,19 @@ class Worker {
 
  private:
   struct Lane;
-  Worker(const WorkerPorts& ports, std::unique_ptr<Poller> poller);
+  Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller);
   void obey() noexcept;
   void take_items(int most) noexcept;
   void take(const Item& item) noexcept;
   void acknowledge(const Ack& ack) noexcept;
   void send_acks() noexcept;
   [[nodiscard]] std::int64_t next_due_ns(std::int64_t now_ns) const noexcept;
-  void pass_on(const Notice& notice, Lane& lane) noexcept;
+  void pass_on(const StreamEvent& event, Lane& lane) noexcept;
   void tick(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool idle() const noexcept;
 
   WorkerPorts ports_;
-  std::unique_ptr<Poller> poller_;
+  std::unique_ptr<system::Poller> poller_;
   std::vector<std::unique_ptr<Lane>> lanes_;
   std::uint64_t place_ = 1;  // number of the item before which a decision made now takes effect
   // Acks that found no room; at most as many as there are commands under way.

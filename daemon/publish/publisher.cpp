@@ -7,11 +7,11 @@
 #include <spdlog/spdlog.h>
 #include <time.h>
 
-#include "daemon/control/gatekeeper.hpp"
-#include "daemon/control/peer_guard.hpp"
-#include "daemon/publish/notice_text.hpp"
-#include "daemon/publish/outlet.hpp"
-#include "daemon/publish/process.hpp"
+#include "daemon/net/peer_guard.hpp"
+#include "daemon/net/zap_authenticator.hpp"
+#include "daemon/publish/event_text.hpp"
+#include "daemon/publish/published_stream.hpp"
+#include "daemon/system/process.hpp"
 
 namespace posed::publish {
 namespace {
@@ -39,8 +39,8 @@ std::int64_t clock_ns(clockid_t clock) {
 }
 
 // What the publisher's thread waits for: new items, and what subscribers say.
-Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake, void* socket) {
-  auto poller = pipeline::Poller::open();
+Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake, void* socket) {
+  auto poller = system::Poller::open();
   if (!poller) return poller;
   int socket_fd = -1;
   std::size_t size = sizeof socket_fd;
@@ -56,7 +56,7 @@ Result<std::unique_ptr<pipeline::Poller>> open_poller(const pipeline::Wake& wake
 }  // namespace
 
 // What other threads asked for or want to know. Cold: never touched by the hot threads.
-struct Publisher::Told {
+struct Publisher::SharedState {
   struct Posted {
     std::uint32_t stream;
     v1::Event::Kind kind;
@@ -79,42 +79,41 @@ int send_high_water_mark(double messages_per_s) {
 
 Result<> set_queue_options(void* socket, double messages_per_s) {
   const int depth = send_high_water_mark(messages_per_s);
-  if (auto set = control::set_option(socket, ZMQ_SNDHWM, depth); !set) return set;
-  return control::set_option(socket, ZMQ_SNDBUF, kSendBuffer);
+  if (auto set = net::set_option(socket, ZMQ_SNDHWM, depth); !set) return set;
+  return net::set_option(socket, ZMQ_SNDBUF, kSendBuffer);
 }
 
 Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
                                                    std::vector<StreamInfo> streams,
                                                    pipeline::Ring<pipeline::Item>& in,
-                                                   pipeline::Wake& wake) {
-  auto socket = control::open_socket(options.context, ZMQ_XPUB);
+                                                   system::EventFd& wake) {
+  auto socket = net::open_socket(options.context, ZMQ_XPUB);
   if (!socket) return std::unexpected(socket.error());
   double messages_per_s = 0.0;
   for (const StreamInfo& stream : streams) messages_per_s += stream.rate_hz * (stream.raw ? 2 : 1);
   if (auto set = set_queue_options(socket->get(), messages_per_s); !set) {
     return std::unexpected(set.error());
   }
-  if (auto set = control::set_option(socket->get(), ZMQ_XPUB_VERBOSER, 1); !set) {
+  if (auto set = net::set_option(socket->get(), ZMQ_XPUB_VERBOSER, 1); !set) {
     return std::unexpected(set.error());
   }
-  if (options.gatekeeper != nullptr) {
-    auto secured =
-        control::secure_server(socket->get(), control::Domain::kPublish, options.secret_z85);
+  if (options.authenticator != nullptr) {
+    auto secured = net::secure_server(socket->get(), net::Domain::kPublish, options.secret_z85);
     if (!secured) return std::unexpected(secured.error());
   }
-  if (auto set = control::set_receive_limits(socket->get(), kLongestPart, kSubscriptionsWaiting,
-                                             kReceiveBuffer_bytes);
+  if (auto set = net::set_receive_limits(socket->get(), kLongestPart, kSubscriptionsWaiting,
+                                         kReceiveBuffer_bytes);
       !set) {
     return std::unexpected(set.error());
   }
-  auto guard = control::PeerGuard::open(options.context, socket->get(),
-                                        {.name = "publish",
-                                         .most_peers = control::peer_shares().publish,
-                                         .most_unheard = kMostUnheard,
-                                         .most_unheard_of_all = kMostUnheardOfAll,
-                                         .gatekeeper = options.gatekeeper});
+  auto guard = net::PeerGuard::open(options.context, socket->get(),
+                                    {.name = "publish",
+                                     .most_peers = net::peer_shares().publish,
+                                     .most_unheard = kMostUnheard,
+                                     .most_unheard_of_all = kMostUnheardOfAll,
+                                     .authenticator = options.authenticator});
   if (!guard) return std::unexpected(guard.error());
-  auto endpoint = control::bind_socket(socket->get(), options.endpoint);
+  auto endpoint = net::bind_socket(socket->get(), options.endpoint);
   if (!endpoint) return std::unexpected(endpoint.error());
   auto poller = open_poller(wake, socket->get());
   if (!poller) return std::unexpected(poller.error());
@@ -124,10 +123,9 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
 }
 
 Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
-                     pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake,
-                     control::Socket socket, std::string endpoint,
-                     std::unique_ptr<pipeline::Poller> poller,
-                     std::unique_ptr<control::PeerGuard> guard)
+                     pipeline::Ring<pipeline::Item>& in, system::EventFd& wake, net::Socket socket,
+                     std::string endpoint, std::unique_ptr<system::Poller> poller,
+                     std::unique_ptr<net::PeerGuard> guard)
     : options_(std::move(options)),
       in_(in),
       wake_(wake),
@@ -136,10 +134,10 @@ Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
       subscriptions_([this](std::string_view prefix) { return is_topic(prefix); }),
       endpoint_(std::move(endpoint)),
       poller_(std::move(poller)),
-      told_(std::make_unique<Told>()) {
+      shared_(std::make_unique<SharedState>()) {
   if (!options_.data_clock) options_.data_clock = options_.clock;
   for (StreamInfo& stream : streams) {
-    outlets_.push_back(std::make_unique<Outlet>(std::move(stream)));
+    published_.push_back(std::make_unique<PublishedStream>(std::move(stream)));
   }
 }
 
@@ -156,18 +154,18 @@ std::int64_t Publisher::turn(std::int64_t now_ns) {
   take_all();
   do_what_was_asked();
   // At the first turn, too: who asks for the status at once is told the streams.
-  if (told_->reported_ns == kNoTime_ns || now_ns >= told_->reported_ns + kNanosPerSecond) {
+  if (shared_->reported_ns == kNoTime_ns || now_ns >= shared_->reported_ns + kNanosPerSecond) {
     every_second(now_ns);
   }
   const bool all_heard = hear_subscriptions(now_ns);
   const std::int64_t skeleton_ns = send_skeletons(now_ns);
   if (!all_heard) return now_ns;
-  return std::min(told_->reported_ns + kNanosPerSecond, skeleton_ns);
+  return std::min(shared_->reported_ns + kNanosPerSecond, skeleton_ns);
 }
 
 void Publisher::finish(std::int64_t now_ns) {
   take_all();
-  for (std::uint32_t i = 0; i < outlets_.size(); ++i) tell_shed(i, true);
+  for (std::uint32_t i = 0; i < published_.size(); ++i) tell_shed(i, true);
   every_second(now_ns);
 }
 
@@ -175,7 +173,7 @@ void Publisher::run() {
   while (!stop_.load(std::memory_order_acquire)) {
     const std::int64_t due_ns = turn(options_.clock());
     wake_.going_to_sleep();
-    if (in_.empty() && !told_->asked.load() && !stop_.load(std::memory_order_acquire)) {
+    if (in_.empty() && !shared_->asked.load() && !stop_.load(std::memory_order_acquire)) {
       static_cast<void>(poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0)));
     }
     wake_.awake();
@@ -185,7 +183,7 @@ void Publisher::run() {
 
 void Publisher::stop() noexcept {
   stop_.store(true, std::memory_order_release);
-  wake_.ring();
+  wake_.notify();
 }
 
 void Publisher::send(std::string_view topic, const google::protobuf::MessageLite& message) {
@@ -193,7 +191,7 @@ void Publisher::send(std::string_view topic, const google::protobuf::MessageLite
   const std::size_t size = message.ByteSizeLong();
   if (zmq_msg_init_size(&body, size) != 0) return;  // out of memory: this message is lost
   message.SerializeWithCachedSizesToArray(static_cast<std::uint8_t*>(zmq_msg_data(&body)));
-  if (!control::send_part(socket_.get(), topic, true) ||
+  if (!net::send_part(socket_.get(), topic, true) ||
       zmq_msg_send(&body, socket_.get(), ZMQ_DONTWAIT) < 0) {
     zmq_msg_close(&body);
   }
@@ -201,61 +199,61 @@ void Publisher::send(std::string_view topic, const google::protobuf::MessageLite
 
 void Publisher::take(const pipeline::Item& item) {
   using Kind = pipeline::Item::Kind;
-  pipeline::count(outlets_[pipeline::stream_of(item)]->info.counters->publisher.taken);
+  pipeline::count(published_[pipeline::stream_of(item)]->info.counters->publisher.taken);
   switch (item.kind) {
     case Kind::kFrame:
     case Kind::kRawFrame:
       take_frame(item.frame, item.kind == Kind::kRawFrame);
       break;
     case Kind::kSample: {
-      Outlet& outlet = *outlets_[item.sample.header.stream];
-      outlet.count_sample();
-      send(outlet.styled.sensor_topic, outlet.styled.samples.encode(item.sample));
+      PublishedStream& published = *published_[item.sample.header.stream];
+      published.count_sample();
+      send(published.styled.sensor_topic, published.styled.samples.encode(item.sample));
       break;
     }
-    case Kind::kNotice:
-      take_notice(item.notice);
+    case Kind::kEvent:
+      take_notice(item.stream_event);
       break;
   }
 }
 
-void Publisher::take_notice(const pipeline::Notice& notice) {
-  const auto kind = static_cast<v1::Event::Kind>(notice.event);
+void Publisher::take_notice(const pipeline::StreamEvent& event) {
+  const auto kind = static_cast<v1::Event::Kind>(event.kind);
   if (kind == v1::Event::KIND_SHED) {
-    outlets_[notice.stream]->shed.add(notice.sequence, static_cast<std::uint64_t>(notice.value));
-    return tell_shed(notice.stream, false);
+    published_[event.stream]->shed.add(event.sequence, static_cast<std::uint64_t>(event.value));
+    return tell_shed(event.stream, false);
   }
-  if (kind == v1::Event::KIND_ENDED) tell_shed(notice.stream, true);
-  send_event(notice.stream, kind, notice.time_ns, notice.sequence, sentence(notice));
+  if (kind == v1::Event::KIND_ENDED) tell_shed(event.stream, true);
+  send_event(event.stream, kind, event.time_ns, event.sequence, sentence(event));
 }
 
 void Publisher::tell_shed(std::uint32_t stream, bool at_end) {
   const std::int64_t now_ns = options_.clock();
-  const auto sum = outlets_[stream]->shed.take(now_ns, at_end);
+  const auto sum = published_[stream]->shed.take(now_ns, at_end);
   if (!sum) return;
   send_event(stream, v1::Event::KIND_SHED, options_.data_clock(), sum->first, sentence(*sum));
 }
 
 void Publisher::take_frame(const Frame& frame, bool raw) {
   const std::uint32_t stream = frame.header.stream;
-  Outlet& outlet = *outlets_[stream];
-  Channel& channel = raw ? *outlet.raw : outlet.styled;
+  PublishedStream& published = *published_[stream];
+  Channel& channel = raw ? *published.raw : published.styled;
   const v1::Frame& bare = channel.frames.encode(frame);
-  if (options_.tape != nullptr && options_.tape->wants_published()) {
+  if (options_.record_sink != nullptr && options_.record_sink->wants_published()) {
     bare.SerializeToString(&scratch_);
-    options_.tape->published(stream, frame.header.sequence, raw,
-                             std::as_bytes(std::span(scratch_)));
+    options_.record_sink->published(stream, frame.header.sequence, raw,
+                                    std::as_bytes(std::span(scratch_)));
   }
   StageStamps stamps = frame.stamps;
   if (options_.stamps) stamps.published_ns = options_.data_clock();
   send(channel.pose_topic, channel.frames.stamp(stamps));
-  if (!raw) outlet.count(frame, stamps);
+  if (!raw) published.count(frame, stamps);
 }
 
 void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
                            std::uint64_t sequence, const std::string& text) {
   v1::Event event;
-  event.set_stream(outlets_[stream]->info.name);
+  event.set_stream(published_[stream]->info.name);
   event.set_kind(kind);
   event.set_time_ns(time_ns);
   event.set_sequence(sequence);
@@ -264,17 +262,17 @@ void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int6
                    kind == v1::Event::KIND_LOST || kind == v1::Event::KIND_CLOCK_JUMPED ||
                    (kind >= v1::Event::KIND_RECORDING_GAP && kind <= v1::Event::KIND_WARNING);
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "{}: {}", event.stream(), text);
-  send(outlets_[stream]->styled.event_topic, event);
+  send(published_[stream]->styled.event_topic, event);
 }
 
 // A subscription message is one byte, 1 for coming and 0 for going, then the topic's beginning.
 bool Publisher::hear_subscriptions(std::int64_t now_ns) {
   for (const int peer : guard_->take_gone()) subscriptions_.forget(peer);
-  control::Message message;
+  net::Message message;
   for (int i = 0; i < kSubscriptionsATurn; ++i) {
     if (!message.receive(socket_.get())) return true;
     const std::string_view text = message.text();
-    const int peer = control::source_of(message);
+    const int peer = net::source_of(message);
     if (!guard_->knows(peer)) continue;  // gone meanwhile, or libzmq says what went with it
     guard_->heard(peer, message.property("User-Id"));
     if (text.empty() || static_cast<unsigned char>(text.front()) > 1) {
@@ -294,8 +292,8 @@ bool Publisher::is_topic(std::string_view prefix) const {
     return channel.pose_topic.starts_with(prefix) || channel.skeleton_topic.starts_with(prefix) ||
            channel.sensor_topic.starts_with(prefix) || channel.event_topic.starts_with(prefix);
   };
-  return std::ranges::any_of(outlets_, [&](const auto& outlet) {
-    return begins_one_of(outlet->styled) || (outlet->raw && begins_one_of(*outlet->raw));
+  return std::ranges::any_of(published_, [&](const auto& published) {
+    return begins_one_of(published->styled) || (published->raw && begins_one_of(*published->raw));
   });
 }
 
@@ -306,14 +304,14 @@ void Publisher::want_skeletons(std::string_view prefix) {
     channel.skeleton_due_ns =
         std::min(channel.skeleton_due_ns, channel.skeleton_sent_ns + kSkeletonPause_ns);
   };
-  for (const auto& outlet : outlets_) {
-    want(outlet->styled);
-    if (outlet->raw) want(*outlet->raw);
+  for (const auto& published : published_) {
+    want(published->styled);
+    if (published->raw) want(*published->raw);
   }
 }
 
 std::int64_t Publisher::send_skeletons(std::int64_t now_ns) {
-  std::int64_t next_ns = pipeline::kForever_ns;
+  std::int64_t next_ns = system::kForever_ns;
   const auto send_one = [&](Channel& channel) {
     if (!channel.skeleton) return;
     if (now_ns >= channel.skeleton_due_ns) {
@@ -323,86 +321,86 @@ std::int64_t Publisher::send_skeletons(std::int64_t now_ns) {
     }
     next_ns = std::min(next_ns, channel.skeleton_due_ns);
   };
-  for (const auto& outlet : outlets_) {
-    send_one(outlet->styled);
-    if (outlet->raw) send_one(*outlet->raw);
+  for (const auto& published : published_) {
+    send_one(published->styled);
+    if (published->raw) send_one(*published->raw);
   }
   return next_ns;
 }
 
 void Publisher::every_second(std::int64_t now_ns) {
-  const bool first = told_->reported_ns == kNoTime_ns;
-  const double since_s = first ? 0.0 : seconds(now_ns - told_->reported_ns);
-  const std::int64_t cpu_ns = cpu_time_ns();
-  if (first) told_->cpu_ns = cpu_ns;
+  const bool first = shared_->reported_ns == kNoTime_ns;
+  const double since_s = first ? 0.0 : seconds(now_ns - shared_->reported_ns);
+  const std::int64_t cpu_ns = system::cpu_time_ns();
+  if (first) shared_->cpu_ns = cpu_ns;
   v1::Stats stats;
   const std::int64_t data_ns = options_.data_clock();
   stats.set_time_ns(data_ns);
   stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - data_ns);
-  stats.set_rss_bytes(resident_bytes());
+  stats.set_rss_bytes(system::resident_bytes());
   stats.set_cpu_percent(
-      static_cast<float>(100.0 * seconds(cpu_ns - told_->cpu_ns) / std::max(since_s, 1e-3)));
-  for (std::uint32_t i = 0; i < outlets_.size(); ++i) {
-    outlets_[i]->report(*stats.add_stream(), since_s);
+      static_cast<float>(100.0 * seconds(cpu_ns - shared_->cpu_ns) / std::max(since_s, 1e-3)));
+  for (std::uint32_t i = 0; i < published_.size(); ++i) {
+    published_[i]->report(*stats.add_stream(), since_s);
     tell_shed(i, false);
   }
   if (options_.more_stats) options_.more_stats(stats);
-  told_->reported_ns = now_ns;
-  told_->cpu_ns = cpu_ns;
+  shared_->reported_ns = now_ns;
+  shared_->cpu_ns = cpu_ns;
   send("stats", stats);
-  const std::scoped_lock lock(told_->mutex);
-  told_->stats = std::move(stats);
+  const std::scoped_lock lock(shared_->mutex);
+  shared_->stats = std::move(stats);
 }
 
 void Publisher::do_what_was_asked() {
-  if (!told_->asked.exchange(false)) return;
-  std::vector<Told::Posted> events;
+  if (!shared_->asked.exchange(false)) return;
+  std::vector<SharedState::Posted> events;
   bool check = false;
   {
-    const std::scoped_lock lock(told_->mutex);
-    events.swap(told_->events);
-    check = std::exchange(told_->check, false);
+    const std::scoped_lock lock(shared_->mutex);
+    events.swap(shared_->events);
+    check = std::exchange(shared_->check, false);
   }
-  for (const Told::Posted& event : events) {
+  for (const SharedState::Posted& event : events) {
     send_event(event.stream, event.kind, options_.data_clock(), 0, event.text);
   }
-  if (!check || options_.gatekeeper == nullptr) return;
+  if (!check || options_.authenticator == nullptr) return;
   guard_->cut_unless([this](std::string_view user) {
-    return options_.gatekeeper->allows(user, control::Domain::kPublish);
+    return options_.authenticator->allows(user, net::Domain::kPublish);
   });
 }
 
 template <typename Change>
 void Publisher::ask(Change&& change) {
   {
-    const std::scoped_lock lock(told_->mutex);
-    change(*told_);
+    const std::scoped_lock lock(shared_->mutex);
+    change(*shared_);
   }
-  told_->asked.store(true);
-  wake_.ring();
+  shared_->asked.store(true);
+  wake_.notify();
 }
 
 void Publisher::set_model_name(std::uint32_t stream, std::string name) {
-  outlets_[stream]->set_model(std::move(name));
+  published_[stream]->set_model(std::move(name));
 }
 
 void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {
-  ask([&](Told& told) { told.events.push_back({stream, kind, std::move(text)}); });
+  ask([&](SharedState& told) { told.events.push_back({stream, kind, std::move(text)}); });
 }
 
 void Publisher::check_subscribers() {
-  ask([](Told& told) { told.check = true; });
+  ask([](SharedState& told) { told.check = true; });
 }
 
 v1::Stats Publisher::stats() const {
   v1::Stats stats;
   {
-    const std::scoped_lock lock(told_->mutex);
-    stats = told_->stats;
+    const std::scoped_lock lock(shared_->mutex);
+    stats = shared_->stats;
   }
-  for (int i = 0; i < static_cast<int>(outlets_.size()); ++i) {
+  for (int i = 0; i < static_cast<int>(published_.size()); ++i) {
     if (i == stats.stream_size()) stats.add_stream();  // nothing has been reported yet
-    outlets_[static_cast<std::size_t>(i)]->fill(*stats.mutable_stream(i));
+    published_[static_cast<std::size_t>(i)]->fill(*stats.mutable_stream(i));
   }
   stats.set_time_ns(options_.data_clock());
   if (options_.more_stats) options_.more_stats(stats);

@@ -12,22 +12,22 @@
 #include <string>
 #include <vector>
 
-#include "daemon/control/zmq_handle.hpp"
 #include "daemon/devices/present_device.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
-#include "daemon/pipeline/wake.hpp"
 #include "daemon/publish/subscriptions.hpp"
-#include "daemon/record/tape.hpp"
+#include "daemon/system/event_fd.hpp"
 #include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
 
-namespace posed::control {
-class Gatekeeper;
+namespace posed::net {
+class ZapAuthenticator;
 class PeerGuard;
-}  // namespace posed::control
+}  // namespace posed::net
 
 namespace posed::publish {
 
@@ -46,11 +46,11 @@ struct PublisherOptions {
   void* context = nullptr;  // ZeroMQ's; outlives the publisher
   std::string endpoint;
   // Asked about every subscriber; null (in tests): nobody is asked, and old ZMTP is spoken, too.
-  control::Gatekeeper* gatekeeper = nullptr;
-  std::string secret_z85;                      // the server's key; empty: no CURVE
-  std::function<void(v1::Stats&)> more_stats;  // adds what others know (recorder); may be empty
-  record::Tape* tape = nullptr;                // null: nothing is recorded
-  Clock clock = nullptr;                       // the host's: paces what is said every second
+  net::ZapAuthenticator* authenticator = nullptr;
+  std::string secret_z85;                       // the server's key; empty: no CURVE
+  std::function<void(v1::Stats&)> more_stats;   // adds what others know (recorder); may be empty
+  pipeline::RecordSink* record_sink = nullptr;  // null: nothing is recorded
+  Clock clock = nullptr;                        // the host's: paces what is said every second
   // The clock of what is published: frames', events' and stats' own times. Empty: `clock`. A replay
   // publishes on the clock of its recording.
   std::function<std::int64_t()> data_clock{};
@@ -62,7 +62,7 @@ struct PublisherOptions {
 // That depth, and a small kernel buffer behind it. Before bind.
 [[nodiscard]] Result<> set_queue_options(void* socket, double messages_per_s);
 
-class Outlet;
+class PublishedStream;
 
 class Publisher {
  public:
@@ -70,7 +70,7 @@ class Publisher {
   [[nodiscard]] static Result<std::unique_ptr<Publisher>> open(PublisherOptions options,
                                                                std::vector<StreamInfo> streams,
                                                                pipeline::Ring<pipeline::Item>& in,
-                                                               pipeline::Wake& wake);
+                                                               system::EventFd& wake);
   ~Publisher();
 
   [[nodiscard]] const std::string& endpoint() const noexcept;  // really bound
@@ -88,21 +88,21 @@ class Publisher {
   void set_model_name(std::uint32_t stream, std::string name);
   // Says something a person should know on event/<stream>.
   void post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text);
-  // Cuts off who is not allowed any more (a key was withdrawn); needs a gatekeeper.
+  // Cuts off who is not allowed any more (a key was withdrawn); needs an authenticator.
   void check_subscribers();
   // Rates and percentiles are the last full second's; all else is so at this moment.
   [[nodiscard]] v1::Stats stats() const;
 
  private:
-  struct Told;
+  struct SharedState;
   Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
-            pipeline::Ring<pipeline::Item>& in, pipeline::Wake& wake, control::Socket socket,
-            std::string endpoint, std::unique_ptr<pipeline::Poller> poller,
-            std::unique_ptr<control::PeerGuard> guard);
+            pipeline::Ring<pipeline::Item>& in, system::EventFd& wake, net::Socket socket,
+            std::string endpoint, std::unique_ptr<system::Poller> poller,
+            std::unique_ptr<net::PeerGuard> guard);
   void take_all();
   void take(const pipeline::Item& item);
   void take_frame(const Frame& frame, bool raw);
-  void take_notice(const pipeline::Notice& notice);
+  void take_notice(const pipeline::StreamEvent& event);
   void tell_shed(std::uint32_t stream, bool at_end);
   void send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
                   std::uint64_t sequence, const std::string& text);
@@ -120,14 +120,14 @@ class Publisher {
 
   PublisherOptions options_;
   pipeline::Ring<pipeline::Item>& in_;
-  pipeline::Wake& wake_;
-  control::Socket socket_;
-  std::unique_ptr<control::PeerGuard> guard_;
+  system::EventFd& wake_;
+  net::Socket socket_;
+  std::unique_ptr<net::PeerGuard> guard_;
   Subscriptions subscriptions_;
   std::string endpoint_;
-  std::unique_ptr<pipeline::Poller> poller_;
-  std::vector<std::unique_ptr<Outlet>> outlets_;
-  std::unique_ptr<Told> told_;
+  std::unique_ptr<system::Poller> poller_;
+  std::vector<std::unique_ptr<PublishedStream>> published_;
+  std::unique_ptr<SharedState> shared_;
   std::string scratch_;
   std::atomic<bool> stop_{false};
 };

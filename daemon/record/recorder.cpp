@@ -75,9 +75,9 @@ Result<std::string> keep(log::Writer& writer, std::span<const std::byte> bytes) 
 
 }  // namespace
 
-RecordedStream recorded_stream(const pipeline::OpenStream& stream) {
+RecordedStream recorded_stream(const devices::OpenStream& stream) {
   const drivers::Description& description = stream.device.description;
-  const pipeline::StreamConfig& config = stream.config;
+  const config::StreamConfig& config = stream.config;
   const auto style = std::as_bytes(std::span(stream.model_file));
   const auto gesture = std::as_bytes(std::span(stream.gesture_file));
   RecordedStream recorded{
@@ -90,7 +90,7 @@ RecordedStream recorded_stream(const pipeline::OpenStream& stream) {
       .settings = {.publish_raw = config.publish_raw,
                    .stale_after_s = config.stale_after_s,
                    .rate_hz = description.rate_hz,
-                   .constrain = pipeline::bind_constrain(stream).value_or(false)},
+                   .constrain = devices::bind_constrain(stream).value_or(false)},
       .style = {style.begin(), style.end()},
       .gesture = {gesture.begin(), gesture.end()}};
   if (config.style) {
@@ -141,7 +141,7 @@ Recorder::Recorder(RecorderOptions options, const std::vector<RecordedStream>& s
                    log::Writer writer)
     : options_(std::move(options)),
       rings_(ring_shares(streams, options_.frames)),
-      scribe_(rings_, std::move(writer), options_.file, options_.tell),
+      log_writer_(rings_, std::move(writer), options_.file, options_.tell),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 Recorder::~Recorder() = default;
@@ -149,7 +149,7 @@ Recorder::~Recorder() = default;
 void Recorder::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    scribe_.turn(options_.clock());
+    log_writer_.turn(options_.clock());
     wake_.wait_for(lock, stop, kWakeEvery, [] { return false; });
   }
 }
@@ -157,7 +157,7 @@ void Recorder::run(const std::stop_token& stop) {
 Result<> Recorder::finish() {
   thread_.request_stop();
   thread_.join();
-  return scribe_.finish(options_.clock());
+  return log_writer_.finish(options_.clock());
 }
 
 }  // namespace posed::record

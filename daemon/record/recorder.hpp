@@ -1,5 +1,5 @@
 // Recorder: the thread that writes the device log. It wakes by its own timer, so the hot threads
-// only ever touch the rings behind tape(). Cold.
+// only ever touch the rings behind record_sink(). Cold.
 #pragma once
 
 #include <condition_variable>
@@ -12,11 +12,11 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/pipeline/open_stream.hpp"
-#include "daemon/record/scribe.hpp"
+#include "daemon/devices/open_stream.hpp"
+#include "daemon/pipeline/record_sink.hpp"
+#include "daemon/record/log_writer_loop.hpp"
+#include "daemon/record/record_rings.hpp"
 #include "daemon/record/stream_settings.hpp"
-#include "daemon/record/tape.hpp"
-#include "daemon/record/tape_rings.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/log/rows.hpp"
@@ -31,7 +31,7 @@ struct RecordedStream {
   std::vector<std::byte> gesture{};  // the same of the gesture model
 };
 // An opened stream, as a recorder needs it.
-[[nodiscard]] RecordedStream recorded_stream(const pipeline::OpenStream& stream);
+[[nodiscard]] RecordedStream recorded_stream(const devices::OpenStream& stream);
 
 struct RecorderOptions {
   std::filesystem::path file;
@@ -41,7 +41,7 @@ struct RecorderOptions {
   std::string publish_endpoint;  // where it published; replay does, too
   Clock clock = nullptr;         // CLOCK_MONOTONIC
   // Called from the recorder thread.
-  std::function<void(const Notice&)> tell = [](const Notice&) {};
+  std::function<void(const RecorderEvent&)> tell = [](const RecorderEvent&) {};
 };
 
 // Makes the log and writes what stands in it before the first chunk, committed.
@@ -57,15 +57,15 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
   ~Recorder();
 
-  [[nodiscard]] Tape& tape() noexcept { return rings_; }
+  [[nodiscard]] pipeline::RecordSink& record_sink() noexcept { return rings_; }
 
   // Stops the thread, writes the rest and leaves one file. Call once, after every thread that uses
-  // tape() has ended.
+  // record_sink() has ended.
   [[nodiscard]] Result<> finish();
 
   // Any thread.
-  [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return scribe_.lost_chunks(); }
-  [[nodiscard]] std::uint64_t errors() const noexcept { return scribe_.errors(); }
+  [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return log_writer_.lost_chunks(); }
+  [[nodiscard]] std::uint64_t errors() const noexcept { return log_writer_.errors(); }
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }
 
  private:
@@ -73,8 +73,8 @@ class Recorder {
   void run(const std::stop_token& stop);
 
   RecorderOptions options_;
-  TapeRings rings_;
-  Scribe scribe_;
+  RecordRings rings_;
+  LogWriterLoop log_writer_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
   std::jthread thread_;  // last: uses all the others

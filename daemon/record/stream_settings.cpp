@@ -18,7 +18,7 @@ bool sound(const StreamSettings& settings) {
   constexpr double kMost = 1e6;  // seconds, Hz, per second: far beyond sense, far below overflow
   const auto within = [](double value) { return value >= -kMost && value <= kMost; };
   const style::FilterOptions style = settings.style.value_or(style::FilterOptions{});
-  const generate::LiveOptions live = settings.generate.value_or(generate::LiveOptions{});
+  const smooth::LiveOptions live = settings.generate.value_or(smooth::LiveOptions{});
   return settings.stale_after_s > 0.0 && within(settings.stale_after_s) &&
          within(settings.rate_hz) && within(style.alpha) && within(style.alpha_slew_per_s) &&
          within(style.gate_fallback) && live.lag.frames >= 0 && live.lag.frames <= 1000 &&
@@ -45,7 +45,7 @@ style::FilterOptions style_of(const Json& parameters) {
           .calibrate = parameters.at("calibrate").get<bool>()};
 }
 
-generate::LiveOptions generate_of(const Json& parameters) {
+smooth::LiveOptions generate_of(const Json& parameters) {
   return {.lag = {.frames = parameters.at("lag_frames").get<int>(),
                   .seconds = parameters.at("lag_s").get<double>()},
           .noise_rad = parameters.at("noise_rad").get<double>()};

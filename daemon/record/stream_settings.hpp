@@ -7,7 +7,7 @@
 #include <string>
 
 #include "drivers/driver.hpp"
-#include "models/generate/live_options.hpp"
+#include "models/smooth/live_options.hpp"
 #include "models/style/style_filter.hpp"
 #include "proto/frame/result.hpp"
 
@@ -25,7 +25,7 @@ struct StreamSettings {
   double rate_hz = 0.0;                         // the device's nominal rate; 0 unknown
   std::optional<style::FilterOptions> style{};  // the style stage is there when this is
   StageModel style_model{};
-  std::optional<generate::LiveOptions> generate{};  // the generate stage is there when this is
+  std::optional<smooth::LiveOptions> generate{};  // the generate stage is there when this is
   StageModel gesture_model{};
   bool constrain = false;  // the constrain stage is there
 };

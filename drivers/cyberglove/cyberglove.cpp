@@ -4,14 +4,14 @@
 #include <cmath>
 
 #include "drivers/cyberglove/decoder.hpp"
+#include "drivers/cyberglove/device_info.hpp"
 #include "drivers/cyberglove/emulator.hpp"
-#include "drivers/cyberglove/greeting.hpp"
 #include "drivers/cyberglove/start.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
@@ -36,55 +36,56 @@ Result<std::size_t> choice(const Options& options, const std::string& name,
 
 // The III's frames: 30 a second, times a multiplier of at most 3 (the maker verified 100 Hz), or
 // one in every few.
-void set_frames(double rate_hz, Wish& wish) {
+void set_frames(double rate_hz, RequestedConfig& requested) {
   const double frames = rate_hz > 0.0 ? rate_hz / kFrames_hz : 3.0;
-  wish.layout.multiplier = static_cast<int>(std::clamp(std::round(frames), 1.0, 3.0));
-  wish.divider = static_cast<int>(std::clamp(std::round(1.0 / std::min(frames, 1.0)), 1.0, 255.0));
+  requested.layout.multiplier = static_cast<int>(std::clamp(std::round(frames), 1.0, 3.0));
+  requested.divider =
+      static_cast<int>(std::clamp(std::round(1.0 / std::min(frames, 1.0)), 1.0, 255.0));
 }
 
-std::int64_t ticks_of(const Wish& wish) {
-  if (wish.layout.form == Form::k8Bit) return wish.period.ticks();
-  return kTicksAFrame * wish.divider / wish.layout.multiplier;
+std::int64_t ticks_of(const RequestedConfig& requested) {
+  if (requested.layout.form == Form::k8Bit) return requested.period.ticks();
+  return kTicksAFrame * requested.divider / requested.layout.multiplier;
 }
 
-Result<Wish> wish_of(const Options& options) {
+Result<RequestedConfig> requested_config(const Options& options) {
   const auto hand = glove::hand_option(options);
   if (!hand) return std::unexpected(hand.error());
   const auto form = choice(options, "form", kForms);
   if (!form) return std::unexpected(form.error());
   const auto mode = choice(options, "mode", kModes);
   if (!mode) return std::unexpected(mode.error());
-  Wish wish{.hand = *hand,
-            .sensors = static_cast<int>(option<std::int64_t>(options, "sensors")),
-            .layout = {.form = static_cast<Form>(*form),
-                       .mode = static_cast<Mode>(*mode),
-                       .mask = kMask22,
-                       .time = option<bool>(options, "time"),
-                       .multiplier = 1},
-            .filter = option<bool>(options, "filter"),
-            .period = {},
-            .over_tcp = option<std::string>(options, "link") == "tcp",
-            .baud = option<std::int64_t>(options, "baud")};
-  if (wish.sensors == 18) wish.layout.mask = kMask18;
+  RequestedConfig requested{.hand = *hand,
+                            .sensors = static_cast<int>(option<std::int64_t>(options, "sensors")),
+                            .layout = {.form = static_cast<Form>(*form),
+                                       .mode = static_cast<Mode>(*mode),
+                                       .mask = kMask22,
+                                       .time = option<bool>(options, "time"),
+                                       .multiplier = 1},
+                            .filter = option<bool>(options, "filter"),
+                            .period = {},
+                            .over_tcp = option<std::string>(options, "link") == "tcp",
+                            .baud = option<std::int64_t>(options, "baud")};
+  if (requested.sensors == 18) requested.layout.mask = kMask18;
   const auto rate_hz = option<double>(options, "rate_hz");
   if (!(rate_hz >= 0.0 && rate_hz <= kMaxRate_hz) || (rate_hz > 0.0 && rate_hz < 1.0)) {
     return misuse("rate_hz should be 1 to 1000, or 0 for as fast as the glove can");
   }
-  if (wish.layout.mode == Mode::kPoll && rate_hz == 0.0) {
+  if (requested.layout.mode == Mode::kPoll && rate_hz == 0.0) {
     return misuse("a polled glove needs a rate_hz above 0");
   }
-  if (wish.layout.mode == Mode::kSync && wish.layout.form == Form::k16Bit) {
+  if (requested.layout.mode == Mode::kSync && requested.layout.form == Form::k16Bit) {
     return misuse("mode = \"sync\" goes with form = \"8bit\" only");
   }
-  wish.period = period_of(rate_hz);
-  if (wish.layout.form == Form::k16Bit) set_frames(rate_hz, wish);
-  return wish;
+  requested.period = period_of(rate_hz);
+  if (requested.layout.form == Form::k16Bit) set_frames(rate_hz, requested);
+  return requested;
 }
 
-Result<Wish> wish_of_given(const Options& given) {
+Result<RequestedConfig> requested_config_of_given(const Options& given) {
   const auto options = complete_options(cyberglove_driver(), given);
   if (!options) return std::unexpected(options.error());
-  return wish_of(*options);
+  return requested_config(*options);
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
@@ -105,11 +106,12 @@ Result<Description> describe(const std::string& text, const std::string& identit
 Result<Description> expect(const Options& given) {
   const auto options = complete_options(cyberglove_driver(), given);
   if (!options) return std::unexpected(options.error());
-  const auto wish = wish_of(*options);
-  if (!wish) return std::unexpected(wish.error());
+  const auto requested = requested_config(*options);
+  if (!requested) return std::unexpected(requested.error());
   if (auto sound = glove::check_connection(*options); !sound) return std::unexpected(sound.error());
   return describe(
-      greeting_of({.hand = wish->hand, .layout = wish->layout, .ticks = ticks_of(*wish)}),
+      greeting_of(
+          {.hand = requested->hand, .layout = requested->layout, .ticks = ticks_of(*requested)}),
       option<std::string>(*options, "id"));
 }
 
@@ -134,30 +136,30 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
                                     glove->layout);
 }
 
-Poll poll_of(const Wish& wish) {
-  if (wish.layout.mode != Mode::kPoll) return {};
-  const std::string_view request = wish.layout.form == Form::k8Bit ? "G" : "1G";
+Poll poll_of(const RequestedConfig& requested) {
+  if (requested.layout.mode != Mode::kPoll) return {};
+  const std::string_view request = requested.layout.form == Form::k8Bit ? "G" : "1G";
   const auto bytes = std::as_bytes(std::span(request));
   return {.request = {bytes.begin(), bytes.end()},
-          .period_ns = std::llround(1e9 * static_cast<double>(ticks_of(wish)) / kTicks_hz)};
+          .period_ns = std::llround(1e9 * static_cast<double>(ticks_of(requested)) / kTicks_hz)};
 }
 
-Result<Device> open(const Options& given, Ports& ports) {
+Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(cyberglove_driver(), given);
   if (!options) return std::unexpected(options.error());
-  const auto wish = wish_of(*options);
-  if (!wish) return std::unexpected(wish.error());
+  const auto requested = requested_config(*options);
+  if (!requested) return std::unexpected(requested.error());
   auto link = glove::connect(*options, ports, {kFtdi});
   if (!link) return std::unexpected(link.error());
-  const auto layout = start(*link, *wish);
+  const auto layout = start(*link, *requested);
   if (!layout) return std::unexpected(layout.error());
-  auto device =
-      make_device(cyberglove_driver(),
-                  greeting_of({.hand = wish->hand, .layout = *layout, .ticks = ticks_of(*wish)}),
-                  link->identity());
+  auto device = make_device(
+      cyberglove_driver(),
+      greeting_of({.hand = requested->hand, .layout = *layout, .ticks = ticks_of(*requested)}),
+      link->identity());
   if (!device) return device;
   device->transport = make_link_transport(std::move(*link));
-  device->poll = poll_of(*wish);
+  device->poll = poll_of(*requested);
   device->reopen_after_s = kSilence_s;
   return device;
 }
@@ -165,9 +167,9 @@ Result<Device> open(const Options& given, Ports& ports) {
 // The motors shake; they cannot hold a finger. So a force is a finger's strength of shaking, and a
 // vibration, which would have to be ended by us after its time, is refused.
 Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptics& haptics) {
-  const auto wish = wish_of_given(given);
-  if (!wish) return std::unexpected(wish.error());
-  if (wish->layout.form == Form::k16Bit) return misuse("CyberTouch goes with form = \"8bit\"");
+  const auto requested = requested_config_of_given(given);
+  if (!requested) return std::unexpected(requested.error());
+  if (requested->layout.form == Form::k16Bit) return misuse("CyberTouch goes with form = \"8bit\"");
   if (haptics.vibration_s != 0.0F) {
     return misuse("a CyberTouch shakes until it is told otherwise: send forces, 0 to end them");
   }
@@ -184,12 +186,12 @@ Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptic
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
-  const auto wish = wish_of_given(given);
-  if (!wish) return std::unexpected(wish.error());
-  const bool is_iii = wish->layout.form == Form::k16Bit;
+  const auto requested = requested_config_of_given(given);
+  if (!requested) return std::unexpected(requested.error());
+  const bool is_iii = requested->layout.form == Form::k16Bit;
   return CyberGloveEmulator::make(
-      {.hand = wish->hand,
-       .mask = wish->layout.mask,
+      {.hand = requested->hand,
+       .mask = requested->layout.mask,
        .level_one = is_iii,
        .info = is_iii ? "CyberGlove III, Version 3.0" : "CyberGlove II, Version 2.1"});
 }

@@ -10,10 +10,10 @@
 #include "drivers/described/protocol.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
-#include "drivers/glove/greeting.hpp"
+#include "drivers/glove/device_info.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
@@ -128,7 +128,7 @@ bool has_packet(const Table& table, std::span<const std::byte> bytes) {
 
 // Stops what it sends, starts it, and waits for the first packet that fits the description: with a
 // wrong baud rate or another device on the port none does.
-Result<> start(const Table& table, Link& link) {
+Result<> start(const Table& table, Connection& link) {
   if (!table.link.stop.empty()) {
     if (auto ok = link.write(table.link.stop); !ok) return ok;
     if (auto ok = link.drain(kQuiet); !ok) return ok;
@@ -153,7 +153,7 @@ Result<> start(const Table& table, Link& link) {
               link.name());
 }
 
-Result<Link> connect(const Chosen& chosen, Ports& ports) {
+Result<Connection> connect(const Chosen& chosen, TransportFactory& ports) {
   const LinkRule& rule = chosen.table.link;
   if (rule.kind != LinkKind::kHid) {
     return glove::connect(chosen.options, ports, rule.usb_ids);
@@ -165,7 +165,7 @@ Result<Link> connect(const Chosen& chosen, Ports& ports) {
                     .path = option<std::string>(chosen.options, "port")});
 }
 
-Result<Device> open(const Options& given, Ports& ports) {
+Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto chosen = choose(given);
   if (!chosen) return std::unexpected(chosen.error());
   auto link = connect(*chosen, ports);

@@ -25,12 +25,12 @@ constexpr std::int64_t kMaxBaud = 4'000'000;
 constexpr double kMaxRate_hz = 1000.0;
 
 void read_usb_ids(TomlReader& toml, const toml::table& link, LinkRule& rule) {
-  const auto blame = [&] {
-    toml.blame(link,
-               "USB ids are written as vendor = 0x1234 and product = 0x5678, or for a serial "
-               "port as usb_ids = [0x12345678]: vendor and product in one number");
+  const auto add_error = [&] {
+    toml.add_error(link,
+                   "USB ids are written as vendor = 0x1234 and product = 0x5678, or for a serial "
+                   "port as usb_ids = [0x12345678]: vendor and product in one number");
   };
-  if (link.contains("vendor") != link.contains("product")) blame();
+  if (link.contains("vendor") != link.contains("product")) add_error();
   if (link.contains("vendor")) {
     const auto vendor = toml.whole(link, "vendor", 0, 0, 0xFFFF);
     const auto product = toml.whole(link, "product", 0, 0, 0xFFFF);
@@ -39,17 +39,18 @@ void read_usb_ids(TomlReader& toml, const toml::table& link, LinkRule& rule) {
   const toml::node* const more = link.get("usb_ids");
   if (more == nullptr) return;
   const toml::array* const list = more->as_array();
-  if (list == nullptr || list->size() > kMaxUsbIds) return blame();
+  if (list == nullptr || list->size() > kMaxUsbIds) return add_error();
   for (const toml::node& id : *list) {
     const auto value = id.value<std::int64_t>();
-    if (!value || *value < 0 || *value > 0xFFFFFFFF) return blame();
+    if (!value || *value < 0 || *value > 0xFFFFFFFF) return add_error();
     rule.usb_ids.push_back(static_cast<std::uint32_t>(*value));
   }
 }
 
 void read_link(TomlReader& toml, const toml::table& device, LinkRule& rule) {
   const toml::table* const link = toml.table(device, "link");
-  if (link == nullptr) return toml.blame(device, "a device needs its [link]: kind = \"serial\"");
+  if (link == nullptr)
+    return toml.add_error(device, "a device needs its [link]: kind = \"serial\"");
   toml.allow(*link, "[link]", kLinkKeys);
   rule.kind = static_cast<LinkKind>(toml.word(*link, "kind", kLinks, 0));
   rule.baud = static_cast<int>(toml.whole(*link, "baud", rule.baud, 1, kMaxBaud));
@@ -59,21 +60,21 @@ void read_link(TomlReader& toml, const toml::table& device, LinkRule& rule) {
   read_usb_ids(toml, *link, rule);
   const bool hid = rule.kind == LinkKind::kHid;
   if (hid && (!link->contains("vendor") || link->contains("usb_ids"))) {
-    toml.blame(*link, "a HID device is found by vendor = 0x1234 and product = 0x5678");
+    toml.add_error(*link, "a HID device is found by vendor = 0x1234 and product = 0x5678");
   }
 }
 
 void read_packets(TomlReader& toml, const toml::table& device, Table& table) {
   const toml::array* const packets = device["packet"].as_array();
-  if (packets == nullptr) return toml.blame(device, "a device needs at least one [[packet]]");
+  if (packets == nullptr) return toml.add_error(device, "a device needs at least one [[packet]]");
   PacketReader reader(toml, table);
   for (const toml::node& packet : *packets) {
-    if (!packet.is_table()) return toml.blame(packet, "packets are written as [[packet]]");
+    if (!packet.is_table()) return toml.add_error(packet, "packets are written as [[packet]]");
     reader.read_packet(*packet.as_table());
     if (toml.error()) return;
   }
   if (table.model.sensors.empty()) {
-    toml.blame(device, "a glove needs at least one [[packet.field]] of kind \"sensor\"");
+    toml.add_error(device, "a glove needs at least one [[packet.field]] of kind \"sensor\"");
   }
 }
 
@@ -83,7 +84,7 @@ Result<Table> read_device(const toml::table& device, const std::string& text,
   Table table;
   toml.allow(device, "a device", kDeviceKeys);
   table.name = toml.text(device, "name");
-  if (table.name.empty()) toml.blame(device, "a device needs a name");
+  if (table.name.empty()) toml.add_error(device, "a device needs a name");
   table.summary = toml.text(device, "summary");
   table.rate_hz = toml.number(device, "rate_hz", 0.0, 0.0, kMaxRate_hz);
   table.delimiter = toml.hex(device, "delimiter", kMaxDelimiter);

@@ -53,17 +53,17 @@ void PacketReader::read_packet(const toml::table& from) {
                      packet.checksum.kind != ChecksumKind::kNone ||
                      table_.link.kind == LinkKind::kHid;
   if (!found) {
-    toml_.blame(from,
-                "nothing tells where this packet begins: give it a header or a checksum, or "
-                "the device a delimiter");
+    toml_.add_error(from,
+                    "nothing tells where this packet begins: give it a header or a checksum, or "
+                    "the device a delimiter");
   }
   const std::size_t marks = packet.header.size() + packet.end.size() + table_.delimiter.size();
   if (marks > packet.min_bytes) {
-    toml_.blame(from, "the packet is shorter than its header and end");
+    toml_.add_error(from, "the packet is shorter than its header and end");
   }
   if (!toml_.error()) read_fields(from, packet);
   if (table_.packets.size() == kMaxPackets)
-    toml_.blame(from, "at most 16 packets can be described");
+    toml_.add_error(from, "at most 16 packets can be described");
   if (!toml_.error()) table_.packets.push_back(std::move(packet));
 }
 
@@ -71,9 +71,9 @@ void PacketReader::read_length(const toml::table& from, PacketRule& packet) {
   const toml::table* const length = toml_.table(from, "length");
   const std::int64_t bytes = toml_.whole(from, "bytes", 0, 1, kMostBytes);
   if (bytes == 0) {
-    toml_.blame(from,
-                "a packet needs its length: bytes = 24; with a length field in the packet, "
-                "bytes is the least that it can be");
+    toml_.add_error(from,
+                    "a packet needs its length: bytes = 24; with a length field in the packet, "
+                    "bytes is the least that it can be");
     return;
   }
   packet.min_bytes = packet.max_bytes = static_cast<std::size_t>(bytes);
@@ -81,7 +81,7 @@ void PacketReader::read_length(const toml::table& from, PacketRule& packet) {
   toml_.allow(*length, "length", kLengthKeys);
   const std::int64_t byte = toml_.whole(*length, "byte", -1, 0, kMostBytes - 1);
   const std::int64_t bits = toml_.whole(*length, "bits", 8, 1, 16);
-  if (byte < 0) toml_.blame(*length, "length needs the byte where it stands: byte = 2");
+  if (byte < 0) toml_.add_error(*length, "length needs the byte where it stands: byte = 2");
   packet.length.fixed = false;
   packet.max_bytes = kMaxPacketBytes;
   packet.length.add = static_cast<int>(toml_.whole(*length, "add", 0, -kMostBytes, kMostBytes));
@@ -109,22 +109,23 @@ void PacketReader::read_checksum(const toml::table& from, PacketRule& packet) {
   const auto resolved = [length](int place) { return place < 0 ? length + place : place; };
   if (resolved(rule.at) < 0 || resolved(rule.at) + width > length || resolved(rule.from) < 0 ||
       resolved(rule.to) > length || resolved(rule.from) >= resolved(rule.to)) {
-    toml_.blame(*sum,
-                "the checksum or the bytes it covers (from, up to but without to) do not lie "
-                "in the packet's " +
-                    std::to_string(length) + " bytes");
+    toml_.add_error(*sum,
+                    "the checksum or the bytes it covers (from, up to but without to) do not lie "
+                    "in the packet's " +
+                        std::to_string(length) + " bytes");
   }
   if (packet.length.fixed || rule.from < 0 || rule.to < 0 || toml_.error()) return;
-  if (rule.from > rule.to) toml_.blame(*sum, "from should be before to");
+  if (rule.from > rule.to) toml_.add_error(*sum, "from should be before to");
 }
 
 void PacketReader::read_fields(const toml::table& from, PacketRule& packet) {
   const toml::node* const fields = from.get("field");
   if (fields == nullptr) return;
-  if (!fields->is_array()) return toml_.blame(*fields, "fields are written as [[packet.field]]");
+  if (!fields->is_array())
+    return toml_.add_error(*fields, "fields are written as [[packet.field]]");
   for (const toml::node& field : *fields->as_array()) {
     if (toml_.error()) return;
-    if (!field.is_table()) return toml_.blame(field, "fields are written as [[packet.field]]");
+    if (!field.is_table()) return toml_.add_error(field, "fields are written as [[packet.field]]");
     read_field(*field.as_table(), packet);
   }
 }
@@ -143,9 +144,9 @@ void PacketReader::read_field(const toml::table& from, PacketRule& packet) {
   }
   const bool flt = field.form == Form::kFloat;
   const std::int64_t bits = toml_.whole(from, "bits", flt ? 32 : 8, 1, flt ? 64 : 32);
-  if (flt && bits != 32 && bits != 64) toml_.blame(from, "a float has 32 or 64 bits");
+  if (flt && bits != 32 && bits != 64) toml_.add_error(from, "a float has 32 or 64 bits");
   if (from.contains("bit") == from.contains("byte")) {
-    return toml_.blame(from, "a field needs its place: bit = 24, or byte = 3");
+    return toml_.add_error(from, "a field needs its place: bit = 24, or byte = 3");
   }
   std::int64_t bit = from.contains("bit") ? toml_.whole(from, "bit", 0, 0, 8 * kMostBytes)
                                           : 8 * toml_.whole(from, "byte", 0, 0, kMostBytes);
@@ -177,7 +178,8 @@ void PacketReader::read_range(const toml::table& from, Field& field) {
   const auto range = toml_.pair(from, "range");
   if (!range) return;
   if (range->first > range->second || range->first < field.low || range->second > field.high) {
-    return toml_.blame(from, "range is [least, most] of the raw value, within what its bits hold");
+    return toml_.add_error(from,
+                           "range is [least, most] of the raw value, within what its bits hold");
   }
   field.low = range->first;
   field.high = range->second;
@@ -186,18 +188,19 @@ void PacketReader::read_range(const toml::table& from, Field& field) {
 void PacketReader::add_field(const toml::table& from, const std::string& name, Field field,
                              PacketRule& packet) {
   if (!is_name(name)) {
-    return toml_.blame(from,
-                       "a name has up to 32 small letters, digits and _, a letter first; - "
-                       "steps over a value");
+    return toml_.add_error(from,
+                           "a name has up to 32 small letters, digits and _, a letter first; - "
+                           "steps over a value");
   }
-  if (!names_.insert(name).second) return toml_.blame(from, "'" + name + "' is described twice");
+  if (!names_.insert(name).second)
+    return toml_.add_error(from, "'" + name + "' is described twice");
   if (field.kind == FieldKind::kTime) {
     table_.tick_s = toml_.number(from, "tick_s", 0.0, 1e-9, 1.0);
-    if (table_.time_bits != 0) toml_.blame(from, "a device has one time");
+    if (table_.time_bits != 0) toml_.add_error(from, "a device has one time");
     if (field.form != Form::kUnsigned || field.place.bits < 4 || table_.tick_s == 0.0) {
-      toml_.blame(from,
-                  "a time is an unsigned counter of 4 bits or more, with tick_s, the seconds "
-                  "of one count");
+      toml_.add_error(from,
+                      "a time is an unsigned counter of 4 bits or more, with tick_s, the seconds "
+                      "of one count");
     }
     table_.time_bits = field.place.bits;
   } else if (field.kind == FieldKind::kSensor) {
@@ -208,12 +211,12 @@ void PacketReader::add_field(const toml::table& from, const std::string& name, F
     field.index = static_cast<std::uint8_t>(table_.extra_names.size());
     field.scale = toml_.number(from, "scale", 1.0, -1e9, 1e9);
     field.offset = toml_.number(from, "offset", 0.0, -1e9, 1e9);
-    if (from.contains("value")) toml_.blame(from, "value is for sensors; an extra has a scale");
+    if (from.contains("value")) toml_.add_error(from, "value is for sensors; an extra has a scale");
     table_.extra_names.push_back(name);
     table_.extra_units.push_back(toml_.text(from, "unit", "1"));
   }
   if (2 * table_.model.sensors.size() + table_.extra_names.size() > kMaxSampleValues) {
-    toml_.blame(from, "a sample holds 64 values: two for each sensor and one for each extra");
+    toml_.add_error(from, "a sample holds 64 values: two for each sensor and one for each extra");
   }
   packet.fields.push_back(field);
 }
@@ -221,17 +224,17 @@ void PacketReader::add_field(const toml::table& from, const std::string& name, F
 void PacketReader::add_sensor(const toml::table& from, const std::string& name,
                               const Field& field) {
   if (table_.model.sensors.size() == glove::kMaxSensors) {
-    return toml_.blame(from, "a glove has at most 32 sensors");
+    return toml_.add_error(from, "a glove has at most 32 sensors");
   }
   if (from.contains("scale") || from.contains("offset")) {
-    return toml_.blame(from,
-                       "a sensor has no scale: range is its raw value, value what that means");
+    return toml_.add_error(from,
+                           "a sensor has no scale: range is its raw value, value what that means");
   }
   if (field.form == Form::kFloat && !from.contains("range")) {
-    return toml_.blame(from, "a sensor that is a float needs its range, as [0, 1]");
+    return toml_.add_error(from, "a sensor that is a float needs its range, as [0, 1]");
   }
   if (field.place.bits > 24 && !from.contains("range")) {
-    return toml_.blame(from, "a sensor of more than 24 bits needs its range, as [0, 16383]");
+    return toml_.add_error(from, "a sensor of more than 24 bits needs its range, as [0, 16383]");
   }
   const auto value = toml_.pair(from, "value").value_or(std::pair(0.0, 1.0));
   const std::size_t unit = toml_.word(from, "unit", kSensorUnits, 0);
@@ -249,11 +252,11 @@ BitPlace PacketReader::place(const toml::node& blamed, std::int64_t bit, std::in
   const std::int64_t shift = bit % 8;
   const std::int64_t bytes = (shift + bits + 7) / 8;
   if (bit / 8 + bytes > static_cast<std::int64_t>(packet.min_bytes)) {
-    toml_.blame(blamed, "byte " + std::to_string(bit / 8 + bytes - 1) +
-                            " is not in the packet: it has " + std::to_string(packet.min_bytes) +
-                            " bytes, counted from 0");
+    toml_.add_error(blamed, "byte " + std::to_string(bit / 8 + bytes - 1) +
+                                " is not in the packet: it has " +
+                                std::to_string(packet.min_bytes) + " bytes, counted from 0");
   }
-  if (bytes > 8) toml_.blame(blamed, "a 64-bit value begins at a whole byte");
+  if (bytes > 8) toml_.add_error(blamed, "a 64-bit value begins at a whole byte");
   // Little: bit 0 is the lowest of the first byte. Big: it is the highest.
   return {.first = static_cast<std::uint16_t>(bit / 8),
           .bytes = static_cast<std::uint8_t>(bytes),

@@ -25,8 +25,8 @@ void TomlReader::allow(const toml::table& table, std::string_view what,
                        std::span<const std::string_view> keys) {
   for (const auto& [key, node] : table) {
     if (std::ranges::find(keys, key.str()) == keys.end()) {
-      blame(node, in_quotes(key.str()) + " is not known in " + std::string(what) +
-                      "; allowed: " + listed(keys));
+      add_error(node, in_quotes(key.str()) + " is not known in " + std::string(what) +
+                          "; allowed: " + listed(keys));
     }
   }
 }
@@ -35,7 +35,7 @@ std::string TomlReader::text(const toml::table& table, std::string_view key,
                              const std::string& without) {
   const toml::node* const node = table.get(key);
   if (node == nullptr) return without;
-  if (!node->is_string()) blame(*node, in_quotes(key) + " is a text in quotes");
+  if (!node->is_string()) add_error(*node, in_quotes(key) + " is a text in quotes");
   return node->value_or(std::string(without));
 }
 
@@ -45,8 +45,8 @@ std::int64_t TomlReader::whole(const toml::table& table, std::string_view key, s
   if (node == nullptr) return without;
   const auto value = node->is_integer() ? node->value<std::int64_t>() : std::nullopt;
   if (value && *value >= low && *value <= high) return *value;
-  blame(*node, in_quotes(key) + " is a whole number from " + std::to_string(low) + " to " +
-                   std::to_string(high));
+  add_error(*node, in_quotes(key) + " is a whole number from " + std::to_string(low) + " to " +
+                       std::to_string(high));
   return without;
 }
 
@@ -56,8 +56,8 @@ double TomlReader::number(const toml::table& table, std::string_view key, double
   if (node == nullptr) return without;
   const auto value = node->is_number() ? node->value<double>() : std::nullopt;
   if (value && *value >= low && *value <= high) return *value;
-  blame(*node, in_quotes(key) + " is a number from " + clip::number_text(low) + " to " +
-                   clip::number_text(high));
+  add_error(*node, in_quotes(key) + " is a number from " + clip::number_text(low) + " to " +
+                       clip::number_text(high));
   return without;
 }
 
@@ -67,7 +67,7 @@ std::size_t TomlReader::word(const toml::table& table, std::string_view key,
   if (node == nullptr) return without;
   const auto at = std::ranges::find(words, node->value_or(std::string_view()));
   if (at != words.end()) return static_cast<std::size_t>(at - words.begin());
-  blame(*node, in_quotes(key) + " is one of: " + listed(words));
+  add_error(*node, in_quotes(key) + " is one of: " + listed(words));
   return without;
 }
 
@@ -92,8 +92,8 @@ std::vector<std::byte> TomlReader::hex(const toml::table& table, std::string_vie
     at = stop;
   }
   if (good && bytes.size() <= most) return bytes;
-  blame(*node, in_quotes(key) + " is up to " + std::to_string(most) +
-                   " bytes of two hexadecimal digits each, as \"24 0a 57\"");
+  add_error(*node, in_quotes(key) + " is up to " + std::to_string(most) +
+                       " bytes of two hexadecimal digits each, as \"24 0a 57\"");
   return {};
 }
 
@@ -108,14 +108,14 @@ std::optional<std::pair<double, double>> TomlReader::pair(const toml::table& tab
       return std::pair(*low, *high);
     }
   }
-  blame(*node, in_quotes(key) + " is two different numbers, as [0, 1000]");
+  add_error(*node, in_quotes(key) + " is two different numbers, as [0, 1000]");
   return std::nullopt;
 }
 
 const toml::table* TomlReader::table(const toml::table& in, std::string_view key) {
   const toml::node* const node = in.get(key);
   if (node == nullptr) return nullptr;
-  if (!node->is_table()) blame(*node, in_quotes(key) + " is a table");
+  if (!node->is_table()) add_error(*node, in_quotes(key) + " is a table");
   return node->as_table();
 }
 

@@ -14,9 +14,9 @@
 
 namespace posed::drivers::described {
 
-class TomlReader : public FirstMistake {
+class TomlReader : public FirstError {
  public:
-  using FirstMistake::FirstMistake;
+  using FirstError::FirstError;
 
   // Blames the first key of `table` that is not among `keys`; `what` the table is ("a packet").
   void allow(const toml::table& table, std::string_view what,

@@ -63,7 +63,7 @@ Result<> check_options(const std::filesystem::path& path, const Options& options
   return {};
 }
 
-Result<Device> open(const Options& given, Ports& /*ports*/) {
+Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const auto options = complete_options(file_driver(), given);
   if (!options) return std::unexpected(options.error());
   const std::string path = option<std::string>(*options, "path");

@@ -7,10 +7,10 @@
 #include "drivers/fivedt/start.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
-#include "drivers/glove/greeting.hpp"
+#include "drivers/glove/device_info.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
@@ -134,7 +134,7 @@ std::vector<std::uint16_t> products(const Greeted& glove) {
   return {product(0), product(0x02), product(0x06)};
 }
 
-Result<Link> reach(const Options& options, const Greeted& glove, Ports& ports) {
+Result<Connection> reach(const Options& options, const Greeted& glove, TransportFactory& ports) {
   if (is_usb(glove.settings.form)) {
     return ports.hid({.vendor = kVendor,
                       .products = products(glove),
@@ -144,7 +144,7 @@ Result<Link> reach(const Options& options, const Greeted& glove, Ports& ports) {
   return glove::connect(with_baud(options, glove), ports, {});
 }
 
-Result<Device> open(const Options& given, Ports& ports) {
+Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(fivedt_driver(), given);
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);

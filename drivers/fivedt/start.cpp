@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "drivers/glove/greeting.hpp"
+#include "drivers/glove/device_info.hpp"
 
 namespace posed::drivers::fivedt {
 namespace {
@@ -19,7 +19,7 @@ constexpr int kPackets = 2;  // behind the first stands which hand a wireless ty
 
 // Adds what comes to `bytes` until `enough` of it; false when the patience is over first.
 template <typename Enough>
-Result<bool> collect(Link& link, Bytes& bytes, const Enough& enough) {
+Result<bool> collect(Connection& link, Bytes& bytes, const Enough& enough) {
   const auto begin = Clock::now();
   while (!enough()) {
     if (Clock::now() - begin > kPatience) return false;
@@ -30,14 +30,14 @@ Result<bool> collect(Link& link, Bytes& bytes, const Enough& enough) {
   return true;
 }
 
-std::unexpected<Error> other_hand(const Link& link, Side found) {
+std::unexpected<Error> other_hand(const Connection& link, Side found) {
   const std::string name(glove::side_name(found));
   return fail("this is a " + name + " glove; set hand = \"" + name + "\" or take the other one",
               link.name());
 }
 
 // A Data Glove 5 with a cable both ways: asked who it is, then told to stream.
-Result<> start_wired(Link& link, Side side, bool polled) {
+Result<> start_wired(Connection& link, Side side, bool polled) {
   if (auto ok = link.drain(kQuiet); !ok) return ok;
   if (auto ok = link.write("A"); !ok) return ok;
   Bytes answer;
@@ -83,7 +83,8 @@ class Heard final : public Readings {
   bool info = false, right = false;
 };
 
-Result<std::vector<std::string>> await_stream(Link& link, Side side, const Settings& settings) {
+Result<std::vector<std::string>> await_stream(Connection& link, Side side,
+                                              const Settings& settings) {
   Framer framer(settings.form);
   Heard heard;
   Bytes bytes;
@@ -114,7 +115,7 @@ Result<std::vector<std::string>> await_stream(Link& link, Side side, const Setti
 
 }  // namespace
 
-Result<std::vector<std::string>> start(Link& link, Side side, const Settings& settings) {
+Result<std::vector<std::string>> start(Connection& link, Side side, const Settings& settings) {
   if (settings.form != Form::kFive) return await_stream(link, side, settings);
   const auto ok = start_wired(link, side, settings.polled);
   if (!ok) return std::unexpected(ok.error());

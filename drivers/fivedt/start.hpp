@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "drivers/fivedt/decoder.hpp"
-#include "drivers/transport/link.hpp"
+#include "drivers/transport/connection.hpp"
 #include "proto/frame/hand.hpp"
 
 namespace posed::drivers::fivedt {
 
 // Up to a few seconds; an error says what came instead, or that the glove is of the other hand.
 // Returns what the user should look at all the same. Cold.
-[[nodiscard]] Result<std::vector<std::string>> start(Link& link, Side side,
+[[nodiscard]] Result<std::vector<std::string>> start(Connection& link, Side side,
                                                      const Settings& settings);
 
 }  // namespace posed::drivers::fivedt

@@ -14,14 +14,14 @@ namespace {
 constexpr double kMaxGain = 1000.0;
 constexpr double kMaxOffset_deg = 360.0;
 
-class MapReader : private FirstMistake {
+class MapReader : private FirstError {
  public:
   MapReader(const std::string& file, const std::vector<Sensor>& sensors)
-      : FirstMistake(file), sensors_(sensors) {}
+      : FirstError(file), sensors_(sensors) {}
 
   Result<std::vector<MapRow>> read(const toml::table& table) {
     const toml::table* const angles = table["angles"].as_table();
-    if (angles == nullptr) blame(table, "the device's table lacks [angles]");
+    if (angles == nullptr) add_error(table, "the device's table lacks [angles]");
     if (angles != nullptr) {
       for (const auto& [key, node] : *angles) read_value(key.str(), node);
     }
@@ -33,12 +33,14 @@ class MapReader : private FirstMistake {
   void read_value(std::string_view name, const toml::node& node) {
     const auto sensor = std::ranges::find(sensors_, name, &Sensor::name);
     if (sensor == sensors_.end()) {
-      return blame(node, "the glove has no value " + in_quotes(name));
+      return add_error(node, "the glove has no value " + in_quotes(name));
     }
     const toml::array* const shares = node.as_array();
-    if (shares == nullptr) return blame(node, "a list of {channel, gain, offset_deg} is wanted");
+    if (shares == nullptr)
+      return add_error(node, "a list of {channel, gain, offset_deg} is wanted");
     for (const toml::node& share : *shares) {
-      if (!share.is_table()) return blame(share, "{channel = \"index1_x\", gain = 1} is wanted");
+      if (!share.is_table())
+        return add_error(share, "{channel = \"index1_x\", gain = 1} is wanted");
       read_share(static_cast<std::uint8_t>(sensor - sensors_.begin()), *share.as_table());
     }
   }
@@ -46,13 +48,13 @@ class MapReader : private FirstMistake {
   void read_share(std::uint8_t sensor, const toml::table& share) {
     for (const auto& [key, node] : share) {
       if (key != "channel" && key != "gain" && key != "offset_deg") {
-        blame(node, in_quotes(key.str()) + " is not known in an angle");
+        add_error(node, in_quotes(key.str()) + " is not known in an angle");
       }
     }
     const std::string channel = share["channel"].value_or(std::string());
     const int index = hand_channel(channel);
-    if (index < 0) blame(share, "the hand has no channel " + in_quotes(channel));
-    if (rows_.size() == kMaxMapRows) blame(share, "too many angles in one table");
+    if (index < 0) add_error(share, "the hand has no channel " + in_quotes(channel));
+    if (rows_.size() == kMaxMapRows) add_error(share, "too many angles in one table");
     if (error()) return;
     rows_.push_back({.sensor = sensor,
                      .channel = static_cast<std::uint8_t>(index),
@@ -66,7 +68,7 @@ class MapReader : private FirstMistake {
     if (node == nullptr) return without;
     const auto value = node->is_number() ? node->value<double>() : std::nullopt;
     if (value && std::abs(*value) <= most) return *value;
-    blame(*node, std::string(key) + " is a number of a size that fits a hand");
+    add_error(*node, std::string(key) + " is a number of a size that fits a hand");
     return without;
   }
 

@@ -20,23 +20,24 @@ constexpr TomlLimits kLimits{
     .what = "calibration", .bytes = kMaxCalibrationFile, .depth = 4, .items = 2048};
 constexpr double kMaxNumber = 1e6;  // of raw values, calibrated values and parameters
 
-class FileReader : private FirstMistake {
+class FileReader : private FirstError {
  public:
-  using FirstMistake::FirstMistake;
+  using FirstError::FirstError;
 
   Result<CalibrationFile> read(const toml::table& table) {
     if (table["format"].value_or(0) != kFormat) {
       return fail("is no calibration of a glove (it should say format = 1)", file());
     }
     for (const auto& [key, node] : table) entry(key.str(), node);
-    if (read_.driver.empty()) blame(table, "the calibration does not say its driver");
-    if (hand_.empty()) blame(table, "the calibration does not say its hand, right or left");
+    if (read_.driver.empty()) add_error(table, "the calibration does not say its driver");
+    if (hand_.empty()) add_error(table, "the calibration does not say its hand, right or left");
     if (read_.sensors.empty() && read_.parameters.empty()) {
-      blame(table, "the calibration names no sensor; was the file cut off?");
+      add_error(table, "the calibration names no sensor; was the file cut off?");
     }
     if (count_ && *count_ != static_cast<std::int64_t>(read_.sensors.size())) {
-      blame(table, "the calibration should have " + std::to_string(*count_) + " sensors and has " +
-                       std::to_string(read_.sensors.size()) + "; was the file cut off?");
+      add_error(table, "the calibration should have " + std::to_string(*count_) +
+                           " sensors and has " + std::to_string(read_.sensors.size()) +
+                           "; was the file cut off?");
     }
     if (error()) return std::unexpected(*error());
     return std::move(read_);
@@ -52,7 +53,7 @@ class FileReader : private FirstMistake {
       count_ = node.value<std::int64_t>();
     } else if (key == "hand") {
       text(node, hand_);
-      if (hand_ != "right" && hand_ != "left") blame(node, "hand should be right or left");
+      if (hand_ != "right" && hand_ != "left") add_error(node, "hand should be right or left");
       read_.hand = hand_ == "left" ? Side::kLeft : Side::kRight;
     } else if (key == "parameters" && node.is_table()) {
       for (const auto& [name, value] : *node.as_table()) {
@@ -61,38 +62,38 @@ class FileReader : private FirstMistake {
     } else if (key == "sensors" && node.is_table()) {
       for (const auto& [name, points] : *node.as_table()) read_sensor(name.str(), points);
     } else {
-      blame(node, in_quotes(key) + " is not known in a calibration, or of another type");
+      add_error(node, in_quotes(key) + " is not known in a calibration, or of another type");
     }
   }
 
   void text(const toml::node& node, std::string& into) {
     const auto value = node.value_exact<std::string>();
-    if (!value) return blame(node, "a text is wanted here");
+    if (!value) return add_error(node, "a text is wanted here");
     into = *value;
   }
 
   double number(const toml::node* node) {
     const auto value = node->is_number() ? node->value<double>() : std::nullopt;
     if (value && std::abs(*value) <= kMaxNumber) return *value;
-    blame(*node, "a finite number of at most a million is wanted here");
+    add_error(*node, "a finite number of at most a million is wanted here");
     return 0.0;
   }
 
   void read_sensor(std::string_view name, const toml::node& node) {
     const toml::array* const points = node.as_array();
     if (points == nullptr || points->size() < 2 || points->size() > kMaxCurvePoints) {
-      return blame(node, "sensor " + in_quotes(name) + " needs 2 to " +
-                             std::to_string(kMaxCurvePoints) + " points [raw, calibrated]");
+      return add_error(node, "sensor " + in_quotes(name) + " needs 2 to " +
+                                 std::to_string(kMaxCurvePoints) + " points [raw, calibrated]");
     }
     auto& read = read_.sensors[std::string(name)];
     for (const toml::node& point : *points) {
       const toml::array* const pair = point.as_array();
       if (pair == nullptr || pair->size() != 2) {
-        return blame(point, "a point of sensor " + in_quotes(name) + " is [raw, calibrated]");
+        return add_error(point, "a point of sensor " + in_quotes(name) + " is [raw, calibrated]");
       }
       read.push_back({number(pair->get(0)), number(pair->get(1))});
       if (read.size() > 1 && !(read.back()[0] > read[read.size() - 2][0])) {
-        return blame(point, "the raw values of sensor " + in_quotes(name) + " should ascend");
+        return add_error(point, "the raw values of sensor " + in_quotes(name) + " should ascend");
       }
     }
   }

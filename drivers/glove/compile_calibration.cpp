@@ -4,8 +4,8 @@
 
 #include "drivers/glove/angle_map.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/device_info.hpp"
 #include "drivers/glove/fit.hpp"
-#include "drivers/glove/greeting.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::drivers::glove {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <sstream>
 
-#include "drivers/glove/greeting.hpp"
+#include "drivers/glove/device_info.hpp"
 #include "drivers/options.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -67,7 +67,8 @@ Result<> check_connection(const Options& options) {
   return {};
 }
 
-Result<Link> connect(const Options& options, Ports& ports, std::vector<std::uint32_t> usb_ids) {
+Result<Connection> connect(const Options& options, TransportFactory& ports,
+                           std::vector<std::uint32_t> usb_ids) {
   if (auto sound = check_connection(options); !sound) return std::unexpected(sound.error());
   if (link_of(options) == "tcp") return ports.accept(listen_settings(options));
   return ports.serial({.port = option<std::string>(options, "port"),

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "drivers/driver.hpp"
-#include "drivers/transport/link.hpp"
+#include "drivers/transport/connection.hpp"
 
 namespace posed::drivers::glove {
 
@@ -25,7 +25,7 @@ namespace posed::drivers::glove {
 
 // The link that completed options lead to; without port and id one of `usb_ids`
 // (vendor << 16 | product). Cold: may wait half a second for a glove that connects to us.
-[[nodiscard]] Result<Link> connect(const Options& options, Ports& ports,
-                                   std::vector<std::uint32_t> usb_ids);
+[[nodiscard]] Result<Connection> connect(const Options& options, TransportFactory& ports,
+                                         std::vector<std::uint32_t> usb_ids);
 
 }  // namespace posed::drivers::glove

@@ -53,7 +53,7 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   return std::make_unique<LabelsDecoder>(description.skeleton, description.rate_hz);
 }
 
-Result<Device> open(const Options& given, Ports& /*ports*/) {
+Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const auto options = complete_options(labels_driver(), given);
   if (!options) return std::unexpected(options.error());
   const auto& side = option<std::string>(*options, "side");

@@ -5,13 +5,13 @@
 
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
-#include "drivers/glove/greeting.hpp"
+#include "drivers/glove/device_info.hpp"
 #include "drivers/lucidgloves/decoder.hpp"
 #include "drivers/lucidgloves/emulator.hpp"
 #include "drivers/lucidgloves/start.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
@@ -103,7 +103,7 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
                                         glove->settings);
 }
 
-Result<Device> open(const Options& given, Ports& ports) {
+Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(lucidgloves_driver(), given);
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);

@@ -46,7 +46,8 @@ void take(std::span<const std::byte> bytes, const Settings& settings, Seen& seen
   }
 }
 
-std::unexpected<Error> no_glove(const Link& link, const Settings& settings, const Seen& seen) {
+std::unexpected<Error> no_glove(const Connection& link, const Settings& settings,
+                                const Seen& seen) {
   if (!seen.any) {
     return fail("the glove sends nothing; check that it is switched on, and its baud", link.name());
   }
@@ -60,7 +61,7 @@ std::unexpected<Error> no_glove(const Link& link, const Settings& settings, cons
 
 }  // namespace
 
-Result<> start(Link& link, Side side, const Settings& settings) {
+Result<> start(Connection& link, Side side, const Settings& settings) {
   if (auto ok = link.write(kAsk); !ok) return ok;
   Seen seen;
   const auto begin = Clock::now();

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "drivers/lucidgloves/decoder.hpp"
-#include "drivers/transport/link.hpp"
+#include "drivers/transport/connection.hpp"
 #include "proto/frame/hand.hpp"
 
 namespace posed::drivers::lucidgloves {
@@ -17,6 +17,6 @@ inline constexpr std::array<std::uint32_t, 2> kUsbIds{0x10C4EA60, 0x1A867523};
 // Waits for a good line, a few seconds at most: a board that starts when its port is opened talks
 // of other things first. An error says what came instead, or that the glove is of the other hand.
 // The link is left at the end of a line where possible. Cold.
-[[nodiscard]] Result<> start(Link& link, Side side, const Settings& settings);
+[[nodiscard]] Result<> start(Connection& link, Side side, const Settings& settings);
 
 }  // namespace posed::drivers::lucidgloves

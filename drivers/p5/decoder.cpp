@@ -80,15 +80,15 @@ void P5Decoder::drop(std::size_t count) noexcept {
 }
 
 // RT-safe.
-bool P5Decoder::locate(const Report& report, Place& place) noexcept {
+bool P5Decoder::locate(const Report& report, RigidPose& place) noexcept {
   for (int& reports : unseen_) reports = std::min(reports + 1, kForgotten);
-  if (!tower_) return false;
+  if (!rig_) return false;
   std::array<Eigen::Vector3d, kLeds> position_m;
   std::bitset<kLeds> seen;
-  for (const Spot& spot : report.spot) {
+  for (const LedObservation& spot : report.spot) {
     if (spot.led >= kLeds) continue;
-    Spot& before = before_[spot.led];
-    Spot now = spot;
+    LedObservation& before = before_[spot.led];
+    LedObservation now = spot;
     if (unseen_[spot.led] < kForgotten) {
       now.v1 = unwrapped(spot.v1, before.v1);
       now.v2 = unwrapped(spot.v2, before.v2);
@@ -96,9 +96,9 @@ bool P5Decoder::locate(const Report& report, Place& place) noexcept {
     }
     before = now;
     unseen_[spot.led] = 0;
-    seen[spot.led] = tower_->locate(now, position_m[spot.led]);
+    seen[spot.led] = rig_->locate(now, position_m[spot.led]);
   }
-  return fit_hand(*tower_, position_m, seen, place) && place.position_m.norm() <= kMaxPosition_m;
+  return fit_hand(*rig_, position_m, seen, place) && place.position_m.norm() <= kMaxPosition_m;
 }
 
 // RT-safe.
@@ -107,10 +107,10 @@ void P5Decoder::take(const Report& report, Sink& sink) noexcept {
   for (std::size_t f = 0; f < kFingers; ++f) raw[f] = static_cast<float>(report.bend[f]);
   std::array<float, kExtras.size()> extra{};
   for (std::size_t b = 0; b < 3; ++b) extra[b] = (report.buttons >> b & 1) != 0 ? 1.0F : 0.0F;
-  extra[3] = static_cast<float>(
-      std::ranges::count_if(report.spot, [](const Spot& spot) { return spot.led < kLeds; }));
+  extra[3] = static_cast<float>(std::ranges::count_if(
+      report.spot, [](const LedObservation& spot) { return spot.led < kLeds; }));
   std::fill(extra.begin() + kPlaceAt, extra.end(), std::numeric_limits<float>::quiet_NaN());
-  if (Place place; locate(report, place)) {
+  if (RigidPose place; locate(report, place)) {
     for (int i = 0; i < 3; ++i) {
       extra[kPlaceAt + static_cast<std::size_t>(i)] = static_cast<float>(place.position_m[i]);
     }

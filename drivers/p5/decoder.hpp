@@ -9,7 +9,7 @@
 
 #include "drivers/glove/glove_decoder.hpp"
 #include "drivers/glove/model.hpp"
-#include "drivers/p5/tower.hpp"
+#include "drivers/p5/camera_rig.hpp"
 
 namespace posed::drivers::p5 {
 
@@ -18,10 +18,10 @@ namespace posed::drivers::p5 {
 
 class P5Decoder final : public glove::GloveDecoder {
  public:
-  // Without a tower the hand's place is never known.
+  // Without a rig the hand's place is never known.
   P5Decoder(std::shared_ptr<const Skeleton> skeleton,
-            std::shared_ptr<const glove::Calibration> calibration, std::optional<Tower> tower)
-      : GloveDecoder(std::move(skeleton), std::move(calibration)), tower_(std::move(tower)) {}
+            std::shared_ptr<const glove::Calibration> calibration, std::optional<CameraRig> rig)
+      : GloveDecoder(std::move(skeleton), std::move(calibration)), rig_(std::move(rig)) {}
 
   // RT-safe.
   void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
@@ -32,14 +32,14 @@ class P5Decoder final : public glove::GloveDecoder {
   void drop(std::size_t count) noexcept;
   void take(const Report& report, Sink& sink) noexcept;
   // RT-safe.
-  [[nodiscard]] bool locate(const Report& report, Place& place) noexcept;
+  [[nodiscard]] bool locate(const Report& report, RigidPose& place) noexcept;
 
-  std::optional<Tower> tower_;
+  std::optional<CameraRig> rig_;
   std::array<std::byte, kReportBytes + 1> pending_{};
   std::size_t pending_bytes_ = 0;
   bool in_step_ = true;
-  std::array<Spot, kLeds> before_{};  // unwrapped, as last seen
-  std::array<int, kLeds> unseen_{};   // reports since then
+  std::array<LedObservation, kLeds> before_{};  // unwrapped, as last seen
+  std::array<int, kLeds> unseen_{};             // reports since then
 };
 
 }  // namespace posed::drivers::p5

@@ -61,11 +61,11 @@ std::array<std::byte, kLedsBytes> emulated_leds() {
 
 P5Emulator::P5Emulator() : pace_(kPeriod_ns) {
   pace_.start(0);
-  const Tower tower = Tower::of(emulated_heads(), emulated_leds());
+  const CameraRig rig = CameraRig::of(emulated_heads(), emulated_leds());
   const Eigen::Vector3d palm_m(0.05, 0.02, 0.5);
   for (std::size_t i = 0; i < kSpots; ++i) {
     const std::size_t led = 2 * i;
-    report_.spot[i] = tower.project(led, palm_m + tower.led_m[led]);
+    report_.spot[i] = rig.project(led, palm_m + rig.led_m[led]);
   }
   pose({});
 }

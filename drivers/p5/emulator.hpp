@@ -5,7 +5,7 @@
 
 #include "drivers/emulator.hpp"
 #include "drivers/glove/pace.hpp"
-#include "drivers/p5/tower.hpp"
+#include "drivers/p5/camera_rig.hpp"
 
 namespace posed::drivers::p5 {
 
@@ -18,7 +18,7 @@ class P5Emulator final : public Emulator {
  public:
   P5Emulator();
 
-  // The hand stands still half a metre before the tower; four of its LEDs are seen.
+  // The hand stands still half a metre before the rig; four of its LEDs are seen.
   void pose(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }

@@ -5,9 +5,9 @@
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/p5/decoder.hpp"
+#include "drivers/p5/device_info.hpp"
 #include "drivers/p5/emulator.hpp"
-#include "drivers/p5/greeting.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
@@ -50,7 +50,7 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   if (!model) return std::unexpected(model.error());
   auto calibration = glove::default_calibration(*model);
   if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<P5Decoder>(description.skeleton, std::move(*calibration), glove->tower());
+  return std::make_unique<P5Decoder>(description.skeleton, std::move(*calibration), glove->rig());
 }
 
 // A feature report, whole; empty with a warning when the glove does not give it.
@@ -63,7 +63,7 @@ std::vector<std::byte> feature(UsbLink& link, std::uint8_t number, std::size_t b
   return {};
 }
 
-Result<Device> open(const Options& given, Ports& ports) {
+Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(p5_driver(), given);
   if (!options) return std::unexpected(options.error());
   const auto side = glove::hand_option(*options);

@@ -43,7 +43,7 @@ Outcome decode_report(std::span<const std::byte> bytes, Report& report) noexcept
   }
   report.buttons = static_cast<std::uint8_t>(bits(bytes, kButtonsAt, 4));
   for (std::size_t i = 0; i < kSpots; ++i) {
-    Spot& spot = report.spot[i];
+    LedObservation& spot = report.spot[i];
     const std::size_t at = kValuesAt + 30 * i;
     spot.led = static_cast<std::uint8_t>(bits(bytes, kNamesAt + 4 * i, 4));
     spot.v2 = signed_10(bits(bytes, at, 10));
@@ -60,7 +60,7 @@ std::array<std::byte, kReportBytes> encode_report(const Report& report) noexcept
   }
   put_bits(bytes, kButtonsAt, 4, report.buttons);
   for (std::size_t i = 0; i < kSpots; ++i) {
-    const Spot& spot = report.spot[i];
+    const LedObservation& spot = report.spot[i];
     const std::size_t at = kValuesAt + 30 * i;
     put_bits(bytes, kNamesAt + 4 * i, 4, spot.led);
     put_bits(bytes, at, 10, static_cast<std::uint16_t>(spot.v2));

@@ -1,5 +1,5 @@
 // The reports of the Essential Reality P5, a USB glove with five bends and eight LEDs that two
-// camera heads in its tower see. No I/O here.
+// camera heads in its rig see. No I/O here.
 //
 // Input report, 24 bytes; bits counted from the most significant one of byte 0:
 //     0 ..   7   01
@@ -40,7 +40,7 @@ inline constexpr std::uint8_t kLedsReport = 12;
 inline constexpr std::size_t kLedsBytes = 62;
 
 // One LED as the heads see it. Counts of 1/512 of the distance in front of the head.
-struct Spot {
+struct LedObservation {
   std::uint8_t led = 8;  // 8: none was seen
   std::int16_t v2 = 0, v1 = 0, h = 0;
 };
@@ -48,7 +48,7 @@ struct Spot {
 struct Report {
   std::array<std::uint8_t, kFingers> bend{};  // thumb to little
   std::uint8_t buttons = 0;
-  std::array<Spot, kSpots> spot{};
+  std::array<LedObservation, kSpots> spot{};
 };
 
 // kOk fills `report`; kForeign for another report number. RT-safe.

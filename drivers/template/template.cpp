@@ -66,7 +66,7 @@ Chunks simulated_packets() {
   return chunks;
 }
 
-Result<Device> open(const Options& given, Ports& /*ports*/) {
+Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const auto options = complete_options(template_driver(), given);
   if (!options) return std::unexpected(options.error());
   const double rate_hz = option<double>(*options, "rate_hz");

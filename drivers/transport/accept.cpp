@@ -14,7 +14,7 @@
 #include <cstring>
 #include <optional>
 
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -121,7 +121,7 @@ Result<> check_listen(const ListenSettings& settings) {
   return {};
 }
 
-Result<Link> Ports::accept(const ListenSettings& settings) {
+Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
   auto listener = listeners_.find(settings.endpoint);
   if (listener == listeners_.end()) {
     const auto fd = listen_at(settings);
@@ -134,7 +134,7 @@ Result<Link> Ports::accept(const ListenSettings& settings) {
   ::poll(wanted.data(), wanted.size(), kPatience_ms);
   if (cancel_->fired()) return Cancel::error();
   // Of several that wait the newest counts: a glove that started anew leaves its old one behind.
-  std::optional<Link> newest;
+  std::optional<Connection> newest;
   for (int i = 0; i < kMostAtOnce; ++i) {
     Address peer;
     const int fd =
@@ -143,7 +143,7 @@ Result<Link> Ports::accept(const ListenSettings& settings) {
     if (fd < 0 && (errno == EMFILE || errno == ENFILE) && !newest) return no_descriptor(settings);
     if (fd < 0) break;
     const std::string host = host_of(peer);
-    Link link(fd, settings.endpoint + " from " + host, "tcp " + host);
+    Connection link(fd, settings.endpoint + " from " + host, "tcp " + host);
     link.heed(cancel_);
     if (!may_connect(host, settings.peers)) {
       ++refused_;

@@ -20,15 +20,15 @@ fs::path class_entry(const std::string& kind, const std::string& node) {
   return fs::path("/sys/class") / kind / fs::path(node).filename() / "device";
 }
 
-std::string numbers_of(const Plugged& plugged) {
+std::string numbers_of(const DeviceInfo& device) {
   std::array<char, 16> text{};
-  std::snprintf(text.data(), text.size(), "%04x:%04x", plugged.vendor, plugged.product);
+  std::snprintf(text.data(), text.size(), "%04x:%04x", device.vendor, device.product);
   return text.data();
 }
 
-std::string all_of(const std::vector<Plugged>& plugged) {
+std::string all_of(const std::vector<DeviceInfo>& device) {
   std::string text;
-  for (const Plugged& one : plugged) {
+  for (const DeviceInfo& one : device) {
     text += (text.empty() ? "" : ", ") + one.node + (one.is_usb ? " (" + one.identity() + ")" : "");
   }
   return text;
@@ -36,55 +36,56 @@ std::string all_of(const std::vector<Plugged>& plugged) {
 
 }  // namespace
 
-std::string Plugged::identity() const {
+std::string DeviceInfo::identity() const {
   if (!is_usb) return node;
   return numbers_of(*this) + " " + (serial.empty() ? port_path : serial);
 }
 
-bool Plugged::answers_to(std::string_view id) const {
+bool DeviceInfo::answers_to(std::string_view id) const {
   if (id.empty()) return false;
   const std::string at_interface = port_path + ":1." + std::to_string(interface);
   return id == serial || id == port_path || id == identity() || (is_usb && id == at_interface);
 }
 
 // libserialport leaves out the ports that are only a driver's promise (ttyS4 and on).
-std::vector<Plugged> list_serial_ports() {
-  std::vector<Plugged> found;
+std::vector<DeviceInfo> list_serial_ports() {
+  std::vector<DeviceInfo> found;
   sp_port** ports = nullptr;
   if (sp_list_ports(&ports) != SP_OK) return found;
   for (sp_port** port = ports; *port != nullptr; ++port) {
     const std::string node = sp_get_port_name(*port);
-    Plugged plugged{.bus = Bus::kSerial, .node = node, .trouble = trouble_of(node)};
-    describe_usb(class_entry("tty", node), plugged);
-    found.push_back(std::move(plugged));
+    DeviceInfo device{.bus = Bus::kSerial, .node = node, .open_error = open_error_of(node)};
+    describe_usb(class_entry("tty", node), device);
+    found.push_back(std::move(device));
   }
   sp_free_port_list(ports);
-  std::ranges::sort(found, {}, &Plugged::node);
+  std::ranges::sort(found, {}, &DeviceInfo::node);
   return found;
 }
 
-std::vector<Plugged> list_hid_nodes() {
+std::vector<DeviceInfo> list_hid_nodes() {
   static std::mutex one_at_a_time;  // hidapi keeps its state in globals
   const std::lock_guard lock(one_at_a_time);
-  std::vector<Plugged> found;
+  std::vector<DeviceInfo> found;
   hid_device_info* all = hid_enumerate(0, 0);
   for (const hid_device_info* info = all; info != nullptr; info = info->next) {
     const std::string node = info->path;
     // hidapi lists a node once for each of its usages.
     if (!found.empty() && found.back().node == node) continue;
-    Plugged plugged{.bus = Bus::kHid, .node = node, .trouble = trouble_of(node)};
-    describe_usb(class_entry("hidraw", node), plugged);
-    found.push_back(std::move(plugged));
+    DeviceInfo device{.bus = Bus::kHid, .node = node, .open_error = open_error_of(node)};
+    describe_usb(class_entry("hidraw", node), device);
+    found.push_back(std::move(device));
   }
   hid_free_enumeration(all);
-  std::ranges::sort(found, {}, &Plugged::node);
+  std::ranges::sort(found, {}, &DeviceInfo::node);
   return found;
 }
 
-Result<Plugged> choose(const std::vector<Plugged>& plugged, const std::string& id,
-                       const std::function<bool(const Plugged&)>& wanted, const std::string& kind) {
-  std::vector<Plugged> fitting;
-  for (const Plugged& one : plugged) {
+Result<DeviceInfo> choose(const std::vector<DeviceInfo>& device, const std::string& id,
+                          const std::function<bool(const DeviceInfo&)>& wanted,
+                          const std::string& kind) {
+  std::vector<DeviceInfo> fitting;
+  for (const DeviceInfo& one : device) {
     if (wanted(one) && (id.empty() || one.answers_to(id))) fitting.push_back(one);
   }
   if (fitting.size() == 1) return fitting.front();
@@ -99,13 +100,13 @@ Result<Plugged> choose(const std::vector<Plugged>& plugged, const std::string& i
               " by its id (a port path tells twins apart)");
 }
 
-Plugged find_node(const std::vector<Plugged>& plugged, const std::string& path) {
+DeviceInfo find_node(const std::vector<DeviceInfo>& device, const std::string& path) {
   std::error_code failed;
   const fs::path node = fs::canonical(path, failed);
   const auto at = std::ranges::find_if(
-      plugged, [&](const Plugged& one) { return !failed && one.node == node; });
-  if (at != plugged.end()) return *at;
-  Plugged unlisted;
+      device, [&](const DeviceInfo& one) { return !failed && one.node == node; });
+  if (at != device.end()) return *at;
+  DeviceInfo unlisted;
   unlisted.node = path;
   return unlisted;
 }

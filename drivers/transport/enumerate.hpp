@@ -1,4 +1,4 @@
-// What is plugged in: serial ports, HID nodes and USB devices with an identity that outlives a
+// What is device in: serial ports, HID nodes and USB devices with an identity that outlives a
 // replug, and why one of them cannot be opened. Everything here is cold and opens no device.
 #pragma once
 
@@ -14,16 +14,16 @@ namespace posed::drivers {
 
 enum class Bus : std::uint8_t { kSerial, kHid, kUsb };
 
-struct Plugged {
+struct DeviceInfo {
   Bus bus = Bus::kSerial;
   std::string node{};  // "/dev/ttyACM0", "/dev/hidraw0", "/dev/bus/usb/001/004"
   bool is_usb = false;
   std::uint16_t vendor = 0, product = 0;
-  std::string serial{};     // the device's own number; empty where it has none
-  std::string port_path{};  // bus and ports on the way, "1-2.3"; empty when not on USB
-  int interface = -1;       // of a device with several; -1 when that is not known
-  std::string name{};       // manufacturer and product, as the device says
-  std::string trouble{};    // why it cannot be opened and what mends it; empty when it can
+  std::string serial{};      // the device's own number; empty where it has none
+  std::string port_path{};   // bus and ports on the way, "1-2.3"; empty when not on USB
+  int interface = -1;        // of a device with several; -1 when that is not known
+  std::string name{};        // manufacturer and product, as the device says
+  std::string open_error{};  // why it cannot be opened and what mends it; empty when it can
 
   // "0403:6001 A9XYZ", with the port path where there is no serial number, or the node itself.
   [[nodiscard]] std::string identity() const;
@@ -32,17 +32,18 @@ struct Plugged {
   [[nodiscard]] bool answers_to(std::string_view id) const;
 };
 
-[[nodiscard]] std::vector<Plugged> list_serial_ports();
-[[nodiscard]] std::vector<Plugged> list_hid_nodes();
-[[nodiscard]] std::vector<Plugged> list_usb_devices();
+[[nodiscard]] std::vector<DeviceInfo> list_serial_ports();
+[[nodiscard]] std::vector<DeviceInfo> list_hid_nodes();
+[[nodiscard]] std::vector<DeviceInfo> list_usb_devices();
 
 // The one of them that answers to `id` (any when empty) and satisfies `wanted`. None or several is
 // an error that names what there is; `kind` is for that sentence ("serial port").
-[[nodiscard]] Result<Plugged> choose(const std::vector<Plugged>& plugged, const std::string& id,
-                                     const std::function<bool(const Plugged&)>& wanted,
-                                     const std::string& kind);
+[[nodiscard]] Result<DeviceInfo> choose(const std::vector<DeviceInfo>& device,
+                                        const std::string& id,
+                                        const std::function<bool(const DeviceInfo&)>& wanted,
+                                        const std::string& kind);
 
 // The one with this node, whatever link leads there; only the node itself when it is not listed.
-[[nodiscard]] Plugged find_node(const std::vector<Plugged>& plugged, const std::string& path);
+[[nodiscard]] DeviceInfo find_node(const std::vector<DeviceInfo>& device, const std::string& path);
 
 }  // namespace posed::drivers

@@ -8,7 +8,7 @@ namespace {
 constexpr double kMinPeriod_ns = 1'000.0;
 constexpr double kMaxPeriod_ns = 3'600e9;
 
-Result<double> period_of(const Playback& playback) {
+Result<double> period_of(const PlaybackOptions& playback) {
   if (!(playback.rate_hz > 0.0)) return misuse("the frame rate should be more than 0 Hz");
   if (playback.pace == 0.0) return 0.0;
   const double period_ns = 1e9 / (playback.rate_hz * playback.pace);
@@ -23,7 +23,8 @@ Result<double> period_of(const Playback& playback) {
 
 }  // namespace
 
-Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks, const Playback& playback) {
+Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks,
+                                                       const PlaybackOptions& playback) {
   const auto period_ns = period_of(playback);
   if (!period_ns) return std::unexpected(period_ns.error());
   if (chunks.count() == 0) return fail("there is nothing to play");
@@ -36,7 +37,7 @@ Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks, const Play
   return std::unique_ptr<Transport>(new FileTransport(std::move(chunks), *period_ns, playback));
 }
 
-FileTransport::FileTransport(Chunks chunks, double period_ns, const Playback& playback)
+FileTransport::FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& playback)
     : chunks_(std::move(chunks)), period_ns_(period_ns), loop_(playback.loop) {
   if (playback.pace == 0.0 || playback.time_s.size() != chunks_.count()) return;
   const double begin_s = playback.time_s.front();

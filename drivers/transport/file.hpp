@@ -10,7 +10,7 @@
 
 namespace posed::drivers {
 
-struct Playback {
+struct PlaybackOptions {
   double rate_hz = 0.0;  // of the recording, in chunks
   double pace = 1.0;     // of its clock; 0 is as fast as it can be used
   bool loop = true;
@@ -25,13 +25,13 @@ class FileTransport final : public Transport {
  public:
   // At least one chunk, none longer than kMaxChunk. An impossible pace or rate is misuse.
   [[nodiscard]] static Result<std::unique_ptr<Transport>> open(Chunks chunks,
-                                                               const Playback& playback);
+                                                               const PlaybackOptions& playback);
 
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
-  [[nodiscard]] bool patient() const noexcept override { return period_ns_ == 0.0; }
+  [[nodiscard]] bool lossless() const noexcept override { return period_ns_ == 0.0; }
   [[nodiscard]] double rate_hz() const noexcept override {
-    return patient() ? 0.0 : 1e9 / period_ns_;
+    return lossless() ? 0.0 : 1e9 / period_ns_;
   }
   // Whether it begins again after the last chunk, so that it never ends.
   [[nodiscard]] bool loops() const noexcept { return loop_; }
@@ -40,7 +40,7 @@ class FileTransport final : public Transport {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 
  private:
-  FileTransport(Chunks chunks, double period_ns, const Playback& playback);
+  FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& playback);
 
   Chunks chunks_;
   double period_ns_;  // 0: always due

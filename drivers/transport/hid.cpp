@@ -8,16 +8,16 @@
 
 #include "drivers/transport/enumerate.hpp"
 #include "drivers/transport/node.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers {
 
-Result<Link> Ports::hid(const HidSettings& settings) {
+Result<Connection> TransportFactory::hid(const HidSettings& settings) {
   if (only_prepare_) return not_opened();
   const auto nodes = list_hid_nodes();
   auto chosen = find_node(nodes, settings.path);
   if (settings.path.empty()) {
-    const auto wanted = [&](const Plugged& one) {
+    const auto wanted = [&](const DeviceInfo& one) {
       return one.is_usb && one.vendor == settings.vendor &&
              (settings.products.empty() ||
               std::ranges::find(settings.products, one.product) != settings.products.end());
@@ -28,7 +28,7 @@ Result<Link> Ports::hid(const HidSettings& settings) {
   }
   const auto fd = open_node(chosen.node);
   if (!fd) return std::unexpected(fd.error());
-  Link link(*fd, chosen.node, chosen.identity());
+  Connection link(*fd, chosen.node, chosen.identity());
   link.heed(cancel_);
   hidraw_devinfo info{};
   if (::ioctl(*fd, HIDIOCGRAWINFO, &info) != 0) {

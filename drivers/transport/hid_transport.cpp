@@ -8,7 +8,7 @@
 
 namespace posed::drivers {
 
-HidTransport::HidTransport(Link link)
+HidTransport::HidTransport(Connection link)
     : fd_(link.fd()),
       waiting_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
       reader_(make_link_transport(std::move(link))) {}
@@ -45,7 +45,7 @@ void HidTransport::write_waiting() noexcept {
   }
 }
 
-std::unique_ptr<Transport> make_hid_transport(Link link) {
+std::unique_ptr<Transport> make_hid_transport(Connection link) {
   return std::make_unique<HidTransport>(std::move(link));
 }
 

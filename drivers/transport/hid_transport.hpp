@@ -1,4 +1,4 @@
-// HidTransport: a hidraw node's reports, one a read, and one a write, which the device's keeper
+// HidTransport: a hidraw node's reports, one a read, and one a write, which the device's supervisor
 // does (cold_writer.hpp says why).
 #pragma once
 
@@ -11,13 +11,13 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/cold_writer.hpp"
-#include "drivers/transport/link.hpp"
+#include "drivers/transport/connection.hpp"
 
 namespace posed::drivers {
 
 class HidTransport final : public Transport, public ColdWriter {
  public:
-  explicit HidTransport(Link link);
+  explicit HidTransport(Connection link);
   ~HidTransport() override;
   HidTransport(const HidTransport&) = delete;
   HidTransport& operator=(const HidTransport&) = delete;
@@ -25,7 +25,7 @@ class HidTransport final : public Transport, public ColdWriter {
   [[nodiscard]] int poll_fd() const noexcept override { return reader_->poll_fd(); }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override { return reader_->start(now_ns); }
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override { return reader_->read(now_ns); }
-  // Queues the report and tells the keeper with one write to an eventfd. RT-safe but for that.
+  // Queues the report and tells the supervisor with one write to an eventfd. RT-safe but for that.
   [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
 
   [[nodiscard]] int waiting_fd() const noexcept override { return waiting_; }

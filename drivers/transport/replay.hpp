@@ -41,7 +41,7 @@ class ReplayTransport final : public Transport {
 
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
-  [[nodiscard]] bool patient() const noexcept override { return speed_ == 0.0; }
+  [[nodiscard]] bool lossless() const noexcept override { return speed_ == 0.0; }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   // Ends with an empty chunk after the last. RT-safe: no system call at all.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;

@@ -15,7 +15,7 @@
 
 #include "drivers/transport/enumerate.hpp"
 #include "drivers/transport/node.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -57,7 +57,7 @@ Result<> set_raw(int fd, const std::string& port, int baud) {
 }
 
 // USB adapters save interrupts by batching bytes, an FTDI chip for 16 ms; this asks for them at
-// once. Ports without the choice refuse, rightly.
+// once. TransportFactory without the choice refuse, rightly.
 void ask_for_low_latency(int fd) {
   serial_struct port{};
   if (::ioctl(fd, TIOCGSERIAL, &port) != 0) return;
@@ -65,10 +65,10 @@ void ask_for_low_latency(int fd) {
   ::ioctl(fd, TIOCSSERIAL, &port);
 }
 
-Result<Plugged> find_port(const SerialSettings& settings) {
+Result<DeviceInfo> find_port(const SerialSettings& settings) {
   const auto ports = list_serial_ports();
   if (!settings.port.empty()) return find_node(ports, settings.port);
-  const auto wanted = [&](const Plugged& one) {
+  const auto wanted = [&](const DeviceInfo& one) {
     const auto ids = std::uint32_t{one.vendor} << 16 | one.product;
     return !settings.id.empty() ||
            (one.is_usb && std::ranges::find(settings.usb_ids, ids) != settings.usb_ids.end());
@@ -78,14 +78,14 @@ Result<Plugged> find_port(const SerialSettings& settings) {
 
 }  // namespace
 
-Result<Link> Ports::serial(const SerialSettings& settings) {
+Result<Connection> TransportFactory::serial(const SerialSettings& settings) {
   if (settings.baud <= 0) return misuse("baud should be more than 0");
   if (only_prepare_) return not_opened();
   const auto port = find_port(settings);
   if (!port) return std::unexpected(port.error());
   const auto fd = open_node(port->node);
   if (!fd) return std::unexpected(fd.error());
-  Link link(*fd, port->node, port->identity());
+  Connection link(*fd, port->node, port->identity());
   link.heed(cancel_);
   if (auto ok = set_raw(*fd, port->node, settings.baud); !ok) return std::unexpected(ok.error());
   // flock keeps a second posed out; this keeps out the programs that know nothing of flock. Not on

@@ -8,7 +8,7 @@
 
 #include "drivers/transport/enumerate.hpp"
 #include "drivers/transport/node.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "drivers/transport/usb_impl.hpp"
 
 namespace posed::drivers {
@@ -123,9 +123,9 @@ Result<> UsbLink::set_feature(std::span<const std::byte> report) {
               libusb_error_name(sent) + "); unplug it and plug it in again");
 }
 
-Result<UsbLink> Ports::usb(const UsbSettings& settings) {
+Result<UsbLink> TransportFactory::usb(const UsbSettings& settings) {
   if (only_prepare_) return not_opened();
-  const auto wanted = [&](const Plugged& one) {
+  const auto wanted = [&](const DeviceInfo& one) {
     return one.vendor == settings.vendor && one.product == settings.product;
   };
   const auto chosen = choose(list_usb_devices(), settings.id, wanted, "USB device");

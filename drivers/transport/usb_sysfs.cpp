@@ -38,43 +38,43 @@ bool file_exists(const fs::path& path) {
   return fs::exists(path, ignored);
 }
 
-void describe_device(const fs::path& device, Plugged& plugged) {
-  plugged.is_usb = true;
-  plugged.vendor = static_cast<std::uint16_t>(read_number(device / "idVendor", 16));
-  plugged.product = static_cast<std::uint16_t>(read_number(device / "idProduct", 16));
-  plugged.serial = read_line(device / "serial");
-  plugged.port_path = device.filename();
+void describe_device(const fs::path& device, DeviceInfo& info) {
+  info.is_usb = true;
+  info.vendor = static_cast<std::uint16_t>(read_number(device / "idVendor", 16));
+  info.product = static_cast<std::uint16_t>(read_number(device / "idProduct", 16));
+  info.serial = read_line(device / "serial");
+  info.port_path = device.filename();
   const std::string maker = read_line(device / "manufacturer");
   const std::string product = read_line(device / "product");
   // Many products begin with their maker's name themselves.
-  plugged.name = maker.empty() || product.starts_with(maker) ? product
-                 : product.empty()                           ? maker
-                                                             : maker + " " + product;
+  info.name = maker.empty() || product.starts_with(maker) ? product
+              : product.empty()                           ? maker
+                                                          : maker + " " + product;
 }
 
 bool is_hub(const fs::path& device) { return read_line(device / "bDeviceClass") == "09"; }
 
 }  // namespace
 
-void describe_usb(const fs::path& device, Plugged& plugged) {
+void describe_usb(const fs::path& device, DeviceInfo& info) {
   std::error_code failed;
   fs::path at = fs::canonical(device, failed);
   if (failed) return;
   for (; at.has_relative_path(); at = at.parent_path()) {
     if (file_exists(at / "bInterfaceNumber")) {
-      plugged.interface = static_cast<int>(read_number(at / "bInterfaceNumber", 16));
+      info.interface = static_cast<int>(read_number(at / "bInterfaceNumber", 16));
     }
-    if (file_exists(at / "idVendor")) return describe_device(at, plugged);
+    if (file_exists(at / "idVendor")) return describe_device(at, info);
   }
 }
 
 // access() goes by the real user, which is the effective one: posed is never made set-uid.
-std::string trouble_of(const std::string& node) {
+std::string open_error_of(const std::string& node) {
   return ::access(node.c_str(), R_OK | W_OK) == 0 ? "" : node_trouble(node, errno);
 }
 
-std::vector<Plugged> list_usb_devices() {
-  std::vector<Plugged> found;
+std::vector<DeviceInfo> list_usb_devices() {
+  std::vector<DeviceInfo> found;
   std::error_code failed;
   for (fs::directory_iterator entry("/sys/bus/usb/devices", failed), end; !failed && entry != end;
        entry.increment(failed)) {
@@ -83,11 +83,12 @@ std::vector<Plugged> list_usb_devices() {
     std::array<char, 32> node{};
     std::snprintf(node.data(), node.size(), "/dev/bus/usb/%03u/%03u",
                   read_number(device / "busnum", 10), read_number(device / "devnum", 10));
-    Plugged plugged{.bus = Bus::kUsb, .node = node.data(), .trouble = trouble_of(node.data())};
-    describe_usb(device, plugged);
-    found.push_back(std::move(plugged));
+    DeviceInfo info{
+        .bus = Bus::kUsb, .node = node.data(), .open_error = open_error_of(node.data())};
+    describe_usb(device, info);
+    found.push_back(std::move(info));
   }
-  std::ranges::sort(found, {}, &Plugged::node);
+  std::ranges::sort(found, {}, &DeviceInfo::node);
   return found;
 }
 

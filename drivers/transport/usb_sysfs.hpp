@@ -9,11 +9,11 @@
 
 namespace posed::drivers {
 
-// Fills the USB part of `plugged` (ids, serial, port path, interface, name) from the device's
+// Fills the USB part of `info` (ids, serial, port path, interface, name) from the device's
 // directory or link below /sys; leaves it when there is no USB device above. Cold.
-void describe_usb(const std::filesystem::path& device, Plugged& plugged);
+void describe_usb(const std::filesystem::path& device, DeviceInfo& info);
 
 // Why the node cannot be opened and what mends it; empty when it can. Cold.
-[[nodiscard]] std::string trouble_of(const std::string& node);
+[[nodiscard]] std::string open_error_of(const std::string& node);
 
 }  // namespace posed::drivers

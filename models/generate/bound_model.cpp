@@ -8,8 +8,8 @@
 namespace posed::generate {
 namespace {
 
-// Of the script: with 20 frames of 30 Hz a streamed trajectory's jerk is within 3 % of the full
-// solution's (algorithms.md 4.4).
+// Of the label sequence: with 20 frames of 30 Hz a streamed trajectory's jerk is within 3 % of the
+// full solution's (models/trajectory/README.md, "Look-ahead").
 constexpr double kLookAhead_s = 20.0 / 30.0;
 
 }  // namespace
@@ -21,14 +21,15 @@ Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model
     return fail("a gesture model needs a stream of hands (hand45), not " + in_quotes(skeleton.name),
                 std::move(name));
   }
-  auto live = bind_live_model(model, skeleton, name);
+  auto live = smooth::bind_live_model(model, skeleton, name);
   if (!live) return std::unexpected(live.error());
   auto shared = std::make_shared<const gesture::GestureModel>(std::move(model));
   auto bound = std::make_unique<BoundModel>(
-      BoundModel{ModelEvidence(std::move(shared), stream_rate_hz(rate_hz)), nullptr,
+      BoundModel{trajectory::StateInformation(std::move(shared), stream_rate_hz(rate_hz)), nullptr,
                  std::move(*live), std::move(name)});
-  bound->player = std::make_unique<ScriptPlayer>(
-      bound->evidence, PlayerOptions{.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4});
+  bound->player = std::make_unique<perform::LabelSequencePlayer>(
+      bound->evidence,
+      perform::PlayerOptions{.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4});
   return bound;
 }
 

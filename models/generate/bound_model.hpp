@@ -7,9 +7,9 @@
 #include <memory>
 #include <string>
 
-#include "models/generate/live_model.hpp"
-#include "models/generate/script_player.hpp"
 #include "models/gesture/gesture_model.hpp"
+#include "models/perform/label_sequence_player.hpp"
+#include "models/smooth/live_model.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -18,9 +18,9 @@ namespace posed::generate {
 inline constexpr int kMostWaiting = 1024;  // labels of one stream that wait to be performed
 
 struct BoundModel {
-  ModelEvidence evidence;  // holds the gesture model
-  std::unique_ptr<ScriptPlayer> player;
-  std::unique_ptr<const LiveModel> live;
+  trajectory::StateInformation evidence;  // holds the gesture model
+  std::unique_ptr<perform::LabelSequencePlayer> player;
+  std::unique_ptr<const smooth::LiveModel> live;
   std::string name;  // of its file, for people
 
   [[nodiscard]] const gesture::GestureModel& gesture() const noexcept { return evidence.model(); }

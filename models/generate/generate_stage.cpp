@@ -8,21 +8,22 @@
 
 namespace posed::generate {
 
-GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton, const LiveOptions& options,
-                             double rate_hz, const BoundModel* model)
+GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton,
+                             const smooth::LiveOptions& options, double rate_hz,
+                             const BoundModel* model)
     : skeleton_(std::move(skeleton)),
       hand_(hand_side(*skeleton_).has_value()),
       smoother_(*skeleton_, options, model != nullptr ? model->live.get() : nullptr),
-      playback_(rate_hz),
+      player_(rate_hz),
       model_(model) {
-  playback_.set_model(model);
+  player_.set_model(model);
 }
 
 // RT-safe.
 void GenerateStage::set_model(const BoundModel* model) noexcept {
   model_ = model;
   static_cast<void>(smoother_.set_model(model != nullptr ? model->live.get() : nullptr));
-  playback_.set_model(model);
+  player_.set_model(model);
 }
 
 // RT-safe.
@@ -75,17 +76,17 @@ void GenerateStage::frame(const Frame& frame) noexcept {
 
 // What the playback makes of the frame goes out. RT-safe.
 void GenerateStage::show(Frame& frame, const HandAngles* live) noexcept {
-  const Playback::Pose& pose = playback_.step(live);
-  if (pose.what != Playback::What::kLive) {
+  const GesturePlayer::Pose& pose = player_.step(live);
+  if (pose.what != GesturePlayer::What::kLive) {
     const Vec3f root_position_m = frame.root_position_m;
     set_hand_angles(*skeleton_, pose.angles, frame);
     frame.root_position_m = root_position_m;
     frame.source = Source::kLabels;
-    frame.quality = pose.what == Playback::What::kHeld ? Quality::kHeld : Quality::kMeasured;
+    frame.quality = pose.what == GesturePlayer::What::kHeld ? Quality::kHeld : Quality::kMeasured;
     frame.label.fill('\0');
     frame.label_probability = 0.0F;
   }
-  if (pose.what == Playback::What::kPerformed) {
+  if (pose.what == GesturePlayer::What::kPerformed) {
     const std::string& name = model_->gesture().labels[static_cast<std::size_t>(pose.label)].name;
     std::copy_n(name.begin(), std::min(name.size(), frame.label.size() - 1), frame.label.begin());
     frame.label_probability = 1.0F;

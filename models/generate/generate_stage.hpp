@@ -10,9 +10,9 @@
 #include <span>
 
 #include "models/generate/bound_model.hpp"
-#include "models/generate/live_options.hpp"
-#include "models/generate/live_smoother.hpp"
-#include "models/generate/playback.hpp"
+#include "models/generate/gesture_player.hpp"
+#include "models/smooth/live_options.hpp"
+#include "models/smooth/live_smoother.hpp"
 #include "proto/frame/sink.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -21,7 +21,7 @@ namespace posed::generate {
 class GenerateStage final : public Stage, private Emit {
  public:
   // `model` outlives its use here; may be null, and must be for a skeleton that is no hand's.
-  GenerateStage(std::shared_ptr<const Skeleton> skeleton, const LiveOptions& options,
+  GenerateStage(std::shared_ptr<const Skeleton> skeleton, const smooth::LiveOptions& options,
                 double rate_hz, const BoundModel* model);
 
   // Emits the frames that are due. A tick (null) says that nothing came: the frames that still wait
@@ -32,15 +32,13 @@ class GenerateStage final : public Stage, private Emit {
   void flush(Emit& emit) noexcept;
 
   // All RT-safe; in effect from the next frame that is emitted.
-  [[nodiscard]] bool play(const gesture::PlayOrder& order) noexcept {
-    return playback_.play(order);
-  }
-  void stop_playing() noexcept { playback_.stop(); }
+  [[nodiscard]] bool play(const gesture::PlayOrder& order) noexcept { return player_.play(order); }
+  void stop_playing() noexcept { player_.stop(); }
   void set_model(const BoundModel* model) noexcept;
 
   // Whether ticks are wanted when nothing comes: frames wait, or something is performed. RT-safe.
   [[nodiscard]] bool waiting() const noexcept { return entered_ != 0 || performs(); }
-  [[nodiscard]] bool performs() const noexcept { return playback_.busy(); }
+  [[nodiscard]] bool performs() const noexcept { return player_.busy(); }
   [[nodiscard]] const BoundModel* model() const noexcept { return model_; }
 
   // Posterior variance of the frame emitted last, one a rotation channel [rad^2]; valid within
@@ -55,8 +53,8 @@ class GenerateStage final : public Stage, private Emit {
 
   std::shared_ptr<const Skeleton> skeleton_;
   bool hand_;
-  LiveSmoother smoother_;
-  Playback playback_;
+  smooth::LiveSmoother smoother_;
+  GesturePlayer player_;
   const BoundModel* model_;
   Emit* emit_ = nullptr;  // of the call in progress
   int entered_ = 0;       // frames that wait in the smoother

@@ -1,5 +1,5 @@
-// The way back from a performance to the live hand (hand-science.md section 4). Pure arithmetic on
-// hand45 angles, RT-safe.
+// The way back from a performance to the live hand (models/generate/README.md, "Return to the live
+// hand"). Pure arithmetic on hand45 angles, RT-safe.
 #pragma once
 
 #include "proto/frame/hand.hpp"

@@ -120,7 +120,7 @@ class Trainer {
       frames += static_cast<double>(features.rows());
     }
     const VectorXd variance = second / frames - (first / frames).cwiseAbs2();
-    const Index channels = dims / kWindows;
+    const Index channels = dims / kDeltaWindows;
     const double noise = kNoise_rad * kNoise_rad;
     VectorXd least(dims);
     least << VectorXd::Constant(channels, noise), VectorXd::Constant(channels, 0.5 * noise),

@@ -1,6 +1,6 @@
 // From labelled recordings to the statistics of every context (a gesture among its neighbours): a
 // model a label first, from it a model a context, at last rounds over whole recordings in which the
-// labels' borders may move (algorithms.md 3.2). Cold.
+// labels' borders may move (models/gesture/README.md, "Estimation"). Cold.
 #pragma once
 
 #include <functional>

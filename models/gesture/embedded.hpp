@@ -1,5 +1,6 @@
 // One round over whole recordings: the models of the labels in a row against all frames of their
-// stretch, so that a label's borders are a hint and not the law (algorithms.md 3.2). Cold.
+// stretch, so that a label's borders are only hints (models/gesture/README.md, "Embedded rounds").
+// Cold.
 #pragma once
 
 #include <functional>

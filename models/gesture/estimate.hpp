@@ -1,5 +1,5 @@
 // Statistics of aligned frames and the models made of them: flat start, segmental k-means and
-// Baum-Welch on isolated examples (algorithms.md 3.2, 3.3). Cold.
+// Baum-Welch on isolated examples (models/gesture/README.md, "Estimation" and "Durations"). Cold.
 #pragma once
 
 #include <vector>

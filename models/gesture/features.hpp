@@ -1,5 +1,5 @@
-// What training sees of a recording: every frame with how it changes (second paper, section 3.1;
-// algorithms.md 3.1). Cold.
+// What training sees of a recording: every frame with how it changes (models/gesture/README.md,
+// "Features"). Cold.
 #pragma once
 
 #include <Eigen/Core>

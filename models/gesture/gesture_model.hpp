@@ -2,7 +2,7 @@
 // live generator and the model file need. Five states a gesture, left to right without skips; one
 // decision tree per state and finger picks a diagonal Gaussian over that finger's features from
 // the gesture and its two neighbours, so that labels that were never recorded are answered too
-// (second paper, section 3; algorithms.md 3.4, 3.5).
+// (models/gesture/README.md, "Decision trees" and "Questions and unseen labels").
 //
 // Units: radians per frame at `rate_hz` to the power of the window's order. Immutable after load;
 // shared between threads.
@@ -18,14 +18,14 @@
 namespace posed::gesture {
 
 inline constexpr int kStates = 5;
-inline constexpr int kWindows = 3;  // static, delta, delta-delta
-inline constexpr int kClasses = 3;  // A, B, C of a finger
+inline constexpr int kDeltaWindows = 3;  // static, delta, delta-delta
+inline constexpr int kClasses = 3;       // A, B, C of a finger
 inline constexpr int kQuestions = 3 * kClasses;
 
 // A diagonal Gaussian over one finger's features: [window][channel of the finger].
 struct FingerGaussian {
-  std::array<std::array<double, kFingerChannels>, kWindows> mean{};
-  std::array<std::array<double, kFingerChannels>, kWindows> variance{};
+  std::array<std::array<double, kFingerChannels>, kDeltaWindows> mean{};
+  std::array<std::array<double, kFingerChannels>, kDeltaWindows> variance{};
 };
 
 // Frames that each state lasts.

@@ -1,6 +1,7 @@
-// Growing a decision tree over the contexts of gestures: which contexts share one Gaussian (second
-// paper, section 3.3; algorithms.md 3.4). Greedy: the question that gains most likelihood splits,
-// while its gain pays for the parameters that it adds (MDL) and both halves have seen enough. Cold.
+// Growing a decision tree over the contexts of gestures: which contexts share one Gaussian
+// (models/gesture/README.md, "Decision trees"). Greedy: the question that gains most likelihood
+// splits, while its gain pays for the parameters that it adds (MDL) and both halves have seen
+// enough. Cold.
 #pragma once
 
 #include <vector>

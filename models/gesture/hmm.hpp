@@ -1,5 +1,5 @@
 // Left-to-right hidden Markov models without skips: one diagonal Gaussian a state, a start in the
-// first state and an exit from the last (second paper, section 3.1; algorithms.md 3.2). The
+// first state and an exit from the last (models/gesture/README.md, "Hidden Markov model"). The
 // recursions run in the log domain: the linear ones overflow on real gloves. Cold.
 #pragma once
 

@@ -5,19 +5,19 @@
 
 #include "proto/frame/label.hpp"
 #include "proto/model/model_file.hpp"
-#include "proto/model/soundness.hpp"
+#include "proto/model/validator.hpp"
 
 namespace posed::gesture {
 namespace {
 
 using model_file::kMaxNumber;
-using model_file::Soundness;
+using model_file::Validator;
 
 constexpr int kMaxLabels = 1'000;
 constexpr int kMaxLeaves = 1 << kQuestions;  // no path asks a question twice
 constexpr double kMinVariance = 1e-20;       // its inverse is still a number that can be summed
 
-constexpr int kRow = kWindows * kFingerChannels;
+constexpr int kRow = kDeltaWindows * kFingerChannels;
 
 // A leaf's values in the order of the file's rows.
 std::span<double> mean_row(FingerGaussian& leaf) { return {leaf.mean[0].data(), kRow}; }
@@ -29,7 +29,7 @@ static_assert(sizeof(FingerGaussian::mean) == kRow * sizeof(double));
 // One tree and no other shape: children stand behind their parent, so a walk ends; every node but
 // the root is the child of one node, every leaf Gaussian is the leaf of one node.
 template <typename Gaussian>
-void read_nodes(const v1::GestureTree& from, Tree<Gaussian>& tree, Soundness& check) {
+void read_nodes(const v1::GestureTree& from, Tree<Gaussian>& tree, Validator& check) {
   const int count = from.question_size();
   check.want(count >= 1 && count < 2 * kMaxLeaves, "the number of nodes of a tree");
   check.want(from.yes_size() == count && from.no_size() == count && from.leaf_size() == count,
@@ -60,7 +60,7 @@ void read_nodes(const v1::GestureTree& from, Tree<Gaussian>& tree, Soundness& ch
 }
 
 template <typename Gaussian>
-Tree<Gaussian> read_tree(const v1::GestureTree& from, Soundness& check) {
+Tree<Gaussian> read_tree(const v1::GestureTree& from, Validator& check) {
   Tree<Gaussian> tree;
   read_nodes(from, tree, check);
   if (!check.sound()) return {};
@@ -82,7 +82,7 @@ Tree<Gaussian> read_tree(const v1::GestureTree& from, Soundness& check) {
   return tree;
 }
 
-std::vector<Label> read_labels(const v1::GestureModel& from, Soundness& check) {
+std::vector<Label> read_labels(const v1::GestureModel& from, Validator& check) {
   std::vector<Label> labels;
   std::set<std::string> names;
   check.want(from.label_size() >= 1 && from.label_size() <= kMaxLabels, "the number of labels");
@@ -101,7 +101,7 @@ std::vector<Label> read_labels(const v1::GestureModel& from, Soundness& check) {
   return labels;
 }
 
-void read_range(const v1::GestureModel& from, GestureModel& model, Soundness& check) {
+void read_range(const v1::GestureModel& from, GestureModel& model, Validator& check) {
   check.want(from.low_rad_size() == kHandChannels && from.high_rad_size() == kHandChannels,
              "the range of the angles");
   if (!check.sound()) return;
@@ -111,7 +111,7 @@ void read_range(const v1::GestureModel& from, GestureModel& model, Soundness& ch
   }
 }
 
-GestureModel read_model(const v1::GestureModel& from, Soundness& check) {
+GestureModel read_model(const v1::GestureModel& from, Validator& check) {
   GestureModel model;
   model.rate_hz = check.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
   model.labels = read_labels(from, check);
@@ -149,7 +149,7 @@ Result<GestureModel> parse_model(std::span<const std::byte> bytes, const std::st
   if (!file->has_gesture()) {
     return fail("the model is not a gesture model; make one with `posed train gesture`", name);
   }
-  Soundness check;
+  Validator check;
   GestureModel model = read_model(file->gesture(), check);
   if (auto verdict = check.verdict(name); !verdict) return std::unexpected(verdict.error());
   return model;

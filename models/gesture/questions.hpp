@@ -1,6 +1,6 @@
 // What the trees ask: which class a finger of a gesture is of. The classes let a gesture that was
-// never recorded find its way down every tree, a finger at a time (second paper, section 3.4;
-// algorithms.md 3.5). Cold.
+// never recorded find its way down every tree, a finger at a time (models/gesture/README.md,
+// "Questions and unseen labels"). Cold.
 #pragma once
 
 #include <array>
@@ -21,8 +21,9 @@ using ClassLists = std::array<std::array<std::vector<std::string>, kClasses>, kF
 [[nodiscard]] Result<std::vector<Label>> labels_of(const ClassLists& lists);
 [[nodiscard]] ClassLists lists_of(const std::vector<Label>& labels);
 
-// The paper's hands: fist g, scissors c, open p, and unseen 1 (index), 3 (index to ring), 4 (all
-// but the thumb). A closed like g, B as in c, C open like p.
+// The hands of Takamido et al. (models/gesture/README.md, "References"): fist g, scissors c, open
+// p, and unseen 1 (index), 3 (index to ring), 4 (all but the thumb). A closed like g, B as in c, C
+// open like p.
 [[nodiscard]] const std::vector<Label>& built_in_labels();
 
 // A label's pose: the mean angles while it is held.

@@ -6,7 +6,7 @@
 
 #include "models/gesture/features.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/clip/lab.hpp"
+#include "proto/clip/label_file.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::gesture {

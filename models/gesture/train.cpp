@@ -55,7 +55,7 @@ Answers answers_of(const std::vector<Context>& contexts, const ClassOf& class_of
 // The features of one finger among those of all: [window][channel of the finger].
 std::vector<int> features_of_finger(int finger) {
   std::vector<int> features;
-  for (int w = 0; w < kWindows; ++w) {
+  for (int w = 0; w < kDeltaWindows; ++w) {
     for (int c = 0; c < kFingerChannels; ++c) {
       features.push_back(w * kHandChannels + finger * kFingerChannels + c);
     }
@@ -106,8 +106,8 @@ GrownTree grow_durations(const ContextModels& models, const std::vector<Label>& 
 }
 
 // A row of values in the order of the Gaussian's arrays.
-void fill(std::array<std::array<double, kFingerChannels>, kWindows>& to, const VectorXd& row) {
-  for (int w = 0; w < kWindows; ++w) {
+void fill(std::array<std::array<double, kFingerChannels>, kDeltaWindows>& to, const VectorXd& row) {
+  for (int w = 0; w < kDeltaWindows; ++w) {
     for (int c = 0; c < kFingerChannels; ++c) to[w][c] = row[w * kFingerChannels + c];
   }
 }

@@ -1,6 +1,6 @@
-// Training: labelled recordings in, a GestureModel out (second paper, section 3; what won on real
-// gloves: one mono-gesture model a label, from it one model a context, one tree a state and
-// finger). Cold; no clock, no printing: progress goes to a callback.
+// Training: labelled recordings in, a GestureModel out (models/gesture/README.md, "Estimation": one
+// model for each label, from it one for each context, one tree for each state and finger). Cold; no
+// clock, no printing: progress goes to a callback.
 #pragma once
 
 #include <functional>

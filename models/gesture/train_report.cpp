@@ -14,7 +14,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kFewGestures = 20;  // hand-science.md section 1: below, unseen labels go astray
+constexpr int kFewGestures =
+    20;  // below, unseen labels go astray (models/gesture/README.md, measured figures)
 constexpr int kFewExamples = 2;
 constexpr std::array<int, 2> kHold{2, 3};  // the states in which a gesture's pose is held
 constexpr double kAlike_rad = 10.0 * std::numbers::pi / 180.0;  // poses nearer are the same

@@ -1,6 +1,6 @@
-// The decision trees for people: as text, as Graphviz source and as an SVG picture (the paper's
-// figure 3). Each node shows its question and the contexts that reach it, written as in the paper:
-// {g,1}-c-* is c after g or 1, before anything. Cold.
+// The decision trees for people: as text, as Graphviz source and as an SVG picture (figure 3 of
+// Takamido et al.; models/gesture/README.md, "References"). Each node shows its question and the
+// contexts that reach it, written as there: {g,1}-c-* is c after g or 1, before anything. Cold.
 #pragma once
 
 #include <string>

@@ -1,7 +1,8 @@
 // What the predictor's confidence needs, worked out once when a model is loaded. Cold.
 //
-// g(q) = 1 - v(q) / e^lambda with v the posterior variance of the RBF part (algorithms 2.4). With
-// k^ = k / e^lambda and s = noise / e^lambda, g = k^' M k^ = |L k^|^2 for a lower triangle L:
+// g(q) = 1 - v(q) / e^lambda with v the posterior variance of the RBF part (README.md,
+// "Confidence"). With k^ = k / e^lambda and s = noise / e^lambda, g = k^' M k^ = |L k^|^2 for a
+// lower triangle L:
 //
 //   up to 256 poses  exact:  M = (K^ + s I)^-1
 //   above            m = 128 inducing poses by greedy pivoted Cholesky, more (up to 256) where 128

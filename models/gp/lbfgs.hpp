@@ -1,4 +1,5 @@
-// Limited-memory BFGS (Nocedal and Wright, algorithms 7.4, 7.5, 3.5 and 3.6): minimises a smooth
+// Limited-memory BFGS (Nocedal and Wright 2006, their algorithms 7.4, 7.5, 3.5, 3.6; README.md,
+// "Limited-memory BFGS"): minimises a smooth
 // function of a few hundred variables. The caller scales the variables so that each is of order
 // one. Cold.
 #pragma once

@@ -2,8 +2,8 @@
 // weights, tiles that fit the caches, SIMD chosen at run time (AVX2 and AVX-512 give the same
 // bits).
 //
-//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (paper, eq.
-//   4)
+//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (README.md,
+//   "Kernel")
 //
 // Missing dimensions are marginalised: the distance runs over the available ones, scaled by D /
 // D_avail.
@@ -38,8 +38,8 @@ class Predictor {
   void mean(std::span<const float> q, std::span<const std::uint8_t> available,
             std::span<float> out) const noexcept;
 
-  // The same, and returns the confidence g = 1 - v_E(q) / e^lambda in 0..1 (algorithms 2.4).
-  // RT-safe. Needs build(..., gate = true).
+  // The same, and returns the confidence g = 1 - v_E(q) / e^lambda in 0..1 (README.md,
+  // "Confidence"). RT-safe. Needs build(..., gate = true).
   [[nodiscard]] float mean_and_confidence(std::span<const float> q,
                                           std::span<const std::uint8_t> available,
                                           std::span<float> out) const noexcept;

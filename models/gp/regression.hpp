@@ -1,5 +1,6 @@
-// Gaussian process regression with the paper's kernel (eq. 4) and one set of kernel values for all
-// outputs: the covariance is factorised once (algorithms 2.1). Double precision, cold, thread-safe.
+// Gaussian process regression with the kernel of Sato et al., eq. 4 (README.md, "Kernel") and one
+// set of kernel values for all outputs: the covariance is factorised once (README.md,
+// "Regression"). Double precision, cold, thread-safe.
 //
 //   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b,   C = K + sigma^2 I
 #pragma once

@@ -1,4 +1,5 @@
-// Scaled conjugate gradients (Moller 1993) with NETLAB's constants: the paper's optimiser. Cold.
+// Scaled conjugate gradients (Moller 1993) with NETLAB's constants, the optimiser of
+// Sato et al. (README.md, "Scaled conjugate gradients"). Cold.
 #pragma once
 
 #include <functional>

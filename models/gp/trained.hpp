@@ -1,8 +1,8 @@
-// Trained: a Gaussian process with the paper's kernel after learning, double precision, as a model
-// file holds it.
+// Trained: a Gaussian process with the kernel of Sato et al. after learning, double precision, as a
+// model file holds it.
 //
-//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (paper, eq.
-//   4)
+//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (README.md,
+//   "Kernel")
 #pragma once
 
 #include <Eigen/Core>

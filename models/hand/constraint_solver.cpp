@@ -25,7 +25,8 @@ constexpr int kHalvings = 10;
 constexpr double kLeastWeight = 1e-9;  // variances, of the largest one
 
 // `over` is how far an angle lies inside its limit, less than kHinge_rad: bent smoothly onto zero.
-// A quadratic in place of algorithms.md's softplus, so that angles well inside stay as they are.
+// A quadratic and not a softplus, so that angles well inside stay as they are
+// (models/hand/README.md, "Limits bent softly").
 double hinged(double over) noexcept {
   if (over <= -kHinge_rad) return 0.0;
   return (over + kHinge_rad) * (over + kHinge_rad) / (4 * kHinge_rad);

@@ -1,9 +1,9 @@
 // ConstraintSolver: the nearest pose of a hand that keeps its joints' limits and whose fingers do
 // not go through each other. Nearest in the sense of the posterior: min (q - q0)' diag(1/variance)
-// (q - q0), so that uncertain angles move first (algorithms.md 5.1). A sequential QP: the distances
-// of capsules are linearised, the QP is solved by dual Gauss-Seidel, begun from the forces of the
-// frame before. An angle that comes near its limit is bent softly onto it first. Works on hand45
-// angles, so a left and a right hand are the same to it.
+// (q - q0), so that uncertain angles move first (models/hand/README.md, "Quadratic step"). A
+// sequential QP: the distances of capsules are linearised, the QP is solved by dual Gauss-Seidel,
+// begun from the forces of the frame before. An angle that comes near its limit is bent softly onto
+// it first. Works on hand45 angles, so a left and a right hand are the same to it.
 //
 // State is one stream's: the forces and which pairs of bones touched. Const shape, no heap
 // after the constructor. Not thread-safe.

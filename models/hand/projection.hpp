@@ -1,6 +1,7 @@
 // The quadratic step of the constraint stage: the point nearest to a target, in a metric, that
-// keeps linear constraints and a box (algorithms.md 5.1). Dual Gauss-Seidel: each constraint pushes
-// with a force of its own that is never below zero; forces are kept between calls as a warm start.
+// keeps linear constraints and a box (models/hand/README.md, "Quadratic step"). Dual Gauss-Seidel:
+// each constraint pushes with a force of its own that is never below zero; forces are kept between
+// calls as a warm start.
 #pragma once
 
 #include <array>

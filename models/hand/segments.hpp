@@ -1,4 +1,5 @@
-// The closest points of two line segments (algorithms.md 5.1). RT-safe.
+// The closest points of two line segments (models/hand/README.md, "Closest points of two
+// segments"). RT-safe.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// The first paper's 43 joint angles: which joints of the CMU Acclaim skeleton, which of their axes,
-// and the axes' frames (the same in every CMU .asf). Root rotation 3, spine to head 18, arms
-// 2 x (3 + 1), legs 2 x 7 (algorithms.md 2.6).
+// The 43 joint angles of Sato et al. (README.md, References): which joints of the CMU Acclaim
+// skeleton, which of their axes, and the axes' frames (the same in every CMU .asf). Root rotation
+// 3, spine to head 18, arms 2 x (3 + 1), legs 2 x 7 (README.md, "The 43 joint angles").
 #pragma once
 
 #include <array>
@@ -50,7 +50,7 @@ inline constexpr std::array<Cmu43Joint, kCmu43Joints> kCmu43{{
 
 // The rotation vector, in the outer frame, of a small change of the Euler angles at `angle_rad`;
 // the middle angle is taken within 75 degrees, beyond which x and z fall together and a change of
-// them says nothing (algorithms.md 2.7). RT-safe.
+// them says nothing (README.md, "Euler angles near the pole"). RT-safe.
 [[nodiscard]] Eigen::Vector3d euler_change_as_vector(const Eigen::Vector3d& angle_rad,
                                                      const Eigen::Vector3d& change_rad) noexcept;
 inline constexpr double kMaxMiddleAngle_rad = 75.0 * 3.14159265358979323846 / 180.0;

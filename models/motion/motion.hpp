@@ -33,7 +33,7 @@ struct Motion {
 void drop_first_frame(Motion& motion);
 
 // The same motion at another rate. Downwards: zero-phase low-pass at a third of the new rate (10 Hz
-// at 30), then the nearest instants; upwards: slerp. The same rate is returned as it is.
+// at 30), then slerp, as upwards. The same rate is returned as it is.
 [[nodiscard]] Motion resample(const Motion& motion, double rate_hz);
 
 // Which way the walk goes [rad about +Y, 0 is +Z]: the chord from the first to the last root

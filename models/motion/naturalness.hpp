@@ -1,4 +1,4 @@
-// How natural a motion is, in figures (algorithms.md 5.2): jerk, log dimensionless jerk and
+// How natural a motion is, in figures (README.md, "Naturalness"): jerk, log dimensionless jerk and
 // spectral arc length of a speed profile, and the Frechet distance between the features of two
 // motions. Each says nothing alone; compare with a recording of the same person. Cold.
 #pragma once
@@ -26,9 +26,9 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 [[nodiscard]] double log_dimensionless_jerk(std::span<const double> speed, double rate_hz);
 
 // Arc length of the speed's normalised amplitude spectrum up to 10 Hz or where it stays below 0.05
-// (Balasubramanian et al. 2015, zero-padded four times over): closer to 0 is smoother; a
-// minimum-jerk reach has about -1.4. A ripple below the amplitude bound does not count: report
-// both. NaN for fewer than two values or a speed that is always 0.
+// (Balasubramanian et al. 2015, zero-padded to 2^4 times the next power of two): closer to 0 is
+// smoother; a minimum-jerk reach has about -1.4. A ripple below the amplitude bound does not count:
+// report both. NaN for fewer than two values or a speed that is always 0.
 [[nodiscard]] double spectral_arc_length(std::span<const double> speed, double rate_hz);
 
 // Mean and covariance (over n - 1) of rows.

@@ -6,7 +6,8 @@
 //             q_j = log(Rmean_j^T R_j), R_j' = Rmean_j exp(q_j'); 3 a joint, the root first with
 //             its heading removed
 //   humanoid  the same on the canonical skeleton
-//   cmu43     the first paper's Euler angles [rad] of an Acclaim skeleton (root 3 + 40), by the
+//   cmu43     the Euler angles [rad] of Sato et al. (README.md, References) of an Acclaim skeleton
+//   (root 3 + 40), by the
 //             joints' names in an ASF or in the BVH files made from it
 #pragma once
 

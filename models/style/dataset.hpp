@@ -36,12 +36,12 @@ struct DatasetOptions {
 
 struct AlignedClip {
   std::string file, group, motion;
-  int subject = 0;                    // index into Dataset::subjects
-  bool dropped_first = false;         // the file's first frame was an added rest pose
-  Eigen::MatrixXd q;                  // [T x D], rad
-  Eigen::MatrixXd state;              // y = (v, q, dq/dt) [T x 3 + 2D], the paper's 89 for cmu43
-  Eigen::VectorXd leg;                // the stride's reference signal [T]
-  bool has_legs = false;              // else `leg` is the first principal component of q
+  int subject = 0;             // index into Dataset::subjects
+  bool dropped_first = false;  // the file's first frame was an added rest pose
+  Eigen::MatrixXd q;           // [T x D], rad
+  Eigen::MatrixXd state;       // y = (v, q, dq/dt) [T x 3 + 2D]; 89 for cmu43, as in Sato et al.
+  Eigen::VectorXd leg;         // the stride's reference signal [T]
+  bool has_legs = false;       // else `leg` is the first principal component of q
   double theta0 = 0.0, dtheta = 0.0;  // phase of the first frame, phase per frame
 
   [[nodiscard]] Eigen::VectorXd phase() const;
@@ -76,7 +76,7 @@ struct Dataset {
                                            const DatasetOptions& options);
 
 // Phases by the MGPM, a motion at a time; then each clip turned so that its leg signal peaks at
-// phase 0 (style-science 0.2).
+// phase 0 (README.md, "Phase alignment").
 [[nodiscard]] Result<> align(Dataset& dataset, const DatasetOptions& options);
 
 }  // namespace posed::style

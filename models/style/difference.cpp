@@ -16,8 +16,8 @@ using Eigen::VectorXd;
 // noise.
 constexpr double kMinNoise_rad2 = 3.05e-7;
 
-// Where the search for the paper's kernel values starts: the data's own size, 50 degrees, little
-// noise.
+// Where the search for the kernel values of --mode paper starts: the data's own size, 50 degrees,
+// little noise.
 gp::Hyper paper_start(const MatrixXd& Y) {
   constexpr double kLength_rad = 50.0 * std::numbers::pi / 180.0;
   const Eigen::RowVectorXd mean = Y.colwise().mean();
@@ -30,18 +30,18 @@ gp::Hyper paper_start(const MatrixXd& Y) {
 }
 
 struct Grid {
-  MatrixXd inputs, outputs;  // [kGridFrames * pairings x D]
+  MatrixXd inputs, outputs;  // [kGridFrames * training_pairs x D]
   VectorXd offset;           // [D]
 };
 
-Grid grid_of(const std::vector<Pairing>& pairings) {
+Grid grid_of(const std::vector<Pairing>& training_pairs) {
   const MatrixXd basis = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
-  const auto dims = pairings.front().input.cols();
-  const auto rows = static_cast<Eigen::Index>(pairings.size()) * kGridFrames;
+  const auto dims = training_pairs.front().input.cols();
+  const auto rows = static_cast<Eigen::Index>(training_pairs.size()) * kGridFrames;
   Grid grid{MatrixXd(rows, dims), MatrixXd(rows, dims), VectorXd::Zero(dims)};
   int counted = 0;
-  for (Eigen::Index i = 0; i < std::ssize(pairings); ++i) {
-    const Pairing& pairing = pairings[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = 0; i < std::ssize(training_pairs); ++i) {
+    const Pairing& pairing = training_pairs[static_cast<std::size_t>(i)];
     grid.inputs.middleRows(i * kGridFrames, kGridFrames) = basis * pairing.input;
     grid.outputs.middleRows(i * kGridFrames, kGridFrames) = basis * pairing.delta;
     if (pairing.prior) {
@@ -63,9 +63,9 @@ std::vector<double> candidate_lengths_rad(int dims) {
   return lengths;
 }
 
-Result<gp::Trained> fit_difference(const std::vector<Pairing>& pairings, double length_rad,
+Result<gp::Trained> fit_difference(const std::vector<Pairing>& training_pairs, double length_rad,
                                    double noise) {
-  const Grid grid = grid_of(pairings);
+  const Grid grid = grid_of(training_pairs);
   // The signal variance does not move the mean (noise is relative to it); it is what the residual
   // shows, so that the process's variance means something.
   const MatrixXd residual = grid.outputs.rowwise() - grid.offset.transpose();

@@ -1,6 +1,6 @@
 // From aligned cycles to the process that adds a style: pairs of (a source's cycle, its difference
-// to the target), the choice of the kernel's length, and the fit (algorithms.md 2.3, style-science
-// 8). Cold.
+// to the target), the choice of the kernel's length, and the fit (README.md, "Training pairs"
+// and "Length of the kernel"). Cold.
 #pragma once
 
 #include <functional>
@@ -59,11 +59,11 @@ struct Way {
 
 // The default model: prior mean = mean difference of the first source, an RBF of this length on
 // what is left, b = 0, `noise` relative to the signal variance.
-[[nodiscard]] Result<gp::Trained> fit_difference(const std::vector<Pairing>& pairings,
+[[nodiscard]] Result<gp::Trained> fit_difference(const std::vector<Pairing>& training_pairs,
                                                  double length_rad, double noise);
 
-// The paper's way (--mode paper): differences Y [N x D] at the mean cycle X [N x D], all kernel
-// values by evidence (SCG).
+// The way of Sato et al. (--mode paper; README.md, "What differs from the paper, measured"):
+// differences Y [N x D] at the mean cycle X [N x D], all kernel values by evidence (SCG).
 [[nodiscard]] Result<gp::Trained> fit_paper(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y);
 
 // Sum of squared errors on the fold's frames, and of the truth itself.

@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
-// The fixture's figures: three harmonics, 0.2 for a missing first harmonic, 400 frequencies.
+// README.md, "Stride": three harmonics, 0.2 for a missing first harmonic, 400 frequencies.
 constexpr int kStrideHarmonics = 3;
 constexpr double kFirstHarmonicPenalty = 0.2;
 constexpr int kFrequencies = 400;

@@ -32,7 +32,7 @@ struct Stride {
 
 // The stride frequency of a leg signal sampled at `rate_hz`: the best of the periods 0.6 to 1.7 s
 // (and no longer than the signal) by three harmonics, with a penalty on a weak first harmonic,
-// which keeps two strides from being taken for one (style-science 0.1). Needs has_stride().
+// which keeps two strides from being taken for one (README.md, "Stride"). Needs has_stride().
 [[nodiscard]] Stride find_stride(const Eigen::VectorXd& signal, double rate_hz);
 
 // How badly strides fit a leg signal, 0 to about 1.2: the median of find_stride's scores over

@@ -1,5 +1,5 @@
 // Heading: which way the walker goes, as the style filter sees it: the pelvis' own direction with
-// the sway of the stride smoothed out (algorithms 2.7).
+// the sway of the stride smoothed out (README.md, "Heading").
 #pragma once
 
 #include <cmath>

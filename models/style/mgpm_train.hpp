@@ -1,5 +1,5 @@
-// Learns an MGPM: several starts, each optimised in two stages (algorithms.md 1.6). The result is a
-// function of the data and the seed alone. Cold; thread-safe.
+// Learns an MGPM: several starts, each optimised in two stages (README.md, "Optimisation"). The
+// result is a function of the data and the seed alone. Cold; thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,7 @@
 
 #include "models/style/style_model.hpp"
 #include "proto/model/model_file.hpp"
-#include "proto/model/soundness.hpp"
+#include "proto/model/validator.hpp"
 
 namespace posed::style {
 namespace {
@@ -19,7 +19,7 @@ constexpr int kMaxInputs = 20'000;
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-class Reader : public model_file::Soundness {
+class Reader : public model_file::Validator {
  public:
   VectorXd vector(const google::protobuf::RepeatedField<double>& list, int size, const char* what) {
     want(list.size() == size, what);

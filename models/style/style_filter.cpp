@@ -195,7 +195,7 @@ float StyleFilter::smoothed_gate(float confidence, double dt_s) noexcept {
 }
 
 // What the kernel sees: less the walker's own mean offset where that is asked for, and within the
-// range of the training poses (algorithms 2.3, 5.3). RT-safe
+// range of the training poses (README.md, "Filter", Calibration). RT-safe
 void StyleFilter::kernel_input(const Dims& q, const Flags& available, double dt_s,
                                Dims& input) noexcept {
   const Eigen::VectorXf& mean = model_->input_mean;

@@ -1,9 +1,8 @@
-// StyleFilter: the style stage of one stream, y = q + a f(q) (paper, eq. 5), with the same code
-// live, offline (`apply`) and in replay. Memoryless but for what makes it safe to touch while it
-// runs: the heading low-pass, the alpha slew, the gate's smoothing and the blend after a model
-// swap.
-//
-// The law of the step. Let D(t) = R_in^T R_out be what the filter adds to a joint at frame t. Then
+// StyleFilter: the style stage of one stream, y = q + alpha f(q) (README.md, "Filter"), with the
+// same code live, offline (`apply`) and in replay. Memoryless but for what makes it safe to touch
+// while it runs: the heading low-pass, the alpha slew, the gate's smoothing and the blend after a
+// model swap. The bound on the step (README.md, "Bound on the step"). Let D(t) = R_in^T R_out be
+// what the filter adds to a joint at frame t. Then
 //
 //   angle(D(t-1), D(t)) <= |c| slew dt + the change of the model's own answer from t-1 to t,
 //
@@ -42,7 +41,7 @@ struct FilterOptions {
   double alpha = 1.0;  // -2..2
   double alpha_slew_per_s = 2.0;
   bool gate = false;           // fade towards fallback * constant where the process knows nothing
-  double gate_fallback = 1.0;  // kappa_c of algorithms 2.4
+  double gate_fallback = 1.0;  // kappa_c (README.md, "Filter")
   bool calibrate = false;      // remove the walker's own mean offset from the kernel's input
 };
 inline constexpr double kMaxAlpha = 2.0;

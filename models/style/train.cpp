@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "models/style/harmonics.hpp"
-#include "models/style/pairings.hpp"
 #include "models/style/training_check.hpp"
+#include "models/style/training_pairs.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::style {
@@ -84,21 +84,21 @@ bool several_subjects(const Dataset& dataset, const std::string& target) {
 Result<Learnt> learn_default(const Dataset& dataset, const std::string& target,
                              const FoldProgress& progress) {
   const std::string first = first_source_of(dataset, target);
-  const auto pairings = make_pairings(dataset, subject_cycles(dataset), target, first);
+  const auto training_pairs = make_pairings(dataset, subject_cycles(dataset), target, first);
   const double noise = several_subjects(dataset, target) ? kPersonNoise : kMeanCycleNoise;
   const auto folds = make_folds(dataset, target, first);
   const auto candidates = candidate_lengths_rad(dataset.dims());
-  const bool is_union = dataset.motions.size() > 1 || pairings.size() > 2;
+  const bool is_union = dataset.motions.size() > 1 || training_pairs.size() > 2;
   const ChosenLength chosen =
       choose_length_rad(folds, candidates, noise, candidates[is_union ? 2 : 1], progress);
-  auto process = fit_difference(pairings, chosen.length_rad, noise);
+  auto process = fit_difference(training_pairs, chosen.length_rad, noise);
   if (!process) return std::unexpected(process.error());
   Learnt learnt{std::move(*process), {}, {}, chosen.way};
   const MatrixXd basis = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
   learnt.differences.resize(learnt.process.inputs.rows(), dataset.dims());
-  for (Eigen::Index i = 0; i < std::ssize(pairings); ++i) {
+  for (Eigen::Index i = 0; i < std::ssize(training_pairs); ++i) {
     learnt.differences.middleRows(i * kGridFrames, kGridFrames) =
-        basis * pairings[static_cast<std::size_t>(i)].delta;
+        basis * training_pairs[static_cast<std::size_t>(i)].delta;
   }
   learnt.kernel["length_chosen_by"] = folds.empty() ? "default" : "leave-out";
   return learnt;
@@ -123,7 +123,8 @@ MatrixXd mgpm_group_cycle(const Dataset& dataset, std::size_t motion, const std:
   return all.middleCols(3, dataset.dims());
 }
 
-// The paper: mean source cycle -> difference of the mean cycles, kernel values by evidence.
+// The way of Sato et al. (--mode paper): mean source cycle -> difference of the mean cycles, kernel
+// values by evidence.
 Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
   std::set<std::string> sources;
   for (const Subject& s : dataset.subjects) {

@@ -11,7 +11,7 @@ namespace posed::style {
 
 enum class TrainMode : std::uint8_t {
   kDefault,  // per-clip harmonic cycles, mean difference + GP on the residual, length by leave-out
-  kPaper,    // MGPM mean cycles, the paper's kernel, evidence maximised by SCG
+  kPaper,    // Sato et al.: MGPM mean cycles, their kernel, evidence maximised by SCG
 };
 
 [[nodiscard]] Result<TrainMode> mode_from_name(std::string_view name);

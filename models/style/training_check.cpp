@@ -100,7 +100,7 @@ void check_strides(const Dataset& dataset, TrainingCheck& check) {
 
 void check_closing(const std::string& target, TrainingCheck& check) {
   // Two takes of one style by one actor are 1.2 to 4.4 deg rms apart, styles 9.5 and more (dataset
-  // 1 and 2; the table is in models/README.md).
+  // 1 and 2; the table is in README.md, "Verdicts").
   constexpr double kLeastDifference_deg = 5.0;
   if (check.difference_deg < kLeastDifference_deg) {
     check.problems.push_back("there is no difference to learn: the groups' mean cycles are " +

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "models/style/dataset.hpp"
-#include "models/style/pairings.hpp"
+#include "models/style/training_pairs.hpp"
 
 namespace posed::style {
 

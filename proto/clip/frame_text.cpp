@@ -135,12 +135,12 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
   FrameOutcome outcome;
   outcome.expected = 1 + kHandChannels;
   const char* const begin = text.data();
-  const auto blame = [&](FrameFault fault, std::string_view where) {
+  const auto add_error = [&](FrameFault fault, std::string_view where) {
     outcome.fault = fault;
     outcome.where = where;
     return outcome;
   };
-  if (values.size() < kHandChannels) return blame(FrameFault::kTooFew, {});
+  if (values.size() < kHandChannels) return add_error(FrameFault::kTooFew, {});
   text = trim(text);
   for (bool more = true; more; ++outcome.found) {
     const std::size_t comma = text.find(',');
@@ -150,17 +150,17 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
     text.remove_prefix(more ? comma + 1 : text.size());
     if (outcome.found == outcome.expected) {
       ++outcome.found;
-      return blame(FrameFault::kTooMany, {});
+      return add_error(FrameFault::kTooMany, {});
     }
     const auto value = field.empty() ? std::optional(kMissing) : parse_number(field);
-    if (!value) return blame(FrameFault::kNotANumber, field);
+    if (!value) return add_error(FrameFault::kNotANumber, field);
     if (outcome.found == 0) {
       outcome.time_s = *value;
     } else if (!keep(*value, kChannelOfAngle[outcome.found - 1], values)) {
-      return blame(FrameFault::kImplausible, field);
+      return add_error(FrameFault::kImplausible, field);
     }
   }
-  return outcome.found < outcome.expected ? blame(FrameFault::kTooFew, {}) : outcome;
+  return outcome.found < outcome.expected ? add_error(FrameFault::kTooFew, {}) : outcome;
 }
 
 int FrameParser::find_bone(std::string_view name) const noexcept {
@@ -173,7 +173,7 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
                                       std::span<double> values) const noexcept {
   FrameOutcome outcome;
   const std::string_view whole = text;
-  const auto blame = [&](FrameFault fault, std::string_view where, std::string_view word) {
+  const auto add_error = [&](FrameFault fault, std::string_view where, std::string_view word) {
     outcome.fault = fault;
     outcome.where = where;
     outcome.offset = static_cast<std::size_t>(word.data() - whole.data());
@@ -182,16 +182,16 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
   std::string_view word = next_word(text);
   const auto number = std::from_chars(word.data(), word.data() + word.size(), outcome.number);
   if (word.empty() || number.ec != std::errc() || number.ptr != word.data() + word.size()) {
-    return blame(FrameFault::kNoNumber, word, word);
+    return add_error(FrameFault::kNoNumber, word, word);
   }
-  if (values.size() < scale_.size()) return blame(FrameFault::kTooMany, {}, word);
+  if (values.size() < scale_.size()) return add_error(FrameFault::kTooMany, {}, word);
   std::bitset<kMaxJoints> seen;
   word = next_word(text);
   while (!word.empty()) {
     const int index = find_bone(word);
-    if (index < 0) return blame(FrameFault::kUnknownBone, word, word);
+    if (index < 0) return add_error(FrameFault::kUnknownBone, word, word);
     const AcclaimBone& bone = bones_[index];
-    if (seen[index]) return blame(FrameFault::kRepeatedBone, word, word);
+    if (seen[index]) return add_error(FrameFault::kRepeatedBone, word, word);
     seen[index] = true;
     outcome.expected = bone.channels.size();
     outcome.found = 0;
@@ -201,20 +201,20 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
       if (!value && find_bone(word) >= 0) break;
       if (!value) {
         const bool ends = outcome.found == outcome.expected;
-        return blame(ends ? FrameFault::kUnknownBone : FrameFault::kNotANumber, word, word);
+        return add_error(ends ? FrameFault::kUnknownBone : FrameFault::kNotANumber, word, word);
       }
       if (outcome.found < outcome.expected) {
         const auto channel = static_cast<std::size_t>(bone.channels[outcome.found]);
-        if (!keep(*value, channel, values)) return blame(FrameFault::kImplausible, word, word);
+        if (!keep(*value, channel, values)) return add_error(FrameFault::kImplausible, word, word);
       }
       ++outcome.found;
     }
-    if (outcome.found < outcome.expected) return blame(FrameFault::kTooFew, bone.name, name);
-    if (outcome.found > outcome.expected) return blame(FrameFault::kTooMany, bone.name, name);
+    if (outcome.found < outcome.expected) return add_error(FrameFault::kTooFew, bone.name, name);
+    if (outcome.found > outcome.expected) return add_error(FrameFault::kTooMany, bone.name, name);
   }
   for (std::size_t i = 0; i < bones_.size(); ++i) {
     if (!seen[i] && !bones_[i].channels.empty()) {
-      return blame(FrameFault::kMissingBone, bones_[i].name, whole.substr(0, 0));
+      return add_error(FrameFault::kMissingBone, bones_[i].name, whole.substr(0, 0));
     }
   }
   return outcome;

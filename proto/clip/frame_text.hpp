@@ -30,7 +30,7 @@ enum class FrameFault : std::uint8_t {
 
 struct FrameOutcome {
   FrameFault fault = FrameFault::kNone;
-  std::string_view where;    // the word or bone to blame; into the text or the parser
+  std::string_view where;    // the word or bone to add_error; into the text or the parser
   std::size_t offset = 0;    // of the fault in the text
   std::size_t expected = 0;  // values wanted and found, for too few and too many
   std::size_t found = 0;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proto/clip/standing.hpp"
+#include "proto/clip/mean_pose.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/bone_names.hpp"
 #include "proto/frame/plausible.hpp"

@@ -19,15 +19,15 @@ namespace {
 constexpr double kMillimetre = 1e-3;
 constexpr double kLongest_m = 1.0;  // of anything in a hand
 
-class HandReader : private FirstMistake {
+class HandReader : private FirstError {
  public:
-  using FirstMistake::FirstMistake;
+  using FirstError::FirstError;
 
   Result<HandShape> read(const toml::table& table) {
     for (const auto& [key, node] : table) entry(key.str(), node);
-    if (shape_.name.empty()) blame(table, "a hand needs a name");
+    if (shape_.name.empty()) add_error(table, "a hand needs a name");
     for (std::size_t f = 0; f < kFingers; ++f) {
-      if (!seen_[f]) blame(table, "the hand lacks its [" + std::string(kFingerNames[f]) + "]");
+      if (!seen_[f]) add_error(table, "the hand lacks its [" + std::string(kFingerNames[f]) + "]");
     }
     if (error()) return std::unexpected(*error());
     return std::move(shape_);
@@ -43,14 +43,14 @@ class HandReader : private FirstMistake {
       seen_[f] = true;
       read_finger(*node.as_table(), shape_.fingers[f]);
     } else {
-      blame(node, in_quotes(key) + " is not known in a hand, or of another type");
+      add_error(node, in_quotes(key) + " is not known in a hand, or of another type");
     }
   }
 
   void read_finger(const toml::table& table, FingerShape& finger) {
     for (const std::string_view needed :
          {"base_mm", "length_mm", "radius_mm", "x_deg", "y_deg", "z_deg"}) {
-      if (!table.contains(needed)) blame(table, "a finger needs " + std::string(needed));
+      if (!table.contains(needed)) add_error(table, "a finger needs " + std::string(needed));
     }
     for (const auto& [toml_key, node] : table) {
       const std::string_view key = toml_key.str();
@@ -67,7 +67,7 @@ class HandReader : private FirstMistake {
       } else if (key.size() == 5 && key.ends_with("_deg") && key[0] >= 'x' && key[0] <= 'z') {
         read_ranges(node, static_cast<std::size_t>(key[0] - 'x'), finger);
       } else {
-        blame(node, in_quotes(key) + " is not known in a finger");
+        add_error(node, in_quotes(key) + " is not known in a finger");
       }
     }
   }
@@ -75,7 +75,7 @@ class HandReader : private FirstMistake {
   void read_ranges(const toml::node& node, std::size_t axis, FingerShape& finger) {
     const toml::array* const joints = node.as_array();
     if (joints == nullptr || joints->size() != kFingerJoints) {
-      return blame(node, "limits are three pairs, [least, most] of joints 1 to 3");
+      return add_error(node, "limits are three pairs, [least, most] of joints 1 to 3");
     }
     for (std::size_t j = 0; j < kFingerJoints; ++j) {
       const toml::array* const pair = joints->get(j)->as_array();
@@ -83,7 +83,7 @@ class HandReader : private FirstMistake {
       const auto low = is_pair ? pair->get(0)->value<double>() : std::nullopt;
       const auto high = is_pair ? pair->get(1)->value<double>() : std::nullopt;
       if (!low || !high || !(*low <= 0.0) || !(*high >= 0.0) || *low < -180 || *high > 180) {
-        return blame(node, "a limit is [least, most] in degrees, with 0 between them");
+        return add_error(node, "a limit is [least, most] in degrees, with 0 between them");
       }
       finger.range[j][axis] = {*low * kDegree, *high * kDegree};
     }
@@ -97,7 +97,7 @@ class HandReader : private FirstMistake {
       const auto value =
           array != nullptr && array->size() == 3 ? array->get(i)->value<double>() : std::nullopt;
       if (!value || !(std::abs(*value) <= most)) {
-        blame(node, "three numbers are wanted here, of a size that fits a hand");
+        add_error(node, "three numbers are wanted here, of a size that fits a hand");
         return Eigen::Vector3d::Zero();
       }
       read[static_cast<int>(i)] = *value;
@@ -111,7 +111,7 @@ class HandReader : private FirstMistake {
 
   Eigen::Vector3d lengths(const toml::node& node) {
     const Eigen::Vector3d read = point(node);
-    if (!(read.minCoeff() > 0)) blame(node, "lengths are above zero");
+    if (!(read.minCoeff() > 0)) add_error(node, "lengths are above zero");
     return read;
   }
 

@@ -13,14 +13,14 @@
 namespace posed {
 namespace {
 
-class ProfileReader : private FirstMistake {
+class ProfileReader : private FirstError {
  public:
-  using FirstMistake::FirstMistake;
+  using FirstError::FirstError;
 
   Result<Profile> read(const toml::table& table) {
     for (const auto& [key, node] : table) entry(key.str(), node);
-    if (profile_.name.empty()) blame(table, "a profile needs a name");
-    if (profile_.bones.empty()) blame(table, "a profile needs its [bones]");
+    if (profile_.name.empty()) add_error(table, "a profile needs a name");
+    if (profile_.bones.empty()) add_error(table, "a profile needs its [bones]");
     if (error()) return std::unexpected(*error());
     return std::move(profile_);
   }
@@ -30,11 +30,11 @@ class ProfileReader : private FirstMistake {
     if (key == "name") {
       profile_.name = node.value_or("");
     } else if (key == "note") {
-      if (!node.is_string()) blame(node, "note is a text");
+      if (!node.is_string()) add_error(node, "note is a text");
     } else if (key == "metres_per_unit") {
       profile_.metres_per_unit = node.value<double>();
       if (!profile_.metres_per_unit || !(*profile_.metres_per_unit > 0)) {
-        blame(node, "metres_per_unit is a length in metres");
+        add_error(node, "metres_per_unit is a length in metres");
       }
     } else if (key == "person" && node.is_boolean()) {
       profile_.person = node.value_or(true);
@@ -45,7 +45,7 @@ class ProfileReader : private FirstMistake {
     } else if ((key == "along" || key == "bones" || key == "T") && node.is_table()) {
       for (const auto& [joint, value] : *node.as_table()) pair(key, joint.str(), value);
     } else {
-      blame(node, in_quotes(key) + " is not known in a profile, or of another type");
+      add_error(node, in_quotes(key) + " is not known in a profile, or of another type");
     }
   }
 
@@ -55,17 +55,18 @@ class ProfileReader : private FirstMistake {
       profile_.along.emplace(key, text);
     } else if (table == "bones") {  // canonical bone = "joint"
       const auto bone = bone_from_name(key);
-      if (!bone) return blame(value, in_quotes(key) + " is no canonical bone");
+      if (!bone) return add_error(value, in_quotes(key) + " is no canonical bone");
       if (!profile_.bones.emplace(text, *bone).second) {
-        blame(value, "joint " + in_quotes(text) + " is given to two bones");
+        add_error(value, "joint " + in_quotes(text) + " is given to two bones");
       }
     } else if (value.is_array()) {
       const auto T = from_angles(*value.as_array());
-      if (!T) return blame(value, "T as angles is three numbers [deg]: x, y, z, as Acclaim's axis");
+      if (!T)
+        return add_error(value, "T as angles is three numbers [deg]: x, y, z, as Acclaim's axis");
       profile_.T.emplace(key, *T);
     } else {
       const auto T = axes_from_text(text);
-      if (!T) return blame(value, "T says where x, y and z point, for example \"+y-x+z\"");
+      if (!T) return add_error(value, "T says where x, y and z point, for example \"+y-x+z\"");
       profile_.T.emplace(key, *T);
     }
   }

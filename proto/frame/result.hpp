@@ -14,7 +14,7 @@ enum class ExitCode : int { kDone = 0, kFailed = 1, kWrongUse = 2 };
 
 struct Error {
   std::string message;  // one sentence, no trailing newline, says what to do
-  std::string file;     // empty when no file is to blame
+  std::string file;     // empty when no file is to add_error
   int line = 0;         // 1-based; 0 when the place is not a line
   ExitCode exit_code = ExitCode::kFailed;
 

@@ -41,7 +41,8 @@ struct Joint {
   Eigen::Quaterniond channel_frame = Eigen::Quaterniond::Identity();
   std::optional<Bone> bone;  // which canonical bone this joint is
   // T: global rotation of this joint when the figure stands in the canonical T-pose
-  // (style-science section 6); the canonical local rotation is T_parent L T_joint^-1.
+  // (models/motion/README.md, "Canonical humanoid"); the canonical local rotation is T_parent L
+  // T_joint^-1.
   Eigen::Quaterniond T_world_joint = Eigen::Quaterniond::Identity();
 };
 

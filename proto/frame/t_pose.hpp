@@ -1,6 +1,7 @@
 // T: the global rotation of each joint when the figure stands in the canonical T-pose (Y up, facing
 // +Z, left hand to +X, every limb along an axis). With it a source's local rotation L becomes the
-// canonical one, Lc = T_parent L T_joint^-1, identity in T-pose (style-science section 6).
+// canonical one, Lc = T_parent L T_joint^-1, identity in T-pose (models/motion/README.md,
+// "Canonical humanoid").
 #pragma once
 
 #include <optional>

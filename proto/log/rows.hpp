@@ -47,7 +47,7 @@ struct ChunkRow {
   std::int64_t id = 0;  // given by the writer
   std::uint32_t source = 0;
   std::uint32_t socket = 0;    // of the source's
-  std::uint8_t direction = 0;  // posed::record::Direction
+  std::uint8_t direction = 0;  // posed::pipeline::Direction
   std::int64_t arrival_ns = 0;
   std::uint64_t first_item = 0;  // what the first item made from it is counted
   // Of each stream of the source: a reader finds its place after a gap. From a reader, these and

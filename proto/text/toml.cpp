@@ -30,7 +30,7 @@ Result<toml::table> load_toml(const std::filesystem::path& path, const TomlLimit
   return parse_toml(*text, path.string(), limits);
 }
 
-void FirstMistake::blame(const toml::node& node, std::string_view message) {
+void FirstError::add_error(const toml::node& node, std::string_view message) {
   if (!error_) error_ = Error{clean(message), file_, line_of(node.source())};
 }
 

@@ -24,11 +24,11 @@ namespace posed {
                                             const TomlLimits& limits);
 
 // What a reader of such a table derives from: it remembers the first mistake, with its line.
-class FirstMistake {
+class FirstError {
  public:
-  explicit FirstMistake(std::string file) : file_(std::move(file)) {}
+  explicit FirstError(std::string file) : file_(std::move(file)) {}
 
-  void blame(const toml::node& node, std::string_view message);
+  void add_error(const toml::node& node, std::string_view message);
   [[nodiscard]] const std::optional<Error>& error() const noexcept { return error_; }
   [[nodiscard]] const std::string& file() const noexcept { return file_; }
 

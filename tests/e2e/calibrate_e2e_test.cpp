@@ -44,7 +44,7 @@ class CalibrationStage : public Stage {
   }
 
   void put_on() {
-    glove.emplace("lucidgloves", devices::EmulatedPort::connect_tcp(endpoint()).value());
+    glove.emplace("lucidgloves", emulate::EmulatedPort::connect_tcp(endpoint()).value());
   }
 
   [[nodiscard]] std::string endpoint() const { return "127.0.0.1:" + std::to_string(port_); }

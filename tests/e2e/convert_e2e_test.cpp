@@ -7,7 +7,7 @@
 
 #include "proto/clip/hand_clip.hpp"
 #include "tests/e2e/served.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
 namespace {

@@ -16,7 +16,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/control/zmq_handle.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/options.hpp"
 #include "posed/v1/posed.pb.h"
@@ -82,12 +82,12 @@ std::uint64_t resident_bytes(pid_t pid) {
 // The numbers of the frames of one stream that come to a subscriber within a time.
 std::set<std::uint64_t> frames_within(const std::string& endpoint, const std::string& stream,
                                       std::chrono::milliseconds time) {
-  const auto context = control::open_context().value();
-  const auto socket = control::open_socket(context.get(), ZMQ_SUB).value();
-  REQUIRE(control::set_option(socket.get(), ZMQ_SUBSCRIBE, "pose/" + stream));
-  REQUIRE(control::connect_socket(socket.get(), endpoint));
+  const auto context = net::open_context().value();
+  const auto socket = net::open_socket(context.get(), ZMQ_SUB).value();
+  REQUIRE(net::set_option(socket.get(), ZMQ_SUBSCRIBE, "pose/" + stream));
+  REQUIRE(net::connect_socket(socket.get(), endpoint));
   std::set<std::uint64_t> sequences;
-  control::Message message;
+  net::Message message;
   v1::Frame frame;
   for (const auto end = SteadyClock::now() + time; SteadyClock::now() < end;) {
     zmq_pollitem_t wait{socket.get(), 0, ZMQ_POLLIN, 0};

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/pipeline/clock.hpp"
+#include "daemon/system/clock.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/events.hpp"
 #include "tests/e2e/logged_frames.hpp"
@@ -48,7 +48,7 @@ class GloveStage : public Stage {
     INFO(glove->errors());
     REQUIRE(line);
     CHECK(json::parse(*line).at("port") == path(hand));
-    return pipeline::monotonic_ns();
+    return system::monotonic_ns();
   }
 
   static void unplug(std::optional<Process>& glove) {
@@ -145,7 +145,7 @@ TEST_CASE("kill -9 while gloves are recorded: the log opens and replays") {
     std::filesystem::remove(stage.path("take.plog"));
     stage.record();
     std::this_thread::sleep_for(1s + 37ms * (i % 10));
-    const std::int64_t killed_ns = pipeline::monotonic_ns();
+    const std::int64_t killed_ns = system::monotonic_ns();
     stage.daemon->send(SIGKILL);
     CHECK(stage.daemon->exit_code() == 128 + SIGKILL);
     stage.expect_replay();  // folds in the -wal and checks the whole file

@@ -58,7 +58,7 @@ TEST_CASE("a CyberGlove III that connects over TCP is read, lost and found; no f
   };
   for (int i = 0; i < 3; ++i) {
     std::optional<PosingGlove> glove;
-    glove.emplace("cyberglove", devices::EmulatedPort::connect_tcp(endpoint).value(),
+    glove.emplace("cyberglove", emulate::EmulatedPort::connect_tcp(endpoint).value(),
                   drivers::Options{{"link", std::string("tcp")}, {"form", std::string("16bit")}});
     CHECK(frames_come());
     if (i > 0) wait_for(events, "KIND_RECOVERED");

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "models/gesture/model_file.hpp"
-#include "models/gesture/synthetic_performer.hpp"
+#include "models/gesture/synthetic_signer.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
@@ -13,7 +13,7 @@
 #include "proto/text/clean.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
-#include "tests/unit/gesture/toy_gesture.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
 
 namespace posed::test {
 namespace {
@@ -45,9 +45,9 @@ labels = "p"
 )";
 
 void write_hands(const Served& served) {
-  const auto performer = gesture::make_performance({.person = 5, .gestures = 12});
-  REQUIRE(performer);
-  REQUIRE(clip::write_hand_csv(performer->clip, served.folder.path() / "hand.csv"));
+  const auto signer = gesture::make_performance({.person = 5, .gestures = 12});
+  REQUIRE(signer);
+  REQUIRE(clip::write_hand_csv(signer->clip, served.folder.path() / "hand.csv"));
   REQUIRE(gesture::save_model(toy_gesture_model(), served.folder.path() / "toy.gesture"));
   served.folder.write("posed.toml", kTwoHands);
 }

@@ -7,7 +7,7 @@
 #include <map>
 #include <sstream>
 
-#include "daemon/control/zmq_handle.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "daemon/record/decision_code.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/reader.hpp"
@@ -36,10 +36,10 @@ std::string config_of(const std::string& stream, const std::string& file,
 class Listener {
  public:
   explicit Listener(const std::string& endpoint) {
-    REQUIRE(control::set_option(socket_.get(), ZMQ_RCVHWM, 0));
-    REQUIRE(control::set_option(socket_.get(), ZMQ_SUBSCRIBE, "event/walker"));
-    REQUIRE(control::set_option(socket_.get(), ZMQ_SUBSCRIBE, "pose/walker"));
-    REQUIRE(control::connect_socket(socket_.get(), endpoint));
+    REQUIRE(net::set_option(socket_.get(), ZMQ_RCVHWM, 0));
+    REQUIRE(net::set_option(socket_.get(), ZMQ_SUBSCRIBE, "event/walker"));
+    REQUIRE(net::set_option(socket_.get(), ZMQ_SUBSCRIBE, "pose/walker"));
+    REQUIRE(net::connect_socket(socket_.get(), endpoint));
   }
 
   // Listens until `wanted` came so many times.
@@ -62,7 +62,7 @@ class Listener {
 
  private:
   void take() {
-    control::Message topic, body;
+    net::Message topic, body;
     if (!topic.receive(socket_.get()) || !body.receive(socket_.get(), 0)) return;
     const auto bytes = body.bytes();
     const auto size = static_cast<int>(bytes.size());
@@ -73,8 +73,8 @@ class Listener {
     }
   }
 
-  control::Context context_ = *control::open_context();
-  control::Socket socket_ = *control::open_socket(context_.get(), ZMQ_SUB);
+  net::Context context_ = *net::open_context();
+  net::Socket socket_ = *net::open_socket(context_.get(), ZMQ_SUB);
 };
 
 // The largest angle between a joint as it was published and as a file has it in the same frame.

@@ -13,7 +13,7 @@
 
 #include <zmq.h>
 
-#include "daemon/control/zmq_handle.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/control.pb.h"
 #include "tests/e2e/served.hpp"
 #include "tests/support/pipe.hpp"
@@ -30,10 +30,10 @@ constexpr auto kStopsWithin = 5s;
 // Changes of alpha as fast as the daemon answers, a few under way at a time. Returns how many were
 // answered.
 int flood(const std::string& endpoint, int count) {
-  const auto context = control::open_context().value();
-  const auto socket = control::open_socket(context.get(), ZMQ_DEALER).value();
-  REQUIRE(control::connect_socket(socket.get(), endpoint));
-  REQUIRE(control::set_option(socket.get(), ZMQ_RCVTIMEO, 10'000));
+  const auto context = net::open_context().value();
+  const auto socket = net::open_socket(context.get(), ZMQ_DEALER).value();
+  REQUIRE(net::connect_socket(socket.get(), endpoint));
+  REQUIRE(net::set_option(socket.get(), ZMQ_RCVTIMEO, 10'000));
   constexpr int kUnderWay = 8;  // the daemon keeps sixteen replies for a client
   int sent = 0, answered = 0;
   while (answered < count) {
@@ -41,9 +41,9 @@ int flood(const std::string& endpoint, int count) {
       v1::ControlRequest request;
       request.mutable_set_alpha()->set_stream("walker");
       request.mutable_set_alpha()->set_alpha(sent % 2 == 0 ? 0.25F : 0.75F);
-      if (!control::send_part(socket.get(), request.SerializeAsString(), false)) break;
+      if (!net::send_part(socket.get(), request.SerializeAsString(), false)) break;
     }
-    control::Message reply;
+    net::Message reply;
     if (!reply.receive(socket.get(), 0)) return answered;
     ++answered;
   }

@@ -15,7 +15,7 @@
 #include "proto/clip/clip.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/stage.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
 namespace {

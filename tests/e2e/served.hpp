@@ -9,7 +9,7 @@
 #include "models/style/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/e2e/stage.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
 

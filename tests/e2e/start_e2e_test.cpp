@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/devices/emulated_port.hpp"
+#include "daemon/emulate/emulated_port.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/pipe.hpp"
 
@@ -38,7 +38,7 @@ class SilentGloves : public Stage {
                          "path = \"walk.bvh\"\nloop = true\n";
     const std::vector<std::string> drivers{"cyberglove", "lucidgloves", "fivedt"};
     for (std::size_t i = 0; i < 8; ++i) {
-      gloves_.push_back(devices::EmulatedPort::open_pty().value());
+      gloves_.push_back(emulate::EmulatedPort::open_pty().value());
       config += "[[stream]]\nname = \"glove" + std::to_string(i) + "\"\ndriver = \"" +
                 drivers[i % drivers.size()] + "\"\nport = \"" + gloves_.back().name() + "\"\n";
     }
@@ -77,7 +77,7 @@ class SilentGloves : public Stage {
   }
 
  private:
-  std::vector<devices::EmulatedPort> gloves_;
+  std::vector<emulate::EmulatedPort> gloves_;
 };
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <map>
 #include <random>
 
-#include "daemon/control/zmq_handle.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "tests/e2e/served.hpp"
@@ -13,7 +13,7 @@
 namespace posed::test {
 namespace {
 
-using control::Message;
+using net::Message;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
@@ -116,13 +116,13 @@ TEST_CASE("a thousand changes: no frame lost, no jump") {
   Served served;
   served.folder.write("one.style", models[0]);
   served.start();
-  const auto context = *control::open_context();
-  const auto subscriber = *control::open_socket(context.get(), ZMQ_SUB);
-  REQUIRE(control::set_option(subscriber.get(), ZMQ_RCVHWM, 0));
-  REQUIRE(control::set_option(subscriber.get(), ZMQ_SUBSCRIBE, "pose/walker"));
-  REQUIRE(control::connect_socket(subscriber.get(), served.publish));
-  const auto dealer = *control::open_socket(context.get(), ZMQ_DEALER);
-  REQUIRE(control::connect_socket(dealer.get(), served.control));
+  const auto context = *net::open_context();
+  const auto subscriber = *net::open_socket(context.get(), ZMQ_SUB);
+  REQUIRE(net::set_option(subscriber.get(), ZMQ_RCVHWM, 0));
+  REQUIRE(net::set_option(subscriber.get(), ZMQ_SUBSCRIBE, "pose/walker"));
+  REQUIRE(net::connect_socket(subscriber.get(), served.publish));
+  const auto dealer = *net::open_socket(context.get(), ZMQ_DEALER);
+  REQUIRE(net::connect_socket(dealer.get(), served.control));
 
   std::mt19937 random(7);
   Seen seen;
@@ -132,7 +132,7 @@ TEST_CASE("a thousand changes: no frame lost, no jump") {
     if (steady_clock::now() < start + run_for &&
         steady_clock::now() >= start + asked * kChangeEvery) {
       const auto bytes = random_change(random, models).SerializeAsString();
-      REQUIRE(control::send_part(dealer.get(), bytes, false));
+      REQUIRE(net::send_part(dealer.get(), bytes, false));
       ++asked;
     }
     REQUIRE(steady_clock::now() < start + run_for + std::chrono::seconds(60));
@@ -151,7 +151,7 @@ TEST_CASE("a thousand changes: no frame lost, no jump") {
   }
   v1::ControlRequest request;
   request.mutable_status();
-  REQUIRE(control::send_part(dealer.get(), request.SerializeAsString(), false));
+  REQUIRE(net::send_part(dealer.get(), request.SerializeAsString(), false));
   zmq_pollitem_t wait{dealer.get(), 0, ZMQ_POLLIN, 0};
   REQUIRE(zmq_poll(&wait, 1, 30'000) == 1);
   Message message;

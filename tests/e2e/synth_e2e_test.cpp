@@ -13,7 +13,7 @@
 #include "proto/clip/hand_clip.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/shared.hpp"
-#include "tests/unit/gesture/toy_gesture.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
 
 namespace posed::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "models/gesture/model_file.hpp"
-#include "models/gesture/synthetic_performer.hpp"
+#include "models/gesture/synthetic_signer.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/shared.hpp"
@@ -20,7 +20,7 @@ std::string bytes_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// A made-up performer's recording with its labels, and the first examples of them.
+// A made-up signer's recording with its labels, and the first examples of them.
 struct Glove {
   TempFolder folder;
   std::string clip = (folder.path() / "take.csv").string();

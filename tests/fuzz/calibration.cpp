@@ -6,7 +6,7 @@
 #include <string>
 
 #include "drivers/glove/calibration_file.hpp"
-#include "drivers/glove/greeting.hpp"
+#include "drivers/glove/device_info.hpp"
 
 namespace {
 

@@ -8,8 +8,8 @@
 #include "daemon/control/request_handler.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
-#include "tests/unit/gesture/toy_gesture.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace {
 
@@ -22,7 +22,7 @@ void check_play(const pipeline::Command& command) {
   if (!(play.tempo >= 0.5F && play.tempo <= 2.0F)) std::abort();
 }
 
-class Helm final : public control::Helm {
+class DaemonControl final : public control::DaemonControl {
  public:
   bool send(const pipeline::Command& command) override {
     if (!(std::abs(command.alpha) <= 2.0F)) std::abort();
@@ -70,10 +70,10 @@ void check(const control::Answer& answer) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static Helm helm;
-  static control::RequestHandler handler(two_streams(), helm);
+  static DaemonControl daemon_control;
+  static control::RequestHandler handler(two_streams(), daemon_control);
   if (const auto answer = handler.handle({}, std::as_bytes(std::span(data, size)))) check(*answer);
-  for (const pipeline::Ack& ack : std::exchange(helm.acks, {})) {
+  for (const pipeline::Ack& ack : std::exchange(daemon_control.acks, {})) {
     const auto answer = handler.acknowledge(ack);
     if (!answer) std::abort();
     check(*answer);

@@ -18,8 +18,8 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/digest.hpp"
 #include "tests/fuzz/model_envelope.hpp"
-#include "tests/unit/gesture/toy_gesture.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace {
 
@@ -31,7 +31,7 @@ void demand(bool holds) {
   if (!holds) std::abort();
 }
 
-class Helm final : public control::Helm {
+class DaemonControl final : public control::DaemonControl {
  public:
   bool send(const pipeline::Command& command) override {
     demand(std::abs(command.alpha) <= 2.0F);
@@ -115,14 +115,14 @@ std::string stream_name(FuzzedDataProvider& data) {
   return data.PickValueInArray({"w", "h", "g", "nobody"});
 }
 
-struct Desk {
-  Helm helm;
-  control::RequestHandler handler{three_streams(), helm};
+struct Fixture {
+  DaemonControl daemon_control;
+  control::RequestHandler handler{three_streams(), daemon_control};
 
   void ask(const std::string& client, const v1::ControlRequest& request) {
     const std::string bytes = request.SerializeAsString();
     check(handler.handle({client}, std::as_bytes(std::span(bytes))));
-    for (const pipeline::Ack& ack : std::exchange(helm.acks, {})) {
+    for (const pipeline::Ack& ack : std::exchange(daemon_control.acks, {})) {
       const auto answer = handler.acknowledge(ack);
       demand(answer.has_value());
       check(answer);
@@ -137,7 +137,7 @@ struct Desk {
   }
 };
 
-void send_model(FuzzedDataProvider& data, Desk& desk, const std::string& client) {
+void send_model(FuzzedDataProvider& data, Fixture& fixture, const std::string& client) {
   const std::string model = broken_model(data);
   v1::ControlRequest request;
   auto& part = *request.mutable_model_part();
@@ -151,11 +151,11 @@ void send_model(FuzzedDataProvider& data, Desk& desk, const std::string& client)
     part.set_total(wrong ? data.ConsumeIntegral<std::uint64_t>() : model.size());
     part.set_offset(wrong && data.ConsumeBool() ? data.ConsumeIntegral<std::uint64_t>() : offset);
     part.set_bytes(model.substr(offset, size));
-    desk.ask(client, request);
+    fixture.ask(client, request);
   }
 }
 
-void send_other(FuzzedDataProvider& data, Desk& desk, const std::string& client) {
+void send_other(FuzzedDataProvider& data, Fixture& fixture, const std::string& client) {
   v1::ControlRequest request;
   switch (data.ConsumeIntegralInRange(0, 3)) {
     case 0:
@@ -181,7 +181,7 @@ void send_other(FuzzedDataProvider& data, Desk& desk, const std::string& client)
       }
       break;
   }
-  desk.ask(client, request);
+  fixture.ask(client, request);
 }
 
 }  // namespace
@@ -192,14 +192,14 @@ extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  static Desk desk;
+  static Fixture fixture;
   FuzzedDataProvider data(bytes, size);
   while (data.remaining_bytes() > 0) {
     const std::string client = data.PickValueInArray({"1", "2", "3", "4", "5"});
     if (data.ConsumeBool()) {
-      send_model(data, desk, client);
+      send_model(data, fixture, client);
     } else {
-      send_other(data, desk, client);
+      send_other(data, fixture, client);
     }
   }
   return 0;

@@ -11,16 +11,16 @@
 #include <unistd.h>
 
 #include "daemon/publish/encode.hpp"
-#include "daemon/record/expectation.hpp"
-#include "daemon/record/replay.hpp"
+#include "daemon/replay/expectation.hpp"
+#include "daemon/replay/replay.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
 #include "posed/v1/log.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/writer.hpp"
-#include "tests/unit/gesture/toy_gesture.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace {
 
@@ -227,13 +227,13 @@ class FuzzedLog {
 void replay(const std::filesystem::path& path) {
   auto reader = log::Reader::open(path);
   if (!reader) return;
-  auto opened = record::Replay::open(*reader);
+  auto opened = replay::Replay::open(*reader);
   if (!opened) {
     if (opened.error().message.empty()) std::abort();
     return;
   }
-  record::Replay& replay = **opened;
-  auto expectation = record::Expectation::open(*reader);
+  replay::Replay& replay = **opened;
+  auto expectation = replay::Expectation::open(*reader);
   publish::FrameEncoder encoder("s");
   const auto out = [&](const pipeline::Item& item) {
     using Kind = pipeline::Item::Kind;

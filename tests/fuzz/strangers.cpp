@@ -1,6 +1,6 @@
 // What a stranger can send to both sockets, as it reaches our code behind libzmq: subscriptions of
-// several peers, questions to the gatekeeper, pieces of models. With POSED_FUZZ_SOCKETS=1 the bytes
-// go through real connections on loopback instead, before and after the handshake (slow).
+// several peers, questions to the authenticator, pieces of models. With POSED_FUZZ_SOCKETS=1 the
+// bytes go through real connections on loopback instead, before and after the handshake (slow).
 #include <array>
 #include <cstdint>
 #include <cstdlib>
@@ -11,12 +11,12 @@
 #include <fuzzer/FuzzedDataProvider.h>
 
 #include "daemon/control/control_server.hpp"
-#include "daemon/control/gatekeeper.hpp"
 #include "daemon/control/uploads.hpp"
-#include "daemon/control/zap_request.hpp"
-#include "daemon/pipeline/clock.hpp"
+#include "daemon/net/zap_authenticator.hpp"
+#include "daemon/net/zap_request.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/subscriptions.hpp"
+#include "daemon/system/clock.hpp"
 #include "tests/support/raw_peer.hpp"
 
 namespace {
@@ -56,7 +56,7 @@ void try_gatekeeper(FuzzedDataProvider& data) {
   const std::size_t wrong = data.ConsumeIntegralInRange<std::size_t>(0, 7);
   if (wrong < parts.size()) parts[wrong] = data.ConsumeRandomLengthString(40);
   while (data.remaining_bytes() > 0) parts.push_back(data.ConsumeRandomLengthString(40));
-  const auto request = control::read_zap_request(parts);
+  const auto request = net::read_zap_request(parts);
   if (request) demand(request->key_z85.empty() || request->key_z85.size() == 40);
 }
 
@@ -88,19 +88,19 @@ void try_uploads(FuzzedDataProvider& data) {
 }
 
 // Both sockets of a daemon without keys, and nothing behind them.
-class Sockets final : public control::Helm {
+class Sockets final : public control::DaemonControl {
  public:
   Sockets() {
     publish::PublisherOptions options;
     options.context = context_.get();
     options.endpoint = "tcp://127.0.0.1:*";
-    options.gatekeeper = gatekeeper_.get();
-    options.clock = pipeline::monotonic_ns;
+    options.authenticator = authenticator_.get();
+    options.clock = system::monotonic_ns;
     publisher_ = publish::Publisher::open(std::move(options), {}, items_, *wake_).value();
     control::ControlPorts ports;
     ports.acks = &acks_;
     ports.wake = control_wake_.get();
-    ports.gatekeeper = gatekeeper_.get();
+    ports.authenticator = authenticator_.get();
     server_ =
         control::ControlServer::start(context_.get(), "tcp://127.0.0.1:*", ports, handler_).value();
   }
@@ -118,7 +118,7 @@ class Sockets final : public control::Helm {
       if (!peer.send(bytes, std::chrono::milliseconds(5))) break;
     }
     for (int i = 0; i < 3; ++i) {
-      (void)publisher_->turn(pipeline::monotonic_ns());
+      (void)publisher_->turn(system::monotonic_ns());
       (void)peer.receive(1, std::chrono::milliseconds(1));
     }
   }
@@ -130,13 +130,13 @@ class Sockets final : public control::Helm {
   void stop() override {}
 
  private:
-  control::Context context_ = control::open_context().value();
-  std::unique_ptr<control::Gatekeeper> gatekeeper_ =
-      control::Gatekeeper::start(context_.get(), std::nullopt).value();
+  net::Context context_ = net::open_context().value();
+  std::unique_ptr<net::ZapAuthenticator> authenticator_ =
+      net::ZapAuthenticator::start(context_.get(), std::nullopt).value();
   pipeline::Ring<pipeline::Item> items_{64};
   pipeline::Ring<pipeline::Ack> acks_{64};
-  std::unique_ptr<pipeline::Wake> wake_ = pipeline::Wake::open().value();
-  std::unique_ptr<pipeline::Wake> control_wake_ = pipeline::Wake::open().value();
+  std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
+  std::unique_ptr<system::EventFd> control_wake_ = system::EventFd::open().value();
   control::RequestHandler handler_{{}, *this};
   std::unique_ptr<publish::Publisher> publisher_;
   std::unique_ptr<control::ControlServer> server_;

@@ -10,8 +10,8 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "daemon/cli/experiment.hpp"
-#include "daemon/cli/question_file.hpp"
+#include "daemon/cli/models/experiment.hpp"
+#include "daemon/cli/models/question_file.hpp"
 #include "daemon/config/config.hpp"
 #include "drivers/described/device_file.hpp"
 #include "drivers/glove/calibration_file.hpp"

@@ -12,14 +12,14 @@
 #include <utility>
 
 #include "drivers/transport/enumerate.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/lab/functionfs.hpp"
 #include "tests/lab/gadget.hpp"
 
 namespace posed::lab {
 namespace {
 
-using drivers::Ports;
+using drivers::TransportFactory;
 
 constexpr int kP5Interface = 1;
 
@@ -62,7 +62,7 @@ class SerialSide {
   explicit SerialSide(const Gadget& gadget) : gadget_(gadget) {}
 
   void open() {
-    auto link = Ports().serial({.port = gadget_.serial_node()});
+    auto link = TransportFactory().serial({.port = gadget_.serial_node()});
     if (!link) give_up("the serial gadget has no node: " + link.error().message);
     const std::lock_guard lock(mutex_);
     transport_ = drivers::make_link_transport(std::move(*link));
@@ -119,12 +119,12 @@ std::optional<Moment> made(const std::string& node) {
   return std::chrono::steady_clock::now() - age;
 }
 
-std::function<std::optional<Moment>()> looks_for(std::vector<drivers::Plugged> (*list)(),
+std::function<std::optional<Moment>()> looks_for(std::vector<drivers::DeviceInfo> (*list)(),
                                                  const Ids& ids) {
   return [list, ids]() -> std::optional<Moment> {
     const auto all = list();
-    const auto at = std::ranges::find_if(all, [&](const drivers::Plugged& one) {
-      return one.vendor == ids.vendor && one.product == ids.product && one.trouble.empty();
+    const auto at = std::ranges::find_if(all, [&](const drivers::DeviceInfo& one) {
+      return one.vendor == ids.vendor && one.product == ids.product && one.open_error.empty();
     });
     if (at == all.end()) return {};
     return made(at->node);
@@ -138,7 +138,7 @@ std::unique_ptr<LabDevice> hid_device() {
   auto device = device_of(bench, "hidraw");
   device->there_since = looks_for(drivers::list_hid_nodes, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
-    auto link = Ports().hid({.vendor = ids.vendor, .id = ids.serial});
+    auto link = TransportFactory().hid({.vendor = ids.vendor, .id = ids.serial});
     if (!link) return std::unexpected(link.error());
     return drivers::make_link_transport(std::move(*link));
   };
@@ -153,7 +153,7 @@ std::unique_ptr<LabDevice> serial_device() {
   device->serial = true;
   device->there_since = looks_for(drivers::list_serial_ports, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
-    auto link = Ports().serial({.id = ids.serial});
+    auto link = TransportFactory().serial({.id = ids.serial});
     if (!link) return std::unexpected(link.error());
     return drivers::make_link_transport(std::move(*link));
   };
@@ -181,8 +181,8 @@ std::unique_ptr<LabDevice> usb_device() {
   device->say = [side](auto bytes) { return side->send(bytes); };
   device->there_since = looks_for(drivers::list_usb_devices, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
-    auto link =
-        Ports().usb({.vendor = ids.vendor, .product = ids.product, .interface = kP5Interface});
+    auto link = TransportFactory().usb(
+        {.vendor = ids.vendor, .product = ids.product, .interface = kP5Interface});
     if (!link) return std::unexpected(link.error());
     const auto firmware = link->feature(9, 4);
     if (!firmware) return std::unexpected(firmware.error());

@@ -10,7 +10,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kMaxReturn = 1s;      // from the plug
-constexpr auto kMaxOpening = 400ms;  // from the node: the keeper's turn without news of it
+constexpr auto kMaxOpening = 400ms;  // from the node: the supervisor's turn without news of it
 constexpr auto kMaxSilence = 200ms;  // ten reports
 constexpr auto kUnderWay = 30ms;     // from the glove's mouth to the daemon
 

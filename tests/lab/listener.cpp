@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daemon/control/zmq_handle.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/posed.pb.h"
 #include "tests/lab/gadget.hpp"
 
@@ -61,19 +61,19 @@ bool Listener::lost_since(const std::string& stream, Moment begin) const {
 }
 
 void Listener::listen(const std::stop_token& stop, const std::string& endpoint) {
-  const auto context = control::open_context();
+  const auto context = net::open_context();
   if (!context) give_up(context.error().message);
-  const auto socket = control::open_socket(context->get(), ZMQ_SUB);
+  const auto socket = net::open_socket(context->get(), ZMQ_SUB);
   if (!socket) give_up(socket.error().message);
   void* const from = socket->get();
-  if (!control::set_option(from, ZMQ_SUBSCRIBE, kSamples) ||
-      !control::set_option(from, ZMQ_SUBSCRIBE, kEvents) ||
-      !control::set_option(from, ZMQ_RCVTIMEO, kLookAround_ms) ||
-      !control::connect_socket(from, endpoint)) {
+  if (!net::set_option(from, ZMQ_SUBSCRIBE, kSamples) ||
+      !net::set_option(from, ZMQ_SUBSCRIBE, kEvents) ||
+      !net::set_option(from, ZMQ_RCVTIMEO, kLookAround_ms) ||
+      !net::connect_socket(from, endpoint)) {
     give_up("cannot listen to the daemon");
   }
   while (!stop.stop_requested()) {
-    control::Message topic, body;
+    net::Message topic, body;
     if (!topic.receive(from, 0) || !topic.more() || !body.receive(from, 0)) continue;
     topic.text().starts_with(kSamples) ? take_sample(body.text()) : take_event(body.text());
   }

@@ -12,8 +12,8 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/transport/arrivals.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/hotplug_monitor.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/lab/gadget.hpp"
 #include "tests/lab/resources.hpp"
 
@@ -94,8 +94,9 @@ struct Outcome {
   std::string trouble;
 };
 
-// Waits as the daemon's keeper does for a device that is just coming: for news, or a moment.
-Result<std::unique_ptr<Transport>> open_soon(const LabDevice& device, drivers::Arrivals& arrivals) {
+// Waits as the daemon's supervisor does for a device that is just coming: for news, or a moment.
+Result<std::unique_ptr<Transport>> open_soon(const LabDevice& device,
+                                             drivers::HotplugMonitor& arrivals) {
   const auto deadline = Clock::now() + kPatience;
   while (true) {
     auto transport = device.open();
@@ -123,7 +124,7 @@ bool read_until(Transport& transport, Judge& judge, bool serial,
   return true;
 }
 
-Outcome one_round(LabDevice& device, drivers::Arrivals& arrivals) {
+Outcome one_round(LabDevice& device, drivers::HotplugMonitor& arrivals) {
   const auto plugged_at = Clock::now();
   device.plug();
   std::jthread feeder([&](const std::stop_token& stop) {
@@ -166,7 +167,7 @@ long ms(Clock::duration time) {
 }
 
 bool check(LabDevice& device) {
-  drivers::Arrivals arrivals;
+  drivers::HotplugMonitor arrivals;
   Outcome sum;
   Resources after_first, after_last;
   for (int round = 0; round < kRounds && sum.trouble.empty(); ++round) {

@@ -2,27 +2,27 @@
 
 #include <chrono>
 
-#include "daemon/pipeline/clock.hpp"
-#include "tests/rt/law.hpp"
+#include "daemon/system/clock.hpp"
+#include "tests/rt/contract.hpp"
 
 namespace posed::rt {
-Rig::Rig(std::vector<RigStream> streams, record::Tape* tape)
+Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
     : streams_(std::move(streams)),
-      pipeline_wake_(pipeline::Wake::open().value()),
-      publisher_wake_(pipeline::Wake::open().value()) {
+      pipeline_wake_(system::EventFd::open().value()),
+      publisher_wake_(system::EventFd::open().value()) {
   worker_ = pipeline::Worker::open({.in = &decoded_,
                                     .out = &finished_,
                                     .commands = &commands_,
                                     .acks = &acks_,
                                     .wake = pipeline_wake_.get(),
                                     .publisher = publisher_wake_.get(),
-                                    .tape = tape,
-                                    .clock = pipeline::monotonic_ns})
+                                    .record_sink = record_sink,
+                                    .clock = system::monotonic_ns})
                 .value();
   reader_ = pipeline::Reader::open({.out = &decoded_,
                                     .pipeline = pipeline_wake_.get(),
-                                    .tape = tape,
-                                    .clock = pipeline::monotonic_ns,
+                                    .record_sink = record_sink,
+                                    .clock = system::monotonic_ns,
                                     .commands = &device_commands_})
                 .value();
   for (std::uint32_t i = 0; i < streams_.size(); ++i) {
@@ -54,7 +54,7 @@ Rig::~Rig() {
 
 void Rig::start() {
   for (auto& stream : streams_) {
-    stream.device.transport->start(pipeline::monotonic_ns()).value();
+    stream.device.transport->start(system::monotonic_ns()).value();
   }
   worker_thread_ = std::thread([this] {
     if (watch_system_calls()) ++watched_;
@@ -68,8 +68,8 @@ void Rig::start() {
 
 int Rig::take_frames(int frames) {
   int came = 0;
-  const std::int64_t until_ns = pipeline::monotonic_ns() + 10 * kNanosPerSecond;
-  while (came < frames && pipeline::monotonic_ns() < until_ns) {
+  const std::int64_t until_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
+  while (came < frames && system::monotonic_ns() < until_ns) {
     const bool any = finished_.consume([&](const pipeline::Item& item) {
       if (item.kind == pipeline::Item::Kind::kFrame) ++came;
     });
@@ -83,7 +83,7 @@ int Rig::take_frames(int frames) {
 
 void Rig::command(const pipeline::Command& command) {
   while (!commands_.push(command)) std::this_thread::yield();
-  pipeline_wake_->ring();
+  pipeline_wake_->notify();
 }
 
 void Rig::command(const pipeline::DeviceCommand& command) {

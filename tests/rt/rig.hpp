@@ -23,7 +23,7 @@ struct RigStream {
 
 class Rig {
  public:
-  Rig(std::vector<RigStream> streams, record::Tape* tape);
+  Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink);
   ~Rig();  // stops both threads
 
   void start();
@@ -47,7 +47,7 @@ class Rig {
   pipeline::Ring<pipeline::Command> commands_{16};
   pipeline::Ring<pipeline::DeviceCommand> device_commands_{16};
   pipeline::Ring<pipeline::Ack> acks_{16};
-  std::unique_ptr<pipeline::Wake> pipeline_wake_, publisher_wake_;
+  std::unique_ptr<system::EventFd> pipeline_wake_, publisher_wake_;
   std::unique_ptr<pipeline::Worker> worker_;
   std::unique_ptr<pipeline::Reader> reader_;
   std::atomic<int> watched_{0};

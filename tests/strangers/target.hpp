@@ -12,12 +12,12 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/control/zmq_handle.hpp"
+#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/clip/clip.hpp"
 #include "tests/e2e/stage.hpp"
 #include "tests/support/raw_peer.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
 
@@ -64,10 +64,10 @@ class Target : public Stage {
 class Innocent {
  public:
   explicit Innocent(const std::string& endpoint)
-      : socket_(*control::open_socket(context_.get(), ZMQ_SUB)) {
-    REQUIRE(control::set_option(socket_.get(), ZMQ_SUBSCRIBE, "pose/walker"));
-    REQUIRE(control::set_option(socket_.get(), ZMQ_RCVTIMEO, 20));
-    REQUIRE(control::connect_socket(socket_.get(), endpoint));
+      : socket_(*net::open_socket(context_.get(), ZMQ_SUB)) {
+    REQUIRE(net::set_option(socket_.get(), ZMQ_SUBSCRIBE, "pose/walker"));
+    REQUIRE(net::set_option(socket_.get(), ZMQ_RCVTIMEO, 20));
+    REQUIRE(net::connect_socket(socket_.get(), endpoint));
     thread_ = std::thread([this] { listen(); });
     REQUIRE(hears(10));
     longest_ns = 0;
@@ -96,8 +96,8 @@ class Innocent {
     std::uint64_t last = 0;
     auto last_time = std::chrono::steady_clock::now();
     while (!stop_) {
-      control::Message topic;
-      control::Message body;
+      net::Message topic;
+      net::Message body;
       if (!topic.receive(socket_.get(), 0) || !body.receive(socket_.get(), 0)) continue;
       v1::Frame frame;
       if (!frame.ParseFromString(std::string(body.text()))) continue;
@@ -112,8 +112,8 @@ class Innocent {
     }
   }
 
-  control::Context context_ = *control::open_context();
-  control::Socket socket_;
+  net::Context context_ = *net::open_context();
+  net::Socket socket_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -1,5 +1,5 @@
 // Real grasps of GraspDB14's CyberGlove, 60 Hz, and their reference without the glove's dead band:
-// hand-science.md section 2. Degrees; [frames x 19 channels].
+// models/smooth/README.md, "Measured figures". Degrees; [frames x 19 channels].
 #pragma once
 
 #include <algorithm>
@@ -106,7 +106,8 @@ inline Eigen::VectorXd low_pass_8hz(const Eigen::VectorXd& signal) {
   return x.segment(pad, n);
 }
 
-// Reference M of hand-science.md.
+// The recording without the glove's dead band, low-passed (models/smooth/README.md, "Measured
+// figures").
 inline Motion grasp_reference(const std::filesystem::path& path) {
   Motion motion = read_grasps(path);
   for (Eigen::Index c = 0; c < motion.cols(); ++c) {

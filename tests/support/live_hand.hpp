@@ -5,15 +5,15 @@
 #include <string>
 #include <vector>
 
-#include "models/generate/live_smoother.hpp"
 #include "models/gesture/recording.hpp"
+#include "models/smooth/live_smoother.hpp"
 #include "proto/frame/hand_skeleton.hpp"
-#include "tests/support/made_up_hand.hpp"
 #include "tests/support/smoothed.hpp"
+#include "tests/support/synthetic_hand.hpp"
 
 namespace posed::test {
 
-inline gesture::Recording recording_of(const MadeUpHand& hand) {
+inline gesture::Recording recording_of(const SyntheticHand& hand) {
   gesture::Recording recording;
   recording.file = "made-up hand";
   recording.rate_hz = 30.0;
@@ -49,10 +49,10 @@ struct Followed {
   std::vector<double> probability;
 };
 
-inline Followed followed(const Motion& measured, double rate_hz,
-                         const generate::LiveOptions& options, const generate::LiveModel* model) {
+inline Followed followed(const Motion& measured, double rate_hz, const smooth::LiveOptions& options,
+                         const smooth::LiveModel* model) {
   const Skeleton skeleton = hand_skeleton(Side::kRight);
-  generate::LiveSmoother smoother(skeleton, options, model);
+  smooth::LiveSmoother smoother(skeleton, options, model);
   Frames out;
   for (Eigen::Index t = 0; t < measured.rows(); ++t) {
     HandAngles angles{};

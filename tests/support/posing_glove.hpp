@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/devices/emulated_glove.hpp"
+#include "daemon/emulate/emulated_glove.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/fit.hpp"
 
@@ -17,7 +17,7 @@ class PosingGlove {
   using Pose = drivers::glove::Pose;
 
   explicit PosingGlove(const std::string& driver = "cyberglove",
-                       devices::EmulatedPort port = devices::EmulatedPort::open_pty({}).value(),
+                       emulate::EmulatedPort port = emulate::EmulatedPort::open_pty({}).value(),
                        const drivers::Options& options = {})
       : glove_(drivers::find_driver(driver)->emulate(options).value(), std::move(port),
                [this](double) { return drivers::glove::hand_in(pose_.load()); }, {}),
@@ -28,7 +28,7 @@ class PosingGlove {
 
  private:
   std::atomic<Pose> pose_{Pose::kFlat};
-  devices::EmulatedGlove glove_;
+  emulate::EmulatedGlove glove_;
   std::jthread thread_;
 };
 

@@ -1,7 +1,6 @@
-// A labelled hand recording strung together from real CyberGlove poses, as
-// ../shared/fixtures/hand/hand_corpus.py does it (the same distribution, not numpy's numbers):
-// random gestures, minimum-jerk moves of 0.3 to 0.6 s, holds of 1 to 2 s, half of the poses' real
-// spread, slow drift and 0.3 degrees of sensor noise.
+// A labelled hand recording strung together from real CyberGlove poses (models/gesture/README.md,
+// measured figures): random gestures, minimum-jerk moves of 0.3 to 0.6 s, holds of 1 to 2 s, half
+// of the poses' real spread, slow drift and 0.3 degrees of sensor noise.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +13,8 @@
 
 namespace posed::test {
 
-// The letters of the sign alphabet that are the paper's hands.
+// The letters of the sign alphabet that are the hands of Takamido et al. (models/gesture/README.md,
+// "References").
 inline const std::map<std::string, std::string> kSignOf{{"g", "A"}, {"c", "V"}, {"p", "4"},
                                                         {"1", "G"}, {"3", "W"}, {"4", "B"}};
 

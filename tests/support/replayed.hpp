@@ -9,8 +9,8 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/publish/encode.hpp"
-#include "daemon/record/expectation.hpp"
-#include "daemon/record/replay.hpp"
+#include "daemon/replay/expectation.hpp"
+#include "daemon/replay/replay.hpp"
 #include "proto/log/reader.hpp"
 
 namespace posed::test {
@@ -18,7 +18,7 @@ namespace posed::test {
 struct Replayed {
   std::vector<std::string> frames;  // serialized, in pipeline order
   std::optional<Error> difference;  // the first one, or why the log cannot be replayed
-  record::Expectation::Counts counts;
+  replay::Expectation::Counts counts;
 };
 
 // `expect`: compared with the published frames that the log holds.
@@ -26,15 +26,15 @@ inline Replayed replayed(const std::filesystem::path& path, bool expect = true) 
   Replayed result;
   auto reader = log::Reader::open(path);
   REQUIRE(reader);
-  auto opened = record::Replay::open(*reader);
+  auto opened = replay::Replay::open(*reader);
   if (!opened) {
     result.difference = opened.error();
     return result;
   }
-  record::Replay& replay = **opened;
-  std::optional<record::Expectation> expectation;
+  replay::Replay& replay = **opened;
+  std::optional<replay::Expectation> expectation;
   if (expect) {
-    auto live = record::Expectation::open(*reader);
+    auto live = replay::Expectation::open(*reader);
     if (!live) {
       result.difference = live.error();
       return result;

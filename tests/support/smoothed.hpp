@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "models/generate/live_smoother.hpp"
+#include "models/smooth/live_smoother.hpp"
 #include "tests/support/grasps.hpp"
 
 namespace posed::test {
@@ -44,11 +44,10 @@ class Frames final : public Emit {
 };
 
 // Row t is the estimate of frame t [deg]. Channels that are not a number make their joint missing.
-inline Motion smoothed(const Motion& measured, double rate_hz,
-                       const generate::LiveOptions& options) {
+inline Motion smoothed(const Motion& measured, double rate_hz, const smooth::LiveOptions& options) {
   Skeleton skeleton = body_with_channels(static_cast<int>(measured.cols()));
   skeleton.finish().value();
-  generate::LiveSmoother smoother(skeleton, options);
+  smooth::LiveSmoother smoother(skeleton, options);
   Frames out;
   for (Eigen::Index t = 0; t < measured.rows(); ++t) {
     const Frame frame = frame_of(skeleton, measured.row(t), static_cast<std::uint64_t>(t + 1),

@@ -21,7 +21,7 @@ namespace posed::test {
 namespace {
 
 constexpr std::int64_t kBegin_ns = 1'000'000'000'000;
-constexpr std::int64_t kScribeEvery_ns = 50'000'000;
+constexpr std::int64_t kLogWriterEvery_ns = 50'000'000;
 constexpr std::int64_t kLongestHoldup_ns = 400'000'000;
 constexpr int kTurnsBetweenHoldups = 400;
 constexpr int kItemsPublishedATurn = 32;
@@ -30,7 +30,7 @@ thread_local std::int64_t virtual_now_ns = kBegin_ns;
 std::int64_t virtual_clock() noexcept { return virtual_now_ns; }
 
 std::int64_t at_ns(double at_s) {
-  return at_s == kNever_s ? pipeline::kForever_ns : kBegin_ns + nanoseconds(at_s);
+  return at_s == kNever_s ? system::kForever_ns : kBegin_ns + nanoseconds(at_s);
 }
 
 std::span<const std::byte> bytes_of(const std::string& text) {
@@ -46,7 +46,7 @@ class ScriptedTransport final : public drivers::Transport {
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
     if (!link_.flood.empty()) return at_ns(link_.from_s);
     const std::int64_t chunk_ns =
-        next_ < link_.chunks.size() ? at_ns(link_.chunks[next_].at_s) : pipeline::kForever_ns;
+        next_ < link_.chunks.size() ? at_ns(link_.chunks[next_].at_s) : system::kForever_ns;
     return std::min(chunk_ns, at_ns(link_.until_s));
   }
   [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
@@ -69,7 +69,7 @@ class ScriptedTransport final : public drivers::Transport {
 struct Lane {
   Lane(VirtualStream script, std::uint32_t number)
       : stream(std::move(script)), id(number), styled(stream.name), raw(stream.name + "-raw") {
-    slot.keeper = pipeline::Wake::open().value();
+    slot.supervisor = system::EventFd::open().value();
     stream.settings.rate_hz = stream.description.rate_hz;
   }
 
@@ -111,7 +111,7 @@ struct Lane {
     return device.get();
   }
   [[nodiscard]] std::int64_t next_device_ns() const {
-    if (device || next_link == stream.links.size()) return pipeline::kForever_ns;
+    if (device || next_link == stream.links.size()) return system::kForever_ns;
     return at_ns(stream.links[next_link].from_s);
   }
 
@@ -140,7 +140,15 @@ class VirtualDaemon::Parts {
   std::vector<pipeline::Ack> acks_taken;
 
  private:
-  enum Part : std::uint8_t { kReader, kWorker, kPublisher, kScribe, kPerson, kKeeper, kParts };
+  enum Part : std::uint8_t {
+    kReader,
+    kWorker,
+    kPublisher,
+    kLogWriter,
+    kPerson,
+    kSupervisor,
+    kParts
+  };
 
   void open();
   void open_log();
@@ -157,13 +165,13 @@ class VirtualDaemon::Parts {
   }
 
   std::mt19937_64 random;
-  std::unique_ptr<record::TapeRings> tape;
-  std::unique_ptr<record::Scribe> scribe;
+  std::unique_ptr<record::RecordRings> record_sink;
+  std::unique_ptr<record::LogWriterLoop> log_writer;
   std::unique_ptr<pipeline::Ring<pipeline::Item>> decoded, finished;
   std::unique_ptr<pipeline::Ring<pipeline::Command>> commands;
   std::unique_ptr<pipeline::Ring<pipeline::DeviceCommand>> device_commands;
   std::unique_ptr<pipeline::Ring<pipeline::Ack>> acks;
-  std::unique_ptr<pipeline::Wake> pipeline_wake, publisher_wake;
+  std::unique_ptr<system::EventFd> pipeline_wake, publisher_wake;
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
   std::size_t next_command = 0;
@@ -192,10 +200,10 @@ void VirtualDaemon::Parts::open_log() {
   recorder.clock = virtual_clock;
   auto writer = record::begin_log(recorder, streams);
   REQUIRE(writer);
-  tape = std::make_unique<record::TapeRings>(
-      std::vector<record::RingSizes>(lanes.size(), options.tape));
-  scribe = std::make_unique<record::Scribe>(*tape, std::move(*writer), options.log,
-                                            [](const record::Notice&) {});
+  record_sink = std::make_unique<record::RecordRings>(
+      std::vector<record::RingSizes>(lanes.size(), options.record_sink));
+  log_writer = std::make_unique<record::LogWriterLoop>(
+      *record_sink, std::move(*writer), options.log, [](const record::RecorderEvent&) {});
 }
 
 pipeline::EngineOptions VirtualDaemon::Parts::engine_of(Lane& lane) const {
@@ -218,7 +226,7 @@ pipeline::EngineOptions VirtualDaemon::Parts::engine_of(Lane& lane) const {
 void VirtualDaemon::Parts::open() {
   virtual_now_ns = kBegin_ns;
   open_log();
-  std::size_t slots = pipeline::kNoticeSlots + lanes.size();
+  std::size_t slots = pipeline::kEventSlots + lanes.size();
   for (const auto& lane : lanes) slots += lane->stream.slots;
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
   finished = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
@@ -226,20 +234,20 @@ void VirtualDaemon::Parts::open() {
   device_commands =
       std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(pipeline::kMostUnderWay);
   acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(options.ack_slots);
-  pipeline_wake = pipeline::Wake::open().value();
-  publisher_wake = pipeline::Wake::open().value();
+  pipeline_wake = system::EventFd::open().value();
+  publisher_wake = system::EventFd::open().value();
   worker = pipeline::Worker::open({.in = decoded.get(),
                                    .out = finished.get(),
                                    .commands = commands.get(),
                                    .acks = acks.get(),
                                    .wake = pipeline_wake.get(),
                                    .publisher = publisher_wake.get(),
-                                   .tape = tape.get(),
+                                   .record_sink = record_sink.get(),
                                    .clock = virtual_clock})
                .value();
   reader = pipeline::Reader::open({.out = decoded.get(),
                                    .pipeline = pipeline_wake.get(),
-                                   .tape = tape.get(),
+                                   .record_sink = record_sink.get(),
                                    .clock = virtual_clock,
                                    .commands = device_commands.get()})
                .value();
@@ -301,13 +309,13 @@ std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
       if (!decoded->empty() || !commands->empty()) at = virtual_now_ns;
       break;
     case kPublisher:
-      at = finished->empty() && acks->empty() ? pipeline::kForever_ns : virtual_now_ns;
+      at = finished->empty() && acks->empty() ? system::kForever_ns : virtual_now_ns;
       break;
     case kPerson:
-      at = next_command < script.size() ? at_ns(script[next_command].at_s) : pipeline::kForever_ns;
+      at = next_command < script.size() ? at_ns(script[next_command].at_s) : system::kForever_ns;
       break;
-    case kKeeper:
-      at = pipeline::kForever_ns;
+    case kSupervisor:
+      at = system::kForever_ns;
       for (const auto& lane : lanes) {
         at = std::min(at, lane->slot.out.empty() ? lane->next_device_ns() : virtual_now_ns);
       }
@@ -329,9 +337,9 @@ void VirtualDaemon::Parts::take_turn(Part part) {
     case kPublisher:
       publish(kItemsPublishedATurn);
       break;
-    case kScribe:
-      if (scribe) scribe->turn(virtual_now_ns);
-      due[part] = virtual_now_ns + kScribeEvery_ns;
+    case kLogWriter:
+      if (log_writer) log_writer->turn(virtual_now_ns);
+      due[part] = virtual_now_ns + kLogWriterEvery_ns;
       break;
     case kPerson:
       // Control sends no more than may be under way.
@@ -370,7 +378,7 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
   const auto keep = [&] {
     const std::string hash = log::sha256_hex(bytes_of(wanted.bytes));
     hash.copy(command.model_hash.data(), hash.size());
-    if (tape) tape->keep_model(bytes_of(wanted.bytes));
+    if (record_sink) record_sink->keep_model(bytes_of(wanted.bytes));
   };
   switch (wanted.kind) {
     case Kind::kModel:
@@ -403,11 +411,11 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
 void VirtualDaemon::Parts::publish(int most) {
   const auto take = [this](const pipeline::Item& item) {
     using Kind = pipeline::Item::Kind;
-    const bool notice = item.kind == Kind::kNotice;
+    const bool event = item.kind == Kind::kEvent;
     Lane& lane = *lanes[pipeline::stream_of(item)];
     pipeline::count(lane.counters.publisher.taken);
     if (item.kind == Kind::kSample) ++lane.published.samples;
-    if (!notice && item.kind != Kind::kSample) publish_frame(lane, item);
+    if (!event && item.kind != Kind::kSample) publish_frame(lane, item);
   };
   for (int i = 0; i < most && finished->consume(take); ++i) {
   }
@@ -419,16 +427,16 @@ void VirtualDaemon::Parts::publish_frame(Lane& lane, const pipeline::Item& item)
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
   ++(raw ? lane.published.raw : lane.published.frames);
   if (!raw) lane.published.sequences.push_back(item.frame.header.sequence);
-  if (!tape) return;
+  if (!record_sink) return;
   const std::string bytes = (raw ? lane.raw : lane.styled).encode(item.frame).SerializeAsString();
-  tape->published(lane.id, item.frame.header.sequence, raw, bytes_of(bytes));
+  record_sink->published(lane.id, item.frame.header.sequence, raw, bytes_of(bytes));
 }
 
 // From the devices to the log, as the daemon ends.
 void VirtualDaemon::Parts::stop() {
   worker->finish();
   while (!finished->empty() || !acks->empty()) publish(kItemsPublishedATurn);
-  if (scribe) REQUIRE(scribe->finish(virtual_now_ns));
+  if (log_writer) REQUIRE(log_writer->finish(virtual_now_ns));
 }
 
 VirtualDaemon::VirtualDaemon(VirtualOptions options)

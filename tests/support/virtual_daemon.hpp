@@ -23,8 +23,8 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/record/record_rings.hpp"
 #include "daemon/record/stream_settings.hpp"
-#include "daemon/record/tape_rings.hpp"
 #include "drivers/driver.hpp"
 
 namespace posed::test {
@@ -78,7 +78,7 @@ struct VirtualOptions {
   double turn_us = 40.0;       // the longest that a turn takes
   std::size_t ack_slots = 64;  // of the ring to control
   // What each stream may have in the recorder's rings.
-  record::RingSizes tape{.chunk_bytes = 4 << 20, .frame_bytes = 16 << 20, .decisions = 2048};
+  record::RingSizes record_sink{.chunk_bytes = 4 << 20, .frame_bytes = 16 << 20, .decisions = 2048};
 };
 
 class VirtualDaemon {

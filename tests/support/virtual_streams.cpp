@@ -15,8 +15,8 @@
 #include "proto/clip/text_clip.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/virtual_daemon.hpp"
-#include "tests/unit/gesture/toy_gesture.hpp"
-#include "tests/unit/models/toy_style.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
 namespace {

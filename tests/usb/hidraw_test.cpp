@@ -7,8 +7,8 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/options.hpp"
-#include "drivers/transport/arrivals.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/hotplug_monitor.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/usb/gloves.hpp"
@@ -21,7 +21,7 @@ using drivers::Chunk;
 using drivers::Device;
 using drivers::Driver;
 using drivers::Options;
-using drivers::Ports;
+using drivers::TransportFactory;
 
 constexpr int kPatience_ms = 5000;
 
@@ -73,7 +73,7 @@ void check_driver(const std::string& name, const Options& options, HidGlove& glo
   auto emulator = driver->emulate(options);
   REQUIRE(emulator);
   const Speaker speaker(glove, std::move(*emulator));
-  Ports ports;
+  TransportFactory ports;
   for (int round = 0; round < 3; ++round) {
     glove.plug();
     auto device = driver->open(options, ports);
@@ -93,7 +93,7 @@ TEST_CASE("reports of a hidraw node come one a read, until the glove is unplugge
   HidGlove glove(bench, kUltra), other(bench, kMine);
   glove.plug();
   other.plug();
-  Ports ports;
+  TransportFactory ports;
   auto link = ports.hid({.vendor = kUltra.vendor});
   REQUIRE(link);
   CHECK(link->name() == glove.node());
@@ -119,8 +119,8 @@ TEST_CASE("reports of a hidraw node come one a read, until the glove is unplugge
 TEST_CASE("a replugged glove is announced, and found by what it is where it is now") {
   Bench bench;
   HidGlove glove(bench, kUltra);
-  drivers::Arrivals arrivals;
-  Ports ports;
+  drivers::HotplugMonitor arrivals;
+  TransportFactory ports;
   for (const std::string id : {"", "ULTRA-7", "1-2", "1-2:1.0", "5d70:0001 ULTRA-7"}) {
     INFO(id);
     const std::string before = glove.node();

@@ -7,7 +7,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/p5/emulator.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/emulated.hpp"
 #include "tests/usb/gloves.hpp"
@@ -17,8 +17,8 @@ namespace posed::test {
 namespace {
 
 using drivers::Chunk;
-using drivers::Ports;
 using drivers::Transport;
+using drivers::TransportFactory;
 
 constexpr int kInterface = 1;
 constexpr std::chrono::seconds kPatience{5};
@@ -61,7 +61,7 @@ TEST_CASE("feature reports go to and from a USB device, and one that it has not 
   Bench bench;
   P5Glove glove(bench, kP5, p5_features());
   glove.plug();
-  Ports ports;
+  TransportFactory ports;
   {
     auto link = ports.usb(p5_settings());
     if (!link) FAIL(link.error().message);
@@ -91,7 +91,7 @@ TEST_CASE("feature reports go to and from a USB device, and one that it has not 
 TEST_CASE("reports of a USB device come in order, one a read, until it is unplugged") {
   Bench bench;
   P5Glove glove(bench, kP5, p5_features());
-  Ports ports;
+  TransportFactory ports;
   for (int round = 0; round < 3; ++round) {
     glove.plug();
     auto link = ports.usb(p5_settings());
@@ -123,7 +123,7 @@ TEST_CASE("the P5 driver reads heads, LEDs and reports from libusb") {
   glove.plug();
   const drivers::Driver* const driver = drivers::find_driver("p5");
   REQUIRE(driver != nullptr);
-  Ports ports;
+  TransportFactory ports;
   auto device = driver->open({{"id", std::string("1-3")}}, ports);
   if (!device) FAIL(device.error().message);
   CHECK(device->warnings.empty());
@@ -154,7 +154,7 @@ TEST_CASE("a P5 that gives no feature report bends its fingers all the same, wit
   Bench bench;
   P5Glove glove(bench, kP5, {});
   glove.plug();
-  Ports ports;
+  TransportFactory ports;
   const auto device = drivers::find_driver("p5")->open({}, ports);
   if (!device) FAIL(device.error().message);
   CHECK(device->warnings.size() == 3);

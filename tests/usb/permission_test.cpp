@@ -13,7 +13,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/enumerate.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/e2e/stage.hpp"
 #include "tests/support/permission.hpp"
 #include "tests/support/shared.hpp"
@@ -25,7 +25,7 @@
 namespace posed::test {
 namespace {
 
-using drivers::Ports;
+using drivers::TransportFactory;
 
 void forbid(const Bench& bench, const std::string& node) {
   std::filesystem::permissions(bench.file_of(node), std::filesystem::perms::none);
@@ -46,23 +46,23 @@ TEST_CASE("a glove that may not be opened says which rule mends that") {
   const auto nodes = drivers::list_hid_nodes();
   REQUIRE(nodes.size() == 1);
   CHECK(nodes[0].identity() == "5d70:0001 ULTRA-7");  // seen all the same
-  check_sentence(nodes[0].trouble, ultra.node());
+  check_sentence(nodes[0].open_error, ultra.node());
   std::string usb_trouble;
   for (const auto& device : drivers::list_usb_devices()) {
-    if (device.node == p5.node()) usb_trouble = device.trouble;
+    if (device.node == p5.node()) usb_trouble = device.open_error;
   }
   check_sentence(usb_trouble, p5.node());
 
   if (::access(posed_binary().c_str(), X_OK) == 0) {  // nobody may not enter every home
     const Outcome listed = posed({"devices"});
-    CHECK(listed.out.find(nodes[0].trouble + "\n") != std::string::npos);
+    CHECK(listed.out.find(nodes[0].open_error + "\n") != std::string::npos);
     CHECK(listed.out.find(usb_trouble + "\n") != std::string::npos);
   }
 
-  Ports ports;
+  TransportFactory ports;
   const auto hid = ports.hid({.vendor = kUltra.vendor});
   REQUIRE_FALSE(hid);
-  CHECK(hid.error().message == nodes[0].trouble);
+  CHECK(hid.error().message == nodes[0].open_error);
   const auto driver = drivers::find_driver("p5")->open({}, ports);
   REQUIRE_FALSE(driver);
   CHECK(driver.error().message == usb_trouble);
@@ -83,14 +83,14 @@ TEST_CASE("a node of a group is mended by joining it, too; a node for all has no
   forbid(bench, ultra.node());
   {
     const AsNobody nobody;
-    const std::string sentence = drivers::list_hid_nodes().at(0).trouble;
+    const std::string sentence = drivers::list_hid_nodes().at(0).open_error;
     check_sentence(sentence, ultra.node());
     CHECK(sentence.find("sudo usermod -aG plugdev $USER") != std::string::npos);
   }
   std::filesystem::permissions(file, std::filesystem::perms(0666));
   const AsNobody nobody;
-  CHECK(drivers::list_hid_nodes().at(0).trouble.empty());
-  Ports ports;
+  CHECK(drivers::list_hid_nodes().at(0).open_error.empty());
+  TransportFactory ports;
   CHECK(ports.hid({.vendor = kUltra.vendor}));
 }
 

@@ -7,7 +7,7 @@
 #include "proto/frame/degree.hpp"
 #include "proto/text/load_file.hpp"
 #include "tests/support/shared.hpp"
-#include "tests/unit/drivers/specimens.hpp"
+#include "tests/unit/drivers/device_fixtures.hpp"
 
 namespace posed::drivers::glove {
 namespace {

@@ -1,20 +1,20 @@
-// What every driver in the registry must hold, run on a specimen of each.
+// What every driver in the registry must hold, run on a fixture of each.
 #include <catch2/catch.hpp>
 
 #include <random>
 #include <set>
 
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
-#include "tests/unit/drivers/specimens.hpp"
+#include "tests/unit/drivers/device_fixtures.hpp"
 
 namespace posed::drivers {
 namespace {
 
 using test::Bytes;
 using test::CollectSink;
-using test::Specimen;
+using test::DeviceFixture;
 
 std::unique_ptr<Decoder> new_decoder(const Description& description) {
   auto decoder = find_driver(description.driver)->make_decoder(description);
@@ -67,7 +67,7 @@ void check_sound(const CollectSink& sink) {
 
 }  // namespace
 
-TEST_CASE("every driver of the registry has a specimen, a summary and help for its options") {
+TEST_CASE("every driver of the registry has a fixture, a summary and help for its options") {
   std::set<std::string_view> names;
   for (const Driver& driver : registry()) {
     INFO(driver.name);
@@ -75,32 +75,32 @@ TEST_CASE("every driver of the registry has a specimen, a summary and help for i
     CHECK(find_driver(driver.name) == &driver);
     CHECK_FALSE(driver.summary.empty());
     for (const OptionSpec& option : driver.options) CHECK_FALSE(option.help.empty());
-    CHECK(std::ranges::count(test::specimens(), driver.name, &Specimen::driver) > 0);
+    CHECK(std::ranges::count(test::device_fixtures(), driver.name, &DeviceFixture::driver) > 0);
   }
   CHECK(find_driver("no such driver") == nullptr);
 }
 
 TEST_CASE("a chunk is decoded at once, whole, and every loop is like the one before") {
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
-    const auto chunks = test::read_chunks(*device.transport, 3 * specimen.loop_chunks);
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
+    const auto chunks = test::read_chunks(*device.transport, 3 * fixture.loop_chunks);
     CollectSink sink;
     for (std::size_t i = 0; i < chunks.size(); ++i) {
       device.decoder->feed(chunks[i], 0, sink);
-      CHECK(sink.frames.size() == (i + 1) * specimen.chunk_frames);
-      CHECK(sink.samples.size() == (i + 1) * specimen.chunk_samples);
+      CHECK(sink.frames.size() == (i + 1) * fixture.chunk_frames);
+      CHECK(sink.samples.size() == (i + 1) * fixture.chunk_samples);
     }
-    CHECK(sink.count(Outcome::kOk) == static_cast<int>(chunks.size() * specimen.chunk_packets));
+    CHECK(sink.count(Outcome::kOk) == static_cast<int>(chunks.size() * fixture.chunk_packets));
     check_sound(sink);
-    const std::size_t loop = specimen.loop_chunks * specimen.chunk_frames;
+    const std::size_t loop = fixture.loop_chunks * fixture.chunk_frames;
     for (std::size_t i = loop; i < sink.frames.size(); ++i) {
       CHECK(test::same_pose(sink.frames[i], sink.frames[i - loop]));
       if (sink.frames[i].header.device_ns == kNoTime_ns) continue;
       const auto step_ns = sink.frames[i].header.device_ns - sink.frames[i - 1].header.device_ns;
       CHECK(seconds(step_ns) == Approx(1.0 / device.description.rate_hz).margin(1e-6));
     }
-    const std::size_t round = specimen.loop_chunks * specimen.chunk_samples;
+    const std::size_t round = fixture.loop_chunks * fixture.chunk_samples;
     for (std::size_t i = round; i < sink.samples.size(); ++i) {
       CHECK(test::same_values(sink.samples[i], sink.samples[i - round]));
     }
@@ -108,15 +108,15 @@ TEST_CASE("a chunk is decoded at once, whole, and every loop is like the one bef
 }
 
 TEST_CASE("frames and samples are what the description announces") {
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
     CollectSink sink;
-    for (const Bytes& chunk : test::read_chunks(*device.transport, specimen.loop_chunks)) {
+    for (const Bytes& chunk : test::read_chunks(*device.transport, fixture.loop_chunks)) {
       device.decoder->feed(chunk, 0, sink);
     }
     const Description& description = device.description;
-    CHECK(description.driver == specimen.driver);
+    CHECK(description.driver == fixture.driver);
     CHECK(description.samples.names.size() == description.samples.units.size());
     for (const Frame& frame : sink.frames) {
       REQUIRE(description.skeleton != nullptr);
@@ -131,13 +131,13 @@ TEST_CASE("frames and samples are what the description announces") {
 
 TEST_CASE("any cut of the bytes gives the same frames") {
   std::mt19937 random(7);
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
-    const Bytes bytes = joined(test::read_chunks(*device.transport, 2 * specimen.loop_chunks));
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
+    const Bytes bytes = joined(test::read_chunks(*device.transport, 2 * fixture.loop_chunks));
     CollectSink whole;
     device.decoder->feed(bytes, 0, whole);
-    CHECK(whole.frames.size() == 2 * specimen.loop_chunks * specimen.chunk_frames);
+    CHECK(whole.frames.size() == 2 * fixture.loop_chunks * fixture.chunk_frames);
     for (const std::size_t longest : {1U, 2U, 7U, 100U, 1000U}) {
       CollectSink cut;
       feed_in_pieces(*new_decoder(device.description), bytes, longest, random, cut);
@@ -147,9 +147,9 @@ TEST_CASE("any cut of the bytes gives the same frames") {
 }
 
 TEST_CASE("a log's text and identity build the same device again") {
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
     const Description& live = device.description;
     const auto again = find_driver(live.driver)->describe(live.text, live.identity);
     if (!again) FAIL(again.error().text());
@@ -167,7 +167,7 @@ TEST_CASE("a log's text and identity build the same device again") {
     CollectSink here;
     CollectSink there;
     const auto decoder = new_decoder(*again);
-    for (const Bytes& chunk : test::read_chunks(*device.transport, specimen.loop_chunks)) {
+    for (const Bytes& chunk : test::read_chunks(*device.transport, fixture.loop_chunks)) {
       device.decoder->feed(chunk, 0, here);
       decoder->feed(chunk, 0, there);
     }
@@ -177,10 +177,10 @@ TEST_CASE("a log's text and identity build the same device again") {
 
 TEST_CASE("a damaged description is refused in a sentence, never a crash") {
   std::mt19937 random(11);
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    const Device device = test::open_device(specimen);
-    const Driver& driver = *find_driver(specimen.driver);
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    const Device device = test::open_device(fixture);
+    const Driver& driver = *find_driver(fixture.driver);
     CHECK_FALSE(driver.describe("", "x"));
     CHECK_FALSE(driver.describe("foreign", "x"));
     for (int i = 0; i < 500; ++i) {
@@ -199,10 +199,10 @@ TEST_CASE("a damaged description is refused in a sentence, never a crash") {
 
 TEST_CASE("garbage and flipped bytes are counted, never a crash or a pose that is none") {
   std::mt19937 random(13);
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
-    const Bytes good = joined(test::read_chunks(*device.transport, specimen.loop_chunks));
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
+    const Bytes good = joined(test::read_chunks(*device.transport, fixture.loop_chunks));
     for (int round = 0; round < 200; ++round) {
       const auto decoder = new_decoder(device.description);
       CollectSink sink(100'000);
@@ -219,15 +219,15 @@ TEST_CASE("garbage and flipped bytes are counted, never a crash or a pose that i
       feed_in_pieces(*decoder, good, 300, random, sink);
       sink.clear();
       feed_in_pieces(*decoder, good, 300, random, sink);
-      CHECK(sink.frames.size() == specimen.loop_chunks * specimen.chunk_frames);
+      CHECK(sink.frames.size() == fixture.loop_chunks * fixture.chunk_frames);
     }
   }
 }
 
 TEST_CASE("input without an end is given up, and the stream goes on after it") {
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
     CollectSink sink(100'000);
     const Bytes endless(3 * kMaxChunk, std::byte{'7'});
     device.decoder->feed(endless, 0, sink);
@@ -237,9 +237,9 @@ TEST_CASE("input without an end is given up, and the stream goes on after it") {
     CHECK(counted >= 1);
     CHECK(counted < 10);
     sink.clear();
-    const auto chunks = test::read_chunks(*device.transport, specimen.loop_chunks);
+    const auto chunks = test::read_chunks(*device.transport, fixture.loop_chunks);
     for (const Bytes& chunk : chunks) device.decoder->feed(chunk, 0, sink);
-    CHECK(sink.frames.size() + 1 >= chunks.size() * specimen.chunk_frames);
+    CHECK(sink.frames.size() + 1 >= chunks.size() * fixture.chunk_frames);
   }
 }
 
@@ -249,10 +249,10 @@ TEST_CASE("feeding takes nothing from the heap, whatever the bytes are") {
   delete seen;
   REQUIRE(test::allocations() > start);  // the counter counts
   std::mt19937 random(17);
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
-    Bytes bytes = joined(test::read_chunks(*device.transport, specimen.loop_chunks));
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
+    Bytes bytes = joined(test::read_chunks(*device.transport, fixture.loop_chunks));
     Bytes bad = bytes;
     for (int flips = 0; flips < 20; ++flips) bad[random() % bad.size()] ^= std::byte{0x55};
     CollectSink sink;
@@ -266,9 +266,9 @@ TEST_CASE("feeding takes nothing from the heap, whatever the bytes are") {
 }
 
 TEST_CASE("reading takes nothing from the heap") {
-  for (const Specimen& specimen : test::specimens()) {
-    INFO(specimen.name);
-    Device device = test::open_device(specimen);
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    INFO(fixture.name);
+    Device device = test::open_device(fixture);
     (void)test::read_chunks(*device.transport, 1);
     const std::uint64_t before = test::allocations();
     for (int i = 0; i < 1000; ++i) static_cast<void>(device.transport->read(0));
@@ -277,7 +277,7 @@ TEST_CASE("reading takes nothing from the heap") {
 }
 
 TEST_CASE("wrong options are refused in a sentence that names them") {
-  Ports ports;
+  TransportFactory ports;
   for (const Driver& driver : registry()) {
     INFO(driver.name);
     const auto unknown = driver.open({{"no_such_option", true}}, ports);
@@ -296,8 +296,8 @@ TEST_CASE("wrong options are refused in a sentence that names them") {
   }
 }
 
-// A stream whose device may come later is opened by its keeper, long after the start: whatever is
-// wrong with its options has to be found without opening it.
+// A stream whose device may come later is opened by its supervisor, long after the start: whatever
+// is wrong with its options has to be found without opening it.
 TEST_CASE("what open() would refuse as wrong use, expect() refuses in the same sentence") {
   const std::vector<std::pair<std::string, OptionValue>> wrong_values{
       {"hand", std::string("middle")},
@@ -315,7 +315,7 @@ TEST_CASE("what open() would refuse as wrong use, expect() refuses in the same s
       {"device", std::string("nothing.toml")}};
   int refused = 0;
   const auto compare = [&](const Driver& driver, const Options& options) {
-    Ports ports;
+    TransportFactory ports;
     ports.cancel();  // nothing is waited for
     const auto opened = driver.open(options, ports);
     if (opened || opened.error().exit_code != ExitCode::kWrongUse) return;

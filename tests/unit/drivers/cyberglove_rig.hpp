@@ -9,8 +9,8 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/cyberglove/cyberglove.hpp"
+#include "drivers/cyberglove/device_info.hpp"
 #include "drivers/cyberglove/emulator.hpp"
-#include "drivers/cyberglove/greeting.hpp"
 
 namespace posed::drivers::cyberglove {
 

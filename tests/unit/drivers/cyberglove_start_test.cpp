@@ -9,7 +9,7 @@
 
 #include "drivers/cyberglove/cyberglove.hpp"
 #include "drivers/cyberglove/emulator.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
 
@@ -69,7 +69,7 @@ class Box {
 
 Result<Device> open_box(const Box& box, Options options) {
   options["port"] = box.port();
-  Ports ports;
+  TransportFactory ports;
   return cyberglove_driver().open(options, ports);
 }
 
@@ -152,7 +152,7 @@ TEST_CASE("what is no CyberGlove, or not the one that was meant, is named in a s
 }
 
 TEST_CASE("a CyberGlove's options are checked before anything is opened") {
-  Ports ports;
+  TransportFactory ports;
   for (const Options& wrong :
        std::vector<Options>{{{"form", std::string("9bit")}},
                             {{"mode", std::string("push")}},

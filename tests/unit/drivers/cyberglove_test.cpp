@@ -7,7 +7,7 @@
 
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/cyberglove/stamp_clock.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/grasps.hpp"
 #include "tests/support/shared.hpp"
@@ -24,7 +24,7 @@ using test::CollectSink;
 class Line {
  public:
   Line() {
-    Ports ports;
+    TransportFactory ports;
     auto link = ports.serial({.port = terminal_.port()});
     if (!link) FAIL(link.error().text());
     transport_ = make_link_transport(std::move(*link));

@@ -14,7 +14,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
-#include "tests/unit/drivers/specimens.hpp"
+#include "tests/unit/drivers/device_fixtures.hpp"
 
 namespace posed::drivers {
 namespace {

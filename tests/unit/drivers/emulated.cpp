@@ -16,15 +16,15 @@ namespace {
 
 constexpr std::size_t kRounds = 4;  // that the capability tests read at most
 
-const drivers::Driver& driver_of(const Specimen& specimen) {
-  const drivers::Driver* driver = drivers::find_driver(specimen.driver);
+const drivers::Driver& driver_of(const DeviceFixture& fixture) {
+  const drivers::Driver* driver = drivers::find_driver(fixture.driver);
   REQUIRE(driver != nullptr);
   REQUIRE(driver->emulate != nullptr);
   return *driver;
 }
 
-drivers::Description promised(const Specimen& specimen) {
-  auto description = driver_of(specimen).expect(specimen.options);
+drivers::Description promised(const DeviceFixture& fixture) {
+  auto description = driver_of(fixture).expect(fixture.options);
   if (!description) FAIL(description.error().text());
   return std::move(*description);
 }
@@ -62,17 +62,17 @@ HandAngles closing_hand(std::size_t index, std::size_t count) {
   return angles;
 }
 
-std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(const Specimen& specimen,
+std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(const DeviceFixture& fixture,
                                                             std::size_t rounds) {
-  auto emulator = driver_of(specimen).emulate(specimen.options);
+  auto emulator = driver_of(fixture).emulate(fixture.options);
   if (!emulator) FAIL(emulator.error().text());
   std::vector<std::pair<std::int64_t, Bytes>> chunks;
   Bytes answer;
-  (*emulator)->receive(std::as_bytes(std::span(specimen.start)), 0, answer);
-  for (std::size_t i = 0; i < rounds * specimen.loop_chunks; ++i) {
+  (*emulator)->receive(std::as_bytes(std::span(fixture.start)), 0, answer);
+  for (std::size_t i = 0; i < rounds * fixture.loop_chunks; ++i) {
     const std::int64_t due_ns = (*emulator)->next_due_ns();
     REQUIRE(due_ns != kNoTime_ns);
-    (*emulator)->pose(closing_hand(i, specimen.loop_chunks));
+    (*emulator)->pose(closing_hand(i, fixture.loop_chunks));
     Bytes chunk;
     (*emulator)->emit(due_ns, chunk);
     REQUIRE_FALSE(chunk.empty());
@@ -81,13 +81,13 @@ std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(const Specimen& spec
   return chunks;
 }
 
-drivers::Device open_emulated(const Specimen& specimen) {
+drivers::Device open_emulated(const DeviceFixture& fixture) {
   drivers::Chunks chunks;
-  for (const auto& [due_ns, bytes] : emulated_chunks(specimen, kRounds)) chunks.add(bytes);
+  for (const auto& [due_ns, bytes] : emulated_chunks(fixture, kRounds)) chunks.add(bytes);
   auto transport = drivers::FileTransport::open(std::move(chunks), {.rate_hz = 100.0, .pace = 0.0});
   if (!transport) FAIL(transport.error().text());
-  drivers::Description description = promised(specimen);
-  auto decoder = driver_of(specimen).make_decoder(description);
+  drivers::Description description = promised(fixture);
+  auto decoder = driver_of(fixture).make_decoder(description);
   if (!decoder) FAIL(decoder.error().text());
   return {.description = std::move(description),
           .transport = std::move(*transport),
@@ -95,14 +95,14 @@ drivers::Device open_emulated(const Specimen& specimen) {
           .warnings = {}};
 }
 
-std::string emulated_log(const Specimen& specimen) {
-  const drivers::Description description = promised(specimen);
-  std::string text = "# Not a recording: made by posed's emulator of this glove (" + specimen.name +
+std::string emulated_log(const DeviceFixture& fixture) {
+  const drivers::Description description = promised(fixture);
+  std::string text = "# Not a recording: made by posed's emulator of this glove (" + fixture.name +
                      "), with damage put in.\n# A real log takes its place as soon as somebody "
                      "sends one (drivers/README.md).\ndriver " +
                      description.driver + "\nidentity emulated\n" + text_lines(description.text);
   std::size_t index = 0;
-  for (auto& [due_ns, bytes] : emulated_chunks(specimen, 1)) {
+  for (auto& [due_ns, bytes] : emulated_chunks(fixture, 1)) {
     switch (index++) {
       case 2:  // a byte is lost
         bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(bytes.size() / 2));
@@ -127,10 +127,10 @@ std::string emulated_log(const Specimen& specimen) {
 // unit_drivers [.write-logs] makes the logs that are not there yet; UPDATE_EXPECTED=1 what they
 // decode to.
 TEST_CASE("write the logs of emulated gloves", "[.write-logs]") {
-  for (const Specimen& specimen : specimens()) {
-    if (!specimen.emulated) continue;
-    const auto path = golden("devices") / (specimen.name + ".log");
-    if (!std::filesystem::exists(path)) std::ofstream(path) << emulated_log(specimen);
+  for (const DeviceFixture& fixture : device_fixtures()) {
+    if (!fixture.emulated) continue;
+    const auto path = golden("devices") / (fixture.name + ".log");
+    if (!std::filesystem::exists(path)) std::ofstream(path) << emulated_log(fixture);
   }
 }
 

@@ -7,21 +7,21 @@
 #include <vector>
 
 #include "proto/frame/hand.hpp"
-#include "tests/unit/drivers/specimens.hpp"
+#include "tests/unit/drivers/device_fixtures.hpp"
 
 namespace posed::test {
 
 // A hand that closes and opens, each finger in its turn; equal after `count` poses.
 [[nodiscard]] HandAngles closing_hand(std::size_t index, std::size_t count);
 
-// What the specimen's emulator sends in `rounds` rounds of loop_chunks poses, and when it was due.
-[[nodiscard]] std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(const Specimen& specimen,
-                                                                          std::size_t rounds);
+// What the fixture's emulator sends in `rounds` rounds of loop_chunks poses, and when it was due.
+[[nodiscard]] std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(
+    const DeviceFixture& fixture, std::size_t rounds);
 
-// The specimen as its options promise it, playing rounds enough for every test.
-[[nodiscard]] drivers::Device open_emulated(const Specimen& specimen);
+// The fixture as its options promise it, playing rounds enough for every test.
+[[nodiscard]] drivers::Device open_emulated(const DeviceFixture& fixture);
 
 // A recorded log's text (recorded_log.hpp) of one round, with damage, marked as emulated.
-[[nodiscard]] std::string emulated_log(const Specimen& specimen);
+[[nodiscard]] std::string emulated_log(const DeviceFixture& fixture);
 
 }  // namespace posed::test

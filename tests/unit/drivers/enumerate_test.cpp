@@ -2,14 +2,15 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/transport/enumerate.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
 
 namespace posed::drivers {
 namespace {
 
-Plugged adapter(const std::string& node, const std::string& serial, const std::string& port_path) {
-  Plugged plugged;
+DeviceInfo adapter(const std::string& node, const std::string& serial,
+                   const std::string& port_path) {
+  DeviceInfo plugged;
   plugged.node = node;
   plugged.is_usb = true;
   plugged.vendor = 0x10C4;
@@ -20,7 +21,7 @@ Plugged adapter(const std::string& node, const std::string& serial, const std::s
   return plugged;
 }
 
-bool any(const Plugged& /*plugged*/) { return true; }
+bool any(const DeviceInfo& /*plugged*/) { return true; }
 
 bool mentions(const Error& error, const std::string& text) {
   return error.message.find(text) != std::string::npos;
@@ -29,7 +30,7 @@ bool mentions(const Error& error, const std::string& text) {
 }  // namespace
 
 TEST_CASE("a device is known by its serial number, its port path or both with its USB ids") {
-  const Plugged plain = adapter("/dev/ttyUSB0", "A9XYZ", "1-2.3");
+  const DeviceInfo plain = adapter("/dev/ttyUSB0", "A9XYZ", "1-2.3");
   CHECK(plain.identity() == "10c4:ea60 A9XYZ");
   for (const char* id : {"A9XYZ", "1-2.3", "1-2.3:1.0", "10c4:ea60 A9XYZ"}) {
     CHECK(plain.answers_to(id));
@@ -38,7 +39,7 @@ TEST_CASE("a device is known by its serial number, its port path or both with it
     CHECK_FALSE(plain.answers_to(id));
   }
   CHECK(adapter("/dev/ttyUSB0", "", "1-2.3").identity() == "10c4:ea60 1-2.3");
-  Plugged built_in;
+  DeviceInfo built_in;
   built_in.node = "/dev/ttyS0";
   CHECK(built_in.identity() == "/dev/ttyS0");
   CHECK_FALSE(built_in.answers_to(""));
@@ -64,12 +65,12 @@ TEST_CASE("an id that nothing answers to is named") {
   CHECK(mentions(none.error(), "0002"));
   CHECK(mentions(none.error(), "posed devices"));
   CHECK(choose(one, "", any, "serial port"));
-  CHECK_FALSE(choose(one, "", [](const Plugged& p) { return p.vendor == 1; }, "serial port"));
+  CHECK_FALSE(choose(one, "", [](const DeviceInfo& p) { return p.vendor == 1; }, "serial port"));
 }
 
 TEST_CASE("ports, HID nodes and USB devices that are not there are refused in a sentence") {
   constexpr std::uint32_t kNobody = 0xFFF0;  // no vendor has it
-  Ports ports;
+  TransportFactory ports;
   const auto port = ports.serial({.id = "no-such-glove"});
   REQUIRE_FALSE(port);
   CHECK(mentions(port.error(), "no-such-glove"));
@@ -86,7 +87,7 @@ TEST_CASE("ports, HID nodes and USB devices that are not there are refused in a 
 
 TEST_CASE("a port that is not on USB is identified by its name") {
   const test::PseudoTerminal terminal;
-  Ports ports;
+  TransportFactory ports;
   const auto link = ports.serial({.port = terminal.port()});
   REQUIRE(link);
   CHECK(link->identity() == terminal.port());

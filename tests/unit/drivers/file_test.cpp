@@ -4,11 +4,11 @@
 #include <span>
 #include <string>
 
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
-#include "tests/unit/drivers/specimens.hpp"
+#include "tests/unit/drivers/device_fixtures.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -18,7 +18,7 @@ using test::CollectSink;
 Result<Device> open_file(const std::filesystem::path& path, Options options = {}) {
   options["path"] = path.string();
   options.try_emplace("pace", 0.0);
-  Ports ports;
+  TransportFactory ports;
   return find_driver("file")->open(options, ports);
 }
 

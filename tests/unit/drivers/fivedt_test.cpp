@@ -8,7 +8,7 @@
 
 #include "drivers/fivedt/decoder.hpp"
 #include "drivers/fivedt/emulator.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/emulated.hpp"
@@ -46,17 +46,17 @@ Reading decoded(Form form, const Bytes& bytes) {
   return reading;
 }
 
-// Largest error of a channel [rad] after the specimen's emulator and decoder.
-double worst_error(const test::Specimen& specimen, std::size_t joints) {
-  const auto decoder = decoder_of(specimen.options);
+// Largest error of a channel [rad] after the fixture's emulator and decoder.
+double worst_error(const test::DeviceFixture& fixture, std::size_t joints) {
+  const auto decoder = decoder_of(fixture.options);
   CollectSink sink;
-  for (const auto& [due_ns, bytes] : test::emulated_chunks(specimen, 1)) {
+  for (const auto& [due_ns, bytes] : test::emulated_chunks(fixture, 1)) {
     decoder->feed(bytes, due_ns, sink);
   }
-  REQUIRE(sink.frames.size() == specimen.loop_chunks);
+  REQUIRE(sink.frames.size() == fixture.loop_chunks);
   double worst = 0.0;
   for (std::size_t i = 0; i < sink.frames.size(); ++i) {
-    const HandAngles sent = test::closing_hand(i, specimen.loop_chunks);
+    const HandAngles sent = test::closing_hand(i, fixture.loop_chunks);
     const HandAngles got = hand_angles(sink.frames[i]);
     for (std::size_t f = 1; f < kFingers; ++f) {
       for (std::size_t j = 0; j < joints; ++j) {
@@ -68,9 +68,9 @@ double worst_error(const test::Specimen& specimen, std::size_t joints) {
   return worst;
 }
 
-const test::Specimen& specimen(const std::string& name) {
-  const auto at = std::ranges::find(test::specimens(), name, &test::Specimen::name);
-  REQUIRE(at != test::specimens().end());
+const test::DeviceFixture& fixture(const std::string& name) {
+  const auto at = std::ranges::find(test::device_fixtures(), name, &test::DeviceFixture::name);
+  REQUIRE(at != test::device_fixtures().end());
   return *at;
 }
 
@@ -199,19 +199,18 @@ TEST_CASE("a USB glove with five sensors has every third value") {
 
 TEST_CASE("emulated 5DT gloves' poses come back as near as their sensors can tell") {
   // Half a count of a whole bend's 1500; what one sensor cannot tell of two joints is left out.
-  CHECK(worst_error(specimen("fivedt-16"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
-  CHECK(worst_error(specimen("fivedt-ultra-wireless"), 1) <=
-        0.51 * std::numbers::pi / 2.0 / 1500.0);
-  CHECK(worst_error(specimen("fivedt-ultra-usb-14"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
+  CHECK(worst_error(fixture("fivedt-16"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
+  CHECK(worst_error(fixture("fivedt-ultra-wireless"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
+  CHECK(worst_error(fixture("fivedt-ultra-usb-14"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
   // One sensor a finger: the mean of its joints is right, each joint is near.
-  CHECK(worst_error(specimen("fivedt-5"), 3) < 0.25);
-  CHECK(worst_error(specimen("fivedt-ultra-usb-5"), 3) < 0.25);
+  CHECK(worst_error(fixture("fivedt-5"), 3) < 0.25);
+  CHECK(worst_error(fixture("fivedt-ultra-usb-5"), 3) < 0.25);
 }
 
 TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
   FiveDtEmulator glove(Side::kRight, {.form = Form::kFive});
   const test::ServedEmulator served(glove);
-  Ports ports;
+  TransportFactory ports;
   const auto other = driver().open({{"port", served.port()}, {"hand", std::string("left")}}, ports);
   REQUIRE_FALSE(other);
   CHECK(other.error().message.find("right glove") != std::string::npos);
@@ -242,7 +241,7 @@ TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
 TEST_CASE("a 5DT glove that only sends is told apart by its packets") {
   FiveDtEmulator glove(Side::kLeft, {.form = Form::kFiveWireless});
   const test::ServedEmulator served(glove);
-  Ports ports;
+  TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {
     return driver().open({{"port", served.port()}, {"model", model}, {"hand", hand}}, ports);
   };
@@ -254,7 +253,7 @@ TEST_CASE("a 5DT glove that only sends is told apart by its packets") {
 TEST_CASE("a 5DT glove of another hand or model is told in a sentence") {
   FiveDtEmulator glove(Side::kLeft, {.form = Form::kFiveWireless});
   const test::ServedEmulator served(glove);
-  Ports ports;
+  TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {
     return driver().open({{"port", served.port()}, {"model", model}, {"hand", hand}}, ports);
   };

@@ -13,8 +13,8 @@
 namespace posed::drivers {
 namespace {
 
-Plugged plugged(Bus bus, std::uint16_t vendor, std::uint16_t product) {
-  Plugged one;
+DeviceInfo plugged(Bus bus, std::uint16_t vendor, std::uint16_t product) {
+  DeviceInfo one;
   one.bus = bus;
   one.is_usb = true;
   one.vendor = vendor;
@@ -22,7 +22,7 @@ Plugged plugged(Bus bus, std::uint16_t vendor, std::uint16_t product) {
   return one;
 }
 
-const KnownUsb* known(const Plugged& one) {
+const KnownUsb* known(const DeviceInfo& one) {
   for (const KnownUsb& entry : known_usb()) {
     if (entry.fits(one)) return &entry;
   }
@@ -52,7 +52,7 @@ TEST_CASE("an adapter and a stranger do not say what is behind them") {
   CHECK(known(adapter)->hand(adapter).empty());
   CHECK(known(plugged(Bus::kSerial, 0x0403, 0x6002)) == nullptr);
   CHECK(known(plugged(Bus::kHid, 0x0D7F, 0x0100)) == nullptr);
-  CHECK(known(Plugged{}) == nullptr);
+  CHECK(known(DeviceInfo{}) == nullptr);
 }
 
 TEST_CASE("the udev rules open every glove that is known") {

@@ -11,7 +11,7 @@
 
 #include "drivers/lucidgloves/decoder.hpp"
 #include "drivers/lucidgloves/emulator.hpp"
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
@@ -185,19 +185,19 @@ TEST_CASE("a line longer than any glove's is given up once, and its end is not r
 }
 
 TEST_CASE("an emulated LucidGlove's pose comes back within half a count") {
-  for (const test::Specimen& specimen : test::specimens()) {
-    if (specimen.driver != "lucidgloves") continue;
-    INFO(specimen.name);
-    const bool joints = specimen.name == "lucidgloves-alpha";
-    const auto decoder = decoder_of(specimen.options);
+  for (const test::DeviceFixture& fixture : test::device_fixtures()) {
+    if (fixture.driver != "lucidgloves") continue;
+    INFO(fixture.name);
+    const bool joints = fixture.name == "lucidgloves-alpha";
+    const auto decoder = decoder_of(fixture.options);
     CollectSink sink;
-    for (const auto& [due_ns, bytes] : test::emulated_chunks(specimen, 1)) {
+    for (const auto& [due_ns, bytes] : test::emulated_chunks(fixture, 1)) {
       decoder->feed(bytes, due_ns, sink);
     }
-    REQUIRE(sink.frames.size() == specimen.loop_chunks);
+    REQUIRE(sink.frames.size() == fixture.loop_chunks);
     double worst = 0.0;  // counts
     for (std::size_t i = 0; joints && i < sink.frames.size(); ++i) {
-      const HandAngles sent = test::closing_hand(i, specimen.loop_chunks);
+      const HandAngles sent = test::closing_hand(i, fixture.loop_chunks);
       const HandAngles got = hand_angles(sink.frames[i]);
       for (std::size_t c = 0; c < sent.size(); ++c) {
         // The largest count is a middle joint's: 100 degrees over the range.
@@ -238,7 +238,7 @@ TEST_CASE("forces and vibrations reach the glove as told, and what is negative s
 TEST_CASE("a LucidGlove on a port is opened, read and told apart by hand and range") {
   LucidEmulator glove(Side::kLeft, Encoding::kAlpha, 4095);
   const test::ServedEmulator served(glove);
-  Ports ports;
+  TransportFactory ports;
   const auto open = [&](const std::string& hand, std::int64_t max) {
     return driver().open({{"port", served.port()}, {"hand", hand}, {"max_analog_value", max}},
                          ports);
@@ -266,7 +266,7 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
   const std::uint16_t port = test::free_port();
   const Options options{{"link", std::string("tcp")},
                         {"listen", "127.0.0.1:" + std::to_string(port)}};
-  Ports ports;
+  TransportFactory ports;
   CHECK_FALSE(driver().open(options, ports));  // nobody there yet; it goes on listening
   const NetworkGlove glove(port);
   glove.say("A1B2C3D4E5\n\r\nZ(ZV)5(ZG)0(ZH)1\n\r\n");
@@ -289,7 +289,7 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
 
 TEST_CASE("a port with another device on it is refused with what to check") {
   test::PseudoTerminal port;
-  Ports ports;
+  TransportFactory ports;
   const auto device = driver().open({{"port", port.port()}}, ports);
   REQUIRE_FALSE(device);
   CHECK(device.error().message.find("sends nothing") != std::string::npos);

@@ -14,7 +14,7 @@ namespace posed::drivers {
 namespace {
 
 using test::Bytes;
-using test::Specimen;
+using test::DeviceFixture;
 
 constexpr std::size_t kPackets = 150 * 60 * 10;
 constexpr double kNoise = 0.01;   // of bytes
@@ -23,7 +23,7 @@ constexpr std::size_t kLate = 8;  // packets that a decoder may still hold back
 // The share of damaged packets that come through as if they were good, at most, where the framing
 // cannot tell. A glove that is not here has a framing that can.
 struct Blind {
-  std::string_view specimen;
+  std::string_view fixture;
   double most;
   const char* why;
 };
@@ -41,8 +41,8 @@ constexpr std::array kBlind{
     Blind{"lucidgloves-legacy", 0.9, "a line of text without a checksum: other digits are a line"},
 };
 
-double allowed_share(const Specimen& specimen) {
-  const auto at = std::ranges::find(kBlind, specimen.name, &Blind::specimen);
+double allowed_share(const DeviceFixture& fixture) {
+  const auto at = std::ranges::find(kBlind, fixture.name, &Blind::fixture);
   return at == kBlind.end() ? 0.0 : at->most;
 }
 
@@ -95,9 +95,9 @@ class Judge {
   std::size_t lost_ = 0;
 };
 
-std::unique_ptr<Decoder> decoder_of(const Specimen& specimen) {
-  const Driver& driver = *find_driver(specimen.driver);
-  const auto description = driver.expect(specimen.options);
+std::unique_ptr<Decoder> decoder_of(const DeviceFixture& fixture) {
+  const Driver& driver = *find_driver(fixture.driver);
+  const auto description = driver.expect(fixture.options);
   if (!description) FAIL(description.error().text());
   auto decoder = driver.make_decoder(*description);
   if (!decoder) FAIL(decoder.error().text());
@@ -110,18 +110,18 @@ HandAngles any_pose(std::mt19937& random) {
   return angles;
 }
 
-Tally stream_through_noise(const Specimen& specimen) {
-  const auto emulator = find_driver(specimen.driver)->emulate(specimen.options);
+Tally stream_through_noise(const DeviceFixture& fixture) {
+  const auto emulator = find_driver(fixture.driver)->emulate(fixture.options);
   REQUIRE(emulator);
-  const auto noisy = decoder_of(specimen);
-  const auto clean = decoder_of(specimen);
+  const auto noisy = decoder_of(fixture);
+  const auto clean = decoder_of(fixture);
   emulate::FaultInjector line({emulate::FaultKind::kNoise, kNoise}, 3);
   std::mt19937 random(5);
   Judge judge;
   test::CollectSink truth(8);
   test::CollectSink got(64);
   Bytes packet, arrived;
-  (*emulator)->receive(std::as_bytes(std::span(specimen.start)), 0, packet);
+  (*emulator)->receive(std::as_bytes(std::span(fixture.start)), 0, packet);
   for (std::size_t i = 0; i < kPackets; ++i) {
     const std::int64_t now_ns = (*emulator)->next_due_ns();
     (*emulator)->pose(any_pose(random));
@@ -142,10 +142,10 @@ Tally stream_through_noise(const Specimen& specimen) {
 }  // namespace
 
 TEST_CASE("noise on the line costs what it touched, and what is published was sent") {
-  for (const Specimen& specimen : test::specimens()) {
-    if (!specimen.emulated || specimen.whole_reports) continue;
-    INFO(specimen.name);
-    const Tally tally = stream_through_noise(specimen);
+  for (const DeviceFixture& fixture : test::device_fixtures()) {
+    if (!fixture.emulated || fixture.whole_reports) continue;
+    INFO(fixture.name);
+    const Tally tally = stream_through_noise(fixture);
     const std::size_t damaged = tally.sent - tally.whole;
     const double blind = static_cast<double>(tally.wrong) / static_cast<double>(damaged);
     const double through =
@@ -153,11 +153,11 @@ TEST_CASE("noise on the line costs what it touched, and what is published was se
     std::printf(
         "noise: %-26s %5.1f %% of packets untouched, %.2f %% of them through, "
         "%zu wrong published (%.3f %% of damaged), %zu untouched lost in a row\n",
-        specimen.name.c_str(),
+        fixture.name.c_str(),
         100.0 * static_cast<double>(tally.whole) / static_cast<double>(tally.sent), 100.0 * through,
         tally.wrong, 100.0 * blind, tally.lost_in_a_row);
     CHECK(through >= 0.9);
-    CHECK(blind <= allowed_share(specimen));
+    CHECK(blind <= allowed_share(fixture));
     CHECK(tally.lost_in_a_row <= 2);
   }
 }

@@ -6,20 +6,20 @@
 #include <sstream>
 
 #include "drivers/p5/decoder.hpp"
+#include "drivers/p5/device_info.hpp"
 #include "drivers/p5/emulator.hpp"
-#include "drivers/p5/greeting.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
-#include "tests/unit/drivers/specimens.hpp"
+#include "tests/unit/drivers/device_fixtures.hpp"
 
 namespace posed::drivers {
 namespace {
 
-using p5::Place;
+using p5::CameraRig;
+using p5::LedObservation;
 using p5::Report;
-using p5::Spot;
-using p5::Tower;
+using p5::RigidPose;
 using test::Bytes;
 
 Bytes hex(const std::string& text) {
@@ -31,11 +31,11 @@ Bytes hex(const std::string& text) {
   return bytes;
 }
 
-bool same(const Spot& a, const Spot& b) {
+bool same(const LedObservation& a, const LedObservation& b) {
   return a.led == b.led && a.v2 == b.v2 && a.v1 == b.v1 && a.h == b.h;
 }
 
-Tower emulated_tower() { return Tower::of(p5::emulated_heads(), p5::emulated_leds()); }
+CameraRig emulated_tower() { return CameraRig::of(p5::emulated_heads(), p5::emulated_leds()); }
 
 // A feature report of the real dump: the last one that begins with `start`.
 Bytes dumped(const std::filesystem::path& path, const std::string& start, std::size_t size) {
@@ -78,38 +78,38 @@ TEST_CASE("a value that wrapped is led on from the one before") {
 }
 
 TEST_CASE("a LED comes back to where it is, up to the heads' resolution") {
-  const Tower tower = emulated_tower();
+  const CameraRig rig = emulated_tower();
   double worst_m = 0.0;
   for (const double x : {-0.2, 0.0, 0.2}) {
     for (const double y : {-0.1, 0.0, 0.1}) {
       for (const double z : {0.3, 0.5, 0.8}) {
         const Eigen::Vector3d there(x, y, z);
         Eigen::Vector3d found;
-        REQUIRE(tower.locate(tower.project(0, there), found));
+        REQUIRE(rig.locate(rig.project(0, there), found));
         worst_m = std::max(worst_m, (found - there).norm());
       }
     }
   }
   CHECK(worst_m < 0.02);  // half a count each of two heads 0.2 m apart, a metre and more away
   Eigen::Vector3d nowhere;
-  CHECK_FALSE(tower.locate({.led = 0, .v2 = 500, .v1 = -500, .h = 0}, nowhere));
+  CHECK_FALSE(rig.locate({.led = 0, .v2 = 500, .v1 = -500, .h = 0}, nowhere));
 }
 
 TEST_CASE("three LEDs that agree place and turn the hand, two or false ones do not") {
-  const Tower tower = emulated_tower();
+  const CameraRig rig = emulated_tower();
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
   const Eigen::Vector3d palm(0.1, -0.05, 0.6);
   std::array<Eigen::Vector3d, p5::kLeds> found{};
-  for (std::size_t i = 0; i < p5::kLeds; ++i) found[i] = palm + turn * tower.led_m[i];
-  Place place;
-  REQUIRE(p5::fit_hand(tower, found, 0b10101, place));
+  for (std::size_t i = 0; i < p5::kLeds; ++i) found[i] = palm + turn * rig.led_m[i];
+  RigidPose place;
+  REQUIRE(p5::fit_hand(rig, found, 0b10101, place));
   CHECK((place.position_m - palm).norm() < 1e-9);
   CHECK(place.rotation.angularDistance(turn) < 1e-7);
-  CHECK_FALSE(p5::fit_hand(tower, found, 0b00101, place));
+  CHECK_FALSE(p5::fit_hand(rig, found, 0b00101, place));
   found[3] += Eigen::Vector3d(0.3, 0.0, 0.0);  // a reflection of something else
-  REQUIRE(p5::fit_hand(tower, found, 0b11101, place));
+  REQUIRE(p5::fit_hand(rig, found, 0b11101, place));
   CHECK((place.position_m - palm).norm() < 1e-9);
-  CHECK_FALSE(p5::fit_hand(tower, found, 0b01101, place));
+  CHECK_FALSE(p5::fit_hand(rig, found, 0b01101, place));
 }
 
 TEST_CASE("an emulated P5 with its feature reports shows where its hand is") {
@@ -154,7 +154,7 @@ TEST_CASE("a P5's greeting with a damaged feature report is refused") {
   CHECK_FALSE(p5::read_greeting("p5 hand=right firmware=09xx03 heads=none leds=none", "x"));
 }
 
-TEST_CASE("a real P5's feature reports make a tower of plausible size") {
+TEST_CASE("a real P5's feature reports make a rig of plausible size") {
   const auto dump = test::shared("data/gloves/p5/usb-dump.txt");
   if (!dump) {
     SKIP_WITHOUT_SHARED();
@@ -166,14 +166,14 @@ TEST_CASE("a real P5's feature reports make a tower of plausible size") {
   const auto again = p5::read_greeting(p5::greeting_of(glove), "x");
   if (!again) FAIL(again.error().text());
   CHECK(glove.firmware == hex("09 04 03"));
-  const auto tower = again->tower();
-  REQUIRE(tower);
-  CHECK(tower->distance_m == Approx(7.9 * 0.0254));
-  CHECK(tower->tilt1_rad * 180.0 / std::acos(-1.0) == Approx(17.0 - 19.0 / 32.0));
-  CHECK(tower->tilt2_rad * 180.0 / std::acos(-1.0) == Approx(-10.0 - 77.0 / 32.0));
-  CHECK(tower->led_m[0].x() == Approx(2.55 * 0.0254));
-  CHECK(tower->led_m[0].z() == Approx(1.73 * 0.0254));
-  for (const Eigen::Vector3d& led_m : tower->led_m) {
+  const auto rig = again->rig();
+  REQUIRE(rig);
+  CHECK(rig->distance_m == Approx(7.9 * 0.0254));
+  CHECK(rig->tilt1_rad * 180.0 / std::acos(-1.0) == Approx(17.0 - 19.0 / 32.0));
+  CHECK(rig->tilt2_rad * 180.0 / std::acos(-1.0) == Approx(-10.0 - 77.0 / 32.0));
+  CHECK(rig->led_m[0].x() == Approx(2.55 * 0.0254));
+  CHECK(rig->led_m[0].z() == Approx(1.73 * 0.0254));
+  for (const Eigen::Vector3d& led_m : rig->led_m) {
     CHECK(led_m.norm() > 0.02);
     CHECK(led_m.norm() < 0.12);
   }

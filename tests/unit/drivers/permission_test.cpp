@@ -3,7 +3,7 @@
 
 #include <sys/stat.h>
 
-#include "drivers/transport/ports.hpp"
+#include "drivers/transport/transport_factory.hpp"
 #include "tests/support/permission.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
 
@@ -13,7 +13,7 @@ TEST_CASE("a serial port that may not be opened says which rule mends that") {
   const test::PseudoTerminal terminal;
   REQUIRE(::chmod(terminal.port().c_str(), 0) == 0);
   const test::AsNobody nobody;
-  Ports ports;
+  TransportFactory ports;
   const auto link = ports.serial({.port = terminal.port()});
   REQUIRE_FALSE(link);
   test::check_sentence(link.error().message, terminal.port());

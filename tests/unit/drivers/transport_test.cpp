@@ -104,18 +104,18 @@ TEST_CASE("frames come at their times for ever: no drift, and a late one delays 
 TEST_CASE("the pace is a factor on the recording's clock") {
   const auto transport = must(FileTransport::open(letters("ab"), {.rate_hz = 100, .pace = 2.5}));
   CHECK(play(*transport, 251).at_ns.back() == kStart_ns + 1'000'000'000);
-  CHECK_FALSE(transport->patient());
+  CHECK_FALSE(transport->lossless());
   CHECK(transport->poll_fd() == -1);
 }
 
 TEST_CASE("an unpaced file is always due and waits for the pipeline") {
   const auto transport = must(FileTransport::open(letters("ab"), {.rate_hz = 100, .pace = 0}));
-  CHECK(transport->patient());
+  CHECK(transport->lossless());
   CHECK(play(*transport, 1000).at_ns.back() == kStart_ns);
 }
 
 TEST_CASE("a file that cannot be played is refused with a reason") {
-  const auto reason = [](Chunks chunks, const Playback& playback) {
+  const auto reason = [](Chunks chunks, const PlaybackOptions& playback) {
     const auto transport = FileTransport::open(std::move(chunks), playback);
     return transport ? std::string() : transport.error().text();
   };

@@ -1,0 +1,353 @@
+#include "daemon/assembly/daemon.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <optional>
+#include <thread>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/control/control_server.hpp"
+#include "daemon/devices/device_supervisor.hpp"
+#include "daemon/net/keys.hpp"
+#include "daemon/net/peer_guard.hpp"
+#include "daemon/net/zap_authenticator.hpp"
+#include "daemon/pipeline/reader.hpp"
+#include "daemon/pipeline/worker.hpp"
+#include "daemon/publish/publisher.hpp"
+#include "daemon/system/clock.hpp"
+#include "daemon/system/realtime.hpp"
+
+namespace posed::assembly {
+namespace {
+
+constexpr double kUnknownRate_hz = 1000.0;  // what rings must hold when a device does not say
+
+double rate_of(const devices::OpenStream& stream) {
+  const drivers::Device& device = stream.device;
+  if (device.transport && device.transport->rate_hz() > 0.0) return device.transport->rate_hz();
+  return device.description.rate_hz > 0.0 ? device.description.rate_hz : kUnknownRate_hz;
+}
+
+// What a stream may fill of the ring to the pipeline: half a second of its frames and samples.
+std::size_t decoded_slots(const devices::OpenStream& stream) {
+  const drivers::Description& description = stream.device.description;
+  const int kinds = (description.skeleton ? 1 : 0) + (description.samples.names.empty() ? 0 : 1);
+  return pipeline::ring_slots(rate_of(stream) * std::max(kinds, 1));
+}
+// The same of the ring to the publisher, which has the unstyled frames, too.
+std::size_t finished_slots(const devices::OpenStream& stream) {
+  return decoded_slots(stream) +
+         (stream.config.publish_raw ? pipeline::ring_slots(rate_of(stream)) : 0);
+}
+
+}  // namespace
+
+// Members stand in the order in which they are made; what uses another comes after it.
+class Daemon::Parts final : public control::DaemonControl {
+ public:
+  explicit Parts(const config::DaemonConfig& daemon_config) : config(daemon_config) {}
+  ~Parts() override { halt(); }
+
+  Result<> open();
+  Result<> start(DaemonHooks wanted);
+  void halt() noexcept;
+
+  // DaemonControl, for the control thread.
+  bool send(const pipeline::Command& command) override {
+    const bool sent = commands->push(command);
+    pipeline_wake->notify();
+    return sent;
+  }
+  bool send(const pipeline::DeviceCommand& command) override {
+    const bool sent = device_commands->push(command);
+    reader->call();
+    return sent;
+  }
+  void keep_model(std::span<const std::byte> bytes) override {
+    if (hooks.record_sink != nullptr) hooks.record_sink->keep_model(bytes);
+  }
+  void model_in_use(std::uint32_t stream, const std::string& name) override {
+    publisher->set_model_name(stream, name);
+  }
+  void fill(v1::Stats& stats) override { stats = publisher->stats(); }
+  void stop() override { stop_asked.store(true); }
+
+  config::DaemonConfig config;
+  DaemonHooks hooks;
+  std::vector<std::unique_ptr<devices::OpenStream>> streams;
+  std::atomic<bool> stop_asked{false};
+
+  net::Context context;
+  std::unique_ptr<net::ZapAuthenticator> authenticator;
+  std::string secret_z85;
+  std::unique_ptr<system::EventFd> pipeline_wake, publisher_wake, control_wake;
+  std::unique_ptr<pipeline::Ring<pipeline::Item>> decoded, finished;
+  std::unique_ptr<pipeline::Ring<pipeline::Command>> commands;
+  std::unique_ptr<pipeline::Ring<pipeline::DeviceCommand>> device_commands;
+  std::unique_ptr<pipeline::Ring<pipeline::Ack>> acks;
+  std::unique_ptr<control::RequestHandler> handler;  // owns the models
+  std::unique_ptr<publish::Publisher> publisher;
+  std::unique_ptr<pipeline::Worker> worker;
+  std::unique_ptr<pipeline::Reader> reader;
+  std::unique_ptr<control::ControlServer> control;
+  std::thread publisher_thread, worker_thread, reader_thread;
+  std::vector<std::unique_ptr<devices::DeviceSupervisor>> supervisors;
+
+ private:
+  Result<> open_sockets();
+  Result<> open_engines();
+  Result<> start_threads();
+};
+
+Result<> Daemon::Parts::open() {
+  for (const config::StreamConfig& stream_config : config.streams) {
+    auto stream = devices::open_stream(stream_config);
+    if (!stream) return std::unexpected(stream.error());
+    for (const std::string& warning : (*stream)->device.warnings) {
+      spdlog::warn("{}: {}", stream_config.name, warning);
+    }
+    streams.push_back(std::move(*stream));
+  }
+  // Each stream has slots of its own, so that none can take another's, and every event finds one.
+  std::size_t into_pipeline = pipeline::kEventSlots + streams.size();
+  std::size_t out_of_pipeline = into_pipeline;
+  for (const auto& stream : streams) {
+    into_pipeline += decoded_slots(*stream);
+    out_of_pipeline += finished_slots(*stream);
+  }
+  decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(into_pipeline);
+  finished = std::make_unique<pipeline::Ring<pipeline::Item>>(out_of_pipeline);
+  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(control::kMostUnderWay);
+  device_commands =
+      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(control::kMostUnderWay);
+  acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(control::kMostUnderWay);
+  for (auto* wake : {&pipeline_wake, &publisher_wake, &control_wake}) {
+    auto opened = system::EventFd::open();
+    if (!opened) return std::unexpected(opened.error());
+    *wake = std::move(*opened);
+  }
+  return {};
+}
+
+Result<> Daemon::Parts::start(DaemonHooks wanted) {
+  hooks = std::move(wanted);
+  if (auto opened = open_sockets(); !opened) return opened;
+  if (auto opened = open_engines(); !opened) return opened;
+  return start_threads();
+}
+
+Result<> Daemon::Parts::open_sockets() {
+  net::raise_file_limit();
+  auto opened = net::open_context();
+  if (!opened) return std::unexpected(opened.error());
+  context = std::move(*opened);
+  std::optional<net::AccessList> allowed;  // none without keys
+  if (!config.security.server_key.empty()) {
+    auto keys = net::read_secret_key(config.security.server_key);
+    if (!keys) return std::unexpected(keys.error());
+    secret_z85 = keys->secret_z85;
+    allowed.emplace(config.security.clients);
+  }
+  auto started = net::ZapAuthenticator::start(context.get(), std::move(allowed));
+  if (!started) return std::unexpected(started.error());
+  authenticator = std::move(*started);
+  std::vector<publish::StreamInfo> infos;
+  for (const auto& stream : streams) {
+    const auto& style = stream->config.style;
+    const auto& generate = stream->config.generate;
+    const std::filesystem::path model = style      ? style->model
+                                        : generate ? generate->model
+                                                   : std::filesystem::path();
+    infos.push_back({.name = stream->config.name,
+                     .description = stream->device.description,
+                     .rate_hz = rate_of(*stream),
+                     .raw = stream->config.publish_raw,
+                     .model = model.filename().string(),
+                     .comes_and_goes = stream->slot != nullptr,
+                     .present = stream->present,
+                     .counters = &stream->counters});
+  }
+  publish::PublisherOptions options{.context = context.get(),
+                                    .endpoint = config.publish_endpoint,
+                                    .authenticator = authenticator.get(),
+                                    .secret_z85 = secret_z85,
+                                    .more_stats = hooks.more_stats,
+                                    .record_sink = hooks.record_sink,
+                                    .clock = system::monotonic_ns};
+  auto bound =
+      publish::Publisher::open(std::move(options), std::move(infos), *finished, *publisher_wake);
+  if (!bound) return std::unexpected(bound.error());
+  publisher = std::move(*bound);
+  return {};
+}
+
+Result<> Daemon::Parts::open_engines() {
+  auto opened_worker = pipeline::Worker::open({.in = decoded.get(),
+                                               .out = finished.get(),
+                                               .commands = commands.get(),
+                                               .acks = acks.get(),
+                                               .wake = pipeline_wake.get(),
+                                               .publisher = publisher_wake.get(),
+                                               .control = control_wake.get(),
+                                               .record_sink = hooks.record_sink,
+                                               .clock = system::monotonic_ns});
+  if (!opened_worker) return std::unexpected(opened_worker.error());
+  worker = std::move(*opened_worker);
+  auto opened_reader = pipeline::Reader::open({.out = decoded.get(),
+                                               .pipeline = pipeline_wake.get(),
+                                               .record_sink = hooks.record_sink,
+                                               .clock = system::monotonic_ns,
+                                               .commands = device_commands.get()});
+  if (!opened_reader) return std::unexpected(opened_reader.error());
+  reader = std::move(*opened_reader);
+  std::vector<control::ControlledStream> controlled;
+  for (std::uint32_t i = 0; i < streams.size(); ++i) {
+    devices::OpenStream& stream = *streams[i];
+    auto model = devices::bind_style(stream);
+    if (!model) return std::unexpected(model.error());
+    auto gesture = devices::bind_gesture(stream);
+    if (!gesture) return std::unexpected(gesture.error());
+    const auto constrain = devices::bind_constrain(stream);
+    if (!constrain) return std::unexpected(constrain.error());
+    pipeline::EngineOptions engine{.stream = i,
+                                   .stale_after_ns = nanoseconds(stream.config.stale_after_s),
+                                   .publish_raw = stream.config.publish_raw,
+                                   .style = std::nullopt,
+                                   .model = model->get(),
+                                   .generate = std::nullopt,
+                                   .gesture = gesture->model.get(),
+                                   .constrain = *constrain,
+                                   .rate_hz = stream.device.description.rate_hz,
+                                   .skeleton = stream.device.description.skeleton};
+    if (stream.config.style) engine.style = stream.config.style->filter;
+    if (stream.config.generate) engine.generate = stream.config.generate->live;
+    worker->add(engine, rate_of(stream), stream.counters, finished_slots(stream));
+    reader->add({.device = stream.device.transport ? &stream.device : nullptr,
+                 .counters = &stream.counters,
+                 .slot = stream.slot.get(),
+                 .calibration = stream.calibration.get(),
+                 .slots = decoded_slots(stream)});
+    controlled.push_back({.name = stream.config.name,
+                          .publishes_raw = stream.config.publish_raw,
+                          .skeleton = stream.device.description.skeleton,
+                          .rate_hz = engine.rate_hz,
+                          .style = engine.style,
+                          .model = std::move(*model),
+                          .generates = engine.generate.has_value(),
+                          .gesture = std::move(gesture->model),
+                          .device = stream.present,
+                          .options = stream.config.options,
+                          .calibration = nullptr});
+    // Nobody asked for it, so nobody is told: no ticket is 0. The ring has room for every stream.
+    if (gesture->play.size > 0 &&
+        !commands->push(
+            {.kind = pipeline::Command::Kind::kPlay, .stream = i, .play = gesture->play})) {
+      return devices::of_stream(stream.config.name,
+                                fail("too many streams perform from the start").error());
+    }
+  }
+  handler = std::make_unique<control::RequestHandler>(std::move(controlled), *this);
+  return {};
+}
+
+Result<> Daemon::Parts::start_threads() {
+  auto server = control::ControlServer::start(context.get(), config.control_endpoint,
+                                              {.acks = acks.get(),
+                                               .wake = control_wake.get(),
+                                               .authenticator = authenticator.get(),
+                                               .secret_z85 = secret_z85},
+                                              *handler);
+  if (!server) return std::unexpected(server.error());
+  control = std::move(*server);
+  const bool fifo = config.realtime && system::ask_for_realtime();
+  publisher_thread = std::thread([this, fifo] {
+    system::enter_hot_thread("posed-publish", fifo ? system::kPublisherPriority : 0);
+    publisher->run();
+  });
+  worker_thread = std::thread([this, fifo] {
+    system::enter_hot_thread("posed-pipeline", fifo ? system::kPipelinePriority : 0);
+    if (hooks.hot_thread) hooks.hot_thread("pipeline");
+    worker->run();
+  });
+  for (const auto& stream : streams) {
+    if (!stream->device.transport) continue;
+    if (auto started = stream->device.transport->start(system::monotonic_ns()); !started) {
+      return devices::of_stream(stream->config.name, started.error());
+    }
+  }
+  reader_thread = std::thread([this, fifo] {
+    system::enter_hot_thread("posed-reader", fifo ? system::kReaderPriority : 0);
+    if (hooks.hot_thread) hooks.hot_thread("reader");
+    reader->run();
+  });
+  for (std::uint32_t i = 0; i < streams.size(); ++i) {
+    if (!streams[i]->slot) continue;
+    devices::SupervisorPorts ports{
+        .reader = reader.get(), .clock = system::monotonic_ns, .tell = {}};
+    ports.tell = [this, i](v1::Event::Kind kind, const std::string& text) {
+      publisher->post_event(i, kind, text);
+    };
+    supervisors.push_back(
+        std::make_unique<devices::DeviceSupervisor>(*streams[i], std::move(ports)));
+  }
+  return {};
+}
+
+// From the devices to the clients, so that each thread still finds what the one before it made.
+void Daemon::Parts::halt() noexcept {
+  for (const auto& supervisor : supervisors)
+    supervisor->stop();  // all at once, whatever they wait for
+  if (reader) reader->stop();
+  if (reader_thread.joinable()) reader_thread.join();
+  supervisors.clear();
+  if (worker) worker->stop();
+  if (worker_thread.joinable()) worker_thread.join();
+  control.reset();
+  if (publisher) publisher->stop();
+  if (publisher_thread.joinable()) publisher_thread.join();
+}
+
+Daemon::Daemon(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Daemon::~Daemon() = default;
+
+Result<std::unique_ptr<Daemon>> Daemon::open(const config::DaemonConfig& config) {
+  auto parts = std::make_unique<Parts>(config);
+  if (auto opened = parts->open(); !opened) return std::unexpected(opened.error());
+  return std::unique_ptr<Daemon>(new Daemon(std::move(parts)));
+}
+
+std::span<const std::unique_ptr<devices::OpenStream>> Daemon::streams() const noexcept {
+  return parts_->streams;
+}
+Result<> Daemon::start(DaemonHooks hooks) { return parts_->start(std::move(hooks)); }
+void Daemon::stop() noexcept { parts_->halt(); }
+const std::string& Daemon::publish_endpoint() const noexcept {
+  return parts_->publisher->endpoint();
+}
+const std::string& Daemon::control_endpoint() const noexcept { return parts_->control->endpoint(); }
+bool Daemon::asked_to_stop() const noexcept { return parts_->stop_asked.load(); }
+v1::Stats Daemon::stats() const { return parts_->publisher->stats(); }
+
+bool Daemon::all_ended() const noexcept {
+  bool any = false;
+  for (const auto& stream : parts_->streams) {
+    if (stream->endless) continue;
+    any = true;
+    if (stream->counters.pipeline.state.load() != pipeline::StreamState::kEnded) return false;
+  }
+  return any;
+}
+
+bool Daemon::wants_keys() const noexcept { return !parts_->secret_z85.empty(); }
+
+void Daemon::allow(const std::vector<net::AllowedClient>& clients) {
+  const auto change = parts_->authenticator->replace(net::AccessList(clients));
+  if (change.publisher_must_check) parts_->publisher->check_subscribers();
+}
+
+void Daemon::post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text) {
+  parts_->publisher->post_event(stream, kind, text);
+}
+
+}  // namespace posed::assembly

@@ -1,0 +1,371 @@
+// posed bench pipeline: what the daemon adds to a bare ZeroMQ hop, from the reader's arrival stamp
+// to another process; both take turns every second on the same frames.
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/assembly/daemon.hpp"
+#include "daemon/cli/bench/hop_report.hpp"
+#include "daemon/cli/bench/hop_subscriber.hpp"
+#include "daemon/cli/cli.hpp"
+#include "daemon/net/zmq_handle.hpp"
+#include "daemon/publish/encode.hpp"
+#include "daemon/publish/publisher.hpp"
+#include "daemon/system/clock.hpp"
+#include "daemon/system/process.hpp"
+#include "models/gp/synthetic.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/style_model.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+namespace {
+
+constexpr double kRate_hz = 120.0;
+constexpr const char* kBenchPipelineFooter =
+    R"(Synthetic walkers at 120 Hz through the real daemon: file driver, rings, a style model of
+--points poses, publisher; no recording, no real-time rights. Every other second the reader sends
+a message of the same size straight to ZeroMQ instead: the bare hop. The subscriber is another
+process. Believe it only when the CPU pressure (PSI some) stays below 5 %.
+
+  posed bench pipeline
+  posed bench pipeline --streams 32 --points 200 --json)";
+
+struct HopOptions {
+  int streams = 1;
+  int points = 1000;
+  int seconds = 60;
+  bool gate = false;
+  bool json = false;
+};
+
+// A field of the line `some` of the CPU's pressure: "avg10=" [percent] or "total=" [us since boot];
+// negative where the kernel does not say.
+double cpu_pressure(const std::string& field) {
+  std::ifstream file("/proc/pressure/cpu");
+  std::string word;
+  while (file >> word) {
+    if (word.starts_with(field)) return std::atof(word.c_str() + field.size());
+  }
+  return -1.0;
+}
+
+// A folder that goes when the benchmark does.
+class WorkFolder {
+ public:
+  WorkFolder()
+      : path_(std::filesystem::temp_directory_path() /
+              ("posed_bench_" + std::to_string(getpid()))) {
+    std::filesystem::create_directories(path_);
+  }
+  ~WorkFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  WorkFolder(const WorkFolder&) = delete;
+  WorkFolder& operator=(const WorkFolder&) = delete;
+  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// A model of the wanted size for the walker's skeleton; its poses are made up.
+Result<> write_synthetic_model(const Skeleton& skeleton, int points,
+                               const std::filesystem::path& path) {
+  style::StyleModel model;
+  auto spec = motion::describe_space(motion::Space::kNative, skeleton);
+  if (!spec) return std::unexpected(spec.error());
+  model.space = std::move(*spec);
+  const auto space = motion::PoseSpace::bind(model.space, skeleton);
+  if (!space) return std::unexpected(space.error());
+  const int dims = space->dims();
+  model.process = gp::synthetic(points, dims).process;
+  model.limit_rad = Eigen::VectorXd::Constant(dims, 0.5);
+  model.input_mean = Eigen::VectorXd::Zero(dims);
+  model.input_sd = Eigen::VectorXd::Ones(dims);
+  model.from = "walker";
+  model.to = "other";
+  return style::save_model(model, path);
+}
+
+Result<config::DaemonConfig> make_config(const HopOptions& options, const WorkFolder& folder) {
+  const auto clip = motion::make_walker({.rate_hz = kRate_hz});
+  if (!clip) return std::unexpected(clip.error());
+  if (auto written = clip::write_bvh(*clip, folder / "walker.bvh"); !written) {
+    return std::unexpected(written.error());
+  }
+  if (auto written = write_synthetic_model(*clip->skeleton, options.points, folder / "model.style");
+      !written) {
+    return std::unexpected(written.error());
+  }
+  config::DaemonConfig config;
+  config.publish_endpoint = config.control_endpoint = "tcp://127.0.0.1:*";
+  config.realtime = false;
+  for (int i = 0; i < options.streams; ++i) {
+    config::StreamConfig stream;
+    stream.name = "walker" + std::to_string(i);
+    stream.driver = "file";
+    stream.options = {{"path", (folder / "walker.bvh").string()}};
+    stream.stale_after_s = 3.0;  // its turn is every other second
+    stream.style.emplace();
+    stream.style->model = folder / "model.style";
+    stream.style->filter.gate = options.gate;
+    config.streams.push_back(std::move(stream));
+  }
+  return config;
+}
+
+// The bare hop: what the reader thread sends on in its seconds.
+class BareHop {
+ public:
+  BareHop(net::Socket socket, std::string endpoint, std::string body)
+      : socket_(std::move(socket)), endpoint_(std::move(endpoint)), body_(std::move(body)) {}
+
+  static Result<std::unique_ptr<BareHop>> open(void* context, int streams, std::string body) {
+    auto socket = net::open_socket(context, ZMQ_PUB);
+    if (!socket) return std::unexpected(socket.error());
+    if (auto set = publish::set_queue_options(socket->get(), kRate_hz * streams); !set) {
+      return std::unexpected(set.error());
+    }
+    auto endpoint = net::bind_socket(socket->get(), "tcp://127.0.0.1:*");
+    if (!endpoint) return std::unexpected(endpoint.error());
+    return std::make_unique<BareHop>(std::move(*socket), std::move(*endpoint), std::move(body));
+  }
+
+  void send(std::int64_t arrival_ns) noexcept {
+    std::memcpy(body_.data(), &arrival_ns, sizeof arrival_ns);
+    static_cast<void>(net::send_part(socket_.get(), "bare/walker", true) &&
+                      net::send_part(socket_.get(), body_, false));
+  }
+  [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
+
+ private:
+  net::Socket socket_;
+  std::string endpoint_;
+  std::string body_;
+};
+
+// Which second it is: even ones are the pipeline's.
+struct Turns {
+  std::int64_t start_ns = 0;
+  [[nodiscard]] bool bare(std::int64_t time_ns) const noexcept {
+    return (time_ns - start_ns) / kNanosPerSecond % 2 != 0;
+  }
+};
+
+class TurnDecoder final : public drivers::Decoder {
+ public:
+  TurnDecoder(std::unique_ptr<drivers::Decoder> inner, BareHop& hop, const Turns& turns)
+      : inner_(std::move(inner)), hop_(hop), turns_(turns) {}
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override {
+    if (turns_.bare(arrival_ns)) return hop_.send(arrival_ns);
+    inner_->feed(bytes, arrival_ns, sink);
+  }
+
+ private:
+  std::unique_ptr<drivers::Decoder> inner_;
+  BareHop& hop_;
+  const Turns& turns_;
+};
+
+// Starts a little later, so that streams of one rate do not all fall due in the same instant.
+class LaterTransport final : public drivers::Transport {
+ public:
+  LaterTransport(std::unique_ptr<drivers::Transport> inner, std::int64_t later_ns)
+      : inner_(std::move(inner)), later_ns_(later_ns) {}
+  [[nodiscard]] int poll_fd() const noexcept override { return inner_->poll_fd(); }
+  [[nodiscard]] std::int64_t next_due_ns() const noexcept override { return inner_->next_due_ns(); }
+  [[nodiscard]] double rate_hz() const noexcept override { return inner_->rate_hz(); }
+  [[nodiscard]] Result<> start(std::int64_t now_ns) override {
+    return inner_->start(now_ns + later_ns_);
+  }
+  [[nodiscard]] drivers::Chunk read(std::int64_t now_ns) noexcept override {
+    return inner_->read(now_ns);
+  }
+
+ private:
+  std::unique_ptr<drivers::Transport> inner_;
+  std::int64_t later_ns_;
+};
+
+// What was seen of the process while it ran.
+struct Watched {
+  double pipeline_cpu_percent = 0.0;  // of one core, in the pipeline's seconds
+  std::uint64_t rss_10s = 0, rss_end = 0;
+  std::uint64_t dropped = 0, shed = 0;
+  double pressure_before_percent = 0.0, pressure_percent = 0.0;
+  HopReport report;
+  std::uint64_t gaps = 0;
+};
+
+// A serialized frame of the stream's size.
+std::string sample_body(const devices::OpenStream& stream) {
+  const Skeleton& skeleton = *stream.device.description.skeleton;
+  Frame frame;
+  pose_from_channels(skeleton, std::vector<double>(skeleton.channels.size(), 0.1), frame);
+  frame.header.sequence = frame.header.arrival_ns = system::monotonic_ns();
+  frame.header.device_ns = frame.header.arrival_ns;
+  publish::FrameEncoder encoder(stream.config.name);
+  static_cast<void>(encoder.encode(frame));
+  const std::int64_t some_ns = frame.header.arrival_ns;
+  return encoder.stamp({some_ns, some_ns, some_ns}).SerializeAsString();
+}
+
+// Sleeps through all turns, looking at the process at each change.
+void watch(const assembly::Daemon& daemon, const Turns& turns, int seconds, Watched& watched) {
+  std::int64_t pipeline_cpu_ns = 0;
+  std::int64_t before_ns = system::cpu_time_ns();
+  for (int second = 0; second < seconds; ++second) {
+    const std::int64_t until_ns = turns.start_ns + (second + 1) * kNanosPerSecond;
+    std::this_thread::sleep_for(std::chrono::nanoseconds(until_ns - system::monotonic_ns()));
+    const std::int64_t cpu_ns = system::cpu_time_ns();
+    if (second % 2 == 0) pipeline_cpu_ns += cpu_ns - before_ns;
+    before_ns = cpu_ns;
+    watched.rss_end = system::resident_bytes();
+    if (second < 10) watched.rss_10s = watched.rss_end;
+  }
+  watched.pipeline_cpu_percent = static_cast<double>(pipeline_cpu_ns) * 1e-7 / ((seconds + 1) / 2);
+  for (const auto& stream : daemon.streams()) {
+    const auto& counters = stream->counters;
+    watched.dropped += counters.reader.dropped + counters.pipeline.dropped;
+    watched.shed += counters.pipeline.shed;
+  }
+}
+
+Result<Watched> measure(const HopOptions& options) {
+  spdlog::set_level(spdlog::level::err);  // the figures are the message
+  auto subscriber = HopSubscriber::fork();
+  if (!subscriber) return std::unexpected(subscriber.error());
+  const WorkFolder folder;
+  const auto config = make_config(options, folder);
+  if (!config) return std::unexpected(config.error());
+  auto daemon = assembly::Daemon::open(*config);
+  if (!daemon) return std::unexpected(daemon.error());
+  auto context = net::open_context();
+  if (!context) return std::unexpected(context.error());
+  auto hop = BareHop::open(context->get(), options.streams, sample_body(*(*daemon)->streams()[0]));
+  if (!hop) return std::unexpected(hop.error());
+  Turns turns;
+  int place = 0;
+  for (const auto& stream : (*daemon)->streams()) {
+    drivers::Device& device = stream->device;
+    device.decoder = std::make_unique<TurnDecoder>(std::move(device.decoder), **hop, turns);
+    device.transport = std::make_unique<LaterTransport>(
+        std::move(device.transport), nanoseconds(place++ / (kRate_hz * options.streams)));
+  }
+  turns.start_ns = system::monotonic_ns() + kNanosPerSecond / 2;
+  if (auto started = (*daemon)->start(); !started) return std::unexpected(started.error());
+  (*subscriber)->begin((*daemon)->publish_endpoint(), (*hop)->endpoint());
+  Watched watched;
+  watched.pressure_before_percent = cpu_pressure("avg10=");
+  const double pressure_us = cpu_pressure("total=");
+  const std::int64_t begun_ns = system::monotonic_ns();
+  watch(**daemon, turns, options.seconds, watched);
+  watched.pressure_percent =
+      (cpu_pressure("total=") - pressure_us) / (seconds(system::monotonic_ns() - begun_ns) * 1e4);
+  (*daemon)->stop();
+  auto arrivals = (*subscriber)->finish();
+  if (!arrivals) return std::unexpected(arrivals.error());
+  watched.gaps = arrivals->gaps;
+  watched.report = report_hops(arrivals->messages, turns.start_ns,
+                               turns.start_ns + options.seconds * kNanosPerSecond);
+  return watched;
+}
+
+nlohmann::ordered_json to_json(const HopFigures& figures) {
+  return {{"p50_us", figures.p50_us},
+          {"p99_us", figures.p99_us},
+          {"p999_us", figures.p999_us},
+          {"max_us", figures.max_us},
+          {"messages", figures.messages}};
+}
+
+nlohmann::ordered_json to_json(const HopOptions& options, const Watched& watched) {
+  const HopReport& report = watched.report;
+  return {{"streams", options.streams},
+          {"points", options.points},
+          {"gate", options.gate},
+          {"seconds", options.seconds},
+          {"bare", to_json(report.bare)},
+          {"pipeline", to_json(report.pipeline)},
+          {"added_p50_us", report.pipeline.p50_us - report.bare.p50_us},
+          {"block_p50_ratio", report.block_p50_ratio},
+          {"block_p99_ratio", report.block_p99_ratio},
+          {"dropped", watched.dropped},
+          {"shed", watched.shed},
+          {"sequence_gaps", watched.gaps},
+          {"cpu_percent", watched.pipeline_cpu_percent},
+          {"rss_10s_bytes", watched.rss_10s},
+          {"rss_end_bytes", watched.rss_end},
+          {"psi_cpu_some_before_percent", watched.pressure_before_percent},
+          {"psi_cpu_some_percent", watched.pressure_percent}};
+}
+
+void print(const HopOptions& options, const Watched& watched) {
+  const HopReport& report = watched.report;
+  std::printf("%d stream(s) x %.0f Hz x GP of %d poses, %d s\n", options.streams, kRate_hz,
+              options.points, options.seconds);
+  std::printf("%-10s %9s %9s %9s %9s %9s\n", "us", "p50", "p99", "p99.9", "max", "messages");
+  for (const auto& [name, figures] :
+       {std::pair{"bare", report.bare}, std::pair{"pipeline", report.pipeline}}) {
+    std::printf("%-10s %9.1f %9.1f %9.1f %9.1f %9llu\n", name, figures.p50_us, figures.p99_us,
+                figures.p999_us, figures.max_us, static_cast<unsigned long long>(figures.messages));
+  }
+  std::printf("p50 added %.1f us; median over 1-s block pairs: p50 ratio %.2f, p99 ratio %.2f\n",
+              report.pipeline.p50_us - report.bare.p50_us, report.block_p50_ratio,
+              report.block_p99_ratio);
+  std::printf("dropped %llu, shed %llu, sequence gaps %llu; CPU %.1f %% of a core\n",
+              static_cast<unsigned long long>(watched.dropped),
+              static_cast<unsigned long long>(watched.shed),
+              static_cast<unsigned long long>(watched.gaps), watched.pipeline_cpu_percent);
+  std::printf("RSS %.1f MB at 10 s, %.1f MB at the end\n",
+              static_cast<double>(watched.rss_10s) * 1e-6,
+              static_cast<double>(watched.rss_end) * 1e-6);
+  std::printf("CPU pressure (PSI some): %.1f %% in the 10 s before, %.1f %% during the run%s\n",
+              watched.pressure_before_percent, watched.pressure_percent,
+              watched.pressure_percent > 5.0 ? " - too busy: repeat on a quiet machine" : "");
+}
+
+}  // namespace
+
+void add_bench_pipeline(CLI::App& bench, int& exit_code) {
+  CLI::App* command = bench.add_subcommand(
+      "pipeline", "Arrival to receive in another process, against a bare ZeroMQ hop");
+  auto options = std::make_shared<HopOptions>();
+  command->add_option("--streams", options->streams, "Streams at 120 Hz")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command->add_option("--points", options->points, "Poses in the style model")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command->add_option("--seconds", options->seconds, "How long, both turns together")
+      ->check(CLI::Range(4, 86400))
+      ->capture_default_str();
+  command->add_flag("--gate", options->gate, "With the confidence gate");
+  command->add_flag("--json", options->json, "JSON on stdout");
+  command->footer(kBenchPipelineFooter);
+  command->callback([options, &exit_code] {
+    const auto watched = measure(*options);
+    if (!watched) {
+      exit_code = report(watched.error());
+    } else if (options->json) {
+      std::printf("%s\n", json_text(to_json(*options, *watched), 2).c_str());
+    } else {
+      print(*options, *watched);
+    }
+  });
+}
+
+}  // namespace posed::cli

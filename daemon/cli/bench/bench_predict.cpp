@@ -1,0 +1,252 @@
+// posed bench predict: what one call of the style filter's process costs, against reading its
+// bytes.
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <hwy/aligned_allocator.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/bench/percentiles.hpp"
+#include "daemon/cli/bench/stream_sum.hpp"
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/degrees.hpp"
+#include "models/gp/confidence.hpp"
+#include "models/gp/isa.hpp"
+#include "models/gp/kernel.hpp"
+#include "models/gp/predictor.hpp"
+#include "models/gp/regression.hpp"
+#include "models/gp/synthetic.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+namespace {
+
+using nlohmann::json;
+using Floats = hwy::AlignedFreeUniquePtr<float[]>;
+
+constexpr int kHotCalls = 8;  // one hot sample is the mean of so many calls, a clock read costs 1 %
+constexpr const char* kBenchPredictFooter =
+    R"(Made-up walkers, queries from one who is not in the training set.
+hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
+frames of a 120 Hz stream. The yardstick sums as many floats as the process logically reads
+(N x 2D; gate rows are also held against the confidence's triangle added), with eight vector
+accumulators; variants take turns, so that they meet the same machine.
+
+  posed bench predict
+  posed bench predict --samples 500 --json)";
+
+// One thing that is timed: a call for query i, answering a float so that no call is optimised away.
+struct Variant {
+  std::string name;
+  std::function<float(int)> call;
+  std::vector<double> hot_us{}, cold_us{};
+};
+
+// The optimiser may not drop what made this value.
+void keep(float value) { asm volatile("" : : "x"(value) : "memory"); }
+
+// What is read to push everything else out of L2.
+class Evictor {
+ public:
+  Evictor() {
+    const long l2_bytes = ::sysconf(_SC_LEVEL2_CACHE_SIZE);
+    const long bytes = std::max(4 * std::max(l2_bytes, 0L), 8L << 20);
+    count_ = static_cast<int>(bytes / 4 / 128 * 128);
+    data_ = hwy::AllocateAligned<float>(static_cast<std::size_t>(count_));
+    std::fill_n(data_.get(), count_, 1.0F);
+  }
+  void run() const { keep(stream_sum(data_.get(), count_)); }
+
+ private:
+  int count_ = 0;
+  Floats data_;
+};
+
+double time_us(const Variant& variant, int query, int calls) {
+  using Steady = std::chrono::steady_clock;
+  const auto start = Steady::now();
+  for (int i = 0; i < calls; ++i) keep(variant.call(query + i));
+  return std::chrono::duration<double, std::micro>(Steady::now() - start).count() / calls;
+}
+
+void measure(std::vector<Variant>& variants, int samples, const Evictor& evictor) {
+  for (int i = 0; i < samples; ++i) {
+    for (Variant& variant : variants) {
+      for (int warm = 0; warm < 2; ++warm) time_us(variant, i, 1);
+      variant.hot_us.push_back(time_us(variant, i, kHotCalls));
+    }
+  }
+  for (int i = 0; i < samples; ++i) {
+    for (Variant& variant : variants) {
+      evictor.run();
+      variant.cold_us.push_back(time_us(variant, i, 1));
+    }
+  }
+}
+
+Floats ones(int count) {
+  Floats data = hwy::AllocateAligned<float>(static_cast<std::size_t>(count));
+  std::fill_n(data.get(), count, 1.0F);
+  return data;
+}
+
+int to_yardstick(int floats) { return (floats + 127) / 128 * 128; }
+
+// A process, both ways of asking it, and the queries as the hot path has them.
+struct Subject {
+  gp::SyntheticProcess made;
+  gp::Predictor plain, gated;
+  Eigen::MatrixXf queries;  // [dims x queries]
+  mutable std::vector<float> out;
+
+  [[nodiscard]] std::span<const float> query(int i) const {
+    const auto column = queries.col(i % queries.cols());
+    return {column.data(), static_cast<std::size_t>(column.size())};
+  }
+  float mean(int i) const {
+    plain.mean(query(i), {}, out);
+    return out[0];
+  }
+  float gate(int i) const { return gated.mean_and_confidence(query(i), {}, out); }
+};
+
+Subject subject(int poses, int dims) {
+  gp::SyntheticProcess made = gp::synthetic(poses, dims);
+  auto plain = gp::Predictor::build(made.process, false).value();
+  auto gated = gp::Predictor::build(made.process, true).value();
+  Eigen::MatrixXf queries = made.queries.transpose().cast<float>();
+  return {std::move(made), std::move(plain), std::move(gated), std::move(queries),
+          std::vector<float>(static_cast<std::size_t>(dims))};
+}
+
+// Largest errors against the double reference, and whether the instruction sets agree on the bits.
+json accuracy(const Subject& subject) {
+  const auto& made = subject.made;
+  const gp::Posterior exact = gp::posterior(made.process, made.queries);
+  const std::string isa_before(gp::isa_name());
+  std::vector<std::vector<float>> all;
+  json report;
+  for (const auto* isa : {"avx2", "avx512"}) {
+    if (!gp::set_isa(isa)) continue;
+    double mean_rad = 0.0;
+    double gate = 0.0;
+    auto& bits = all.emplace_back();
+    for (int i = 0; i < made.queries.rows(); ++i) {
+      const float g = subject.gate(i);
+      const double g_exact = 1.0 - exact.variance_rbf[i] / std::exp(made.process.lambda);
+      gate = std::max(gate, std::abs(static_cast<double>(g) - g_exact));
+      for (int o = 0; o < subject.gated.outputs(); ++o) {
+        mean_rad = std::max(mean_rad, std::abs(subject.out[o] - exact.mean(i, o)));
+      }
+      bits.insert(bits.end(), subject.out.begin(), subject.out.end());
+      bits.push_back(g);
+    }
+    report["max_mean_error_deg"] = mean_rad * kDegrees;
+    report["max_gate_error"] = gate;
+  }
+  report["avx2_avx512_same_bits"] = all.size() == 2 ? json(all[0] == all[1]) : json(nullptr);
+  static_cast<void>(gp::set_isa(isa_before));
+  return report;
+}
+
+json run_case(int poses, int dims, int samples, const Evictor& evictor) {
+  const Subject s = subject(poses, dims);
+  const int rows = gp::confidence_of(s.made.process, gp::kernel::kMaxGate).rows;
+  const int read = to_yardstick(poses * 2 * dims);
+  const int read_gate = to_yardstick(poses * 2 * dims + rows * (rows + 1) / 2);
+  const Floats data = ones(read_gate);
+  std::vector<Variant> variants{
+      {"sum", [&](int) { return stream_sum(data.get(), read); }},
+      {"sum_with_triangle", [&](int) { return stream_sum(data.get(), read_gate); }},
+      {"mean", [&](int i) { return s.mean(i); }},
+      {"mean_and_gate", [&](int i) { return s.gate(i); }}};
+  measure(variants, samples, evictor);
+  json report{{"poses", poses}, {"dims", dims}, {"gate_rows", rows}, {"accuracy", accuracy(s)}};
+  for (const Variant& variant : variants) {
+    json& entry = report[variant.name];
+    entry = {{"hot", percentiles(variant.hot_us)}, {"cold", percentiles(variant.cold_us)}};
+    for (const auto* heat : {"hot", "cold"}) {
+      const double p50 = entry[heat]["p50_us"];
+      entry[heat]["ratio"] = p50 / report["sum"][heat]["p50_us"].get<double>();
+      entry[heat]["ratio_with_triangle"] =
+          report.contains("sum_with_triangle")
+              ? json(p50 / report["sum_with_triangle"][heat]["p50_us"].get<double>())
+              : json(nullptr);
+    }
+  }
+  return report;
+}
+
+void print_case(const json& report) {
+  std::printf("\nN = %d, D = %d (confidence from %d rows)\n", report["poses"].get<int>(),
+              report["dims"].get<int>(), report["gate_rows"].get<int>());
+  std::printf("  %-18s %-5s %8s %8s %8s %8s %7s %10s\n", "", "", "p50 us", "p99", "p99.9", "max",
+              "x sum", "x sum+tri");
+  for (const auto* name : {"sum", "sum_with_triangle", "mean", "mean_and_gate"}) {
+    for (const auto* heat : {"hot", "cold"}) {
+      const json& row = report[name][heat];
+      std::printf("  %-18s %-5s %8.2f %8.2f %8.2f %8.2f %7.2f", name, heat,
+                  row["p50_us"].get<double>(), row["p99_us"].get<double>(),
+                  row["p99_9_us"].get<double>(), row["max_us"].get<double>(),
+                  row["ratio"].get<double>());
+      const json& with = row["ratio_with_triangle"];
+      if (with.is_number()) std::printf(" %10.2f", with.get<double>());
+      std::printf("\n");
+    }
+  }
+  const json& accuracy = report["accuracy"];
+  std::printf("  mean within %.1e degree of double, confidence within %.4f of the exact one\n",
+              accuracy["max_mean_error_deg"].get<double>(),
+              accuracy["max_gate_error"].get<double>());
+  const json& same = accuracy["avx2_avx512_same_bits"];
+  std::printf("  AVX2 and AVX-512 bits: %s\n",
+              same.is_null() ? "not compared, this CPU lacks one" : (same ? "the same" : "DIFFER"));
+}
+
+}  // namespace
+
+void add_bench_predict(CLI::App& bench, int& exit_code) {
+  struct Options {
+    int samples = 2000;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = bench.add_subcommand("predict", "One call of the style filter's process");
+  command->footer(kBenchPredictFooter);
+  command->add_option("--samples", options->samples, "Timed samples a variant")
+      ->check(CLI::Range(10, 1'000'000))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON object on stdout");
+  command->callback([options, &exit_code] {
+    const Evictor evictor;
+    json cases = json::array();
+    if (!options->json) std::printf("instruction set: %s\n", std::string(gp::isa_name()).c_str());
+    bool same = true;
+    for (const int dims : {43, 63}) {
+      for (const int poses : {200, 1000}) {
+        cases.push_back(run_case(poses, dims, options->samples, evictor));
+        same = same && cases.back()["accuracy"]["avx2_avx512_same_bits"] != json(false);
+        if (!options->json) print_case(cases.back());
+      }
+    }
+    if (options->json) {
+      const json report{{"isa", gp::isa_name()},
+                        {"hot_calls_per_sample", kHotCalls},
+                        {"samples", options->samples},
+                        {"cases", cases}};
+      std::printf("%s\n", json_text(report, 2).c_str());
+    }
+    exit_code = static_cast<int>(same ? ExitCode::kDone : ExitCode::kFailed);
+  });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,29 @@
+// What `posed bench pipeline` makes of the ages that its subscriber noted.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "daemon/cli/bench/hop_subscriber.hpp"
+
+namespace posed::cli {
+
+struct HopFigures {
+  double p50_us = 0.0, p99_us = 0.0, p999_us = 0.0, max_us = 0.0;
+  std::uint64_t messages = 0;
+};
+
+struct HopReport {
+  HopFigures bare, pipeline;
+  // Medians over pairs of adjacent one-second blocks, pipeline over bare.
+  double block_p50_ratio = 0.0;
+  double block_p99_ratio = 0.0;
+};
+
+// Block 0 begins at `start_ns`; even blocks are the pipeline's. The first pair warms up and is left
+// out, and so is what came after `end_ns`.
+[[nodiscard]] HopReport report_hops(std::span<const Arrival> arrivals, std::int64_t start_ns,
+                                    std::int64_t end_ns);
+
+}  // namespace posed::cli

@@ -1,0 +1,263 @@
+// The demo: makes two families of walkers and a signer's glove recording, learns the style
+// between the families and the gestures of the glove, streams a walker it has not seen through the
+// daemon and watches it as any client would, over ZeroMQ.
+#include <cerrno>  // program_invocation_name
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+#include <zmq.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/assembly/daemon.hpp"
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/demo/demo_clips.hpp"
+#include "daemon/cli/demo/demo_folder.hpp"
+#include "daemon/cli/demo/demo_hand.hpp"
+#include "daemon/cli/demo/demo_watcher.hpp"
+#include "daemon/cli/live/client.hpp"
+#include "daemon/cli/live/live_view.hpp"
+#include "daemon/cli/models/train_gesture.hpp"
+#include "daemon/cli/models/train_style.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/emulate/synthetic_signer.hpp"
+#include "daemon/logging/log_output.hpp"
+
+namespace posed::cli {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr double kRedrawEvery_s = 0.5;
+constexpr double kPlainLinesEvery_s = 5.0;
+constexpr double kFirstFrameWithin_s = 10.0;
+constexpr double kHandRate_hz = 30.0;
+
+struct DemoOptions {
+  std::filesystem::path config;   // empty: the demo's own
+  std::filesystem::path folder;   // of clips and models; empty: the user's cache
+  std::filesystem::path prepare;  // only make clips and models there
+  std::optional<double> seconds;
+  bool overwrite = false;
+};
+
+// How this program was called, for the commands that people may copy.
+std::string own_name() {
+  const std::string name = program_invocation_name;
+  return name.contains('/') ? name : "posed";
+}
+
+// Makes what the demo needs, unless this program made it before.
+Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
+  const DemoFolder kept(folder);
+  if (auto own = kept.check_is_own(demo_file_names(), overwrite); !own) return own;
+  if (kept.is_up_to_date()) {
+    std::fprintf(stderr, "1-3/4 using what was made and learnt before, in %s\n", folder.c_str());
+    return {};
+  }
+  std::fprintf(stderr, "1/4 making synthetic walkers and a synthetic signer in %s\n",
+               folder.c_str());
+  const auto clips = make_demo_clips(folder);
+  if (!clips) return std::unexpected(clips.error());
+  std::fprintf(stderr, "2/4 learning the style march -> sway from %zu clips\n",
+               clips->from.size() + clips->to.size());
+  Experiment experiment;
+  experiment.target = "sway";
+  for (const auto& file : clips->from) {
+    experiment.clips.push_back({file, "march", file.stem().string(), "walk", 0});
+  }
+  for (const auto& file : clips->to) {
+    experiment.clips.push_back({file, "sway", file.stem().string(), "walk", 0});
+  }
+  const auto report = train_and_save(experiment, 0, folder / kDemoModel, false);
+  if (!report) return std::unexpected(report.error());
+  const std::string verdict = (*report)["verdict"].get<std::string>();
+  if (!(*report)["written"].get<bool>()) return fail("the demo's own model is " + verdict);
+  std::fprintf(stderr, "    %s\n", verdict.c_str());
+  std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
+  const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);
+  if (!recording) return std::unexpected(recording.error());
+  const auto hand = train_gesture_and_save({*recording}, {}, folder / kDemoHand);
+  if (!hand) return std::unexpected(hand.error());
+  return kept.finish();
+}
+
+// Takes every message that waits.
+void drain(Connection& connection, Watcher& watcher) {
+  net::Message topic, body;
+  while (topic.receive(connection.socket()) && topic.more() &&
+         body.receive(connection.socket(), 0)) {
+    watcher.take(std::string(topic.text()), body.bytes().data(), body.bytes().size());
+  }
+}
+
+double seconds_since(SteadyClock::time_point then) {
+  return std::chrono::duration<double>(SteadyClock::now() - then).count();
+}
+
+// Shows the running daemon until Ctrl-C or `seconds` after the first frame.
+Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watcher& watcher,
+               DemoHand& hand) {
+  ClientOptions client;
+  client.endpoint = daemon.publish_endpoint();
+  auto connection = Connection::open(client, ZMQ_SUB);
+  if (!connection) return std::unexpected(connection.error());
+  if (auto set = net::set_option(connection->socket(), ZMQ_SUBSCRIBE, "pose/"); !set) return set;
+  const LiveScreen screen;
+  LiveViewOptions view{.title = "posed demo " + daemon.publish_endpoint()};
+  const auto start = SteadyClock::now();
+  std::optional<SteadyClock::time_point> first_frame;
+  SteadyClock::time_point drawn{};
+  while (!Interrupt::came() && !screen.quit_pressed() && !daemon.asked_to_stop()) {
+    if (connection->wait(kLookAround)) drain(*connection, watcher);
+    if (!first_frame && watcher.styled() > 0) first_frame = SteadyClock::now();
+    if (first_frame && options.seconds && seconds_since(*first_frame) >= *options.seconds) break;
+    if (first_frame) {
+      if (auto tended = hand.tend(seconds_since(*first_frame)); !tended) return tended;
+    }
+    if (!first_frame && seconds_since(start) > kFirstFrameWithin_s) {
+      return fail("no styled frame arrived within 10 s; the log above says why");
+    }
+    if (seconds_since(drawn) < (screen.is_terminal() ? kRedrawEvery_s : kPlainLinesEvery_s))
+      continue;
+    const bool first_drawing = drawn == SteadyClock::time_point{};
+    drawn = SteadyClock::now();
+    screen.measure(view);
+    view.notes = {
+        fmt::format("received {} styled frames, {} missing; {:.1f} deg rms from the raw pose",
+                    watcher.styled(), watcher.gaps(), watcher.change_lately_deg()),
+        hand.note()};
+    if (screen.is_terminal() || first_drawing) {
+      view.notes.insert(view.notes.end(),
+                        {fmt::format("in another terminal: {} monitor", own_name()),
+                         fmt::format("            or: {} ctl set walker alpha 0.5", own_name()),
+                         fmt::format("            or: {} ctl play hand \"p 4 3 1 g\"", own_name()),
+                         "Ctrl-C ends the demo"});
+    }
+    screen.draw(live_view(daemon.stats(), view));
+  }
+  return {};
+}
+
+// Somebody wears the glove of every stream that names no device of its own.
+using Signers = std::vector<std::unique_ptr<emulate::SyntheticSigner>>;
+Result<Signers> put_on_gloves(config::DaemonConfig& config, const std::filesystem::path& clip) {
+  Signers signers;
+  for (config::StreamConfig& stream : config.streams) {
+    const auto port = stream.options.find("port");
+    if (port == stream.options.end() || !std::get<std::string>(port->second).empty()) continue;
+    auto signer = emulate::SyntheticSigner::start(stream.driver, clip);
+    if (!signer) return std::unexpected(signer.error());
+    port->second = (*signer)->port();
+    signers.push_back(std::move(*signer));
+  }
+  return signers;
+}
+
+Result<> stream(const DemoOptions& options, const std::filesystem::path& folder) {
+  const auto own = folder / kDemoConfig;
+  auto config =
+      config::load_config(options.config.empty() ? own : options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  logging::sum_up_repeats();
+  const Interrupt interrupt;
+  const auto signers = put_on_gloves(*config, folder / kDemoSigner);
+  if (!signers) return std::unexpected(signers.error());
+  auto daemon = assembly::Daemon::open(*config);
+  if (!daemon) return std::unexpected(daemon.error());
+  if (auto started = (*daemon)->start(); !started) return started;
+  std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
+               (*daemon)->publish_endpoint().c_str());
+  auto hand = DemoHand::open((*daemon)->control_endpoint());
+  if (!hand) return std::unexpected(hand.error());
+  Watcher watcher(*hand);
+  const auto watched = watch(**daemon, options, watcher, *hand);
+  const v1::Stats stats = (*daemon)->stats();
+  (*daemon)->stop();
+  if (!watched) return watched;
+  std::printf(
+      "\nreceived %llu styled frames over ZeroMQ, %llu missing; %.1f deg rms from the raw poses\n",
+      static_cast<unsigned long long>(watcher.styled()),
+      static_cast<unsigned long long>(watcher.gaps()), watcher.change_deg());
+  if (const std::string told = hand->summary(); !told.empty()) std::puts(told.c_str());
+  for (const v1::StreamStats& s : stats.stream()) {
+    std::printf(
+        "%s: %.1f frames/s, arrival to ZeroMQ p50 %.0f us, p99 %.0f us, dropped %llu, shed %llu\n",
+        s.stream().c_str(), static_cast<double>(s.rate_hz()),
+        static_cast<double>(s.publish().p50_us()), static_cast<double>(s.publish().p99_us()),
+        static_cast<unsigned long long>(s.dropped()), static_cast<unsigned long long>(s.shed()));
+  }
+  return {};
+}
+
+// Clips and models lie where the config looks for them.
+Result<std::filesystem::path> folder_of(const DemoOptions& options) {
+  if (!options.folder.empty()) return std::filesystem::absolute(options.folder);
+  if (options.config.empty()) return demo_cache_folder();
+  const auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  for (const config::StreamConfig& stream : config->streams) {
+    if (!stream.style || stream.style->model.filename() != kDemoModel) continue;
+    return std::filesystem::absolute(stream.style->model).lexically_normal().parent_path();
+  }
+  return misuse("no stream has the demo's model, " + std::string(kDemoModel) +
+                    "; `posed run --config` streams any other config",
+                options.config.string());
+}
+
+Result<> check_options(const DemoOptions& options) {
+  if (!options.prepare.empty() &&
+      (!options.config.empty() || !options.folder.empty() || options.seconds)) {
+    return misuse("--prepare streams nothing; leave out --config, --folder and --seconds");
+  }
+  if (!options.config.empty() && !options.folder.empty()) {
+    return misuse("--config says where its files are; leave out --folder");
+  }
+  return {};
+}
+
+Result<> demo(const DemoOptions& options) {
+  if (auto ok = check_options(options); !ok) return ok;
+  if (!options.prepare.empty()) return prepare(options.prepare, options.overwrite);
+  const auto folder = folder_of(options);
+  if (!folder) return std::unexpected(folder.error());
+  if (auto prepared = prepare(*folder, options.overwrite); !prepared) return prepared;
+  return stream(options, *folder);
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("demo", "Learn a style from synthetic walkers and stream a new one");
+  const auto options = std::make_shared<DemoOptions>();
+  command->add_option("--config", options->config, "What to stream (default: the demo's own)")
+      ->type_name("FILE.toml");
+  command
+      ->add_option("--folder", options->folder,
+                   "Where clips and models are kept (default: ~/.cache/posed/demo)")
+      ->type_name("DIR");
+  command
+      ->add_option("--prepare", options->prepare,
+                   "Only make the clips and the models in this folder")
+      ->type_name("DIR");
+  add_overwrite_option(*command, options->overwrite);
+  command->add_option("--seconds", options->seconds, "End so long after the first frame")
+      ->check(CLI::PositiveNumber);
+  command->footer(R"(Examples:
+  posed demo                      # from anywhere
+  posed demo --seconds 10
+  posed demo --prepare build/demo # what ./run build does
+What was learnt is kept in $XDG_CACHE_HOME/posed/demo (~/.cache/posed/demo), with a demo.toml that
+`posed run --config` streams, too; another build of posed learns anew.)");
+  command->callback([options, &exit_code] {
+    if (auto done = demo(*options); !done) exit_code = report(done.error());
+  });
+}
+
+}  // namespace posed::cli

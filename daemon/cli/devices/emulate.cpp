@@ -1,0 +1,176 @@
+// `posed emulate`: a glove that is not there, for any program that expects one.
+#include <atomic>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/devices/driver_options.hpp"
+#include "daemon/cli/live/client.hpp"
+#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/log_emulator.hpp"
+#include "models/gesture/synthetic_signer.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+namespace {
+
+struct EmulateOptions {
+  std::string what;  // a log's path or a driver's name
+  std::string stream;
+  std::string tcp;
+  std::filesystem::path link, clip;
+  std::vector<std::string> set;     // KEY=VALUE
+  std::vector<std::string> faults;  // KIND:RATE
+  std::uint64_t seed = 1;
+  bool pty = false;
+  double speed = 1.0;
+  std::optional<double> seconds;
+};
+
+// What the emulated hand does: a clip, or a made-up person's gestures.
+Result<std::function<HandAngles(double)>> motion(const EmulateOptions& options) {
+  auto clip = std::make_shared<clip::HandClip>();
+  if (!options.clip.empty()) {
+    auto read = clip::read_hand_clip(options.clip);
+    if (!read) return std::unexpected(read.error());
+    *clip = std::move(*read);
+  } else {
+    auto made = gesture::make_performance(
+        {.script = {"p", "g", "c", "p", "1", "3", "4", "p"}, .noise_deg = 0.0, .dead_band_deg = 0});
+    if (!made) return std::unexpected(made.error());
+    *clip = std::move(made->clip);
+  }
+  return [clip](double time_s) { return emulate::pose_at(*clip, time_s); };
+}
+
+Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name,
+                                                         const std::vector<std::string>& set) {
+  const drivers::Driver* driver = drivers::find_driver(name);
+  if (driver == nullptr || driver->emulate == nullptr) {
+    std::string known;
+    for (const drivers::Driver& other : drivers::registry()) {
+      if (other.emulate != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
+    }
+    return misuse("'" + name + "' is no log and no glove that can be emulated; there is: " + known);
+  }
+  auto options = parse_driver_options(*driver, set);
+  if (!options) return std::unexpected(options.error());
+  return driver->emulate(*options);
+}
+
+Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& options) {
+  if (!std::filesystem::is_regular_file(options.what)) {
+    if (!options.stream.empty()) {
+      return misuse("--stream chooses from a log's streams; '" + options.what + "' is no log here");
+    }
+    return make_emulator(options.what, options.set);
+  }
+  if (!options.clip.empty()) return misuse("a log brings its own motion: leave out --clip");
+  auto device = emulate::read_logged_device(options.what, options.stream);
+  if (!device) return std::unexpected(device.error());
+  std::unique_ptr<drivers::Emulator> speaker;
+  if (const auto* driver = drivers::find_driver(device->driver);
+      driver != nullptr && driver->emulate != nullptr) {
+    auto made = make_emulator(device->driver, options.set);
+    if (!made) return std::unexpected(made.error());
+    speaker = std::move(*made);
+  } else if (!options.set.empty()) {
+    return misuse("the log's device (driver '" + device->driver +
+                  "') takes no options: leave out --set");
+  }
+  return std::make_unique<emulate::LogEmulator>(std::move(device->recording), std::move(speaker));
+}
+
+Result<> emulate(const EmulateOptions& options) {
+  const Interrupt interrupt;
+  auto emulator = open_emulator(options);
+  if (!emulator) return std::unexpected(emulator.error());
+  emulate::EmulatedGlove::Settings settings{.speed = options.speed};
+  for (const std::string& word : options.faults) {
+    const auto fault = drivers::emulate::parse_fault(word);
+    if (!fault) return std::unexpected(fault.error());
+    settings.faults.emplace_back(*fault, options.seed + settings.faults.size());
+  }
+  auto moves = motion(options);
+  if (!moves) return std::unexpected(moves.error());
+  auto port = options.tcp.empty() ? emulate::EmulatedPort::open_pty(options.link)
+                                  : emulate::EmulatedPort::connect_tcp(options.tcp);
+  if (!port) return std::unexpected(port.error());
+  const nlohmann::ordered_json ready{
+      {"port", options.link.empty() ? port->name() : options.link.string()}};
+  emulate::EmulatedGlove glove(std::move(*emulator), std::move(*port), std::move(*moves),
+                               std::move(settings));
+  std::printf("%s\n", json_text(ready).c_str());
+  std::fflush(stdout);
+  std::atomic<bool> ended{false};
+  std::jthread thread([&](const std::stop_token& stop) {
+    glove.run(stop);
+    ended = true;
+  });
+  const auto start = std::chrono::steady_clock::now();
+  const auto over = [&] {
+    return options.seconds && std::chrono::steady_clock::now() - start >=
+                                  std::chrono::duration<double>(*options.seconds);
+  };
+  while (!Interrupt::came() && !ended && !over()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  thread.request_stop();
+  thread.join();
+  std::fprintf(stderr, "%llu packets sent\n", static_cast<unsigned long long>(glove.packets()));
+  return {};
+}
+
+}  // namespace
+
+void add_emulate(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("emulate", "Be a glove: on a pseudo-terminal or a TCP connection");
+  auto options = std::make_shared<EmulateOptions>();
+  command->add_option("WHAT", options->what, "A device log (.plog) or a driver's name")->required();
+  auto* pty = command->add_flag("--pty", options->pty, "Behind a pseudo-terminal (the default)");
+  auto* tcp = command->add_option("--tcp", options->tcp, "Connect to a host that waits for gloves");
+  tcp->type_name("HOST:PORT")->excludes(pty);
+  command->add_option("--link", options->link, "Also a link to the pseudo-terminal, by this name")
+      ->type_name("PATH")
+      ->excludes(tcp);
+  command->add_option("--speed", options->speed, "Times the device's own pace, 0.01 to 1000")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 1000.0));
+  command
+      ->add_option("--clip", options->clip, "The hand's motion, a hand CSV; else made-up gestures")
+      ->type_name("FILE");
+  command->add_option("--set", options->set, "An option of the driver, like hand=left")
+      ->type_name("KEY=VALUE");
+  auto* fault =
+      command
+          ->add_option("--fault", options->faults, "A fault of the line, so many a byte or packet")
+          ->type_name("KIND:RATE");
+  command->add_option("--seed", options->seed, "Of the faults: the same seed, the same faults")
+      ->needs(fault)
+      ->capture_default_str();
+  command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");
+  command->add_option("--seconds", options->seconds, "End after so many seconds")
+      ->type_name("SECONDS")
+      ->check(CLI::PositiveNumber);
+  command->footer(R"(Prints one JSON line {"port": ...} when it can be opened. Examples:
+  posed emulate cyberglove --link /tmp/glove   # and a stream with port = "/tmp/glove"
+  posed emulate lucidgloves --tcp 127.0.0.1:65432
+  posed emulate take1.plog --stream right      # the bytes of a recorded glove
+  posed emulate cyberglove --fault drop:0.01 --fault burst:0.001
+Faults of so many bytes: drop, zero, flip, insert, noise (any of drop, flip, insert);
+of so many packets: duplicate, silence, baud, burst.)");
+  command->callback([options, &exit_code] {
+    if (auto done = emulate(*options); !done) exit_code = report(done.error());
+  });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,61 @@
+// GloveSource: the raw values of a glove's sensors for the command line, from a free device that it
+// opens itself or through a running daemon.
+#pragma once
+
+#include <bitset>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "daemon/cli/live/client.hpp"
+#include "drivers/driver.hpp"
+#include "drivers/transport/transport_factory.hpp"
+
+namespace posed::cli {
+
+class GloveSource {
+ public:
+  using Raw = std::array<float, drivers::glove::kMaxSensors>;
+  using Valid = std::bitset<drivers::glove::kMaxSensors>;
+  // [sensor of the model]; what is not valid is not measured.
+  using Take = std::function<void(const Raw& raw, const Valid& valid)>;
+
+  // Speaks with the device and starts it.
+  [[nodiscard]] static Result<std::unique_ptr<GloveSource>> open(const drivers::Driver& driver,
+                                                                 const drivers::Options& options);
+  // Of a stream that a daemon publishes: what glove it is, the daemon tells.
+  [[nodiscard]] static Result<std::unique_ptr<GloveSource>> connect(const ClientOptions& client,
+                                                                    const std::string& stream);
+  virtual ~GloveSource() = default;
+  GloveSource(const GloveSource&) = delete;
+  GloveSource& operator=(const GloveSource&) = delete;
+
+  [[nodiscard]] const drivers::glove::Model& model() const { return glove_.model; }
+  [[nodiscard]] const std::string& identity() const { return glove_.identity; }
+  [[nodiscard]] Side hand() const { return glove_.hand; }
+
+  // Hands over what comes for this long, or until it is `enough`, which is asked after each
+  // measurement and ten times a second. An error when the glove is lost, nothing comes, or Ctrl-C.
+  [[nodiscard]] virtual Result<> listen(double seconds, const Take& take,
+                                        const std::function<bool()>& enough) = 0;
+  [[nodiscard]] Result<> listen(double seconds, const Take& take) {
+    return listen(seconds, take, [] { return false; });
+  }
+
+ protected:
+  struct Glove {
+    drivers::glove::Model model;
+    std::string identity;
+    Side hand = Side::kRight;
+  };
+  [[nodiscard]] static Result<Glove> known(const drivers::Driver& driver,
+                                           const drivers::Description& description);
+  explicit GloveSource(Glove glove) : glove_(std::move(glove)) {}
+
+ private:
+  Glove glove_;
+};
+
+}  // namespace posed::cli

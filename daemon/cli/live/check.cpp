@@ -1,0 +1,148 @@
+// `posed check`: does everything that `run` does before it binds a socket, and says what it found.
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/devices/open_stream.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct CheckOptions {
+  std::filesystem::path config;
+  bool json = false;
+};
+
+// What one stream would run, after its device was opened and its model bound.
+Result<ordered_json> try_stream(const config::StreamConfig& config) {
+  const auto stream = devices::open_stream(config);
+  if (!stream) return std::unexpected(stream.error());
+  const auto missing = devices::try_kept_device(**stream);
+  if (!missing) return std::unexpected(missing.error());
+  const auto bound = devices::bind_style(**stream);
+  if (!bound) return std::unexpected(bound.error());
+  const auto gesture = devices::bind_gesture(**stream);
+  if (!gesture) return std::unexpected(gesture.error());
+  const auto constrains = devices::bind_constrain(**stream);
+  if (!constrains) return std::unexpected(constrains.error());
+  const drivers::Description& device = (*stream)->device.description;
+  ordered_json told{{"name", config.name},
+                    {"driver", config.driver},
+                    {"device", device.identity},
+                    {"rate_hz", device.rate_hz},
+                    {"joints", device.skeleton ? device.skeleton->joints.size() : 0},
+                    {"sample_values", device.samples.names.size()},
+                    {"publish_raw", config.publish_raw},
+                    {"stale_after_s", config.stale_after_s}};
+  if (*bound) {
+    told["model"] = (*bound)->name;
+    told["alpha"] = config.style->filter.alpha;
+  }
+  if (config.generate) {
+    told["lag_frames"] = smooth::lag_frames(config.generate->live.lag,
+                                            1.0 / generate::stream_rate_hz(device.rate_hz));
+    if (gesture->model) told["gesture_model"] = gesture->model->name;
+  }
+  told["constrain"] = *constrains;
+  told["present"] = missing->empty();
+  told["warnings"] = (*stream)->device.warnings;
+  if (!missing->empty()) {
+    told["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
+                               *missing + ")");
+  }
+  return told;
+}
+
+std::string security_of(const config::DaemonConfig& config) {
+  if (config.security.server_key.empty()) return "no keys";
+  return "keys, " + std::to_string(config.security.clients.size()) + " clients allowed";
+}
+
+void print(const config::DaemonConfig& config, const ordered_json& streams) {
+  std::printf("publishes on %s, controlled on %s (%s)\n", config.publish_endpoint.c_str(),
+              config.control_endpoint.c_str(), security_of(config).c_str());
+  for (const ordered_json& stream : streams) {
+    const std::string device = clean(stream["device"].get<std::string>());
+    std::printf("%s: %s%s%s, %g Hz, %d joints", stream["name"].get<std::string>().c_str(),
+                stream["driver"].get<std::string>().c_str(),
+                stream["present"].get<bool>() ? " " : " (away)", device.c_str(),
+                stream["rate_hz"].get<double>(), stream["joints"].get<int>());
+    if (stream.contains("model")) {
+      std::printf(", style %s at alpha %g", stream["model"].get<std::string>().c_str(),
+                  stream["alpha"].get<double>());
+    }
+    if (stream.contains("lag_frames")) {
+      std::printf(", generated with a lag of %d frames", stream["lag_frames"].get<int>());
+    }
+    if (stream.contains("gesture_model")) {
+      std::printf(" and %s", stream["gesture_model"].get<std::string>().c_str());
+    }
+    if (stream["constrain"].get<bool>()) std::printf(", fingers held apart");
+    std::puts(stream["publish_raw"].get<bool>() ? ", raw input too" : "");
+    for (const auto& warning : stream["warnings"]) {
+      std::printf("  note: %s\n", clean(warning.get<std::string>()).c_str());
+    }
+  }
+}
+
+// 0 when everything would run; 2 when the config is wrong; 1 when it is right, but a file or a
+// device it names cannot be used.
+int check(const CheckOptions& options) {
+  config::Reading reading = config::read_config_file(options.config, drivers::registry());
+  ordered_json streams = ordered_json::array();
+  if (reading.errors.empty()) {
+    for (const config::StreamConfig& stream : reading.config.streams) {
+      auto told = try_stream(stream);
+      if (told) streams.push_back(std::move(*told));
+      if (!told) reading.errors.push_back(told.error());
+    }
+  }
+  int exit_code = 0;
+  ordered_json errors = ordered_json::array();
+  for (const Error& error : reading.errors) {
+    exit_code = std::max(exit_code, report(error));
+    errors.push_back({{"file", error.file}, {"line", error.line}, {"message", error.message}});
+  }
+  if (options.json) {
+    const ordered_json all{{"ok", errors.empty()},
+                           {"publish", reading.config.publish_endpoint},
+                           {"control", reading.config.control_endpoint},
+                           {"streams", streams},
+                           {"errors", errors}};
+    std::printf("%s\n", json_text(all).c_str());
+  } else if (errors.empty()) {
+    print(reading.config, streams);
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("check", "Read a config, open what it names, say what it is");
+  auto options = std::make_shared<CheckOptions>();
+  command->add_option("--config", options->config, "The daemon's config, TOML")
+      ->required()
+      ->type_name("FILE");
+  command->add_flag("--json", options->json, "What would run, or all mistakes, as one JSON object");
+  command->footer(R"(Examples:
+  posed check --config config/posed.toml
+  posed check --config mine.toml --json | jq .errors
+Every mistake is told, each with file and line. Exit code 0: it would run, though a glove that is
+away is only waited for (a note says so, "present" in JSON is false). 2: the config is wrong.
+1: the config is right, but a clip, model or device that it names cannot be used.)");
+  command->callback([options, &exit_code] { exit_code = check(*options); });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,325 @@
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+
+#include <unistd.h>
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/file_kind.hpp"
+#include "daemon/cli/json.hpp"
+#include "daemon/cli/live/client.hpp"
+#include "daemon/cli/live/live_view.hpp"
+#include "daemon/control/uploads.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/load_calibration.hpp"
+#include "models/gesture/play_order.hpp"
+#include "posed/v1/control.pb.h"
+#include "proto/log/digest.hpp"
+#include "proto/text/load_file.hpp"
+
+namespace posed::cli {
+namespace {
+
+struct CtlOptions {
+  ClientOptions client;
+  double timeout_s = 5.0;
+  bool json = false;
+  std::string stream, parameter;
+  float value = 0.0F;
+  std::filesystem::path model, calibration;
+  std::vector<float> force, vibration;
+  std::string labels;
+  float tempo = 1.0F;
+  bool loop = false;
+};
+
+Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
+                             const v1::ControlRequest& request) {
+  using Clock = std::chrono::steady_clock;
+  if (!net::send_part(connection.socket(), request.SerializeAsString(), false)) {
+    return fail("the request cannot be sent");
+  }
+  const auto end = Clock::now() + std::chrono::duration<double>(options.timeout_s);
+  while (Clock::now() < end && !Interrupt::came()) {
+    if (auto refused = connection.refusal()) return std::unexpected(*refused);
+    if (!connection.wait(kLookAround)) continue;
+    net::Message message;
+    if (!message.receive(connection.socket())) continue;
+    v1::ControlReply reply;
+    const auto bytes = message.bytes();
+    if (message.more() || !reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+      return fail(options.client.endpoint + " does not answer like a posed daemon");
+    }
+    return reply;
+  }
+  if (Interrupt::came()) return fail("interrupted; the request may still take effect");
+  Error silence = connection.no_answer();
+  silence.message += fmt::format("; waited {} s", options.timeout_s);
+  return std::unexpected(std::move(silence));
+}
+
+Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest& request) {
+  const Interrupt interrupt;
+  auto connection = Connection::open(options.client, ZMQ_DEALER);
+  if (!connection) return std::unexpected(connection.error());
+  return ask(*connection, options, request);
+}
+
+// Sends the model piece by piece. The answer to the last piece, or the first one that is a refusal.
+Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& model) {
+  const Interrupt interrupt;
+  auto connection = Connection::open(options.client, ZMQ_DEALER);
+  if (!connection) return std::unexpected(connection.error());
+  v1::ControlRequest request;
+  auto& part = *request.mutable_model_part();
+  part.set_stream(options.stream);
+  part.set_name(options.model.filename().string());
+  part.set_sha256(log::sha256_hex(std::as_bytes(std::span(model))));
+  part.set_total(model.size());
+  Result<v1::ControlReply> reply = fail("the model is empty", options.model);
+  for (std::size_t offset = 0; offset < model.size(); offset += control::kLargestPiece) {
+    part.set_offset(offset);
+    part.set_bytes(model.substr(offset, control::kLargestPiece));
+    reply = ask(*connection, options, request);
+    if (!reply || !reply->ok()) return reply;
+  }
+  return reply;
+}
+
+// Prints an answer: JSON, or what `tell` makes of it.
+template <typename Tell>
+int show(const CtlOptions& options, const Result<v1::ControlReply>& reply, Tell&& tell) {
+  if (!reply) return report(reply.error());
+  if (options.json) (void)print_json(*reply);
+  if (!reply->ok()) return report(Error{reply->error(), {}, 0, ExitCode::kFailed});
+  if (!options.json) tell(*reply);
+  return 0;
+}
+
+template <typename Tell>
+int ask_and_tell(const CtlOptions& options, const v1::ControlRequest& request, Tell&& tell) {
+  return show(options, ask(options, request), tell);
+}
+
+// Says of which stream what is in effect from when on.
+int show_change(const CtlOptions& options, const Result<v1::ControlReply>& reply,
+                const std::string& what) {
+  return show(options, reply, [&](const v1::ControlReply& told) {
+    std::printf("%s: in effect from frame %llu: %s\n", told.stream().c_str(),
+                static_cast<unsigned long long>(told.sequence()), what.c_str());
+  });
+}
+
+int change(const CtlOptions& options, const v1::ControlRequest& request, const std::string& what) {
+  return show_change(options, ask(options, request), what);
+}
+
+int set_parameter(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_set_alpha()->set_stream(options.stream);
+  request.mutable_set_alpha()->set_alpha(options.value);
+  return change(options, request, fmt::format("alpha {:.2f}", options.value));
+}
+
+int send_model(const CtlOptions& options) {
+  const auto fits = expect_kind(options.model, FileKind::kModel, options.stream);
+  if (!fits) return report(fits.error());
+  const auto bytes =
+      load_file(options.model, {.what = "model", .max_bytes = control::kLargestModel});
+  if (!bytes) return report(bytes.error());
+  return show_change(options, upload(options, *bytes),
+                     "model " + options.model.filename().string());
+}
+
+int play(const CtlOptions& options) {
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_play();
+  wanted.set_stream(options.stream);
+  for (std::string& label : gesture::split_labels(options.labels)) {
+    wanted.add_label(std::move(label));
+  }
+  wanted.set_tempo(options.tempo);
+  wanted.set_loop(options.loop);
+  return change(options, request, "performs " + options.labels + " (after those that wait)");
+}
+
+int stop_playing(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_stop_playing()->set_stream(options.stream);
+  return change(options, request, "performs no more");
+}
+
+// Everything about the file itself is found here; whether it fits the glove, the daemon knows.
+Result<std::string> read_calibration(const CtlOptions& options) {
+  const auto& path = options.calibration;
+  const auto fits = expect_kind(path, FileKind::kCalibration, options.stream);
+  if (!fits) return std::unexpected(fits.error());
+  auto text = drivers::glove::load_calibration_text(path);
+  if (!text) return text;
+  const auto parsed = drivers::glove::parse_calibration(*text, path);
+  if (!parsed) return std::unexpected(parsed.error());
+  return text;
+}
+
+int calibrate(const CtlOptions& options) {
+  auto text = read_calibration(options);
+  if (!text) return report(text.error());
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_calibrate();
+  wanted.set_stream(options.stream);
+  wanted.set_toml(std::move(*text));
+  wanted.set_name(options.calibration.filename().string());
+  return change(options, request, "calibration " + options.calibration.filename().string());
+}
+
+int haptics(const CtlOptions& options) {
+  if (options.force.empty() && options.vibration.empty()) {
+    return report(misuse("say what is to be felt: --force, --vibrate or both").error());
+  }
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_haptics();
+  wanted.set_stream(options.stream);
+  for (const float force : options.force) wanted.add_force(force);
+  if (!options.vibration.empty()) {
+    wanted.set_vibration_hz(options.vibration[0]);
+    wanted.set_vibration_s(options.vibration[1]);
+    wanted.set_vibration_amplitude(options.vibration[2]);
+  }
+  return ask_and_tell(options, request, [&](const v1::ControlReply&) {
+    std::printf("%s: sent to the device\n", options.stream.c_str());
+  });
+}
+
+int show_status(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_status();
+  return ask_and_tell(options, request, [&](const v1::ControlReply& reply) {
+    LiveViewOptions view{.title = "posed " + options.client.endpoint, .height = 0};
+    if (isatty(STDOUT_FILENO) == 0) view.width = 0;  // a script wants whole names
+    for (const std::string& line : live_view(reply.status(), view)) std::puts(line.c_str());
+  });
+}
+
+int stop_daemon(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_stop();
+  return ask_and_tell(options, request,
+                      [](const v1::ControlReply&) { std::puts("the daemon is ending"); });
+}
+
+constexpr const char* kExamples = R"(Examples:
+  posed ctl set walker alpha 0.5
+  posed ctl status
+  posed ctl --connect tcp://stage:5571 --key me.key --server-key stage.pub stop
+`posed ctl COMMAND --help` has examples of each. Exit code 0: it is in effect; 1: the daemon refused
+or did not answer; 2: wrong use.)";
+
+// One thing that a daemon can be asked for; the options of `ctl` itself go with each.
+class Actions {
+ public:
+  Actions(CLI::App& command, std::shared_ptr<CtlOptions> options, int& exit_code)
+      : command_(command), options_(std::move(options)), exit_code_(exit_code) {}
+
+  CLI::App* add(const char* name, const char* help, int (*run)(const CtlOptions&),
+                const std::string& footer) {
+    CLI::App* action = command_.add_subcommand(name, help);
+    action->footer(
+        footer + "\n--connect, --key, --server-key, --timeout and --json: see `posed ctl --help`.");
+    action->callback(
+        [options = options_, run, &exit_code = exit_code_] { exit_code = run(*options); });
+    return action;
+  }
+  CLI::App* add_for_stream(const char* name, const char* help, int (*run)(const CtlOptions&),
+                           const std::string& footer) {
+    CLI::App* action = add(name, help, run, footer);
+    action->add_option("stream", options_->stream, "The stream, as its config names it")
+        ->required();
+    return action;
+  }
+
+ private:
+  CLI::App& command_;
+  std::shared_ptr<CtlOptions> options_;
+  int& exit_code_;
+};
+
+void add_style_actions(Actions& actions, CtlOptions& options) {
+  CLI::App* set = actions.add_for_stream("set", "Change a stream's parameter", set_parameter,
+                                         R"(Example:
+  posed ctl set walker alpha 0.5     # half the style; alpha slides there
+alpha: 0 none of the style, 1 as it was learnt, 2 twice as much, -1 the other way.)");
+  set->add_option("parameter", options.parameter, "alpha: how much style")
+      ->required()
+      ->check(CLI::IsMember({"alpha"}));
+  set->add_option("value", options.value, "The new value, -2 to 2")->required();
+  CLI::App* model = actions.add_for_stream("model", "Give a stream another style or gesture model",
+                                           send_model, R"(Examples:
+  posed ctl model walker march.style   # another style, from the next frame on
+  posed ctl model hand ours.gesture    # another gesture model: the file says what it is)");
+  model->add_option("model", options.model, "The model file (M.style, H.gesture)")->required();
+}
+
+void add_hand_actions(Actions& actions, CtlOptions& options) {
+  CLI::App* perform = actions.add_for_stream("play", "Perform labels on a hand", play, R"(Examples:
+  posed ctl play hand "g 1 c 3 4 p"    # after those that still wait
+  posed ctl play hand "g c p" --tempo 1.5 --loop)");
+  perform->add_option("labels", options.labels, "Names that the gesture model knows: \"g 1 c\"")
+      ->required();
+  perform->add_option("--tempo", options.tempo, "0.5 to 2 times the learnt one; 2 is twice as fast")
+      ->capture_default_str();
+  perform->add_flag("--loop", options.loop, "Begin again after the last, until others come");
+  static_cast<void>(actions.add_for_stream("stop-playing", "Back to the live hand", stop_playing,
+                                           "Example:\n  posed ctl stop-playing hand"));
+}
+
+void add_glove_actions(Actions& actions, CtlOptions& options) {
+  CLI::App* fit = actions.add_for_stream("calibrate", "Give a glove another calibration", calibrate,
+                                         R"(Example:
+  posed ctl calibrate right ann.toml   # from the next packet on)");
+  fit->add_option("calibration", options.calibration, "What `posed calibrate` wrote")->required();
+  CLI::App* feel = actions.add_for_stream("haptics", "Let a glove with motors be felt", haptics,
+                                          R"(Examples:
+  posed ctl haptics right --force 0 0.5 0.5 0 0
+  posed ctl haptics right --vibrate 80 0.2 0.5    # 80 Hz for 0.2 s at half the strength)");
+  feel->add_option("--force", options.force,
+                   "Thumb to little: 0 free to 1 blocked; negative leaves a finger as it is")
+      ->expected(1, kFingers);
+  feel->add_option("--vibrate", options.vibration, "Frequency [Hz], time [s], amplitude 0 to 1")
+      ->expected(3);
+}
+
+}  // namespace
+
+void add_ctl(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("ctl", "Change or stop a running daemon");
+  auto options = std::make_shared<CtlOptions>();
+  command->require_subcommand(1)->fallthrough();
+  add_client_options(*command, options->client, "tcp://127.0.0.1:5571");
+  command->add_option("--timeout", options->timeout_s, "Seconds to wait for the answer")
+      ->type_name("SECONDS")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "The answer as proto3 JSON (posed.v1.ControlReply)");
+  command->footer(kExamples);
+  Actions actions(*command, options, exit_code);
+  add_style_actions(actions, *options);
+  add_hand_actions(actions, *options);
+  add_glove_actions(actions, *options);
+  static_cast<void>(actions.add("status", "Print the daemon's state once", show_status,
+                                std::string("Examples:\n  posed ctl status\n  posed ctl --json "
+                                            "status | jq .status.stream[0].state\n") +
+                                    kColumnsHelp));
+  static_cast<void>(actions.add("stop", "End the daemon cleanly", stop_daemon,
+                                "Example:\n  posed ctl stop\nIt answers at once; a recording is "
+                                "finished before the daemon ends."));
+}
+
+}  // namespace posed::cli

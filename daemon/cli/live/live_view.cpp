@@ -1,0 +1,220 @@
+#include "daemon/cli/live/live_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/cli/live/monitor_line.hpp"
+#include "daemon/cli/paint.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/frame/time.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::cli {
+namespace {
+
+constexpr int kLeastWidth = 80;
+constexpr int kNameWidth = 11;
+
+// Cut or padded to exactly `width` columns (names are ASCII); 0: to its last word.
+std::string fit(const std::string& text, int width) {
+  if (width == 0) return text.substr(0, text.find_last_not_of(' ') + 1);
+  return fmt::format("{:<{}}", cut(text, width), width);
+}
+
+// Columns of a line, of streams' names and of models' names; 0: no limit.
+struct Widths {
+  int line = kLeastWidth;
+  int name = kNameWidth;
+  int model = 1;
+};
+
+// A count in at most 5 characters.
+std::string short_count(std::uint64_t count) {
+  if (count < 100'000) return std::to_string(count);
+  if (count < 10'000'000) return fmt::format("{}k", count / 1000);
+  return fmt::format("{}M", std::min<std::uint64_t>(count / 1'000'000, 9999));
+}
+
+// "-" for a stage that no frame went through in this second.
+std::string stage(const v1::Percentiles& percentiles) {
+  if (percentiles.p99_us() == 0.0F && percentiles.max_us() == 0.0F) return "-";
+  return short_duration(percentiles.p50_us()) + "/" + short_duration(percentiles.p99_us());
+}
+
+std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
+  std::string line = fmt::format("{}   {} stream{}", options.title, stats.stream_size(),
+                                 stats.stream_size() == 1 ? "" : "s");
+  if (options.silence.empty()) {
+    line += fmt::format("   cpu {:.1f} %   rss {:.1f} MB", stats.cpu_percent(),
+                        static_cast<double>(stats.rss_bytes()) / 1e6);
+  }
+  if (!stats.recorder_file().empty()) {
+    line += fmt::format("   rec {} lost {} errors {}", clean_name(stats.recorder_file()),
+                        stats.recorder_lost_chunks(), stats.recorder_errors());
+  }
+  return line;
+}
+
+// A device that is not there is more than a stream in which nothing comes.
+std::string state_of(const v1::StreamStats& stream) {
+  return stream.away() ? "away" : clean_name(stream.state());
+}
+
+std::string row(const v1::StreamStats& stream, const Widths& widths, bool silent) {
+  const std::string rate =
+      silent ? "-" : fmt::format("{:.1f}", std::min(stream.rate_hz(), 9999.9F));
+  const auto now = [&](const v1::Percentiles& times) { return silent ? "-" : stage(times); };
+  return fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}",
+                     fit(clean_name(stream.stream()), widths.name),
+                     fit(silent ? "?" : state_of(stream), 7), rate, short_count(stream.dropped()),
+                     short_count(stream.shed()), now(stream.decode()), now(stream.style()),
+                     now(stream.publish()), stream.alpha(),
+                     fit(clean_name(stream.model()), widths.model));
+}
+
+// What a stream's stages do, below its row; empty where there is nothing to say.
+std::string stages_row(const v1::StreamStats& stream) {
+  std::string text = label_words(stream);
+  const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  if (stream.lag_frames() > 0) {
+    add(fmt::format("lag {} frame{} ({:.0f} ms)", stream.lag_frames(),
+                    stream.lag_frames() == 1 ? "" : "s", stream.lag_ms()));
+  }
+  // To what the column shows, alpha has arrived.
+  if (std::abs(stream.alpha_target() - stream.alpha()) >= 0.005F) {
+    add(fmt::format("alpha slides to {:.2f}", stream.alpha_target()));
+  }
+  return text;
+}
+
+// "8 s", "5 min", "2.5 h"
+std::string for_people(double time_s) {
+  if (time_s < 120.0) return fmt::format("{:.0f} s", std::max(time_s, 0.0));
+  if (time_s < 7200.0) return fmt::format("{:.0f} min", time_s / 60.0);
+  return fmt::format("{:.1f} h", time_s / 3600.0);
+}
+
+// Whether a glove is there and how its clock runs; empty for a stream without either.
+std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
+  const std::string since = for_people(seconds(now_ns - stream.link_ns()));
+  const std::uint64_t links = stream.connections();
+  if (stream.away()) {
+    if (links == 0) return "not there yet; posed has looked for it for " + since;
+    return fmt::format("away for {}; connected {} before", since,
+                       links == 1 ? "once" : fmt::format("{} times", links));
+  }
+  std::string text;
+  const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  if (links > 1) {
+    add(fmt::format("back for {}, reconnected {}", since,
+                    links == 2 ? "once" : fmt::format("{} times", links - 1)));
+  }
+  if (stream.has_clock_offset_ns()) {
+    const float drift_ppm = std::round(stream.clock_drift_ppm() * 10.0F) / 10.0F + 0.0F;  // no -0.0
+    add(fmt::format("clock {:+.3f} s, drift {:+.1f} ppm", seconds(stream.clock_offset_ns()),
+                    drift_ppm));
+  }
+  if (!stream.greeting().empty()) add(clean(stream.identity()));
+  return text;
+}
+
+// What stands below the streams' rows.
+std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths) {
+  std::vector<std::string> rows;
+  if (!stats.replay_file().empty()) rows.push_back("  " + replay_words(stats));
+  for (const v1::StreamStats& stream : stats.stream()) {
+    for (const std::string& text : {device_row(stream, stats.time_ns()), stages_row(stream)}) {
+      if (text.empty()) continue;
+      rows.push_back("  " + fit(clean_name(stream.stream()), widths.name - 1) + text);
+    }
+  }
+  return rows;
+}
+
+Widths widths_for(const v1::Stats& stats, int wanted) {
+  if (wanted > 0) return {.line = std::max(wanted, kLeastWidth)};
+  Widths widths{.line = 0, .model = 0};
+  for (const v1::StreamStats& stream : stats.stream()) {
+    widths.name = std::max(widths.name, static_cast<int>(stream.stream().size()) + 2);
+  }
+  return widths;
+}
+
+const char* colour_of(const v1::StreamStats& stream) {
+  if (stream.dropped() > 0 || stream.shed() > 0) return kRed;
+  if (stream.away() || stream.state() == "stale" || stream.state() == "waiting") return kYellow;
+  return stream.state() == "ended" ? kDim : "";
+}
+
+}  // namespace
+
+std::string short_duration(double microseconds) {
+  if (microseconds < 999.5) return fmt::format("{:.0f}", microseconds);
+  if (microseconds < 9'950) return fmt::format("{:.1f}m", microseconds * 1e-3);
+  if (microseconds < 999'500) return fmt::format("{:.0f}m", microseconds * 1e-3);
+  return fmt::format("{:.0f}s", std::min(microseconds * 1e-6, 999.0));
+}
+
+const char* const kColumnsHelp = R"(Columns, one row a stream:
+  STATE    waiting (nothing came yet), live, stale (fell silent), away (its device), ended
+  HZ       frames published in the last second
+  DROP     frames lost so far because a queue was full: the machine could not keep up
+  SHED     frames skipped so far because newer ones waited already: the newest pose wins
+  DECODE   from arrival to decoded, STYLE from decoded through all stages, PUBLISH from arrival to
+           handed out: half of the frames of the last second took at most the first figure, 99 % the
+           second; microseconds, with m milliseconds, with s seconds; - where no frame passed
+  ALPHA    how much style, -2 to 2; below the row where it slides to
+  MODEL    the style model in use, or the gesture model)";
+
+std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {
+  Widths widths = widths_for(stats, options.width);
+  const bool silent = !options.silence.empty();
+  const std::string names =
+      fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} ", fit("STREAM", widths.name),
+                  fit("STATE", 7), "HZ", "DROP", "SHED", "DECODE", "STYLE", "PUBLISH", "ALPHA");
+  if (widths.line > 0) widths.model = std::max(1, widths.line - static_cast<int>(names.size()));
+  std::vector<std::string> lines{
+      paint(options.colour, kBold, fit(head(stats, options), widths.line)),
+      paint(options.colour, kDim, fit(names + fit("MODEL", widths.model), widths.line)),
+  };
+  // What stands above all else: that the rest is old.
+  if (silent)
+    lines.insert(lines.begin(), paint(options.colour, kRed, fit(options.silence, widths.line)));
+  // Streams first; what does not fit is at least counted.
+  const int above = static_cast<int>(lines.size());
+  const int room = options.height == 0 ? stats.stream_size() : options.height - above - 1;
+  const int shown = stats.stream_size() <= room ? stats.stream_size() : std::max(0, room - 1);
+  for (int i = 0; i < shown; ++i) {
+    const char* const colour = silent ? kDim : colour_of(stats.stream(i));
+    const std::string text = fit(row(stats.stream(i), widths, silent), widths.line);
+    lines.push_back(paint(options.colour, colour, text));
+  }
+  if (shown < stats.stream_size()) {
+    lines.push_back(fmt::format("... and {} more", stats.stream_size() - shown));
+  }
+  const auto fits = [&] {
+    return options.height == 0 || static_cast<int>(lines.size()) + 1 < options.height;
+  };
+  if (!silent) {
+    for (const std::string& below : rows_below(stats, widths)) {
+      if (fits()) lines.push_back(fit(below, widths.line));
+    }
+  }
+  lines.push_back(
+      paint(options.colour, kDim,
+            fit("stage times: p50/p99 in us (m: ms), publish counts from arrival", widths.line)));
+  const std::size_t left =
+      options.height == 0
+          ? options.notes.size()
+          : static_cast<std::size_t>(std::max(0, options.height - static_cast<int>(lines.size())));
+  const std::size_t first = options.notes.size() - std::min(left, options.notes.size());
+  for (std::size_t i = first; i < options.notes.size(); ++i) {
+    lines.push_back(fit(options.notes[i], widths.line));
+  }
+  return lines;
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,45 @@
+#include <memory>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/assembly/daemon.hpp"
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/live/serve.hpp"
+#include "daemon/config/config.hpp"
+
+namespace posed::cli {
+namespace {
+
+Result<> run(const ServeOptions& options) {
+  prepare_to_serve();
+  auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  auto daemon = assembly::Daemon::open(*config);
+  if (!daemon) return std::unexpected(daemon.error());
+  if (auto sound = check_end(**daemon, options); !sound) return sound;
+  if (auto started = (*daemon)->start(); !started) return started;
+  print_ready(**daemon);
+  serve(**daemon, options);
+  return {};
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("run", "Stream as a config says, until stopped");
+  auto options = std::make_shared<ServeOptions>();
+  add_serve_options(*command, *options);
+  command->footer(
+      "Once ready it prints one line of JSON on stdout with the endpoints really bound. SIGINT "
+      "and\n"
+      "SIGTERM end it cleanly. Examples:\n"
+      "  posed run --config config/demo.toml\n"
+      "  posed run --config mine.toml --until-end     # for clips with loop = false\n"
+      "  posed monitor --count 10                     # in another terminal: see the poses");
+  command->callback([options, &exit_code] {
+    const auto done = run(*options);
+    exit_code = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,117 @@
+#include "daemon/cli/live/serve.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "daemon/config/config.hpp"
+#include "daemon/logging/log_output.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+namespace {
+
+constexpr std::chrono::milliseconds kReadyLineWithin{300};
+
+sigset_t end_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGHUP);
+  return set;
+}
+
+// Whether there was a list to read again; a config that is wrong leaves the old list in force.
+bool read_clients_again(assembly::Daemon& daemon, const std::string& path) {
+  if (path.empty() || !daemon.wants_keys()) return false;
+  const auto config = config::load_config(path, drivers::registry());
+  if (!config) {
+    spdlog::error("the client list stays as it was: {}", config.error().text());
+    return true;
+  }
+  if (config->security.server_key.empty()) {
+    spdlog::error(
+        "the client list stays as it was: {} has no [security] server_key any more; a daemon that"
+        " began with keys keeps them until it is started again",
+        path);
+    return true;
+  }
+  daemon.allow(config->security.clients);
+  spdlog::info("{} clients may connect now", config->security.clients.size());
+  return true;
+}
+
+}  // namespace
+
+void add_serve_options(CLI::App& command, ServeOptions& options) {
+  command.add_option("--config", options.config, "The daemon's config, TOML")->required();
+  command.add_option("--seconds", options.seconds, "End after so many seconds")
+      ->type_name("SECONDS")
+      ->check([](const std::string& text) {
+        return std::strtod(text.c_str(), nullptr) > 0.0
+                   ? std::string()
+                   : "'" + text + "' is no time to run: give seconds above 0";
+      });
+  command.add_flag("--until-end", options.until_end,
+                   "End when every source that can end has ended: not gloves or looped clips");
+}
+
+void prepare_to_serve() {
+  logging::sum_up_repeats();
+  const sigset_t set = end_signals();
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit is a full disk, which the recorder tells
+}
+
+Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) {
+  const auto endless = [](const auto& stream) { return stream->endless; };
+  if (!options.until_end || !std::ranges::all_of(daemon.streams(), endless)) return {};
+  return misuse(
+      "--until-end: no source of this config ever ends (gloves come and go, clips loop); leave it"
+      " out, give --seconds, or set loop = false");
+}
+
+void print_ready(const assembly::Daemon& daemon) {
+  nlohmann::ordered_json line{{"ready", true},
+                              {"publish", daemon.publish_endpoint()},
+                              {"control", daemon.control_endpoint()},
+                              {"streams", nlohmann::json::array()}};
+  for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
+  // Not by stdio: a pipe that is full, or that nobody reads, must not hold up the stop signals.
+  if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kReadyLineWithin)) {
+    spdlog::warn("stdout does not take the line that says where posed is to be found: {}",
+                 json_text(line));
+  }
+}
+
+void serve(assembly::Daemon& daemon, const ServeOptions& options) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  const sigset_t set = end_signals();
+  const timespec look_every{.tv_sec = 0, .tv_nsec = 50'000'000};
+  while (true) {
+    if (const int signal = sigtimedwait(&set, nullptr, &look_every); signal > 0) {
+      if (signal == SIGHUP && read_clients_again(daemon, options.config)) continue;
+      spdlog::info("{}: ending", signal == SIGINT ? "interrupted" : "terminated");
+      break;
+    }
+    if (daemon.asked_to_stop()) {
+      spdlog::info("asked to stop: ending");
+      break;
+    }
+    if (options.until_end && daemon.all_ended()) break;
+    const std::chrono::duration<double> served = Clock::now() - start;
+    if (options.seconds && served.count() >= *options.seconds) break;
+  }
+  daemon.stop();
+}
+
+}  // namespace posed::cli

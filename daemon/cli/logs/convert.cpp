@@ -1,0 +1,184 @@
+// posed convert: a clip in one format to a clip in another, or a device log's stream to a clip.
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/models/waiting.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/replay/log_clip.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/frames_clip.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+namespace {
+
+constexpr const char* kUneven = "frames are not evenly spaced, but a BVH's are: its clock differs";
+
+struct Convert {
+  std::string in;
+  std::string out;
+  clip::ReadOptions read;
+  double metres_per_unit = 0.0;  // 0: not given
+  std::string hand;              // "left", "right" or not given
+  std::string stream;            // of a log; empty: the only one
+  bool overwrite = false, json = false;
+  bool rate_given = false, shape_given = false;
+};
+
+bool ends_in(const std::string& path, const std::string& extension) {
+  return clip::lower(std::filesystem::path(path).extension().string()) == extension;
+}
+
+bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
+bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
+
+// An option that would mean nothing for this input or output is a mistake.
+Result<> check_options(const Convert& convert) {
+  const auto useless = [&](bool given, bool means_something, const char* what) -> Result<> {
+    if (!given || means_something) return {};
+    return misuse(what, convert.in);
+  };
+  const bool csv_in = is_hand_csv(convert.in);
+  const bool bvh_in = ends_in(convert.in, ".bvh");
+  const bool to_csv = is_hand_csv(convert.out);
+  for (const auto& checked :
+       {useless(!convert.stream.empty(), is_log(convert.in),
+                "is no device log (.plog), so --stream means nothing"),
+        useless(!convert.read.asf.empty(), is_amc(convert.in),
+                "is no AMC, so --skeleton means nothing"),
+        useless(convert.rate_given, is_amc(convert.in), "is no AMC, so --rate means nothing"),
+        useless(convert.metres_per_unit != 0.0, bvh_in,
+                "is no BVH, so --metres-per-unit means nothing"),
+        useless(!convert.read.profile.empty(), bvh_in || is_amc(convert.in),
+                "is no BVH or AMC, so --profile means nothing"),
+        useless(!convert.hand.empty(), csv_in || to_csv,
+                "neither IN nor OUT is a hand CSV, so --hand means nothing"),
+        useless(convert.shape_given, csv_in && !to_csv,
+                "--hand-shape is for a hand CSV that becomes a BVH, and means nothing here")}) {
+    if (!checked) return checked;
+  }
+  return OutputFiles(convert.overwrite)
+      .reads(convert.in)
+      .reads(convert.read.asf)
+      .writes(convert.out, {".bvh", ".csv"})
+      .check();
+}
+
+// A BVH has no room for a gap or an uneven clock.
+Result<clip::Clip> read_log(const Convert& convert) {
+  auto clip = replay::clip_of_log(convert.in, convert.stream);
+  if (!clip || is_hand_csv(convert.out)) return clip;
+  clip::hold_missing(*clip);
+  if (clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
+    clip->warnings.emplace_back(kUneven);
+  return clip;
+}
+
+// Nor has a hand CSV room for a body.
+Result<clip::Clip> read(const Convert& convert) {
+  if (is_log(convert.in)) return read_log(convert);
+  auto clip = clip::read_clip(convert.in, convert.read);
+  if (!clip || !is_hand_csv(convert.in) || is_hand_csv(convert.out)) return clip;
+  auto hand = clip::hand_of(*clip, convert.read);
+  if (!hand) return std::unexpected(hand.error());
+  clip::fill_gaps(*hand);
+  if (clip::has_uneven_times(hand->time_s, hand->rate_hz)) hand->warnings.emplace_back(kUneven);
+  return clip::clip_of_hand(*hand, convert.read.hand_shape);
+}
+
+Result<> write(const Convert& convert, const clip::Clip& clip) {
+  if (!is_hand_csv(convert.out)) return clip::write_bvh(clip, convert.out);
+  const auto hand = clip::hand_of(clip, convert.read);
+  if (!hand) return std::unexpected(hand.error());
+  return clip::write_hand_csv(*hand, convert.out);
+}
+
+int run(Convert& convert) {
+  if (auto ok = check_options(convert); !ok) return report(ok.error());
+  if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
+  if (!convert.hand.empty()) {
+    convert.read.hand = convert.hand == "left" ? Side::kLeft : Side::kRight;
+  }
+  const auto clip = [&] {
+    const Waiting waiting("reading " + convert.in);
+    return read(convert);
+  }();
+  if (!clip) return report(clip.error());
+  for (const std::string& warning : clip->warnings) {
+    std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());
+  }
+  if (auto ok = write(convert, *clip); !ok) return report(ok.error());
+  if (!convert.json) {
+    std::fprintf(stderr, "posed: wrote %s: %d frames at %g Hz, %zu joints\n", convert.out.c_str(),
+                 clip->frames(), clip->frame_rate_hz, clip->skeleton->joints.size());
+    return static_cast<int>(ExitCode::kDone);
+  }
+  const nlohmann::json summary{{"in", convert.in},
+                               {"out", convert.out},
+                               {"frames", clip->frames()},
+                               {"rate_hz", clip->frame_rate_hz},
+                               {"joints", clip->skeleton->joints.size()},
+                               {"metres_per_unit", clip->metres_per_unit},
+                               {"warnings", clip->warnings}};
+  // Names may hold any bytes; what is no UTF-8 is replaced rather than thrown at.
+  std::printf("%s\n", json_text(summary).c_str());
+  return static_cast<int>(ExitCode::kDone);
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("convert", "Write a clip, or a log's stream, in another format");
+  auto convert = std::make_shared<Convert>();
+  command->add_option("IN", convert->in, "To read: .bvh, .amc, a hand as .csv, or a log (.plog)")
+      ->required();
+  command->add_option("--out", convert->out, "Clip to write: .bvh, or .csv of a hand")->required();
+  command->add_option("--skeleton", convert->read.asf,
+                      "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
+  auto* rate =
+      command->add_option("--rate", convert->read.amc_rate_hz, "Frames a second of an AMC");
+  rate->capture_default_str();
+  command
+      ->add_option("--metres-per-unit", convert->metres_per_unit,
+                   "Unit of a BVH (default: the profile's, else by the figure's height)")
+      ->check(CLI::Range(1e-6, 1e6));
+  command->add_option("--profile", convert->read.profile,
+                      "Skeleton profile (default: found by the joints' names)");
+  command->add_option("--stream", convert->stream,
+                      "Which of a log's streams (default: the only one)");
+  command->add_option("--hand", convert->hand, "Whose a hand CSV is, or which hand to take")
+      ->check(CLI::IsMember({"left", "right"}));
+  auto* shape =
+      command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH");
+  shape->capture_default_str();
+  add_overwrite_option(*command, convert->overwrite);
+  command->add_flag("--json", convert->json, "Print a summary as JSON on stdout");
+  command->footer(
+      "A BVH keeps its names, hierarchy, channel order and unit. An AMC becomes a BVH in\n"
+      "centimetres with Z, Y, X rotations on every joint. A hand CSV\n"
+      "holds 45 angles a frame; any BVH with the fifteen finger joints of a hand can become "
+      "one.\n"
+      "A log gives the frames that were published, styled as they were; its BVH is in "
+      "centimetres.\n\n"
+      "Examples:\n"
+      "  posed convert 07_01.amc --out walk.bvh\n"
+      "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
+      "  posed convert glove.csv --hand left --out glove.bvh\n"
+      "  posed convert take1.plog --stream walker --out walker.bvh");
+  command->callback([convert, rate, shape, &exit_code] {
+    convert->rate_given = rate->count() > 0;
+    convert->shape_given = shape->count() > 0;
+    exit_code = run(*convert);
+  });
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,331 @@
+// `posed replay`: a log's run again, from the log alone.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <unistd.h>
+
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/live/client.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/cli/progress.hpp"
+#include "daemon/publish/encode.hpp"
+#include "daemon/replay/broadcast.hpp"
+#include "daemon/replay/expectation.hpp"
+#include "daemon/replay/frame_file.hpp"
+#include "daemon/replay/pace.hpp"
+#include "daemon/replay/replay.hpp"
+#include "models/gp/isa.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+namespace {
+
+struct ReplayOptions {
+  std::string log;
+  std::string speed = "1";
+  std::string out;
+  std::string endpoint;
+  std::string isa;
+  bool publish = false;
+  bool expect = false;
+  bool overwrite = false;
+  bool json = false;
+};
+
+// Waits until a chunk is due; false when the user has had enough.
+class Pacer {
+ public:
+  Pacer(std::string log, double speed)  // 0: as fast as possible
+      : log_(std::move(log)), speed_(speed), pace_(speed) {}
+
+  bool operator()(const log::ChunkRow& chunk) {
+    if (speed_ == 0.0) return !Interrupt::came();
+    const auto step = pace_.step(chunk);
+    if (step.skipped_ns > 0) {
+      spdlog::warn("{}: nothing came for {:.0f} s before chunk {}; that silence is skipped", log_,
+                   seconds(step.skipped_ns), chunk.id);
+    }
+    const auto due = start_ + std::chrono::nanoseconds(step.due_ns);
+    while (!Interrupt::came() && Clock::now() < due) {
+      std::this_thread::sleep_until(
+          std::min<Clock::time_point>(due, Clock::now() + std::chrono::milliseconds(50)));
+    }
+    return !Interrupt::came();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::string log_;
+  double speed_;
+  replay::Pace pace_;
+  Clock::time_point start_ = Clock::now();
+};
+
+// Says how far the replay is, once it takes long enough for someone to wonder.
+class ReplayProgress {
+ public:
+  explicit ReplayProgress(const std::optional<log::Reader::Extent>& extent) : extent_(extent) {}
+
+  [[nodiscard]] double elapsed_s() const { return bar_.elapsed_s(); }
+
+  void show(std::int64_t arrival_ns) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!extent_ || now - shown_ < kEvery || now - start_ < kQuiet) return;
+    shown_ = now;
+    const double whole_s = seconds(extent_->last_ns - extent_->first_ns);
+    const double done_s = seconds(arrival_ns - extent_->first_ns);
+    bar_.show(fmt::format("replayed {:.0f} of {:.0f} s", std::clamp(done_s, 0.0, whole_s), whole_s),
+              whole_s > 0.0 ? done_s / whole_s : 1.0);
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kQuiet{1000};
+  const std::chrono::milliseconds kEvery{isatty(STDERR_FILENO) == 1 ? 200 : 5000};
+  std::optional<log::Reader::Extent> extent_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point shown_{};
+  ProgressBar bar_;
+};
+
+// Where the frames of a replay go: the file, the comparison, the network.
+class Outputs {
+ public:
+  explicit Outputs(const replay::Replay& replay) : replay_(replay) {
+    for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+      const std::string& name = replay.stream(id).name;
+      encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(name + "-raw")});
+    }
+  }
+
+  void take(const pipeline::Item& item) {
+    if (broadcast) broadcast->add(item);
+    const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
+    if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
+    ++frames;
+    const std::uint32_t stream = item.frame.header.stream;
+    const v1::Frame& frame = encoders_[stream][raw].encode(item.frame);
+    if (file) file->add(frame);
+    if (!expectation || difference) return;
+    auto same = expectation->compare(stream, raw, frame, replay_.broken_at(stream));
+    if (!same) difference = same.error();
+  }
+
+  // After the last frame.
+  Result<> finish() {
+    if (file) {
+      if (auto closed = file->close(); !closed) return closed;
+    }
+    for (std::uint32_t id = 0; expectation && !difference && id < encoders_.size(); ++id) {
+      auto same = expectation->finish(id, replay_.broken_at(id));
+      if (!same) difference = same.error();
+    }
+    if (difference) return std::unexpected(*difference);
+    return {};
+  }
+
+  std::optional<replay::FrameFile> file;
+  std::optional<replay::Expectation> expectation;
+  std::unique_ptr<replay::Broadcast> broadcast;
+  std::optional<Error> difference;
+  std::uint64_t frames = 0;
+
+ private:
+  const replay::Replay& replay_;
+  std::vector<std::array<publish::FrameEncoder, 2>> encoders_;  // styled, raw
+};
+
+Result<double> speed_of(const std::string& text) {
+  if (text == "max") return 0.0;
+  char* end = nullptr;
+  const double speed = std::strtod(text.c_str(), &end);
+  if (*end == '\0' && speed > 0.0 && speed <= 1000.0) return speed;
+  return misuse("--speed is a factor above 0 and up to 1000 such as 1 or 0.5, or max, not '" +
+                text + "'");
+}
+
+// Bits are promised on one instruction set: by default the log's own.
+Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
+  const auto meta = reader.meta().find("isa");
+  const std::string recorded = meta == reader.meta().end() ? "auto" : meta->second;
+  if (!options.isa.empty()) {
+    if (auto set = gp::set_isa(options.isa); !set) return set;
+  } else if (!gp::set_isa(recorded)) {
+    if (auto set = gp::set_isa("auto"); !set) return set;
+  }
+  if (recorded != "auto" && recorded != gp::isa_name()) {
+    spdlog::warn("recorded on {}, replayed on {}: the last bits may differ", recorded,
+                 gp::isa_name());
+  }
+  return {};
+}
+
+void warn_of_gaps(const log::Reader& reader) {
+  constexpr std::array<const char*, 3> kNames{"chunks", "decisions", "published frames"};
+  const auto gaps = reader.gaps();
+  if (!gaps) return;  // open() has read them already
+  for (const log::GapRow& gap : *gaps) {
+    const bool chunks = gap.kind == log::GapRow::Kind::kChunks;
+    const auto owner =
+        chunks ? std::ranges::find(reader.sources(), gap.owner, &log::SourceRow::id)->name
+               : reader.streams()[*reader.place_of_stream(gap.owner)].name;
+    const auto kind = std::min<std::size_t>(static_cast<std::size_t>(gap.kind), 2);
+    spdlog::warn("{} {}: the log lacks {} {} after chunk {}", chunks ? "source" : "stream", owner,
+                 gap.lost, kNames[kind], gap.after_chunk);
+  }
+}
+
+void print_summary(const ReplayOptions& options, const Outputs& outputs, double took_s) {
+  nlohmann::ordered_json line{
+      {"frames", outputs.frames}, {"isa", gp::isa_name()}, {"took_s", took_s}};
+  if (outputs.expectation) {
+    const auto& counts = outputs.expectation->counts();
+    line["compared"] = counts.compared;
+    line["lost"] = counts.lost;
+    line["after_gap"] = counts.after_gap;
+    line["past_end"] = counts.past_end;
+    if (counts.lost + counts.after_gap + counts.past_end > 0) {
+      spdlog::warn("not compared: {} frames that the log lacks, {} after a gap, {} past its end",
+                   counts.lost, counts.after_gap, counts.past_end);
+    }
+    spdlog::info("{} frames are as published, bit for bit", counts.compared);
+  }
+  if (options.json) {
+    std::printf("%s\n", json_text(line).c_str());
+  } else {
+    spdlog::info("{} frames replayed in {:.1f} s on {}", outputs.frames, took_s, gp::isa_name());
+  }
+}
+
+Result<> open_outputs(const ReplayOptions& options, double speed, const log::Reader& reader,
+                      const replay::Replay& replay, Outputs& outputs) {
+  if (options.expect) {
+    auto expectation = replay::Expectation::open(reader);
+    if (!expectation) return std::unexpected(expectation.error());
+    outputs.expectation = std::move(*expectation);
+  }
+  if (!options.out.empty()) {
+    auto file = replay::FrameFile::create(options.out);
+    if (!file) return std::unexpected(file.error());
+    outputs.file = std::move(*file);
+  }
+  if (!options.publish) return {};
+  const auto meta = reader.meta().find("publish_endpoint");
+  std::string endpoint = meta == reader.meta().end() ? "" : meta->second;
+  if (!options.endpoint.empty()) endpoint = options.endpoint;
+  const auto extent = reader.extent();
+  if (!extent) return std::unexpected(extent.error());
+  auto broadcast =
+      replay::Broadcast::open({.endpoint = endpoint,
+                               .log = std::filesystem::path(options.log).filename().string(),
+                               .speed = speed,
+                               .begin_ns = *extent ? (*extent)->first_ns : 0},
+                              replay);
+  if (!broadcast) return std::unexpected(broadcast.error());
+  outputs.broadcast = std::move(*broadcast);
+  nlohmann::ordered_json ready{{"ready", true},
+                               {"publish", outputs.broadcast->endpoint()},
+                               {"replay", options.log},
+                               {"streams", nlohmann::json::array()}};
+  for (const log::StreamRow& row : reader.streams()) ready["streams"].push_back(row.name);
+  std::printf("%s\n", json_text(ready).c_str());
+  std::fflush(stdout);
+  return {};
+}
+
+// Just watching may end at any time; a file or a comparison that is not whole is a failure.
+Result<> ended_early(const ReplayOptions& options, const Outputs& outputs) {
+  const std::string what = fmt::format("interrupted after {} frames", outputs.frames);
+  if (options.expect) return fail(what + ": those after them were not compared");
+  if (!options.out.empty()) return fail(what + ": " + options.out + " holds only those");
+  spdlog::info("{}", what);
+  return {};
+}
+
+Result<> replay(const ReplayOptions& options) {
+  const auto speed = speed_of(options.speed);
+  if (!speed) return std::unexpected(speed.error());
+  const auto files = OutputFiles(options.overwrite)
+                         .reads(options.log)
+                         .writes_any_but_other(options.out, {".bin"})
+                         .check();
+  if (!files) return files;
+  auto reader = log::Reader::open(options.log);
+  if (!reader) return std::unexpected(reader.error());
+  if (auto chosen = choose_isa(options, *reader); !chosen) return chosen;
+  auto opened = replay::Replay::open(*reader);
+  if (!opened) return std::unexpected(opened.error());
+  replay::Replay& replay = **opened;
+  warn_of_gaps(*reader);
+  Outputs outputs(replay);
+  if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
+  const auto extent = reader->extent();
+  if (!extent) return std::unexpected(extent.error());
+  ReplayProgress progress(*extent);
+  const Interrupt interrupt;  // after the progress, whose Ctrl-C it takes over
+  Pacer pacer(options.log, *speed);
+  const auto pace = [&](const log::ChunkRow& chunk) {
+    if (!pacer(chunk)) return false;
+    if (static_cast<pipeline::Direction>(chunk.direction) != pipeline::Direction::kFromDevice) {
+      return true;  // only what a device sent has a time of its own
+    }
+    progress.show(chunk.arrival_ns);
+    if (outputs.broadcast) outputs.broadcast->clock().reached(chunk.arrival_ns);
+    return true;
+  };
+  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, pace);
+  if (!done) return done;
+  if (Interrupt::came()) return ended_early(options, outputs);
+  done = outputs.finish();
+  if (done) print_summary(options, outputs, progress.elapsed_s());
+  return done;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("replay", "Compute a device log's frames again");
+  auto options = std::make_shared<ReplayOptions>();
+  command->add_option("log", options->log, "The device log")->required();
+  command
+      ->add_option("--speed", options->speed,
+                   "Times the recording's pace: 1 as it came; max: as fast as possible")
+      ->capture_default_str();
+  auto* publish =
+      command->add_flag("--publish", options->publish, "Publish where the recorded run did");
+  command->add_option("--endpoint", options->endpoint, "With --publish: publish there instead")
+      ->type_name("ENDPOINT")
+      ->needs(publish);
+  command->add_option("--out", options->out, "Write FRAMES.bin: {u32 length, posed.v1.Frame}...")
+      ->type_name("FILE");
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--expect", options->expect, "Compare with the frames in the log, bit for bit");
+  command->add_option("--isa", options->isa, "portable, avx2 or avx512; default: the log's own");
+  command->add_flag("--json", options->json, "Print the counts as JSON");
+  command->footer(
+      R"(Nothing but the log is needed: it holds what the devices sent, the models, the settings
+and every decision. The same log gives the same bits on one instruction set. --expect ends
+with 1 and names stream, sequence and field of the first difference. A published replay says
+in its stats that it is one; its times are the recording's, on the recording's clock. Nobody
+can control it. Examples:
+  posed replay take1.plog --speed max --expect
+  posed replay take1.plog --speed max --out FRAMES.bin
+  posed replay take1.plog --publish     # and watch it: posed top)");
+  command->callback([options, &exit_code] {
+    const auto done = replay(*options);
+    exit_code = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace posed::cli

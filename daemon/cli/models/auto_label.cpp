@@ -1,0 +1,47 @@
+#include "daemon/cli/models/auto_label.hpp"
+
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "daemon/cli/models/train_gesture.hpp"
+#include "daemon/cli/models/waiting.hpp"
+#include "models/gesture/auto_label.hpp"
+#include "proto/clip/label_file.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::cli {
+
+int auto_label(const AutoLabelOptions& options) {
+  const auto recording =
+      load_recording(options.clip, options.examples, options.rate_hz, options.read);
+  if (!recording) return report(recording.error());
+  const auto proposed = [&] {
+    const Waiting waiting("proposing labels");
+    return gesture::propose_segments(*recording);
+  }();
+  if (!proposed) return report(proposed.error());
+  std::vector<clip::LabelSegment> labels;
+  for (const gesture::Segment& segment : *proposed) {
+    labels.push_back({segment.begin / options.rate_hz, segment.end / options.rate_hz, segment.label,
+                      static_cast<int>(labels.size()) + 1});
+  }
+  if (auto written = clip::write_labels(labels, options.out); !written) {
+    return report(written.error());
+  }
+  const std::size_t examples = recording->segments.size();
+  if (options.json) {
+    const nlohmann::json told{
+        {"examples", examples}, {"segments", labels.size()}, {"out", options.out.string()}};
+    std::printf("%s\n", json_text(told, 2).c_str());
+  } else {
+    std::printf(
+        "%zu segments proposed from %zu examples, written to %s; look through them, two "
+        "gestures of one name in a row look like one\n",
+        labels.size(), examples, options.out.c_str());
+  }
+  return 0;
+}
+
+}  // namespace posed::cli

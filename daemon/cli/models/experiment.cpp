@@ -1,0 +1,91 @@
+#include "daemon/cli/models/experiment.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "daemon/config/toml_reader.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/text/toml.hpp"
+
+namespace posed::cli {
+namespace {
+
+constexpr TomlLimits kExperimentLimits{
+    .what = "experiment file", .bytes = std::size_t{1024} * 1024, .depth = 4, .items = 20'000};
+constexpr std::size_t kMaxClips = 4000;
+
+// A word that must be one of a few.
+template <typename T>
+void read_choice(config::TableReader& reader, const char* key, T& value,
+                 Result<T> (*parse)(std::string_view)) {
+  std::string word;
+  reader.read(key, word);
+  if (word.empty()) return;
+  const auto parsed = parse(word);
+  if (parsed) {
+    value = *parsed;
+  } else {
+    reader.add_error(key, parsed.error().message);
+  }
+}
+
+void read_clip_table(config::TableReader& table, const std::filesystem::path& folder,
+                     Experiment& experiment) {
+  ExperimentClip clip;
+  clip.line = table.line();
+  std::string file;
+  table.require("file", file);
+  table.require("group", clip.group);
+  table.require("motion", clip.motion);
+  clip.file = folder / file;
+  clip.subject = std::filesystem::path(file).stem().string();
+  table.read("subject", clip.subject);
+  experiment.clips.push_back(std::move(clip));
+}
+
+void read_tables(const toml::table& root, const std::filesystem::path& folder,
+                 config::Findings& findings, Experiment& experiment) {
+  config::TableReader reader(root, "", findings);
+  reader.require("target", experiment.target);
+  reader.read("rate_hz", experiment.rate_hz, {10.0, 1000.0});
+  read_choice(reader, "pose_space", experiment.space, motion::space_from_name);
+  read_choice(reader, "mode", experiment.mode, style::mode_from_name);
+  std::string asf;
+  reader.read("skeleton", asf);
+  if (!asf.empty()) experiment.asf = folder / asf;
+  auto clips = reader.tables("clip", kMaxClips);
+  for (config::TableReader& clip : clips) {
+    read_clip_table(clip, folder, experiment);
+    clip.finish();
+  }
+  if (clips.empty() && findings.errors.empty()) {
+    findings.add_error(1, "the experiment names no [[clip]]; list the clips to learn from");
+  }
+  reader.finish();
+}
+
+}  // namespace
+
+Result<Experiment> read_experiment(const std::filesystem::path& path) {
+  const auto root = load_toml(path, kExperimentLimits);
+  if (!root) return misuse(root.error().message, root.error().file, root.error().line);
+  config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
+  Experiment experiment;
+  read_tables(*root, path.parent_path(), findings, experiment);
+  if (findings.errors.empty()) return experiment;
+  return std::unexpected(*std::ranges::min_element(findings.errors, {}, &Error::line));
+}
+
+Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment) {
+  std::vector<style::TrainingClip> clips;
+  for (const ExperimentClip& entry : experiment.clips) {
+    clip::ReadOptions options;
+    if (entry.file.extension() == ".amc") options.asf = experiment.asf;
+    auto clip = clip::read_clip(entry.file, options);
+    if (!clip) return std::unexpected(clip.error());
+    clips.push_back({std::move(*clip), entry.group, entry.subject, entry.motion});
+  }
+  return clips;
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,22 @@
+// Training with a progress bar: what `train style` and the demo share.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "daemon/cli/models/experiment.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::cli {
+
+// Reads the experiment's clips, learns, writes the model to `out` and returns the report that
+// `train --json` prints. A model that is unusable is written only when `force` says so: the
+// report's `written` and `verdict` tell. Draws progress on stderr; Ctrl-C ends it with an error and
+// no file.
+[[nodiscard]] Result<nlohmann::json> train_and_save(const Experiment& experiment,
+                                                    std::uint64_t seed,
+                                                    const std::filesystem::path& out, bool force);
+
+}  // namespace posed::cli

@@ -1,0 +1,168 @@
+#include "daemon/devices/device_supervisor.hpp"
+
+#include <array>
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/devices/calibration.hpp"
+#include "daemon/system/realtime.hpp"
+
+namespace posed::devices {
+namespace {
+
+constexpr std::chrono::milliseconds kTryEvery{400};   // at most 0.5 s apart, the try included
+constexpr std::chrono::milliseconds kLookEvery{200};  // for silence, while a device is there
+// A node that has just come may not open yet: the kernel still finds the device's interfaces, or
+// udev has not given its permissions.
+constexpr std::chrono::milliseconds kTrySoon{50};
+constexpr std::chrono::nanoseconds kSettles = std::chrono::seconds(1);
+
+}  // namespace
+
+bool DeviceSupervisor::wanted(const devices::OpenStream& stream) {
+  return drivers::find_driver(stream.config.driver)->expect != nullptr;
+}
+
+DeviceSupervisor::DeviceSupervisor(devices::OpenStream& stream, SupervisorPorts ports)
+    : stream_(stream),
+      ports_(std::move(ports)),
+      driver_(*drivers::find_driver(stream.config.driver)),
+      thread_([this] { run(); }) {}
+
+DeviceSupervisor::~DeviceSupervisor() {
+  stop();
+  thread_.join();
+}
+
+void DeviceSupervisor::stop() noexcept {
+  stop_.store(true);
+  stream_.ports->cancel();
+  stream_.slot->supervisor->notify();
+}
+
+void DeviceSupervisor::run() {
+  system::name_thread("keep-" + stream_.config.name);
+  while (!stop_.load()) {
+    while (stream_.slot->out.consume([this](drivers::Device* /*device_*/) { take_back(); })) {
+    }
+    if (away_) {
+      look_for_device();
+    } else {
+      write_to_device();
+      watch_silence();
+    }
+    sleep();
+  }
+}
+
+void DeviceSupervisor::sleep() {
+  system::EventFd& wake = *stream_.slot->supervisor;
+  wake.going_to_sleep();
+  if (stream_.slot->out.empty() && !stop_.load()) {
+    // A node that comes is tried at once; where nothing tells of it, at the next turn.
+    const auto turn = !away_ ? kLookEvery : settling() ? kTrySoon : kTryEvery;
+    std::array<pollfd, 3> wait{{{wake.fd(), POLLIN, 0},
+                                {away_ ? hotplug_.poll_fd() : -1, POLLIN, 0},
+                                {writer_ != nullptr ? writer_->waiting_fd() : -1, POLLIN, 0}}};
+    poll(wait.data(), wait.size(), static_cast<int>(turn.count()));
+    if ((wait[0].revents & POLLIN) != 0) {
+      std::uint64_t rung = 0;
+      [[maybe_unused]] const ssize_t cleared = ::read(wake.fd(), &rung, sizeof rung);
+    }
+    if ((wait[1].revents & POLLIN) != 0 && hotplug_.take()) {
+      settled_ns_ = ports_.clock() + kSettles.count();
+    }
+  }
+  wake.awake();
+}
+
+bool DeviceSupervisor::settling() const { return ports_.clock() < settled_ns_; }
+
+// Closes the link: only then can the port be opened again.
+void DeviceSupervisor::take_back() {
+  writer_ = nullptr;
+  device_.reset();
+  away_ = true;
+  stream_.present->gone();
+  const std::string why = std::exchange(asked_back_, false)
+                              ? "nothing usable came from the device for a while"
+                              : "the link to the device is lost";
+  ports_.tell(v1::Event::KIND_LOST, why + "; posed looks for it until it is back");
+  told_.clear();
+}
+
+void DeviceSupervisor::watch_silence() {
+  if (device_->reopen_after_s <= 0.0 || asked_back_) return;
+  const auto& reader = stream_.counters.reader;
+  if (!reader.connected.load()) return;
+  const std::int64_t silent_ns = ports_.clock() - reader.heard_ns.load();
+  if (seconds(silent_ns) < device_->reopen_after_s) return;
+  asked_back_ = true;
+  stream_.slot->give_back.store(true);
+  ports_.reader->call();
+}
+
+// While a write takes its time the queue behind it gives old messages up, which is told.
+void DeviceSupervisor::write_to_device() {
+  if (writer_ == nullptr) return;
+  writer_->write_waiting();
+  const std::uint64_t dropped = writer_->dropped();
+  if (dropped == drops_told_) return;
+  ports_.tell(v1::Event::KIND_WARNING,
+              std::to_string(dropped - std::exchange(drops_told_, dropped)) +
+                  " messages to the device were given up: it takes them too slowly; send fewer");
+}
+
+void DeviceSupervisor::look_for_device() {
+  auto found = try_open();
+  if (stop_.load()) return;
+  if (!found) {
+    const std::string text = found.error().text();
+    if (text == told_ || settling()) return;  // said once, and not of a device that is just coming
+    told_ = text;
+    ports_.tell(v1::Event::KIND_WARNING,
+                found_once_ ? text : text + "; posed looks for it until it is there");
+    return;
+  }
+  found_once_ = true;
+  device_ = std::move(*found);
+  writer_ = dynamic_cast<drivers::ColdWriter*>(device_->transport.get());
+  drops_told_ = 0;
+  away_ = false;
+  told_.clear();
+  for (const std::string& warning : device_->warnings) {
+    ports_.tell(v1::Event::KIND_WARNING, warning);
+  }
+  stream_.present->connected(device_->description);
+  stream_.slot->give_back.store(false);  // that was about the one before
+  static_cast<void>(stream_.slot->in.push(device_.get()));
+  ports_.reader->call();
+  ports_.tell(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
+}
+
+// A device that is not what the stream was set up for would silently mean other joints.
+Result<std::unique_ptr<drivers::Device>> DeviceSupervisor::try_open() {
+  auto opened = driver_.open(stream_.config.options, *stream_.ports);
+  if (!opened) return std::unexpected(opened.error());
+  auto device = std::make_unique<drivers::Device>(std::move(*opened));
+  const drivers::Description& is = device->description;
+  const drivers::Description& was = stream_.device.description;
+  const auto id = [](const drivers::Description& d) { return d.skeleton ? d.skeleton->id : 0; };
+  if (id(is) != id(was) || is.samples.names != was.samples.names) {
+    return fail("another device answers (" + is.identity +
+                "); connect the one that the stream began with, or start posed again");
+  }
+  if (const auto in_use = stream_.present->calibration(); !in_use.toml.empty()) {
+    const auto fits = compile_calibration(is, in_use.toml, in_use.file);
+    if (!fits) return std::unexpected(fits.error());
+  }
+  if (auto started = device->transport->start(ports_.clock()); !started) {
+    return std::unexpected(started.error());
+  }
+  return device;
+}
+
+}  // namespace posed::devices

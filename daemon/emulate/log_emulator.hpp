@@ -1,0 +1,45 @@
+// LogEmulator: a recorded device that answers again. The driver's emulator speaks with the host as
+// the device did; once the host has started the stream, it is the log's bytes that come, at the
+// times they came.
+#pragma once
+
+#include <memory>
+
+#include "drivers/emulator.hpp"
+#include "drivers/transport/replay.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::emulate {
+
+class LogEmulator final : public drivers::Emulator {
+ public:
+  // `speaker` may be null: a device that streams by itself and hears nothing.
+  LogEmulator(drivers::Recording recording, std::unique_ptr<drivers::Emulator> speaker);
+
+  void pose(const HandAngles&) override {}
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
+  [[nodiscard]] std::int64_t next_due_ns() const override;
+  void emit(std::int64_t now_ns, Bytes& out) override;
+
+  [[nodiscard]] bool done() const noexcept { return next_ == recording_.count(); }
+
+ private:
+  [[nodiscard]] bool streams() const {
+    return speaker_ == nullptr || speaker_->next_due_ns() != kNoTime_ns;
+  }
+
+  drivers::Recording recording_;
+  std::unique_ptr<drivers::Emulator> speaker_;
+  std::size_t next_ = 0;
+  std::int64_t start_ns_ = 0;  // device time of the first chunk
+};
+
+// The chunks that a stream of the log received; without a name the log has to have one stream only.
+struct LoggedDevice {
+  std::string stream, driver, text;
+  drivers::Recording recording;
+};
+[[nodiscard]] Result<LoggedDevice> read_logged_device(const std::string& log,
+                                                      const std::string& stream);
+
+}  // namespace posed::emulate

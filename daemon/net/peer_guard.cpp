@@ -1,0 +1,282 @@
+#include "daemon/net/peer_guard.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+
+#include <malloc.h>
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+
+#include "daemon/net/received_bytes.hpp"
+#include "daemon/net/zap_authenticator.hpp"
+#include "daemon/system/clock.hpp"
+#include "daemon/system/process.hpp"
+#include "proto/frame/time.hpp"
+
+namespace posed::net {
+namespace {
+
+// A flood of empty parts fills about 0.7 GB a second, so peers are looked at often: 64 a tick, all
+// of them when the process' memory has grown.
+constexpr std::int64_t kGuardTick_ns = kNanosPerSecond / 100;
+constexpr std::int64_t kPeersATick = 64;
+constexpr std::uint64_t kNoticeableGrowth = 4 * 1024 * 1024;  // bytes
+
+constexpr std::size_t kMostSubscribers = 1024;
+constexpr std::size_t kMostControllers = 64;
+constexpr std::size_t kReservedFiles = 16;  // for devices, logs and models that come later
+constexpr std::size_t kFewestPeers = 4;
+
+std::uint64_t cookie_of(int fd) {
+  std::uint64_t cookie = 0;
+  socklen_t size = sizeof cookie;
+  return getsockopt(fd, SOL_SOCKET, SO_COOKIE, &cookie, &size) == 0 ? cookie : 0;
+}
+
+}  // namespace
+
+Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages, int buffer_bytes) {
+  const std::string_view largest(reinterpret_cast<const char*>(&part_bytes), sizeof part_bytes);
+  for (const Result<>& set :
+       {set_option(socket, ZMQ_MAXMSGSIZE, largest), set_option(socket, ZMQ_RCVHWM, messages),
+        set_option(socket, ZMQ_RCVBUF, buffer_bytes)}) {
+    if (!set) return set;
+  }
+  return {};
+}
+
+int source_of(const Message& message) {
+  const std::string_view text = message.property("__fd");  // libzmq's name for ZMQ_SRCFD
+  int fd = -1;
+  std::from_chars(text.data(), text.data() + text.size(), fd);
+  return fd;
+}
+
+Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
+                                                   const PeerLimits& limits) {
+  static std::atomic<unsigned> number{0};  // a context may have several guards
+  const std::string endpoint = fmt::format("inproc://posed.peers.{}", ++number);
+  if (zmq_socket_monitor(socket, endpoint.c_str(), ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED) !=
+      0) {
+    return fail(std::string("cannot watch connections: ") + zmq_strerror(zmq_errno()));
+  }
+  auto monitor = open_socket(context, ZMQ_PAIR);
+  if (!monitor) return std::unexpected(monitor.error());
+  // Without a limit: libzmq's own thread would wait here for us to read.
+  if (auto set = set_option(monitor->get(), ZMQ_RCVHWM, 0); !set) {
+    return std::unexpected(set.error());
+  }
+  if (auto done = connect_socket(monitor->get(), endpoint); !done) {
+    return std::unexpected(done.error());
+  }
+  int fd = -1;
+  std::size_t size = sizeof fd;
+  if (zmq_getsockopt(monitor->get(), ZMQ_FD, &fd, &size) != 0) {
+    return fail("ZeroMQ names no descriptor to wait for");
+  }
+  auto wake = system::EventFd::open();
+  if (!wake) return std::unexpected(wake.error());
+  auto poller = system::Poller::open();
+  if (!poller) return std::unexpected(poller.error());
+  for (const Result<>& added : {(*poller)->add(**wake), (*poller)->add(fd, 0)}) {
+    if (!added) return std::unexpected(added.error());
+  }
+  return std::unique_ptr<PeerGuard>(
+      new PeerGuard(socket, std::move(*monitor), std::move(*wake), std::move(*poller), limits));
+}
+
+PeerGuard::PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::EventFd> wake,
+                     std::unique_ptr<system::Poller> poller, const PeerLimits& limits)
+    : socket_(socket),
+      monitor_(std::move(monitor)),
+      wake_(std::move(wake)),
+      poller_(std::move(poller)),
+      limits_(limits),
+      told_ns_(std::numeric_limits<std::int64_t>::min() / 2),
+      thread_([this] { serve(); }) {}
+
+PeerGuard::~PeerGuard() {
+  stop_.store(true);
+  wake_->notify();
+  thread_.join();
+  zmq_socket_monitor(socket_, nullptr, 0);
+}
+
+void PeerGuard::serve() {
+  pthread_setname_np(pthread_self(), "posed-guard");
+  while (!stop_.load()) {
+    wake_->going_to_sleep();
+    std::int64_t wait_ns = system::kForever_ns;
+    {
+      const std::scoped_lock lock(mutex_);
+      const std::int64_t now_ns = system::monotonic_ns();
+      const std::int64_t due_ns = turn(now_ns);
+      if (due_ns != system::kForever_ns) wait_ns = due_ns - now_ns;
+    }
+    if (!stop_.load()) static_cast<void>(poller_->wait(wait_ns));
+    wake_->awake();
+  }
+}
+
+std::int64_t PeerGuard::turn(std::int64_t now_ns) {
+  hear_monitor();
+  if (peers_.empty()) return system::kForever_ns;
+  // Memory that was freed stays resident for a while, so its growth alone does not tell.
+  const std::int64_t pause_ns =
+      kGuardTick_ns * (1 + static_cast<std::int64_t>(peers_.size()) / kPeersATick);
+  if (const std::uint64_t resident = system::resident_bytes();
+      resident > resident_before_ + kNoticeableGrowth || now_ns >= inspected_ns_ + pause_ns) {
+    resident_before_ = resident;
+    inspected_ns_ = now_ns;
+    inspect_all();
+  }
+  return now_ns + kGuardTick_ns;
+}
+
+// An event is two parts: number (16 bits) and descriptor (32), then the endpoint.
+void PeerGuard::hear_monitor() {
+  Message part;
+  while (part.receive(monitor_.get())) {
+    std::uint16_t event = 0;
+    std::int32_t fd = -1;
+    const std::string_view text = part.text();
+    if (text.size() == sizeof event + sizeof fd) {
+      std::memcpy(&event, text.data(), sizeof event);
+      std::memcpy(&fd, text.data() + sizeof event, sizeof fd);
+    }
+    while (part.more() && part.receive(monitor_.get(), 0)) {
+    }
+    if (event != ZMQ_EVENT_ACCEPTED && event != ZMQ_EVENT_DISCONNECTED) continue;
+    if (peers_.erase(fd) > 0) gone_.push_back(fd);
+    if (event == ZMQ_EVENT_ACCEPTED) admit(fd);
+  }
+}
+
+void PeerGuard::admit(int fd) {
+  peers_[fd].cookie = cookie_of(fd);
+  if (peers_.size() > limits_.most_peers) cut_now(fd, "came when there were too many");
+}
+
+void PeerGuard::inspect_all() {
+  std::uint64_t unheard = 0;
+  std::uint64_t most = 0;
+  int most_fd = -1;
+  for (const auto& [fd, peer] : peers_) {
+    const std::uint64_t bytes = received_bytes(fd);
+    const std::uint64_t since = bytes - std::min(bytes, peer.heard);
+    if (peer.is_cut) continue;
+    unheard += since;
+    if (since > most) {
+      most = since;
+      most_fd = fd;
+    }
+  }
+  if (most <= limits_.most_unheard && unheard <= limits_.most_unheard_of_all) return;
+  cut_offender(most_fd, "sent much and ended no message");
+  malloc_trim(0);
+  resident_before_ = 0;  // it may not have been the only one: look again at the next tick
+}
+
+bool PeerGuard::knows(int fd) {
+  const std::scoped_lock lock(mutex_);
+  if (fd < 0 || peers_.contains(fd)) return fd >= 0;
+  hear_monitor();  // it may have come just now
+  wake_->notify();
+  return peers_.contains(fd);
+}
+
+void PeerGuard::heard(int fd, std::string_view user) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = peers_.find(fd);
+  if (found == peers_.end()) return;
+  Peer& peer = found->second;
+  peer.heard = received_bytes(fd);
+  if (!peer.spoke) peer.user = user;
+  peer.spoke = true;
+}
+
+std::vector<int> PeerGuard::take_gone() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(gone_, {});
+}
+
+std::size_t PeerGuard::peers() const {
+  const std::scoped_lock lock(mutex_);
+  return peers_.size();
+}
+
+std::uint64_t PeerGuard::cuts() const {
+  const std::scoped_lock lock(mutex_);
+  return cuts_;
+}
+
+void PeerGuard::cut(int fd, const char* why) {
+  const std::scoped_lock lock(mutex_);
+  cut_offender(fd, why);
+}
+
+void PeerGuard::cut_offender(int fd, const char* why) {
+  cut_now(fd, why);
+  if (limits_.authenticator != nullptr) limits_.authenticator->slow_down();
+}
+
+void PeerGuard::cut_now(int fd, const char* why) {
+  const auto found = peers_.find(fd);
+  if (found == peers_.end() || found->second.is_cut) return;
+  found->second.is_cut = true;
+  // libzmq's thread may have closed the connection and the number may name another thing by now.
+  if (found->second.cookie == 0 || cookie_of(fd) != found->second.cookie) return;
+  shutdown(fd, SHUT_RDWR);
+  tell(why);
+}
+
+void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& allowed) {
+  const std::scoped_lock lock(mutex_);
+  hear_monitor();
+  for (const auto& [fd, peer] : peers_) {
+    if (!peer.spoke || !allowed(peer.user)) {
+      cut_now(fd, "has lost its right, or did not say its name");
+    }
+  }
+}
+
+void PeerGuard::tell(const char* why) {
+  ++cuts_;
+  ++untold_;
+  const std::int64_t now_ns = system::monotonic_ns();
+  if (now_ns < told_ns_ + kNanosPerSecond) return;  // a flood is one line a second
+  told_ns_ = now_ns;
+  if (untold_ == 1) {
+    spdlog::warn("a connection to the {} socket was cut: it {}", limits_.name, why);
+  } else {
+    spdlog::warn("{} connections to the {} socket were cut; the last {}", untold_, limits_.name,
+                 why);
+  }
+  untold_ = 0;
+}
+
+PeerShares peer_shares() {
+  rlimit limit{};
+  getrlimit(RLIMIT_NOFILE, &limit);
+  std::error_code none;
+  const auto open = static_cast<std::size_t>(
+      std::distance(std::filesystem::directory_iterator("/proc/self/fd", none), {}));
+  const std::size_t used = open + kReservedFiles;
+  const auto files = static_cast<std::size_t>(limit.rlim_cur);
+  const std::size_t free = files > used ? files - used : 0;
+  return {.publish = std::clamp(free * 3 / 4, kFewestPeers, kMostSubscribers),
+          .control = std::clamp(free / 4, kFewestPeers, kMostControllers)};
+}
+
+void raise_file_limit() noexcept {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+}  // namespace posed::net

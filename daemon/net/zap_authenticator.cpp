@@ -1,0 +1,125 @@
+#include "daemon/net/zap_authenticator.hpp"
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "daemon/system/clock.hpp"
+#include "proto/frame/time.hpp"
+
+namespace posed::net {
+namespace {
+
+constexpr const char* kZapEndpoint = "inproc://zeromq.zap.01";
+constexpr long kPause_ms = 50;
+constexpr std::size_t kLongestRequest = 16;  // parts; RFC 27 needs 7 for CURVE
+
+// All parts of one message; those beyond the longest request are left out.
+std::vector<std::string> read_parts(void* door, Message& part) {
+  std::vector<std::string> parts;
+  do {
+    if (parts.size() < kLongestRequest) parts.emplace_back(part.text());
+  } while (part.more() && part.receive(door, 0));
+  return parts;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ZapAuthenticator>> ZapAuthenticator::start(void* context,
+                                                                  std::optional<AccessList> list) {
+  auto door = open_socket(context, ZMQ_REP);
+  auto stop_in = open_socket(context, ZMQ_PAIR);
+  auto stop_out = open_socket(context, ZMQ_PAIR);
+  for (const auto* socket : {&door, &stop_in, &stop_out}) {
+    if (!*socket) return std::unexpected(socket->error());
+  }
+  const std::string bell = "inproc://posed.authenticator";
+  if (auto done = bind_socket(door->get(), kZapEndpoint); !done) {
+    return fail("this ZeroMQ context has a authenticator already");
+  }
+  if (auto done = bind_socket(stop_in->get(), bell); !done) return std::unexpected(done.error());
+  if (auto done = connect_socket(stop_out->get(), bell); !done) {
+    return std::unexpected(done.error());
+  }
+  return std::unique_ptr<ZapAuthenticator>(new ZapAuthenticator(
+      std::move(*door), std::move(*stop_in), std::move(*stop_out), std::move(list)));
+}
+
+ZapAuthenticator::ZapAuthenticator(Socket door, Socket stop_in, Socket stop_out,
+                                   std::optional<AccessList> list)
+    : door_(std::move(door)),
+      stop_in_(std::move(stop_in)),
+      stop_out_(std::move(stop_out)),
+      list_(std::move(list)),
+      thread_([this] { serve(); }) {}
+
+ZapAuthenticator::~ZapAuthenticator() {
+  zmq_send(stop_out_.get(), "", 0, 0);
+  thread_.join();
+}
+
+ZapAuthenticator::Change ZapAuthenticator::replace(AccessList list) {
+  const std::scoped_lock lock(mutex_);
+  if (!list_) return {};
+  const Change change{list_->loses_someone(list, Domain::kPublish)};
+  list_ = std::move(list);
+  return change;
+}
+
+bool ZapAuthenticator::allows(std::string_view user_id, Domain domain) const {
+  const std::scoped_lock lock(mutex_);
+  return !list_ || list_->find(user_id, domain) != nullptr;
+}
+
+void ZapAuthenticator::serve() {
+  std::array<zmq_pollitem_t, 2> wait{
+      {{door_.get(), 0, ZMQ_POLLIN, 0}, {stop_in_.get(), 0, ZMQ_POLLIN, 0}}};
+  for (;;) {
+    if (zmq_poll(wait.data(), 2, -1) < 0) {
+      if (zmq_errno() == EINTR) continue;
+      return;  // the context is going
+    }
+    if ((wait[1].revents & ZMQ_POLLIN) != 0) return;
+    Message part;
+    if ((wait[0].revents & ZMQ_POLLIN) != 0 && part.receive(door_.get())) {
+      answer(part);
+      pause();
+    }
+  }
+}
+
+void ZapAuthenticator::slow_down() noexcept {
+  slow_until_ns_.store(system::monotonic_ns() + kNanosPerSecond);
+}
+
+// What comes meanwhile waits in the socket; only the bell that ends the thread is heard.
+void ZapAuthenticator::pause() {
+  if (system::monotonic_ns() >= slow_until_ns_.load()) return;
+  zmq_pollitem_t bell{stop_in_.get(), 0, ZMQ_POLLIN, 0};
+  zmq_poll(&bell, 1, kPause_ms);
+}
+
+bool ZapAuthenticator::welcomes(const ZapRequest& request) const {
+  if (!request.domain) return false;
+  const std::scoped_lock lock(mutex_);
+  if (!list_) return request.mechanism == "NULL";
+  return !request.key_z85.empty() && list_->find(request.key_z85, *request.domain) != nullptr;
+}
+
+void ZapAuthenticator::answer(Message& part) {
+  const auto request = read_zap_request(read_parts(door_.get(), part));
+  const bool welcome = request && welcomes(*request);
+  if (!welcome) refused_.fetch_add(1);
+  // version, request id, status, text, user id, metadata
+  const std::array<std::string_view, 6> reply{"1.0",
+                                              request ? std::string_view(request->id) : "",
+                                              welcome ? "200" : "400",
+                                              welcome ? "welcome" : "not on the allow-list",
+                                              welcome ? std::string_view(request->key_z85) : "",
+                                              ""};
+  for (std::size_t i = 0; i < reply.size(); ++i) {
+    (void)send_part(door_.get(), reply[i], i + 1 < reply.size());
+  }
+}
+
+}  // namespace posed::net

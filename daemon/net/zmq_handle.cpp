@@ -1,0 +1,63 @@
+#include "daemon/net/zmq_handle.hpp"
+
+#include <array>
+#include <cerrno>
+
+namespace posed::net {
+namespace {
+
+std::string last_error() { return zmq_strerror(zmq_errno()); }
+
+}  // namespace
+
+Result<Context> open_context() {
+  Context context(zmq_ctx_new());
+  if (!context) return fail("ZeroMQ does not start: " + last_error());
+  return context;
+}
+
+Result<Socket> open_socket(void* context, int type) {
+  Socket socket(zmq_socket(context, type));
+  if (!socket) return fail("ZeroMQ cannot open a socket: " + last_error());
+  if (auto set = set_option(socket.get(), ZMQ_LINGER, 0); !set) return std::unexpected(set.error());
+  return socket;
+}
+
+Result<> set_option(void* socket, int option, int value) {
+  if (zmq_setsockopt(socket, option, &value, sizeof value) == 0) return {};
+  return fail("ZeroMQ refuses socket option " + std::to_string(option) + ": " + last_error());
+}
+
+Result<> set_option(void* socket, int option, std::string_view value) {
+  if (zmq_setsockopt(socket, option, value.data(), value.size()) == 0) return {};
+  return fail("ZeroMQ refuses socket option " + std::to_string(option) + ": " + last_error());
+}
+
+Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
+  if (zmq_bind(socket, endpoint.c_str()) != 0) {
+    if (zmq_errno() == EADDRINUSE) {
+      return fail(endpoint +
+                  " is in use: another posed may be running; stop it or choose another"
+                  " endpoint");
+    }
+    return fail("cannot listen on '" + endpoint + "': " + last_error() +
+                "; an endpoint reads like tcp://127.0.0.1:5570");
+  }
+  std::array<char, 512> bound{};
+  std::size_t size = bound.size();
+  if (zmq_getsockopt(socket, ZMQ_LAST_ENDPOINT, bound.data(), &size) != 0) return endpoint;
+  return std::string(bound.data());
+}
+
+Result<> connect_socket(void* socket, const std::string& endpoint) {
+  if (zmq_connect(socket, endpoint.c_str()) == 0) return {};
+  return misuse("cannot connect to '" + endpoint + "': " + last_error() +
+                "; an endpoint reads like tcp://127.0.0.1:5570");
+}
+
+bool send_part(void* socket, std::string_view bytes, bool more) noexcept {
+  const int flags = ZMQ_DONTWAIT | (more ? ZMQ_SNDMORE : 0);
+  return zmq_send(socket, bytes.data(), bytes.size(), flags) >= 0;
+}
+
+}  // namespace posed::net

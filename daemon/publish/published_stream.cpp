@@ -1,0 +1,123 @@
+#include "daemon/publish/published_stream.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace posed::publish {
+namespace {
+
+v1::Percentiles percentiles(LatencyHistogram& histogram) {
+  v1::Percentiles message;
+  message.set_p50_us(static_cast<float>(histogram.percentile_us(0.5)));
+  message.set_p99_us(static_cast<float>(histogram.percentile_us(0.99)));
+  message.set_max_us(static_cast<float>(histogram.max_us()));
+  histogram.clear();
+  return message;
+}
+
+// A stage that did not see the frame left no stamp.
+void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t to_ns) noexcept {
+  if (from_ns != kNoTime_ns && to_ns != kNoTime_ns) histogram.add(to_ns - from_ns);
+}
+
+// The greeting of what is no glove would be a whole file's header.
+void tell_device(const drivers::Description& device, v1::StreamStats& stats) {
+  const drivers::Driver* driver = drivers::find_driver(device.driver);
+  stats.set_identity(device.identity);
+  if (driver != nullptr && driver->glove_model != nullptr) stats.set_greeting(device.text);
+}
+
+constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "ended"};
+
+}  // namespace
+
+Channel::Channel(const std::string& name, const StreamInfo& info)
+    : pose_topic("pose/" + name),
+      skeleton_topic("skeleton/" + name),
+      sensor_topic("sensor/" + name),
+      event_topic("event/" + name),
+      frames(name),
+      samples(name, info.description.samples) {
+  if (info.description.skeleton) {
+    skeleton = skeleton_message(name, *info.description.skeleton, info.rate_hz);
+  }
+}
+
+PublishedStream::PublishedStream(StreamInfo stream_info)
+    : info(std::move(stream_info)), styled(info.name, info) {
+  if (info.raw) raw.emplace(info.name + "-raw", info);
+  now_.model = info.model;
+}
+
+void PublishedStream::measure(const Frame& frame, const StageStamps& stamps) noexcept {
+  if (frame.quality == Quality::kStale) return;
+  const std::int64_t arrival_ns = frame.header.arrival_ns;
+  add_between(decode_, arrival_ns, stamps.decoded_ns);
+  add_between(style_, stamps.decoded_ns, stamps.styled_ns);
+  add_between(publish_, arrival_ns, stamps.published_ns);
+}
+
+void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
+  measure(frame, stamps);
+  const std::scoped_lock lock(mutex_);
+  ++now_.frames;
+  now_.lag_frames = frame.lag_frames;
+  now_.lag_ms = frame.lag_ms;
+  now_.label = frame.label;
+  now_.label_probability = frame.label_probability;
+  now_.source = frame.source;
+  now_.clock = frame.header.clock;
+}
+
+void PublishedStream::count_sample() {
+  const std::scoped_lock lock(mutex_);
+  ++now_.samples;
+}
+
+void PublishedStream::set_model(std::string name) {
+  const std::scoped_lock lock(mutex_);
+  now_.model = std::move(name);
+}
+
+void PublishedStream::fill(v1::StreamStats& stats) const {
+  const auto& reader = info.counters->reader;
+  const auto& pipeline = info.counters->pipeline;
+  stats.set_stream(info.name);
+  stats.set_driver(info.description.driver);
+  stats.set_state(kStateNames[static_cast<std::size_t>(pipeline.state.load())]);
+  stats.set_dropped(reader.dropped.load() + pipeline.dropped.load());
+  stats.set_shed(pipeline.shed.load());
+  stats.clear_outcome();
+  for (const auto& outcome : reader.outcome) stats.add_outcome(outcome.load());
+  stats.set_alpha(pipeline.alpha.load());
+  stats.set_alpha_target(pipeline.alpha_target.load());
+  const std::int64_t link_ns = reader.link_ns.load();
+  const bool begun = link_ns != kNoTime_ns;  // until the reader has, nobody is missed
+  stats.set_away(info.comes_and_goes && begun && !reader.connected.load());
+  stats.set_connections(reader.connections.load());
+  stats.set_link_ns(begun ? link_ns : 0);
+  if (info.present) tell_device(*info.present->description(), stats);
+  const std::scoped_lock lock(mutex_);
+  stats.set_frames(now_.frames);
+  stats.set_samples(now_.samples);
+  stats.set_model(now_.model);
+  stats.set_lag_frames(now_.lag_frames);
+  stats.set_lag_ms(now_.lag_ms);
+  stats.set_label(std::string(now_.label.begin(), std::ranges::find(now_.label, '\0')));
+  stats.set_label_probability(now_.label_probability);
+  stats.set_source(static_cast<v1::Source>(now_.source));
+  if (now_.clock.valid) stats.set_clock_offset_ns(now_.clock.offset_ns);
+  stats.set_clock_drift_ppm(now_.clock.drift_ppm);
+}
+
+void PublishedStream::report(v1::StreamStats& stats, double seconds_since) {
+  fill(stats);
+  const auto frames = static_cast<double>(stats.frames() - frames_reported_);
+  stats.set_rate_hz(seconds_since > 0.0 ? static_cast<float>(frames / seconds_since) : 0.0F);
+  frames_reported_ = stats.frames();
+  *stats.mutable_decode() = percentiles(decode_);
+  *stats.mutable_style() = percentiles(style_);
+  *stats.mutable_publish() = percentiles(publish_);
+}
+
+}  // namespace posed::publish

@@ -1,0 +1,76 @@
+// PublishedStream: what the publisher keeps of one stream: its topics, its reused messages, its
+// counts.
+#pragma once
+
+#include <array>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/publish/encode.hpp"
+#include "daemon/publish/histogram.hpp"
+#include "daemon/publish/publisher.hpp"
+#include "daemon/publish/shed_tally.hpp"
+
+namespace posed::publish {
+
+// The topics and frame message under one published name; a stream has a second one for its raw
+// input.
+struct Channel {
+  Channel(const std::string& name, const StreamInfo& info);
+
+  std::string pose_topic, skeleton_topic, sensor_topic, event_topic;
+  FrameEncoder frames;
+  SampleEncoder samples;
+  std::optional<v1::Skeleton> skeleton;
+  // When it is to be sent next: at once when somebody subscribes, but not over and over.
+  std::int64_t skeleton_sent_ns = 0;
+  std::int64_t skeleton_due_ns = 0;
+};
+
+// Publisher thread, but for set_model() and fill(): any thread.
+class PublishedStream {
+ public:
+  explicit PublishedStream(StreamInfo stream_info);
+
+  // A styled frame goes out with these stamps. Its times go into the percentiles of this second;
+  // those of stale frames are old and are left out.
+  void count(const Frame& frame, const StageStamps& stamps);
+  void count_sample();
+  void set_model(std::string name);
+
+  // What is so at this moment: all of `stats` but rates and percentiles, which are a second's.
+  void fill(v1::StreamStats& stats) const;
+  // The same with the rates and percentiles of the second that ends here; begins the next one.
+  void report(v1::StreamStats& stats, double seconds_since);
+
+  StreamInfo info;
+  Channel styled;
+  std::optional<Channel> raw;
+  ShedTally shed;
+
+ private:
+  // What fill() reads while the publisher goes on.
+  struct Now {
+    std::uint64_t frames = 0;
+    std::uint64_t samples = 0;
+    std::string model;
+    // Of the last frame.
+    std::uint16_t lag_frames = 0;
+    float lag_ms = 0.0F;
+    std::array<char, kMaxLabel> label{};
+    float label_probability = 0.0F;
+    Source source = Source::kDevice;
+    ClockMapping clock;
+  };
+
+  void measure(const Frame& frame, const StageStamps& stamps) noexcept;
+
+  mutable std::mutex mutex_;
+  Now now_;  // under mutex_
+  std::uint64_t frames_reported_ = 0;
+  LatencyHistogram decode_, style_, publish_;
+};
+
+}  // namespace posed::publish

@@ -1,0 +1,153 @@
+// The rings behind RecordSink: the hot threads' end puts records in, the recorder thread takes them
+// out. Each stream has a share of every ring, so that none can cost another its records. What does
+// not fit is counted, and the next record of the same stream that does fit carries the count, so
+// that the gap stands in the log where it happened.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include <boost/lockfree/spsc_queue.hpp>
+
+#include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/record_sink.hpp"
+#include "daemon/record/record_ring.hpp"
+#include "proto/log/rows.hpp"
+
+namespace posed::record {
+
+struct ChunkHeader {
+  std::uint32_t bytes = 0;
+  std::uint32_t stream = 0;
+  std::uint8_t socket = 0;
+  pipeline::Direction direction = pipeline::Direction::kFromDevice;
+  std::int64_t arrival_ns = 0;
+  pipeline::Position next{};
+  std::uint64_t lost_before = 0;
+};
+
+struct FrameHeader {
+  std::uint32_t bytes = 0;
+  std::uint32_t stream = 0;
+  bool raw = false;
+  std::uint64_t sequence = 0;
+  std::uint64_t lost_before = 0;
+};
+
+// Stands for no frame: a later one than any.
+inline constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
+
+// The first frame of its stream that a decision concerns. RT-safe.
+[[nodiscard]] inline std::uint64_t first_frame_of(const pipeline::Decision& decision) noexcept {
+  const bool of_samples = decision.kind == pipeline::Decision::Kind::kShedSamples;
+  return of_samples ? kNoFrame : decision.sequence;
+}
+
+struct DecisionRecord {
+  pipeline::Decision decision;
+  std::uint64_t lost_before = 0;
+  std::uint64_t lost_from_frame = 0;  // the first frame that one of them may concern
+};
+
+// What one stream may have in the rings.
+struct RingSizes {
+  std::size_t chunk_bytes = 0;
+  std::size_t frame_bytes = 0;  // 0: published frames are not wanted
+  std::size_t decisions = 0;
+};
+
+class RecordRings final : public pipeline::RecordSink {
+ public:
+  // A share for each stream, in their order. Frames are wanted of all streams or of none.
+  explicit RecordRings(const std::vector<RingSizes>& shares);
+
+  // RecordSink, for the hot threads.
+  void chunk(std::uint32_t stream, std::uint8_t socket, pipeline::Direction direction,
+             std::int64_t arrival_ns, const pipeline::Position& next,
+             std::span<const std::byte> bytes) noexcept override;
+  void decision(const pipeline::Decision& decision) noexcept override;
+  [[nodiscard]] bool wants_published() const noexcept override { return wants_published_; }
+  void published(std::uint32_t stream, std::uint64_t sequence, bool raw,
+                 std::span<const std::byte> bytes) noexcept override;
+  void unpublished(std::uint32_t stream) noexcept override;
+  void keep_model(std::span<const std::byte> bytes) override;
+
+  // The recorder thread's end: each(header, bytes) or each(record) for what is there now.
+  template <typename Each>
+  void drain_chunks(Each&& each) {
+    chunks_.drain([&](const ChunkHeader& header, std::span<const std::byte> bytes) {
+      give_back(header.stream, GapKind::kChunks, chunks_.size_of(header));
+      each(header, bytes);
+    });
+  }
+  template <typename Each>
+  void drain_frames(Each&& each) {
+    frames_.drain([&](const FrameHeader& header, std::span<const std::byte> bytes) {
+      give_back(header.stream, GapKind::kFrames, frames_.size_of(header));
+      each(header, bytes);
+    });
+  }
+  template <typename Each>
+  void drain_decisions(Each&& each) {
+    DecisionRecord record;
+    for (auto n = decisions_.read_available(); n > 0 && decisions_.pop(record); --n) {
+      give_back(record.decision.stream, GapKind::kDecisions, 1);
+      each(record);
+    }
+  }
+  [[nodiscard]] std::vector<std::vector<std::byte>> take_models();
+
+  using GapKind = log::GapRow::Kind;
+  // Records of one kind that did not fit since the start. Any thread.
+  [[nodiscard]] std::uint64_t overflowed(std::uint32_t stream, GapKind kind) const noexcept;
+  // Those of them that no later record carries; meaningful once the producers have stopped.
+  [[nodiscard]] std::uint64_t uncarried(std::uint32_t stream, GapKind kind) const noexcept;
+  // The first frame that a decision which no later one carries may concern.
+  [[nodiscard]] std::uint64_t uncarried_from_frame(std::uint32_t stream) const noexcept;
+  [[nodiscard]] std::size_t streams() const noexcept { return lanes_.size(); }
+
+ private:
+  // One stream's end of one ring. The share, carried and lost_from_frame belong to the one
+  // producer of its kind; total is written by any; taken by the recorder; all but the share are
+  // read by any.
+  struct Lane {
+    explicit Lane(std::size_t size) noexcept : share(size, taken) {}
+    std::atomic<std::uint64_t> taken{0};
+    pipeline::RingShare share;
+    std::atomic<std::uint64_t> total{0};            // records that did not fit
+    std::atomic<std::uint64_t> carried{0};          // of them, those that a later record tells of
+    std::atomic<std::uint64_t> lost_from_frame{0};  // of decisions, see DecisionRecord
+  };
+  struct Lanes {
+    explicit Lanes(const RingSizes& sizes) noexcept
+        : by_kind{Lane(sizes.chunk_bytes), Lane(sizes.decisions), Lane(sizes.frame_bytes)} {}
+    std::array<Lane, 3> by_kind;  // by GapKind
+  };
+
+  [[nodiscard]] Lane& lane(std::uint32_t stream, GapKind kind) noexcept {
+    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  }
+  [[nodiscard]] const Lane& lane(std::uint32_t stream, GapKind kind) const noexcept {
+    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  }
+  void give_back(std::uint32_t stream, GapKind kind, std::size_t amount) noexcept {
+    lane(stream, kind).taken.fetch_add(amount, std::memory_order_release);
+  }
+
+  RecordRing<ChunkHeader> chunks_;
+  RecordRing<FrameHeader> frames_;
+  boost::lockfree::spsc_queue<DecisionRecord> decisions_;
+  bool wants_published_ = false;
+  std::deque<Lanes> lanes_;  // by stream
+  std::mutex models_mutex_;
+  std::vector<std::vector<std::byte>> models_;
+};
+
+}  // namespace posed::record

@@ -1,0 +1,151 @@
+#include "daemon/replay/broadcast.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "daemon/net/security.hpp"
+#include "daemon/replay/pace.hpp"
+#include "daemon/system/clock.hpp"
+
+namespace posed::replay {
+namespace {
+
+constexpr auto kLookAgain = std::chrono::milliseconds(1);
+
+}  // namespace
+
+TakeClock::TakeClock(double speed, std::int64_t begin_ns, Clock host)
+    : speed_(speed), host_(host), take_ns_(begin_ns), host_ns_(kNoTime_ns) {}
+
+// Until the first chunk is reached it stands: how long a log takes to open is no age of its frames.
+std::int64_t TakeClock::at(std::int64_t host_ns) const {
+  if (host_ns_ == kNoTime_ns) return take_ns_;
+  return take_ns_ + nanoseconds(seconds(host_ns - host_ns_) * speed_);
+}
+
+void TakeClock::reached(std::int64_t arrival_ns) {
+  const std::int64_t host_ns = host_();
+  const std::scoped_lock lock(mutex_);
+  const std::int64_t now_ns = at(host_ns);
+  const bool back = arrival_ns < now_ns - Pace::kLongestSilence_ns;  // a wrong time is over
+  take_ns_ = back ? arrival_ns : std::max(arrival_ns, now_ns);
+  host_ns_ = host_ns;
+}
+
+std::int64_t TakeClock::now_ns() const {
+  const std::scoped_lock lock(mutex_);
+  return at(host_());
+}
+
+Broadcast::Broadcast(const BroadcastOptions& options, const Replay& replay, std::size_t slots,
+                     std::unique_ptr<system::EventFd> wake)
+    : replay_(replay),
+      clock_(options.speed, options.begin_ns, system::monotonic_ns),
+      counters_(replay.streams()),
+      ring_(slots),
+      wake_(std::move(wake)) {}
+
+Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& options,
+                                                   const Replay& replay) {
+  const std::string& endpoint = options.endpoint;
+  if (!net::is_loopback(endpoint)) {
+    return misuse("the log's run published on " + endpoint +
+                  "; a replay knows no keys and publishes on this machine only: say --endpoint "
+                  "tcp://127.0.0.1:5570");
+  }
+  auto wake = system::EventFd::open();
+  if (!wake) return std::unexpected(wake.error());
+  std::vector<publish::StreamInfo> infos;
+  double frames_per_s = 0.0;
+  const std::uint32_t streams = replay.streams();
+  for (std::uint32_t id = 0; id < streams; ++id) {
+    const ReplayStream& stream = replay.stream(id);
+    infos.push_back({.name = stream.name,
+                     .description = stream.description,
+                     .rate_hz = stream.settings.rate_hz,
+                     .raw = stream.settings.publish_raw,
+                     .model = stream.settings.style ? stream.settings.style_model.name
+                                                    : stream.settings.gesture_model.name,
+                     .counters = nullptr});
+    frames_per_s += stream.settings.rate_hz * 2.0;  // raw and styled
+  }
+  std::unique_ptr<Broadcast> self(
+      new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(*wake)));
+  for (std::uint32_t id = 0; id < streams; ++id) {
+    infos[id].counters = &self->counters_[id];
+    const auto& style = replay.stream(id).settings.style;
+    if (style) self->counters_[id].pipeline.alpha_target.store(static_cast<float>(style->alpha));
+  }
+  auto context = net::open_context();
+  if (!context) return std::unexpected(context.error());
+  self->context_ = std::move(*context);
+  auto authenticator = net::ZapAuthenticator::start(self->context_.get(), std::nullopt);
+  if (!authenticator) return std::unexpected(authenticator.error());
+  self->authenticator_ = std::move(*authenticator);
+  publish::PublisherOptions published;
+  published.authenticator = self->authenticator_.get();
+  published.context = self->context_.get();
+  published.endpoint = endpoint;
+  published.clock = system::monotonic_ns;
+  published.data_clock = [clock = &self->clock_] { return clock->now_ns(); };
+  published.stamps = options.speed != 0.0;  // as fast as possible, no frame has a right moment
+  published.more_stats = [file = options.log, speed = options.speed](v1::Stats& stats) {
+    stats.set_replay_file(file);
+    stats.set_replay_speed(speed);
+  };
+  auto publisher =
+      publish::Publisher::open(std::move(published), std::move(infos), self->ring_, *self->wake_);
+  if (!publisher) return std::unexpected(publisher.error());
+  self->publisher_ = std::move(*publisher);
+  self->thread_ = std::jthread([publisher = self->publisher_.get()] { publisher->run(); });
+  return self;
+}
+
+Broadcast::~Broadcast() {
+  if (publisher_) publisher_->stop();
+}
+
+void Broadcast::add(const pipeline::Item& item) {
+  if (item.kind == pipeline::Item::Kind::kEvent) note(item.stream_event);
+  if (item.kind == pipeline::Item::Kind::kFrame) {
+    const std::uint32_t stream = item.frame.header.stream;
+    counters_[stream].pipeline.alpha.store(replay_.alpha(stream));
+  }
+  while (!ring_.push(item)) std::this_thread::sleep_for(kLookAgain);
+  wake_->notify();
+}
+
+// What the pipeline's counters and the control thread knew in the live run.
+void Broadcast::note(const pipeline::StreamEvent& event) {
+  using pipeline::Change;
+  using pipeline::StreamState;
+  auto& counters = counters_[event.stream].pipeline;
+  switch (event.kind) {
+    case v1::Event::KIND_STARTED:
+    case v1::Event::KIND_RECOVERED:
+      counters.state.store(StreamState::kLive);
+      break;
+    case v1::Event::KIND_STALE:
+      counters.state.store(StreamState::kStale);
+      break;
+    case v1::Event::KIND_ENDED:
+      counters.state.store(StreamState::kEnded);
+      break;
+    case v1::Event::KIND_SHED:
+      pipeline::count(counters.shed, static_cast<std::uint64_t>(event.value));
+      break;
+    case v1::Event::KIND_CONTROL:
+      if (event.change == Change::kAlpha) {
+        counters.alpha_target.store(static_cast<float>(event.value));
+      } else if (event.change != Change::kStopPlaying) {
+        publisher_->set_model_name(event.stream, std::string(event.after.text()));
+      }
+      break;
+    default:
+      break;
+  }
+}
+
+}  // namespace posed::replay

@@ -1,0 +1,83 @@
+// Broadcast: publishes what a replay makes as the live run did: same topics, same messages. Times
+// are the recording's, on the recording's clock, and stats say that this is a replay. Cold.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/net/zap_authenticator.hpp"
+#include "daemon/net/zmq_handle.hpp"
+#include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/ring.hpp"
+#include "daemon/publish/publisher.hpp"
+#include "daemon/replay/replay.hpp"
+#include "daemon/system/event_fd.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::replay {
+
+// What time it is in the recording that is being replayed. It steps back only where the recording's
+// own times do, by more than a minute. Any thread.
+class TakeClock {
+ public:
+  // `speed` of the replay, times the recording's pace; 0: as fast as possible, and the clock stands
+  // still between chunks.
+  TakeClock(double speed, std::int64_t begin_ns, Clock host);
+
+  void reached(std::int64_t arrival_ns);  // what arrived then is replayed now
+  [[nodiscard]] std::int64_t now_ns() const;
+
+ private:
+  [[nodiscard]] std::int64_t at(std::int64_t host_ns) const;
+
+  double speed_;
+  Clock host_;
+  mutable std::mutex mutex_;
+  std::int64_t take_ns_;  // the recording's time at ...
+  std::int64_t host_ns_;  // ... this host time
+};
+
+struct BroadcastOptions {
+  std::string endpoint;
+  std::string log;            // the log's file name, for people
+  double speed = 1.0;         // 0: as fast as possible
+  std::int64_t begin_ns = 0;  // when the log's first chunk arrived
+};
+
+class Broadcast {
+ public:
+  // Binds and starts the publisher's thread. A log holds no keys, so only loopback is allowed. The
+  // replay outlives the broadcast.
+  [[nodiscard]] static Result<std::unique_ptr<Broadcast>> open(const BroadcastOptions& options,
+                                                               const Replay& replay);
+  ~Broadcast();  // publishes what is waiting, then ends
+  Broadcast(const Broadcast&) = delete;
+  Broadcast& operator=(const Broadcast&) = delete;
+
+  [[nodiscard]] const std::string& endpoint() const noexcept { return publisher_->endpoint(); }
+  [[nodiscard]] TakeClock& clock() noexcept { return clock_; }
+  // Waits while the publisher is behind: a replay loses nothing. Replay's thread.
+  void add(const pipeline::Item& item);
+
+ private:
+  Broadcast(const BroadcastOptions& options, const Replay& replay, std::size_t slots,
+            std::unique_ptr<system::EventFd> wake);
+  void note(const pipeline::StreamEvent& event);
+
+  const Replay& replay_;
+  TakeClock clock_;
+  net::Context context_;
+  std::unique_ptr<net::ZapAuthenticator> authenticator_;
+  std::vector<pipeline::StreamCounters> counters_;
+  pipeline::Ring<pipeline::Item> ring_;
+  std::unique_ptr<system::EventFd> wake_;
+  std::unique_ptr<publish::Publisher> publisher_;
+  std::jthread thread_;
+};
+
+}  // namespace posed::replay

@@ -1,0 +1,186 @@
+#include "daemon/replay/expectation.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/text_format.h>
+#include <spdlog/fmt/fmt.h>
+
+namespace posed::replay {
+namespace {
+
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Reflection;
+
+// One field alone, as bytes.
+std::string bytes_of_field(const v1::Frame& frame, const FieldDescriptor* field) {
+  v1::Frame alone;
+  const auto* descriptor = v1::Frame::descriptor();
+  alone.CopyFrom(frame);
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    if (descriptor->field(i) != field) {
+      v1::Frame::GetReflection()->ClearField(&alone, descriptor->field(i));
+    }
+  }
+  return alone.SerializeAsString();
+}
+
+std::string print_field(const v1::Frame& frame, const FieldDescriptor* field, int index) {
+  if (field->is_repeated() && index >= v1::Frame::GetReflection()->FieldSize(frame, field)) {
+    return "nothing";
+  }
+  std::string text;
+  google::protobuf::TextFormat::PrintFieldValueToString(frame, field,
+                                                        field->is_repeated() ? index : -1, &text);
+  return text;
+}
+
+// Where two repeated float fields part: the first element, or the shorter one's end.
+int first_index(const v1::Frame& live, const v1::Frame& replayed, const FieldDescriptor* field) {
+  const Reflection* reflection = v1::Frame::GetReflection();
+  const int count =
+      std::min(reflection->FieldSize(live, field), reflection->FieldSize(replayed, field));
+  for (int i = 0; i < count; ++i) {
+    const auto one = std::bit_cast<std::uint32_t>(reflection->GetRepeatedFloat(live, field, i));
+    const auto two = std::bit_cast<std::uint32_t>(reflection->GetRepeatedFloat(replayed, field, i));
+    if (one != two) return i;
+  }
+  return count;
+}
+
+}  // namespace
+
+std::string first_difference(const v1::Frame& live, const v1::Frame& replayed) {
+  if (live.SerializeAsString() == replayed.SerializeAsString()) return {};
+  const auto* descriptor = v1::Frame::descriptor();
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    const FieldDescriptor* field = descriptor->field(i);
+    if (bytes_of_field(live, field) == bytes_of_field(replayed, field)) continue;
+    std::string place = field->name();
+    int index = 0;
+    if (field->is_repeated()) {
+      index = first_index(live, replayed, field);
+      place += fmt::format("[{}]", index);
+    }
+    return fmt::format("{}: {} live, {} replayed", place, print_field(live, field, index),
+                       print_field(replayed, field, index));
+  }
+  return "a field this posed does not know";
+}
+
+Result<Expectation> Expectation::open(const log::Reader& reader) {
+  const std::string& file = reader.file();
+  const auto has_frames = reader.has_frames();
+  if (!has_frames) return std::unexpected(has_frames.error());
+  if (!*has_frames) {
+    return fail("holds no published frames to expect; record with --frames", file);
+  }
+  Expectation expectation(file);
+  for (const log::StreamRow& row : reader.streams()) {
+    Stream stream{.name = row.name, .channels = {}, .may_lack = 0};
+    for (const bool raw : {false, true}) {
+      auto frames = reader.frames(row.id, raw);
+      if (!frames) return std::unexpected(frames.error());
+      stream.channels[raw].emplace(Channel{std::move(*frames), std::nullopt, {}});
+      if (auto done = expectation.advance(*stream.channels[raw]); !done) {
+        return std::unexpected(done.error());
+      }
+    }
+    expectation.streams_.push_back(std::move(stream));
+  }
+  const auto gaps = reader.gaps();
+  if (!gaps) return std::unexpected(gaps.error());
+  for (const log::GapRow& gap : *gaps) {
+    if (gap.kind == log::GapRow::Kind::kFrames) {
+      expectation.streams_[*reader.place_of_stream(gap.owner)].may_lack += gap.lost;
+    }
+  }
+  return expectation;
+}
+
+// Of a live frame that was not met. One sequence may come twice (a pose is repeated), so a replayed
+// frame that differs from it may have been another that the log lacks, or not.
+std::string Expectation::how_it_lacks(const Channel& channel) {
+  return channel.difference.empty() ? "published live, but not replayed" : channel.difference;
+}
+
+Result<> Expectation::advance(Channel& channel) const {
+  channel.difference.clear();
+  const auto row = channel.frames.next();
+  if (!row) return std::unexpected(row.error());
+  if (!row->has_value()) {
+    channel.live.reset();
+    return {};
+  }
+  channel.live.emplace();
+  const auto bytes = (*row)->bytes;
+  if (!channel.live->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return fail(
+        fmt::format("the log is damaged (published frame {} cannot be read)", (*row)->sequence),
+        file_);
+  }
+  return {};
+}
+
+Result<> Expectation::compare(std::uint32_t id, bool raw, const v1::Frame& replayed,
+                              std::optional<std::uint64_t> broken_at) {
+  Stream& stream = streams_[id];
+  Channel& channel = *stream.channels[raw];
+  const std::uint64_t sequence = replayed.sequence();
+  if (broken_at && sequence >= *broken_at) {
+    ++counts_.after_gap;
+    return {};
+  }
+  if (!channel.live) {
+    // A gap row may stand for the last frames, too; else the recording ended before they were out.
+    if (stream.may_lack > 0) {
+      --stream.may_lack;
+      ++counts_.lost;
+    } else {
+      ++counts_.past_end;
+    }
+    return {};
+  }
+  if (channel.live->sequence() < sequence) {
+    return differs(stream, raw, channel.live->sequence(), how_it_lacks(channel));
+  }
+  const bool same_frame = channel.live->sequence() == sequence;
+  if (same_frame) channel.difference = first_difference(*channel.live, replayed);
+  if (same_frame && channel.difference.empty()) {
+    ++counts_.compared;
+    return advance(channel);
+  }
+  if (stream.may_lack > 0) {
+    --stream.may_lack;
+    ++counts_.lost;
+    return {};
+  }
+  return differs(stream, raw, sequence,
+                 same_frame ? channel.difference : "replayed, but not published live");
+}
+
+Result<> Expectation::finish(std::uint32_t id, std::optional<std::uint64_t> broken_at) {
+  Stream& stream = streams_[id];
+  for (const bool raw : {false, true}) {
+    Channel& channel = *stream.channels[raw];
+    while (channel.live) {
+      if (!broken_at || channel.live->sequence() < *broken_at) {
+        return differs(stream, raw, channel.live->sequence(), how_it_lacks(channel));
+      }
+      ++counts_.after_gap;
+      if (auto done = advance(channel); !done) return done;
+    }
+  }
+  return {};
+}
+
+Result<> Expectation::differs(const Stream& stream, bool raw, std::uint64_t sequence,
+                              const std::string& how) const {
+  return fail(
+      fmt::format("stream {}{}, sequence {}, {}", stream.name, raw ? "-raw" : "", sequence, how),
+      file_);
+}
+
+}  // namespace posed::replay

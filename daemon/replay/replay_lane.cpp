@@ -1,0 +1,290 @@
+#include "daemon/replay/replay_lane.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "daemon/pipeline/record_sink.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::replay {
+namespace {
+
+using Kind = pipeline::Decision::Kind;
+
+// No clock that counts from a machine's start gets there; sums of two stay within 64 bits.
+constexpr std::int64_t kLastTime_ns = std::int64_t{1} << 61;
+
+bool possible(std::int64_t time_ns) { return time_ns >= 0 && time_ns <= kLastTime_ns; }
+
+std::string text_of(const log::ChunkRow& chunk) {
+  return {reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()};
+}
+
+}  // namespace
+
+ReplayLane::ReplayLane(std::uint32_t lane, std::uint32_t stream_id, ReplayModels& models,
+                       LaneHost& host, std::string file)
+    : lane_(lane),
+      stream_id_(stream_id),
+      models_(models),
+      host_(host),
+      file_(std::move(file)),
+      intake_(lane, host.next_item, *this) {}
+
+Result<std::unique_ptr<ReplayLane>> ReplayLane::open(std::uint32_t lane,
+                                                     const log::SourceRow& source,
+                                                     const log::StreamRow& stream,
+                                                     ReplayModels& models, LaneHost& host,
+                                                     const std::string& file) {
+  auto self = std::make_unique<ReplayLane>(lane, stream.id, models, host, file);
+  self->stream_.name = stream.name;
+  auto settings = record::settings_from_json(stream.stages_json, file);
+  if (!settings) return std::unexpected(settings.error());
+  self->stream_.settings = std::move(*settings);
+  if (auto done = self->open_decoder(source); !done) return std::unexpected(done.error());
+  if (auto done = self->open_engine(); !done) return std::unexpected(done.error());
+  return self;
+}
+
+Result<> ReplayLane::open_decoder(const log::SourceRow& source) {
+  const drivers::Driver* driver = drivers::find_driver(source.driver);
+  if (driver == nullptr) {
+    return fail("stream " + in_quotes(stream_.name) + " comes from driver " +
+                    in_quotes(source.driver) + ", which this posed does not have",
+                file_);
+  }
+  auto description = driver->describe(source.text, source.identity);
+  if (!description) return std::unexpected(description.error());
+  stream_.description = *description;
+  device_ = std::move(*description);
+  auto decoder = driver->make_decoder(device_);
+  if (!decoder) return std::unexpected(decoder.error());
+  decoder_ = std::move(*decoder);
+  return {};
+}
+
+Result<> ReplayLane::open_engine() {
+  const record::StreamSettings& settings = stream_.settings;
+  const drivers::Description& device = stream_.description;
+  if ((settings.style || settings.generate) && !device.skeleton) {
+    return fail("stream " + in_quotes(stream_.name) + " has stages but no skeleton", file_);
+  }
+  if (settings.style && !settings.style_model.sha256.empty()) {
+    auto bound = models_.style(settings.style_model.sha256, device, *settings.style);
+    if (!bound) return std::unexpected(bound.error());
+    style_ = std::move(*bound);
+  }
+  if (settings.generate && !settings.gesture_model.sha256.empty()) {
+    auto bound = models_.gesture(settings.gesture_model.sha256, device);
+    if (!bound) return std::unexpected(bound.error());
+    gesture_ = std::move(*bound);
+  }
+  const bool hand = device.skeleton && hand_side(*device.skeleton).has_value();
+  engine_.emplace(pipeline::EngineOptions{.stream = lane_,
+                                          .stale_after_ns = nanoseconds(settings.stale_after_s),
+                                          .publish_raw = settings.publish_raw,
+                                          .style = settings.style,
+                                          .model = style_.get(),
+                                          .generate = settings.generate,
+                                          .gesture = gesture_.get(),
+                                          .constrain = settings.constrain && hand,
+                                          .rate_hz = device.rate_hz,
+                                          .skeleton = device.skeleton});
+  return {};
+}
+
+Result<> ReplayLane::expect(const pipeline::Decision& decision) {
+  const record::StreamSettings& settings = stream_.settings;
+  const std::string hash = decision.model_hash.data();
+  switch (decision.kind) {
+    case Kind::kShed:
+      shed_frames_.add(decision.sequence, decision.count);
+      return {};
+    case Kind::kShedSamples:
+      shed_samples_.add(decision.sequence, decision.count);
+      return {};
+    case Kind::kModel: {
+      if (!settings.style || !tried_styles_.insert(hash).second) return {};
+      const auto bound = models_.style(hash, stream_.description, *settings.style);
+      if (!bound) return std::unexpected(bound.error());
+      return {};
+    }
+    case Kind::kGesture: {
+      if (!settings.generate || !tried_gestures_.insert(hash).second) return {};
+      const auto bound = models_.gesture(hash, stream_.description);
+      if (!bound) return std::unexpected(bound.error());
+      return {};
+    }
+    default:
+      if (possible(decision.now_ns)) return {};
+      return fail("the log is damaged (a decision of stream " + in_quotes(stream_.name) +
+                      " was made at an impossible time); use another copy of it",
+                  file_);
+  }
+}
+
+void ReplayLane::set_gap(std::int64_t after_chunk) {
+  gap_after_ = std::min(gap_after_.value_or(after_chunk), after_chunk);
+}
+
+// Frames that a stage still holds back depend on what comes next, and the last one may be repeated:
+// they are not to be trusted either.
+void ReplayLane::notice_gap(std::int64_t chunk) {
+  if (gap_after_ && !broken_at_ && chunk > *gap_after_) broken_at_ = last_out_;
+}
+
+// Formats 1 and 2 count frames only; the rest goes on by itself.
+Result<> ReplayLane::find_place(const log::ChunkRow& chunk) {
+  const auto place = std::ranges::find(chunk.places, stream_id_, &log::StreamPlace::stream);
+  if (place == chunk.places.end() || place->next_frame == 0 || !possible(chunk.arrival_ns)) {
+    return log::damaged_row(file_, "chunk", chunk.id, "has an impossible time or place");
+  }
+  pipeline::Position next = intake_.next();
+  next.frame = place->next_frame;
+  if (place->next_sample != 0) next.sample = place->next_sample;
+  if (chunk.first_item != 0) next.item = chunk.first_item;
+  intake_.go_to(next);
+  arrival_ns_ = chunk.arrival_ns;
+  intake_.arrived(arrival_ns_);
+  return {};
+}
+
+Result<> ReplayLane::feed(const log::ChunkRow& chunk) {
+  if (auto found = find_place(chunk); !found) return found;
+  switch (static_cast<pipeline::Direction>(chunk.direction)) {
+    case pipeline::Direction::kFromDevice:
+      decoder_->feed(chunk.bytes, arrival_ns_, intake_);
+      return outcome_so_far();
+    case pipeline::Direction::kToDevice:
+      return {};
+    case pipeline::Direction::kDeviceInfo:
+      return use_device(text_of(chunk));
+    case pipeline::Direction::kCalibration:
+      return calibrate(text_of(chunk));
+    default:
+      return log::damaged_row(file_, "chunk", chunk.id,
+                              "holds what this posed does not know, or is of a newer one");
+  }
+}
+
+// The device came back, perhaps as another make of it; what the pipeline was bound to stays.
+Result<> ReplayLane::use_device(const std::string& info) {
+  const drivers::Driver* driver = drivers::find_driver(stream_.description.driver);
+  auto description = driver->describe(info, stream_.description.identity);
+  if (!description) return std::unexpected(description.error());
+  auto decoder = driver->make_decoder(*description);
+  if (!decoder) return std::unexpected(decoder.error());
+  decoder_ = std::move(*decoder);
+  device_ = std::move(*description);
+  intake_.new_link();
+  if (calibration_) decoder_->calibrate(*calibration_->calibration);
+  return {};
+}
+
+Result<> ReplayLane::calibrate(const std::string& toml) {
+  drivers::Description device = device_;
+  device.identity.clear();  // whose it was, the live run has checked
+  auto compiled = devices::compile_calibration(device, toml, "the log's calibration");
+  if (!compiled) return std::unexpected(compiled.error());
+  decoder_->calibrate(*(*compiled)->calibration);
+  calibration_ = std::move(*compiled);
+  return {};
+}
+
+bool ReplayLane::item(pipeline::Item& item) noexcept {
+  host_.before(item, lane_);
+  switch (item.kind) {
+    case pipeline::Item::Kind::kSample:
+      if (shed_samples_.contains(item.sample.header.sequence)) break;
+      engine_->on_sample(item.sample, *this);
+      break;
+    case pipeline::Item::Kind::kEvent:
+      host_.publish(item);
+      break;
+    default:
+      if (shed_frames_.contains(item.frame.header.sequence)) break;
+      engine_->on_frame(item.frame, *this);
+  }
+  return true;
+}
+
+void ReplayLane::apply(const pipeline::Decision& decision) noexcept {
+  switch (decision.kind) {
+    case Kind::kShed:
+    case Kind::kShedSamples:
+      return;  // the engine decides it again when it meets the gap
+    case Kind::kTick:
+      return engine_->tick_now(decision.now_ns, *this);
+    case Kind::kEnd:
+      close_gaps();
+      return engine_->end(decision.now_ns, *this);
+    case Kind::kAlpha:
+      return command({.kind = pipeline::Command::Kind::kAlpha, .alpha = decision.alpha});
+    case Kind::kModel:
+      return swap_style(decision);
+    case Kind::kGesture:
+      return swap_gesture(decision);
+    case Kind::kPlay:
+      return command({.kind = pipeline::Command::Kind::kPlay, .play = decision.play});
+    case Kind::kStopPlaying:
+      return command({.kind = pipeline::Command::Kind::kStopPlaying});
+  }
+}
+
+// Where the stage of a swap is missing, it was ignored live, too. What was used before is freed
+// once it is no longer read.
+void ReplayLane::swap_style(const pipeline::Decision& decision) noexcept {
+  if (!stream_.settings.style) return;
+  auto bound =
+      models_.style(decision.model_hash.data(), stream_.description, *stream_.settings.style);
+  if (!bound) {
+    error_ = std::move(bound.error());
+    return;
+  }
+  command({.kind = pipeline::Command::Kind::kModel,
+           .model = bound->get(),
+           .model_hash = decision.model_hash});
+  style_ = std::move(*bound);
+}
+
+void ReplayLane::swap_gesture(const pipeline::Decision& decision) noexcept {
+  if (!stream_.settings.generate) return;
+  auto bound = models_.gesture(decision.model_hash.data(), stream_.description);
+  if (!bound) {
+    error_ = std::move(bound.error());
+    return;
+  }
+  command({.kind = pipeline::Command::Kind::kGesture,
+           .gesture = bound->get(),
+           .model_hash = decision.model_hash});
+  gesture_ = std::move(*bound);
+}
+
+void ReplayLane::command(const pipeline::Command& command) noexcept {
+  static_cast<void>(engine_->apply(command, *this));
+}
+
+// Nothing more comes: what is missing of what was decoded last was shed.
+void ReplayLane::close_gaps() noexcept {
+  const pipeline::Position next = intake_.next();
+  engine_->close_gaps(next.frame - 1, next.sample - 1, *this);
+}
+
+Result<> ReplayLane::finish(bool ends) {
+  close_gaps();
+  if (ends) {
+    engine_->end(arrival_ns_, *this);
+  } else {
+    engine_->flush(*this);
+  }
+  return outcome_so_far();
+}
+
+Result<> ReplayLane::outcome_so_far() {
+  if (error_) return std::unexpected(*error_);
+  return {};
+}
+
+}  // namespace posed::replay

@@ -1,0 +1,125 @@
+// ReplayLane: one stream of a log, computed again by what ran live: its decoder, its intake and its
+// engine. Cold.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "daemon/devices/calibration.hpp"
+#include "daemon/pipeline/intake.hpp"
+#include "daemon/pipeline/stream_engine.hpp"
+#include "daemon/record/stream_settings.hpp"
+#include "daemon/replay/replay_models.hpp"
+#include "daemon/replay/shed_ranges.hpp"
+#include "drivers/driver.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/log/rows.hpp"
+
+namespace posed::replay {
+
+// A stream as a replay's users see it.
+struct ReplayStream {
+  std::string name;
+  drivers::Description description;
+  record::StreamSettings settings;
+};
+
+// What all lanes of a replay share.
+class LaneHost {
+ public:
+  LaneHost() = default;
+  LaneHost(const LaneHost&) = delete;
+  LaneHost& operator=(const LaneHost&) = delete;
+  virtual ~LaneHost() = default;
+
+  // An item is about to enter the engine of a lane.
+  virtual void before(const pipeline::Item& item, std::uint32_t lane) noexcept = 0;
+  // What a lane publishes.
+  virtual void publish(const pipeline::Item& item) noexcept = 0;
+
+  std::uint64_t next_item = 1;  // Item::number of what comes next
+};
+
+class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOut {
+ public:
+  // Items that it publishes have `lane` as their stream. Host and models outlive it.
+  [[nodiscard]] static Result<std::unique_ptr<ReplayLane>> open(
+      std::uint32_t lane, const log::SourceRow& source, const log::StreamRow& stream,
+      ReplayModels& models, LaneHost& host, const std::string& file);
+  ReplayLane(std::uint32_t lane, std::uint32_t stream_id, ReplayModels& models, LaneHost& host,
+             std::string file);
+
+  // Before the first chunk, each decision of the stream in the log's order: tries what it needs, so
+  // that nothing can fail on the way, and remembers what never reached the engine.
+  [[nodiscard]] Result<> expect(const pipeline::Decision& decision);
+  // The log lacks chunks or decisions after this chunk.
+  void set_gap(std::int64_t after_chunk);
+  // After the last of both.
+  void ready() {
+    shed_frames_.finish();
+    shed_samples_.finish();
+  }
+
+  // Before the chunk of this id is fed to any lane: decisions that follow a gap of this stream may
+  // come with the chunks of another.
+  void notice_gap(std::int64_t chunk);
+
+  [[nodiscard]] Result<> feed(const log::ChunkRow& chunk);
+  void apply(const pipeline::Decision& decision) noexcept;
+  // After the last chunk and decision. `ends`: the log is of a format that does not say whether the
+  // stream ended.
+  [[nodiscard]] Result<> finish(bool ends);
+
+  [[nodiscard]] const ReplayStream& stream() const noexcept { return stream_; }
+  [[nodiscard]] std::optional<std::uint64_t> broken_at() const noexcept { return broken_at_; }
+  [[nodiscard]] float alpha() const noexcept { return engine_->alpha(); }
+
+ private:
+  [[nodiscard]] Result<> open_decoder(const log::SourceRow& source);
+  [[nodiscard]] Result<> open_engine();
+  [[nodiscard]] Result<> find_place(const log::ChunkRow& chunk);
+  [[nodiscard]] Result<> use_device(const std::string& info);
+  [[nodiscard]] Result<> calibrate(const std::string& toml);
+  void swap_style(const pipeline::Decision& decision) noexcept;
+  void swap_gesture(const pipeline::Decision& decision) noexcept;
+  void command(const pipeline::Command& command) noexcept;
+  void close_gaps() noexcept;
+  [[nodiscard]] Result<> outcome_so_far();
+
+  // IntakeOut
+  bool item(pipeline::Item& item) noexcept override;
+  void outcome(Outcome) noexcept override {}
+  // EngineOut: the engine decides again what the log made it decide.
+  void item(const pipeline::Item& item) noexcept override {
+    if (item.kind == pipeline::Item::Kind::kFrame) last_out_ = item.frame.header.sequence;
+    host_.publish(item);
+  }
+  void decision(const pipeline::Decision&) noexcept override {}
+
+  std::uint32_t lane_;
+  std::uint32_t stream_id_;  // in the log
+  ReplayModels& models_;
+  LaneHost& host_;
+  std::string file_;
+  ReplayStream stream_;
+  drivers::Description device_;  // as it introduced itself last
+  std::unique_ptr<drivers::Decoder> decoder_;
+  std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: the device's default
+  std::unique_ptr<const style::BoundModel> style_;                // that the engine uses
+  std::unique_ptr<const generate::BoundModel> gesture_;           // the same
+  std::set<std::string> tried_styles_, tried_gestures_;
+  pipeline::Intake intake_;
+  std::optional<pipeline::StreamEngine> engine_;
+  ShedRanges shed_frames_, shed_samples_;
+  std::int64_t arrival_ns_ = 0;
+  std::uint64_t last_out_ = 0;  // sequence of the last frame that left the engine
+  std::optional<std::int64_t> gap_after_;
+  std::optional<std::uint64_t> broken_at_;
+  std::optional<Error> error_;  // the first that could not be returned at once
+};
+
+}  // namespace posed::replay

@@ -1,0 +1,90 @@
+#include "daemon/system/event_fd.hpp"
+
+#include <cerrno>
+#include <cstring>
+
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "daemon/system/hot_mark.hpp"
+#include "proto/frame/time.hpp"
+
+namespace posed::system {
+namespace {
+
+constexpr std::uint32_t kWakeKey = std::numeric_limits<std::uint32_t>::max();
+
+std::unexpected<Error> system_error(const char* what) {
+  return fail(std::string(what) + ": " + std::strerror(errno) +
+              "; raise the limit of open files (ulimit -n)");
+}
+
+}  // namespace
+
+Result<std::unique_ptr<EventFd>> EventFd::open() {
+  const int fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+  if (fd < 0) return system_error("cannot make an eventfd");
+  return std::unique_ptr<EventFd>(new EventFd(fd));
+}
+
+EventFd::~EventFd() { close(fd_); }
+
+void EventFd::notify() noexcept {
+  // Both sides exchange the flag: whichever comes second sees what the other did before, so either
+  // the consumer finds the new element or we find it asleep.
+  if (!asleep_.exchange(false, std::memory_order_acq_rel)) return;
+  const std::uint64_t one = 1;
+  const AllowedCall allowed;
+  [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+}
+
+Result<std::unique_ptr<Poller>> Poller::open() {
+  const int fd = epoll_create1(EPOLL_CLOEXEC);
+  if (fd < 0) return system_error("cannot make an epoll set");
+  return std::unique_ptr<Poller>(new Poller(fd));
+}
+
+Poller::~Poller() { close(fd_); }
+
+Result<> Poller::add(const EventFd& wake) {
+  epoll_event event{};
+  event.events = EPOLLIN | EPOLLET;
+  event.data.u32 = kWakeKey;
+  if (epoll_ctl(fd_, EPOLL_CTL_ADD, wake.fd(), &event) != 0) return system_error("cannot poll");
+  return {};
+}
+
+Result<> Poller::add(int fd, std::uint32_t key) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u32 = key;
+  if (epoll_ctl(fd_, EPOLL_CTL_ADD, fd, &event) != 0) return system_error("cannot poll a device");
+  return {};
+}
+
+void Poller::remove(int fd) noexcept {
+  const AllowedCall once_a_device;
+  epoll_ctl(fd_, EPOLL_CTL_DEL, fd, nullptr);
+}
+
+std::span<const std::uint32_t> Poller::wait(std::int64_t timeout_ns) noexcept {
+  std::array<epoll_event, kMaxReady> events;
+  timespec timeout{};
+  timeout.tv_sec = timeout_ns / kNanosPerSecond;
+  timeout.tv_nsec = timeout_ns % kNanosPerSecond;
+  int count = 0;
+  {
+    const AllowedCall allowed;
+    count = epoll_pwait2(fd_, events.data(), kMaxReady,
+                         timeout_ns == kForever_ns ? nullptr : &timeout, nullptr);
+  }
+  std::size_t ready = 0;
+  for (int i = 0; i < count; ++i) {
+    const std::uint32_t key = events[static_cast<std::size_t>(i)].data.u32;
+    if (key != kWakeKey) ready_[ready++] = key;
+  }
+  return std::span(ready_).first(ready);
+}
+
+}  // namespace posed::system

@@ -1,0 +1,51 @@
+#include "daemon/system/realtime.hpp"
+
+#include <cerrno>
+#include <cstring>
+
+#include <pthread.h>
+#include <sched.h>
+#include <spdlog/spdlog.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+
+namespace posed::system {
+namespace {
+
+bool become_fifo(int priority) {
+  const sched_param wanted{.sched_priority = priority};
+  return pthread_setschedparam(pthread_self(), SCHED_FIFO, &wanted) == 0;
+}
+
+// Tried on the calling thread, which goes back to what it was.
+bool may_be_fifo() {
+  if (!become_fifo(kReaderPriority)) return false;
+  const sched_param ordinary{.sched_priority = 0};
+  return pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary) == 0;
+}
+
+}  // namespace
+
+bool ask_for_realtime() {
+  const bool locked = mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
+  const bool fifo = may_be_fifo();
+  if (!locked || !fifo) {
+    spdlog::warn(
+        "no real-time rights ({}): frames may be late when the machine is busy; grant "
+        "LimitRTPRIO and LimitMEMLOCK, or set realtime = false",
+        locked ? "SCHED_FIFO refused" : "memory cannot be locked");
+  }
+  return fifo;
+}
+
+void name_thread(const std::string& name) {
+  pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
+}
+
+void enter_hot_thread(const char* name, int priority) {
+  name_thread(name);
+  prctl(PR_SET_TIMERSLACK, 1UL);  // waits end on time, not up to 50 us later
+  if (priority > 0) static_cast<void>(become_fifo(priority));
+}
+
+}  // namespace posed::system

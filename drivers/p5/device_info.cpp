@@ -1,0 +1,69 @@
+#include "drivers/p5/device_info.hpp"
+
+#include <array>
+#include <charconv>
+
+#include "drivers/glove/device_info.hpp"
+
+namespace posed::drivers::p5 {
+namespace {
+
+constexpr std::string_view kNone = "none";
+
+std::string hex_of(const std::vector<std::byte>& bytes) {
+  if (bytes.empty()) return std::string(kNone);
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::byte byte : bytes) {
+    text += kDigits[std::to_integer<std::size_t>(byte >> 4)];
+    text += kDigits[std::to_integer<std::size_t>(byte & std::byte{0xF})];
+  }
+  return text;
+}
+
+// False when it is not that report, whole.
+bool read_hex(const std::string& text, std::uint8_t number, std::size_t size,
+              std::vector<std::byte>& bytes) {
+  if (text == kNone) return true;
+  if (text.size() != 2 * size) return false;
+  for (std::size_t i = 0; i < text.size(); i += 2) {
+    unsigned value = 0;
+    const char* const end = text.data() + i + 2;
+    const auto [stop, error] = std::from_chars(text.data() + i, end, value, 16);
+    if (error != std::errc() || stop != end) return false;
+    bytes.push_back(static_cast<std::byte>(value));
+  }
+  return bytes[0] == std::byte{number};
+}
+
+}  // namespace
+
+std::optional<CameraRig> Greeted::rig() const {
+  if (heads.size() != kHeadsBytes || leds.size() != kLedsBytes) return {};
+  return CameraRig::of(std::span(heads).first<kHeadsBytes>(), std::span(leds).first<kLedsBytes>());
+}
+
+std::string greeting_of(const Greeted& glove) {
+  return "p5 hand=" + std::string(glove::side_name(glove.side)) +
+         " firmware=" + hex_of(glove.firmware) + " heads=" + hex_of(glove.heads) +
+         " leds=" + hex_of(glove.leds);
+}
+
+Result<Greeted> read_greeting(const std::string& text, const std::string& identity) {
+  glove::Greeting greeting(text, "p5", identity);
+  Greeted glove;
+  glove.side = greeting.side();
+  const std::string firmware = greeting.word("firmware");
+  const std::string heads = greeting.word("heads");
+  const std::string leds = greeting.word("leds");
+  if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
+  if (!read_hex(firmware, kFirmwareReport, kFirmwareBytes, glove.firmware) ||
+      !read_hex(heads, kHeadsReport, kHeadsBytes, glove.heads) ||
+      !read_hex(leds, kLedsReport, kLedsBytes, glove.leds)) {
+    return fail("the greeting of a 'p5' has a feature report that is none; the log is damaged",
+                identity);
+  }
+  return glove;
+}
+
+}  // namespace posed::drivers::p5

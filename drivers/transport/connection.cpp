@@ -1,0 +1,188 @@
+#include "drivers/transport/connection.hpp"
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace posed::drivers {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr std::size_t kRead = 4096;  // bytes; a HID report and a terminal's buffer fit in one
+constexpr milliseconds kWritePatience{1000};
+constexpr milliseconds kDrainPatience{1000};
+constexpr int kMostWaiting = 256;  // reads; hidraw keeps 64 reports
+
+bool not_now(int error) noexcept {
+  return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
+}
+
+// send() for sockets, where a plain write() to a peer that has gone would end the process.
+ssize_t write_some(int fd, std::span<const std::byte> bytes) noexcept {
+  const ssize_t sent = ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  if (sent >= 0 || errno != ENOTSOCK) return sent;
+  return ::write(fd, bytes.data(), bytes.size());
+}
+
+milliseconds left_until(Clock::time_point deadline) {
+  const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
+  return std::max(left, milliseconds{0});
+}
+
+std::string gone(const std::string& name, int error) {
+  return name + " has gone (" + (error == 0 ? "hung up" : std::strerror(error)) +
+         "); plug it in again or switch it on";
+}
+
+class LinkTransport final : public Transport {
+ public:
+  explicit LinkTransport(Connection link) : link_(std::move(link)) {}
+
+  [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
+  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+  [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
+
+ private:
+  bool flush() noexcept;
+
+  Connection link_;
+  std::array<std::byte, kRead> buffer_;
+  // What the device took only in part; nothing else may go between its halves.
+  std::array<std::byte, kRead> unsent_;
+  std::size_t unsent_from_ = 0, unsent_to_ = 0;
+};
+
+// What came while other devices were opened is old, and all of it would get one arrival time: the
+// device begins with what comes now. Bounded, for one that never stops.
+Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
+  for (int i = 0; i < kMostWaiting && ::read(link_.fd(), buffer_.data(), buffer_.size()) > 0; ++i) {
+  }
+  return {};
+}
+
+// One read a call, so that one HID report is one chunk. All devices are opened such that 0 bytes
+// mean a hang-up (VMIN is 1). RT-safe but for the read.
+Chunk LinkTransport::read(std::int64_t /*now_ns*/) noexcept {
+  flush();
+  const ssize_t got = ::read(link_.fd(), buffer_.data(), buffer_.size());
+  if (got > 0) return {.bytes = {buffer_.data(), static_cast<std::size_t>(got)}};
+  if (got < 0 && not_now(errno)) return {};
+  return {.bytes = {}, .lost = true};
+}
+
+// RT-safe but for the write.
+bool LinkTransport::flush() noexcept {
+  while (unsent_from_ < unsent_to_) {
+    const ssize_t sent =
+        write_some(link_.fd(), std::span(unsent_).subspan(unsent_from_, unsent_to_ - unsent_from_));
+    if (sent <= 0) return false;
+    unsent_from_ += static_cast<std::size_t>(sent);
+  }
+  return true;
+}
+
+// RT-safe but for the write.
+bool LinkTransport::send(std::span<const std::byte> bytes) noexcept {
+  if (bytes.size() > unsent_.size() || !flush()) return false;
+  const ssize_t sent = write_some(link_.fd(), bytes);
+  if (sent < 0) return false;
+  const auto rest = bytes.subspan(static_cast<std::size_t>(sent));
+  std::memcpy(unsent_.data(), rest.data(), rest.size());
+  unsent_from_ = 0;
+  unsent_to_ = rest.size();
+  return true;
+}
+
+}  // namespace
+
+Connection::Connection(int fd, std::string name, std::string identity) noexcept
+    : fd_(fd), name_(std::move(name)), identity_(std::move(identity)) {}
+
+Connection::~Connection() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Connection::Connection(Connection&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)),
+      name_(std::move(other.name_)),
+      identity_(std::move(other.identity_)),
+      cancel_(std::move(other.cancel_)) {}
+
+Connection& Connection::operator=(Connection&& other) noexcept {
+  if (this == &other) return *this;
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = std::exchange(other.fd_, -1);
+  name_ = std::move(other.name_);
+  identity_ = std::move(other.identity_);
+  cancel_ = std::move(other.cancel_);
+  return *this;
+}
+
+void Connection::wait_for(short events, milliseconds patience) const {
+  std::array<pollfd, 2> wanted{
+      {{.fd = fd_, .events = events, .revents = 0},
+       {.fd = cancel_ ? cancel_->fd() : -1, .events = POLLIN, .revents = 0}}};
+  ::poll(wanted.data(), wanted.size(), static_cast<int>(patience.count()));
+}
+
+Result<> Connection::write(std::span<const std::byte> bytes) {
+  const auto deadline = Clock::now() + kWritePatience;
+  while (!bytes.empty()) {
+    if (cancelled()) return Cancel::error();
+    const ssize_t sent = write_some(fd_, bytes);
+    if (sent > 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(sent));
+      continue;
+    }
+    if (sent < 0 && !not_now(errno)) return fail(gone(name_, errno));
+    const auto left = left_until(deadline);
+    if (left.count() == 0) {
+      return fail(name_ + " takes no bytes; check that a glove is on it and switched on");
+    }
+    wait_for(POLLOUT, left);
+  }
+  return {};
+}
+
+Result<> Connection::write(std::string_view text) { return write(std::as_bytes(std::span(text))); }
+
+Result<std::vector<std::byte>> Connection::read(std::chrono::milliseconds patience) {
+  const auto deadline = Clock::now() + patience;
+  std::vector<std::byte> bytes(kRead);
+  while (true) {
+    if (cancelled()) return Cancel::error();
+    const ssize_t got = ::read(fd_, bytes.data(), bytes.size());
+    if (got < 0 && not_now(errno)) {
+      const auto left = left_until(deadline);
+      if (left.count() == 0) return std::vector<std::byte>{};
+      wait_for(POLLIN, left);
+      continue;
+    }
+    if (got <= 0) return fail(gone(name_, got == 0 ? 0 : errno));
+    bytes.resize(static_cast<std::size_t>(got));
+    return bytes;
+  }
+}
+
+Result<> Connection::drain(std::chrono::milliseconds quiet) {
+  const auto deadline = Clock::now() + kDrainPatience;
+  while (true) {
+    const auto bytes = read(std::min(quiet, left_until(deadline)));
+    if (!bytes) return std::unexpected(bytes.error());
+    if (bytes->empty() || Clock::now() >= deadline) return {};
+  }
+}
+
+std::unique_ptr<Transport> make_link_transport(Connection link) {
+  return std::make_unique<LinkTransport>(std::move(link));
+}
+
+}  // namespace posed::drivers

@@ -1,0 +1,51 @@
+#include "drivers/transport/hotplug_monitor.hpp"
+
+#include <sys/inotify.h>
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+#include <utility>
+
+namespace posed::drivers {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A rule that opens a node to us changes its attributes a moment after it was made.
+constexpr std::uint32_t kNews = IN_CREATE | IN_MOVED_TO | IN_ATTRIB | IN_ONLYDIR;
+
+}  // namespace
+
+HotplugMonitor::HotplugMonitor(std::string root)
+    : fd_(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC)), root_(std::move(root)) {
+  watch_folders();
+}
+
+HotplugMonitor::~HotplugMonitor() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+// Watching a folder again changes nothing, so all are named anew whenever something has come.
+void HotplugMonitor::watch_folders() {
+  if (fd_ < 0) return;
+  const fs::path buses = fs::path(root_) / "bus/usb";
+  for (const fs::path& folder : {fs::path(root_), fs::path(root_) / "bus", buses}) {
+    ::inotify_add_watch(fd_, folder.c_str(), kNews);
+  }
+  std::error_code failed;
+  for (fs::directory_iterator bus(buses, failed), end; !failed && bus != end;
+       bus.increment(failed)) {
+    ::inotify_add_watch(fd_, bus->path().c_str(), kNews);
+  }
+}
+
+bool HotplugMonitor::take() {
+  alignas(inotify_event) std::array<char, 4096> events;
+  bool any = false;
+  while (fd_ >= 0 && ::read(fd_, events.data(), events.size()) > 0) any = true;
+  if (any) watch_folders();
+  return any;
+}
+
+}  // namespace posed::drivers

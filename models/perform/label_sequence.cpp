@@ -1,0 +1,88 @@
+#include "models/perform/label_sequence.hpp"
+
+#include <algorithm>
+
+#include "models/perform/state_duration.hpp"
+
+namespace posed::perform {
+namespace {
+
+// How long the cursor's state lasts. Away from tempo 1 what rounding takes is handed on, so that a
+// fast string does not drift from its tempo.
+void begin_state(Cursor& cursor, const LabelSequence& script,
+                 const trajectory::StateInformation& evidence, double tempo) noexcept {
+  const gesture::DurationGaussian duration = evidence.duration(script.context(cursor.position));
+  const double mean = duration.mean[cursor.state];
+  const double variance = duration.variance[cursor.state];
+  const double rho = tempo_rho(duration, tempo);
+  const double carried = tempo == 1.0 ? 0.0 : cursor.carried;
+  cursor.frames = cursor.frames_left = state_frames(mean, variance, rho, carried);
+  if (tempo != 1.0) cursor.carried += std::max(1.0, mean + rho * variance) - cursor.frames;
+}
+
+}  // namespace
+
+LabelSequence::LabelSequence(int capacity) : labels_(static_cast<std::size_t>(capacity)) {}
+
+// RT-safe.
+bool LabelSequence::append(int label) noexcept {
+  const auto capacity = static_cast<long>(labels_.size());
+  if (end_ - first_ == capacity) return false;
+  labels_[static_cast<std::size_t>(end_ % capacity)] = label;
+  ++end_;
+  return true;
+}
+
+// RT-safe.
+void LabelSequence::clear() noexcept { first_ = end_; }
+
+// RT-safe.
+bool LabelSequence::has_next(long position) const noexcept {
+  return position + 1 < end_ || (loop_ && !empty());
+}
+
+// RT-safe.
+long LabelSequence::next(long position) const noexcept {
+  return position + 1 < end_ ? position + 1 : first_;
+}
+
+// RT-safe.
+gesture::Context LabelSequence::context(long position) const noexcept {
+  const int current = label(position);
+  const int previous = position > first_ ? label(position - 1) : loop_ ? label(end_ - 1) : current;
+  return {previous, current, has_next(position) ? label(next(position)) : current};
+}
+
+// RT-safe.
+void LabelSequence::forget_before(long position) noexcept {
+  if (!loop_) first_ = std::max(first_, position - 1);
+}
+
+// RT-safe.
+Cursor enter(const LabelSequence& script, const trajectory::StateInformation& evidence,
+             long position, double tempo) noexcept {
+  Cursor cursor{.position = position};
+  begin_state(cursor, script, evidence, tempo);
+  return cursor;
+}
+
+// RT-safe.
+void step(Cursor& cursor, const LabelSequence& script, const trajectory::StateInformation& evidence,
+          double tempo) noexcept {
+  if (cursor.frames_left > 1) {
+    --cursor.frames_left;
+    return;
+  }
+  if (cursor.state + 1 < gesture::kStates) {
+    ++cursor.state;
+  } else if (script.has_next(cursor.position)) {
+    cursor.position = script.next(cursor.position);
+    cursor.state = 0;
+  } else {
+    cursor.frames_left = 0;
+    return;
+  }
+  begin_state(cursor, script, evidence, tempo);
+}
+
+}  // namespace posed::perform

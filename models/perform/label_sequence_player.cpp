@@ -1,0 +1,177 @@
+#include "models/perform/label_sequence_player.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "models/perform/state_duration.hpp"
+#include "models/trajectory/pentadiagonal.hpp"
+
+namespace posed::perform {
+namespace {
+
+constexpr int kStride = trajectory::padded(kHandChannels);
+constexpr int kSettling = 3;  // frames that an elimination for good needs (pentadiagonal.hpp)
+
+// The lead-in lasts 1.5 times what the farthest channel would take at this speed.
+constexpr double kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
+constexpr double kMinLead_s = 0.2, kMaxLead_s = 0.8;
+
+hwy::AlignedFreeUniquePtr<double[]> rows(int count) {
+  auto data = hwy::AllocateAligned<double>(static_cast<std::size_t>(count) * kStride);
+  std::fill_n(data.get(), count * kStride, 0.0);
+  return data;
+}
+
+int frames_in(double seconds, double rate_hz) {
+  return static_cast<int>(std::ceil(seconds * rate_hz));
+}
+
+// What two poses that are certain say of the two frames after them, through curves of precision p2
+// and mean 0 centred on the second pose and on the first frame after it: the kernel's carry rows.
+void clamp_to(const HandAngles& before, const HandAngles& last, const double* p2,
+              double* carry) noexcept {
+  for (int c = 0; c < kHandChannels; ++c) {
+    carry[0 * kStride + c] = 5.0 * p2[c];
+    carry[1 * kStride + c] = -2.0 * p2[c];
+    carry[2 * kStride + c] = p2[c] * (4.0 * last[c] - before[c]);
+    carry[3 * kStride + c] = p2[c];
+    carry[4 * kStride + c] = -p2[c] * last[c];
+  }
+}
+
+}  // namespace
+
+LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& evidence,
+                                         const PlayerOptions& options)
+    : evidence_(evidence),
+      options_(options),
+      look_ahead_(std::max(kSettling, frames_in(options.look_ahead_s, evidence.rate_hz()))),
+      script_(options.capacity),
+      states_(kHandChannels, 2 + look_ahead_),
+      carry_(rows(trajectory::kernel::kCarryRows)),
+      variance_(rows(1)) {
+  const int most = frames_in(kMaxLead_s, evidence.rate_hz()) + look_ahead_ + 1;
+  frames_.resize(static_cast<std::size_t>(most));
+  x_ = rows(most);
+  factor_rows_ = rows(most * trajectory::kernel::kFactorRows);
+  for (int i = 0; i < most; ++i) {
+    factors_.push_back(factor_rows_.get() +
+                       static_cast<std::ptrdiff_t>(i) * trajectory::kernel::kFactorRows * kStride);
+  }
+}
+
+// RT-safe.
+void LabelSequencePlayer::set_tempo(double tempo) noexcept {
+  tempo_ = std::clamp(tempo, kMinTempo, kMaxTempo);
+}
+
+// RT-safe.
+void LabelSequencePlayer::clear() noexcept {
+  script_.clear();
+  started_ = false;
+}
+
+// RT-safe.
+void LabelSequencePlayer::start() noexcept {
+  started_ = !script_.empty();
+  carries_ = false;
+  lead_left_ = shown_ = 0;
+  if (started_) cursor_ = enter(script_, evidence_, script_.first(), tempo_);
+}
+
+// RT-safe.
+void LabelSequencePlayer::start(const HandAngles& before, const HandAngles& last) noexcept {
+  start();
+  if (!started_) return;
+  before_ = before;
+  last_ = last;
+  glide();
+}
+
+// The lead-in: from the last two poses into the cursor's state. RT-safe.
+void LabelSequencePlayer::glide() noexcept {
+  double* lead = states_.row(0, trajectory::kPosition);
+  evidence_.fill(script_.context(cursor_.position), 0, lead);
+  double farthest_rad = 0.0;
+  for (int c = 0; c < kHandChannels; ++c) {
+    const double goal =
+        lead[trajectory::kPositionMean * kStride + c] / lead[trajectory::kPosition * kStride + c];
+    farthest_rad = std::max(farthest_rad, std::abs(goal - last_[c]));
+  }
+  const double lead_s = std::clamp(1.5 * farthest_rad / kLeadSpeed_rad_s, kMinLead_s, kMaxLead_s);
+  lead_left_ = frames_in(lead_s, evidence_.rate_hz());
+  std::fill_n(lead, kHandChannels, 0.0);  // of the first state only the curve's precision is left
+  std::fill(lead + trajectory::kPositionMean * kStride, lead + trajectory::kCurve * kStride, 0.0);
+  std::fill(lead + trajectory::kCurveMean * kStride, lead + trajectory::kRows * kStride, 0.0);
+  clamp_to(before_, last_, lead + trajectory::kCurve * kStride, carry_.get());
+  carries_ = true;
+}
+
+// Writes the evidence of the frames that are not settled into frames_ and returns their number;
+// `shown` becomes the cursor of the frame to give out. RT-safe.
+int LabelSequencePlayer::plan(Cursor& shown) noexcept {
+  const int most = lead_left_ + look_ahead_ + 1;
+  int frames = 0;
+  for (; frames < lead_left_; ++frames) frames_[frames] = states_.frame(0);
+  Cursor ahead = cursor_;
+  int slot = 0;
+  for (bool entered = true; frames < most; ++frames) {
+    if (ahead.frames_left == 0 && !options_.rest && !script_.has_next(ahead.position)) break;
+    if (entered) {
+      evidence_.fill(script_.context(ahead.position), ahead.state,
+                     states_.row(++slot, trajectory::kPosition));
+    }
+    if (frames == shown_) shown = ahead;
+    frames_[frames] = states_.frame(slot);
+    const Cursor before = ahead;
+    step(ahead, script_, evidence_, tempo_);
+    entered = ahead.state != before.state || ahead.position != before.position;
+  }
+  return frames;
+}
+
+// RT-safe.
+void LabelSequencePlayer::advance(int frames) noexcept {
+  if (frames < kSettling) {
+    ++shown_;
+    return;
+  }
+  carries_ = true;
+  if (lead_left_ > 0) {
+    --lead_left_;
+  } else {
+    step(cursor_, script_, evidence_, tempo_);
+    script_.forget_before(cursor_.position);
+  }
+}
+
+// RT-safe.
+bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
+  if (!started_) return false;
+  if (cursor_.frames_left == 0 && script_.has_next(cursor_.position)) {  // a label ends the rest
+    step(cursor_, script_, evidence_, tempo_);
+    glide();
+  }
+  Cursor shown = cursor_;
+  const int frames = plan(shown);
+  if (frames <= shown_) return false;
+  trajectory::kernel::eliminate({.evidence = frames_.data(),
+                                 .frames = frames,
+                                 .stride = kStride,
+                                 .carry_in = carries_ ? carry_.get() : nullptr,
+                                 .carry_out = frames >= kSettling ? carry_.get() : nullptr},
+                                factors_.data());
+  trajectory::kernel::substitute(factors_.data(), frames, shown_, kStride, x_.get());
+  trajectory::kernel::variance(factors_.data(), frames, shown_, kStride, variance_.get(), 0);
+  std::copy_n(x_.get(), kHandChannels, out.angle.begin());
+  std::copy_n(variance_.get(), kHandChannels, out.variance.begin());
+  before_ = last_;
+  last_ = out.angle;
+  out.label = script_.context(shown.position).current;
+  out.state = lead_left_ > shown_ || shown.frames_left == 0 ? -1 : shown.state;
+  advance(frames);
+  return true;
+}
+
+}  // namespace posed::perform

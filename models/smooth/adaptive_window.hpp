@@ -1,0 +1,115 @@
+// AdaptiveWindow: the windowed solve with the speed-adaptive prior (models/smooth/README.md,
+// "Speed-adaptive prior") for a row of channels, no model needed. Solved once under one loose prior
+// for the acceleration, then twice more under priors whose variances follow the speed that the
+// solve before found.
+//
+// Units: radians and seconds; a frame lasts what its times say, even or not. Hot parts are RT-safe
+// and never allocate.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "models/trajectory/information_form.hpp"
+#include "models/trajectory/sliding_window.hpp"
+
+namespace posed::smooth {
+
+// Frames of window at a beat: 26 up to 60 Hz, 0.43 s above. RT-safe.
+inline constexpr int kMaxWindow = 434;  // at 1000 Hz
+[[nodiscard]] int window_frames(double period_s) noexcept;
+
+class AdaptiveWindow;
+
+// What else is known of the window's frames: adds to their evidence before each solve but the
+// first, looking at what the solve before found. RT-safe.
+class WindowEvidence {
+ public:
+  WindowEvidence() = default;
+  WindowEvidence(const WindowEvidence&) = delete;
+  WindowEvidence& operator=(const WindowEvidence&) = delete;
+  virtual ~WindowEvidence() = default;
+
+  virtual void add(AdaptiveWindow& window) noexcept = 0;
+};
+
+class AdaptiveWindow {
+ public:
+  explicit AdaptiveWindow(int channels);
+
+  // The next frame: [channels] rad, not a number where a channel is missing. Times increase.
+  void push(double time_s, std::span<const double> measured_rad, double noise_rad) noexcept;
+
+  // Solves the last frames, at most window_frames(period_s) of them.
+  void solve(double period_s, WindowEvidence* extra = nullptr) noexcept;
+
+  // One solve under the loose prior alone: what the others are measured against.
+  void solve_once(double period_s) noexcept;
+
+  void reset() noexcept;
+
+  // Of the last solve; `back` frames before the newest, below frames().
+  [[nodiscard]] int frames() const noexcept { return frames_; }
+  [[nodiscard]] const double* x(int back) const noexcept { return window_.x(frames_ - 1 - back); }
+  // out: [stride()], 64-byte aligned
+  void variance(int back, double* out) const noexcept { window_.variance(frames_ - 1 - back, out); }
+  // That frame's rows as the next solve will take them (InformationForm). Only WindowEvidence
+  // writes them.
+  [[nodiscard]] double* row(int back, trajectory::Row row) noexcept {
+    return evidence_.row(slot(frames_ - 1 - back), row);
+  }
+  [[nodiscard]] bool measured(int back, int channel) const noexcept {
+    return sensed(slot(frames_ - 1 - back))[channel] > kNothing;
+  }
+  // All channels of that frame were measured.
+  [[nodiscard]] bool whole(int back) const noexcept {
+    return whole_[static_cast<std::size_t>(slot(frames_ - 1 - back))] != 0;
+  }
+  // Time between that frame and the newest [s].
+  [[nodiscard]] double age_s(int back) const noexcept {
+    return time_s_[static_cast<std::size_t>(frames_ - 1)] -
+           time_s_[static_cast<std::size_t>(frames_ - 1 - back)];
+  }
+  // The channel was measured in one of the window's frames at least.
+  [[nodiscard]] bool known(int channel) const noexcept;
+
+  [[nodiscard]] int stride() const noexcept { return evidence_.stride(); }
+
+ private:
+  [[nodiscard]] int slot(int index) const noexcept;  // ring position of the window's frame
+  [[nodiscard]] const double* sensed(int slot) const noexcept {
+    return sensed_.data() + static_cast<std::ptrdiff_t>(2 * slot) * stride();
+  }
+  void take_sensed(int slot) noexcept;
+  void forget_extra() noexcept;
+  void adopt(std::size_t channel, double value_rad) noexcept;
+  void begin(double period_s) noexcept;
+  void loose_prior() noexcept;
+  void speed_prior() noexcept;
+  void run() noexcept;
+  [[nodiscard]] double curve_time_s3(int index) const noexcept;
+
+  static constexpr double kNothing = 3.3e-6;  // precision of what was not measured [rad^-2]
+
+  int channels_;
+  long pushed_ = 0;
+  int frames_ = 0;  // of the window
+  double period_s_ = 0.0;
+  bool extra_ = false;                    // the window's positions hold more than was measured
+  bool even_ = true;                      // the window's frames stand evenly
+  trajectory::InformationForm evidence_;  // ring
+  std::vector<double> sensed_;            // the same ring: kPosition and kPositionMean as measured
+  trajectory::Window window_;
+  std::vector<std::uint8_t> whole_;             // [kMaxWindow] ring
+  std::vector<double> ring_time_s_;             // [kMaxWindow]
+  std::vector<long> last_measured_;             // [channels] when, counted in frames; -1 never
+  std::vector<double> held_rad_;                // [channels] the last measured value
+  hwy::AlignedFreeUniquePtr<double[]> active_;  // [stride] 1 where a channel ever changed
+  hwy::AlignedFreeUniquePtr<double[]> speeds_;  // [kMaxWindow + 1][stride]
+  std::vector<double> hand_speeds_;             // [kMaxWindow + 1]
+  std::vector<double> time_s_, step_s_, skew_;  // [kMaxWindow] of the window's frames
+  std::vector<const double*> rows_;             // [kMaxWindow]
+};
+
+}  // namespace posed::smooth

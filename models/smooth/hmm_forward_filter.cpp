@@ -1,0 +1,246 @@
+#include "models/smooth/hmm_forward_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace posed::smooth {
+namespace {
+
+using gesture::kDeltaWindows;
+using gesture::kStates;
+
+constexpr double kTemper = 0.05;  // of the likelihoods at the model's rate
+// A hand may begin a gesture out of turn: the filter never locks itself in.
+const double kLogRestart = std::log(1e-4);
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+constexpr double kShortestStay = 1.5;  // frames
+constexpr double kNever = -std::numeric_limits<double>::infinity();
+constexpr double kVanished = 1e-200;
+// What the sensors' noise adds to a feature, in variances of a value.
+constexpr std::array<double, kDeltaWindows> kNoiseGain{1.0, 0.5, 6.0};
+
+// ln(e^a + e^b)
+double log_sum(double a, double b) noexcept {
+  const double top = std::max(a, b);
+  if (top == -std::numeric_limits<double>::infinity()) return top;
+  return top + std::log1p(std::exp(std::min(a, b) - top));
+}
+
+}  // namespace
+
+HmmForwardFilter::HmmForwardFilter(int max_window)
+    : max_window_(max_window),
+      tables_(kMaxLiveChains * kStates),
+      forward_(static_cast<std::size_t>(max_window)),
+      likelihood_(static_cast<std::size_t>(max_window)),
+      swept_(static_cast<std::size_t>(max_window)) {}
+
+// RT-safe.
+void HmmForwardFilter::set_model(const LiveModel* model) noexcept {
+  model_ = model;
+  states_ = model == nullptr ? 0 : static_cast<int>(model->states.size());
+  period_s_ = 0.0;
+  reset();
+}
+
+// RT-safe.
+void HmmForwardFilter::reset() noexcept {
+  pushed_ = 0;
+  swept_frames_ = 0;
+  even_frames_ = 0;
+  for (auto& row : past_) row.fill(kMissing);
+  if (states_ == 0) return;
+  std::fill_n(log_now_.begin(), states_, -std::log(states_));
+  const auto labels = static_cast<double>(model_->labels.size());
+  const bool pairs = model_->chains.front().previous != kAny;
+  log_choices_ = std::log(pairs ? labels - 1.0 : labels);
+}
+
+// A state as this stream's sensors see it at its rate. RT-safe.
+void HmmForwardFilter::renew_table(int state) noexcept {
+  const auto s = static_cast<std::size_t>(state);
+  const LiveState& from = model_->states[s];
+  Table& table = tables_[s];
+  const RateRule rule = rate_rule(pace_);
+  std::size_t k = 0;
+  for (std::size_t w = 0; w < kDeltaWindows; ++w) {
+    const double noise = kNoiseGain[w] * noise_rad_ * noise_rad_;
+    for (std::size_t c = 0; c < kHandChannels; ++c, ++k) {
+      const double variance = from.variance[w][c] * rule.variance[w] + noise;
+      table.mean[k] = from.mean[w][c] * rule.mean[w];
+      table.half_precision[k] = 0.5 / variance;
+      table.half_log[k] = 0.5 * std::log(variance);
+    }
+  }
+  table.stay = 1.0 - 1.0 / std::max(kShortestStay, from.frames * pace_);
+  table.log_stay = std::log(table.stay);
+  table.log_leave = std::log(1.0 - table.stay);
+}
+
+// RT-safe.
+void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, double period_s,
+                            double noise_rad) noexcept {
+  if (model_ == nullptr) return;
+  const bool first = period_s_ <= 0.0;
+  period_s_ = period_s > 0.0 ? period_s : 1.0 / model_->rate_hz;
+  noise_rad_ = noise_rad;
+  pace_ = std::max(1.0 / (period_s_ * model_->rate_hz), 0.1);
+  // Beat and noise move slowly: a state a frame keeps up with them.
+  for (int i = 0; i < (first ? states_ : 1); ++i) {
+    renew_table(next_table_);
+    next_table_ = (next_table_ + 1) % states_;
+  }
+  even_frames_ = even ? std::min(even_frames_ + 1, 2) : 0;
+  Row log_emission;
+  weigh(measured_rad, log_emission);
+  for (std::size_t c = 0; c < kHandChannels; ++c) {
+    past_[1][c] = past_[0][c];
+    past_[0][c] = measured_rad[c];
+  }
+  advance(log_emission);
+}
+
+// The tempered log likelihood of every state; what is missing says nothing. RT-safe.
+void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) const noexcept {
+  std::array<double, kPaddedFeatures> feature{};
+  std::array<double, kPaddedFeatures> weight{};
+  const bool near = even_frames_ == 2;
+  for (std::size_t c = 0; c < kHandChannels; ++c) {
+    if (!model_->moves[c]) continue;
+    const double before = past_[0][c];
+    const double now = near ? measured_rad[c] : kMissing;
+    const std::array<double, kDeltaWindows> values{before, 0.5 * (now - past_[1][c]),
+                                                   now - 2.0 * before + past_[1][c]};
+    for (std::size_t w = 0; w < kDeltaWindows; ++w) {
+      if (!std::isfinite(values[w])) continue;
+      feature[w * kHandChannels + c] = values[w];
+      weight[w * kHandChannels + c] = kTemper / pace_;
+    }
+  }
+  for (std::size_t s = 0; s < static_cast<std::size_t>(states_); ++s) {
+    const Table& table = tables_[s];
+    std::array<double, trajectory::kLanes>
+        sum{};  // several, because each addition waits for the one before
+    for (std::size_t k = 0; k < kPaddedFeatures; k += trajectory::kLanes) {
+      for (std::size_t i = 0; i < trajectory::kLanes; ++i) {
+        const double off = feature[k + i] - table.mean[k + i];
+        sum[i] += weight[k + i] * (off * off * table.half_precision[k + i] + table.half_log[k + i]);
+      }
+    }
+    out[s] = -std::accumulate(sum.begin(), sum.end(), 0.0);
+  }
+}
+
+// One step of the forward filter. RT-safe.
+void HmmForwardFilter::advance(const Row& log_emission) noexcept {
+  const auto states = static_cast<std::size_t>(states_);
+  LabelRow leaving;  // a label's last states
+  std::fill_n(leaving.begin(), model_->labels.size(), kNever);
+  double leaving_any = kNever;
+  for (std::size_t s = kStates - 1; s < states; s += kStates) {
+    const auto label = static_cast<std::size_t>(model_->chains[s / kStates].label);
+    const double leaves = log_now_[s] + tables_[s].log_leave;
+    leaving[label] = log_sum(leaving[label], leaves);
+    leaving_any = log_sum(leaving_any, leaves);
+  }
+  Row next;
+  double top = kNever;
+  for (std::size_t s = 0; s < states; ++s) {
+    const int previous = model_->chains[s / kStates].previous;
+    double entering = log_now_[s > 0 ? s - 1 : 0] + tables_[s > 0 ? s - 1 : 0].log_leave;
+    if (s % kStates == 0) {
+      entering = (previous == kAny ? leaving_any : leaving[static_cast<std::size_t>(previous)]) -
+                 log_choices_;
+      entering = log_sum(entering, kLogRestart);
+    }
+    next[s] = log_sum(log_now_[s] + tables_[s].log_stay, entering) + log_emission[s];
+    top = std::max(top, next[s]);
+  }
+  double sum = 0.0;
+  for (std::size_t s = 0; s < states; ++s) sum += std::exp(next[s] - top);
+  const double norm = top + std::log(sum);
+  const double best = *std::max_element(log_emission.begin(), log_emission.begin() + states_);
+  const auto at = static_cast<std::size_t>(pushed_ % max_window_);
+  for (std::size_t s = 0; s < states; ++s) {
+    log_now_[s] = next[s] - norm;
+    forward_[at][s] = std::exp(log_now_[s]);
+    likelihood_[at][s] = std::exp(log_emission[s] - best);
+  }
+  ++pushed_;
+}
+
+// Backward probabilities from the newest frame on; beliefs in the linear domain, where a frame that
+// contradicts itself (all products vanish) keeps the forward filter's. RT-safe.
+void HmmForwardFilter::sweep(int frames) noexcept {
+  if (model_ == nullptr) return;
+  const auto states = static_cast<std::size_t>(states_);
+  Row backward;
+  std::fill_n(backward.begin(), states_, 1.0);
+  swept_frames_ = static_cast<int>(std::min<long>(frames, pushed_));
+  for (int back = 0; back < swept_frames_; ++back) {
+    const auto at = static_cast<std::size_t>((pushed_ - 1 - back) % max_window_);
+    Row& belief = swept_[static_cast<std::size_t>(back)];
+    double sum = 0.0;
+    for (std::size_t s = 0; s < states; ++s) {
+      belief[s] = forward_[at][s] * backward[s];
+      sum += belief[s];
+    }
+    const bool kept = sum > kVanished;
+    for (std::size_t s = 0; s < states; ++s) belief[s] = kept ? belief[s] / sum : forward_[at][s];
+    Row ahead;
+    for (std::size_t s = 0; s < states; ++s) {
+      ahead[s] = (kept ? backward[s] : 1.0) * likelihood_[at][s];
+    }
+    step_back(ahead, backward);
+  }
+}
+
+// From what lies ahead of each state to the frame before; the largest is 1. RT-safe.
+void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept {
+  const auto states = static_cast<std::size_t>(states_);
+  const double choice = std::exp(-log_choices_);
+  LabelRow entries;  // of the chains that follow a label
+  std::fill_n(entries.begin(), model_->labels.size(), 0.0);
+  double entries_any = 0.0;
+  for (std::size_t s = 0; s < states; s += kStates) {
+    const int previous = model_->chains[s / kStates].previous;
+    if (previous != kAny) entries[static_cast<std::size_t>(previous)] += choice * ahead[s];
+    if (previous == kAny) entries_any += choice * ahead[s];
+  }
+  double largest = kVanished;
+  for (std::size_t s = 0; s < states; ++s) {
+    const auto label = static_cast<std::size_t>(model_->chains[s / kStates].label);
+    const bool last = s % kStates == kStates - 1;
+    const double onwards = last ? entries[label] + entries_any : ahead[s + 1];
+    backward[s] = tables_[s].stay * ahead[s] + (1.0 - tables_[s].stay) * onwards;
+    largest = std::max(largest, backward[s]);
+  }
+  for (std::size_t s = 0; s < states; ++s) backward[s] /= largest;
+}
+
+// What was measured at a frame describes the one before, so frame `back` is believed one sweep step
+// later. RT-safe.
+std::span<const double> HmmForwardFilter::states(int back) const noexcept {
+  return {swept_[static_cast<std::size_t>(std::max(0, back - 1))].data(),
+          static_cast<std::size_t>(states_)};
+}
+
+// RT-safe.
+HmmForwardFilter::Answer HmmForwardFilter::label(int back) const noexcept {
+  Answer answer;
+  if (!knows(back)) return answer;
+  const auto belief = states(back);
+  LabelRow probability;
+  std::fill_n(probability.begin(), model_->labels.size(), 0.0);
+  for (std::size_t s = 0; s < belief.size(); ++s) {
+    probability[static_cast<std::size_t>(model_->chains[s / kStates].label)] += belief[s];
+  }
+  for (std::size_t l = 0; l < model_->labels.size(); ++l) {
+    if (probability[l] > answer.probability) answer = {static_cast<int>(l), probability[l]};
+  }
+  return answer;
+}
+
+}  // namespace posed::smooth

@@ -1,0 +1,95 @@
+// HmmForwardFilter: which gesture a live hand is in, and which state of it. A forward filter over
+// the model's chains in a loop, left to right within a chain and on to any that follows its label
+// (models/smooth/README.md, "HMM forward filter"),
+// with likelihoods tempered because a hand's features are far from independent; it runs in the log
+// domain. Backward sweeps over the window then say what is believed of each of its frames by now.
+//
+// At another rate than the model's: models/trajectory/README.md, "State information and frame
+// rate". Features are causal, so what a frame measures describes the frame before it. RT-safe but
+// for construction.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <vector>
+
+#include "models/smooth/live_model.hpp"
+#include "models/trajectory/information_form.hpp"
+
+namespace posed::smooth {
+
+class HmmForwardFilter {
+ public:
+  explicit HmmForwardFilter(int max_window);
+
+  // Begins anew with this model, not owned; null recognises nothing. RT-safe.
+  void set_model(const LiveModel* model) noexcept;
+  [[nodiscard]] const LiveModel* model() const noexcept { return model_; }
+
+  // The next frame: [45 channels] rad, not a number where missing; `even`: it follows the one
+  // before by one beat. RT-safe.
+  void push(std::span<const double> measured_rad, bool even, double period_s,
+            double noise_rad) noexcept;
+
+  // Sweeps back over the last `frames` pushed frames. RT-safe.
+  void sweep(int frames) noexcept;
+
+  // Whether the last sweep knows the frame `back` before the newest: not when it came before the
+  // model did. RT-safe.
+  [[nodiscard]] bool knows(int back) const noexcept {
+    return std::max(back - 1, 0) < swept_frames_;
+  }
+
+  // What the last sweep believes of that frame, which it knows: [states], sums to 1. The newest
+  // frame is believed to be as the one before. RT-safe.
+  [[nodiscard]] std::span<const double> states(int back) const noexcept;
+
+  // The likeliest label of that frame, its index and probability. RT-safe.
+  struct Answer {
+    int label = -1;  // -1: nothing is known of the frame
+    double probability = 0.0;
+  };
+  [[nodiscard]] Answer label(int back) const noexcept;
+
+  // The stream's rate over the model's. RT-safe.
+  [[nodiscard]] double pace() const noexcept { return pace_; }
+
+  void reset() noexcept;  // RT-safe
+
+ private:
+  static constexpr std::size_t kPaddedFeatures =
+      (gesture::kDeltaWindows * kHandChannels + trajectory::kLanes - 1) / trajectory::kLanes *
+      trajectory::kLanes;
+
+  // One state's Gaussian, [window][channel], and its duration, at the stream's rate and noise.
+  struct Table {
+    std::array<double, kPaddedFeatures> mean{}, half_precision{}, half_log{};
+    double stay = 0.0, log_stay = 0.0, log_leave = 0.0;
+  };
+  using Row = std::array<double, kMaxLiveChains * gesture::kStates>;  // [states]
+  using LabelRow = std::array<double, kMaxLiveChains>;                // [labels]
+
+  void renew_table(int state) noexcept;
+  void weigh(std::span<const double> measured_rad, Row& out) const noexcept;
+  void advance(const Row& log_emission) noexcept;
+  void step_back(const Row& ahead, Row& backward) const noexcept;
+
+  const LiveModel* model_ = nullptr;
+  int max_window_;
+  int states_ = 0;
+  double log_choices_ = 0.0;  // of how many chains may follow a label
+  double pace_ = 1.0;         // the stream's rate over the model's
+  double period_s_ = 0.0, noise_rad_ = 0.0;
+  int next_table_ = 0;
+  long pushed_ = 0;
+  int even_frames_ = 0;                                      // in a row, up to 2
+  std::array<std::array<double, kHandChannels>, 2> past_{};  // the last measured frames
+  std::vector<Table> tables_;                                // [states]
+  Row log_now_{};                                            // forward filter, sums to 1
+  std::vector<Row> forward_, likelihood_;                    // rings [max_window], linear
+  std::vector<Row> swept_;                                   // [max_window], by frames back
+  int swept_frames_ = 0;                                     // of them, those of the last sweep
+};
+
+}  // namespace posed::smooth

@@ -1,0 +1,132 @@
+#include "models/smooth/live_model.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::smooth {
+namespace {
+
+using gesture::Context;
+using gesture::GestureModel;
+using gesture::kDeltaWindows;
+using gesture::kStates;
+
+constexpr double kStill_rad = 1e-6;  // a channel that ranges over less does not move
+
+// A label between all that may stand beside it.
+std::vector<Context> contexts_of(int label, std::span<const int> previous,
+                                 std::span<const int> trained) {
+  const auto beside = [label](std::span<const int> all) {
+    std::vector<int> others;
+    for (const int other : all) {
+      if (other != label) others.push_back(other);
+    }
+    if (others.empty()) others.push_back(label);
+    return others;
+  };
+  std::vector<Context> contexts;
+  for (const int before : beside(previous)) {
+    for (const int after : beside(trained)) contexts.push_back({before, label, after});
+  }
+  return contexts;
+}
+
+std::vector<int> trained_labels(const GestureModel& model) {
+  std::vector<int> trained;
+  for (int i = 0; i < std::ssize(model.labels); ++i) {
+    if (model.labels[static_cast<std::size_t>(i)].trained) trained.push_back(i);
+  }
+  return trained;
+}
+
+// Every label after every other, where that is not too many.
+std::vector<LiveChain> chains_of(int labels) {
+  std::vector<LiveChain> chains;
+  const bool pairs = labels * (labels - 1) <= kMaxLiveChains && labels > 1;
+  for (int label = 0; label < labels; ++label) {
+    if (!pairs) chains.push_back({label, kAny});
+    for (int previous = 0; pairs && previous < labels; ++previous) {
+      if (previous != label) chains.push_back({label, previous});
+    }
+  }
+  return chains;
+}
+
+// Moments over the contexts: the mean of what each says, its variance with their spread
+// (models/smooth/README.md, "Live model").
+LiveState state_of(const GestureModel& model, const std::vector<Context>& contexts, int state) {
+  LiveState pooled;
+  const double share = 1.0 / static_cast<double>(contexts.size());
+  HandRows square{};
+  double frames = 0.0;
+  for (const Context& context : contexts) {
+    frames += share * gesture::duration(model, context).mean[static_cast<std::size_t>(state)];
+    for (std::size_t c = 0; c < kHandChannels; ++c) {
+      const std::size_t angle = kAngleOfChannel[c];
+      const auto& leaf =
+          gesture::leaf(model, state, static_cast<int>(angle / kFingerChannels), context);
+      for (std::size_t w = 0; w < kDeltaWindows; ++w) {
+        const double mean = leaf.mean[w][angle % kFingerChannels];
+        pooled.mean[w][c] += share * mean;
+        square[w][c] += share * (leaf.variance[w][angle % kFingerChannels] + mean * mean);
+      }
+    }
+  }
+  for (std::size_t w = 0; w < kDeltaWindows; ++w) {
+    for (std::size_t c = 0; c < kHandChannels; ++c) {
+      const double mean = pooled.mean[w][c];
+      pooled.variance[w][c] = std::max(square[w][c] - mean * mean, 1e-12);
+    }
+  }
+  pooled.frames = std::max(frames, 1.0);
+  return pooled;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& model,
+                                                         const Skeleton& skeleton,
+                                                         const std::string& name) {
+  if (!hand_side(skeleton)) {
+    return fail("a gesture model steadies a hand, but " + in_quotes(skeleton.name) +
+                    " is none: give the stream a hand, or leave the model out",
+                name);
+  }
+  auto live = std::make_unique<LiveModel>();
+  live->rate_hz = model.rate_hz;
+  live->skeleton = skeleton.id;
+  for (std::size_t c = 0; c < kHandChannels; ++c) {
+    const std::size_t angle = kAngleOfChannel[c];
+    live->moves[c] = model.high[angle] - model.low[angle] > kStill_rad;
+  }
+  const std::vector<int> trained = trained_labels(model);
+  if (trained.empty()) return fail("the model holds no recorded label", name);
+  if (std::ssize(trained) > kMaxLiveChains) {
+    return fail("the model has " + std::to_string(trained.size()) +
+                    " recorded labels; a live stream tells at most " +
+                    std::to_string(kMaxLiveChains) + " apart",
+                name);
+  }
+  for (const int label : trained) {
+    const std::string& from = model.labels[static_cast<std::size_t>(label)].name;
+    auto& to = live->labels.emplace_back();
+    std::copy_n(from.begin(), std::min(from.size(), to.size() - 1), to.begin());
+  }
+  live->chains = chains_of(static_cast<int>(trained.size()));
+  for (const LiveChain& chain : live->chains) {
+    const int label = trained[static_cast<std::size_t>(chain.label)];
+    const std::span<const int> all(trained);
+    const auto previous =
+        chain.previous == kAny ? all : all.subspan(static_cast<std::size_t>(chain.previous), 1);
+    const auto contexts = contexts_of(label, previous, trained);
+    for (int state = 0; state < kStates; ++state) {
+      live->states.push_back(state_of(model, contexts, state));
+    }
+  }
+  return live;
+}
+
+}  // namespace posed::smooth

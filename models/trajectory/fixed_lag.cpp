@@ -1,0 +1,62 @@
+#include "models/trajectory/fixed_lag.hpp"
+
+#include <algorithm>
+
+namespace posed::trajectory {
+namespace {
+
+hwy::AlignedFreeUniquePtr<double[]> rows(int count, int stride) {
+  return hwy::AllocateAligned<double>(static_cast<std::size_t>(count) *
+                                      static_cast<std::size_t>(stride));
+}
+
+}  // namespace
+
+FixedLag::FixedLag(int channels, int lag)
+    : lag_(lag),
+      recent_(channels, kOpen),
+      carry_(rows(kernel::kCarryRows, recent_.stride())),
+      x_(rows(lag + 1, recent_.stride())) {
+  const int kept = std::max(lag + 1, kOpen);
+  factor_rows_ = rows(kept * kernel::kFactorRows, stride());
+  for (int i = 0; i < kept; ++i) {
+    factors_.push_back(factor_rows_.get() +
+                       static_cast<std::ptrdiff_t>(i) * kernel::kFactorRows * stride());
+  }
+  for (int i = 0; i < kOpen; ++i) tail_[i] = recent_.frame(i);
+}
+
+// RT-safe.
+void FixedLag::push(const double* evidence) noexcept {
+  if (pushed_ >= kOpen) std::ranges::rotate(tail_, tail_.begin() + 1);
+  const long open = std::min<long>(pushed_, kOpen - 1);
+  double* newest = recent_.row(static_cast<int>(pushed_ % kOpen), kPosition);
+  std::copy_n(evidence, kRows * stride(), newest);
+  tail_[static_cast<std::size_t>(open)] = newest;
+  if (pushed_ >= static_cast<long>(factors_.size())) {
+    std::ranges::rotate(factors_, factors_.begin() + 1);
+  }
+  ++pushed_;
+  const int frames = static_cast<int>(open) + 1;
+  const auto held = std::min<long>(pushed_, static_cast<long>(factors_.size()));
+  // The first of the open frames is eliminated for good as soon as there are three.
+  kernel::eliminate({.evidence = tail_.data(),
+                     .frames = frames,
+                     .stride = stride(),
+                     .carry_in = pushed_ > kOpen ? carry_.get() : nullptr,
+                     .carry_out = frames == kOpen ? carry_.get() : nullptr},
+                    factors_.data() + held - frames);
+}
+
+// RT-safe.
+void FixedLag::estimate(int back, double* x, double* variance) noexcept {
+  const auto held = static_cast<int>(std::min<long>(pushed_, static_cast<long>(factors_.size())));
+  const int first = held - 1 - back;
+  kernel::substitute(factors_.data(), held, first, stride(), x_.get());
+  std::copy_n(x_.get(), stride(), x);
+  if (variance != nullptr) {
+    kernel::variance(factors_.data(), held, first, stride(), variance, 0);
+  }
+}
+
+}  // namespace posed::trajectory

@@ -1,0 +1,37 @@
+#include "models/trajectory/sliding_window.hpp"
+
+namespace posed::trajectory {
+
+Window::Window(int channels, int max_frames)
+    : channels_(channels),
+      stride_(padded(channels)),
+      x_(hwy::AllocateAligned<double>(static_cast<std::size_t>(max_frames) *
+                                      static_cast<std::size_t>(stride_))),
+      factor_rows_(
+          hwy::AllocateAligned<double>(static_cast<std::size_t>(max_frames) * kernel::kFactorRows *
+                                       static_cast<std::size_t>(stride_))) {
+  for (int i = 0; i < max_frames; ++i) {
+    factors_.push_back(factor_rows_.get() +
+                       static_cast<std::ptrdiff_t>(i) * kernel::kFactorRows * stride_);
+  }
+}
+
+// RT-safe.
+void Window::solve(std::span<const double* const> evidence, Boundary boundary,
+                   const double* skew) noexcept {
+  frames_ = static_cast<int>(evidence.size());
+  kernel::eliminate({evidence.data(), frames_, stride_, boundary, skew}, factors_.data());
+  kernel::substitute(factors_.data(), frames_, 0, stride_, x_.get());
+}
+
+// RT-safe.
+void Window::variance(int frame, double* out) const noexcept {
+  kernel::variance(factors_.data(), frames_, frame, stride_, out, 0);
+}
+
+// RT-safe.
+void Window::variances(double* out) const noexcept {
+  kernel::variance(factors_.data(), frames_, 0, stride_, out, stride_);
+}
+
+}  // namespace posed::trajectory

@@ -1,0 +1,42 @@
+// Window: the most likely trajectory over a few frames of all channels and its variance, solved at
+// once. InformationForm may be changed and solved again at any time: nothing is kept between
+// solves. For the live generator (a window that slides and is re-solved) and, with many frames, for
+// a whole string.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "models/trajectory/information_form.hpp"
+#include "models/trajectory/pentadiagonal.hpp"
+
+namespace posed::trajectory {
+
+class Window {
+ public:
+  Window(int channels, int max_frames);
+
+  // Solves the given frames (1 to max_frames), each pointer to a frame's rows
+  // (InformationForm::frame() of this many channels). `skew`: [frames] of an uneven clock
+  // (kernel::System), else null. RT-safe.
+  void solve(std::span<const double* const> evidence, Boundary boundary = Boundary::kDrop,
+             const double* skew = nullptr) noexcept;
+
+  // Of the last solve. [channels], padded; RT-safe.
+  [[nodiscard]] const double* x(int frame) const noexcept {
+    return x_.get() + static_cast<std::ptrdiff_t>(frame) * stride_;
+  }
+  void variance(int frame, double* out) const noexcept;  // out: [stride()], 64-byte aligned
+  void variances(double* out) const noexcept;            // out: [frames][stride()]
+
+  [[nodiscard]] int channels() const noexcept { return channels_; }
+  [[nodiscard]] int stride() const noexcept { return stride_; }
+
+ private:
+  int channels_, stride_;
+  int frames_ = 0;  // of the last solve
+  hwy::AlignedFreeUniquePtr<double[]> x_, factor_rows_;
+  std::vector<double*> factors_;
+};
+
+}  // namespace posed::trajectory

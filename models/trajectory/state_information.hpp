@@ -1,0 +1,40 @@
+// StateInformation: what a gesture model says of each state of a gesture, as evidence rows at one
+// frame rate, and how many frames the state lasts. Built cold, then const and shared.
+//
+// At a rate r times the model's, means are divided by r (delta) and r^2 (curve), variances
+// multiplied by r (position) and divided by r (delta) and r^3 (curve), durations multiplied by r
+// (models/trajectory/README.md, "State information and frame rate").
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "models/gesture/gesture_model.hpp"
+#include "models/trajectory/information_form.hpp"
+
+namespace posed::trajectory {
+
+class StateInformation {
+ public:
+  StateInformation(std::shared_ptr<const gesture::GestureModel> model, double rate_hz);
+
+  // Writes the kRows rows (stride padded(kHandChannels)) of one frame in `state` (from 0) of a
+  // gesture. RT-safe.
+  void fill(const gesture::Context& context, int state, double* rows) const noexcept;
+
+  // Durations in frames of rate_hz(). RT-safe.
+  [[nodiscard]] gesture::DurationGaussian duration(const gesture::Context& context) const noexcept;
+
+  [[nodiscard]] const gesture::GestureModel& model() const noexcept { return *model_; }
+  [[nodiscard]] double rate_hz() const noexcept { return rate_hz_; }
+
+ private:
+  using FingerRows = std::array<std::array<double, kFingerChannels>, kRows>;
+
+  std::shared_ptr<const gesture::GestureModel> model_;
+  double rate_hz_;
+  std::array<std::array<std::vector<FingerRows>, kFingers>, gesture::kStates> leaves_;
+};
+
+}  // namespace posed::trajectory

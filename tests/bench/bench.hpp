@@ -1,0 +1,13 @@
+// The commands of posed_bench: posed timed beside other programs and methods in the same run.
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace posed::bench {
+
+void add_bench_generate(CLI::App& app, int& exit_code);
+void add_bench_smooth(CLI::App& app, int& exit_code);
+
+}  // namespace posed::bench

@@ -1,0 +1,29 @@
+// LAPACK as a baseline of the batch solve: one banded system a channel, built and solved by dpbsv.
+// The library is loaded when asked for, because nothing but the bench wants it.
+#pragma once
+
+#include <vector>
+
+#include "models/trajectory/information_form.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::bench {
+
+class LapackBaseline {
+ public:
+  // Refuses when liblapack.so.3 is not installed.
+  [[nodiscard]] static Result<LapackBaseline> load();
+
+  // The trajectory of every channel, [channel][frame], from the evidence of all frames.
+  void solve(const trajectory::InformationForm& evidence, std::vector<double>& x);
+
+ private:
+  using Dpbsv = void (*)(const char* uplo, const int* n, const int* kd, const int* nrhs, double* ab,
+                         const int* ldab, double* b, const int* ldb, int* info);
+  explicit LapackBaseline(Dpbsv dpbsv) : dpbsv_(dpbsv) {}
+
+  Dpbsv dpbsv_;
+  std::vector<double> bands_;
+};
+
+}  // namespace posed::bench

@@ -1,0 +1,20 @@
+// posed_bench: posed beside other programs and methods. What measures the user's own machine is
+// `posed bench`.
+#include <CLI/CLI.hpp>
+
+#include "daemon/cli/cli.hpp"
+#include "tests/bench/bench.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app{"Times posed beside other programs and methods in the same run", "posed_bench"};
+  app.require_subcommand(1);
+  int exit_code = 0;
+  posed::bench::add_bench_generate(app, exit_code);
+  posed::bench::add_bench_smooth(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(posed::cli::ExitCode::kWrongUse);
+  }
+  return exit_code;
+}

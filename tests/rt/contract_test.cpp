@@ -1,0 +1,246 @@
+// The hot law holds on the real reader and pipeline threads; and each way of breaking it, put into
+// those threads on purpose, is found.
+#include <spdlog/spdlog.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#include <catch2/catch.hpp>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <thread>
+
+#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/system/clock.hpp"
+#include "drivers/options.hpp"
+#include "drivers/transport/transport_factory.hpp"
+#include "models/gesture/synthetic_signer.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "tests/rt/contract.hpp"
+#include "tests/rt/rig.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+namespace posed::rt {
+namespace {
+
+using pipeline::Command;
+
+// A record_sink that keeps the law itself; the recorder's has tests of its own.
+class CountingTape final : public pipeline::RecordSink {
+ public:
+  void chunk(std::uint32_t, std::uint8_t, pipeline::Direction, std::int64_t,
+             const pipeline::Position&, std::span<const std::byte>) noexcept override {
+    ++chunks;
+  }
+  void decision(const pipeline::Decision&) noexcept override { ++decisions; }
+  [[nodiscard]] bool wants_published() const noexcept override { return false; }
+  void published(std::uint32_t, std::uint64_t, bool, std::span<const std::byte>) noexcept override {
+  }
+  void unpublished(std::uint32_t) noexcept override {}
+  void keep_model(std::span<const std::byte>) override {}
+  std::atomic<int> chunks{0}, decisions{0};
+};
+
+drivers::Device open_device(const char* driver, const drivers::Options& options) {
+  drivers::TransportFactory ports;
+  return drivers::find_driver(driver)->open(options, ports).value();
+}
+
+// Breaks the law once, at the fifth chunk.
+class BreakingDecoder final : public drivers::Decoder {
+ public:
+  BreakingDecoder(std::unique_ptr<drivers::Decoder> inner, std::function<void()> breach)
+      : inner_(std::move(inner)), breach_(std::move(breach)) {}
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override {
+    if (++chunks_ == 5) breach_();
+    inner_->feed(bytes, arrival_ns, sink);
+  }
+
+ private:
+  std::unique_ptr<drivers::Decoder> inner_;
+  std::function<void()> breach_;
+  int chunks_ = 0;
+};
+
+void check_no_breach() {
+  for (int b = 0; b < static_cast<int>(Breach::kCount); ++b) {
+    INFO(kBreachNames[static_cast<std::size_t>(b)] << ", last system call " << last_system_call());
+    CHECK(breaches(static_cast<Breach>(b)) == 0);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("reader and pipeline keep the hot law", "[rt]") {
+  watch_log();
+  const test::TempFolder folder;
+  const auto path = folder.path() / "toy.bvh";
+  REQUIRE(clip::write_bvh(test::toy_walk(120, 120.0), path));
+  CountingTape record_sink;
+  const auto device = open_device("file", {{"path", path.string()}});
+  const Skeleton& skeleton = *device.description.skeleton;
+  const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
+  const auto second = style::bind_model(test::toy_model(2), skeleton, {}, "second").value();
+  std::vector<RigStream> streams;
+  streams.push_back(
+      {.device = open_device("file", {{"path", path.string()}}), .style = first.get()});
+  streams.push_back({.device = open_device("template", {})});
+  // Once through at 20 times its speed: ends, and is silent before that is noticed.
+  streams.push_back(
+      {.device = open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}}),
+       .style = first.get()});
+  Rig rig(std::move(streams), &record_sink);
+  forget_breaches();
+  rig.start();
+  REQUIRE(rig.take_frames(200) == 200);
+  rig.command({.kind = Command::Kind::kAlpha, .stream = 0, .ticket = 1, .alpha = 0.5F});
+  rig.command({.kind = Command::Kind::kModel, .stream = 0, .ticket = 2, .model = second.get()});
+  REQUIRE(rig.take_frames(200) == 200);
+  CHECK(rig.take_acks() == 2);
+  CHECK(record_sink.chunks > 0);
+  CHECK(record_sink.decisions >= 2);
+  if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
+  check_no_breach();
+}
+
+TEST_CASE("hands keep the hot law: smoothed, constrained, performing, given another model",
+          "[rt]") {
+  watch_log();
+  const test::TempFolder folder;
+  const auto path = folder.path() / "hand.csv";
+  const auto signer = gesture::make_performance({.person = 3, .gestures = 6}).value();
+  REQUIRE(clip::write_hand_csv(signer.clip, path));
+  CountingTape record_sink;
+  std::vector<RigStream> streams;
+  streams.push_back({.device = open_device("file", {{"path", path.string()}, {"pace", 4.0}})});
+  streams.push_back({.device = open_device("labels", {{"rate_hz", 120.0}})});
+  // Falls silent with frames in the smoother, and performs on.
+  streams.push_back(
+      {.device = open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}})});
+  std::vector<std::unique_ptr<const generate::BoundModel>> models;
+  const auto bind = [&](const drivers::Description& hand) {
+    models.push_back(
+        generate::bind_model(test::toy_gesture_model(), *hand.skeleton, hand.rate_hz, "toy")
+            .value());
+    return models.back().get();
+  };
+  for (RigStream& stream : streams) stream.gesture = bind(stream.device.description);
+  const auto* const another = bind(streams[0].device.description);
+  const auto order = gesture::make_play_order(models[0]->gesture(),
+                                              gesture::split_labels("g 1 c 3 4 p"), 2.0, true)
+                         .value();
+  Rig rig(std::move(streams), &record_sink);
+  forget_breaches();
+  rig.start();
+  REQUIRE(rig.take_frames(150) == 150);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    rig.command({.kind = Command::Kind::kPlay, .stream = i, .ticket = 1 + i, .play = order});
+  }
+  REQUIRE(rig.take_frames(150) == 150);
+  rig.command({.kind = Command::Kind::kGesture, .stream = 0, .ticket = 4, .gesture = another});
+  rig.command({.kind = Command::Kind::kStopPlaying, .stream = 1, .ticket = 5});
+  REQUIRE(rig.take_frames(150) == 150);
+  CHECK(rig.take_acks() == 5);
+  check_no_breach();
+}
+
+TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "[rt]") {
+  watch_log();
+  CountingTape record_sink;
+  const auto plug_in = [] {
+    auto emulator =
+        drivers::find_driver("lucidgloves")
+            ->emulate(drivers::complete_options(*drivers::find_driver("lucidgloves"), {}).value());
+    return std::make_unique<emulate::EmulatedGlove>(std::move(*emulator),
+                                                    emulate::EmulatedPort::open_pty().value(),
+                                                    nullptr, emulate::EmulatedGlove::Settings{});
+  };
+  auto glove = plug_in();
+  const auto wear = [&] {
+    return std::jthread([&glove](const std::stop_token& stop) { glove->run(stop); });
+  };
+  std::jthread worn = wear();
+  pipeline::DeviceSlot slot;
+  slot.supervisor = system::EventFd::open().value();
+  std::vector<RigStream> streams;
+  streams.push_back(
+      {.device = open_device("lucidgloves", {{"port", glove->port()}}), .slot = &slot});
+  const auto model =
+      drivers::find_driver("lucidgloves")->glove_model(streams[0].device.description);
+  const drivers::glove::OwnedCalibration calibration{
+      drivers::glove::default_calibration(*model).value(), "calibration"};
+  drivers::Device again;
+  {
+    Rig rig(std::move(streams), &record_sink);
+    forget_breaches();
+    rig.start();
+    REQUIRE(rig.take_frames(50) == 50);
+    rig.command({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
+                 .ticket = 1,
+                 .calibration = &calibration});
+    rig.command({.kind = pipeline::DeviceCommand::Kind::kSend, .size = 5});
+    REQUIRE(rig.take_frames(50) == 50);
+    CHECK(rig.take_acks() == 1);
+    worn.request_stop();
+    worn.join();
+    glove.reset();  // unplugged
+    drivers::Device* lost = nullptr;
+    while (!slot.out.consume([&](drivers::Device* device) { lost = device; })) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    lost->transport.reset();
+    glove = plug_in();
+    worn = wear();
+    again = open_device("lucidgloves", {{"port", glove->port()}});
+    again.transport->start(system::monotonic_ns()).value();
+    REQUIRE(slot.in.push(&again));
+    rig.call_reader();
+    REQUIRE(rig.take_frames(50) == 50);
+    if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
+    check_no_breach();
+  }
+}
+
+TEST_CASE("each way of breaking the hot law is found", "[rt]") {
+  watch_log();
+  struct Way {
+    Breach breach;
+    std::function<void()> commit;
+  };
+  static std::mutex mutex;
+  const std::vector<Way> ways{
+      {Breach::kAllocation, [] { delete new volatile int(1); }},
+      {Breach::kLock, [] { const std::scoped_lock lock(mutex); }},
+      {Breach::kLog, [] { spdlog::info("hot"); }},
+      {Breach::kThrow,
+       [] {
+         try {
+           throw 1;
+         } catch (int) {
+         }
+       }},
+      {Breach::kSystemCall, [] { syscall(SYS_getppid); }},
+  };
+  for (const Way& way : ways) {
+    INFO(kBreachNames[static_cast<std::size_t>(way.breach)]);
+    std::vector<RigStream> streams;
+    streams.push_back({.device = open_device("template", {{"rate_hz", 500.0}})});
+    auto& decoder = streams[0].device.decoder;
+    decoder = std::make_unique<BreakingDecoder>(std::move(decoder), way.commit);
+    Rig rig(std::move(streams), nullptr);
+    forget_breaches();
+    rig.start();
+    REQUIRE(rig.take_frames(20) == 20);
+    if (way.breach == Breach::kSystemCall && !rig.system_calls_watched()) {
+      WARN("SKIPPED: this kernel has no syscall user dispatch");
+      continue;
+    }
+    CHECK(breaches(way.breach) >= 1);
+  }
+}
+
+}  // namespace posed::rt

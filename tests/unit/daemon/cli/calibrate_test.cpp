@@ -1,0 +1,124 @@
+// `posed calibrate` on an emulated glove behind a pseudo-terminal: from poses to angles.
+#include <catch2/catch.hpp>
+
+#include <deque>
+
+#include "daemon/cli/devices/calibrate_poses.hpp"
+#include "drivers/driver.hpp"
+#include "tests/support/posing_glove.hpp"
+
+namespace posed::cli {
+namespace {
+
+using drivers::glove::Pose;
+using test::PosingGlove;
+
+// Says these words, one a pose; poses that the script does not know begin at once.
+class ScriptedUser final : public PoseGuide {
+ public:
+  explicit ScriptedUser(PosingGlove& glove, std::deque<Word> script = {})
+      : glove_(glove), script_(std::move(script)) {}
+
+  void want(Pose pose) override {
+    asked.push_back(pose);
+    glove_.hold(pose);
+  }
+  Word hear() override {
+    if (script_.empty()) return Word::kGo;
+    const Word word = script_.front();
+    script_.pop_front();
+    return word;
+  }
+  void show(const GloveSource::Raw&, const GloveSource::Valid&, PosePhase phase, double left_s,
+            double whole_s) override {
+    ++shown;
+    if (phase == PosePhase::kHeld && !(left_s <= whole_s)) ++wrong;
+    if (fidgets && phase == PosePhase::kHeld) {
+      glove_.hold(left_s > whole_s / 2 ? Pose::kFlat : Pose::kFist);
+    }
+  }
+  void restless(Pose pose, const std::string&) override { moved.push_back(pose); }
+
+  std::vector<Pose> asked, moved;
+  std::size_t shown = 0, wrong = 0;
+  bool fidgets = false;
+
+ private:
+  PosingGlove& glove_;
+  std::deque<Word> script_;
+};
+
+std::unique_ptr<GloveSource> worn(const PosingGlove& glove) {
+  auto source = GloveSource::open(*drivers::find_driver("cyberglove"), {{"port", glove.port()}});
+  if (!source) FAIL(source.error().text());
+  return std::move(*source);
+}
+
+const PosePlan kQuick{.seconds = {0.2, 0.2, 0.2, 0.2}, .ready_s = std::nullopt, .settle_s = 0.3};
+
+}  // namespace
+
+TEST_CASE("a glove calibrated by poses reads the angles of those poses") {
+  PosingGlove glove;
+  const auto source = worn(glove);
+  ScriptedUser user(glove);
+  const auto recorded = record_poses(*source, kQuick, user);
+  if (!recorded) FAIL(recorded.error().text());
+  CHECK(user.asked == std::vector{Pose::kFlat, Pose::kFist, Pose::kThumb, Pose::kSpread});
+  CHECK(user.shown > 4);
+  CHECK(user.wrong == 0);
+  CHECK(user.moved.empty());
+  CHECK(source->hand() == Side::kRight);
+  const auto& model = source->model();
+  const auto fitted = drivers::glove::fit_poses(model, *recorded);
+  if (!fitted) FAIL(fitted.error().text());
+  CHECK(fitted->warnings.empty());
+  // The emulator's gains are the driver's defaults: the fit finds them again, to a count's
+  // rounding.
+  for (const auto& [name, points] : fitted->sensors) {
+    INFO(name);
+    const auto sensor = std::ranges::find(model.sensors, name, &drivers::glove::Sensor::name);
+    REQUIRE(sensor != model.sensors.end());
+    for (const auto& point : points) {
+      const auto by_default =
+          static_cast<double>(sensor->curve.value_at(static_cast<float>(point[0])));
+      CHECK(by_default == Approx(point[1]).margin(0.02));
+    }
+  }
+  CHECK(fitted->sensors.size() >= 18);
+}
+
+TEST_CASE("a pose can be held again, and a hand that moved in it is told") {
+  PosingGlove glove;
+  const auto source = worn(glove);
+  using Word = PoseGuide::Word;
+  ScriptedUser user(glove, {Word::kBack, Word::kGo, Word::kNothing, Word::kBack, Word::kGo});
+  user.fidgets = true;
+  const auto recorded = record_poses(
+      *source, {.seconds = {0.6, 0.2, 0, 0}, .ready_s = std::nullopt, .settle_s = 0.1}, user);
+  if (!recorded) FAIL(recorded.error().text());
+  CHECK(user.asked == std::vector{Pose::kFlat, Pose::kFlat, Pose::kFist, Pose::kFlat, Pose::kFist});
+  REQUIRE_FALSE(user.moved.empty());
+  CHECK(user.moved[0] == Pose::kFlat);
+}
+
+TEST_CASE("poses that begin by themselves need no word") {
+  PosingGlove glove;
+  const auto source = worn(glove);
+  ScriptedUser user(glove, std::deque<PoseGuide::Word>(100'000, PoseGuide::Word::kNothing));
+  const auto recorded =
+      record_poses(*source, {.seconds = {0.1, 0.1, 0, 0}, .ready_s = 0.2, .settle_s = 0.1}, user);
+  if (!recorded) FAIL(recorded.error().text());
+  CHECK(user.asked == std::vector{Pose::kFlat, Pose::kFist});
+}
+
+TEST_CASE("a calibration that the user gives up writes nothing, and says so") {
+  PosingGlove glove;
+  const auto source = worn(glove);
+  ScriptedUser user(glove, {PoseGuide::Word::kNothing, PoseGuide::Word::kStop});
+  const auto recorded = record_poses(*source, {}, user);
+  REQUIRE_FALSE(recorded);
+  CHECK(recorded.error().message.contains("no calibration was written"));
+}
+
+}  // namespace posed::cli

@@ -1,0 +1,44 @@
+#include "daemon/cli/live/heartbeat.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "proto/frame/time.hpp"
+
+namespace posed::cli {
+namespace {
+
+constexpr std::int64_t kSecond = kNanosPerSecond;
+
+TEST_CASE("a daemon that was never heard is missed within two seconds") {
+  Heartbeat heart(100 * kSecond);
+  CHECK_FALSE(heart.silent_s(101 * kSecond));
+  CHECK_FALSE(heart.ever_heard());
+  REQUIRE(heart.silent_s(102 * kSecond));
+  CHECK(*heart.silent_s(120 * kSecond) == Approx(20.0));
+}
+
+TEST_CASE("a daemon that falls silent is told once for each doubling, and that it is back once") {
+  Heartbeat heart(0);
+  heart.heard(kSecond / 2);
+  CHECK_FALSE(heart.silence_to_tell(3 * kSecond));
+  int told = 0;
+  double last_s = 0.0;
+  for (int tenth = 30; tenth < 600; ++tenth) {
+    const auto silence_s = heart.silence_to_tell(tenth * kSecond / 10);
+    if (!silence_s) continue;
+    ++told;
+    CHECK(*silence_s >= 2.0 * last_s);
+    last_s = *silence_s;
+  }
+  CHECK(told == 5);  // after 3, 6, 12, 24 and 48 s
+  CHECK_FALSE(heart.return_to_tell());
+  heart.heard(60 * kSecond);
+  CHECK(heart.return_to_tell().value() == Approx(59.5));
+  CHECK_FALSE(heart.return_to_tell());
+  CHECK_FALSE(heart.silent_s(62 * kSecond));
+  heart.heard(62 * kSecond);
+  CHECK_FALSE(heart.return_to_tell());
+}
+
+}  // namespace
+}  // namespace posed::cli

@@ -1,0 +1,190 @@
+#include "daemon/cli/live/live_view.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "daemon/cli/json.hpp"
+#include "posed/v1/posed.pb.h"
+
+namespace posed::cli {
+namespace {
+
+v1::Stats stats_of(int streams) {
+  v1::Stats stats;
+  stats.set_cpu_percent(12.34F);
+  stats.set_rss_bytes(45'600'000);
+  for (int i = 0; i < streams; ++i) {
+    auto& stream = *stats.add_stream();
+    stream.set_stream("walker" + std::to_string(i));
+    stream.set_state("live");
+    stream.set_rate_hz(120.0F);
+    stream.set_alpha(-0.5F);
+    stream.set_alpha_target(-0.5F);
+    stream.set_model("march-to-sway.style");
+    stream.mutable_style()->set_p50_us(31.4F);
+    stream.mutable_style()->set_p99_us(1234.0F);
+  }
+  return stats;
+}
+
+TEST_CASE("the live view fits 80 x 24 whatever the daemon says") {
+  v1::Stats stats = stats_of(32);
+  auto& wild = *stats.mutable_stream(0);
+  wild.set_stream(std::string(32, 'x'));
+  wild.set_model("\x1b[2Jevil");
+  wild.set_rate_hz(1e9F);
+  wild.set_dropped(123'456'789'012);
+  wild.set_shed(99'999);
+  wild.mutable_publish()->set_p99_us(3e12F);
+  LiveViewOptions options{.title = "posed tcp://127.0.0.1:5570"};
+  options.notes.assign(40, "walker0 something happened");
+  for (const int height : {24, 10, 3, 1}) {
+    options.height = height;
+    const auto lines = live_view(stats, options);
+    CHECK(lines.size() <= static_cast<std::size_t>(std::max(height, 4)));
+    for (const std::string& line : lines) {
+      INFO(line);
+      CHECK(line.size() <= 80);
+      CHECK(line.find('\x1b') == std::string::npos);
+    }
+  }
+}
+
+TEST_CASE("the live view shows what matters of each stream") {
+  const auto lines = live_view(stats_of(2), {.title = "posed", .width = 100});
+  REQUIRE(lines.size() == 5);
+  CHECK(lines[0].find("2 streams   cpu 12.3 %   rss 45.6 MB") != std::string::npos);
+  CHECK(lines[3].find("walker1") == 0);
+  CHECK(lines[3].find("120.0") != std::string::npos);
+  CHECK(lines[3].find("31/1.2m") != std::string::npos);
+  CHECK(lines[3].find("-0.50 march-to-sway.style") != std::string::npos);
+}
+
+TEST_CASE("the live view tells which gloves are away, since when, and how a glove's clock runs") {
+  v1::Stats stats = stats_of(4);
+  stats.set_time_ns(1'000'000'000'000);
+  for (auto& stream : *stats.mutable_stream()) {
+    stream.set_greeting("cyberglove hand=right");
+    stream.set_link_ns(stats.time_ns() - 180'000'000'000);
+    stream.set_connections(1);
+    stream.set_identity("0403:6001 A9XYZ");
+  }
+  auto& late = *stats.mutable_stream(0);
+  late.set_away(true);
+  late.set_connections(0);
+  auto& lost = *stats.mutable_stream(1);
+  lost.set_away(true);
+  lost.set_state("stale");
+  lost.set_connections(3);
+  lost.set_link_ns(stats.time_ns() - 12'000'000'000);
+  auto& back = *stats.mutable_stream(2);
+  back.set_connections(4);
+  back.set_clock_offset_ns(-2'500'000'000);
+  back.set_clock_drift_ppm(7.26F);
+  back.set_identity("/dev/\x1b[2J");
+  const auto lines = live_view(stats, {.title = "posed", .height = 0});
+  REQUIRE(lines.size() == 11);
+  CHECK(lines[2].starts_with("walker0     away "));
+  CHECK(lines[3].starts_with("walker1     away "));
+  CHECK(lines[4].starts_with("walker2     live "));
+  CHECK(lines[6].starts_with("  walker0   not there yet; posed has looked for it for 3 min"));
+  CHECK(lines[7].starts_with("  walker1   away for 12 s; connected 3 times before"));
+  CHECK(
+      lines[8].starts_with("  walker2   back for 3 min, reconnected 3 times, clock -2.500 s, dri"));
+  CHECK(lines[9].starts_with("  walker3   0403:6001 A9XYZ"));
+  const auto wide = live_view(stats, {.title = "posed", .width = 120, .height = 0});
+  stats.mutable_stream(2)->set_clock_drift_ppm(-0.02F);
+  CHECK(live_view(stats, {.title = "posed", .width = 120, .height = 0})[8].contains(
+      "drift +0.0 ppm"));
+  CHECK(wide[8].contains("drift +7.3 ppm, /dev/\\x1b[2J"));
+  CHECK(live_view(stats, {.height = 0, .colour = true})[3].starts_with("\x1b[33m"));
+}
+
+TEST_CASE("a daemon that does not answer is not shown as live") {
+  v1::Stats stats = stats_of(2);
+  stats.mutable_stream(0)->set_label("g");
+  LiveViewOptions options{.title = "posed tcp://a:1", .height = 0, .colour = true};
+  options.silence = "no answer for 20 s: the daemon has ended, or cannot be reached";
+  const auto lines = live_view(stats, options);
+  CHECK(lines[0].starts_with("\x1b[31mno answer for 20 s: the daemon has ended"));
+  std::string all;
+  for (const std::string& line : lines) all += line + "\n";
+  INFO(all);
+  CHECK_FALSE(all.contains("live"));
+  CHECK_FALSE(all.contains("120.0"));
+  CHECK_FALSE(all.contains("31/"));
+  CHECK_FALSE(all.contains("cpu"));
+  CHECK_FALSE(all.contains("recognised"));
+  CHECK(all.contains("walker1"));
+}
+
+TEST_CASE("on no terminal names are whole and lines end with their words") {
+  v1::Stats stats = stats_of(2);
+  const std::string name = "a-model-with-quite-a-long-name-indeed-yes.style";
+  stats.mutable_stream(0)->set_model(name);
+  stats.mutable_stream(1)->set_stream(std::string(32, 'w'));
+  stats.mutable_stream(1)->clear_model();
+  stats.mutable_stream(1)->set_label("g");
+  const auto lines = live_view(stats, {.title = "posed", .width = 0, .height = 0});
+  CHECK(lines[2].ends_with(" " + name));
+  CHECK(lines[3].starts_with(std::string(32, 'w') + " "));
+  CHECK(lines[4] == "  " + std::string(32, 'w') + " recognised g 0 %");
+  for (const std::string& line : lines) CHECK_FALSE(line.ends_with(' '));
+}
+
+TEST_CASE("what a stream does is told: performed, recognised, sliding, replayed") {
+  v1::Stats stats = stats_of(1);
+  auto& stream = *stats.mutable_stream(0);
+  stream.set_alpha_target(-0.5F);
+  stream.set_label("g");
+  stream.set_label_probability(0.83F);
+  const auto below = [&] {
+    return live_view(stats, {.title = "posed", .width = 0, .height = 0})[3];
+  };
+  CHECK(below() == "  walker0   recognised g 83 %");
+  stream.set_source(v1::SOURCE_LABELS);
+  CHECK(below() == "  walker0   performs g");
+  stream.set_alpha_target(1.0F);
+  CHECK(below() == "  walker0   performs g, alpha slides to 1.00");
+  stats.set_replay_file("take1.plog");
+  stats.set_replay_speed(1.0);
+  CHECK(below() == "  a replay of take1.plog, 1 x its pace; all times are the recording's");
+  // A stage that no frame passed has no times.
+  CHECK(live_view(stats, {.width = 0, .height = 0})[2].contains(" -   31/1.2m         - "));
+}
+
+TEST_CASE("streams that do not fit are counted, notes fill what is left") {
+  LiveViewOptions options{.title = "posed", .height = 10};
+  const auto many = live_view(stats_of(32), options);
+  CHECK(many.size() == 10);
+  CHECK(many[8] == "... and 26 more");
+  options.notes = {"old", "new"};
+  const auto few = live_view(stats_of(6), options);
+  CHECK(few.size() == 10);
+  CHECK(few.back().starts_with("new"));
+}
+
+TEST_CASE("durations are short") {
+  CHECK(short_duration(0.0) == "0");
+  CHECK(short_duration(31.4) == "31");
+  CHECK(short_duration(999.6) == "1.0m");
+  CHECK(short_duration(9'960.0) == "10m");
+  CHECK(short_duration(2.6e6) == "3s");
+  CHECK(short_duration(1e18) == "999s");
+}
+
+TEST_CASE("JSON is canonical proto3, with every plain field") {
+  v1::Frame frame;
+  frame.set_stream("walker");
+  frame.set_sequence(7);
+  frame.add_rotation_xyzw(1.0F);
+  const std::string json = to_json(frame);
+  CHECK(json.find("\"sequence\":\"7\"") != std::string::npos);
+  CHECK(json.find("\"rotationXyzw\":[1]") != std::string::npos);
+  CHECK(json.find("\"quality\":\"QUALITY_MEASURED\"") != std::string::npos);
+  CHECK(json.find("\"lagFrames\":0") != std::string::npos);
+  CHECK(json.find("deviceNs") == std::string::npos);
+  CHECK(json.find('\n') == std::string::npos);
+}
+
+}  // namespace
+}  // namespace posed::cli

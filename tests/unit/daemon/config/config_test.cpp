@@ -1,0 +1,376 @@
+#include "daemon/config/config.hpp"
+
+#include <array>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/net/keys.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::config {
+namespace {
+
+// Drivers of the tests' own: one option of each type.
+std::vector<drivers::Driver> two_drivers() {
+  using drivers::OptionSpec;
+  return {{"file",
+           "a clip",
+           {OptionSpec{"path", std::string(), true, true, "the clip to play"},
+            OptionSpec{"loop", false, false, false, ""}, OptionSpec{"pace", 1.0, false, false, ""},
+            OptionSpec{"first", std::int64_t{1}, false, false, ""}},
+           nullptr,
+           nullptr,
+           nullptr},
+          {"glove", "a glove", {}, nullptr, nullptr, nullptr}};
+}
+
+Reading read(const std::string& text) {
+  static const auto drivers = two_drivers();
+  return read_config(text, "stage/posed.toml", drivers);
+}
+
+constexpr const char* kWalker = R"(
+[[stream]]
+name = "walker"
+driver = "file"
+[stream.file]
+path = "walk.bvh"
+)";
+
+// The one complaint about kWalker with these lines behind it.
+std::string complaint(const std::string& more, const std::string& start = kWalker) {
+  const Reading reading = read(start + more);
+  INFO(more);
+  REQUIRE(reading.errors.size() == 1);
+  CHECK(reading.errors[0].exit_code == ExitCode::kWrongUse);
+  return reading.errors[0].text();
+}
+
+TEST_CASE("a small config gets every default") {
+  const Reading reading = read(kWalker);
+  REQUIRE(reading.errors.empty());
+  const config::DaemonConfig defaults;
+  CHECK(reading.config.publish_endpoint == defaults.publish_endpoint);
+  CHECK(reading.config.control_endpoint == defaults.control_endpoint);
+  REQUIRE(reading.config.streams.size() == 1);
+  const auto& stream = reading.config.streams[0];
+  CHECK(stream.name == "walker");
+  CHECK(stream.driver == "file");
+  CHECK_FALSE(stream.style);
+  CHECK(std::get<std::string>(stream.options.at("path")) == "stage/walk.bvh");
+  CHECK(std::get<bool>(stream.options.at("loop")) == false);
+  CHECK(std::get<double>(stream.options.at("pace")) == 1.0);
+  CHECK(std::get<std::int64_t>(stream.options.at("first")) == 1);
+  CHECK(reading.config.text == kWalker);
+}
+
+TEST_CASE("every value reaches its field") {
+  const Reading reading = read(R"(
+realtime = false
+publish.endpoint = "tcp://0.0.0.0:1"
+publish.insecure = true
+control.endpoint = "ipc:///tmp/posed"
+[[stream]]
+name = "a"
+driver = "file"
+publish_raw = true
+stale_after_s = 2
+[stream.file]
+path = "/clips/walk.bvh"
+loop = true
+pace = 0
+first = 7
+[stream.style]
+model = "walk.style"
+alpha = -1.5
+alpha_slew_per_s = 4.0
+gate = true
+gate_fallback = 0.25
+calibrate = true
+[stream.generate]
+lag_frames = 3
+lag_ms = 50
+noise_deg = 2
+model = "hand.gesture"
+labels = "g 1"
+tempo = 1.5
+loop = true
+[stream.constrain]
+enabled = false
+[[stream]]
+name = "b"
+driver = "glove"
+)");
+  REQUIRE(reading.errors.empty());
+  const auto& config = reading.config;
+  CHECK_FALSE(config.realtime);
+  CHECK(config.publish_endpoint == "tcp://0.0.0.0:1");
+  CHECK(config.control_endpoint == "ipc:///tmp/posed");
+  REQUIRE(config.streams.size() == 2);
+  const auto& a = config.streams[0];
+  CHECK(a.publish_raw);
+  CHECK(a.stale_after_s == 2.0);
+  CHECK(std::get<std::string>(a.options.at("path")) == "/clips/walk.bvh");
+  CHECK(std::get<bool>(a.options.at("loop")));
+  CHECK(std::get<double>(a.options.at("pace")) == 0.0);
+  CHECK(std::get<std::int64_t>(a.options.at("first")) == 7);
+  REQUIRE(a.style);
+  CHECK(a.style->model == "stage/walk.style");
+  CHECK(a.style->filter.alpha == -1.5);
+  CHECK(a.style->filter.alpha_slew_per_s == 4.0);
+  CHECK(a.style->filter.gate);
+  CHECK(a.style->filter.gate_fallback == 0.25);
+  CHECK(a.style->filter.calibrate);
+  CHECK(config.streams[1].driver == "glove");
+  REQUIRE(a.generate);
+  CHECK(a.generate->live.lag.frames == 3);
+  CHECK(a.generate->live.lag.seconds == Approx(0.05));
+  CHECK(a.generate->live.noise_rad == Approx(0.0349065850));
+  CHECK(a.generate->model == "stage/hand.gesture");
+  CHECK(a.generate->labels == std::vector<std::string>{"g", "1"});
+  CHECK(a.generate->tempo == 1.5);
+  CHECK(a.generate->loop);
+  CHECK(a.constrain == false);
+  CHECK_FALSE(config.streams[1].generate);
+  CHECK_FALSE(config.streams[1].constrain);
+}
+
+TEST_CASE("each mistake is one sentence with file and line") {
+  CHECK(complaint("lop = true\n") ==
+        "stage/posed.toml:7: unknown key 'stream.file.lop'; the nearest known one here is 'loop'");
+  CHECK(complaint("[publsh]\n")
+            .find(":7: unknown key 'publsh'; the nearest known one here is"
+                  " 'publish'") != std::string::npos);
+  CHECK(complaint("loop = 1\n") ==
+        "stage/posed.toml:7: stream.file.loop must be true or false, not an integer");
+  CHECK(complaint("pace = \"fast\"\n").find("must be a number, not text") != std::string::npos);
+  CHECK(complaint("first = 1.5\n").find("must be an integer, not a number") != std::string::npos);
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\nalpha = 3\n") ==
+        "stage/posed.toml:9: stream.style.alpha = 3 is out of range: it takes a number from -2 to"
+        " 2");
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\nalpha = nan\n").find("out of range") !=
+        std::string::npos);
+  CHECK(complaint("[stream.style]\nalpha = 1\n").find("stream.style.model is missing") !=
+        std::string::npos);
+  CHECK(complaint("[stream]\n").find("not TOML") != std::string::npos);
+  CHECK(complaint("[control]\nendpoint = \"127.0.0.1:5\"\n")
+            .find(":8: '127.0.0.1:5' is no"
+                  " endpoint") != std::string::npos);
+  CHECK(complaint("[control]\nendpoint = \"tcp://127.0.0.1:5570\"\n").find("cannot share") !=
+        std::string::npos);
+}
+
+TEST_CASE("an unknown key is told where it belongs, or what is known") {
+  CHECK(complaint("", "[[stream]]\nname = \"a\"\ndriver = \"glove\"\nalpha = 0.5\n") ==
+        "stage/posed.toml:4: unknown key 'stream.alpha'; it belongs into [stream.style]");
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\npublish_raw = true\n")
+            .ends_with("unknown key 'stream.style.publish_raw'; it belongs into [stream]"));
+  CHECK(complaint("[control]\nmodel = 1\n")
+            .ends_with("it belongs into [stream.generate] or [stream.style]"));
+  CHECK(complaint("xyzzy = 1\n").ends_with("known here: first, loop, pace, path"));
+  // Nothing of a stranger's key reaches the terminal as it is.
+  CHECK(complaint("\"\\u001b[2J\" = 1\n").find("'stream.file.\\x1b[2J'") != std::string::npos);
+}
+
+TEST_CASE("generate: lags, tempo and labels are checked") {
+  const std::string table = "[stream.generate]\nmodel = \"m\"\n";
+  CHECK(complaint(table + "lag_frames = -1\n").find("0 to 170 frames") != std::string::npos);
+  CHECK(complaint(table + "lag_frames = 0.5\n").find("must be an integer") != std::string::npos);
+  CHECK(complaint(table + "lag_ms = 200\n").find("from 0 to 170") != std::string::npos);
+  CHECK(complaint(table + "tempo = 3\n").find("from 0.5 to 2") != std::string::npos);
+  CHECK(complaint(table + "noise_deg = -1\n").find("from 0 to 90") != std::string::npos);
+  CHECK(complaint("[stream.generate]\nlabels = \"g\"\n").find("need a gesture model") !=
+        std::string::npos);
+  CHECK(complaint("[stream.constrain]\nenable = true\n").find("'enabled'") != std::string::npos);
+}
+
+TEST_CASE("a wrong unit is told the right one") {
+  const std::string stream = "[[stream]]\nname = \"w\"\ndriver = \"glove\"\n";
+  CHECK(complaint("stale_after_s = \"500 ms\"\n", stream) ==
+        "stage/posed.toml:4: stream.stale_after_s must be a number of seconds, not text");
+  CHECK(complaint("stale_after_ms = 500\n", stream).find("'stale_after_s'") != std::string::npos);
+  CHECK(complaint("stale_after_s = 0\n", stream).find("a number of seconds from 0.01 to 3600") !=
+        std::string::npos);
+}
+
+TEST_CASE("streams: names, drivers and their tables") {
+  const auto one = [](const std::string& name, const std::string& more = "") {
+    return "[[stream]]\nname = \"" + name + "\"\ndriver = \"glove\"\n" + more;
+  };
+  CHECK(complaint("", "").find("there is no stream") != std::string::npos);
+  CHECK(complaint("", "stream = 5\n").find("a list of tables") != std::string::npos);
+  CHECK(complaint("", one("Walker")).find(":2: a stream's name has") != std::string::npos);
+  CHECK(complaint("", one(std::string(33, 'a'))).find("a stream's name has") != std::string::npos);
+  CHECK(complaint("", one("a") + one("a"))
+            .find(":4: a second stream is named 'a' (the first"
+                  " stands in line 1)") != std::string::npos);
+  CHECK(complaint("", one("a", "publish_raw = true\n") + one("a-raw"))
+            .find(":5: 'a-raw' is the"
+                  " name") != std::string::npos);
+  CHECK(complaint("", one(std::string(30, 'a'), "publish_raw = true\n")).find("longer than 32") !=
+        std::string::npos);
+  CHECK(complaint("", "[[stream]]\ndriver = \"glove\"\n").find("stream.name is missing") !=
+        std::string::npos);
+  CHECK(complaint("", "[[stream]]\nname=\"a\"\ndriver = \"fil\"\n[stream.file]\npath = \"x\"\n")
+            .find(":3: there is no driver of this name; the nearest is 'file'") !=
+        std::string::npos);
+  CHECK(complaint("", "[[stream]]\nname = \"a\"\ndriver = \"file\"\n")
+            .find(":1: stream.file.path is missing: the clip to play") != std::string::npos);
+}
+
+TEST_CASE("all mistakes are told at once, in the file's order") {
+  const Reading reading = read(R"(realtime = "yes"
+[[stream]]
+name = "A"
+driver = "glove"
+stale = 1
+[stream.style]
+alpha = 9
+)");
+  std::vector<int> lines;
+  for (const Error& error : reading.errors) lines.push_back(error.line);
+  CHECK(lines == std::vector<int>{1, 3, 5, 6, 7});
+}
+
+TEST_CASE("nothing listens beyond this machine without keys unless the config insists") {
+  CHECK(complaint("[publish]\nendpoint = \"tcp://0.0.0.0:5570\"\n")
+            .find("insecure = true in"
+                  " [publish]") != std::string::npos);
+  CHECK(complaint("[control]\nendpoint = \"tcp://*:5570\"\n").find("[control]") !=
+        std::string::npos);
+  CHECK(read(kWalker + std::string("[control]\nendpoint = \"tcp://*:5\"\ninsecure = true\n"))
+            .errors.empty());
+}
+
+TEST_CASE("security: keys are read and clients checked") {
+  const test::TempFolder folder;
+  REQUIRE(net::write_new_keys("server", folder.path()));
+  const auto viewer = net::write_new_keys("viewer", folder.path());
+  REQUIRE(viewer);
+  const auto director = net::write_new_keys("director", folder.path());
+  const auto drivers = two_drivers();
+  const auto read_here = [&](const std::string& security) {
+    return read_config(security + kWalker, folder.path() / "posed.toml", drivers);
+  };
+  const std::string start = "[publish]\nendpoint = \"tcp://*:5570\"\n[security]\n";
+  const std::string first = "[[security.client]]\nname = \"v\"\npublic_key = \"viewer.pub\"\n";
+
+  const auto good = read_here(start + "server_key = \"server.key\"\n" + first +
+                              "[[security.client]]\nname = \"d\"\npublic_key = \"" +
+                              director->public_z85 + "\"\nrights = [\"control\"]\n");
+  REQUIRE(good.errors.empty());
+  const auto& clients = good.config.security.clients;
+  REQUIRE(clients.size() == 2);
+  CHECK(clients[0].public_z85 == viewer->public_z85);
+  CHECK(clients[0].may_subscribe);
+  CHECK_FALSE(clients[0].may_control);
+  CHECK_FALSE(clients[1].may_subscribe);
+  CHECK(clients[1].may_control);
+
+  const auto complaint_of = [&](const std::string& security) {
+    const auto reading = read_here(security);
+    REQUIRE_FALSE(reading.errors.empty());
+    return reading.errors[0].message;
+  };
+  const std::string served = "[security]\nserver_key = \"server.key\"\n";
+  CHECK(complaint_of("[security]\n" + first).find("no server_key") != std::string::npos);
+  CHECK(complaint_of("[security]\nserver_key = \"no.key\"\n").find("No such file") !=
+        std::string::npos);
+  CHECK(complaint_of("[security]\nserver_key = \"server.pub\"\n").find("public half") !=
+        std::string::npos);
+  CHECK(complaint_of(served + "[[security.client]]\nname = \"x\"\npublic_key = \"viewer.key\"\n")
+            .find("secret half") != std::string::npos);
+  CHECK(complaint_of(served + first + first).find("two clients are named 'v'") !=
+        std::string::npos);
+  CHECK(complaint_of(served + first +
+                     "[[security.client]]\nname = \"w\"\npublic_key = \"viewer.pub\"\n")
+            .find("have the same key") != std::string::npos);
+  CHECK(complaint_of(served + first + "rights = [\"root\"]\n").find("two rights") !=
+        std::string::npos);
+}
+
+TEST_CASE("a config that is not there or no text is one sentence") {
+  const auto drivers = two_drivers();
+  const test::TempFolder folder;
+  const auto missing = load_config(folder.path() / "none.toml", drivers);
+  REQUIRE_FALSE(missing);
+  CHECK(missing.error().text().find("none.toml: cannot read the config: No such file") !=
+        std::string::npos);
+  CHECK_FALSE(load_config(folder.path(), drivers));
+  for (const std::string& text :
+       {std::string("\xff\xfe\0x", 4), std::string(100000, '['), std::string("a=\"\x1b[2J"),
+        std::string("a = tr\x1b\n"), std::string("[[stream]]\n\"\x1b[2J\" = 1\n")}) {
+    const auto reading = load_config(folder.write("bad.toml", text), drivers);
+    REQUIRE_FALSE(reading);
+    CHECK(reading.error().text().find('\x1b') == std::string::npos);
+  }
+}
+
+// The shipped file with every "#key = value" and "#[table]" line switched on.
+std::string shipped(bool with_commented_defaults) {
+  std::ifstream file(test::source_dir() / "config/posed.toml");
+  const std::regex commented(R"(^#([a-z_]+ = |\[))");
+  std::string text;
+  for (std::string line; std::getline(file, line);) {
+    if (with_commented_defaults && std::regex_search(line, commented)) line.erase(0, 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+TEST_CASE("the shipped config lists every key there is, with its default") {
+  const auto read_real = [](const std::string& text) {
+    return read_config(text, test::source_dir() / "config/posed.toml", drivers::registry());
+  };
+  const Reading bare = read_real(shipped(false));
+  REQUIRE(bare.errors.empty());
+
+  const Reading full = read_real(shipped(true));
+  for (const Error& error : full.errors) {  // its example keys are not there; nothing else is wrong
+    INFO(error.text());
+    CHECK(error.message.find("cannot read the key") != std::string::npos);
+  }
+  // Every key that the reader asks for stands in the file.
+  const std::string text = shipped(true);
+  for (const std::string& key : full.known) {
+    const std::string last = key.substr(key.rfind('.') + 1);
+    INFO(key);
+    CHECK(std::regex_search(text, std::regex("(^|\n)" + last + " = |\n\\[+" + key + "\\]")));
+  }
+  // And what it says is the default: switching all of it on changes nothing.
+  const auto& a = bare.config;
+  const auto& b = full.config;
+  CHECK(a.realtime == b.realtime);
+  CHECK(a.publish_endpoint == b.publish_endpoint);
+  CHECK(a.publish_insecure == b.publish_insecure);
+  CHECK(a.control_endpoint == b.control_endpoint);
+  CHECK(a.control_insecure == b.control_insecure);
+  CHECK(a.streams[0].publish_raw == b.streams[0].publish_raw);
+  CHECK(a.streams[0].stale_after_s == b.streams[0].stale_after_s);
+  CHECK(a.streams[0].options == b.streams[0].options);
+  REQUIRE(b.streams[0].style);
+  const style::FilterOptions defaults;
+  const style::FilterOptions& written = b.streams[0].style->filter;
+  CHECK(written.alpha == defaults.alpha);
+  CHECK(written.alpha_slew_per_s == defaults.alpha_slew_per_s);
+  CHECK(written.gate == defaults.gate);
+  CHECK(written.gate_fallback == defaults.gate_fallback);
+  CHECK(written.calibrate == defaults.calibrate);
+  REQUIRE(b.streams[0].generate);
+  const config::GenerateConfig generate;
+  CHECK(b.streams[0].generate->live.lag.frames == generate.live.lag.frames);
+  CHECK(b.streams[0].generate->live.lag.seconds == generate.live.lag.seconds);
+  CHECK(b.streams[0].generate->live.noise_rad == generate.live.noise_rad);
+  CHECK(b.streams[0].generate->model == generate.model);
+  CHECK(b.streams[0].generate->labels == generate.labels);
+  CHECK(b.streams[0].generate->tempo == generate.tempo);
+  CHECK(b.streams[0].generate->loop == generate.loop);
+  CHECK(b.streams[0].constrain == true);
+}
+
+}  // namespace
+}  // namespace posed::config

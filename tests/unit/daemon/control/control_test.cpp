@@ -1,0 +1,392 @@
+// What control messages do: the handler with a pipeline of the test's own, then the socket.
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <deque>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/control/control_server.hpp"
+#include "daemon/control/request_handler.hpp"
+#include "daemon/net/keys.hpp"
+#include "posed/v1/control.pb.h"
+#include "proto/log/digest.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+namespace posed::control {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace net;
+using pipeline::Ack;
+using pipeline::Command;
+
+class FakeDaemonControl final : public DaemonControl {
+ public:
+  bool send(const Command& command) override {
+    if (full) return false;
+    sent.push_back(command);
+    return true;
+  }
+  bool send(const pipeline::DeviceCommand& command) override {
+    if (full) return false;
+    to_device.push_back(command);
+    return true;
+  }
+  void keep_model(std::span<const std::byte> bytes) override { kept.push_back(bytes.size()); }
+  void model_in_use(std::uint32_t stream, const std::string& name) override {
+    in_use = std::to_string(stream) + " " + name;
+  }
+  void fill(v1::Stats& stats) override { stats.set_rss_bytes(42); }
+  void stop() override { stopped = true; }
+
+  std::deque<Command> sent;
+  std::vector<pipeline::DeviceCommand> to_device;
+  std::vector<std::size_t> kept;
+  std::string in_use;
+  bool full = false;
+  std::atomic<bool> stopped{false};
+};
+
+std::vector<ControlledStream> three_streams() {
+  const auto skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
+  std::vector<ControlledStream> streams(3);
+  streams[0].name = "walker";
+  streams[0].publishes_raw = true;
+  streams[0].skeleton = skeleton;
+  streams[0].style.emplace();
+  streams[1].name = "plain";
+  streams[1].skeleton = skeleton;
+  streams[2].name = "runner";
+  streams[2].skeleton = skeleton;
+  streams[2].style.emplace();
+  return streams;
+}
+
+v1::ControlRequest alpha_request(const std::string& stream, float alpha) {
+  v1::ControlRequest request;
+  request.mutable_set_alpha()->set_stream(stream);
+  request.mutable_set_alpha()->set_alpha(alpha);
+  return request;
+}
+
+// A model that goes into one piece.
+v1::ControlRequest model_request(const std::string& stream, const std::string& bytes) {
+  v1::ControlRequest request;
+  auto& part = *request.mutable_model_part();
+  part.set_stream(stream);
+  part.set_sha256(log::sha256_hex(std::as_bytes(std::span(bytes))));
+  part.set_total(bytes.size());
+  part.set_bytes(bytes);
+  part.set_name("sway.style");
+  return request;
+}
+
+v1::ControlReply reply_of(const std::optional<Answer>& answer) {
+  v1::ControlReply reply;
+  REQUIRE(answer);
+  CHECK(answer->to == Asker{"me"});
+  REQUIRE(reply.ParseFromString(answer->bytes));
+  return reply;
+}
+
+struct Fixture {
+  FakeDaemonControl daemon_control;
+  RequestHandler handler{three_streams(), daemon_control};
+
+  std::optional<Answer> ask(const std::string& bytes) {
+    return handler.handle({"me"}, std::as_bytes(std::span(bytes)));
+  }
+  std::optional<Answer> ask(const v1::ControlRequest& request) {
+    return ask(request.SerializeAsString());
+  }
+  // The sentence of a refusal.
+  std::string refused(const v1::ControlRequest& request) {
+    const auto reply = reply_of(ask(request));
+    CHECK_FALSE(reply.ok());
+    CHECK(daemon_control.sent.empty());
+    return reply.error();
+  }
+  // The sentence of the refusal of a model that takes several pieces.
+  std::string refused_in_pieces(const std::string& stream, const std::string& model) {
+    auto request = model_request(stream, model);
+    auto& part = *request.mutable_model_part();
+    for (std::size_t offset = 0; offset < model.size(); offset += kLargestPiece) {
+      part.set_offset(offset);
+      part.set_bytes(model.substr(offset, kLargestPiece));
+      const auto reply = reply_of(ask(request));
+      if (!reply.ok()) return reply.error();
+    }
+    return {};
+  }
+  v1::ControlReply acknowledge(std::uint64_t sequence) {
+    const Command command = daemon_control.sent.front();
+    daemon_control.sent.pop_front();
+    return reply_of(handler.acknowledge(
+        {.ticket = command.ticket, .stream = command.stream, .sequence = sequence}));
+  }
+};
+
+bool has(const std::string& text, const std::string& part) {
+  INFO(text);
+  return text.find(part) != std::string::npos;
+}
+
+TEST_CASE("an alpha goes to its stream and is answered when it took effect") {
+  Fixture fixture;
+  CHECK_FALSE(fixture.ask(alpha_request("runner", -2.0F)));
+  REQUIRE(fixture.daemon_control.sent.size() == 1);
+  CHECK(fixture.daemon_control.sent[0].kind == Command::Kind::kAlpha);
+  CHECK(fixture.daemon_control.sent[0].stream == 2);
+  CHECK(fixture.daemon_control.sent[0].alpha == -2.0F);
+  const auto reply = fixture.acknowledge(77);
+  CHECK(reply.ok());
+  CHECK(reply.stream() == "runner");
+  CHECK(reply.sequence() == 77);
+}
+
+TEST_CASE("a model is parsed, bound, kept and owned until the next one took effect") {
+  Fixture fixture;
+  const std::string bytes = style::serialize_model(test::toy_model(1, 0.3));
+  CHECK_FALSE(fixture.ask(model_request("walker", bytes)));
+  REQUIRE(fixture.daemon_control.sent.size() == 1);
+  const Command command = fixture.daemon_control.sent[0];
+  REQUIRE(command.model != nullptr);
+  CHECK(command.model->name == "sway.style");
+  CHECK(std::string(command.model_hash.data()) == log::sha256_hex(std::as_bytes(std::span(bytes))));
+  CHECK(fixture.daemon_control.kept == std::vector<std::size_t>{bytes.size()});
+  CHECK(fixture.daemon_control.in_use.empty());
+  CHECK(fixture.acknowledge(5).sequence() == 5);
+  CHECK(fixture.daemon_control.in_use == "0 sway.style");
+  for (int i = 0; i < 10; ++i) {  // under ASan: none leaks, none is freed too early
+    CHECK_FALSE(fixture.ask(model_request("walker", bytes)));
+    const auto* bound = fixture.daemon_control.sent.front().model;
+    CHECK(fixture.acknowledge(6).ok());
+    CHECK(bound->name == "sway.style");
+  }
+  CHECK_FALSE(fixture.ask(model_request("walker", bytes)));  // never acknowledged
+}
+
+TEST_CASE("status and stop are answered at once") {
+  Fixture fixture;
+  v1::ControlRequest request;
+  request.mutable_status();
+  CHECK(reply_of(fixture.ask(request)).status().rss_bytes() == 42);
+  request.mutable_stop();
+  CHECK(reply_of(fixture.ask(request)).ok());
+  CHECK(fixture.daemon_control.stopped);
+}
+
+TEST_CASE("each refusal is one sentence") {
+  Fixture fixture;
+  CHECK(has(fixture.refused(alpha_request("nobody", 0.0F)),
+            "there is no stream 'nobody'; there is: walker, plain, runner"));
+  CHECK(has(fixture.refused(alpha_request("walker-raw", 0.0F)), "before its stages"));
+  CHECK(has(fixture.refused(alpha_request("plain", 0.0F)), "plain has no style"));
+  for (const float alpha : {2.1F, -3.0F, NAN, INFINITY}) {
+    CHECK(has(fixture.refused(alpha_request("walker", alpha)), "out of range"));
+  }
+  CHECK(has(fixture.refused(alpha_request("\x1b[2J", 0.0F)), "'\\x1b[2J'"));
+  CHECK(has(fixture.refused({}), "is empty"));
+  CHECK(has(reply_of(fixture.ask(std::string("\xff\xff\xff"))).error(), "no posed.v1"));
+
+  const std::string good = style::serialize_model(test::toy_model(1, 0.3));
+  CHECK(has(fixture.refused(model_request("walker", "")), "a model file has 1 to"));
+  CHECK(
+      has(fixture.refused(model_request("walker", good.substr(0, good.size() - 1))), "sway.style"));
+  std::string flipped = good;
+  flipped[flipped.size() / 2] = static_cast<char>(flipped[flipped.size() / 2] ^ 1);
+  CHECK(has(fixture.refused(model_request("walker", flipped)), "sway.style"));
+  CHECK(fixture.daemon_control.kept.empty());
+
+  fixture.daemon_control.full = true;
+  CHECK(has(fixture.refused(alpha_request("walker", 0.0F)), "too many changes"));
+}
+
+TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
+  Fixture fixture;
+  const std::string wild = "\x1b[2J" + std::string(60'000, 'x');
+  const std::string stream = fixture.refused(alpha_request(wild, 0.0F));
+  CHECK(has(stream, "there is no stream '\\x1b[2Jxxx"));
+  CHECK(stream.size() < 300);
+  auto named = model_request("walker", "no model");
+  named.mutable_model_part()->set_name(wild);
+  const std::string name = fixture.refused(named);
+  CHECK(name.find('\x1b') == std::string::npos);
+  CHECK(name.size() < 300);
+  // A model's joints are named in the sentence that says which of them the stream lacks.
+  auto model = test::toy_model(1, 0.3);
+  model.space.joints.back() = "\x1b[2J" + std::string(1 << 20, 'x');
+  const std::string joints = fixture.refused_in_pieces("walker", style::serialize_model(model));
+  CHECK(has(joints, "it has no joint \\x1b[2Jxxx"));
+  CHECK(joints.size() < 1000);
+}
+
+TEST_CASE("requests are bounded in size and in number") {
+  Fixture fixture;
+  auto request = alpha_request("walker", 0.0F);
+  request.mutable_set_alpha()->set_stream(std::string(kLargestRequest, 'x'));
+  CHECK(has(fixture.refused(request), "too large"));
+  CHECK(has(fixture.refused(model_request("walker", std::string(kLargestPiece + 1, 'x'))),
+            "a piece of a model has"));
+  for (std::size_t i = 0; i < kMostUnderWay; ++i) {
+    CHECK_FALSE(fixture.ask(alpha_request("walker", 1.0F)));
+  }
+  const auto one_more = reply_of(fixture.ask(alpha_request("walker", 1.0F)));
+  CHECK(has(one_more.error(), "too many changes"));
+  CHECK(fixture.acknowledge(1).ok());
+  CHECK_FALSE(fixture.ask(alpha_request("walker", 1.0F)));
+}
+
+TEST_CASE("an acknowledgement of nothing is nothing") {
+  Fixture fixture;
+  CHECK_FALSE(fixture.handler.acknowledge({.ticket = 99, .stream = 0}));
+}
+
+// A daemon reduced to its control side: a socket, and a pipeline that acknowledges.
+class Booth final : public DaemonControl {
+ public:
+  explicit Booth(ZapAuthenticator* authenticator = nullptr, std::string secret = {},
+                 void* context = nullptr)
+      : context_(*open_context()) {
+    server_ =
+        *ControlServer::start(context == nullptr ? context_.get() : context, "tcp://127.0.0.1:*",
+                              {&acks_, wake_.get(), authenticator, std::move(secret)}, handler_);
+  }
+  bool send(const pipeline::DeviceCommand&) override { return true; }
+  bool send(const Command& command) override {
+    ++commands;
+    const bool pushed =
+        acks_feed_.push({.ticket = command.ticket, .stream = command.stream, .sequence = commands});
+    return pushed;
+  }
+  // The pipeline's part, on the test's thread.
+  void serve() {
+    while (acks_feed_.consume([this](const Ack& ack) noexcept { (void)acks_.push(ack); })) {
+    }
+    wake_->notify();
+  }
+  void keep_model(std::span<const std::byte>) override {}
+  void model_in_use(std::uint32_t, const std::string&) override {}
+  void fill(v1::Stats& stats) override { stats.set_rss_bytes(42); }
+  void stop() override { stopped = true; }
+  [[nodiscard]] const std::string& endpoint() const { return server_->endpoint(); }
+
+  std::atomic<std::uint64_t> commands{0};
+  std::atomic<bool> stopped{false};
+
+ private:
+  Context context_;
+  std::unique_ptr<system::EventFd> wake_ = *system::EventFd::open();
+  pipeline::Ring<Ack> acks_{kMostUnderWay};
+  pipeline::Ring<Ack> acks_feed_{kMostUnderWay};
+  RequestHandler handler_{three_streams(), *this};
+  std::unique_ptr<ControlServer> server_;
+};
+
+class Client {
+ public:
+  Client(const std::string& endpoint, int type) : socket_(*open_socket(context_.get(), type)) {
+    REQUIRE(connect_socket(socket_.get(), endpoint));
+  }
+  [[nodiscard]] void* socket() const { return socket_.get(); }
+  void send(const v1::ControlRequest& request) const {
+    REQUIRE(send_part(socket_.get(), request.SerializeAsString(), false));
+  }
+  // The next reply; nullopt when none came in time.
+  [[nodiscard]] std::optional<v1::ControlReply> receive(std::chrono::milliseconds within) const {
+    zmq_pollitem_t wait{socket_.get(), 0, ZMQ_POLLIN, 0};
+    if (zmq_poll(&wait, 1, within.count()) <= 0) return std::nullopt;
+    Message part;
+    while (part.receive(socket_.get()) && part.more()) {
+    }
+    v1::ControlReply reply;
+    REQUIRE(reply.ParseFromArray(part.text().data(), static_cast<int>(part.text().size())));
+    return reply;
+  }
+
+ private:
+  Context context_ = *open_context();
+  Socket socket_;
+};
+
+v1::ControlRequest status_request() {
+  v1::ControlRequest request;
+  request.mutable_status();
+  return request;
+}
+
+TEST_CASE("the control socket answers REQ and DEALER clients") {
+  Booth booth;
+  const Client req(booth.endpoint(), ZMQ_REQ);
+  req.send(status_request());
+  const auto status = req.receive(5s);
+  REQUIRE(status);
+  CHECK(status->status().rss_bytes() == 42);
+
+  const Client dealer(booth.endpoint(), ZMQ_DEALER);
+  dealer.send(alpha_request("walker", 0.5F));
+  while (booth.commands == 0) std::this_thread::sleep_for(1ms);
+  booth.serve();
+  const auto done = dealer.receive(5s);
+  REQUIRE(done);
+  CHECK(done->ok());
+  CHECK(done->sequence() == 1);
+}
+
+TEST_CASE("neither silent, deaf, wild nor busy clients keep others waiting") {
+  Booth booth;
+  // One sends rubbish and never reads; one sends an endless envelope; one floods with requests
+  // whose answers never come because the pipeline stands.
+  const Client wild(booth.endpoint(), ZMQ_DEALER);
+  const Client endless(booth.endpoint(), ZMQ_DEALER);
+  const Client flood(booth.endpoint(), ZMQ_DEALER);
+  for (int i = 0; i < 2000; ++i) {
+    (void)send_part(wild.socket(), std::string(100, '\xff'), false);
+    (void)send_part(endless.socket(), "x", i % 50 != 49);
+    (void)send_part(flood.socket(), alpha_request("walker", 1.0F).SerializeAsString(), false);
+  }
+  const Client good(booth.endpoint(), ZMQ_REQ);
+  for (int i = 0; i < 20; ++i) {
+    good.send(status_request());
+    const auto reply = good.receive(5s);
+    REQUIRE(reply);
+    CHECK(reply->ok());
+  }
+}
+
+TEST_CASE("a controller's key counts for every message it sends") {
+  const test::TempFolder folder;
+  const auto server = *write_new_keys("server", folder.path());
+  const auto director = *write_new_keys("director", folder.path());
+  const Context context = *open_context();
+  const auto authenticator = *ZapAuthenticator::start(
+      context.get(), AccessList({{"d", director.public_z85, false, true}}));
+  Booth booth(authenticator.get(), server.secret_z85, context.get());
+
+  const Context there = *open_context();
+  const Socket dealer = *open_socket(there.get(), ZMQ_DEALER);
+  REQUIRE(
+      secure_client(dealer.get(), folder.path() / "director.key", folder.path() / "server.pub"));
+  REQUIRE(connect_socket(dealer.get(), booth.endpoint()));
+  const auto ask = [&] {
+    REQUIRE(send_part(dealer.get(), status_request().SerializeAsString(), false));
+    zmq_pollitem_t wait{dealer.get(), 0, ZMQ_POLLIN, 0};
+    REQUIRE(zmq_poll(&wait, 1, 5000) == 1);
+    Message message;
+    REQUIRE(message.receive(dealer.get()));
+    v1::ControlReply reply;
+    REQUIRE(reply.ParseFromArray(message.text().data(), static_cast<int>(message.text().size())));
+    return reply;
+  };
+  CHECK(ask().ok());
+  (void)authenticator->replace(AccessList{});
+  const auto after = ask();
+  CHECK_FALSE(after.ok());
+  CHECK(has(after.error(), "your key may no longer control"));
+}
+
+}  // namespace
+}  // namespace posed::control

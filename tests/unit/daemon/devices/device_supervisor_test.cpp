@@ -1,0 +1,133 @@
+// A supervisor, a reader and an emulated glove on threads of their own: whoever hands what to whom,
+// a glove that comes, goes and comes again is read each time. For the thread sanitizer, too.
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/devices/device_supervisor.hpp"
+#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/system/clock.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/options.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::devices {
+
+using emulate::EmulatedGlove;
+using emulate::EmulatedPort;
+namespace {
+
+using namespace std::chrono_literals;
+
+const drivers::Driver& lucidgloves() { return *drivers::find_driver("lucidgloves"); }
+
+// DeviceInfo in as long as it lives.
+class PluggedGlove {
+ public:
+  explicit PluggedGlove(const std::filesystem::path& port)
+      : glove_(lucidgloves().emulate({}).value(), EmulatedPort::open_pty(port).value(), {}, {}),
+        thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
+
+ private:
+  EmulatedGlove glove_;
+  std::jthread thread_;
+};
+
+// A stream whose glove is away, its reader at work and its supervisor looking out.
+class KeptStream {
+ public:
+  explicit KeptStream(const std::filesystem::path& port) {
+    config::StreamConfig config;
+    config.name = "right";
+    config.driver = "lucidgloves";
+    config.options = drivers::complete_options(lucidgloves(), {{"port", port.string()}}).value();
+    stream = devices::open_stream(config).value();
+    reader_ = pipeline::Reader::open({.out = &decoded_,
+                                      .pipeline = wake_.get(),
+                                      .record_sink = nullptr,
+                                      .clock = system::monotonic_ns,
+                                      .commands = &commands_})
+                  .value();
+    reader_->add({.device = nullptr,
+                  .counters = &stream->counters,
+                  .slot = stream->slot.get(),
+                  .calibration = nullptr});
+    reader_thread_ = std::thread([this] { reader_->run(); });
+    supervisor_.emplace(*stream,
+                        SupervisorPorts{.reader = reader_.get(),
+                                        .clock = system::monotonic_ns,
+                                        .tell = [this](v1::Event::Kind kind, const std::string&) {
+                                          lost += kind == v1::Event::KIND_LOST ? 1 : 0;
+                                          found += kind == v1::Event::KIND_FOUND ? 1 : 0;
+                                        }});
+  }
+  ~KeptStream() {
+    reader_->stop();
+    reader_thread_.join();
+  }
+
+  // Frames that came within ten seconds, up to `count`.
+  int take_frames(int count) {
+    int came = 0;
+    const auto take = [&](const pipeline::Item& item) {
+      came += item.kind == pipeline::Item::Kind::kFrame ? 1 : 0;
+    };
+    for (const std::int64_t until_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
+         came < count && system::monotonic_ns() < until_ns;) {
+      if (!decoded_.consume(take)) std::this_thread::sleep_for(1ms);
+    }
+    return came;
+  }
+  // Until the reader has let the glove go, and what it had sent is gone, too.
+  void wait_for_loss(int times) {
+    while (lost.load() < times) std::this_thread::sleep_for(1ms);
+    while (decoded_.consume([](const pipeline::Item&) {})) {
+    }
+  }
+  void calibrate(const drivers::glove::OwnedCalibration& calibration) {
+    REQUIRE(commands_.push({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
+                            .stream = 0,
+                            .ticket = 7,
+                            .calibration = &calibration}));
+    reader_->call();
+  }
+
+  std::unique_ptr<devices::OpenStream> stream;
+  std::atomic<int> lost{0}, found{0};
+
+ private:
+  pipeline::Ring<pipeline::Item> decoded_{1024};
+  pipeline::Ring<pipeline::DeviceCommand> commands_{16};
+  std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
+  std::unique_ptr<pipeline::Reader> reader_;
+  std::optional<DeviceSupervisor> supervisor_;  // ends after the reader's thread, before the reader
+  std::thread reader_thread_;
+};
+
+}  // namespace
+
+TEST_CASE("a kept glove is read each time that it comes, and calibrated anew") {
+  const test::TempFolder folder;
+  const auto port = folder.path() / "glove";
+  const auto description = lucidgloves().expect({{"port", port.string()}}).value();
+  const drivers::glove::OwnedCalibration calibration{
+      drivers::glove::default_calibration(lucidgloves().glove_model(description).value()).value(),
+      "calibration"};
+  KeptStream kept(port);
+  CHECK(kept.take_frames(0) == 0);
+  for (int time = 1; time <= 3; ++time) {
+    {
+      const PluggedGlove glove(port);
+      REQUIRE(kept.take_frames(20) == 20);
+      CHECK(kept.found.load() == time);
+      kept.calibrate(calibration);
+      REQUIRE(kept.take_frames(20) == 20);
+    }
+    kept.wait_for_loss(time);
+  }
+  CHECK(kept.stream->counters.reader.dropped.load() == 0);
+}
+
+}  // namespace posed::devices

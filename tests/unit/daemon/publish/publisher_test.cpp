@@ -1,0 +1,251 @@
+#include <catch2/catch.hpp>
+
+#include <map>
+#include <thread>
+
+#include "daemon/publish/published_stream.hpp"
+#include "daemon/publish/publisher.hpp"
+#include "daemon/publish/shed_tally.hpp"
+#include "daemon/system/clock.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+namespace posed::publish {
+namespace {
+
+using pipeline::Item;
+
+// A publisher of one stream on a free port, its thread, and a subscriber to everything.
+class Rig {
+ public:
+  Rig() {
+    StreamInfo info;
+    info.name = "toy";
+    info.description.driver = "file";
+    info.description.skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
+    info.description.samples = {.names = {"bend"}, .units = {"rad"}};
+    info.rate_hz = 100.0;
+    info.raw = true;
+    info.counters = &counters;
+    PublisherOptions options;
+    options.context = context.get();
+    options.endpoint = "tcp://127.0.0.1:*";
+    options.clock = system::monotonic_ns;
+    publisher = Publisher::open(std::move(options), {std::move(info)}, ring, *wake).value();
+    subscriber = net::open_socket(context.get(), ZMQ_SUB).value();
+    REQUIRE(net::set_option(subscriber.get(), ZMQ_SUBSCRIBE, std::string_view()));
+    REQUIRE(net::set_option(subscriber.get(), ZMQ_RCVTIMEO, 20));
+    REQUIRE(net::connect_socket(subscriber.get(), publisher->endpoint()));
+    thread = std::thread([this] { publisher->run(); });
+  }
+  ~Rig() {
+    publisher->stop();
+    thread.join();
+  }
+
+  void put(const Item& item) {
+    REQUIRE(ring.push(item));
+    wake->notify();
+  }
+  // Takes messages until `topic` has come `count` times; false after ten seconds.
+  bool receive(const std::string& topic, int count) {
+    const std::int64_t until_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
+    while (seen[topic] < count && system::monotonic_ns() < until_ns) {
+      net::Message name;
+      net::Message body;
+      if (!name.receive(subscriber.get(), 0) || !body.receive(subscriber.get(), 0)) continue;
+      ++seen[std::string(name.text())];
+      bodies[std::string(name.text())] = std::string(body.text());
+    }
+    return seen[topic] >= count;
+  }
+
+  pipeline::StreamCounters counters;
+  pipeline::Ring<Item> ring{64};
+  std::unique_ptr<system::EventFd> wake = system::EventFd::open().value();
+  net::Context context = net::open_context().value();
+  std::unique_ptr<Publisher> publisher;
+  net::Socket subscriber;
+  std::thread thread;
+  std::map<std::string, int> seen;
+  std::map<std::string, std::string> bodies;
+};
+
+Item frame_item(std::uint64_t sequence) {
+  Item item;
+  item.frame = test::toy_walk(3).frame(1);
+  item.frame.header.sequence = sequence;
+  item.frame.header.arrival_ns = 1000;
+  item.frame.header.device_ns = 500;
+  return item;
+}
+
+}  // namespace
+
+TEST_CASE("each kind of item goes out under its topic") {
+  Rig rig;
+  REQUIRE(rig.receive("skeleton/toy", 1));  // answers the subscription
+  REQUIRE(rig.receive("skeleton/toy-raw", 1));
+  Item item = frame_item(41);
+  rig.put(item);
+  item.kind = Item::Kind::kRawFrame;
+  rig.put(item);
+  Item sample;
+  sample.kind = Item::Kind::kSample;
+  sample.sample = {};
+  sample.sample.header.sequence = 5;
+  sample.sample.value_count = 1;
+  sample.sample.value[0] = 0.25F;
+  sample.sample.valid[0] = true;
+  rig.put(sample);
+  Item stale;
+  stale.kind = Item::Kind::kEvent;
+  stale.stream_event = {0, v1::Event::KIND_STALE, 77, 41, 0.5};
+  rig.put(stale);
+  rig.publisher->post_event(0, v1::Event::KIND_WARNING, "look here");
+  rig.publisher->set_model_name(0, "other.style");
+  REQUIRE(rig.receive("event/toy", 2));
+  REQUIRE(rig.receive("pose/toy-raw", 1));
+  REQUIRE(rig.receive("stats", 2));
+
+  v1::Frame frame;
+  REQUIRE(frame.ParseFromString(rig.bodies["pose/toy"]));
+  CHECK(frame.stream() == "toy");
+  CHECK(frame.sequence() == 41);
+  CHECK(frame.device_ns() == 500);
+  CHECK(frame.arrival_ns() == 1000);
+  CHECK(frame.rotation_xyzw_size() == 20);
+  CHECK(frame.angle_rad_size() == 15);
+  CHECK(frame.validity() == std::string(5, '\1'));
+  CHECK(frame.published_ns() > 0);
+  CHECK_FALSE(frame.has_styled_ns());
+  v1::Sample bend;
+  REQUIRE(bend.ParseFromString(rig.bodies["sensor/toy"]));
+  CHECK(bend.name(0) == "bend");
+  CHECK(bend.value(0) == 0.25F);
+  v1::Skeleton skeleton;
+  REQUIRE(skeleton.ParseFromString(rig.bodies["skeleton/toy"]));
+  CHECK(skeleton.joint_name_size() == 5);
+  CHECK(skeleton.id() == frame.skeleton_id());
+  CHECK(skeleton.channel_axis() == "zxyzxyzxyzxyzxy");
+  v1::Event event;
+  REQUIRE(event.ParseFromString(rig.bodies["event/toy"]));
+  CHECK(event.stream() == "toy");
+  v1::Stats stats;
+  REQUIRE(stats.ParseFromString(rig.bodies["stats"]));
+  REQUIRE(stats.stream_size() == 1);
+  CHECK(stats.stream(0).frames() == 1);
+  CHECK(stats.stream(0).samples() == 1);
+  CHECK(stats.stream(0).model() == "other.style");
+  CHECK(stats.stream(0).state() == "waiting");
+  CHECK(stats.monotonic_to_utc_ns() > 0);
+  CHECK(stats.rss_bytes() > 0);
+}
+
+TEST_CASE("skipped frames are told at once, then as a sum a second, and none is left out") {
+  constexpr std::int64_t kStep_ns = kNanosPerSecond / 100;
+  ShedTally tally;
+  std::uint64_t told = 0, lines = 0;
+  for (std::uint64_t i = 0; i < 1000; ++i) {  // ten seconds; of four frames one goes out
+    tally.add(4 * i + 1, 3);
+    const auto sum = tally.take(static_cast<std::int64_t>(i) * kStep_ns);
+    if (!sum) continue;
+    CHECK(sum->first == told / 3 * 4 + 1);
+    CHECK(sum->last == 4 * i + 3);
+    told += sum->frames;
+    ++lines;
+  }
+  CHECK(lines == 10);
+  const auto rest = tally.take(999 * kStep_ns, true);
+  REQUIRE(rest);
+  CHECK(told + rest->frames == 3000);
+  CHECK_FALSE(tally.take(2000 * kStep_ns, true));
+}
+
+TEST_CASE("a flood of skipped frames is one event, and its sum when the stream ends") {
+  Rig rig;
+  REQUIRE(rig.receive("skeleton/toy", 1));  // subscribed
+  Item item;
+  item.kind = Item::Kind::kEvent;
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    item.stream_event = {0, v1::Event::KIND_SHED, 77, 10 * i + 1, 9.0};
+    rig.put(item);
+  }
+  item.stream_event = {0, v1::Event::KIND_ENDED, 78, 500, 0.0};
+  rig.put(item);
+  std::vector<std::string> texts;
+  for (std::string last; !last.contains("has ended"); texts.push_back(last)) {
+    REQUIRE(rig.receive("event/toy", static_cast<int>(texts.size()) + 1));
+    v1::Event event;
+    REQUIRE(event.ParseFromString(rig.bodies["event/toy"]));
+    last = event.text();
+  }
+  CHECK(texts[0] == "9 frames, 1 to 9, were skipped: newer ones waited");
+  CHECK(texts[texts.size() - 2].contains("to 499, were skipped"));
+  std::uint64_t told = 0;
+  for (const std::string& text : texts) {
+    if (text.contains("skipped")) told += std::stoull(text);
+  }
+  CHECK(told == 450);
+  CHECK(texts.size() < 50);  // three, unless the machine took seconds for this
+}
+
+TEST_CASE("a glove is away only once the reader has begun to look for it") {
+  pipeline::StreamCounters counters;
+  StreamInfo info;
+  info.name = "right";
+  info.comes_and_goes = true;
+  info.counters = &counters;
+  PublishedStream outlet(std::move(info));
+  v1::StreamStats stats;
+  outlet.report(stats, 1.0);
+  CHECK_FALSE(stats.away());
+  counters.reader.link_ns = 7;
+  outlet.report(stats, 1.0);
+  CHECK(stats.away());
+  CHECK(stats.link_ns() == 7);
+  counters.reader.connected = true;
+  outlet.report(stats, 1.0);
+  CHECK_FALSE(stats.away());
+}
+
+TEST_CASE("the status is of this moment, though stats go out once a second") {
+  Rig rig;
+  REQUIRE(rig.receive("stats", 1));
+  rig.counters.pipeline.alpha_target = 0.5F;
+  rig.counters.pipeline.state = pipeline::StreamState::kLive;
+  rig.publisher->set_model_name(0, "other.style");
+  v1::Stats stats = rig.publisher->stats();
+  REQUIRE(stats.stream_size() == 1);
+  CHECK(stats.stream(0).alpha_target() == 0.5F);
+  CHECK(stats.stream(0).state() == "live");
+  CHECK(stats.stream(0).model() == "other.style");
+  CHECK(stats.stream(0).outcome_size() == kOutcomes);
+  Item item = frame_item(41);
+  item.frame.source = Source::kLabels;
+  item.frame.label = {'g'};
+  rig.put(item);
+  REQUIRE(rig.receive("pose/toy", 1));
+  const std::int64_t until_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
+  while (rig.publisher->stats().stream(0).frames() == 0 && system::monotonic_ns() < until_ns) {
+  }
+  stats = rig.publisher->stats();
+  CHECK(stats.stream(0).frames() == 1);
+  CHECK(stats.stream(0).label() == "g");
+  CHECK(stats.stream(0).source() == v1::SOURCE_LABELS);
+  CHECK(stats.stream(0).outcome_size() == kOutcomes);
+}
+
+TEST_CASE("a busy port is one sentence that names it") {
+  Rig rig;
+  pipeline::Ring<Item> ring(64);
+  const net::Context other = net::open_context().value();  // as another daemon has
+  PublisherOptions options;
+  options.context = other.get();
+  options.endpoint = rig.publisher->endpoint();
+  options.clock = system::monotonic_ns;
+  const auto second = Publisher::open(std::move(options), {}, ring, *rig.wake);
+  REQUIRE_FALSE(second);
+  CHECK(second.error().message.find(rig.publisher->endpoint()) != std::string::npos);
+}
+
+}  // namespace posed::publish

@@ -1,0 +1,277 @@
+// The recorder: everything that fitted is in the log, everything that did not is counted there.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/record/log_writer_loop.hpp"
+#include "daemon/record/recorder.hpp"
+#include "proto/log/digest.hpp"
+#include "proto/log/reader.hpp"
+#include "tests/support/file_limit.hpp"
+#include "tests/support/temp_folder.hpp"
+
+using namespace posed;
+using namespace posed::record;
+using pipeline::Direction;
+using pipeline::RecordSink;
+using GapKind = log::GapRow::Kind;
+
+namespace {
+
+constexpr std::int64_t kTurn_ns = 50'000'000;
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+// The shares of two streams.
+std::vector<RingSizes> for_two(const RingSizes& each) { return {each, each}; }
+
+log::Writer make_writer(const std::filesystem::path& path, std::uint32_t streams) {
+  auto writer = log::Writer::create(path, {}, false);
+  REQUIRE(writer);
+  for (std::uint32_t id = 0; id < streams; ++id) {
+    const std::string name = "s" + std::to_string(id);
+    REQUIRE(writer->add(log::SourceRow{id, name, "file", "", "", "{}"}));
+    REQUIRE(writer->add(log::StreamRow{id, id, "", name, "{}", 1}));
+  }
+  REQUIRE(writer->commit());
+  return std::move(*writer);
+}
+
+// Everything a log holds of its chunks: sequences in order, per stream.
+std::vector<std::vector<std::uint64_t>> sequences(const std::filesystem::path& path) {
+  auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  std::vector<std::vector<std::uint64_t>> found(reader->streams().size());
+  for (;;) {
+    const auto chunk = reader->next_chunk();
+    REQUIRE(chunk);
+    if (!chunk->has_value()) return found;
+    found[(*chunk)->source].push_back((*chunk)->places[0].next_frame);
+  }
+}
+
+std::vector<log::GapRow> gaps(const std::filesystem::path& path) {
+  const auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  const auto rows = reader->gaps();
+  REQUIRE(rows);
+  return *rows;
+}
+
+std::uint64_t lost(const std::vector<log::GapRow>& rows, std::uint32_t stream, GapKind kind) {
+  std::uint64_t sum = 0;
+  for (const log::GapRow& row : rows) {
+    if (row.owner == stream && row.kind == kind) sum += row.lost;
+  }
+  return sum;
+}
+
+void put_chunk(RecordSink& record_sink, std::uint32_t stream, std::uint64_t sequence,
+               const std::string& text) {
+  record_sink.chunk(stream, 0, Direction::kFromDevice, static_cast<std::int64_t>(sequence),
+                    {.frame = sequence}, bytes_of(text));
+}
+
+}  // namespace
+
+TEST_CASE("what two hot threads put on the record_sink is in the log, in order, whole") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  RecordRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 64}));
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, [](const RecorderEvent&) {});
+  constexpr std::uint64_t kChunks = 5000;
+  std::atomic<bool> running{true};
+  std::atomic<std::uint64_t> refused{0};
+  std::thread reader([&] {
+    for (std::uint64_t i = 1; i <= kChunks; ++i) {
+      const auto stream = static_cast<std::uint32_t>(i % 2);
+      const auto before = rings.overflowed(stream, GapKind::kChunks);
+      put_chunk(rings, stream, i, std::string(i % 700, 'x'));
+      if (rings.overflowed(stream, GapKind::kChunks) != before) ++refused;
+    }
+    running = false;
+  });
+  std::int64_t now_ns = 0;
+  while (running) log_writer.turn(now_ns += kTurn_ns);
+  reader.join();
+  REQUIRE(log_writer.finish(now_ns));
+  const auto found = sequences(path);
+  CHECK(found[0].size() + found[1].size() + refused == kChunks);
+  CHECK(log_writer.lost_chunks() == refused);
+  for (std::uint32_t id = 0; id < 2; ++id) {
+    CHECK(std::is_sorted(found[id].begin(), found[id].end()));
+  }
+  auto log = log::Reader::open(path);
+  REQUIRE(log);
+  for (auto chunk = log->next_chunk(); chunk && chunk->has_value(); chunk = log->next_chunk()) {
+    REQUIRE((*chunk)->bytes.size() == (*chunk)->places[0].next_frame % 700);
+  }
+}
+
+TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  RecordRings rings(for_two({.chunk_bytes = 1024, .frame_bytes = 1024, .decisions = 2}));
+  std::vector<RecorderEvent> events;
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path,
+                           [&](const RecorderEvent& event) { events.push_back(event); });
+  const std::string line(400, '1');
+  for (std::uint64_t i = 1; i <= 6; ++i) put_chunk(rings, 0, i, line);  // two fit
+  for (std::uint64_t i = 1; i <= 5; ++i) rings.decision({.stream = 1, .item = i});
+  for (std::uint64_t i = 1; i <= 4; ++i) rings.published(0, i, false, bytes_of(line));
+  log_writer.turn(kTurn_ns);
+  CHECK(events.size() == 3);
+  put_chunk(rings, 0, 7, line);
+  log_writer.turn(2 * kTurn_ns);
+  CHECK(events.size() == 3);
+  CHECK(log_writer.lost_chunks() == 4);
+  REQUIRE(log_writer.finish(3 * kTurn_ns));
+  CHECK(sequences(path)[0] == std::vector<std::uint64_t>{1, 2, 7});
+  const auto rows = gaps(path);
+  CHECK(rows.front().after_chunk == 2);
+  CHECK(lost(rows, 0, GapKind::kChunks) == 4);
+  CHECK(lost(rows, 1, GapKind::kDecisions) == 3);
+  CHECK(lost(rows, 0, GapKind::kFrames) == 2);
+}
+
+TEST_CASE("a stream that fills its share of the rings costs its neighbour nothing") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  RecordRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 8}));
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, [](const RecorderEvent&) {});
+  const std::string line(40, '1');
+  constexpr std::uint64_t kTurns = 20;
+  for (std::uint64_t turn = 1; turn <= kTurns; ++turn) {
+    for (std::uint64_t i = 0; i < 500; ++i) {
+      put_chunk(rings, 0, 500 * turn + i, line);
+      rings.decision({.stream = 0, .item = 501 * turn + i});
+      rings.published(0, 500 * turn + i, false, bytes_of(line));
+    }
+    put_chunk(rings, 1, turn, line);
+    rings.decision({.stream = 1, .item = 501 * turn + 500});
+    rings.published(1, turn, false, bytes_of(line));
+    log_writer.turn(static_cast<std::int64_t>(turn) * kTurn_ns);
+  }
+  REQUIRE(log_writer.finish(static_cast<std::int64_t>(kTurns) * kTurn_ns));
+  CHECK(sequences(path)[1].size() == kTurns);
+  const auto rows = gaps(path);
+  for (const GapKind kind : {GapKind::kChunks, GapKind::kDecisions, GapKind::kFrames}) {
+    CHECK(lost(rows, 0, kind) > 1000);
+    CHECK(lost(rows, 1, kind) == 0);
+  }
+}
+
+// The pipeline decides later than the reader reads: the chunk that a lost decision concerns may be
+// in the log long before.
+TEST_CASE("the gap of a lost decision begins before the chunk that it concerns") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  RecordRings rings({{.chunk_bytes = 4096, .frame_bytes = 0, .decisions = 1}});
+  LogWriterLoop log_writer(rings, make_writer(path, 1), path, [](const RecorderEvent&) {});
+  for (std::uint64_t frame = 1; frame <= 10; ++frame) put_chunk(rings, 0, frame, "1\n");
+  log_writer.turn(kTurn_ns);
+  rings.decision({.stream = 0, .item = 3, .sequence = 3});
+  rings.decision({.stream = 0, .item = 5, .sequence = 5});  // does not fit
+  rings.decision({.stream = 0, .item = 7, .sequence = 7});  // nor this one
+  log_writer.turn(2 * kTurn_ns);
+  rings.decision({.stream = 0, .item = 9, .sequence = 9});
+  REQUIRE(log_writer.finish(3 * kTurn_ns));
+  const auto rows = gaps(path);
+  REQUIRE(rows.size() == 1);
+  CHECK(rows[0].lost == 2);
+  CHECK(rows[0].after_chunk == 4);
+}
+
+TEST_CASE("a full disk: counted, told, and recording goes on with a gap row when there is room") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  RecordRings rings(for_two({.chunk_bytes = 1 << 20, .frame_bytes = 0, .decisions = 64}));
+  std::vector<RecorderEvent> events;
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path,
+                           [&](const RecorderEvent& event) { events.push_back(event); });
+  const std::string model = "model bytes";
+  const std::string line(20'000, '1');
+  std::uint64_t sequence = 0;
+  std::int64_t now_ns = 0;
+  const auto turns = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      put_chunk(rings, 0, ++sequence, line);
+      put_chunk(rings, 1, sequence, "short");
+      rings.decision({.stream = 1, .item = sequence});
+      log_writer.turn(now_ns += kTurn_ns);
+    }
+  };
+  turns(10);
+  CHECK(log_writer.errors() == 0);
+  {
+    const test::FileLimit limit(400'000);
+    rings.keep_model(bytes_of(model));
+    turns(100);  // five seconds: several retries
+    CHECK(log_writer.errors() >= 1);
+    REQUIRE(!events.empty());
+    CHECK(events.front().kind == RecorderEvent::Kind::kError);
+    CHECK(events.front().text.find(path.string()) != std::string::npos);
+  }
+  turns(400);
+  CHECK(events.size() < 16);  // retries slow down, and so does what is told
+  REQUIRE(log_writer.finish(now_ns));
+  const auto found = sequences(path);
+  const auto rows = gaps(path);
+  CHECK(found[0].back() == sequence);
+  CHECK(found[0].size() + lost(rows, 0, GapKind::kChunks) == sequence);
+  CHECK(found[1].size() + lost(rows, 1, GapKind::kChunks) == sequence);
+  CHECK(lost(rows, 0, GapKind::kChunks) > 50);
+  CHECK(lost(rows, 1, GapKind::kDecisions) > 50);
+  CHECK(log_writer.lost_chunks() ==
+        lost(rows, 0, GapKind::kChunks) + lost(rows, 1, GapKind::kChunks));
+  // A model that came while the disk was full is there: its bytes were kept until they were safe.
+  const auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  CHECK(reader->blob(log::sha256_hex(bytes_of(model))));
+}
+
+TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  const Clock clock = []() noexcept -> std::int64_t {
+    return std::chrono::steady_clock::now().time_since_epoch().count();
+  };
+  RecordedStream stream;
+  stream.source.name = "a";
+  stream.settings.style.emplace();
+  stream.style = {std::byte{1}, std::byte{2}};
+  RecorderOptions options;
+  options.file = path;
+  options.frames = true;
+  options.config_text = "x";
+  options.clock = clock;
+  auto recorder = Recorder::open(options, {stream});
+  REQUIRE(recorder);
+  CHECK((*recorder)->record_sink().wants_published());
+  for (std::uint64_t i = 1; i <= 100; ++i) {
+    put_chunk((*recorder)->record_sink(), 0, i, "1 2 3\n");
+    (*recorder)->record_sink().published(0, i, false, bytes_of("frame"));
+  }
+  REQUIRE((*recorder)->finish());
+  CHECK(!std::filesystem::exists(path.string() + "-wal"));
+  CHECK(sequences(path)[0].size() == 100);
+  CHECK(gaps(path).empty());
+  const auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  CHECK(reader->meta().at("config") == "x");
+  CHECK(reader->meta().contains("isa"));
+  const auto settings = settings_from_json(reader->streams()[0].stages_json, "");
+  REQUIRE(settings);
+  CHECK(reader->blob(settings->style_model.sha256)->size() == 2);
+
+  const auto again = Recorder::open(options, {stream});
+  REQUIRE(!again);
+  CHECK(again.error().message.find("exists already") != std::string::npos);
+}

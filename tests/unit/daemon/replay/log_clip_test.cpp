@@ -1,0 +1,164 @@
+// A log's stream as a clip: the frames that were published, and what the clip lacks.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "daemon/replay/log_clip.hpp"
+#include "daemon/replay/replay.hpp"
+#include "proto/clip/frames_clip.hpp"
+#include "tests/unit/daemon/replay/staged_run.hpp"
+
+namespace posed::test {
+namespace {
+
+constexpr std::size_t kFrames = 120;
+
+std::vector<Frame> published(const std::filesystem::path& log, std::uint32_t stream) {
+  auto reader = log::Reader::open(log);
+  REQUIRE(reader);
+  const auto replay = replay::Replay::open(*reader);
+  REQUIRE(replay);
+  std::vector<Frame> frames;
+  const auto done = (*replay)->run(
+      [&](const pipeline::Item& item) {
+        if (item.kind != pipeline::Item::Kind::kFrame || item.frame.header.stream != stream) return;
+        const bool again =
+            !frames.empty() && item.frame.header.sequence <= frames.back().header.sequence;
+        if (!again) frames.push_back(item.frame);
+      },
+      [](const log::ChunkRow&) { return true; });
+  REQUIRE(done);
+  return frames;
+}
+
+void check_same(const clip::Clip& clip, const std::vector<Frame>& frames) {
+  REQUIRE(clip.frames() == std::ssize(frames));
+  for (int i = 0; i < clip.frames(); ++i) {
+    const Frame made = clip.frame(i);
+    const Frame& given = frames[static_cast<std::size_t>(i)];
+    REQUIRE(made.joint_count == given.joint_count);
+    for (std::size_t j = 0; j < given.joint_count; ++j) {
+      const double off_rad = angle_between_rad(to_eigen_double(made.rotation_xyzw[j]),
+                                               to_eigen_double(given.rotation_xyzw[j]));
+      CHECK(off_rad < 1e-5);
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      CHECK(made.root_position_m[c] == Approx(given.root_position_m[c]).margin(1e-6));
+    }
+  }
+}
+
+bool says(const std::vector<std::string>& warnings, const std::string& text) {
+  return std::ranges::any_of(
+      warnings, [&](const auto& warning) { return warning.find(text) != std::string::npos; });
+}
+
+// A figure with a place to stand above its hips, which move: each of `movers` has position
+// channels.
+Skeleton standing_above(const std::vector<std::uint16_t>& movers) {
+  Skeleton skeleton;
+  for (const char* name : {"reference", "hips", "chest"}) {
+    Joint joint;
+    joint.name = name;
+    joint.parent = static_cast<int>(skeleton.joints.size()) - 1;
+    joint.offset_m = Eigen::Vector3d(0.1, 0.2, -0.3) * (joint.parent + 2);
+    skeleton.joints.push_back(joint);
+  }
+  skeleton.root_joint = 1;
+  for (std::uint16_t j = 0; j < 3; ++j) {
+    for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+      if (std::ranges::find(movers, j) == movers.end()) continue;
+      skeleton.channels.push_back({.joint = j, .axis = axis, .translation = true});
+    }
+    for (const Axis axis : {Axis::kZ, Axis::kX, Axis::kY}) {
+      skeleton.channels.push_back({.joint = j, .axis = axis});
+    }
+  }
+  REQUIRE(skeleton.finish());
+  return skeleton;
+}
+
+}  // namespace
+
+TEST_CASE("a log's stream becomes a clip of its published frames") {
+  const TempFolder folder;
+  const auto log = folder.path() / "take.plog";
+  write_staged_log(log, kFrames);
+  for (const std::uint32_t id : {0U, 1U}) {
+    const auto clip = replay::clip_of_log(log, id == 0 ? "a" : "b");
+    if (!clip) FAIL(clip.error().text());
+    const auto frames = published(log, id);
+    check_same(*clip, frames);
+    CHECK(clip->frame_rate_hz == Approx(60.0));
+    const bool all = frames.size() == kFrames;
+    CHECK(all == (id == 1));  // the other stream shed some
+    CHECK(says(clip->warnings, "frames were skipped") == !all);
+    // As a file, to the precision of its text.
+    const auto out = folder.path() / "out.bvh";
+    REQUIRE(clip::write_bvh(*clip, out));
+    const auto back = clip::read_clip(out, {.metres_per_unit = 0.01});
+    REQUIRE(back);
+    check_same(*back, frames);
+  }
+}
+
+TEST_CASE("which stream of a log is meant has to be said, and be there") {
+  const TempFolder folder;
+  const auto log = folder.path() / "take.plog";
+  write_staged_log(log, 30);
+  const auto unclear = replay::clip_of_log(log, "");
+  REQUIRE_FALSE(unclear);
+  CHECK(unclear.error().message.find("a, b") != std::string::npos);
+  CHECK(unclear.error().message.find("--stream") != std::string::npos);
+  const auto missing = replay::clip_of_log(log, "c");
+  REQUIRE_FALSE(missing);
+  CHECK(missing.error().message.find("'c'") != std::string::npos);
+  CHECK_FALSE(replay::clip_of_log(folder.write("no.plog", "no log"), ""));
+  CHECK_FALSE(replay::clip_of_log(folder.path() / "none.plog", ""));
+}
+
+TEST_CASE("the position goes to the channels that move the figure, wherever they are") {
+  for (const std::vector<std::uint16_t>& movers :
+       {std::vector<std::uint16_t>{0}, std::vector<std::uint16_t>{1}}) {
+    const auto skeleton = std::make_shared<const Skeleton>(standing_above(movers));
+    clip::Clip source;
+    source.skeleton = skeleton;
+    source.frame_rate_hz = 50.0;
+    source.channels.resize(20, std::ssize(skeleton->channels));
+    for (int i = 0; i < 20; ++i) {
+      for (int c = 0; c < source.channels.cols(); ++c)
+        source.channels(i, c) = std::sin(i + 3.0 * c);
+    }
+    clip::FramesClip made(skeleton);
+    std::vector<double> times_s;
+    for (int i = 0; i < 20; ++i) {
+      made.add(source.frame(i));
+      times_s.push_back(i / 50.0);
+    }
+    const auto clip = made.finish("made", 0.0, times_s);
+    REQUIRE(clip);
+    CHECK(clip->frame_rate_hz == Approx(50.0));
+    CHECK((clip->channels - source.channels).cwiseAbs().maxCoeff() < 1e-5);
+  }
+}
+
+TEST_CASE("what a frame lacks is held, and told") {
+  const auto skeleton = std::make_shared<const Skeleton>(standing_above({}));
+  clip::Clip clip;
+  clip.skeleton = skeleton;
+  clip.channels.resize(4, 9);
+  for (int i = 0; i < 4; ++i) clip.channels.row(i).setConstant(i);
+  clip.channels(0, 2) = clip.channels(2, 3) = NAN;
+  clip.channels.col(5).setConstant(NAN);
+  clip::hold_missing(clip);
+  CHECK(clip.channels(0, 2) == 1.0);
+  CHECK(clip.channels(2, 3) == 1.0);
+  CHECK(clip.channels(3, 3) == 3.0);
+  CHECK(clip.channels.col(5).isZero());
+  REQUIRE(clip.warnings.size() == 1);
+  CHECK(clip.warnings.front().find("6 of 36") != std::string::npos);
+}
+
+}  // namespace posed::test

@@ -1,0 +1,193 @@
+// Whatever happens while a daemon records, the replay of its log gives what it published, bit for
+// bit. Each seed is another run on the virtual clock: other stalls, unplugs, bursts and commands,
+// other turns of the daemon's parts. POSED_SEEDS=10000 runs that many instead of 200; POSED_SEED=n
+// runs that one alone.
+#include <catch2/catch.hpp>
+
+#include <cstdint>
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <utility>
+
+#include "models/gesture/model_file.hpp"
+#include "models/style/style_model.hpp"
+#include "tests/support/replayed.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/support/virtual_daemon.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+namespace posed::test {
+namespace {
+
+constexpr double kLength_s = 2.5;
+constexpr std::uint64_t kSeeds = 200;
+
+class Dice {
+ public:
+  explicit Dice(std::uint64_t seed) : random_(seed) {}
+  [[nodiscard]] int below(int count) {
+    return std::uniform_int_distribution<int>(0, count - 1)(random_);
+  }
+  [[nodiscard]] double within(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
+  [[nodiscard]] std::uint64_t seed() { return random_(); }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+enum class What : std::uint8_t { kBody, kHand };
+
+VirtualStream random_body(const std::string& name, Dice& dice) {
+  VirtualStream body = walking_stream(name, kLength_s, 1);
+  body.settings.publish_raw = dice.below(2) == 0;
+  if (dice.below(2) == 0) body.settings.generate.reset();
+  if (body.settings.generate) body.settings.generate->lag.frames = dice.below(4);
+  return body;
+}
+
+VirtualStream random_hand(const std::string& name, Dice& dice) {
+  VirtualStream hand = glove_stream(name, kLength_s);
+  hand.settings.publish_raw = dice.below(2) == 0;
+  hand.settings.generate->lag.frames = dice.below(4);
+  hand.settings.constrain = dice.below(4) != 0;
+  if (dice.below(2) == 0) hand.calibration = glove_calibration(dice.below(3));
+  return hand;
+}
+
+VirtualCommand random_command(std::uint32_t stream, What what, Dice& dice) {
+  static const std::string one = style::serialize_model(toy_model(1));
+  static const std::string two = style::serialize_model(toy_model(2));
+  static const std::string gestures = gesture::serialize_model(toy_gesture_model());
+  using Kind = VirtualCommand::Kind;
+  VirtualCommand command{.at_s = dice.within(0.0, kLength_s), .stream = stream};
+  if (what == What::kBody) {
+    command.kind = dice.below(2) == 0 ? Kind::kAlpha : Kind::kModel;
+    command.alpha = static_cast<float>(dice.within(-2.0, 2.0));
+    command.bytes = dice.below(2) == 0 ? one : two;
+    return command;
+  }
+  constexpr std::array kKinds{Kind::kPlay, Kind::kPlay, Kind::kStopPlaying, Kind::kGesture,
+                              Kind::kCalibrate};
+  command.kind = kKinds[static_cast<std::size_t>(dice.below(kKinds.size()))];
+  command.bytes = command.kind == Kind::kGesture ? gestures : glove_calibration(dice.below(4));
+  command.labels = dice.below(2) == 0 ? "g 1 c" : "4";
+  command.loop = dice.below(4) == 0;
+  return command;
+}
+
+// A run of the daemon as its seed wants it; the log is at `path`.
+void record_run(std::uint64_t seed, const std::filesystem::path& path,
+                const record::RingSizes& record_sink = VirtualOptions{}.record_sink) {
+  Dice dice(seed);
+  VirtualOptions options{.seed = dice.seed(), .log = path, .record_sink = record_sink};
+  VirtualDaemon daemon(options);
+  const bool small_rings = dice.below(8) == 0;
+  std::vector<What> streams{What::kBody, What::kHand};
+  if (dice.below(3) == 0) streams.push_back(dice.below(2) == 0 ? What::kBody : What::kHand);
+  for (std::uint32_t id = 0; id < streams.size(); ++id) {
+    const std::string name = "s" + std::to_string(id);
+    VirtualStream stream =
+        streams[id] == What::kBody ? random_body(name, dice) : random_hand(name, dice);
+    stream.slots = small_rings ? 16 : 256;
+    disturb(stream, dice.seed());
+    daemon.add(std::move(stream));
+    for (int i = dice.below(10); i > 0; --i) {
+      daemon.command(random_command(id, streams[id], dice));
+    }
+  }
+  daemon.run(kLength_s + dice.within(0.0, 2.5));
+}
+
+// The frames that were compared.
+std::uint64_t check_seed(std::uint64_t seed, const std::filesystem::path& path) {
+  record_run(seed, path);
+  const Replayed result = replayed(path);
+  if (result.difference) {
+    FAIL("seed " << seed << ": " << result.difference->text() << "; POSED_SEED=" << seed
+                 << " runs it alone");
+  }
+  INFO("seed " << seed);
+  CHECK(result.counts.after_gap + result.counts.past_end == 0);
+  CHECK(result.counts.compared > 0);
+  std::filesystem::remove(path);
+  return result.counts.compared;
+}
+
+std::uint64_t number_of(const char* variable, std::uint64_t otherwise) {
+  const char* const text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
+}
+
+// The seeds to run, first and last: POSED_SEED alone, or one of `part` of POSED_SEEDS.
+std::pair<std::uint64_t, std::uint64_t> seeds(std::uint64_t part) {
+  const std::uint64_t alone = number_of("POSED_SEED", 0);
+  if (alone != 0) return {alone, alone};
+  return {1, number_of("POSED_SEEDS", kSeeds) / part};
+}
+
+}  // namespace
+
+TEST_CASE("whatever happens while it is recorded, a log replays to the bit", "[property]") {
+  const TempFolder folder;
+  const auto path = folder.path() / "run.plog";
+  const auto [first, last] = seeds(1);
+  std::uint64_t compared = 0;
+  for (std::uint64_t seed = first; seed <= last; ++seed) compared += check_seed(seed, path);
+  WARN(last - first + 1 << " runs replayed, " << compared << " frames compared");
+}
+
+// A recorder that is held up loses chunks, decisions and frames. What its log still holds is
+// compared, what it lacks is counted, and nothing is called different that was not.
+TEST_CASE("a log with gaps replays what it holds and says what it lacks", "[property]") {
+  const TempFolder folder;
+  const auto path = folder.path() / "gaps.plog";
+  const auto [first, last] = seeds(4);
+  replay::Expectation::Counts sum;
+  for (std::uint64_t seed = first; seed <= last; ++seed) {
+    Dice dice(~seed);
+    record_run(seed, path,
+               {.chunk_bytes = static_cast<std::size_t>(1000 * dice.below(40) + 2000),
+                .frame_bytes = static_cast<std::size_t>(4000 * dice.below(40) + 4000),
+                .decisions = static_cast<std::size_t>(dice.below(12) + 1)});
+    const Replayed result = replayed(path);
+    INFO("seed " << seed << "; POSED_SEED=" << seed << " runs it alone");
+    CHECK((result.difference ? result.difference->text() : "") == "");
+    sum.compared += result.counts.compared;
+    sum.lost += result.counts.lost;
+    sum.after_gap += result.counts.after_gap;
+    std::filesystem::remove(path);
+  }
+  WARN(last - first + 1 << " runs: " << sum.compared << " frames compared, " << sum.lost
+                        << " not in the log, " << sum.after_gap << " after a gap");
+  if (number_of("POSED_SEED", 0) == 0)
+    CHECK((sum.compared > 0 && sum.lost > 0 && sum.after_gap > 0));
+}
+
+// The decoder gives a sample before its frame. A replay that lets the sample in before the tick
+// that the silence had brought is not the live run.
+TEST_CASE("a glove that was silent, with frames waiting in the generate stage, replays") {
+  for (const int lag : {0, 1, 2, 3}) {
+    INFO("lag " << lag);
+    const TempFolder folder;
+    const auto path = folder.path() / "silent.plog";
+    VirtualDaemon daemon({.seed = 1, .log = path, .holdups = false});
+    VirtualStream hand = glove_stream("hand", 2.0);
+    hand.settings.generate->lag.frames = lag;
+    for (ScriptedChunk& chunk : hand.links[0].chunks) {
+      if (chunk.at_s >= 1.0) chunk.at_s += 0.3;
+    }
+    daemon.add(std::move(hand));
+    daemon.run(3.0);
+    const Replayed result = replayed(path);
+    INFO((result.difference ? result.difference->text() : ""));
+    CHECK_FALSE(result.difference);
+    CHECK(result.counts.compared >= 200);
+    CHECK(result.counts.lost + result.counts.after_gap + result.counts.past_end == 0);
+  }
+}
+
+}  // namespace posed::test

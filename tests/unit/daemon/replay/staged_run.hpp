@@ -1,0 +1,199 @@
+// A live run without threads, clocks or luck: two streams through the real decoders, engines and
+// recorder, with every decision a pipeline can take: an alpha change, a model swap, a shed, ticks.
+#pragma once
+
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/pipeline/intake.hpp"
+#include "daemon/pipeline/stream_engine.hpp"
+#include "daemon/publish/encode.hpp"
+#include "daemon/record/recorder.hpp"
+#include "daemon/record/stream_settings.hpp"
+#include "drivers/driver.hpp"
+#include "drivers/transport/transport_factory.hpp"
+#include "models/style/style_model.hpp"
+#include "proto/log/digest.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+namespace posed::test {
+
+// One stream of the run, from chunk to published frame.
+class StagedStream final : private pipeline::IntakeOut, private pipeline::EngineOut {
+ public:
+  // `next_item` is shared by all streams of the run.
+  StagedStream(std::uint32_t id, std::string name, drivers::Device device, std::string model_bytes,
+               std::uint64_t& next_item)
+      : id_(id),
+        name_(std::move(name)),
+        device_(std::move(device)),
+        model_bytes_(std::move(model_bytes)),
+        styled_(name_),
+        raw_(name_ + "-raw"),
+        next_item_(next_item),
+        intake_(id, next_item, *this) {
+    settings_.publish_raw = true;
+    settings_.rate_hz = device_.description.rate_hz;
+    settings_.style.emplace();
+    model_ = bind(model_bytes_);
+    engine_.emplace(pipeline::EngineOptions{
+        .stream = id, .publish_raw = true, .style = settings_.style, .model = model_.get()});
+  }
+
+  [[nodiscard]] record::RecordedStream recorded() const {
+    const auto bytes = std::as_bytes(std::span(model_bytes_));
+    const drivers::Description& description = device_.description;
+    return {.source = {.id = 0,
+                       .name = name_,
+                       .driver = description.driver,
+                       .text = description.text,
+                       .identity = "toy.bvh",
+                       .config = "{}"},
+            .settings = settings_,
+            .style = {bytes.begin(), bytes.end()}};
+  }
+
+  void set_tape(pipeline::RecordSink& record_sink) { tape_ = &record_sink; }
+
+  // The line of a clip, or a piece of it. A dropped chunk is decoded, but never reaches the engine.
+  void feed(const std::string& line, std::int64_t arrival_ns, bool shed = false) {
+    shed_ = shed;
+    const auto bytes = std::as_bytes(std::span(line));
+    intake_.arrived(arrival_ns);
+    tape_->chunk(id_, 0, pipeline::Direction::kFromDevice, arrival_ns, intake_.next(), bytes);
+    device_.decoder->feed(bytes, arrival_ns, intake_);
+  }
+
+  void tick(std::int64_t now_ns) { CHECK(engine_->tick(now_ns, *this)); }
+
+  void set_alpha(float alpha) {
+    static_cast<void>(engine_->apply(
+        {.kind = pipeline::Command::Kind::kAlpha, .stream = id_, .alpha = alpha}, *this));
+  }
+
+  void set_model(const std::string& bytes) {
+    swapped_.push_back(bind(bytes));
+    pipeline::Command command{
+        .kind = pipeline::Command::Kind::kModel, .stream = id_, .model = swapped_.back().get()};
+    const auto view = std::as_bytes(std::span(bytes));
+    const std::string hash = log::sha256_hex(view);
+    hash.copy(command.model_hash.data(), hash.size());
+    tape_->keep_model(view);
+    static_cast<void>(engine_->apply(command, *this));
+  }
+
+ private:
+  using Model = std::unique_ptr<const style::BoundModel>;
+  [[nodiscard]] Model bind(const std::string& bytes) const {
+    const auto model = style::parse_model(std::as_bytes(std::span(bytes)), "toy.style");
+    REQUIRE(model);
+    return style::bind_model(*model, *device_.description.skeleton, *settings_.style, "toy")
+        .value();
+  }
+
+  bool item(pipeline::Item& item) noexcept override {
+    place_ = item.number;
+    if (!shed_) engine_->on_frame(item.frame, *this);
+    place_ = 0;
+    return !shed_;
+  }
+  void outcome(Outcome) noexcept override {}
+
+  void item(const pipeline::Item& item) noexcept override {
+    const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
+    if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
+    const std::string bytes = (raw ? raw_ : styled_).encode(item.frame).SerializeAsString();
+    tape_->published(id_, item.frame.header.sequence, raw, std::as_bytes(std::span(bytes)));
+  }
+  void decision(const pipeline::Decision& decision) noexcept override {
+    pipeline::Decision placed = decision;
+    placed.item = place_ != 0 ? place_ : next_item_;
+    tape_->decision(placed);
+  }
+
+  std::uint32_t id_;
+  std::string name_;
+  drivers::Device device_;
+  std::string model_bytes_;
+  record::StreamSettings settings_;
+  publish::FrameEncoder styled_, raw_;
+  std::uint64_t& next_item_;
+  std::uint64_t place_ = 0;  // number of the item in the engine; 0 between two
+  pipeline::Intake intake_;
+  Model model_;
+  std::vector<Model> swapped_;
+  std::optional<pipeline::StreamEngine> engine_;
+  pipeline::RecordSink* tape_ = nullptr;
+  bool shed_ = false;
+};
+
+// The motion lines of a clip, each with its end of line.
+inline std::vector<std::string> motion_lines(const std::filesystem::path& bvh) {
+  std::ifstream file(bvh);
+  std::vector<std::string> lines;
+  bool motion = false;
+  for (std::string line; std::getline(file, line);) {
+    if (motion) lines.push_back(line + "\n");
+    motion = motion || line.starts_with("Frame Time");
+  }
+  return lines;
+}
+
+// Writes the log of the staged run: `frames` of each stream, 60 Hz.
+inline void write_staged_log(const std::filesystem::path& path, std::size_t frames) {
+  const TempFolder dir;
+  const auto bvh = dir.path() / "toy.bvh";
+  REQUIRE(clip::write_bvh(toy_walk(static_cast<int>(frames), 60.0, 0.4), bvh));
+  const auto lines = motion_lines(bvh);
+  REQUIRE(lines.size() == frames);
+  const std::string one = style::serialize_model(toy_model(1));
+  const std::string two = style::serialize_model(toy_model(2));
+  std::vector<std::unique_ptr<StagedStream>> streams;
+  std::vector<record::RecordedStream> rows;
+  drivers::TransportFactory ports;
+  std::uint64_t next_item = 1;
+  for (std::uint32_t id = 0; id < 2; ++id) {
+    auto device = drivers::find_driver("file")->open({{"path", bvh.string()}}, ports);
+    REQUIRE(device);
+    streams.push_back(std::make_unique<StagedStream>(id, id == 0 ? "a" : "b", std::move(*device),
+                                                     one, next_item));
+    rows.push_back(streams.back()->recorded());
+  }
+  record::RecorderOptions options;
+  options.file = path;
+  options.frames = true;
+  options.clock = []() noexcept -> std::int64_t { return 1'000'000'000; };
+  auto recorder = record::Recorder::open(std::move(options), std::move(rows));
+  REQUIRE(recorder);
+  for (const auto& stream : streams) stream->set_tape((*recorder)->record_sink());
+  std::int64_t now_ns = 5'000'000'000;
+  for (std::size_t i = 0; i < frames; ++i) {
+    now_ns += 16'666'667;
+    if (i == frames / 6) streams[0]->set_alpha(-0.5F);
+    if (i == frames / 4) streams[1]->set_model(two);
+    if (i == frames / 2) {
+      streams[0]->set_model(one);  // a model that replaces itself
+      now_ns += 700'000'000;
+      for (const auto& stream : streams) stream->tick(now_ns);
+      now_ns += 1'100'000'000;
+      streams[1]->tick(now_ns);
+    }
+    const bool shed = i > 2 * frames / 3 && i < 2 * frames / 3 + 6;
+    streams[0]->feed(lines[i], now_ns, shed);
+    // The other stream's lines come cut in two, and a foreign piece among them.
+    const std::size_t half = lines[i].size() / 2;
+    streams[1]->feed(lines[i].substr(0, half), now_ns);
+    streams[1]->feed(lines[i].substr(half), now_ns + 1000);
+    if (i % 10 == 3) streams[1]->feed("not a number\n", now_ns + 2000);
+  }
+  streams[0]->tick(now_ns + 600'000'000);
+  REQUIRE((*recorder)->finish());
+}
+
+}  // namespace posed::test

@@ -1,0 +1,307 @@
+// Links over pseudo-terminals and loopback sockets: bytes unchanged, hang-ups told, mistakes named.
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <numeric>
+#include <thread>
+
+#include "drivers/transport/transport_factory.hpp"
+#include "tests/support/free_port.hpp"
+#include "tests/unit/drivers/pseudo_terminal.hpp"
+
+namespace posed::drivers {
+namespace {
+
+using std::chrono::milliseconds;
+using test::free_port;
+using test::PseudoTerminal;
+
+constexpr milliseconds kPatience{2000};
+
+std::string text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+Connection open_port(const PseudoTerminal& terminal, int baud = 115200) {
+  TransportFactory ports;
+  auto link = ports.serial({.port = terminal.port(), .baud = baud});
+  REQUIRE(link);
+  return std::move(*link);
+}
+
+std::string all_bytes() {
+  std::string bytes(256, '\0');
+  std::iota(bytes.begin(), bytes.end(), '\0');
+  return bytes;
+}
+
+bool readable(const Transport& transport) {
+  pollfd wanted{.fd = transport.poll_fd(), .events = POLLIN, .revents = 0};
+  return ::poll(&wanted, 1, static_cast<int>(kPatience.count())) == 1;
+}
+
+// A client on loopback, closed in the end.
+class Client {
+ public:
+  explicit Client(std::uint16_t port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    REQUIRE(::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0);
+  }
+  ~Client() { ::close(fd_); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  void say(std::string_view text) const {
+    REQUIRE(::write(fd_, text.data(), text.size()) == static_cast<ssize_t>(text.size()));
+  }
+
+ private:
+  int fd_;
+};
+
+std::string loopback(std::uint16_t port) { return "127.0.0.1:" + std::to_string(port); }
+
+}  // namespace
+
+TEST_CASE("every byte value crosses a port unchanged, both ways") {
+  const PseudoTerminal terminal;
+  Connection link = open_port(terminal);
+  REQUIRE(link.write(all_bytes()));
+  CHECK(terminal.heard() == all_bytes());
+  terminal.say(all_bytes());
+  const auto bytes = link.read(kPatience);
+  REQUIRE(bytes);
+  CHECK(text_of(*bytes) == all_bytes());
+}
+
+TEST_CASE("a port takes the baud rates of gloves") {
+  for (const int baud : {9600, 19200, 38400, 57600, 115200, 230400, 460800, 1'000'000}) {
+    const PseudoTerminal terminal;
+    Connection link = open_port(terminal, baud);
+    REQUIRE(link.write("x"));
+    CHECK(terminal.heard() == "x");
+  }
+  TransportFactory ports;
+  CHECK_FALSE(ports.serial({.port = "/dev/null", .baud = 0}));
+}
+
+TEST_CASE("bytes from before the port was opened are thrown away") {
+  const PseudoTerminal terminal;
+  {
+    Connection first = open_port(terminal);
+  }
+  terminal.say("stale\n");
+  Connection link = open_port(terminal);
+  const auto bytes = link.read(milliseconds{0});
+  REQUIRE(bytes);
+  CHECK(bytes->empty());
+}
+
+TEST_CASE("drain leaves nothing of what came before") {
+  const PseudoTerminal terminal;
+  Connection link = open_port(terminal);
+  terminal.say("noise");
+  REQUIRE(link.drain(milliseconds{1}));
+  terminal.say("answer");
+  const auto bytes = link.read(kPatience);
+  REQUIRE(bytes);
+  CHECK(text_of(*bytes) == "answer");
+}
+
+TEST_CASE("a device that was opened early begins with what comes from its start on") {
+  PseudoTerminal terminal;
+  const auto transport = make_link_transport(open_port(terminal));
+  terminal.say("old");
+  REQUIRE(readable(*transport));
+  REQUIRE(transport->start(0));
+  terminal.say("new");
+  REQUIRE(readable(*transport));
+  CHECK(text_of(transport->read(0).bytes) == "new");
+}
+
+TEST_CASE("an unplugged port is lost for the reader and an error for cold code") {
+  PseudoTerminal terminal;
+  const auto transport = make_link_transport(open_port(terminal));
+  REQUIRE(transport->start(0));
+  CHECK(transport->read(0).bytes.empty());
+  terminal.say("last words");
+  REQUIRE(readable(*transport));
+  CHECK(text_of(transport->read(0).bytes) == "last words");
+  terminal.unplug();
+  REQUIRE(readable(*transport));
+  CHECK(transport->read(0).lost);
+  CHECK_FALSE(transport->send(std::array{std::byte{1}}));
+
+  PseudoTerminal second;
+  Connection link = open_port(second);
+  second.unplug();
+  const auto bytes = link.read(kPatience);
+  REQUIRE_FALSE(bytes);
+  CHECK(bytes.error().message.find("has gone") != std::string::npos);
+}
+
+TEST_CASE("what a full port took in part is completed before anything else is sent") {
+  const PseudoTerminal terminal;
+  const auto transport = make_link_transport(open_port(terminal));
+  const std::vector<std::byte> letters(3000, std::byte{'a'});
+  const std::array digit{std::byte{'1'}};
+  std::string taken;
+  while (transport->send(letters)) taken.append(letters.size(), 'a');
+  if (transport->send(digit)) taken += '1';  // the kernel may have made room meanwhile
+  std::string heard;
+  while (heard.size() < taken.size()) {
+    heard += terminal.heard();
+    CHECK(transport->read(0).bytes.empty());  // also sends the rest
+  }
+  CHECK(heard == taken);
+  REQUIRE(transport->send(digit));
+  CHECK(terminal.heard() == "1");
+}
+
+TEST_CASE("a message longer than the buffer is refused whole") {
+  const PseudoTerminal terminal;
+  const auto transport = make_link_transport(open_port(terminal));
+  CHECK_FALSE(transport->send(std::vector<std::byte>(kMaxChunk)));
+}
+
+TEST_CASE("a second posed is told who has the port") {
+  const PseudoTerminal terminal;
+  const Connection link = open_port(terminal);
+  TransportFactory ports;
+  const auto second = ports.serial({.port = terminal.port()});
+  REQUIRE_FALSE(second);
+  CHECK(second.error().message.starts_with(terminal.port() + " is in use by "));
+}
+
+TEST_CASE("a port that is missing or no port is refused in a sentence") {
+  TransportFactory ports;
+  const auto missing = ports.serial({.port = "/dev/ttyNotThere"});
+  REQUIRE_FALSE(missing);
+  CHECK(missing.error().message.find("is not there") != std::string::npos);
+  const auto foreign = ports.serial({.port = "/dev/null"});
+  REQUIRE_FALSE(foreign);
+  CHECK(foreign.error().message.find("no serial port") != std::string::npos);
+}
+
+TEST_CASE("a glove that connects between two tries is kept, and the newest counts") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  const Client older(port), newer(port);
+  older.say("older");
+  newer.say("newer");
+  auto link = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(link);
+  CHECK(link->identity() == "tcp 127.0.0.1");
+  const auto bytes = link->read(kPatience);
+  REQUIRE(bytes);
+  CHECK(text_of(*bytes) == "newer");
+}
+
+TEST_CASE("a glove that hangs up is lost, and may come again") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  for (int round = 0; round < 3; ++round) {
+    auto glove = std::make_unique<Client>(port);
+    auto link = ports.accept({.endpoint = loopback(port)});
+    REQUIRE(link);
+    const auto transport = make_link_transport(std::move(*link));
+    glove->say("frame");
+    glove.reset();
+    REQUIRE(readable(*transport));
+    CHECK(text_of(transport->read(0).bytes) == "frame");
+    REQUIRE(readable(*transport));
+    CHECK(transport->read(0).lost);
+  }
+}
+
+TEST_CASE("without a descriptor left the glove is told to be there, and waits for one") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  const Client glove(port);
+  rlimit before{};
+  REQUIRE(getrlimit(RLIMIT_NOFILE, &before) == 0);
+  const int lowest = ::dup(0);  // the next descriptor that anyone would get
+  REQUIRE(lowest >= 0);
+  ::close(lowest);
+  const rlimit none{static_cast<rlim_t>(lowest), before.rlim_max};
+  REQUIRE(setrlimit(RLIMIT_NOFILE, &none) == 0);
+  const auto refused = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(setrlimit(RLIMIT_NOFILE, &before) == 0);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().message.find("LimitNOFILE") != std::string::npos);
+  CHECK(ports.accept({.endpoint = loopback(port)}));
+}
+
+TEST_CASE("only peers may connect, and without peers only loopback listens") {
+  TransportFactory ports;
+  const auto open_door = ports.accept({.endpoint = "0.0.0.0:5200"});
+  REQUIRE_FALSE(open_door);
+  CHECK(open_door.error().message.find("peers") != std::string::npos);
+
+  const std::uint16_t port = free_port();
+  const ListenSettings others{.endpoint = loopback(port), .peers = {"192.0.2.7"}};
+  CHECK_FALSE(ports.accept(others));
+  const Client stranger(port);
+  CHECK_FALSE(ports.accept(others));
+  CHECK(ports.refused() == 1);
+}
+
+TEST_CASE("whoever stops while a device is opened waits for nothing, then or later") {
+  using std::chrono::hours;
+  const PseudoTerminal silent;
+  TransportFactory ports;
+  auto link = ports.serial({.port = silent.port()});
+  REQUIRE(link);
+  std::thread stopper([&] { ports.cancel(); });
+  const auto bytes = link->read(hours(1));
+  stopper.join();
+  REQUIRE_FALSE(bytes);
+  CHECK(bytes.error().message.find("posed stops") != std::string::npos);
+  CHECK_FALSE(link->drain(hours(1)));
+  CHECK_FALSE(link->write("x"));
+  CHECK_FALSE(ports.accept({.endpoint = loopback(free_port())}));
+}
+
+TEST_CASE("ports that only prepare listen already, open nothing and still refuse wrong use") {
+  const PseudoTerminal terminal;
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  ports.only_prepare(true);
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  CHECK_FALSE(ports.serial({.port = terminal.port()}));
+  CHECK(ports.serial({.port = terminal.port(), .baud = 0}).error().exit_code ==
+        ExitCode::kWrongUse);
+  CHECK(ports.accept({.endpoint = "nonsense"}).error().exit_code == ExitCode::kWrongUse);
+  const Client early(port);  // is kept until the ports are used in earnest
+  ports.only_prepare(false);
+  CHECK(ports.accept({.endpoint = loopback(port)}));
+  CHECK(ports.serial({.port = terminal.port()}));
+}
+
+TEST_CASE("an endpoint that is none or taken is refused in a sentence") {
+  TransportFactory ports;
+  for (const char* wrong : {"", "5200", ":5200", "127.0.0.1:", "glove:5200", "127.0.0.1:x"}) {
+    const auto link = ports.accept({.endpoint = wrong});
+    REQUIRE_FALSE(link);
+    CHECK(link.error().exit_code == ExitCode::kWrongUse);
+  }
+  const std::uint16_t port = free_port();
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  TransportFactory baseline;
+  const auto taken = baseline.accept({.endpoint = loopback(port)});
+  REQUIRE_FALSE(taken);
+  CHECK(taken.error().message.find("cannot listen") != std::string::npos);
+}
+
+}  // namespace posed::drivers

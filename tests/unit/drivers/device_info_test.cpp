@@ -1,0 +1,50 @@
+// A glove's greeting comes back key by key, and a damaged one is refused in one sentence.
+#include "drivers/glove/device_info.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <array>
+
+namespace posed::drivers::glove {
+namespace {
+
+constexpr std::array<std::string_view, 2> kForms{"alpha", "legacy"};
+
+// Reads what a made-up glove says; empty when all is well.
+std::string complaint(const std::string& text) {
+  Greeting greeting(text, "toy", "A9");
+  (void)greeting.side();
+  (void)greeting.whole("sensors", 18, 22);
+  (void)greeting.choice("form", kForms);
+  const auto ok = greeting.finish();
+  return ok ? std::string() : ok.error().text();
+}
+
+}  // namespace
+
+TEST_CASE("a greeting gives back what a driver put into it") {
+  Greeting greeting("toy form=legacy sensors=22 hand=left name=x=y", "toy", "A9");
+  CHECK(greeting.side() == Side::kLeft);
+  CHECK(greeting.whole("sensors", 18, 22) == 22);
+  CHECK(greeting.choice("form", kForms) == 1);
+  CHECK(greeting.word("name") == "x=y");
+  CHECK(greeting.finish());
+}
+
+TEST_CASE("a damaged greeting is refused, and the sentence says what is wrong with it") {
+  CHECK(complaint("toy hand=right sensors=18 form=alpha").empty());
+  CHECK(complaint("other hand=right sensors=18 form=alpha").find("its name") != std::string::npos);
+  CHECK(complaint("toy hand=right form=alpha").find("lacks 'sensors'") != std::string::npos);
+  CHECK(complaint("toy hand=right sensors=17 form=alpha").find("18 to 22") != std::string::npos);
+  CHECK(complaint("toy hand=right sensors=18x form=alpha").find("18 to 22") != std::string::npos);
+  CHECK(complaint("toy hand=up sensors=18 form=alpha").find("'hand'") != std::string::npos);
+  CHECK(complaint("toy hand=right sensors= form=alpha").find("nothing") != std::string::npos);
+  CHECK(complaint("toy hand=right sensors=18 form=alpha hand=left").find("twice") !=
+        std::string::npos);
+  CHECK(complaint("toy hand=right sensors=18 form=alpha more=1").find("does not know") !=
+        std::string::npos);
+  CHECK(complaint("toy hand right").find("key=value") != std::string::npos);
+  CHECK(complaint("").starts_with("A9: "));
+}
+
+}  // namespace posed::drivers::glove

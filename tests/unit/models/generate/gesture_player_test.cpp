@@ -1,0 +1,251 @@
+// A performance on a live hand: it leads in and back without a jump, keeps its time, and takes new
+// labels while it plays.
+#include "models/generate/gesture_player.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/allocations.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+
+namespace posed::generate {
+namespace {
+
+using What = GesturePlayer::What;
+
+struct Shown {
+  HandAngles angles;
+  What what;
+  int label;
+};
+
+std::unique_ptr<const BoundModel> toy(double rate_hz) {
+  return bind_model(test::toy_gesture_model(), hand_skeleton(Side::kRight), rate_hz, "toy").value();
+}
+
+gesture::PlayOrder order(const BoundModel& model, const std::string& labels, double tempo = 1.0,
+                         bool loop = false) {
+  return gesture::make_play_order(model.gesture(), gesture::split_labels(labels), tempo, loop)
+      .value();
+}
+
+// A brisk hand that opens and closes as people do: moves of 0.3 s, each in its smoothest way, with
+// rests between, fingers one after the other.
+HandAngles live_hand(double time_s) {
+  constexpr double kPeriod_s = 1.2, kMove_s = 0.3;
+  const auto moved = [](double since_s) {
+    const double t = std::clamp(since_s / kMove_s, 0.0, 1.0);
+    return t * t * t * (10.0 - t * (15.0 - 6.0 * t));
+  };
+  HandAngles angles{};
+  for (std::size_t c = 0; c < angles.size(); c += 3) {
+    const double phase_s = std::fmod(time_s + 0.02 * double(c), kPeriod_s);
+    angles[c] = 0.1 + 1.2 * (moved(phase_s) - moved(phase_s - kPeriod_s / 2));
+  }
+  return angles;
+}
+
+// Plays over the live hand (null: none) until the playback is idle again, `before` frames first.
+std::vector<Shown> perform(GesturePlayer& playback, const gesture::PlayOrder& what, double rate_hz,
+                           bool live = true, int before = 40) {
+  std::vector<Shown> shown;
+  const auto step = [&] {
+    const HandAngles hand = live_hand(double(shown.size()) / rate_hz);
+    const GesturePlayer::Pose& pose = playback.step(live ? &hand : nullptr);
+    shown.push_back({pose.angles, pose.what, pose.label});
+  };
+  for (int i = 0; i < before; ++i) step();
+  REQUIRE(playback.play(what));
+  while (playback.busy()) {
+    step();
+    REQUIRE(shown.size() < 100'000);
+  }
+  for (int i = 0; i < before; ++i) step();
+  return shown;
+}
+
+// The largest second difference of any channel over frames [first, end) [rad/frame^2].
+double acceleration(const std::vector<Shown>& shown, std::size_t first, std::size_t end) {
+  double most = 0.0;
+  for (std::size_t t = std::max<std::size_t>(first, 1); t + 1 < std::min(end, shown.size()); ++t) {
+    for (std::size_t c = 0; c < kHandChannels; ++c) {
+      most = std::max(most, std::abs(shown[t + 1].angles[c] - 2.0 * shown[t].angles[c] +
+                                     shown[t - 1].angles[c]));
+    }
+  }
+  return most;
+}
+
+std::size_t first_of(const std::vector<Shown>& shown, What what) {
+  std::size_t t = 0;
+  while (t < shown.size() && shown[t].what != what) ++t;
+  return t;
+}
+
+std::size_t count_of(const std::vector<Shown>& shown, What what) {
+  return std::size_t(std::ranges::count(shown, what, &Shown::what));
+}
+
+}  // namespace
+
+TEST_CASE("a performance begins and ends on a live hand without a jump", "[playback]") {
+  for (const double rate_hz : {30.0, 60.0, 120.0}) {
+    for (const int before : {40, 47, 55}) {  // other moments of the live hand
+      const auto model = toy(rate_hz);
+      GesturePlayer playback(rate_hz);
+      playback.set_model(model.get());
+      const auto shown = perform(playback, order(*model, "g 1 c 3 4 p"), rate_hz, true, before);
+      const std::size_t begin = first_of(shown, What::kPerformed);
+      const std::size_t back = first_of(shown, What::kLeadingBack);
+      const std::size_t idle = back + count_of(shown, What::kLeadingBack);
+      CHECK(begin == std::size_t(before));
+      const auto lead = std::size_t(rate_hz);  // longer than any lead-in
+      const double own =
+          std::max(acceleration(shown, begin + lead, back - 2), acceleration(shown, 0, begin));
+      INFO(rate_hz << " Hz, after " << before);
+      // The hand is at its own maximum now and then; what leads it off adds to that.
+      for (const std::size_t seam : {begin, back, idle}) {
+        CHECK(acceleration(shown, seam - 2, seam + 2) <= 1.15 * own);
+      }
+      CHECK(acceleration(shown, begin, begin + lead) <= 1.25 * own);
+      CHECK(acceleration(shown, back, idle) <= 1.25 * own);
+      CHECK(shown.back().what == What::kLive);
+      const HandAngles hand = live_hand(double(shown.size() - 1) / rate_hz);
+      CHECK(shown.back().angles == hand);
+    }
+  }
+}
+
+TEST_CASE("each label is reached, in order, and a model of 30 Hz is right at other rates",
+          "[playback]") {
+  std::vector<double> seconds_of;
+  for (const double rate_hz : {30.0, 60.0, 120.0}) {
+    const auto model = toy(rate_hz);
+    GesturePlayer playback(rate_hz);
+    playback.set_model(model.get());
+    const auto shown = perform(playback, order(*model, "g p 1"), rate_hz);
+    std::vector<std::pair<int, double>> middle;  // index flexion in the middle of each label
+    for (std::size_t t = first_of(shown, What::kPerformed); shown[t].what == What::kPerformed;) {
+      std::size_t end = t;
+      while (shown[end].what == What::kPerformed && shown[end].label == shown[t].label) ++end;
+      middle.emplace_back(shown[t].label, shown[(t + end) / 2].angles[kFingerChannels]);
+      t = end;
+    }
+    REQUIRE(middle.size() == 3);
+    CHECK(model->gesture().labels[std::size_t(middle[1].first)].name == "p");
+    CHECK(middle[0].second == Approx(test::toy_flexion(1, 0, 0)).margin(0.05));
+    CHECK(middle[1].second == Approx(test::toy_flexion(1, 0, 2)).margin(0.05));
+    CHECK(middle[2].second == Approx(test::toy_flexion(1, 0, 2)).margin(0.05));
+    seconds_of.push_back(double(count_of(shown, What::kPerformed)) / rate_hz);
+  }
+  CHECK(seconds_of[1] == Approx(seconds_of[0]).epsilon(0.02));
+  CHECK(seconds_of[2] == Approx(seconds_of[0]).epsilon(0.02));
+}
+
+TEST_CASE("the tempo divides a performance's length", "[playback]") {
+  const double rate_hz = 30.0;
+  const auto model = toy(rate_hz);
+  const auto frames = [&](double tempo) {
+    GesturePlayer playback(rate_hz);
+    playback.set_model(model.get());
+    const auto shown = perform(playback, order(*model, "g 1 c 3 4 p", tempo), rate_hz, false, 0);
+    // The lead-in is the same at any tempo: it goes from a flat hand to the first label.
+    constexpr double kFarthest_rad = 1.3, kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
+    const double lead = std::ceil(rate_hz * 1.5 * kFarthest_rad / kLeadSpeed_rad_s);
+    return double(count_of(shown, What::kPerformed)) - lead;
+  };
+  const double natural = frames(1.0);
+  for (const double tempo : {0.5, 0.75, 1.5, 2.0}) {
+    INFO("tempo " << tempo);
+    CHECK(frames(tempo) == Approx(natural / tempo).epsilon(0.05));
+  }
+}
+
+TEST_CASE("labels that come while it plays are performed after those before them", "[playback]") {
+  const auto model = toy(30.0);
+  GesturePlayer playback(30.0);
+  playback.set_model(model.get());
+  REQUIRE(playback.play(order(*model, "g")));
+  std::vector<int> labels;
+  HandAngles before{};
+  double most_step = 0.0;
+  for (int t = 0; playback.busy(); ++t) {
+    if (t == 80) REQUIRE(playback.play(order(*model, "p c")));
+    const GesturePlayer::Pose& pose = playback.step(nullptr);
+    if (pose.what == What::kPerformed && (labels.empty() || labels.back() != pose.label)) {
+      labels.push_back(pose.label);
+    }
+    for (std::size_t c = 0; c < kHandChannels; ++c) {
+      most_step = std::max(most_step, std::abs(pose.angles[c] - before[c]));
+    }
+    before = pose.angles;
+    REQUIRE(t < 10'000);
+  }
+  CHECK(labels == std::vector<int>{0, 2, 1});
+  CHECK(most_step < 0.35);  // 600 degrees a second
+  CHECK(playback.step(nullptr).what == What::kHeld);
+}
+
+TEST_CASE("a loop goes on until other labels come; stop leads back at once", "[playback]") {
+  const auto model = toy(30.0);
+  GesturePlayer playback(30.0);
+  playback.set_model(model.get());
+  REQUIRE(playback.play(order(*model, "g p", 2.0, true)));
+  for (int t = 0; t < 2000; ++t) CHECK(playback.step(nullptr).what == What::kPerformed);
+  REQUIRE(playback.play(order(*model, "c")));
+  int t = 0;
+  while (playback.busy() && t < 1000) {
+    static_cast<void>(playback.step(nullptr));
+    ++t;
+  }
+  CHECK(t < 300);
+  REQUIRE(playback.play(order(*model, "g p g p g p")));
+  for (int i = 0; i < 60; ++i) static_cast<void>(playback.step(nullptr));
+  playback.stop();
+  for (int i = 0; i < 24; ++i) CHECK(playback.step(nullptr).what == What::kLeadingBack);
+  CHECK(playback.step(nullptr).what == What::kHeld);
+}
+
+TEST_CASE("what cannot be performed is refused", "[playback]") {
+  const auto model = toy(30.0);
+  GesturePlayer playback(30.0);
+  const auto one = order(*model, "g");
+  CHECK_FALSE(playback.play(one));  // no model
+  playback.set_model(model.get());
+  auto unknown = one;
+  unknown.label[0] = 6;
+  CHECK_FALSE(playback.play(unknown));
+  CHECK_FALSE(playback.play(gesture::PlayOrder{}));
+  std::string many;
+  for (int i = 0; i < gesture::kMostLabels; ++i) many += "g ";
+  for (int i = 0; i < 4; ++i) CHECK(playback.play(order(*model, many)));
+  CHECK_FALSE(playback.play(one));  // no room
+  CHECK(gesture::make_play_order(model->gesture(), gesture::split_labels("g x"), 1.0, false)
+            .error()
+            .message.find("does not know the label 'x'; it knows: g c p 1 3 4") !=
+        std::string::npos);
+}
+
+TEST_CASE("a performance allocates nothing", "[playback]") {
+  const auto model = toy(120.0);
+  const auto other = toy(120.0);
+  GesturePlayer playback(120.0);
+  playback.set_model(model.get());
+  const auto what = order(*model, "g 1 c", 1.5, true);
+  const auto before = test::allocations();
+  for (int t = 0; t < 3000; ++t) {
+    const HandAngles hand = live_hand(t / 120.0);
+    if (t % 700 == 100) static_cast<void>(playback.play(what));
+    if (t % 900 == 600) playback.stop();
+    if (t == 2000) playback.set_model(other.get());
+    static_cast<void>(playback.step(&hand));
+  }
+  CHECK(test::allocations() == before);
+}
+
+}  // namespace posed::generate

@@ -1,0 +1,255 @@
+// The float32 predictor against the double regression, on every instruction set this CPU has.
+#include "models/gp/predictor.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "models/gp/confidence.hpp"
+#include "models/gp/isa.hpp"
+#include "models/gp/kernel.hpp"
+#include "models/gp/regression.hpp"
+#include "models/gp/synthetic.hpp"
+#include "tests/support/allocations.hpp"
+
+using namespace posed;
+
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+struct AnyIsa {
+  ~AnyIsa() { static_cast<void>(gp::set_isa("auto")); }
+};
+
+std::vector<float> floats(const Eigen::MatrixXd& row) {
+  const Eigen::VectorXf f = row.reshaped().cast<float>();
+  return {f.begin(), f.end()};
+}
+
+struct Output {
+  Eigen::MatrixXf mean;
+  Eigen::VectorXf confidence;
+};
+
+Output predict(const gp::Predictor& predictor, const Eigen::MatrixXd& queries,
+               const std::vector<std::uint8_t>& available = {}) {
+  Output out{Eigen::MatrixXf(predictor.outputs(), queries.rows()), Eigen::VectorXf(queries.rows())};
+  for (Eigen::Index i = 0; i < queries.rows(); ++i) {
+    const std::vector<float> q = floats(queries.row(i));
+    const std::span<float> column(out.mean.col(i).data(),
+                                  static_cast<std::size_t>(predictor.outputs()));
+    out.confidence[i] = predictor.mean_and_confidence(q, available, column);
+  }
+  return out;
+}
+
+double worst_deg(const Output& out, const Eigen::MatrixXd& expected) {
+  return (out.mean.transpose().cast<double>() - expected).cwiseAbs().maxCoeff() * kDegrees;
+}
+
+// 1 - v / e^lambda of the exact process.
+Eigen::VectorXd exact_confidence(const gp::Trained& process, const Eigen::MatrixXd& queries) {
+  return 1.0 - gp::posterior(process, queries).variance_rbf.array() / std::exp(process.lambda);
+}
+
+}  // namespace
+
+TEST_CASE("the float32 mean is within 1e-3 degree of the double one", "[gp][predictor]") {
+  const AnyIsa restore;
+  for (const auto& [poses, dims] : {std::pair{200, 43},
+                                    {1000, 43},
+                                    {1000, 63},
+                                    {28, 43},
+                                    {333, 288},
+                                    {1, 3},
+                                    {17, 5},
+                                    {64, 16},
+                                    {65, 17}}) {
+    const gp::SyntheticProcess made = gp::synthetic(poses, dims);
+    const auto expected = gp::posterior(made.process, made.queries).mean;
+    const auto predictor = gp::Predictor::build(made.process, true);
+    REQUIRE(predictor);
+    for (const auto* isa : {"portable", "avx2", "avx512"}) {
+      if (!gp::set_isa(isa)) {
+        WARN("SKIPPED " << isa << ": this CPU lacks it");
+        continue;
+      }
+      REQUIRE(gp::isa_name() == isa);
+      INFO(poses << " poses, " << dims << " dims on " << isa);
+      CHECK(worst_deg(predict(*predictor, made.queries), expected) < 1e-3);
+    }
+  }
+}
+
+TEST_CASE("AVX2 and AVX-512 give the same bits", "[gp][predictor]") {
+  const AnyIsa restore;
+  if (!gp::set_isa("avx512") || !gp::set_isa("avx2")) {
+    WARN("SKIPPED same bits: this CPU lacks AVX2 or AVX-512");
+    return;
+  }
+  for (const auto& [poses, dims] :
+       {std::pair{200, 43}, {1000, 43}, {1000, 63}, {250, 288}, {100, 7}, {40, 100}}) {
+    const gp::SyntheticProcess made = gp::synthetic(poses, dims);
+    const auto predictor = gp::Predictor::build(made.process, true);
+    REQUIRE(predictor);
+    std::vector<std::uint8_t> available(static_cast<std::size_t>(dims), 1);
+    available[2] = 0;
+    for (const auto& flags : {std::vector<std::uint8_t>{}, available}) {
+      REQUIRE(gp::set_isa("avx2"));
+      const Output a = predict(*predictor, made.queries, flags);
+      REQUIRE(gp::set_isa("avx512"));
+      const Output b = predict(*predictor, made.queries, flags);
+      INFO(poses << " poses, " << dims << " dims");
+      CHECK(std::memcmp(a.mean.data(), b.mean.data(), sizeof(float) * a.mean.size()) == 0);
+      CHECK(std::memcmp(a.confidence.data(), b.confidence.data(),
+                        sizeof(float) * a.confidence.size()) == 0);
+    }
+  }
+}
+
+TEST_CASE("the confidence is the exact one up to 256 poses and near it above", "[gp][predictor]") {
+  for (const auto& [poses, tolerance] :
+       {std::pair{200, 1e-4}, {256, 1e-4}, {257, 0.02}, {1000, 0.02}}) {
+    const gp::SyntheticProcess made = gp::synthetic(poses, 43);
+    const auto predictor = gp::Predictor::build(made.process, true);
+    REQUIRE(predictor);
+    Eigen::MatrixXd queries(made.queries.rows() + poses + 1, 43);
+    queries << made.queries, made.process.inputs, Eigen::RowVectorXd::Constant(43, 9.0);
+    const Eigen::VectorXd exact = exact_confidence(made.process, queries);
+    const Output out = predict(*predictor, queries);
+    INFO(poses << " poses");
+    CHECK((out.confidence.cast<double>() - exact).cwiseAbs().maxCoeff() < tolerance);
+    CHECK(out.confidence.tail(1)[0] == 0.0F);
+    CHECK(out.confidence.maxCoeff() <= 1.0F);
+  }
+}
+
+TEST_CASE("asking for the confidence does not change the mean's bits up to 256 poses",
+          "[gp][predictor]") {
+  const gp::SyntheticProcess made = gp::synthetic(200, 43);
+  const auto gated = gp::Predictor::build(made.process, true);
+  const auto plain = gp::Predictor::build(made.process, false);
+  REQUIRE((gated && plain));
+  const std::vector<float> q = floats(made.queries.row(7));
+  std::vector<float> a(43);
+  std::vector<float> b(43);
+  plain->mean(q, {}, a);
+  static_cast<void>(gated->mean_and_confidence(q, {}, b));
+  CHECK(a == b);
+}
+
+TEST_CASE("missing dimensions are marginalised", "[gp][predictor]") {
+  const gp::SyntheticProcess made = gp::synthetic(300, 43);
+  const auto predictor = gp::Predictor::build(made.process, true);
+  REQUIRE(predictor);
+  std::vector<std::uint8_t> available(43, 1);
+  Eigen::MatrixXd seen(300, 40);
+  Eigen::MatrixXd asked(made.queries.rows(), 40);
+  for (int d = 0, to = 0; d < 43; ++d) {
+    if (d == 0 || d == 20 || d == 42) {
+      available[static_cast<std::size_t>(d)] = 0;
+      continue;
+    }
+    seen.col(to) = made.process.inputs.col(d);
+    asked.col(to++) = made.queries.col(d);
+  }
+  // The same weights; the distance over 40 of 43 dimensions, scaled by 43 / 40.
+  gp::Trained reference = made.process;
+  reference.inputs = seen;
+  reference.mu *= 43.0 / 40.0;
+  const auto expected = gp::posterior(reference, asked).mean;
+  Eigen::MatrixXd queries = made.queries;
+  queries.col(20).setConstant(std::numeric_limits<double>::quiet_NaN());  // must not be read
+  CHECK(worst_deg(predict(*predictor, queries, available), expected) < 1e-3);
+
+  const Output none = predict(*predictor, queries, std::vector<std::uint8_t>(43, 0));
+  CHECK(none.mean.col(0) == made.process.offset.cast<float>());
+  CHECK(none.confidence.maxCoeff() == 0.0F);
+}
+
+TEST_CASE("far from all poses only the constant is left", "[gp][predictor]") {
+  gp::SyntheticProcess made = gp::synthetic(100, 43);
+  made.process.b = 0.02;
+  const auto predictor = gp::Predictor::build(made.process, true);
+  REQUIRE(predictor);
+  const Eigen::MatrixXd far = Eigen::MatrixXd::Constant(2, 43, 1e6);
+  CHECK(worst_deg(predict(*predictor, far), gp::posterior(made.process, far).mean) < 1e-3);
+  const Output out = predict(*predictor, far);
+  CHECK(std::equal(predictor->constant().begin(), predictor->constant().end(),
+                   out.mean.col(1).data()));
+}
+
+TEST_CASE("the kernel's exponential is right to an ulp and reaches exactly zero",
+          "[gp][predictor]") {
+  const AnyIsa restore;
+  std::vector<float> x;
+  for (int i = 0; i < 160'000; ++i) x.push_back(-static_cast<float>(i) * 7.9e-4F);
+  std::vector<float> y(x.size());
+  for (const auto* isa : {"portable", "avx2", "avx512"}) {
+    if (!gp::set_isa(isa)) continue;
+    gp::kernel::exp2_of(x.data(), static_cast<int>(x.size()), y.data());
+    double worst = 0.0;
+    for (std::size_t i = 0; i < x.size() && x[i] >= -125.0F; ++i) {
+      const double exact = std::exp2(static_cast<double>(x[i]));
+      worst = std::max(worst, std::abs(y[i] / exact - 1.0));
+    }
+    INFO(isa);
+    CHECK(worst < 1.2e-7);
+    CHECK(y[0] == 1.0F);
+    CHECK(y.back() == 0.0F);
+  }
+  std::vector<float> extreme(16, -std::numeric_limits<float>::infinity());
+  extreme[1] = -1e30F;
+  gp::kernel::exp2_of(extreme.data(), 16, extreme.data());
+  CHECK(extreme[0] == 0.0F);
+  CHECK(extreme[1] == 0.0F);
+}
+
+TEST_CASE("a prediction takes nothing from the heap", "[gp][predictor]") {
+  const gp::SyntheticProcess made = gp::synthetic(300, 43);
+  const auto predictor = gp::Predictor::build(made.process, true).value();
+  const std::vector<float> q = floats(made.queries.row(0));
+  std::vector<std::uint8_t> available(43, 1);
+  available[5] = 0;
+  std::vector<float> out(43);
+  const std::uint64_t before = test::allocations();
+  predictor.mean(q, {}, out);
+  predictor.mean(q, available, out);
+  static_cast<void>(predictor.mean_and_confidence(q, {}, out));
+  CHECK(test::allocations() == before);
+}
+
+TEST_CASE("a broken process is refused with a sentence", "[gp][predictor]") {
+  const gp::Trained good = gp::synthetic(28, 10).process;
+  const auto refused = [&](auto&& spoil) {
+    gp::Trained bad = good;
+    spoil(bad);
+    return !gp::Predictor::build(bad, true).has_value();
+  };
+  const double nan = std::nan("");
+  CHECK_FALSE(refused([](gp::Trained&) {}));
+  CHECK(refused([](gp::Trained& t) { t.inputs.resize(0, 10); }));
+  CHECK(refused([](gp::Trained& t) { t.inputs.resize(28, 0); }));
+  CHECK(refused([](gp::Trained& t) { t.inputs = Eigen::MatrixXd::Zero(28, 289); }));
+  CHECK(refused([](gp::Trained& t) { t.weights.conservativeResize(27, 10); }));
+  CHECK(refused([](gp::Trained& t) { t.offset.conservativeResize(9); }));
+  CHECK(refused([&](gp::Trained& t) { t.inputs(3, 3) = nan; }));
+  CHECK(refused([&](gp::Trained& t) { t.weights(3, 3) = nan; }));
+  CHECK(refused([](gp::Trained& t) { t.weights *= 1e40; }));
+  CHECK(refused([](gp::Trained& t) { t.mu = 0.0; }));
+  CHECK(refused([](gp::Trained& t) { t.b = -1.0; }));
+  CHECK(refused([&](gp::Trained& t) { t.lambda = nan; }));
+  CHECK(refused([](gp::Trained& t) { t.lambda = 1000.0; }));
+}
+
+TEST_CASE("an unknown instruction set is refused", "[gp][predictor]") {
+  const AnyIsa restore;
+  CHECK_FALSE(gp::set_isa("neon9"));
+  REQUIRE(gp::set_isa("portable"));
+  CHECK(gp::isa_name() == "portable");
+}

@@ -1,0 +1,202 @@
+// Whole strings: their plan, the look-ahead against the full solve, gestures that nobody recorded,
+// global variance.
+#include "models/perform/perform.hpp"
+
+#include <cmath>
+#include <iostream>
+#include <numbers>
+
+#include <catch2/catch.hpp>
+
+#include "models/gesture/train.hpp"
+#include "models/perform/constrain.hpp"
+#include "tests/support/real_pose_corpus.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/unit/models/gesture/toy_gesture.hpp"
+#include "tests/unit/models/perform/lookahead_corpus.hpp"
+
+using namespace posed;
+using perform::Performance;
+using trajectory::StateInformation;
+
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+StateInformation evidence_of(gesture::GestureModel model) {
+  const double rate_hz = model.rate_hz;
+  return {std::make_shared<const gesture::GestureModel>(std::move(model)), rate_hz};
+}
+
+Performance performed(const StateInformation& evidence, const std::string& text,
+                      const perform::PerformOptions& options = {}) {
+  const auto labels = perform::labels_of(evidence.model(), text);
+  REQUIRE(labels.has_value());
+  return perform::perform(evidence, *labels, options);
+}
+
+double rms_apart_deg(const Performance& a, const Performance& b) {
+  REQUIRE(a.angles.size() == b.angles.size());
+  double sum = 0.0;
+  for (std::size_t t = 0; t < a.angles.size(); ++t) {
+    for (int c = 0; c < kHandChannels; ++c) sum += std::pow(a.angles[t][c] - b.angles[t][c], 2);
+  }
+  return kDegrees * std::sqrt(sum / static_cast<double>(a.angles.size() * kHandChannels));
+}
+
+double jerk_deg(const Performance& p) {
+  double sum = 0.0;
+  for (std::size_t t = 3; t < p.angles.size(); ++t) {
+    for (int c = 0; c < kHandChannels; ++c) {
+      sum += std::pow(
+          p.angles[t][c] - 3.0 * p.angles[t - 1][c] + 3.0 * p.angles[t - 2][c] - p.angles[t - 3][c],
+          2);
+    }
+  }
+  return kDegrees * std::sqrt(sum / static_cast<double>((p.angles.size() - 3) * kHandChannels));
+}
+
+// Mean over states 3 and 4 of a label against real poses: rms over the flexion angles, thumb left
+// out.
+double held_off_deg(const Performance& p, int label, const Eigen::VectorXd& real) {
+  Eigen::VectorXd held = Eigen::VectorXd::Zero(kHandChannels);
+  int frames = 0;
+  for (const auto& state : p.states) {
+    if (state.context.current != label || (state.state != 2 && state.state != 3)) continue;
+    for (int t = state.start; t < state.start + state.frames; ++t, ++frames) {
+      held += Eigen::Map<const Eigen::VectorXd>(p.angles[t].data(), kHandChannels);
+    }
+  }
+  REQUIRE(frames > 0);
+  held /= frames;
+  double sum = 0.0;
+  for (int f = 1; f < kFingers; ++f) {
+    for (int j = 0; j < kFingerJoints; ++j) {
+      const int c = f * kFingerChannels + 3 * j;
+      sum += std::pow(held[c] - real[c], 2);
+    }
+  }
+  return kDegrees * std::sqrt(sum / 12.0);
+}
+
+}  // namespace
+
+TEST_CASE("a performance tells its states, from the first frame to the last", "[generate]") {
+  const auto evidence = evidence_of(test::toy_gesture_model());
+  const auto p = performed(evidence, "g 1 c");
+  REQUIRE(p.states.size() == 3 * gesture::kStates);
+  int start = 0;
+  for (std::size_t i = 0; i < p.states.size(); ++i) {
+    CHECK(p.states[i].start == start);
+    CHECK(p.states[i].state == static_cast<int>(i) % gesture::kStates);
+    start += p.states[i].frames;
+  }
+  CHECK(start == static_cast<int>(p.angles.size()));
+  CHECK(p.variances.size() == p.angles.size());
+  CHECK(p.states[7].leaf[0] == 0);  // label 1: the thumb as in g, the index as in p
+  CHECK(p.states[7].leaf[1] == 2);
+}
+
+TEST_CASE("strings of no label and of unknown labels are refused by name", "[generate]") {
+  const auto model = test::toy_gesture_model();
+  const auto unknown = perform::labels_of(model, "g 2 c five");
+  REQUIRE_FALSE(unknown);
+  CHECK(unknown.error().message.find("2 five") != std::string::npos);
+  CHECK(unknown.error().message.find("g c p 1 3 4") != std::string::npos);
+  CHECK(unknown.error().exit_code == ExitCode::kWrongUse);
+  CHECK_FALSE(perform::labels_of(model, "  "));
+}
+
+// The table in models/trajectory/README.md, "Look-ahead", is of one corpus; corpora differ by a
+// factor of two, so ten are asked.
+TEST_CASE("a look-ahead of 15 or 20 frames is the full solve for the eye", "[generate]") {
+  constexpr int kCorpora = 10;
+  double at_15_deg = 0.0;
+  double at_20_deg = 0.0;
+  double jerk_ratio = 0.0;
+  for (std::uint32_t seed = 0; seed < kCorpora; ++seed) {
+    auto model = gesture::train_gesture({test::study_corpus(seed)}, {});
+    REQUIRE(model.has_value());
+    const auto evidence = evidence_of(std::move(*model));
+    const auto full = performed(evidence, "g 1 c 3 4 p");
+    const auto at_15 = performed(evidence, "g 1 c 3 4 p", {.look_ahead = 15});
+    const auto at_20 = performed(evidence, "g 1 c 3 4 p", {.look_ahead = 20});
+    std::cout << "look-ahead, corpus " << seed << ": " << full.angles.size()
+              << " frames, rms at 15 " << rms_apart_deg(at_15, full) << ", at 20 "
+              << rms_apart_deg(at_20, full) << " deg, jerk " << jerk_deg(at_20) / jerk_deg(full)
+              << " of the full solve's\n";
+    at_15_deg += rms_apart_deg(at_15, full) / kCorpora;
+    at_20_deg += rms_apart_deg(at_20, full) / kCorpora;
+    jerk_ratio += jerk_deg(at_20) / jerk_deg(full) / kCorpora;
+    CHECK(rms_apart_deg(performed(evidence, "g 1 c 3 4 p", {.look_ahead = 1'000}), full) < 1e-9);
+  }
+  std::cout << "look-ahead, mean: " << at_15_deg << ", " << at_20_deg << " deg, jerk " << jerk_ratio
+            << '\n';
+  CHECK(at_15_deg <= 0.20);
+  CHECK(at_20_deg <= 0.12);
+  CHECK(std::abs(jerk_ratio - 1.0) <= 0.03);
+}
+
+TEST_CASE("gestures of a real hand that nobody recorded are near the real ones", "[real]") {
+  const auto folder = test::shared("data/gloves/libras_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  auto model = gesture::train_gesture({test::real_pose_corpus(*folder, 7)}, {});
+  REQUIRE(model.has_value());
+  const auto evidence = evidence_of(std::move(*model));
+  const auto p = performed(evidence, "g 1 c 3 4 p");
+  std::cout << "real-pose corpus: g 1 c 3 4 p has " << p.angles.size() << " frames";
+  CHECK(std::abs(static_cast<int>(p.angles.size()) - 345) <= 40);
+  const std::map<std::string, double> composed_deg{{"1", 12.4}, {"3", 19.8}, {"4", 13.6}};
+  for (const auto& [label, yardstick] : composed_deg) {
+    const Eigen::VectorXd real =
+        test::libras_poses(*folder, test::kSignOf.at(label)).colwise().mean();
+    const double off = held_off_deg(p, evidence.model().label_index(label), real);
+    std::cout << "; " << label << " is " << off << " deg off, " << off / yardstick
+              << " of the best composition";
+    CHECK(off <= 1.25 * yardstick);
+  }
+  std::cout << '\n';
+  for (const double tempo : {0.5, 0.75, 1.5, 2.0}) {
+    const auto fast = performed(evidence, "g 1 c 3 4 p", {.tempo = tempo});
+    const double length =
+        static_cast<double>(fast.angles.size()) * tempo / static_cast<double>(p.angles.size());
+    CHECK(std::abs(length - 1.0) <= 0.05);
+  }
+}
+
+// All 1,296 strings of four labels are asked in `posed bench generate`.
+TEST_CASE("no finger goes through another in strings of a real hand's gestures", "[real]") {
+  const auto folder = test::shared("data/gloves/libras_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  auto model = gesture::train_gesture({test::real_pose_corpus(*folder, 7)}, {});
+  REQUIRE(model.has_value());
+  const auto evidence = evidence_of(std::move(*model));
+  double before_m = 1.0;
+  for (const char* text : {"g 1 c 3", "4 p 3 c", "c 4 g p", "p 1 4 3", "3 3 1 c", "g p g p"}) {
+    auto p = performed(evidence, text);
+    const auto kept = perform::constrain(p, default_hand_shape());
+    INFO(text);
+    CHECK(kept.min_gap_m >= 0.0);
+    CHECK(perform::smallest_gap_m(p, default_hand_shape()) >= 0.0);
+    before_m = std::min(before_m, kept.before_m);
+  }
+  CHECK(before_m < 0.0);  // else the stage had nothing to do, and nothing was shown
+}
+
+TEST_CASE("global variance gives range back, within its limit", "[generate]") {
+  auto model = gesture::train_gesture({test::study_corpus(3)}, {});
+  REQUIRE(model.has_value());
+  const auto evidence = evidence_of(std::move(*model));
+  const auto plain = performed(evidence, "g p c g");
+  const auto lively = performed(evidence, "g p c g", {.global_variance = true});
+  const auto range = [](const Performance& p, int c) {
+    double low = 1e9;
+    double high = -1e9;
+    for (const auto& pose : p.angles) low = std::min(low, pose[c]), high = std::max(high, pose[c]);
+    return high - low;
+  };
+  for (int c = 0; c < kHandChannels; ++c) {
+    CHECK(range(lively, c) >= range(plain, c) * (1.0 - 1e-12));
+    CHECK(range(lively, c) <= range(plain, c) * 1.3 + 1e-12);
+  }
+}

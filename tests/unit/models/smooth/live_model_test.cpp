@@ -1,0 +1,204 @@
+// A gesture model beside the live generator (models/smooth/README.md, "Model prior"): it tells the
+// gesture, bridges gaps in its own vocabulary, steadies poses it knows, and leaves an unknown hand
+// alone.
+#include <iostream>
+
+#include <catch2/catch.hpp>
+
+#include "models/gesture/train.hpp"
+#include "tests/bench/baselines.hpp"
+#include "tests/support/allocations.hpp"
+#include "tests/support/gaps.hpp"
+#include "tests/support/last_frame.hpp"
+#include "tests/support/live_hand.hpp"
+#include "tests/support/real_pose_corpus.hpp"
+#include "tests/support/shared.hpp"
+
+using namespace posed;
+using namespace posed::test;
+using smooth::LiveOptions;
+
+namespace {
+
+constexpr const char* kLibras = "data/gloves/libras_cyberglove";
+constexpr const char* kGrasps = "data/gloves/graspdb14_cyberglove";
+
+LiveOptions with(int lag, double noise_deg) {
+  return {.lag = {.frames = lag}, .noise_rad = noise_deg * kDegree};
+}
+
+std::unique_ptr<const smooth::LiveModel> model_of(const gesture::Recording& recording) {
+  const auto model = gesture::train_gesture({recording}, {}).value();
+  return smooth::bind_live_model(model, hand_skeleton(Side::kRight), "toy").value();
+}
+
+const smooth::LiveModel& synthetic_model() {
+  static const auto kModel = model_of(recording_of(synthetic_hand(100, 1)));
+  return *kModel;
+}
+
+const smooth::LiveModel& real_pose_model() {
+  static const auto kModel = model_of(real_pose_corpus(*shared(kLibras), 7));
+  return *kModel;
+}
+
+}  // namespace
+
+TEST_CASE("a live hand's gestures are told", "[live][labels]") {
+  for (const auto& [noise_deg, least] : {std::pair{1.0, 0.86}, {3.0, 0.82}, {6.0, 0.78}}) {
+    LabelScore score;
+    for (const unsigned seed : {123U, 5U, 77U}) {
+      const SyntheticHand hand = synthetic_hand(40, seed);
+      const auto told =
+          followed(noisy(hand.angles, noise_deg, 5), 30.0, with(1, noise_deg), &synthetic_model());
+      score.add(told, recording_of(hand), 1);
+    }
+    std::cout << "labels, made-up hand, " << noise_deg << " deg, lag 1: " << score.accuracy()
+              << " of frames right, p > 0.8 after " << score.median_delay() << " frames\n";
+    CHECK(score.accuracy() >= least);
+  }
+}
+
+TEST_CASE("gestures of real poses are told", "[live][labels]") {
+  if (!shared(kLibras)) {
+    SKIP_WITHOUT_SHARED();
+  }
+  const auto truth = real_pose_corpus(*shared(kLibras), 8, 40);
+  for (const double noise_deg : {1.0, 3.0, 6.0}) {
+    LabelScore score;
+    const Motion measured = noisy(truth.angles_rad / kDegree, noise_deg, 5);
+    score.add(followed(measured, 30.0, with(1, noise_deg), &real_pose_model()), truth, 1);
+    std::cout << "labels, real poses, " << noise_deg << " deg, lag 1: " << score.accuracy()
+              << " of frames right, p > 0.8 after " << score.median_delay() << " frames\n";
+    CHECK(score.accuracy() >= 0.9);
+  }
+}
+
+TEST_CASE("poses that the model knows are steadied", "[live]") {
+  const SyntheticHand hand = synthetic_hand(18, 123);
+  for (const double noise_deg : {1.0, 3.0, 6.0}) {
+    const Motion measured = noisy(hand.angles, noise_deg, 5);
+    const auto without = followed(measured, 30.0, with(1, noise_deg), nullptr);
+    const auto known = followed(measured, 30.0, with(1, noise_deg), &synthetic_model());
+    CHECK(bench::rms_deg(known.angles, hand.angles) < bench::rms_deg(without.angles, hand.angles));
+    CHECK(without.label[500].empty());
+  }
+}
+
+TEST_CASE("dropouts within the model's vocabulary are bridged", "[live]") {
+  if (!shared(kLibras)) {
+    SKIP_WITHOUT_SHARED();
+  }
+  GapError error;
+  for (const unsigned seed : {8U, 9U, 10U, 11U}) {
+    const Motion truth = real_pose_corpus(*shared(kLibras), seed).angles_rad / kDegree;
+    const Gaps gaps = with_gaps(noisy(truth, 1.0, 5), 8, 3);
+    error.add(truth, followed(gaps.measured, 30.0, with(1, 1.0), &real_pose_model()).angles, gaps);
+  }
+  std::cout << "dropouts of 8 frames, own vocabulary, lag 1: " << error.ours_deg() << " deg, held "
+            << error.held_deg() << "\n";
+  CHECK(error.ours_deg() <= 0.65 * error.held_deg());
+}
+
+TEST_CASE("an unknown hand comes to no harm", "[live]") {
+  if (!shared(kGrasps) || !shared(kLibras)) {
+    SKIP_WITHOUT_SHARED();
+  }
+  const int step = GENERATE(1, 2);  // 60 and 30 Hz
+  const double rate_hz = 60.0 / step;
+  for (const smooth::LiveModel* model : {&real_pose_model(), &synthetic_model()}) {
+    for (const auto& [noise_deg, lag] : {std::pair{1.0, 1}, {3.0, 1}}) {
+      const LiveOptions options = with(lag, noise_deg);
+      GapError gap_error;
+      double square = 0.0;
+      double square_without = 0.0;
+      for (const char* name : {"10_ex01-rad-003-grasp-su04.txt", "01_ex01-rad-002-grasp-su01.txt",
+                               "04_ex01-rad-045-grasp-su03.txt"}) {
+        const Motion truth = unknown_hand(*shared(kGrasps) / name, step);
+        const Motion measured = noisy(truth, noise_deg, 11);
+        const Motion known = followed(measured, rate_hz, options, model).angles;
+        const Motion without = followed(measured, rate_hz, options, nullptr).angles;
+        square += std::pow(bench::rms_deg(known, truth), 2);
+        square_without += std::pow(bench::rms_deg(without, truth), 2);
+        const Gaps gaps = with_gaps(measured, 8, 3);
+        gap_error.add(truth, followed(gaps.measured, rate_hz, options, model).angles, gaps);
+      }
+      INFO(rate_hz << " Hz, " << noise_deg << " deg, lag " << lag);
+      CHECK(std::sqrt(square) <= 1.01 * std::sqrt(square_without));
+      CHECK(gap_error.ours_deg() <= gap_error.held_deg());
+    }
+  }
+}
+
+TEST_CASE("a model comes and goes while the hand moves, without the heap", "[live]") {
+  const Skeleton skeleton = hand_skeleton(Side::kRight);
+  smooth::LiveSmoother smoother(skeleton, with(1, 1.0));
+  const SyntheticHand hand = synthetic_hand(6, 3);
+  LastFrame last;
+  const smooth::LiveModel* const model = &synthetic_model();
+  for (Eigen::Index t = 0; t < hand.angles.rows(); ++t) {
+    HandAngles angles{};
+    for (Eigen::Index c = 0; c < kHandChannels; ++c) {
+      angles[static_cast<std::size_t>(c)] = hand.angles(t, c) * kDegree;
+    }
+    if (t % 40 > 35) angles.fill(std::numeric_limits<double>::quiet_NaN());
+    Frame frame;
+    set_hand_angles(skeleton, angles, frame);
+    frame.header.device_ns = nanoseconds(static_cast<double>(t) / 30.0);
+    const auto before = allocations();
+    if (t == 100) CHECK(smoother.set_model(model) == nullptr);
+    if (t == 250) CHECK(smoother.set_model(nullptr) == model);
+    smoother.step(&frame, 0, last);
+    if (allocations() != before) FAIL("takes memory");
+    if (t == 200) CHECK(last.out.label[0] != '\0');
+    if (t == 260) CHECK(last.out.label[0] == '\0');
+  }
+}
+
+// The model knows nothing of the frames that came before it: they keep the pose that the window
+// gives them, without a label.
+TEST_CASE("a model that comes while frames wait neither names nor bends them", "[live]") {
+  const Skeleton skeleton = hand_skeleton(Side::kRight);
+  const smooth::LiveModel* const model = &synthetic_model();
+  const SyntheticHand hand = synthetic_hand(6, 3);
+  for (const int lag : {2, 3, 8}) {
+    INFO("lag " << lag);
+    smooth::LiveSmoother plain(skeleton, with(lag, 1.0)), swapped(skeleton, with(lag, 1.0));
+    LastFrame without, with_model;
+    const auto step = [&](int t) {
+      HandAngles angles{};
+      for (Eigen::Index c = 0; c < kHandChannels; ++c) {
+        angles[static_cast<std::size_t>(c)] = hand.angles(t, c) * kDegree;
+      }
+      Frame frame;
+      set_hand_angles(skeleton, angles, frame);
+      frame.header.device_ns = nanoseconds(t / 30.0);
+      plain.step(&frame, 0, without);
+      swapped.step(&frame, 0, with_model);
+    };
+    for (int t = 0; t < 60; ++t) step(t);
+    REQUIRE(swapped.set_model(model) == nullptr);
+    step(60);
+    CHECK(with_model.out.label[0] == '\0');
+    CHECK(with_model.out.label_probability == 0.0F);
+    swapped.set_model(model);  // and again: nothing at all has come since
+    plain.flush(without);
+    swapped.flush(with_model);
+    CHECK(with_model.count == without.count);
+    CHECK(with_model.out.label[0] == '\0');
+    for (std::size_t c = 0; c < kHandChannels; ++c) {
+      REQUIRE(std::isfinite(with_model.out.angle_rad[c]));
+      CHECK(with_model.out.angle_rad[c] == Approx(without.out.angle_rad[c]).margin(1e-3));
+    }
+  }
+}
+
+TEST_CASE("a model without a hand, or without labels, is refused", "[live]") {
+  const auto model = gesture::train_gesture({recording_of(synthetic_hand(100, 1))}, {}).value();
+  const auto body = smooth::bind_live_model(model, body_with_channels(45), "H.gesture");
+  REQUIRE_FALSE(body);
+  CHECK(body.error().text().find("H.gesture") != std::string::npos);
+  gesture::GestureModel empty = model;
+  for (gesture::Label& label : empty.labels) label.trained = false;
+  CHECK_FALSE(smooth::bind_live_model(empty, hand_skeleton(Side::kLeft), "H.gesture"));
+}

@@ -1,0 +1,52 @@
+// Training as in Sato et al. (--mode paper) on synthetic walkers: its cycles, its kernel and what
+// it does to a walk.
+#include <catch2/catch.hpp>
+
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/apply.hpp"
+#include "models/style/evaluate.hpp"
+#include "models/style/train.hpp"
+#include "models/style/training_pairs.hpp"
+
+using namespace posed;
+using motion::WalkerFamily;
+
+namespace {
+
+clip::Clip walker(WalkerFamily family, double noise_deg) {
+  return motion::make_walker({.family = family, .person = 1, .noise_deg = noise_deg}).value();
+}
+
+style::StyleModel trained(style::TrainMode mode, double noise_deg) {
+  const std::vector<style::TrainingClip> clips{
+      {walker(WalkerFamily::kMarch, noise_deg), "march", "march", "walk"},
+      {walker(WalkerFamily::kSway, noise_deg), "sway", "sway", "walk"}};
+  style::TrainOptions options;
+  options.target = "sway";
+  options.mode = mode;
+  return style::train_style(clips, options).value();
+}
+
+}  // namespace
+
+TEST_CASE("paper mode's mean cycle is the walker's, joints that never move included",
+          "[style][train]") {
+  const Eigen::MatrixXd paper = trained(style::TrainMode::kPaper, 0.0).process.inputs;
+  const Eigen::MatrixXd harmonic = trained(style::TrainMode::kDefault, 0.0).process.inputs;
+  // The mean over a cycle does not depend on where its phases begin.
+  const Eigen::RowVectorXd paper_mean = paper.colwise().mean();
+  const Eigen::RowVectorXd mean = harmonic.topRows(style::kGridFrames).colwise().mean();
+  CHECK((paper_mean - mean).cwiseAbs().maxCoeff() < 0.03);
+}
+
+TEST_CASE("paper mode keeps a noise that floats can hold and brings a walk near the target",
+          "[style][train]") {
+  const style::StyleModel model = trained(style::TrainMode::kPaper, 0.3);
+  CHECK(model.process.noise >= 3e-7);
+  const clip::Clip march = walker(WalkerFamily::kMarch, 0.2);
+  const auto styled = style::apply_to_clip(model, "paper.style", march, {}).value();
+  const auto score =
+      style::evaluate_style(march, styled.clip, walker(WalkerFamily::kSway, 0.2)).value();
+  CHECK(score.cycle_ratio < 0.4);
+  CHECK(score.jerk_ratio < 2.0);
+}

@@ -1,0 +1,57 @@
+// Readers of the trajectory fixture (tests/golden/mlpg.json): evidence and expected trajectories.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "models/trajectory/information_form.hpp"
+#include "tests/support/golden_json.hpp"
+
+namespace posed::test {
+
+using Table = std::vector<std::vector<double>>;  // [frame][channel]
+
+inline trajectory::InformationForm evidence_of(const nlohmann::json& golden,
+                                               bool with_observations) {
+  const auto mean = golden["mean"].get<std::vector<Table>>();
+  const auto variance = golden["var"].get<std::vector<Table>>();
+  const auto seen = golden["obs"].get<Table>();
+  const auto precision = golden["obs_precision"].get<Table>();
+  trajectory::InformationForm evidence(golden["M"].get<int>(), golden["T"].get<int>());
+  for (int t = 0; t < evidence.frames(); ++t) {
+    for (int c = 0; c < evidence.channels(); ++c) {
+      for (int w = 0; w < 3; ++w) {
+        const double p = 1.0 / variance[t][w][c];
+        evidence.row(t, static_cast<trajectory::Row>(2 * w))[c] = p;
+        evidence.row(t, static_cast<trajectory::Row>(2 * w + 1))[c] = p * mean[t][w][c];
+      }
+      if (with_observations) {
+        evidence.row(t, trajectory::kPosition)[c] += precision[t][c];
+        evidence.row(t, trajectory::kPositionMean)[c] += precision[t][c] * seen[t][c];
+      }
+    }
+  }
+  return evidence;
+}
+
+inline std::vector<const double*> frames_of(const trajectory::InformationForm& evidence) {
+  std::vector<const double*> frames;
+  for (int t = 0; t < evidence.frames(); ++t) frames.push_back(evidence.frame(t));
+  return frames;
+}
+
+// Largest difference of a row from the expected one.
+inline double off(const double* row, const std::vector<double>& expected) {
+  double worst = 0.0;
+  for (std::size_t c = 0; c < expected.size(); ++c) {
+    const double difference = std::abs(row[c] - expected[c]);
+    worst = difference <= worst ? worst : difference;  // so that not a number counts
+  }
+  return worst;
+}
+
+}  // namespace posed::test

@@ -1,0 +1,350 @@
+// The device log: what goes in comes out, a crash costs what was not committed, and a file that is
+// no whole log is told so in one sentence.
+#include <catch2/catch.hpp>
+
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "posed/v1/log.pb.h"
+#include "proto/log/digest.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/log/writer.hpp"
+#include "tests/support/file_limit.hpp"
+#include "tests/support/log_surgery.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/proto/log/toy_log.hpp"
+
+using namespace posed;
+using log::Reader;
+using log::Writer;
+using test::bytes_of;
+using test::chunk_row;
+using test::forge;
+using test::run_sql;
+using test::text_of;
+using test::writer_with_two_streams;
+
+namespace {
+
+// A small log that ended as it should.
+void write_whole_log(const std::filesystem::path& path, int chunks) {
+  Writer writer = writer_with_two_streams(path);
+  const std::string line(1000, '7');
+  for (int i = 0; i < chunks; ++i) {
+    const auto sequence = static_cast<std::uint64_t>(i + 1);
+    REQUIRE(writer.add(chunk_row(static_cast<std::uint32_t>(i % 2), sequence, line)));
+  }
+  REQUIRE(writer.close());
+}
+
+std::size_t count_chunks(Reader& reader) {
+  std::size_t count = 0;
+  for (;;) {
+    const auto chunk = reader.next_chunk();
+    REQUIRE(chunk);
+    if (!chunk->has_value()) return count;
+    ++count;
+  }
+}
+
+std::string refusal(const std::filesystem::path& path) {
+  const auto reader = Reader::open(path);
+  REQUIRE(!reader);
+  CHECK(reader.error().file == path.string());
+  return reader.error().message;
+}
+
+}  // namespace
+
+TEST_CASE("sha256 names bytes as the standard does") {
+  CHECK(log::sha256_hex({}) == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  CHECK(log::sha256_hex(bytes_of("abc")) ==
+        "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+TEST_CASE("a log gives back every row it was given") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  constexpr std::uint32_t kLate = 3U << 16U | 5U;  // ids are names, not places
+  constexpr std::uint64_t kMost = ~std::uint64_t{0};
+  Writer writer = writer_with_two_streams(path);
+  REQUIRE(writer.add(log::StreamRow{kLate, 1, "Ann", "b-ann", "{\"stages\":[]}", 40}));
+  const std::vector<log::StreamPlace> places{{1, 7, 8}, {kLate, 300, kMost}};
+  REQUIRE(writer.add(log::ChunkRow{.source = 1,
+                                   .socket = 2,
+                                   .direction = 3,
+                                   .arrival_ns = -5,
+                                   .first_item = 11,
+                                   .places = places,
+                                   .bytes = bytes_of("1 2 3\n")}));
+  REQUIRE(writer.add(chunk_row(0, 1, "")));
+  CHECK(writer.last_chunk_id() == 2);
+  REQUIRE(writer.add(log::DecisionRow{.item = kMost,
+                                      .stream = kLate,
+                                      .stage = "style",
+                                      .name = "alpha",
+                                      .value = "v",
+                                      .now_ns = -9}));
+  REQUIRE(writer.add(log::FrameRow{1, 7, true, bytes_of("raw")}));
+  REQUIRE(writer.add(log::FrameRow{1, 7, false, bytes_of("styled")}));
+  REQUIRE(writer.add(log::GapRow{log::GapRow::Kind::kDecisions, kLate, 2, 11, 99}));
+  const auto hash = writer.add_blob(bytes_of("model"));
+  REQUIRE(hash);
+  CHECK(*writer.add_blob(bytes_of("model")) == *hash);
+  REQUIRE(writer.close());
+  CHECK(!std::filesystem::exists(path.string() + "-wal"));
+  forge(path, "INSERT INTO take VALUES(1, 'jump', 12, 40, 0)");
+
+  auto reader = Reader::open(path);
+  REQUIRE(reader);
+  CHECK(reader->meta().at("isa") == "avx2");
+  REQUIRE(reader->sources().size() == 2);
+  CHECK(reader->sources()[1].text == "HIERARCHY\n");
+  CHECK(reader->sources()[1].config == "{\"path\":\"walk.bvh\"}");
+  REQUIRE(reader->streams().size() == 3);
+  const log::StreamRow& late = reader->streams()[2];
+  CHECK(late.id == kLate);
+  CHECK(late.body == "Ann");
+  CHECK(late.name == "b-ann");
+  CHECK(late.stages_json == "{\"stages\":[]}");
+  CHECK(late.first_item == 40);
+  CHECK(reader->source_of(late).name == "b");
+  auto chunk = reader->next_chunk();
+  REQUIRE((chunk && chunk->has_value()));
+  CHECK((*chunk)->source == 1);
+  CHECK((*chunk)->socket == 2);
+  CHECK((*chunk)->direction == 3);
+  CHECK((*chunk)->arrival_ns == -5);
+  CHECK((*chunk)->first_item == 11);
+  REQUIRE((*chunk)->places.size() == 2);
+  CHECK((*chunk)->places[1].stream == kLate);
+  CHECK((*chunk)->places[1].next_frame == 300);
+  CHECK((*chunk)->places[1].next_sample == kMost);
+  CHECK(text_of((*chunk)->bytes) == "1 2 3\n");
+  chunk = reader->next_chunk();
+  REQUIRE((chunk && chunk->has_value()));
+  CHECK((*chunk)->bytes.empty());
+  CHECK(count_chunks(*reader) == 0);
+  CHECK(count_chunks(*reader) == 0);  // the end stays the end
+
+  const auto decisions = reader->decisions();
+  REQUIRE((decisions && decisions->size() == 1));
+  CHECK(decisions->front().item == kMost);
+  CHECK(decisions->front().stream == kLate);
+  CHECK(decisions->front().stage == "style");
+  CHECK(decisions->front().name == "alpha");
+  CHECK(decisions->front().value == "v");
+  CHECK(decisions->front().now_ns == -9);
+  auto frames = reader->frames(1, false);
+  REQUIRE(frames);
+  const auto frame = frames->next();
+  REQUIRE((frame && frame->has_value()));
+  CHECK(text_of((*frame)->bytes) == "styled");
+  CHECK(!frames->next()->has_value());
+  CHECK(*reader->has_frames());
+  const auto gaps = reader->gaps();
+  REQUIRE((gaps && gaps->size() == 1));
+  CHECK(gaps->front().lost == 11);
+  CHECK(gaps->front().owner == kLate);
+  CHECK(gaps->front().kind == log::GapRow::Kind::kDecisions);
+  const auto takes = reader->takes();
+  REQUIRE((takes && takes->size() == 1));
+  CHECK(takes->front().name == "jump");
+  CHECK(takes->front().last_item == 40);
+  CHECK(text_of(*reader->blob(*hash)) == "model");
+  CHECK(!reader->blob("none"));
+}
+
+// tests/golden/replay/staged.plog is of format 1, which lacks the column decision.labels of 2.
+TEST_CASE("a log of format 1 or 2 looks like one of format 3 that counts no items") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "old.plog";
+  std::filesystem::copy_file(test::golden("replay/staged.plog"), path);
+  const bool first = GENERATE(true, false);
+  if (!first) {
+    run_sql(path,
+            "ALTER TABLE decision ADD COLUMN labels TEXT NOT NULL DEFAULT '';"
+            "INSERT INTO decision VALUES(NULL,1,6,9,1,0,1.5,'','0 4 1'),(NULL,1,9,9,0,0,0,'','');"
+            "PRAGMA user_version=2;");
+  }
+  auto reader = Reader::open(path);
+  REQUIRE(reader);
+  REQUIRE(reader->streams().size() == 2);
+  const log::StreamRow& stream = reader->streams()[1];
+  CHECK(stream.name == "b");
+  CHECK(stream.body.empty());
+  CHECK(reader->source_of(stream).driver == "file");
+  CHECK(reader->source_of(stream).text.starts_with("posed-clip bvh"));
+  CHECK(stream.stages_json.find("\"stage\":\"style\",\"model\":\"") != std::string::npos);
+  auto chunk = reader->next_chunk();
+  REQUIRE((chunk && chunk->has_value()));
+  CHECK((*chunk)->first_item == 0);
+  REQUIRE((*chunk)->places.size() == 1);
+  CHECK((*chunk)->places[0].next_frame == 1);
+  CHECK((*chunk)->places[0].next_sample == 0);
+  CHECK(count_chunks(*reader) > 50);
+  const auto decisions = reader->decisions();
+  REQUIRE(decisions);
+  std::map<std::string, v1::DecisionValue> found;  // the last of its kind
+  for (const log::DecisionRow& row : *decisions) {
+    CHECK(row.item == 0);
+    CHECK(row.before_frame > 0);
+    REQUIRE(found[row.stage + "/" + row.name].ParseFromString(row.value));
+  }
+  CHECK(found.at("style/alpha").number() == -0.5);
+  CHECK(reader->blob(found.at("style/model").sha256()));
+  CHECK(found.at("/shed").range().count() == 5);
+  CHECK(found.contains("/tick"));
+  if (!first) {
+    const auto& play = found.at("generate/play").play();
+    CHECK(std::vector<std::uint32_t>(play.label().begin(), play.label().end()) ==
+          std::vector<std::uint32_t>{0, 4, 1});
+    CHECK(play.tempo() == 1.5F);
+    CHECK(play.loop());
+    CHECK(found.contains("/unknown"));
+  }
+  CHECK(*reader->has_frames());
+  CHECK(reader->takes()->empty());
+}
+
+TEST_CASE("an existing file is kept unless the caller insists") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  write_whole_log(path, 3);
+  const auto refused = Writer::create(path, {}, false);
+  REQUIRE(!refused);
+  CHECK(refused.error().text().find("exists already") != std::string::npos);
+  REQUIRE(Writer::create(path, {}, true));
+  CHECK(Reader::open(path)->streams().empty());
+}
+
+TEST_CASE("after a crash the log opens with everything that was committed, as one file") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "live.plog", crashed = dir.path() / "crashed.plog";
+  Writer writer = writer_with_two_streams(path);
+  for (std::uint64_t i = 1; i <= 40; ++i) REQUIRE(writer.add(chunk_row(0, i, "1 2 3\n")));
+  REQUIRE(writer.commit());
+  for (std::uint64_t i = 41; i <= 50; ++i) REQUIRE(writer.add(chunk_row(0, i, "1 2 3\n")));
+  // What kill -9 leaves: the file and its -wal as they are now.
+  std::filesystem::copy_file(path, crashed);
+  std::filesystem::copy_file(path.string() + "-wal", crashed.string() + "-wal");
+  auto reader = Reader::open(crashed);
+  REQUIRE(reader);
+  CHECK(count_chunks(*reader) == 40);
+  CHECK(!std::filesystem::exists(crashed.string() + "-wal"));
+  REQUIRE(writer.close());
+}
+
+TEST_CASE("a log can be read while it is being recorded, and recording goes on") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "live.plog";
+  Writer writer = writer_with_two_streams(path);
+  REQUIRE(writer.add(chunk_row(0, 1, "1\n")));
+  REQUIRE(writer.commit());
+  {
+    auto reader = Reader::open(path);
+    REQUIRE(reader);
+    REQUIRE(writer.add(chunk_row(0, 2, "2\n")));
+    REQUIRE(writer.commit());
+    CHECK(count_chunks(*reader) == 2);
+  }
+  REQUIRE(writer.add(chunk_row(0, 3, "3\n")));
+  REQUIRE(writer.close());
+  auto reader = Reader::open(path);
+  REQUIRE(reader);
+  CHECK(count_chunks(*reader) == 3);
+}
+
+TEST_CASE("a file that is no whole log of ours is refused with one sentence") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "x.plog";
+  SECTION("missing") { CHECK(refusal(path).find("No such file") != std::string::npos); }
+  SECTION("a folder") {
+    std::filesystem::create_directory(path);
+    CHECK(refusal(path) == "is a folder, not a log");
+  }
+  SECTION("empty") {
+    std::ofstream{path};
+    CHECK(refusal(path).find("not a device log") != std::string::npos);
+  }
+  SECTION("text") {
+    std::ofstream{path} << std::string(5000, 'x');
+    CHECK(refusal(path) == "not a device log (not an SQLite file)");
+  }
+  SECTION("another database") {
+    run_sql(path, "CREATE TABLE chunk(id); INSERT INTO chunk VALUES(1);");
+    CHECK(refusal(path).find("not posed's") != std::string::npos);
+  }
+  SECTION("another table") {
+    write_whole_log(path, 3);
+    run_sql(path, "DROP TABLE chunk; CREATE TABLE chunk(id, other);");
+    CHECK(refusal(path).find("no such column") != std::string::npos);
+  }
+  SECTION("a newer format") {
+    write_whole_log(path, 3);
+    run_sql(path, "PRAGMA user_version=4;");
+    CHECK(refusal(path).find("update posed") != std::string::npos);
+  }
+  SECTION("a source that is not described") {
+    write_whole_log(path, 3);
+    forge(path, "UPDATE chunk SET source=-1;");
+    auto reader = Reader::open(path);
+    REQUIRE(reader);
+    const auto chunk = reader->next_chunk();
+    REQUIRE(!chunk);
+    CHECK(chunk.error().message.find("row 1 of table chunk names source -1, which") !=
+          std::string::npos);
+  }
+  SECTION("cut short anywhere, or with pages overwritten: refused or read, never a crash") {
+    write_whole_log(path, 60);
+    const auto size = std::filesystem::file_size(path);
+    std::filesystem::resize_file(path, size / 2);
+    CHECK(refusal(path).find("damaged") != std::string::npos);
+    for (std::uintmax_t keep = 0; keep < size; keep += size / 37) {
+      const auto cut = dir.path() / ("cut" + std::to_string(keep));
+      write_whole_log(cut, 60);
+      std::filesystem::resize_file(cut, keep);
+      CHECK(!refusal(cut).empty());
+      const auto scribbled = dir.path() / ("scribbled" + std::to_string(keep));
+      write_whole_log(scribbled, 60);
+      std::fstream(scribbled, std::ios::in | std::ios::out | std::ios::binary)
+          .seekp(static_cast<std::streamoff>(keep))
+          .write("\xff\xfe\xfd\xfc\xfb", 5);
+      auto reader = Reader::open(scribbled);
+      while (reader) {
+        const auto chunk = reader->next_chunk();
+        if (!chunk || !chunk->has_value()) break;
+      }
+    }
+  }
+}
+
+TEST_CASE("a full disk is an error that ends with the cause: writing goes on afterwards") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "full.plog";
+  Writer writer = writer_with_two_streams(path);
+  REQUIRE(writer.add(chunk_row(0, 1, "1\n")));
+  REQUIRE(writer.commit());
+  const std::string big(60'000, '9');
+  {
+    const test::FileLimit limit(200'000);
+    Result<> outcome;
+    for (std::uint64_t i = 2; outcome && i < 100; ++i) {
+      outcome = writer.add(chunk_row(0, i, big));
+      if (outcome) outcome = writer.commit();
+    }
+    REQUIRE(!outcome);
+    CHECK(outcome.error().file == path.string());
+    writer.rollback();
+  }
+  const auto before = writer.last_chunk_id();
+  CHECK(before >= 1);
+  REQUIRE(writer.add(chunk_row(0, 200, big)));
+  REQUIRE(writer.close());
+  auto reader = Reader::open(path);
+  REQUIRE(reader);
+  CHECK(count_chunks(*reader) == static_cast<std::size_t>(before) + 1);
+}
