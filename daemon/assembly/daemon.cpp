@@ -29,6 +29,11 @@ double rate_of(const devices::OpenStream& stream) {
   return device.description.rate_hz > 0.0 ? device.description.rate_hz : kUnknownRate_hz;
 }
 
+std::vector<std::string> stages_of(const devices::OpenStream& stream) {
+  return pipeline::stage_names(pipeline::engine_options(0, devices::stream_settings(stream),
+                                                        stream.device.description.skeleton));
+}
+
 // What a stream may fill of the ring to the pipeline: half a second of its frames and samples.
 std::size_t decoded_slots(const devices::OpenStream& stream) {
   const drivers::Description& description = stream.device.description;
@@ -162,6 +167,7 @@ Result<> Daemon::Parts::open_sockets() {
     infos.push_back({.name = stream->config.name,
                      .description = stream->device.description,
                      .rate_hz = rate_of(*stream),
+                     .stages = stages_of(*stream),
                      .raw = stream->config.publish_raw,
                      .model = model.filename().string(),
                      .comes_and_goes = stream->slot != nullptr,
@@ -210,18 +216,11 @@ Result<> Daemon::Parts::open_engines() {
     if (!gesture) return std::unexpected(gesture.error());
     const auto constrain = devices::bind_constrain(stream);
     if (!constrain) return std::unexpected(constrain.error());
-    pipeline::EngineOptions engine{.stream = i,
-                                   .stale_after_ns = nanoseconds(stream.config.stale_after_s),
-                                   .publish_raw = stream.config.publish_raw,
-                                   .style = std::nullopt,
-                                   .model = model->get(),
-                                   .generate = std::nullopt,
-                                   .gesture = gesture->model.get(),
-                                   .constrain = *constrain,
-                                   .rate_hz = stream.device.description.rate_hz,
-                                   .skeleton = stream.device.description.skeleton};
-    if (stream.config.style) engine.style = stream.config.style->filter;
-    if (stream.config.generate) engine.generate = stream.config.generate->live;
+    pipeline::EngineOptions engine = pipeline::engine_options(i, devices::stream_settings(stream),
+                                                              stream.device.description.skeleton);
+    engine.model = model->get();
+    engine.gesture = gesture->model.get();
+    engine.clock = system::monotonic_ns;
     worker->add(engine, rate_of(stream), stream.counters, finished_slots(stream));
     reader->add({.device = stream.device.transport ? &stream.device : nullptr,
                  .counters = &stream.counters,

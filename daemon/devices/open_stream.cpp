@@ -68,6 +68,23 @@ Result<> open_slot(const drivers::Driver& driver, OpenStream& stream) {
 
 }  // namespace
 
+pipeline::StreamSettings stream_settings(const OpenStream& stream) {
+  const config::StreamConfig& config = stream.config;
+  pipeline::StreamSettings settings{.publish_raw = config.publish_raw,
+                                    .stale_after_s = config.stale_after_s,
+                                    .rate_hz = stream.device.description.rate_hz,
+                                    .constrain = bind_constrain(stream).value_or(false)};
+  if (config.style) {
+    settings.style = config.style->filter;
+    settings.style_model.name = config.style->model.filename().string();
+  }
+  if (config.generate) {
+    settings.generate = config.generate->live;
+    settings.gesture_model.name = config.generate->model.filename().string();
+  }
+  return settings;
+}
+
 std::unexpected<Error> of_stream(const std::string& name, Error error) {
   error.message = "stream '" + name + "': " + error.message;
   return std::unexpected(std::move(error));

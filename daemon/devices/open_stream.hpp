@@ -8,6 +8,7 @@
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/reader.hpp"
+#include "daemon/pipeline/stream_settings.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/transport/transport_factory.hpp"
@@ -55,6 +56,9 @@ struct BoundGesture {
 
 // Whether the stream's last stage constrains: on a hand, unless the config says no. Cold.
 [[nodiscard]] Result<bool> bind_constrain(const OpenStream& stream);
+
+// What its engine runs by. Without the hashes of its models, which the recorder knows. Cold.
+[[nodiscard]] pipeline::StreamSettings stream_settings(const OpenStream& stream);
 
 // Says which stream an error is about.
 [[nodiscard]] std::unexpected<Error> of_stream(const std::string& name, Error error);

@@ -1,16 +1,15 @@
 #include "daemon/pipeline/stream_engine.hpp"
 
 #include <algorithm>
+#include <utility>
 
+#include "models/hand/constrain_stage.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
 namespace {
 
 constexpr std::int64_t kHeldEvery_ns = kNanosPerSecond;
-// Silence after which frames that wait in the generate stage go out: none that is only late.
-constexpr std::int64_t kSilence_ns = 100'000'000;
-constexpr std::int64_t kSilentFrames = 4;
 
 void add_labels(const gesture::GestureModel& model, const gesture::PlayOrder& order,
                 ShortText& text) noexcept {
@@ -23,14 +22,63 @@ void add_labels(const gesture::GestureModel& model, const gesture::PlayOrder& or
 
 }  // namespace
 
-StreamEngine::StreamEngine(const EngineOptions& options) noexcept
+std::vector<std::string> stage_names(const EngineOptions& options) {
+  std::vector<std::string> names;
+  if (options.style) names.push_back("style");
+  if (options.generate) names.push_back("generate");
+  if (options.constrain) names.push_back("constrain");
+  return names;
+}
+
+StreamEngine::StreamEngine(const EngineOptions& options)
     : options_(options), model_(options.model) {
-  if (options.style) style_.emplace(options.model, *options.style);
-  if (options.constrain) constrain_.emplace(options.skeleton);
-  if (!options.generate) return;
-  const double rate_hz = generate::stream_rate_hz(options.rate_hz);
-  period_ns_ = nanoseconds(1.0 / rate_hz);
-  generate_.emplace(options.skeleton, *options.generate, rate_hz, options.gesture);
+  if (options.style) {
+    auto stage = std::make_unique<style::StyleFilter>(options.model, *options.style);
+    style_ = stage.get();
+    stages_.push_back(std::move(stage));
+  }
+  if (options.generate) {
+    auto stage = std::make_unique<generate::GenerateStage>(
+        options.skeleton, *options.generate, generate::stream_rate_hz(options.rate_hz),
+        options.gesture);
+    generate_ = stage.get();
+    stages_.push_back(std::move(stage));
+  }
+  if (options.constrain) {
+    stages_.push_back(std::make_unique<hand::ConstrainStage>(options.skeleton));
+  }
+}
+
+class StreamEngine::Chain final : public StageOut {
+ public:
+  Chain(StreamEngine& engine, std::size_t next, EngineOut& out) noexcept
+      : engine_(engine), next_(next), out_(out) {}
+  void frame(const StageFrame& frame) noexcept override { engine_.run(next_, frame, out_); }
+
+ private:
+  StreamEngine& engine_;
+  std::size_t next_;
+  EngineOut& out_;
+};
+
+// From stage `next` on, and out behind the last.
+void StreamEngine::run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept {
+  if (next == stages_.size()) return emit(frame.frame, out);
+  Chain rest(*this, next + 1, out);
+  const std::size_t before = time_stage(next);
+  stages_[next]->process(frame, rest);
+  time_stage(before);
+}
+
+// From now on the time is that of this stage, kMaxStages: of none. Returns whose it was.
+std::size_t StreamEngine::time_stage(std::size_t stage) noexcept {
+  if (options_.clock == nullptr) return stage;
+  const std::int64_t now_ns = options_.clock();
+  if (timed_stage_ < kMaxStages) {
+    stage_us_[timed_stage_] += static_cast<float>(now_ns - timed_since_ns_) * 1e-3F;
+  }
+  timed_since_ns_ = now_ns;
+  return std::exchange(timed_stage_, stage);
 }
 
 float StreamEngine::alpha() const noexcept { return style_ ? style_->alpha() : 0.0F; }
@@ -47,12 +95,8 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
     pose_.frame = frame;
     out.item(pose_);
   }
-  out_ = &out;
-  if (style_) {
-    style_->step(&frame, header.arrival_ns, styled_);
-  } else {
-    generate(frame);
-  }
+  stage_us_.fill(0.0F);
+  run(0, {.frame = frame, .input = &frame}, out);
   tell_played(header.arrival_ns, out);
 }
 
@@ -86,24 +130,16 @@ void StreamEngine::close_gaps(std::uint64_t last_frame, std::uint64_t last_sampl
   shed_samples_until(last_sample + 1, out);
 }
 
-void StreamEngine::generate(const Frame& frame) noexcept {
-  if (generate_) {
-    generate_->step(&frame, frame.header.arrival_ns, *this);
-  } else {
-    this->frame(frame);
-  }
-}
-
-void StreamEngine::frame(const Frame& frame) noexcept {
+// A frame leaves the last stage.
+void StreamEngine::emit(const Frame& frame, EngineOut& out) noexcept {
   pose_.kind = Item::Kind::kFrame;
   pose_.frame = frame;
-  if (constrain_) {
-    constrain_->step(pose_.frame,
-                     generate_ ? generate_->variance_rad2() : std::span<const double>());
-  }
+  const std::size_t last = time_stage(kMaxStages);
+  pose_.frame.stage_us = stage_us_;
   has_pose_ = true;
   last_out_ = frame.header.sequence;
-  out_->item(pose_);
+  out.item(pose_);
+  time_stage(last);
 }
 
 void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
@@ -118,7 +154,7 @@ void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
 // Something came: a silent stream has recovered.
 void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
   last_arrival_ns_ = arrival_ns;
-  last_generate_ns_ = kNoTime_ns;
+  for (const auto& stage : stages_) stage->heard(arrival_ns);
   const StreamState before = state_;
   state_ = StreamState::kLive;
   if (before == StreamState::kWaiting) {
@@ -134,17 +170,25 @@ std::int64_t StreamEngine::stale_due_ns() const noexcept {
   return kNoTime_ns;
 }
 
-std::int64_t StreamEngine::generate_due_ns() const noexcept {
-  const bool runs = state_ == StreamState::kLive || state_ == StreamState::kStale;
-  if (!runs || !generate_ || !generate_->waiting()) return kNoTime_ns;
-  if (last_generate_ns_ != kNoTime_ns) return last_generate_ns_ + period_ns_;
-  return last_arrival_ns_ + std::max(kSilence_ns, kSilentFrames * period_ns_);
+// When the first stage wants a tick; kNoTime_ns: none does.
+std::int64_t StreamEngine::stages_due_ns() const noexcept {
+  if (state_ != StreamState::kLive && state_ != StreamState::kStale) return kNoTime_ns;
+  std::int64_t first_ns = kNoTime_ns;
+  for (const auto& stage : stages_) {
+    const std::int64_t due_ns = stage->next_due_ns();
+    if (due_ns != kNoTime_ns && (first_ns == kNoTime_ns || due_ns < first_ns)) first_ns = due_ns;
+  }
+  return first_ns;
+}
+
+bool StreamEngine::any_performs() const noexcept {
+  return std::ranges::any_of(stages_, [](const auto& stage) { return stage->performs(); });
 }
 
 std::int64_t StreamEngine::next_tick_ns() const noexcept {
-  const std::int64_t generate_ns = generate_due_ns();
+  const std::int64_t stages_ns = stages_due_ns();
   const std::int64_t stale_ns = stale_due_ns();
-  return generate_ns == kNoTime_ns ? stale_ns : std::min(generate_ns, stale_ns);
+  return stages_ns == kNoTime_ns ? stale_ns : std::min(stages_ns, stale_ns);
 }
 
 bool StreamEngine::tick(std::int64_t now_ns, EngineOut& out) noexcept {
@@ -159,12 +203,19 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
                 .stream = options_.stream,
                 .sequence = last_sequence_ + 1,
                 .now_ns = now_ns});
-  const bool generates = generate_due_ns() != kNoTime_ns && now_ns >= generate_due_ns();
-  const bool stale = !generates || now_ns >= stale_due_ns();
-  if (generates) {
-    out_ = &out;
-    last_generate_ns_ = now_ns;
-    generate_->step(nullptr, now_ns, *this);
+  const std::int64_t due_ns = stages_due_ns();
+  const bool stages_tick = due_ns != kNoTime_ns && now_ns >= due_ns;
+  const bool stale = !stages_tick || now_ns >= stale_due_ns();
+  if (stages_tick) {
+    stage_us_.fill(0.0F);
+    for (std::size_t i = 0; i < stages_.size(); ++i) {
+      const std::int64_t stage_due_ns = stages_[i]->next_due_ns();
+      if (stage_due_ns == kNoTime_ns || now_ns < stage_due_ns) continue;
+      Chain rest(*this, i + 1, out);
+      const std::size_t before = time_stage(i);
+      stages_[i]->tick(now_ns, rest);
+      time_stage(before);
+    }
     tell_played(now_ns, out);
   }
   if (!stale) return;
@@ -173,7 +224,7 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
     event(v1::Event::KIND_STALE, now_ns, last_sequence_, seconds(now_ns - last_arrival_ns_), out);
   }
   next_held_ns_ = now_ns + kHeldEvery_ns;
-  if (has_pose_ && !(generate_ && generate_->performs())) {
+  if (has_pose_ && !any_performs()) {
     pose_.kind = Item::Kind::kFrame;
     pose_.frame.quality = Quality::kStale;
     out.item(pose_);
@@ -253,13 +304,16 @@ void StreamEngine::describe(const Command& command, StreamEvent& event) const no
 }
 
 void StreamEngine::flush(EngineOut& out) noexcept {
-  out_ = &out;
-  if (generate_) generate_->flush(*this);
+  stage_us_.fill(0.0F);
+  for (std::size_t i = 0; i < stages_.size(); ++i) {
+    Chain rest(*this, i + 1, out);
+    stages_[i]->flush(rest);
+  }
 }
 
 void StreamEngine::tell_played(std::int64_t time_ns, EngineOut& out) noexcept {
   const bool performed = performs_;
-  performs_ = generate_ && generate_->performs();
+  performs_ = any_performs();
   if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);
 }
 

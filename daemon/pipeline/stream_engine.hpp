@@ -4,14 +4,16 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "models/generate/generate_stage.hpp"
-#include "models/hand/constrain_stage.hpp"
+#include "models/stage.hpp"
 #include "models/style/style_filter.hpp"
-#include "proto/frame/sink.hpp"
 
 namespace posed::pipeline {
 
@@ -39,13 +41,17 @@ struct EngineOptions {
   bool constrain = false;                         // the stage is there; hands only
   double rate_hz = 0.0;                           // of the stream; only `generate` needs it
   std::shared_ptr<const Skeleton> skeleton{};  // of the stream; `generate` and `constrain` need it
+  Clock clock = nullptr;                       // times the stages; null: not timed
 };
 
-// style -> generate -> constrain, each where its options are. All calls come from one thread and
-// are RT-safe, but for construction.
-class StreamEngine final : private Emit {
+// The stages that the options ask for, in the order in which the engine runs them.
+[[nodiscard]] std::vector<std::string> stage_names(const EngineOptions& options);
+
+// Runs the stages of one stream as a list. All calls come from one thread and are RT-safe, but for
+// construction.
+class StreamEngine final {
  public:
-  explicit StreamEngine(const EngineOptions& options) noexcept;
+  explicit StreamEngine(const EngineOptions& options);
 
   // A decoded frame, stamped with stream, sequence and arrival. A gap since the last sequence is a
   // shed: decided and told before the frame itself.
@@ -56,11 +62,10 @@ class StreamEngine final : private Emit {
   // sample that came was shed, too.
   void close_gaps(std::uint64_t last_frame, std::uint64_t last_sample, EngineOut& out) noexcept;
 
-  // Says that the time is `now_ns` when nothing came. What waits in the generate stage goes out
-  // after a few frames' silence, and a performance goes on at the stream's rate. Frames are missing
-  // for stale_after: the stream turns stale, and the last pose goes out once a second with quality
-  // stale, under its own old sequence and times. Returns whether anything happened; only then is a
-  // decision emitted.
+  // Says that the time is `now_ns` when nothing came. Stages whose tick is due get it. Frames are
+  // missing for stale_after: the stream turns stale, and the last pose goes out once a second with
+  // quality stale, under its own old sequence and times. Returns whether anything happened; only
+  // then is a decision emitted.
   bool tick(std::int64_t now_ns, EngineOut& out) noexcept;
   // The tick itself, for replay: the live run has decided that it was due.
   void tick_now(std::int64_t now_ns, EngineOut& out) noexcept;
@@ -85,33 +90,27 @@ class StreamEngine final : private Emit {
   }
 
  private:
-  // What the style stage emitted.
-  class Styled final : public Emit {
-   public:
-    explicit Styled(StreamEngine& engine) noexcept : engine_(engine) {}
-    void frame(const Frame& frame) noexcept override { engine_.generate(frame); }
+  // Where the stage before `next` puts its frames.
+  class Chain;
 
-   private:
-    StreamEngine& engine_;
-  };
-
-  void generate(const Frame& frame) noexcept;
+  void run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept;
+  void emit(const Frame& frame, EngineOut& out) noexcept;
+  std::size_t time_stage(std::size_t stage) noexcept;
   void tell_played(std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_until(std::uint64_t sequence, std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_samples_until(std::uint64_t sequence, EngineOut& out) noexcept;
-  void frame(const Frame& frame) noexcept override;  // what the last stage emitted
   [[nodiscard]] std::int64_t stale_due_ns() const noexcept;
-  [[nodiscard]] std::int64_t generate_due_ns() const noexcept;
+  [[nodiscard]] std::int64_t stages_due_ns() const noexcept;
+  [[nodiscard]] bool any_performs() const noexcept;
   void heard(std::int64_t arrival_ns, EngineOut& out) noexcept;
   void event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
              EngineOut& out) noexcept;
   void describe(const Command& command, StreamEvent& event) const noexcept;
 
   EngineOptions options_;
-  std::optional<style::StyleFilter> style_;
-  std::optional<generate::GenerateStage> generate_;
-  std::optional<hand::ConstrainStage> constrain_;
-  Styled styled_{*this};
+  std::vector<std::unique_ptr<Stage>> stages_;
+  style::StyleFilter* style_ = nullptr;          // of them; null where it is not there
+  generate::GenerateStage* generate_ = nullptr;  // the same
   const style::BoundModel* model_ = nullptr;
   StreamState state_ = StreamState::kWaiting;
   std::uint64_t last_sequence_ = 0;  // that entered
@@ -119,13 +118,14 @@ class StreamEngine final : private Emit {
   std::uint64_t last_sample_ = 0;    // that entered
   std::int64_t last_arrival_ns_ = kNoTime_ns;
   std::int64_t next_held_ns_ = kNoTime_ns;
-  std::int64_t period_ns_ = 0;                  // of a performance that goes on in silence
-  std::int64_t last_generate_ns_ = kNoTime_ns;  // last tick of the generate stage in this silence
-  EngineOut* out_ = nullptr;                    // of the call in progress
-  bool performs_ = false;                       // as last told
-  bool has_pose_ = false;                       // pose_ holds a pose that went out
-  Item pose_;                                   // frames on their way out, and the last pose
-  Item other_;                                  // samples and events on their way out
+  // The stopwatch: which stage runs, since when, and what each has taken in this call.
+  std::size_t timed_stage_ = kMaxStages;  // kMaxStages: none
+  std::int64_t timed_since_ns_ = 0;
+  std::array<float, kMaxStages> stage_us_{};
+  bool performs_ = false;  // as last told
+  bool has_pose_ = false;  // pose_ holds a pose that went out
+  Item pose_;              // frames on their way out, and the last pose
+  Item other_;             // samples and events on their way out
 };
 
 }  // namespace posed::pipeline

@@ -48,7 +48,6 @@ struct Worker::Lane final : EngineOut {
 
   void item(const Item& item) noexcept override {
     outgoing = item;
-    if (outgoing.kind == Item::Kind::kFrame) outgoing.frame.stamps.styled_ns = ports.clock();
     if ((within_share(outgoing) && !share.has_room()) || !ports.out->push(outgoing)) {
       if (ports.record_sink != nullptr && is_pose(outgoing))
         ports.record_sink->unpublished(outgoing.frame.header.stream);

@@ -49,15 +49,15 @@ const v1::Frame& FrameEncoder::encode(const Frame& frame) {
   message_.set_lag_frames(frame.lag_frames);
   message_.set_lag_ms(frame.lag_ms);
   message_.clear_decoded_ns();
-  message_.clear_styled_ns();
   message_.clear_published_ns();
+  message_.clear_stage_us();
   return message_;
 }
 
-const v1::Frame& FrameEncoder::stamp(const StageStamps& stamps) {
+const v1::Frame& FrameEncoder::stamp(const StageStamps& stamps, std::span<const float> stage_us) {
   if (stamps.decoded_ns != kNoTime_ns) message_.set_decoded_ns(stamps.decoded_ns);
-  if (stamps.styled_ns != kNoTime_ns) message_.set_styled_ns(stamps.styled_ns);
   if (stamps.published_ns != kNoTime_ns) message_.set_published_ns(stamps.published_ns);
+  assign(*message_.mutable_stage_us(), stage_us);
   return message_;
 }
 

@@ -20,7 +20,7 @@ class FrameEncoder {
   // The frame without stage stamps, as logs keep it; valid until the next call.
   [[nodiscard]] const v1::Frame& encode(const Frame& frame);
   // Adds the stage stamps that are known to what encode() made.
-  [[nodiscard]] const v1::Frame& stamp(const StageStamps& stamps);
+  [[nodiscard]] const v1::Frame& stamp(const StageStamps& stamps, std::span<const float> stage_us);
 
  private:
   v1::Frame message_;

@@ -20,18 +20,18 @@ void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t
   if (from_ns != kNoTime_ns && to_ns != kNoTime_ns) histogram.add(to_ns - from_ns);
 }
 
-// The greeting of what is no glove would be a whole file's header.
-void tell_device(const drivers::Description& device, v1::StreamStats& stats) {
+// Only of a glove: the device info of a file is its whole header.
+void describe_device(const drivers::Description& device, v1::StreamStats& stats) {
   const drivers::Driver* driver = drivers::find_driver(device.driver);
   stats.set_identity(device.identity);
-  if (driver != nullptr && driver->glove_model != nullptr) stats.set_greeting(device.text);
+  if (driver != nullptr && driver->glove_model != nullptr) stats.set_device_info(device.text);
 }
 
 constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "ended"};
 
 }  // namespace
 
-Channel::Channel(const std::string& name, const StreamInfo& info)
+Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
     : pose_topic("pose/" + name),
       skeleton_topic("skeleton/" + name),
       sensor_topic("sensor/" + name),
@@ -40,12 +40,13 @@ Channel::Channel(const std::string& name, const StreamInfo& info)
       samples(name, info.description.samples) {
   if (info.description.skeleton) {
     skeleton = skeleton_message(name, *info.description.skeleton, info.rate_hz);
+    if (!unstyled) skeleton->mutable_stage()->Assign(info.stages.begin(), info.stages.end());
   }
 }
 
 PublishedStream::PublishedStream(StreamInfo stream_info)
-    : info(std::move(stream_info)), styled(info.name, info) {
-  if (info.raw) raw.emplace(info.name + "-raw", info);
+    : info(std::move(stream_info)), styled(info.name, info, false) {
+  if (info.raw) raw.emplace(info.name + "-raw", info, true);
   now_.model = info.model;
 }
 
@@ -53,7 +54,13 @@ void PublishedStream::measure(const Frame& frame, const StageStamps& stamps) noe
   if (frame.quality == Quality::kStale) return;
   const std::int64_t arrival_ns = frame.header.arrival_ns;
   add_between(decode_, arrival_ns, stamps.decoded_ns);
-  add_between(style_, stamps.decoded_ns, stamps.styled_ns);
+  if (stamps.decoded_ns == kNoTime_ns) return;  // computed again by a replay: not timed
+  float all_us = 0.0F;
+  for (std::size_t i = 0; i < info.stages.size(); ++i) {
+    stage_[i].add(nanoseconds(frame.stage_us[i] * 1e-6));
+    all_us += frame.stage_us[i];
+  }
+  if (!info.stages.empty()) stages_.add(nanoseconds(all_us * 1e-6));
   add_between(publish_, arrival_ns, stamps.published_ns);
 }
 
@@ -87,6 +94,8 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_state(kStateNames[static_cast<std::size_t>(pipeline.state.load())]);
   stats.set_dropped(reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
+  stats.clear_stage();
+  for (const std::string& stage : info.stages) stats.add_stage()->set_name(stage);
   stats.clear_outcome();
   for (const auto& outcome : reader.outcome) stats.add_outcome(outcome.load());
   stats.set_alpha(pipeline.alpha.load());
@@ -96,7 +105,7 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_away(info.comes_and_goes && begun && !reader.connected.load());
   stats.set_connections(reader.connections.load());
   stats.set_link_ns(begun ? link_ns : 0);
-  if (info.present) tell_device(*info.present->description(), stats);
+  if (info.present) describe_device(*info.present->description(), stats);
   const std::scoped_lock lock(mutex_);
   stats.set_frames(now_.frames);
   stats.set_samples(now_.samples);
@@ -116,7 +125,10 @@ void PublishedStream::report(v1::StreamStats& stats, double seconds_since) {
   stats.set_rate_hz(seconds_since > 0.0 ? static_cast<float>(frames / seconds_since) : 0.0F);
   frames_reported_ = stats.frames();
   *stats.mutable_decode() = percentiles(decode_);
-  *stats.mutable_style() = percentiles(style_);
+  *stats.mutable_stages() = percentiles(stages_);
+  for (std::size_t i = 0; i < info.stages.size(); ++i) {
+    *stats.mutable_stage(static_cast<int>(i))->mutable_time() = percentiles(stage_[i]);
+  }
   *stats.mutable_publish() = percentiles(publish_);
 }
 

@@ -18,7 +18,8 @@ namespace posed::publish {
 // The topics and frame message under one published name; a stream has a second one for its raw
 // input.
 struct Channel {
-  Channel(const std::string& name, const StreamInfo& info);
+  // `unstyled`: of the stream before its stages.
+  Channel(const std::string& name, const StreamInfo& info, bool unstyled);
 
   std::string pose_topic, skeleton_topic, sensor_topic, event_topic;
   FrameEncoder frames;
@@ -70,7 +71,8 @@ class PublishedStream {
   mutable std::mutex mutex_;
   Now now_;  // under mutex_
   std::uint64_t frames_reported_ = 0;
-  LatencyHistogram decode_, style_, publish_;
+  LatencyHistogram decode_, stages_, publish_;
+  std::array<LatencyHistogram, kMaxStages> stage_;
 };
 
 }  // namespace posed::publish

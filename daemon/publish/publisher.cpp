@@ -246,7 +246,10 @@ void Publisher::take_frame(const Frame& frame, bool raw) {
   }
   StageStamps stamps = frame.stamps;
   if (options_.stamps) stamps.published_ns = options_.data_clock();
-  send(channel.pose_topic, channel.frames.stamp(stamps));
+  // What a replay computes again is not timed.
+  const bool timed = !raw && stamps.decoded_ns != kNoTime_ns;
+  const std::size_t stages = timed ? published.info.stages.size() : 0;
+  send(channel.pose_topic, channel.frames.stamp(stamps, std::span(frame.stage_us).first(stages)));
   if (!raw) published.count(frame, stamps);
 }
 

@@ -34,10 +34,11 @@ namespace posed::publish {
 struct StreamInfo {
   std::string name;
   drivers::Description description;
-  double rate_hz = 0.0;         // at which frames are to be expected; 0 unknown
-  bool raw = false;             // the unstyled input goes out as <name>-raw
-  std::string model;            // the style model's name at the start
-  bool comes_and_goes = false;  // the device may be away
+  double rate_hz = 0.0;             // at which frames are to be expected; 0 unknown
+  std::vector<std::string> stages;  // in the order in which a frame passes them
+  bool raw = false;                 // the unstyled input goes out as <name>-raw
+  std::string model;                // the style model's name at the start
+  bool comes_and_goes = false;      // the device may be away
   std::shared_ptr<const devices::PresentDevice> present{};  // null: nothing comes from a device
   pipeline::StreamCounters* counters = nullptr;
 };

@@ -80,28 +80,15 @@ RecordedStream recorded_stream(const devices::OpenStream& stream) {
   const config::StreamConfig& config = stream.config;
   const auto style = std::as_bytes(std::span(stream.model_file));
   const auto gesture = std::as_bytes(std::span(stream.gesture_file));
-  RecordedStream recorded{
-      .source = {.id = 0,
-                 .name = config.name,
-                 .driver = description.driver,
-                 .text = description.text,
-                 .identity = description.identity,
-                 .config = to_json(config.options)},
-      .settings = {.publish_raw = config.publish_raw,
-                   .stale_after_s = config.stale_after_s,
-                   .rate_hz = description.rate_hz,
-                   .constrain = devices::bind_constrain(stream).value_or(false)},
-      .style = {style.begin(), style.end()},
-      .gesture = {gesture.begin(), gesture.end()}};
-  if (config.style) {
-    recorded.settings.style = config.style->filter;
-    recorded.settings.style_model.name = config.style->model.filename().string();
-  }
-  if (config.generate) {
-    recorded.settings.generate = config.generate->live;
-    recorded.settings.gesture_model.name = config.generate->model.filename().string();
-  }
-  return recorded;
+  return {.source = {.id = 0,
+                     .name = config.name,
+                     .driver = description.driver,
+                     .text = description.text,
+                     .identity = description.identity,
+                     .config = to_json(config.options)},
+          .settings = devices::stream_settings(stream),
+          .style = {style.begin(), style.end()},
+          .gesture = {gesture.begin(), gesture.end()}};
 }
 
 Result<log::Writer> begin_log(const RecorderOptions& options,

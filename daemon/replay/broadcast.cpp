@@ -65,6 +65,7 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
     infos.push_back({.name = stream.name,
                      .description = stream.description,
                      .rate_hz = stream.settings.rate_hz,
+                     .stages = stream.stages,
                      .raw = stream.settings.publish_raw,
                      .model = stream.settings.style ? stream.settings.style_model.name
                                                     : stream.settings.gesture_model.name,

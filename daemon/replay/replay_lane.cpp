@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "daemon/pipeline/record_sink.hpp"
-#include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 
@@ -81,17 +80,12 @@ Result<> ReplayLane::open_engine() {
     if (!bound) return std::unexpected(bound.error());
     gesture_ = std::move(*bound);
   }
-  const bool hand = device.skeleton && hand_side(*device.skeleton).has_value();
-  engine_.emplace(pipeline::EngineOptions{.stream = lane_,
-                                          .stale_after_ns = nanoseconds(settings.stale_after_s),
-                                          .publish_raw = settings.publish_raw,
-                                          .style = settings.style,
-                                          .model = style_.get(),
-                                          .generate = settings.generate,
-                                          .gesture = gesture_.get(),
-                                          .constrain = settings.constrain && hand,
-                                          .rate_hz = device.rate_hz,
-                                          .skeleton = device.skeleton});
+  pipeline::EngineOptions options = pipeline::engine_options(lane_, settings, device.skeleton);
+  options.rate_hz = device.rate_hz;  // what the models are bound at
+  options.model = style_.get();
+  options.gesture = gesture_.get();
+  stream_.stages = pipeline::stage_names(options);
+  engine_.emplace(options);
   return {};
 }
 

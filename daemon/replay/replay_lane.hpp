@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "daemon/devices/calibration.hpp"
 #include "daemon/pipeline/intake.hpp"
@@ -26,6 +27,7 @@ struct ReplayStream {
   std::string name;
   drivers::Description description;
   record::StreamSettings settings;
+  std::vector<std::string> stages{};  // in their order
 };
 
 // What all lanes of a replay share.

@@ -13,51 +13,55 @@
 #include "models/generate/gesture_player.hpp"
 #include "models/smooth/live_options.hpp"
 #include "models/smooth/live_smoother.hpp"
-#include "proto/frame/sink.hpp"
+#include "models/stage.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::generate {
 
-class GenerateStage final : public Stage, private Emit {
+class GenerateStage final : public Stage {
  public:
   // `model` outlives its use here; may be null, and must be for a skeleton that is no hand's.
   GenerateStage(std::shared_ptr<const Skeleton> skeleton, const smooth::LiveOptions& options,
                 double rate_hz, const BoundModel* model);
 
-  // Emits the frames that are due. A tick (null) says that nothing came: the frames that still wait
-  // go out, and a performance goes on by one frame, under the last frame's sequence. RT-safe.
-  void step(const Frame* in, std::int64_t now_ns, Emit& emit) noexcept override;
-
+  // Emits the frames that are due. RT-safe.
+  void process(const StageFrame& in, StageOut& out) noexcept override;
+  // Frames that wait go out after a few frames' silence, and a performance goes on at the stream's
+  // rate, under the last frame's sequence. RT-safe.
+  void heard(std::int64_t arrival_ns) noexcept override;
+  [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
+  void tick(std::int64_t now_ns, StageOut& out) noexcept override;
   // Emits the frames that wait: the source has ended. RT-safe.
-  void flush(Emit& emit) noexcept;
+  void flush(StageOut& out) noexcept override;
+  [[nodiscard]] bool performs() const noexcept override { return player_.busy(); }
 
   // All RT-safe; in effect from the next frame that is emitted.
   [[nodiscard]] bool play(const gesture::PlayOrder& order) noexcept { return player_.play(order); }
   void stop_playing() noexcept { player_.stop(); }
   void set_model(const BoundModel* model) noexcept;
 
-  // Whether ticks are wanted when nothing comes: frames wait, or something is performed. RT-safe.
-  [[nodiscard]] bool waiting() const noexcept { return entered_ != 0 || performs(); }
-  [[nodiscard]] bool performs() const noexcept { return player_.busy(); }
   [[nodiscard]] const BoundModel* model() const noexcept { return model_; }
 
-  // Posterior variance of the frame emitted last, one a rotation channel [rad^2]; valid within
-  // Emit::frame. RT-safe.
+ private:
+  // Where the smoother puts its frames.
+  class Smoothed;
+
+  void smoothed(const StageFrame& frame, StageOut& out) noexcept;
+  void show(Frame& frame, const HandAngles* live, StageOut& out) noexcept;
+  // Of the frame that goes out.
   [[nodiscard]] std::span<const double> variance_rad2() const noexcept {
     return std::span(variance_rad2_).first(channels_);
   }
-
- private:
-  void frame(const Frame& frame) noexcept override;  // out of the smoother
-  void show(Frame& frame, const HandAngles* live) noexcept;
 
   std::shared_ptr<const Skeleton> skeleton_;
   bool hand_;
   smooth::LiveSmoother smoother_;
   GesturePlayer player_;
   const BoundModel* model_;
-  Emit* emit_ = nullptr;  // of the call in progress
-  int entered_ = 0;       // frames that wait in the smoother
+  std::int64_t period_ns_;  // of a performance that goes on in silence
+  std::int64_t last_heard_ns_ = kNoTime_ns;
+  std::int64_t last_tick_ns_ = kNoTime_ns;  // in this silence
+  int entered_ = 0;                         // frames that wait in the smoother
   bool has_last_ = false;
   bool live_seen_ = false;  // a hand came; else the stream only performs
   Frame last_;              // that went out

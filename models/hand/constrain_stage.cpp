@@ -28,22 +28,25 @@ ConstrainStage::ConstrainStage(std::shared_ptr<const Skeleton> skeleton)
     : skeleton_(std::move(skeleton)), solver_(shape_of(*skeleton_)) {}
 
 // RT-safe.
-void ConstrainStage::step(Frame& frame, std::span<const double> variance_rad2) noexcept {
-  if (frame.skeleton != skeleton_->id) return solver_.reset();
-  HandAngles variance{};
-  if (variance_rad2.size() == variance.size()) {
-    for (std::size_t c = 0; c < variance.size(); ++c)
-      variance[kAngleOfChannel[c]] = variance_rad2[c];
+void ConstrainStage::process(const StageFrame& in, StageOut& out) noexcept {
+  if (in.frame.skeleton != skeleton_->id) {
+    solver_.reset();
+    return out.frame(in);
   }
-  const HandAngles before = hand_angles(frame);
+  HandAngles variance{};
+  if (in.variance_rad2.size() == variance.size()) {
+    for (std::size_t c = 0; c < variance.size(); ++c)
+      variance[kAngleOfChannel[c]] = in.variance_rad2[c];
+  }
+  const HandAngles before = hand_angles(in.frame);
   HandAngles angles = before;
   solver_.step(angles, variance);
-  if (!differ(angles, before)) return;
-  const auto valid = frame.valid;
-  const Vec3f root_position_m = frame.root_position_m;
+  if (!differ(angles, before)) return out.frame(in);
+  Frame frame = in.frame;
   set_hand_angles(*skeleton_, angles, frame);
-  frame.valid = valid;
-  frame.root_position_m = root_position_m;
+  frame.valid = in.frame.valid;
+  frame.root_position_m = in.frame.root_position_m;
+  out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
 }
 
 }  // namespace posed::hand

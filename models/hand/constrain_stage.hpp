@@ -3,23 +3,22 @@
 #pragma once
 
 #include <memory>
-#include <span>
 
 #include "models/hand/constraint_solver.hpp"
+#include "models/stage.hpp"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::hand {
 
-class ConstrainStage {
+class ConstrainStage final : public Stage {
  public:
   // `skeleton` is a hand's (hand_side() knows it); the shape that it is named after is used.
   explicit ConstrainStage(std::shared_ptr<const Skeleton> skeleton);
 
-  // Moves the frame's angles to the nearest that are allowed. `variance_rad2` is the posterior's, a
-  // rotation channel each; empty: all angles are equally sure. A hand that lacks an angle is left
-  // alone. RT-safe.
-  void step(Frame& frame, std::span<const double> variance_rad2) noexcept;
+  // Moves the frame's angles to the nearest that are allowed; an angle that is known well moves
+  // less. A hand that lacks an angle is left alone. RT-safe.
+  void process(const StageFrame& in, StageOut& out) noexcept override;
 
  private:
   std::shared_ptr<const Skeleton> skeleton_;

@@ -51,7 +51,7 @@ struct LiveSmoother::State {
 
   [[nodiscard]] bool serves(const Frame& frame) const noexcept;
   void take(const Frame& frame) noexcept;
-  void emit_until(long last, Emit& emit) noexcept;
+  void emit_until(long last, StageOut& out) noexcept;
   void rebuild(Frame& frame, int back) noexcept;
   void turn_joints(Frame& frame) noexcept;
   void name_gesture(Frame& frame, int back) const noexcept;
@@ -122,27 +122,23 @@ void LiveSmoother::State::forget() noexcept {
 }
 
 // RT-safe.
-void LiveSmoother::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) noexcept {
-  if (in == nullptr) {
-    flush(emit);
-    return;
-  }
+void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
   State& s = *state_;
-  if (!s.serves(*in)) {
-    flush(emit);
-    emit.frame(*in);
+  if (!s.serves(in.frame)) {
+    flush(out);
+    out.frame({.frame = in.frame});
     return;
   }
-  const double now_s = s.clock.tick(in->header);
+  const double now_s = s.clock.tick(in.frame.header);
   const double step_s = now_s - s.last_s;
   s.last_s = now_s;
   if (step_s > kForgetAfter_s) {
-    flush(emit);
+    flush(out);
     s.forget();
   }
   const double period_s = s.clock.period_s();
-  if (s.taken - s.emitted >= window_frames(period_s)) flush(emit);  // the beat became much slower
-  s.take(*in);
+  if (s.taken - s.emitted >= window_frames(period_s)) flush(out);  // the beat became much slower
+  s.take(in.frame);
   const bool even = step_s < kEvenStep * period_s;
   if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, even);
   s.window.push(now_s, s.measured, noise_rad());
@@ -154,11 +150,14 @@ void LiveSmoother::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) no
   // Until the beat is known a lag in time is no number of frames yet: the first frames wait.
   const bool in_time = s.options.lag.seconds > 0.0;
   if (in_time && !s.clock.settled() && s.taken - s.emitted < kMostWaiting) return;
-  s.emit_until(s.taken - 1 - lag_frames(s.options.lag, period_s), emit);
+  s.emit_until(s.taken - 1 - lag_frames(s.options.lag, period_s), out);
 }
 
 // RT-safe.
-void LiveSmoother::flush(Emit& emit) noexcept { state_->emit_until(state_->taken - 1, emit); }
+void LiveSmoother::tick(std::int64_t /*now_ns*/, StageOut& out) noexcept { flush(out); }
+
+// RT-safe.
+void LiveSmoother::flush(StageOut& out) noexcept { state_->emit_until(state_->taken - 1, out); }
 
 // RT-safe.
 void LiveSmoother::reset() noexcept {
@@ -178,22 +177,18 @@ const LiveModel* LiveSmoother::set_model(const LiveModel* model) noexcept {
 }
 
 // RT-safe.
-std::span<const double> LiveSmoother::variance_rad2() const noexcept {
-  return {state_->variance.get(), static_cast<std::size_t>(state_->channels)};
-}
-
-// RT-safe.
 double LiveSmoother::noise_rad() const noexcept {
   const State& s = *state_;
   return s.options.noise_rad > 0.0 ? s.options.noise_rad : s.noise.noise_rad();
 }
 
 // Frames up to number `last` go out. RT-safe.
-void LiveSmoother::State::emit_until(long last, Emit& emit) noexcept {
+void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept {
   for (; emitted <= last; ++emitted) {
     Frame frame = pending[static_cast<std::size_t>(emitted % kMaxPending)];
     rebuild(frame, static_cast<int>(taken - 1 - emitted));
-    emit.frame(frame);
+    out.frame(
+        {.frame = frame, .variance_rad2 = {variance.get(), static_cast<std::size_t>(channels)}});
   }
 }
 

@@ -20,7 +20,7 @@
 
 #include "models/smooth/live_model.hpp"
 #include "models/smooth/live_options.hpp"
-#include "proto/frame/sink.hpp"
+#include "models/stage.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::smooth {
@@ -35,23 +35,20 @@ class LiveSmoother final : public Stage {
   // Emits none, one or several frames: those that are `lag` behind `in` and have not gone out. An
   // emitted frame keeps its own header, source, root and stamps; its angles, rotations, validity
   // and quality (predicted where something was bridged) are the solve's, lag_frames and lag_ms say
-  // how far behind `in` it is. A tick (null) means silence: flushes. RT-safe.
-  void step(const Frame* in, std::int64_t now_ns, Emit& emit) noexcept override;
+  // how far behind `in` it is; the posterior variance goes with it. RT-safe.
+  void process(const StageFrame& in, StageOut& out) noexcept override;
+  // Silence: flushes. RT-safe.
+  void tick(std::int64_t now_ns, StageOut& out) noexcept override;
 
   // Emits the frames that still wait, with the little that is known of their future: end of stream,
   // or silence. The stream may go on after it. RT-safe.
-  void flush(Emit& emit) noexcept;
+  void flush(StageOut& out) noexcept override;
 
   // Forgets the past: the next frame is a first one. RT-safe.
   void reset() noexcept;
 
   // From the next frame on; returns the model before. RT-safe.
   const LiveModel* set_model(const LiveModel* model) noexcept;
-
-  // Posterior variance of the frame that was emitted last, [rad^2], one a rotation channel in the
-  // order of Frame::angle_rad; infinite where nothing is known. Valid within Emit::frame and until
-  // the next call. RT-safe.
-  [[nodiscard]] std::span<const double> variance_rad2() const noexcept;
 
   // Sensor noise in use [rad]. RT-safe.
   [[nodiscard]] double noise_rad() const noexcept;

@@ -12,9 +12,9 @@ namespace {
 constexpr int kProgressEvery = 1000;  // frames
 
 // Keeps what the stage emits.
-class Catch final : public Emit {
+class Catch final : public StageOut {
  public:
-  void frame(const Frame& frame) noexcept override { frame_ = frame; }
+  void frame(const StageFrame& styled) noexcept override { frame_ = styled.frame; }
   [[nodiscard]] const Frame& get() const { return frame_; }
 
  private:
@@ -87,7 +87,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   Catch out;
   for (int i = 0; i < clip.frames(); ++i) {
     const Frame in = clip.frame(i);
-    filter.step(&in, in.header.device_ns, out);
+    filter.process({.frame = in}, out);
     for (std::size_t j = 0; j < in.joint_count; ++j) {
       const Quatf& styled = out.get().rotation_xyzw[j];
       if (styled == in.rotation_xyzw[j]) continue;

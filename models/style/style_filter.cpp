@@ -119,9 +119,8 @@ double StyleFilter::elapsed_s(const Frame& frame) noexcept {
 }
 
 // RT-safe
-void StyleFilter::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) noexcept {
-  if (in == nullptr) return;
-  Frame frame = *in;
+void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
+  Frame frame = in.frame;
   drop_broken_joints(frame);
   const double dt_s = elapsed_s(frame);
   const double slew = options_.alpha_slew_per_s * dt_s;
@@ -133,7 +132,7 @@ void StyleFilter::step(const Frame* in, std::int64_t /*now_ns*/, Emit& emit) noe
   } else {
     last_joints_ = 0;  // the pose itself is another body's: nothing to blend from
   }
-  emit.frame(frame);
+  out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
 }
 
 // RT-safe

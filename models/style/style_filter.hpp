@@ -22,9 +22,9 @@
 
 #include "models/gp/predictor.hpp"
 #include "models/motion/pose_space.hpp"
+#include "models/stage.hpp"
 #include "models/style/heading.hpp"
 #include "models/style/style_model.hpp"
-#include "proto/frame/sink.hpp"
 
 namespace posed::style {
 
@@ -58,9 +58,9 @@ class StyleFilter final : public Stage {
   // `model` outlives its use here; null passes frames through until the first set_model.
   StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept;
 
-  // Emits one frame for each frame in, with its header and quality; nothing on a tick. A joint
+  // Emits one frame for each frame in, with its header, quality and variance. A joint
   // whose quaternion is not finite or has no length comes out as not measured. RT-safe.
-  void step(const Frame* in, std::int64_t now_ns, Emit& emit) noexcept override;
+  void process(const StageFrame& in, StageOut& out) noexcept override;
 
   // Both take effect at the next frame; RT-safe. Alpha is clamped to +-2, one that is not a number
   // is ignored. set_model returns the old pointer, which is no longer read; `model` is not null (to

@@ -28,7 +28,6 @@ enum class Source : std::uint8_t { kDevice, kFile, kReplay, kLabels };
 // When each step finished with the frame, host time [ns]; kNoTime_ns while it has not.
 struct StageStamps {
   std::int64_t decoded_ns = kNoTime_ns;
-  std::int64_t styled_ns = kNoTime_ns;
   std::int64_t published_ns = kNoTime_ns;  // handed to the publisher
 };
 
@@ -54,7 +53,8 @@ struct Frame {
   float label_probability = 0.0F;
   Vec3f root_position_m{};  // the skeleton's root_joint in the world
   StageStamps stamps;
-  std::bitset<kMaxJoints> valid;  // joint was measured; its rotation is identity otherwise
+  std::array<float, 8> stage_us{};  // spent in each stage of the stream, in their order
+  std::bitset<kMaxJoints> valid;    // joint was measured; its rotation is identity otherwise
   std::array<Quatf, kMaxJoints> rotation_xyzw{};  // [joint], parent-relative
   std::array<float, kMaxChannels> angle_rad{};    // [rotation channel], in Skeleton::channels order
 };

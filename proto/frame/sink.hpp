@@ -25,28 +25,4 @@ class Sink {
   virtual void outcome(Outcome outcome) noexcept = 0;
 };
 
-// Where a pipeline stage puts its frames.
-class Emit {
- public:
-  Emit() = default;
-  Emit(const Emit&) = delete;
-  Emit& operator=(const Emit&) = delete;
-  virtual ~Emit() = default;
-
-  virtual void frame(const Frame& frame) noexcept = 0;
-};
-
-// One step of the pipeline for one stream. `in` is null on a tick (silence, dropout, label-only
-// stream). A stage knows only frame times and `now_ns`, never a clock. RT-safe; called from one
-// thread.
-class Stage {
- public:
-  Stage() = default;
-  Stage(const Stage&) = delete;
-  Stage& operator=(const Stage&) = delete;
-  virtual ~Stage() = default;
-
-  virtual void step(const Frame* in, std::int64_t now_ns, Emit& emit) noexcept = 0;
-};
-
 }  // namespace posed

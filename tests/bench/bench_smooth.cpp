@@ -186,8 +186,11 @@ json cost(unsigned seed) {
   const Skeleton skeleton = hand_skeleton(Side::kRight);
   smooth::AdaptiveWindow window(kHandChannels);
   smooth::LiveSmoother stage(skeleton, {.lag = {}, .noise_rad = 1.0 / kDegrees});
-  struct Last final : Emit {
-    void frame(const Frame& frame) noexcept override { angle = frame.angle_rad[0]; }
+  struct Last final : StageOut {
+    void frame(const StageFrame& made) noexcept override {
+      const Frame& frame = made.frame;
+      angle = frame.angle_rad[0];
+    }
     float angle = 0.0F;
   } last;
   std::vector<double> bare_us, solve_us, stage_us;
@@ -211,7 +214,7 @@ json cost(unsigned seed) {
     window.push(now_s, angles, 1.0 / kDegrees);
     timed(bare_us, [&] { window.solve_once(1.0 / 60.0); });
     timed(solve_us, [&] { window.solve(1.0 / 60.0); });
-    timed(stage_us, [&] { stage.step(&frame, 0, last); });
+    timed(stage_us, [&] { stage.process({.frame = frame}, last); });
   }
   json report{{"bare_solve", percentiles(bare_us)},
               {"live_solve", percentiles(solve_us)},

@@ -1,13 +1,14 @@
-// An Emit that keeps the last frame and counts them all.
+// A StageOut that keeps the last frame and counts them all.
 #pragma once
 
-#include "proto/frame/sink.hpp"
+#include "models/stage.hpp"
 
 namespace posed::test {
 
-class LastFrame final : public Emit {
+class LastFrame final : public StageOut {
  public:
-  void frame(const Frame& frame) noexcept override {
+  void frame(const StageFrame& made) noexcept override {
+    const Frame& frame = made.frame;
     out = frame;
     ++count;
   }

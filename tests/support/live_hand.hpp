@@ -63,7 +63,7 @@ inline Followed followed(const Motion& measured, double rate_hz, const smooth::L
     set_hand_angles(skeleton, angles, frame);
     frame.header.sequence = static_cast<std::uint64_t>(t + 1);
     frame.header.device_ns = nanoseconds(static_cast<double>(t) / rate_hz);
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
   }
   smoother.flush(out);
   Followed result;

@@ -37,10 +37,14 @@ inline Frame frame_of(const Skeleton& skeleton, const Eigen::RowVectorXd& angles
   return frame;
 }
 
-class Frames final : public Emit {
+class Frames final : public StageOut {
  public:
-  void frame(const Frame& frame) noexcept override { all.push_back(frame); }
+  void frame(const StageFrame& made) noexcept override {
+    all.push_back(made.frame);
+    variance_rad2.assign(made.variance_rad2.begin(), made.variance_rad2.end());
+  }
   std::vector<Frame> all;
+  std::vector<double> variance_rad2;  // of the last
 };
 
 // Row t is the estimate of frame t [deg]. Channels that are not a number make their joint missing.
@@ -52,7 +56,7 @@ inline Motion smoothed(const Motion& measured, double rate_hz, const smooth::Liv
   for (Eigen::Index t = 0; t < measured.rows(); ++t) {
     const Frame frame = frame_of(skeleton, measured.row(t), static_cast<std::uint64_t>(t + 1),
                                  nanoseconds(static_cast<double>(t) / rate_hz));
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
   }
   smoother.flush(out);
   Motion result(measured.rows(), measured.cols());

@@ -220,7 +220,7 @@ std::string sample_body(const devices::OpenStream& stream) {
   publish::FrameEncoder encoder(stream.config.name);
   static_cast<void>(encoder.encode(frame));
   const std::int64_t some_ns = frame.header.arrival_ns;
-  return encoder.stamp({some_ns, some_ns, some_ns}).SerializeAsString();
+  return encoder.stamp({some_ns, some_ns}, {}).SerializeAsString();
 }
 
 // Sleeps through all turns, looking at the process at each change.

@@ -243,7 +243,7 @@ Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& c
     const v1::StreamStats* told = subscription->part_of(*heard->stats);
     if (told == nullptr) return no_such_stream(stream, *heard->stats);
     const drivers::Driver* driver = drivers::find_driver(told->driver());
-    if (driver == nullptr || told->greeting().empty()) {
+    if (driver == nullptr || told->device_info().empty()) {
       return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(told->driver()) +
                     ", which has no sensors that can be calibrated");
     }
@@ -251,7 +251,7 @@ Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& c
       return fail("the glove of stream " + in_quotes(stream) +
                   " is away: plug it in and begin again");
     }
-    const auto description = driver->describe(told->greeting(), told->identity());
+    const auto description = driver->describe(told->device_info(), told->identity());
     if (!description) return std::unexpected(description.error());
     auto glove = known(*driver, *description);
     if (!glove) return std::unexpected(glove.error());

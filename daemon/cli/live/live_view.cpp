@@ -70,7 +70,7 @@ std::string row(const v1::StreamStats& stream, const Widths& widths, bool silent
   return fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}",
                      fit(clean_name(stream.stream()), widths.name),
                      fit(silent ? "?" : state_of(stream), 7), rate, short_count(stream.dropped()),
-                     short_count(stream.shed()), now(stream.decode()), now(stream.style()),
+                     short_count(stream.shed()), now(stream.decode()), now(stream.stages()),
                      now(stream.publish()), stream.alpha(),
                      fit(clean_name(stream.model()), widths.model));
 }
@@ -79,6 +79,10 @@ std::string row(const v1::StreamStats& stream, const Widths& widths, bool silent
 std::string stages_row(const v1::StreamStats& stream) {
   std::string text = label_words(stream);
   const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  // Of a single stage the column says it.
+  for (const v1::StageStats& one : stream.stage()) {
+    if (stream.stage_size() > 1) add(clean_name(one.name()) + " " + stage(one.time()));
+  }
   if (stream.lag_frames() > 0) {
     add(fmt::format("lag {} frame{} ({:.0f} ms)", stream.lag_frames(),
                     stream.lag_frames() == 1 ? "" : "s", stream.lag_ms()));
@@ -117,7 +121,7 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
     add(fmt::format("clock {:+.3f} s, drift {:+.1f} ppm", seconds(stream.clock_offset_ns()),
                     drift_ppm));
   }
-  if (!stream.greeting().empty()) add(clean(stream.identity()));
+  if (!stream.device_info().empty()) add(clean(stream.identity()));
   return text;
 }
 
@@ -163,8 +167,8 @@ const char* const kColumnsHelp = R"(Columns, one row a stream:
   HZ       frames published in the last second
   DROP     frames lost so far because a queue was full: the machine could not keep up
   SHED     frames skipped so far because newer ones waited already: the newest pose wins
-  DECODE   from arrival to decoded, STYLE from decoded through all stages, PUBLISH from arrival to
-           handed out: half of the frames of the last second took at most the first figure, 99 % the
+  DECODE   from arrival to decoded, STAGES in all stages together, PUBLISH from arrival to handed
+           out: half of the frames of the last second took at most the first figure, 99 % the
            second; microseconds, with m milliseconds, with s seconds; - where no frame passed
   ALPHA    how much style, -2 to 2; below the row where it slides to
   MODEL    the style model in use, or the gesture model)";
@@ -174,7 +178,7 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
   const bool silent = !options.silence.empty();
   const std::string names =
       fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} ", fit("STREAM", widths.name),
-                  fit("STATE", 7), "HZ", "DROP", "SHED", "DECODE", "STYLE", "PUBLISH", "ALPHA");
+                  fit("STATE", 7), "HZ", "DROP", "SHED", "DECODE", "STAGES", "PUBLISH", "ALPHA");
   if (widths.line > 0) widths.model = std::max(1, widths.line - static_cast<int>(names.size()));
   std::vector<std::string> lines{
       paint(options.colour, kBold, fit(head(stats, options), widths.line)),

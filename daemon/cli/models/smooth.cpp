@@ -33,11 +33,12 @@ struct SmoothOptions {
 };
 
 // Puts what comes out into the clip's rows, and counts.
-class Rows final : public Emit {
+class Rows final : public StageOut {
  public:
   explicit Rows(clip::HandClip& clip) : clip_(clip) {}
 
-  void frame(const Frame& frame) noexcept override {
+  void frame(const StageFrame& made) noexcept override {
+    const Frame& frame = made.frame;
     HandAngles& row = clip_.angles[next_++];
     const HandAngles angles = hand_angles(frame);
     for (std::size_t c = 0; c < row.size(); ++c) {
@@ -132,7 +133,7 @@ Result<> smooth(const SmoothOptions& options) {
     set_hand_angles(skeleton, measured[t], frame);
     frame.header.sequence = t + 1;
     frame.header.device_ns = nanoseconds(clip->time_s[t] - clip->time_s[0]);
-    smoother.step(&frame, 0, rows);
+    smoother.process({.frame = frame}, rows);
   }
   smoother.flush(rows);
   if (auto written = clip::write_hand_csv(*clip, options.out); !written) return written;

@@ -20,8 +20,8 @@ v1::Stats stats_of(int streams) {
     stream.set_alpha(-0.5F);
     stream.set_alpha_target(-0.5F);
     stream.set_model("march-to-sway.style");
-    stream.mutable_style()->set_p50_us(31.4F);
-    stream.mutable_style()->set_p99_us(1234.0F);
+    stream.mutable_stages()->set_p50_us(31.4F);
+    stream.mutable_stages()->set_p99_us(1234.0F);
   }
   return stats;
 }
@@ -63,7 +63,7 @@ TEST_CASE("the live view tells which gloves are away, since when, and how a glov
   v1::Stats stats = stats_of(4);
   stats.set_time_ns(1'000'000'000'000);
   for (auto& stream : *stats.mutable_stream()) {
-    stream.set_greeting("cyberglove hand=right");
+    stream.set_device_info("cyberglove hand=right");
     stream.set_link_ns(stats.time_ns() - 180'000'000'000);
     stream.set_connections(1);
     stream.set_identity("0403:6001 A9XYZ");

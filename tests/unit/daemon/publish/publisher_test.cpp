@@ -117,7 +117,7 @@ TEST_CASE("each kind of item goes out under its topic") {
   CHECK(frame.angle_rad_size() == 15);
   CHECK(frame.validity() == std::string(5, '\1'));
   CHECK(frame.published_ns() > 0);
-  CHECK_FALSE(frame.has_styled_ns());
+  CHECK(frame.stage_us().empty());
   v1::Sample bend;
   REQUIRE(bend.ParseFromString(rig.bodies["sensor/toy"]));
   CHECK(bend.name(0) == "bend");

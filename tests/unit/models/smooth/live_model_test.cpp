@@ -148,7 +148,7 @@ TEST_CASE("a model comes and goes while the hand moves, without the heap", "[liv
     const auto before = allocations();
     if (t == 100) CHECK(smoother.set_model(model) == nullptr);
     if (t == 250) CHECK(smoother.set_model(nullptr) == model);
-    smoother.step(&frame, 0, last);
+    smoother.process({.frame = frame}, last);
     if (allocations() != before) FAIL("takes memory");
     if (t == 200) CHECK(last.out.label[0] != '\0');
     if (t == 260) CHECK(last.out.label[0] == '\0');
@@ -173,8 +173,8 @@ TEST_CASE("a model that comes while frames wait neither names nor bends them", "
       Frame frame;
       set_hand_angles(skeleton, angles, frame);
       frame.header.device_ns = nanoseconds(t / 30.0);
-      plain.step(&frame, 0, without);
-      swapped.step(&frame, 0, with_model);
+      plain.process({.frame = frame}, without);
+      swapped.process({.frame = frame}, with_model);
     };
     for (int t = 0; t < 60; ++t) step(t);
     REQUIRE(swapped.set_model(model) == nullptr);

@@ -53,7 +53,7 @@ TEST_CASE("each frame comes out once, as late as the lag says", "[live]") {
   Frames out;
   for (long i = 0; i < 50; ++i) {
     const Frame frame = wave_frame(skeleton, i);
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
     REQUIRE(static_cast<int>(out.all.size()) == std::max(0L, i + 1 - lag));
   }
   for (std::size_t i = 0; i < out.all.size(); ++i) {
@@ -69,7 +69,7 @@ TEST_CASE("each frame comes out once, as late as the lag says", "[live]") {
     const auto turned = local_rotation(skeleton, 1, angles);
     CHECK(angle_between_rad(turned, to_eigen_double(frame.rotation_xyzw[1])) < 1e-6);
   }
-  smoother.step(nullptr, 0, out);  // silence: what waited comes out
+  smoother.tick(0, out);  // silence: what waited comes out
   REQUIRE(out.all.size() == 50);
   CHECK(out.all.back().header.sequence == 50);
   CHECK(out.all.back().lag_frames == 0);
@@ -84,7 +84,7 @@ TEST_CASE("a lag in time becomes frames at the stream's own rate", "[live]") {
   Frames out;
   for (long i = 0; i < 60; ++i) {
     const Frame frame = wave_frame(skeleton, i, rate_hz);
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
   }
   const int frames = static_cast<int>(std::lround(0.033 * rate_hz));
   CHECK(static_cast<int>(out.all.size()) == 60 - frames);
@@ -119,8 +119,8 @@ TEST_CASE("missing joints are bridged and called predicted", "[live]") {
       frame.rotation_xyzw[1] = kIdentity;
       frame.angle_rad[4] = std::numeric_limits<float>::quiet_NaN();
     }
-    smoother.step(&frame, 0, out);
-    const double variance = smoother.variance_rad2()[4];
+    smoother.process({.frame = frame}, out);
+    const double variance = out.variance_rad2[4];
     if (i == 50) CHECK(std::sqrt(variance) / kDegree < 0.3);
     if (i == 63) CHECK(std::sqrt(variance) / kDegree > 0.5);
   }
@@ -141,10 +141,10 @@ TEST_CASE("a joint that was never measured stays unknown", "[live]") {
   for (long i = 0; i < 40; ++i) {
     Frame frame = wave_frame(skeleton, i);
     if (i < 20) frame.valid[1] = false;
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
     if (i == 10) {
-      CHECK(std::isinf(smoother.variance_rad2()[4]));
-      CHECK(std::isfinite(smoother.variance_rad2()[1]));
+      CHECK(std::isinf(out.variance_rad2[4]));
+      CHECK(std::isfinite(out.variance_rad2[1]));
     }
   }
   CHECK_FALSE(out.all[10].valid[1]);
@@ -172,7 +172,7 @@ TEST_CASE("uneven and missing frames are where their times say", "[live]") {
       for (double& angle : angles) angle += noise(random);
       const Frame frame =
           frame_of(skeleton, angles, static_cast<std::uint64_t>(i + 1), nanoseconds(t));
-      smoother.step(&frame, 0, out);
+      smoother.process({.frame = frame}, out);
       if (i < 40) continue;
       const Frame& last = out.all.back();
       sum += std::pow(angle_deg(last, 1) - wave(3, seconds(last.header.device_ns))[1], 2);
@@ -206,7 +206,7 @@ TEST_CASE("a clock that stands still or runs backwards does no harm", "[live]") 
       default:
         break;
     }
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
   }
   smoother.flush(out);
   REQUIRE(out.all.size() == 400);
@@ -226,7 +226,7 @@ TEST_CASE("arrival times that come in bursts are taken as the beat behind them",
     Frame frame = wave_frame(skeleton, i);
     frame.header.arrival_ns = at_60hz(i) + nanoseconds(late(random));
     frame.header.device_ns = kNoTime_ns;
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
     if (i < 60) continue;
     sum += std::pow(
         angle_deg(out.all.back(), 1) - wave(3, static_cast<double>(out.all.size() - 1) / 60.0)[1],
@@ -245,7 +245,7 @@ TEST_CASE("turns and the two ways to say a rotation do not jump", "[live]") {
     angles << std::remainder(turn_deg, 360.0), 20.0, 10.0;
     if (i % 7 == 3) angles << angles[0] + 180.0, 180.0 - angles[1], angles[2] - 180.0;
     const Frame frame = frame_of(skeleton, angles, static_cast<std::uint64_t>(i + 1), at_60hz(i));
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
     if (out.all.size() < 40) continue;
     const long shown = static_cast<long>(out.all.size()) - 1;
     const Frame truth =
@@ -263,7 +263,7 @@ TEST_CASE("frames that are not its own pass through in order", "[live]") {
     Frame frame = wave_frame(skeleton, i);
     if (i == 10) frame.skeleton += 1;
     if (i == 11) frame.angle_count = 0;
-    smoother.step(&frame, 0, out);
+    smoother.process({.frame = frame}, out);
   }
   smoother.flush(out);
   REQUIRE(out.all.size() == 20);
@@ -275,8 +275,9 @@ TEST_CASE("the same frames give the same bits, and none is taken from the heap",
   const Skeleton skeleton = finished(45);
   const SyntheticHand hand = synthetic_hand(4, 3);
   const Motion measured = noisy(hand.angles, 1.0, 4);
-  struct Sum final : Emit {
-    void frame(const Frame& frame) noexcept override {
+  struct Sum final : StageOut {
+    void frame(const StageFrame& made) noexcept override {
+      const Frame& frame = made.frame;
       for (int c = 0; c < 45; ++c) total += static_cast<double>(frame.angle_rad[c]) * (c + 1);
     }
     double total = 0.0;
@@ -290,7 +291,7 @@ TEST_CASE("the same frames give the same bits, and none is taken from the heap",
       Frame frame = frame_of(skeleton, measured.row(i), static_cast<std::uint64_t>(i), at_60hz(i));
       if (i % 20 == 0) frame.valid[3] = false;
       const auto before = allocations();
-      smoother.step(&frame, 0, *sum);
+      smoother.process({.frame = frame}, *sum);
       if (allocations() != before) FAIL("step takes memory");
     }
     const auto before = allocations();

@@ -10,9 +10,12 @@ using namespace posed::test;
 
 namespace {
 
-class Keep final : public Emit {
+class Keep final : public StageOut {
  public:
-  void frame(const Frame& frame) noexcept override { out = frame; }
+  void frame(const StageFrame& made) noexcept override {
+    const Frame& frame = made.frame;
+    out = frame;
+  }
   Frame out;
 };
 
@@ -44,7 +47,7 @@ TEST_CASE("apply --cold gives the live filter's frames", "[style][apply]") {
   Keep keep;
   for (int i = 0; i < walk.frames(); ++i) {
     const Frame in = walk.frame(i);
-    live.step(&in, in.header.device_ns, keep);
+    live.process({.frame = in}, keep);
     CHECK(furthest_rad(keep.out, cold.clip.frame(i)) < 1e-5);
   }
 }

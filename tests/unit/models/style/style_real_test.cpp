@@ -148,7 +148,7 @@ TEST_CASE("a model taught at 30 Hz serves the same walk at 120 Hz, frame by fram
     Frame in = fast.frame(t);
     in.header.sequence = 7U + 3U * static_cast<std::uint64_t>(t);
     in.header.arrival_ns = in.header.device_ns + 1'234'567;
-    filter.step(&in, in.header.arrival_ns, last);
+    filter.process({.frame = in}, last);
     REQUIRE(last.count == t + 1);
     REQUIRE(last.out.header.sequence == in.header.sequence);
     REQUIRE(last.out.header.device_ns == in.header.device_ns);
