@@ -97,7 +97,8 @@ FrameParser FrameParser::hand_csv() {
 
 bool FrameParser::keep(double value, std::size_t channel, std::span<double> values) const noexcept {
   values[channel] = value * scale_[channel];
-  return !(std::abs(values[channel]) > limit_[channel]);  // NaN is a value that is missing
+  return !(std::abs(values[channel]) >
+           limit_[channel]);  // NaN marks a missing value and is accepted
 }
 
 FrameOutcome FrameParser::parse(std::string_view text, std::span<double> values) const noexcept {
