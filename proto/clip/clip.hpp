@@ -21,16 +21,16 @@ struct Clip {
   std::string path;
   std::shared_ptr<const Skeleton> skeleton;
   double frame_rate_hz = 0.0;
-  ChannelMatrix
-      channels;  // [frames x Skeleton::channels], rad and m; NaN where a hand CSV has no value
+  // [frames x Skeleton::channels], rad and m; NaN where a hand CSV has no value.
+  ChannelMatrix channels;
   std::vector<double> time_s{};       // [frame], increasing; empty: evenly spaced, from 0
   std::vector<std::string> warnings;  // one sentence for each thing that was read leniently
-  double metres_per_unit =
-      0.01;  // of the file; kept so that it can be written back in its own unit
+  // Unit of the file, kept so that the clip can be written back in it.
+  double metres_per_unit = 0.01;
 
   [[nodiscard]] int frames() const { return static_cast<int>(channels.rows()); }
-  [[nodiscard]] Frame frame(
-      int index) const;  // pose and device time (from the index); the stream is not set
+  // The pose, with a device time from the index; the stream is not set.
+  [[nodiscard]] Frame frame(int index) const;
 };
 
 struct ReadOptions {

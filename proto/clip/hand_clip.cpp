@@ -10,8 +10,7 @@
 namespace posed::clip {
 namespace {
 
-using JointsOfHand =
-    std::array<int, kHandJoints>;  // [joint of the hand] index in the clip's skeleton
+using JointsOfHand = std::array<int, kHandJoints>;  // joint index in the clip's skeleton
 
 std::string_view side_name(Side side) { return side == Side::kLeft ? "left" : "right"; }
 

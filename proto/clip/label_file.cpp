@@ -14,8 +14,8 @@ namespace posed::clip {
 namespace {
 
 constexpr double kHtkUnit_s = 1e-7;
-constexpr double kHtkFrom =
-    10'000.0;  // if all times are integers and the last exceeds this, they are HTK's
+// Times that are all integers with the last above this are HTK's.
+constexpr double kHtkFrom = 10'000.0;
 constexpr std::uintmax_t kMaxLabelFile = 64'000'000;  // bytes
 constexpr double kSlack_s = 1e-6;                     // times are written with six decimals
 

@@ -21,9 +21,10 @@ namespace posed::clip {
 // The shortest text that reads back as the same number.
 [[nodiscard]] std::string number_text(double value);
 
-// Largest |value| of a joint angle or length that parse_number() accepts. RT-safe.
+// Largest |value| of a joint angle or length that parse_number() accepts.
 inline constexpr double kMaxValue = 1e9;
 
+// RT-safe.
 [[nodiscard]] constexpr bool is_space(char c) noexcept {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
 }

@@ -6,10 +6,7 @@
 namespace posed {
 namespace {
 
-constexpr int kFirstMirroredFinger =
-    3;  // the ring and little fingers, beyond the middle finger, are mirrored
-
-// Rotates fingers from +Z to the side's own X axis; the palm stays down on both sides.
+constexpr int kFirstMirroredFinger = 3;  // ring and little, beyond the middle finger
 Eigen::Quaterniond t_frame(Side side) {
   const double quarter = std::numbers::pi / 2;
   return axis_rotation(Axis::kY, side == Side::kLeft ? quarter : -quarter);

@@ -22,8 +22,8 @@ struct Profile {
   std::vector<std::string> match;  // the profile fits a figure with all these joints,
   std::map<std::string, std::string> along;  // if these joints' OFFSETs point this way ("-y")
   std::map<std::string, Bone> bones;         // joint name -> canonical bone
-  std::map<std::string, Eigen::Quaterniond>
-      T;  // joint name -> T; other joints get theirs by the rule in t_pose.hpp
+  // Joint name -> T; other joints get theirs by the rule in t_pose.hpp.
+  std::map<std::string, Eigen::Quaterniond> T;
 };
 
 // All profiles, read once. They are built into the program; a mistake in one is a bug, which the

@@ -8,8 +8,8 @@
 
 namespace posed::model_file {
 
-inline constexpr double kMaxNumber =
-    1e30;  // small enough that products stay within the hot path's floats
+// Small enough that products stay within the hot path's floats.
+inline constexpr double kMaxNumber = 1e30;
 
 class Validator {
  public:
