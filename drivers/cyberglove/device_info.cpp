@@ -7,7 +7,8 @@
 namespace posed::drivers::cyberglove {
 namespace {
 
-constexpr int kMostTicks = 65535 * 1024;  // slower than any rate that options allow
+// Longer than the period of any rate that the options allow.
+constexpr int kMostTicks = 65535 * 1024;
 
 }  // namespace
 

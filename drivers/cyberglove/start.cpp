@@ -52,8 +52,8 @@ Result<> check_hand(Session& session, Side hand) {
               "\", or plug the other glove in");
 }
 
-// The mask of the fitted sensors. Gloves of 18 and 22 are known; of others the box's own word is
-// taken when it agrees with itself.
+// Reads the mask of the fitted sensors. Gloves with 18 and 22 sensors are known; for others the
+// box's mask is used if its sensor count agrees.
 Result<std::uint32_t> read_mask(Session& session, int wanted) {
   const auto count = session.query('S', 1);
   if (!count) return std::unexpected(count.error());
@@ -82,7 +82,7 @@ Result<> set_and_read_back(Session& session, char letter, bool on) {
               "'; switch its box off and on again");
 }
 
-// Left over from the program before, these would change a sample's length without a word.
+// These settings may be left over from another program and would silently change a sample's length.
 Result<> set_layout(Session& session, const Layout& layout) {
   const std::string mask{'M', byte_of(layout.mask), byte_of(layout.mask >> 8),
                          byte_of(layout.mask >> 16)};
@@ -98,7 +98,7 @@ Result<> start_8bit(Session& session, const RequestedConfig& requested, const La
   if (auto ok = set_layout(session, layout); !ok) return ok;
   if (auto ok = session.set(std::string{'F', requested.filter ? '\x01' : '\0'}, "F"); !ok)
     return ok;
-  // In ASCII: sources differ on the byte order of the binary form.
+  // Sent in ASCII, because sources differ on the byte order of the binary form.
   const std::string period =
       "t " + std::to_string(requested.period.w1) + " " + std::to_string(requested.period.w2) + "\r";
   if (auto ok = session.set(period, "t"); !ok) return ok;

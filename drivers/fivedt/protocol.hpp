@@ -53,15 +53,15 @@ inline constexpr std::array<std::string_view, 6> kFormNames{
 
 inline constexpr std::size_t kMaxPacket = 64;
 inline constexpr std::size_t kMaxValues = 16;
-inline constexpr std::byte kReady{0x55};  // the answer to A, and what may follow a packet
+inline constexpr std::byte kReady{0x55};  // the answer to A; may also follow a packet
 
-[[nodiscard]] bool is_usb(Form form) noexcept;               // reports, no byte stream; RT-safe
+[[nodiscard]] bool is_usb(Form form) noexcept;  // sends reports, not a byte stream; RT-safe
 [[nodiscard]] std::size_t sensors_of(Form form) noexcept;    // RT-safe
-[[nodiscard]] std::size_t packet_bytes(Form form) noexcept;  // of a measurement; RT-safe
-// Where sensor `index` stands among the values of a packet. RT-safe.
+[[nodiscard]] std::size_t packet_bytes(Form form) noexcept;  // of a measurement packet; RT-safe
+// Index of sensor `index` among the values of a packet. RT-safe.
 [[nodiscard]] std::size_t value_of_sensor(Form form, std::size_t index) noexcept;
 
-// One packet.
+// The content of one packet.
 struct Reading {
   enum class Kind : std::uint8_t { kData, kInfo };
   Kind kind = Kind::kData;
@@ -71,22 +71,24 @@ struct Reading {
   bool right = true;                 // of an info packet
 };
 
-// Length of the packet that begins with these bytes; 0 when none begins so. One byte is enough to
-// say 0 or not; until the length is certain it is a lower bound above bytes.size(). RT-safe.
+// Length of the packet that begins with these bytes; 0 when no packet begins like this. One byte is
+// enough to tell whether it is 0; until the length is certain, it is a lower bound greater than
+// bytes.size(). RT-safe.
 [[nodiscard]] std::size_t packet_length(Form form, std::span<const std::byte> bytes) noexcept;
 
-// `bytes` is one packet. kOk fills `reading`; kBadChecksum, kOutOfRange (more than 12 bits),
-// kForeign. RT-safe.
+// `bytes` is one packet. Fills `reading` and returns kOk; otherwise kBadChecksum, kOutOfRange (more
+// than 12 bits) or kForeign. RT-safe.
 [[nodiscard]] Outcome decode_packet(Form form, std::span<const std::byte> bytes,
                                     Reading& reading) noexcept;
 
-// What the glove would send; `side` goes into a wireless type's tenth byte.
+// The bytes that the glove would send; `side` goes into the tenth byte of a wireless type.
 [[nodiscard]] std::vector<std::byte> encode_packet(Form form, const Reading& reading, Side side);
-// The answer to G of a Data Glove 5; only its hand is read.
+// Length of a Data Glove 5's answer to G; only its hand is used.
 inline constexpr std::size_t kInfoBytes = 32;
 [[nodiscard]] std::vector<std::byte> encode_info(Side side);
 
-// Whether a wireless type's tenth byte is one at all, and says left. RT-safe.
+// True when the byte is a valid tenth byte of a wireless type; and when it means a left hand.
+// RT-safe.
 [[nodiscard]] bool is_capability(std::byte byte) noexcept;
 [[nodiscard]] bool says_left(std::byte capability) noexcept;
 
