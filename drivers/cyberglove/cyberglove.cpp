@@ -172,7 +172,7 @@ Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptic
   if (!requested) return std::unexpected(requested.error());
   if (requested->layout.form == Form::k16Bit) return misuse("CyberTouch goes with form = \"8bit\"");
   if (haptics.vibration_s != 0.0F) {
-    return misuse("a CyberTouch shakes until it is told otherwise: send forces, 0 to end them");
+    return misuse("a CyberTouch shakes until the next command: send forces, and 0 to end them");
   }
   std::vector<std::byte> bytes{kTouch, std::byte{0}};
   for (std::size_t f = 0; f < kFingers; ++f) {

@@ -10,7 +10,7 @@
 //    lead     S streamed, G polled, Y by external sync
 //    sensors  N bytes of 1 to 255, those of the mask in ascending order
 //    stamp    flags, then u32 LE [1/115200 s]; a counter byte of 0 is sent as 1 with its flag set
-//    status   bit 0 glove device in, 1 switch, 2 light, 7 always set
+//    status   bit 0 glove plugged in, 1 switch, 2 light, 7 always set
 //    pairs    e s: sampled too fast; e g: glove unplugged
 //
 // 16-bit form (III): 61 bytes
@@ -18,7 +18,7 @@
 //   +------------------+-----+-----------------+----------+
 //   | HH:MM:SS:ff:n    |  S  | 22 x u16 BE     | 0D 0A 00 |
 //   +------------------+-----+-----------------+----------+
-//    ff  frame of 30 a second, n sub-frame; values of 12 bits, 1 to 4094
+//    ff  frame of 30 per second, n sub-frame; values of 12 bits, 1 to 4094
 #pragma once
 
 #include <array>

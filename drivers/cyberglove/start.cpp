@@ -26,7 +26,7 @@ Result<> check_device(Session& session, const RequestedConfig& requested) {
   const auto printable = std::ranges::count_if(
       *info, [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\0'; });
   if (printable < static_cast<std::ptrdiff_t>(info->size() * 3 / 4)) {
-    return fail(session.name() + " answers what makes no sense" + rate +
+    return fail(session.name() + " sends answers that make no sense" + rate +
                 ": set baud as the CyberGlove's box is set (9600 to 115200), or name another port");
   }
   return fail(session.name() + " is another device, not a CyberGlove: name the right port or id");
@@ -36,7 +36,7 @@ Result<> check_glove(Session& session) {
   const auto state = session.query('G', 1);
   if (!state) return std::unexpected(state.error());
   if (((*state)[0] & kGloveIn) == 0) {
-    return fail("the glove is not device into its box on " + session.name() + ": plug it in");
+    return fail("the glove is not plugged into its box on " + session.name() + ": plug it in");
   }
   if (((*state)[0] & kInitialised) != 0) return {};
   return session.set("\x09", "\x09");  // the box reads the glove's data again
@@ -69,8 +69,8 @@ Result<std::uint32_t> read_mask(Session& session, int wanted) {
   if (sensors == std::popcount(kMask18)) return kMask18;
   if (sensors == std::popcount(kMask22)) return kMask22;
   if (sensors > 0 && std::popcount(mask) == sensors) return mask;
-  return fail("the box on " + session.name() + " says it has " + std::to_string(sensors) +
-              " sensors, and a mask of others: check the glove's plug");
+  return fail("the box on " + session.name() + " reports " + std::to_string(sensors) +
+              " sensors, but a mask with another number: check the glove's plug");
 }
 
 Result<> set_and_read_back(Session& session, char letter, bool on) {

@@ -56,7 +56,7 @@ enum class ChecksumKind : std::uint8_t { kNone, kSum8, kXor8, kCrc32 };
 struct ChecksumRule {
   ChecksumKind kind = ChecksumKind::kNone;
   int at = 0;            // position of its first byte
-  int from = 0, to = 0;  // sum of the bytes from `from` up to but not including `to`
+  int from = 0, to = 0;  // covers the bytes from `from` up to but not including `to`
   bool big = false;      // byte order of a CRC-32
 };
 

@@ -1,25 +1,25 @@
 // The packets of 5DT data gloves. No I/O here.
 //
-//   Data Glove 5, serial, 19200 8N1. The host sends one letter: A starts anew, answered by 55; G
-//   asks who it is, answered by 32 bytes ("BR", major, minor, bit 0: right, bit 4: pitch and roll
-//   fitted,
-//   .. name from byte 16); C asks for one packet; D for packets without end.
+//   Data Glove 5, serial, 19200 8N1. The host sends one letter: A resets it, answered by 55; G asks
+//   for its info, answered by 32 bytes ("BR", major, minor, bit 0: right, bit 4: pitch and roll
+//   fitted, .. name from byte 16); C asks for one packet; D starts continuous packets.
 //      0      1       2       3       4       5        6       7       8
 //   +------+-------+-------+-------+------+--------+-------+------+----------+
 //   |  80  | thumb | index | middle| ring | little | pitch | roll | checksum |  then sometimes 55
 //   +------+-------+-------+-------+------+--------+-------+------+----------+
 //     bends 0 (straight) to 255; pitch and roll 0 to 255 for 0 to 180 degrees; checksum: XOR of
-//     bytes 1 to 7. 80 may be data, too.
-//   Data Glove 5 of the wireless type, 9600 8N1: the same without being asked, with a tenth byte
-//     that says which hand (01 or 00 right, 40 or 06 left: sources differ).
-//   Data Glove 16, serial, 19200 8N1, without being asked:
+//     bytes 1 to 7. 80 may also be data.
+//   Data Glove 5 of the wireless type, 9600 8N1: the same without a request, with a tenth byte
+//     for the hand (01 or 00 right, 40 or 06 left: sources differ).
+//   Data Glove 16, serial, 19200 8N1, without a request:
 //     '<' 'I' hw-major hw-minor flags(bit 0: right) flags(bit 0: wired) ?             7 bytes
-//     '<' 'D' 16 values of 12 bits as u16 BE, 2 bytes that nobody has explained      36 bytes
+//     '<' 'D' 16 values of 12 bits as u16 BE, 2 bytes of unknown meaning             36 bytes
 //   Ultra Wireless kit, serial: 29 bytes
 //     3C, port (low nibble 2 or 3: A, else B), ?, 14 values of 12 bits packed most significant bit
-//     first (21 bytes), 5 bytes that nobody has explained. 3C may be data, too.
-//   Ultra USB, HID: reports of 64 bytes without a number; 16 values of 12 bits as i16 BE, then 32
-//     bytes that nobody has explained. Five sensors are values 0, 3, 6, 9 and 12.
+//     first (21 bytes), 5 bytes of unknown meaning. 3C may also be data.
+//   Ultra USB, HID: reports of 64 bytes without a report number; 16 values of 12 bits as i16 BE,
+//   then 32
+//     bytes of unknown meaning. Five sensors are values 0, 3, 6, 9 and 12.
 //
 // Order of the wide gloves' values: thumb near, thumb far, thumb/index, index near, index far,
 // index/middle, middle near, far, middle/ring, ring near, far, ring/little, little near, far, and
