@@ -1,6 +1,5 @@
-// The calibration of Shadow's ROS driver: XML; a raw value v is 1 + 254 v counts,
-// values are counts; calibrated values in degrees, flexion and spread positive; two points or more
-// in any order.
+// The calibration of Shadow's ROS driver: XML; a raw value from 0 to 1 stands for 1 to 255 counts;
+// calibrated values in degrees, flexion and spread positive; two points or more in any order.
 #include <algorithm>
 #include <array>
 
