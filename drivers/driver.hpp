@@ -1,6 +1,6 @@
-// The contract between posed and a device. A driver is passive: the daemon owns every thread. It
-// splits in two: a Transport that hands over raw chunks, and a Decoder that turns chunks into
-// frames. A log of the chunks therefore replays through the very decoder that ran live.
+// The contract between posed and a device. A driver starts no threads: the daemon owns them all. It
+// has two parts: a Transport that delivers raw chunks of bytes, and a Decoder that turns chunks
+// into frames. A log of the chunks therefore replays through the same decoder that ran live.
 #pragma once
 
 #include <array>
@@ -26,17 +26,16 @@ namespace posed::drivers {
 
 class TransportFactory;  // drivers/transport/transport_factory.hpp
 
-inline constexpr std::size_t kMaxChunk =
-    64 * 1024;  // bytes; a longer one is an error of the transport
+inline constexpr std::size_t kMaxChunk = 64 * 1024;  // bytes; a Transport never gives more
 
-// What one read gave.
+// The result of one read.
 struct Chunk {
-  std::span<const std::byte> bytes;  // valid until the next read; empty when nothing was due
-  bool end = false;   // comes alone, after the last bytes: the source will never give more
-  bool lost = false;  // comes alone: the link is broken; the device may come back on a new one
+  std::span<const std::byte> bytes;  // valid until the next read; empty when nothing was available
+  bool end = false;   // delivered alone after the last bytes: the source has ended for good
+  bool lost = false;  // delivered alone: the connection is lost; the device may return on a new one
 };
 
-// Where bytes come from. One reader thread uses it after open().
+// The source of bytes. After open(), one reader thread uses it.
 class Transport {
  public:
   Transport() = default;
@@ -44,34 +43,34 @@ class Transport {
   Transport& operator=(const Transport&) = delete;
   virtual ~Transport() = default;
 
-  // Readable when a chunk may be due; the daemon polls it. Valid from open() to destruction. -1 for
-  // a source that goes by time alone.
+  // Readable when a chunk may be available; the daemon polls it. Valid from open() to destruction.
+  // -1 for a source driven by time only.
   [[nodiscard]] virtual int poll_fd() const noexcept = 0;
 
-  // Host time of the next chunk of a source that goes by time (files, replay); kNoTime_ns for one
-  // that its descriptor announces. RT-safe.
+  // Host time of the next chunk of a source driven by time (files, replay); kNoTime_ns for a source
+  // whose descriptor announces chunks. RT-safe.
   [[nodiscard]] virtual std::int64_t next_due_ns() const noexcept { return kNoTime_ns; }
 
-  // Whether the source would rather wait than lose frames (a file played as fast as possible): it
-  // is read only when the pipeline has caught up.
+  // True when the source must not lose frames and may wait instead (a file played as fast as
+  // possible): it is read only when the pipeline has caught up.
   [[nodiscard]] virtual bool lossless() const noexcept { return false; }
 
-  // Chunks a second to be expected of a source that goes by time; 0 where only the device knows.
+  // Expected chunks per second of a source driven by time; 0 when only the device knows.
   [[nodiscard]] virtual double rate_hz() const noexcept { return 0.0; }
 
-  // Starts the source (a file's clock begins to run). Cold.
+  // Starts the source (the clock of a file begins to run). Cold.
   [[nodiscard]] virtual Result<> start(std::int64_t now_ns) = 0;
 
-  // The next chunk, at most one; call again until it is empty. Never blocks. RT-safe but for its
+  // The next chunk, at most one; call again until it is empty. Never blocks. RT-safe except for its
   // read.
   [[nodiscard]] virtual Chunk read(std::int64_t now_ns) noexcept = 0;
 
-  // Sends bytes to the device, all or none; false when the link does not take them now. RT-safe but
-  // for its write.
+  // Sends bytes to the device, all or none; returns false when the link does not accept them now.
+  // RT-safe except for its write.
   [[nodiscard]] virtual bool send(std::span<const std::byte> /*bytes*/) noexcept { return false; }
 };
 
-// Bytes to frames. Pure: no clock, no I/O, no allocation after construction.
+// Turns bytes into frames. Pure: no clock, no I/O, no allocation after construction.
 class Decoder {
  public:
   Decoder() = default;
@@ -79,13 +78,14 @@ class Decoder {
   Decoder& operator=(const Decoder&) = delete;
   virtual ~Decoder() = default;
 
-  // Bytes in any cut; `arrival_ns` is the time of the read. Whatever the bytes are, it neither
-  // crashes nor hangs, and counts what it cannot use. RT-safe.
+  // Decodes bytes, which may be cut at any position; `arrival_ns` is the time of the read. The
+  // bytes are untrusted: for any input it neither crashes nor hangs, and it counts what it cannot
+  // use. RT-safe.
   virtual void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept = 0;
 
-  // Uses this calibration from the next packet on; it must outlive its use. Without a call the
-  // device's default holds; what is no glove has nothing to calibrate. RT-safe.
+  // Uses this calibration from the next packet on; the calibration must outlive its use. Until the
+  // first call the device's default applies; a device other than a glove ignores the call. RT-safe.
   virtual void calibrate(const glove::Calibration& /*calibration*/) noexcept {}
 };
 
@@ -95,20 +95,21 @@ struct SampleLayout {
   std::vector<std::string> units;  // "rad", "1", "m"
 };
 
-// Everything a device says about itself before it streams; stored in the log, enough to decode it
+// What is known about a device before it streams. Stored in the log; enough to decode its bytes
 // again.
 struct Description {
-  std::string driver;    // registry name
-  std::string text;      // the device's own header (a BVH's HIERARCHY), decoder's input
-  std::string identity;  // stable name of the device: path, serial number
+  std::string driver;  // registry name
+  // Device info: the device's own header (a BVH's HIERARCHY); input of the decoder.
+  std::string text;
+  std::string identity;                      // stable name of the device: path, serial number
   std::shared_ptr<const Skeleton> skeleton;  // null for a device that emits samples only
   SampleLayout samples;
   double rate_hz = 0.0;  // nominal; 0 when unknown
 };
 
-// What is sent to a device that answers instead of streaming.
+// The request for a device that answers instead of streaming.
 struct Poll {
-  std::vector<std::byte> request;  // empty: the device streams by itself
+  std::vector<std::byte> request;  // empty: the device streams on its own
   std::int64_t period_ns = 0;
 };
 
@@ -117,12 +118,13 @@ struct Device {
   Description description;
   std::unique_ptr<Transport> transport;
   std::unique_ptr<Decoder> decoder;
-  std::vector<std::string> warnings;  // one sentence each, for the user: opened, but look at this
+  // One sentence each for the user: the device is open, but something needs attention.
+  std::vector<std::string> warnings;
   Poll poll{};
-  double reopen_after_s = 0.0;  // silence after which the link is opened anew; 0: never
+  double reopen_after_s = 0.0;  // seconds of silence after which the link is reopened; 0: never
 };
 
-// What a glove with motors is told: a control message, in units of the hand.
+// A control message for a glove with motors, in units of the hand.
 struct Haptics {
   std::array<float, kFingers> force{};  // thumb to little: 0 free, 1 blocked, negative unchanged
   float vibration_hz = 0.0F;
@@ -130,8 +132,8 @@ struct Haptics {
   float vibration = 0.0F;    // amplitude, 0 to 1
 };
 
-// The options a driver takes from its [stream.<driver>] table; config/ checks them against this
-// list.
+// The options that a driver accepts in its [stream.<driver>] table; the daemon's config reader
+// checks a config against this list.
 using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
 using Options = std::map<std::string, OptionValue>;
 struct OptionSpec {
@@ -142,30 +144,30 @@ struct OptionSpec {
   std::string_view help;
 };
 
-// One line of the registry.
+// One entry of the registry.
 struct Driver {
   std::string_view name;
   std::string_view summary;
   std::vector<OptionSpec> options;
-  // Finds the device, speaks with it and starts it; may take a few seconds. Files open at once.
+  // Finds the device, talks to it and starts it; may take a few seconds. Files open at once.
   Result<Device> (*open)(const Options& options, TransportFactory& ports);
-  // The decoder alone, from what a log kept of the description's text; replay uses it.
+  // Makes only the decoder, from the description's text stored in a log; used by replay.
   Result<std::unique_ptr<Decoder>> (*make_decoder)(const Description& description);
-  // Skeleton, samples and rate again from driver + text + identity.
+  // Rebuilds skeleton, samples and rate from driver + text + identity.
   Result<Description> (*describe)(const std::string& text, const std::string& identity);
-  // For a device that may come later: its description as the options promise it. What open() finds
-  // has the same skeleton and samples. Null: the device must be there from the start.
+  // For a device that may be connected later: its description according to the options. The device
+  // found by open() has the same skeleton and samples. Null: the device must be present at start.
   Result<Description> (*expect)(const Options& options) = nullptr;
-  // The sensors of a glove and what they mean before calibration; null for what is no glove.
+  // The sensors of a glove and their meaning before calibration; null for other devices.
   Result<glove::Model> (*glove_model)(const Description& description) = nullptr;
-  // The bytes for the device; null for one that cannot be felt.
+  // Encodes a haptics message for the device; null for a device without motors.
   Result<std::vector<std::byte>> (*encode_haptics)(const Options& options,
                                                    const Haptics& haptics) = nullptr;
-  // The device's other side, for tests, `posed emulate` and the demo; null where there is none.
+  // Emulates the device, for tests, `posed emulate` and the demo; null when there is no emulator.
   Result<std::unique_ptr<Emulator>> (*emulate)(const Options& options) = nullptr;
 };
 
-[[nodiscard]] std::span<const Driver> registry();                // the one list
+[[nodiscard]] std::span<const Driver> registry();                // the list of all drivers
 [[nodiscard]] const Driver* find_driver(std::string_view name);  // null when unknown
 
 }  // namespace posed::drivers

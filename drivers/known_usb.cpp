@@ -6,13 +6,13 @@ namespace posed::drivers {
 namespace {
 
 constexpr std::array kKnown{
-    // CyberGlove III: an FTDI chip (its user guide); the id is that chip's default.
+    // CyberGlove III: an FTDI chip (see its user guide); the id is that chip's default.
     KnownUsb{.vendor = 0x0403, .product = 0x6001, .driver = "cyberglove", .adapter = true},
-    // LucidGloves: the two bridges of ESP32 and Arduino boards that opengloves-driver looks for
-    // (its 7524 is no CH340, which is 1A86:7523).
+    // LucidGloves: the two USB-serial bridges of ESP32 and Arduino boards that opengloves-driver
+    // looks for (it lists 1A86:7524, but a CH340 is 1A86:7523).
     KnownUsb{.vendor = 0x10C4, .product = 0xEA60, .driver = "lucidgloves", .adapter = true},
     KnownUsb{.vendor = 0x1A86, .product = 0x7523, .driver = "lucidgloves", .adapter = true},
-    // 5DT Ultra: every product of the vendor is a glove; bit 0 says left (VRPN's 5dtUSB).
+    // 5DT Ultra: every product of the vendor is a glove; bit 0 marks a left one (VRPN's 5dtUSB).
     KnownUsb{
         .bus = Bus::kHid, .vendor = 0x5D70, .product_mask = 0, .driver = "fivedt", .left_bit = 1},
     // P5 (libp5glove). The kernel's HID layer ignores it, so there is no hidraw node.

@@ -1,5 +1,5 @@
-// The USB ids that gloves are known by. Ids of adapters (FTDI, CP210x, CH340) only say what may be
-// behind them; those of gloves say what is.
+// Known USB ids of gloves. The id of an adapter (FTDI, CP210x, CH340) only shows that a glove may
+// be connected to it; the id of a glove identifies the glove.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@
 namespace posed::drivers {
 
 struct KnownUsb {
-  Bus bus = Bus::kSerial;  // how the glove is reached
+  Bus bus = Bus::kSerial;  // how the glove is connected
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
   std::uint16_t product_mask = 0xFFFF;  // bits of the product that count
   std::string_view driver;              // registry name
-  bool adapter = false;                 // anything may be behind it
-  std::uint16_t left_bit = 0;           // of the product: set for a left glove; 0: not told
+  bool adapter = false;        // a general-purpose adapter: any device may be connected to it
+  std::uint16_t left_bit = 0;  // bit of the product id that is set for a left glove; 0: unknown
 
   [[nodiscard]] bool fits(const DeviceInfo& device) const noexcept;
-  // "right", "left", or empty where the ids do not tell.
+  // "right", "left", or empty when the ids do not show it.
   [[nodiscard]] std::string_view hand(const DeviceInfo& device) const noexcept;
 };
 

@@ -1,4 +1,4 @@
-// The Device that a driver's open() returns, begun from what the device said.
+// Builds the Device that a driver's open() returns.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace posed::drivers {
 
-// Description and decoder out of `text` (Description::text), by the driver's own describe() and
-// make_decoder(): so what plays live is what a log rebuilds. The transport and whatever else the
-// device needs are left to open(). Cold.
+// Makes description and decoder from `text` (Description::text) with the driver's own describe()
+// and make_decoder(), so that a live stream uses exactly what a log rebuilds. open() adds the
+// transport and anything else. Cold.
 [[nodiscard]] Result<Device> make_device(const Driver& driver, const std::string& text,
                                          const std::string& identity);
 

@@ -1,4 +1,4 @@
-// Reading a driver's options: what the config gave, completed and checked against the driver's
+// Reads a driver's options: the values from the config, completed and checked against the driver's
 // list.
 #pragma once
 
@@ -9,11 +9,11 @@
 
 namespace posed::drivers {
 
-// `given` with the driver's defaults for what is left out; a whole number serves where a real one
-// is wanted. An unknown option, another type or a missing required one is misuse. Cold.
+// Returns `given` completed with the driver's defaults; a whole number is accepted for a real one.
+// An unknown option, another type or a missing required option is misuse. Cold.
 [[nodiscard]] Result<Options> complete_options(const Driver& driver, const Options& given);
 
-// Of completed options; asking for another name or type than the driver's list has is our own bug.
+// Reads a completed option. A name or type that is not in the driver's list is a bug in the driver.
 template <typename T>
 [[nodiscard]] const T& option(const Options& options, const std::string& name) {
   return std::get<T>(options.at(name));

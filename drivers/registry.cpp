@@ -1,4 +1,4 @@
-// The one list of all drivers. A new device is one line here.
+// The list of all drivers. Each new device adds one line here.
 #include <algorithm>
 #include <array>
 

@@ -1,18 +1,19 @@
-// UnrolledCounter: a device's counter of few bits as a time that does not wrap.
+// UnrolledCounter: turns a device's counter of few bits into a time that does not wrap.
 #pragma once
 
 #include <cstdint>
 
 namespace posed::drivers {
 
-// Counts modulo 2^bits. A step of less than half the range is forward; a larger one is a device
-// that ran backwards (it restarted): time goes on from where it was, and `restarted` says so.
+// Counts modulo 2^bits. A step of less than half the range is forward; a larger step means that the
+// device's counter ran backwards (it restarted): time continues from where it was, and `restarted`
+// is set.
 class UnrolledCounter {
  public:
   explicit UnrolledCounter(int bits) noexcept : mask_((std::uint64_t{1} << bits) - 1) {}
 
   struct Step {
-    std::int64_t ticks;  // since the first count seen; never falls
+    std::int64_t ticks;  // since the first count; never decreases
     bool restarted;
   };
 

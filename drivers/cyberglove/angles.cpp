@@ -12,10 +12,10 @@ namespace {
 constexpr float kMaxThumbRoll_rad = 0.5F;
 constexpr double kDefaultBias = 0.248;
 
-// Radians a count as the library's formula -gain * (raw - offset) has them, recovered from the
-// steps in real recordings: GraspDB14, and for the distal joints of 22-sensor gloves the LIBRAS
-// poses. The sensor between index and middle counts the other way. Offsets are ours, in the range
-// where drivers' logs have extended fingers.
+// Radians per count in the library's formula -gain * (raw - offset), recovered from the steps in
+// real recordings: GraspDB14, and for the distal joints of 22-sensor gloves the LIBRAS poses. The
+// sensor between index and middle counts in the opposite direction. The offsets are chosen for
+// posed, in the range where the logs of other drivers show extended fingers.
 struct DefaultSensor {
   std::string_view name;
   double gain;
@@ -35,8 +35,8 @@ constexpr std::array<DefaultSensor, kSensors> kDefaults{{
 constexpr std::array<std::size_t, 6> kMirrored{kThumbAbd, kIndexAbd,  kMiddleAbd,
                                                kRingAbd,  kLittleAbd, kWristYaw};
 
-// DIP = sign(PIP) |0.32 PIP^2 + 0.17 PIP|: what VirtualHand's own recordings of 18-sensor gloves
-// obey; the published source lacks the sign.
+// DIP = sign(PIP) |0.32 PIP^2 + 0.17 PIP|: VirtualHand's own recordings of 18-sensor gloves follow
+// this formula; the published source lacks the sign.
 float distal(float pip) noexcept {
   return std::copysign(std::abs(0.32F * pip * pip + 0.17F * pip), pip);
 }

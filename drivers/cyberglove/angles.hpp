@@ -1,6 +1,6 @@
-// From sensor values to the angles of the maker's library: gains, relative abductions, computed
-// distal joints, the left hand mirrored. Sources: vt_glove.cpp in VR Juggler, and ltaquet's
-// calibrateCGdata.m, which was written from the CyberGlove III SDK and agrees.
+// Converts sensor values to the joint angles of the maker's library: gains, relative abductions,
+// computed distal joints, and the mirrored left hand. Sources: vt_glove.cpp in VR Juggler, and
+// ltaquet's calibrateCGdata.m, which was written from the CyberGlove III SDK and agrees.
 #pragma once
 
 #include <bitset>
@@ -16,20 +16,20 @@ namespace posed::drivers::cyberglove {
 
 using Valid = std::bitset<glove::kMaxSensors>;
 
-// 23 sensors by name, in mask order, curves of default gains; a raw value is an 8-bit count, in
-// sixteenths for the 16-bit form. Cold.
+// 23 sensors by name, in mask order, with curves of default gains. A raw value is an 8-bit count;
+// the 16-bit form adds steps of a sixteenth. Cold.
 [[nodiscard]] Result<glove::Model> glove_model(Side hand);
 
-// Place in Calibration::parameter.
+// Index in Calibration::parameter.
 inline constexpr std::size_t kAbductionBias = 0;
 
-// Calibrated values [23] to the library's angles [rad], in place: flexion negative, abductions
-// absolute; distal joints that `fitted` lacks are computed. RT-safe.
+// Turns calibrated values [23] into the library's angles [rad], in place: flexion negative,
+// abductions absolute. Distal joints that `fitted` lacks are computed. RT-safe.
 void compute_angles(float abduction_bias, Side hand, std::uint32_t fitted, std::span<float> value,
                     Valid& valid) noexcept;
 
-// The way back for emulators: angles as compute_angles gives them to calibrated values. What the
-// middle finger's own abduction was is lost: sensors only know differences.
+// The inverse, for emulators: angles as compute_angles gives them to calibrated values. The middle
+// finger's own abduction is lost, because the sensors measure only differences.
 void uncompute_angles(Side hand, std::span<double> value) noexcept;
 
 }  // namespace posed::drivers::cyberglove

@@ -18,10 +18,11 @@ namespace posed::drivers {
 namespace cyberglove {
 namespace {
 
-constexpr std::uint32_t kFtdi = 0x0403'6001;  // of the III's USB; the II's dongles differ
+// USB id of the III; the dongles of the II have other ids.
+constexpr std::uint32_t kFtdi = 0x0403'6001;
 constexpr double kMaxRate_hz = 1000.0;
 constexpr double kSilence_s = 1.0;
-constexpr std::int64_t kTicksAFrame = 3840;  // 1/115200 s in one of 30 frames a second
+constexpr std::int64_t kTicksAFrame = 3840;  // 1/115200 s in one of 30 frames per second
 
 template <std::size_t N>
 Result<std::size_t> choice(const Options& options, const std::string& name,
@@ -34,8 +35,8 @@ Result<std::size_t> choice(const Options& options, const std::string& name,
   return misuse(name + " should be one of " + known);
 }
 
-// The III's frames: 30 a second, times a multiplier of at most 3 (the maker verified 100 Hz), or
-// one in every few.
+// Sets the III's frame rate: 30 per second, times a multiplier of at most 3 (the maker verified 100
+// Hz), or one out of several frames.
 void set_frames(double rate_hz, RequestedConfig& requested) {
   const double frames = rate_hz > 0.0 ? rate_hz / kFrames_hz : 3.0;
   requested.layout.multiplier = static_cast<int>(std::clamp(std::round(frames), 1.0, 3.0));
@@ -164,14 +165,14 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   return device;
 }
 
-// The motors shake; they cannot hold a finger. So a force is a finger's strength of shaking, and a
-// vibration, which would have to be ended by us after its time, is refused.
+// The motors can only shake; they cannot hold a finger. So a force sets how strongly a finger's
+// motor shakes. A vibration is refused, because posed would have to end it after its duration.
 Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptics& haptics) {
   const auto requested = requested_config_of_given(given);
   if (!requested) return std::unexpected(requested.error());
   if (requested->layout.form == Form::k16Bit) return misuse("CyberTouch goes with form = \"8bit\"");
   if (haptics.vibration_s != 0.0F) {
-    return misuse("a CyberTouch shakes until it is told otherwise: send forces, 0 to end them");
+    return misuse("a CyberTouch shakes until the next command: send forces, and 0 to end them");
   }
   std::vector<std::byte> bytes{kTouch, std::byte{0}};
   for (std::size_t f = 0; f < kFingers; ++f) {

@@ -1,4 +1,4 @@
-// Bytes of a CyberGlove to samples and frames: one decoder for each form.
+// Decodes the bytes of a CyberGlove into samples and frames: one decoder for each form.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ class CyberGloveDecoder : public glove::GloveDecoder {
   Layout layout_;
 };
 
-// Frames by length and end mark together: 'S' is a legal value, and no byte inside is zero.
+// Finds samples by length and end mark together: 'S' is a legal value, and no byte inside is zero.
 class Decoder8 final : public CyberGloveDecoder {
  public:
   using CyberGloveDecoder::CyberGloveDecoder;
@@ -48,14 +48,14 @@ class Decoder8 final : public CyberGloveDecoder {
   [[nodiscard]] Outcome check_piece(std::span<const std::byte> piece) const noexcept;
   void take_sample(std::span<const std::byte> piece, Sink& sink) noexcept;
 
-  std::array<std::byte, kMaxSample> piece_{};  // since the last end mark
+  std::array<std::byte, kMaxSample> piece_{};  // bytes since the last end mark
   std::size_t size_ = 0;
-  bool lost_ = false;  // the piece is longer than any sample: nothing of it is kept
+  bool lost_ = false;  // the piece is longer than any sample and is discarded
   StampClock clock_{std::int64_t{1} << 32, std::int64_t{10} * 115200};
   std::array<std::byte, kSensors + kStampBytes> before_{};  // the last sample, without its status
 };
 
-// Records by time pattern and end: zeros are legal inside.
+// Finds records by the pattern of their time and their end: zeros are legal inside.
 class Decoder16 final : public CyberGloveDecoder {
  public:
   Decoder16(std::shared_ptr<const Skeleton> skeleton,
@@ -77,8 +77,8 @@ class Decoder16 final : public CyberGloveDecoder {
 
   std::array<std::byte, kRecordBytes> record_{};
   std::size_t size_ = 0;
-  std::size_t strays_ = 0;  // bytes since the last record that belong to none
-  bool told_ = false;       // of this hunt
+  std::size_t strays_ = 0;  // bytes since the last record that belong to no record
+  bool told_ = false;       // the present search has already counted an outcome
   StampClock clock_;
 };
 

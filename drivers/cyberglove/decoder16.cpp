@@ -6,10 +6,11 @@
 namespace posed::drivers::cyberglove {
 namespace {
 
-// "1S", the echo of the start, and "nS" or "e1S", which Shadow's authors saw between records.
+// Sequences seen between records: "1S", the echo of the start command, and "nS" or "e1S", which the
+// authors of Shadow's driver saw.
 constexpr std::size_t kKnownStrays = 3;
 constexpr unsigned kMaxValue = 0x0FFF;
-constexpr float kSteps = 16.0F;  // of an 8-bit count, so that both forms share calibrations
+constexpr float kSteps = 16.0F;  // per 8-bit count, so that both forms share calibrations
 
 }  // namespace
 
@@ -23,7 +24,7 @@ void Decoder16::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns
   }
 }
 
-// Of its last byte; those before were looked at when they came. RT-safe.
+// Checks the last byte only; those before were checked when they arrived. RT-safe.
 bool Decoder16::could_be_record() const noexcept {
   const std::size_t place = size_ - 1;
   if (place < kRecordHead) return fits_pattern(place, record_[place]);
@@ -31,7 +32,7 @@ bool Decoder16::could_be_record() const noexcept {
   return place < kEndAt || record_[place] == kRecordEnd[place - kEndAt];
 }
 
-// What was taken for a record is none: the next one may begin inside it. RT-safe.
+// The bytes were not a record; searches for the next one, which may begin inside them. RT-safe.
 void Decoder16::hunt(Sink& sink) noexcept {
   std::size_t from = 1;
   for (; from < size_; ++from) {
@@ -58,11 +59,11 @@ void Decoder16::take_record(Sink& sink) noexcept {
   std::array<float, kSensors> raw{};
   std::size_t place = kRecordHead;
   for (std::size_t i = 0; i < kSensors; ++i) {
-    if ((kMask22 >> i & 1U) == 0) continue;  // records have a place for all 22
+    if ((kMask22 >> i & 1U) == 0) continue;  // records have a field for all 22
     const unsigned value = std::to_integer<unsigned>(record_[place]) << 8 |
                            std::to_integer<unsigned>(record_[place + 1]);
     place += 2;
-    if ((layout().mask >> i & 1U) == 0) continue;  // an 18-sensor glove's place says nothing
+    if ((layout().mask >> i & 1U) == 0) continue;  // the field is unused on an 18-sensor glove
     if (value == 0 || value > kMaxValue) return sink.outcome(Outcome::kOutOfRange);
     raw[i] = static_cast<float>(value) / kSteps;
   }

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::byte kEnd{0};
 
-// Of the pairs behind a sample: glove unplugged.
+// True when the pairs after a sample report that the glove is unplugged.
 bool says_unplugged(std::span<const std::byte> pairs) noexcept {
   for (std::size_t i = 1; i < pairs.size(); i += 2) {
     if (pairs[i] == std::byte{'g'}) return true;
@@ -30,7 +30,7 @@ bool are_pairs(std::span<const std::byte> bytes) noexcept {
 // RT-safe.
 void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                     Sink& sink) noexcept {
-  // A stamp's flags are zero on gloves that never set their bit 7 (Vista's author saw one).
+  // A stamp's flags are zero on gloves that never set their bit 7 (the author of Vista saw one).
   const std::size_t flags = sample_bytes(layout()) - kStampBytes - (layout().status ? 1 : 0);
   for (const std::byte byte : bytes) {
     if (byte == kEnd && !(layout().time && !lost_ && size_ == flags)) {
@@ -48,7 +48,7 @@ void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*
 
 // RT-safe.
 void Decoder8::take_piece(Sink& sink) noexcept {
-  if (lost_ || size_ == 0) return;                // told already; or the end of an answer
+  if (lost_ || size_ == 0) return;                // already counted; or the end of an answer
   if (size_ == 1 && piece_[0] == kTouch) return;  // the answer to a CyberTouch command
   const std::span<const std::byte> piece = std::span(piece_).first(size_);
   const Outcome outcome = check_piece(piece);
@@ -92,7 +92,7 @@ void Decoder8::take_sample(std::span<const std::byte> piece, Sink& sink) noexcep
     constexpr std::int64_t kNs = 78125, kTicks = 9;  // 9 ticks of 1/115200 s are 78125 ns
     packet.device_ns = clock_.to(count) * kNs / kTicks;
   }
-  // A polled glove answers again with what it has; the stamp tells, where there is one.
+  // A polled glove may repeat an old measurement; the stamp, if there is one, shows whether it did.
   const std::span<const std::byte> measured = piece.subspan(1, place - 1);
   if (layout().mode == Mode::kPoll &&
       std::ranges::equal(measured, std::span(before_).first(measured.size()))) {

@@ -7,7 +7,8 @@
 namespace posed::drivers::cyberglove {
 namespace {
 
-constexpr int kMostTicks = 65535 * 1024;  // slower than any rate that options allow
+// Longer than the period of any rate that the options allow.
+constexpr int kMostTicks = 65535 * 1024;
 
 }  // namespace
 
@@ -39,7 +40,7 @@ Result<Greeted> read_greeting(const std::string& text, const std::string& identi
   if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
   if (std::popcount(glove.layout.mask) != sensors) {
     return fail(
-        "the greeting of a 'cyberglove' counts other sensors than its mask has; the log "
+        "the device info of a 'cyberglove' and its mask have different numbers of sensors; the log "
         "is damaged",
         identity);
   }

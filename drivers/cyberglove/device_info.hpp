@@ -1,4 +1,4 @@
-// What a CyberGlove's Description::text keeps:
+// The device info of a CyberGlove, kept in Description::text:
 //   cyberglove hand=right sensors=22 mask=8388479 form=8bit mode=stream time=1 status=1 ticks=1152
 //   multiplier=1                      (one line; ticks of 1/115200 s between samples, 0 unknown)
 #pragma once

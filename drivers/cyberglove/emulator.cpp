@@ -11,7 +11,7 @@ namespace posed::drivers::cyberglove {
 namespace {
 
 constexpr std::int64_t kNs = 78125, kTicks = 9;  // 9 ticks of 1/115200 s are 78125 ns
-constexpr std::int64_t kFastest_ticks = 768;     // 150 Hz: what "as fast as possible" comes to
+constexpr std::int64_t kFastest_ticks = 768;     // 150 Hz: the result of "as fast as possible"
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 double raw_of(const glove::Curve& line, double value) {
@@ -58,7 +58,7 @@ void CyberGloveEmulator::start(Streaming what) {
   records_ = 0;
 }
 
-// The n-th record after the start, without a rounding that adds up.
+// Due time of the n-th record after the start; rounding errors do not accumulate.
 std::int64_t CyberGloveEmulator::due_after_start_ns(std::int64_t records) const {
   if (streaming_ == Streaming::k16Bit) {
     return records * divider_ * kSecond_ns / (std::int64_t{kFrames_hz} * multiplier_);

@@ -1,5 +1,6 @@
-// A CyberGlove's box as its manuals and drivers show it: command set and state of a I or II (8-bit)
-// and, with level-one commands, of a III (16-bit records). See the README for what is inferred.
+// Emulates a CyberGlove's box as described in its manuals and drivers: commands and state of a I or
+// II (8-bit) and, with level-one commands, of a III (16-bit records). The README lists what is
+// inferred.
 #pragma once
 
 #include <array>
@@ -24,8 +25,8 @@ struct EmulatorSettings {
   bool level_one = false;        // a III: "1.." commands and 16-bit records
   std::string info = "CyberGlove II, Version 2.1";
   std::uint32_t first_count = 0;     // of the time stamp
-  std::int64_t first_sub_frame = 0;  // of the day, at the III's multiplier
-  // Faults, which may change while it runs.
+  std::int64_t first_sub_frame = 0;  // sub-frames since midnight, at the III's multiplier
+  // Faults; they may be changed while the emulator runs.
   bool plugged_in = true;
   bool too_fast = false;    // an error pair in every sample
   bool stray_echo = false;  // "e1S" before each 16-bit record
@@ -42,7 +43,7 @@ class CyberGloveEmulator final : public Emulator {
   [[nodiscard]] std::int64_t next_due_ns() const override;
   void emit(std::int64_t now_ns, Bytes& out) override;
 
-  // What the sensors read [8-bit counts], instead of a pose.
+  // Sets the sensor readings [8-bit counts] directly instead of from a pose.
   void set_raw(const std::array<double, kSensors>& raw) { raw_ = raw; }
   [[nodiscard]] EmulatorSettings& settings() { return settings_; }
 
@@ -55,7 +56,7 @@ class CyberGloveEmulator final : public Emulator {
 
   static void add(std::string_view text, Bytes& out);
   void power_up();
-  // Bytes of the command at the start of `input`, 0 when it is not whole yet.
+  // Length of the command at the start of `input`; 0 when it is incomplete.
   [[nodiscard]] std::size_t take_command(std::string_view input, Bytes& answer);
   [[nodiscard]] std::size_t take_query(std::string_view input, Bytes& answer) const;
   [[nodiscard]] std::size_t take_binary_set(std::string_view input, Bytes& answer);
@@ -78,7 +79,7 @@ class CyberGloveEmulator final : public Emulator {
   std::shared_ptr<const glove::Calibration> calibration_;
   std::array<double, kSensors> raw_{};
   std::string input_;
-  std::map<char, unsigned> flags_;  // of one byte: B D F J L N Q U W Y
+  std::map<char, unsigned> flags_;  // settings of one byte: B D F J L N Q U W Y
   std::uint32_t mask_ = 0;
   Period period_;
   std::array<unsigned, 6> touch_{};

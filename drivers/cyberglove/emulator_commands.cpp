@@ -1,5 +1,6 @@
-// The emulated box's command set. One letter, upper case binary, lower case ASCII, '?' before it a
-// query, '1' before it a command of the CyberGlove III; every answer ends with a NUL.
+// The emulated box's command set. A command is one letter: upper case for binary, lower case for
+// ASCII; a '?' before it makes a query, a '1' a command of the CyberGlove III. Every answer ends
+// with a NUL.
 #include <algorithm>
 #include <bit>
 #include <sstream>
@@ -18,7 +19,7 @@ char upper(char letter) { return static_cast<char>(letter - 'a' + 'A'); }
 bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
 bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 
-// Bytes of a binary set command's payload; 0 for a letter that sets nothing.
+// Number of payload bytes of a binary set command; 0 for a letter that sets nothing.
 std::size_t payload_bytes(char letter) {
   if (std::string_view("BDFJLNQUWY").contains(letter)) return 1;
   if (letter == 'M' || letter == 'P') return 3;
@@ -89,7 +90,7 @@ std::size_t CyberGloveEmulator::take_command(std::string_view input, Bytes& answ
   if (c == '1' && settings_.level_one) return take_level_one(input, answer);
   if (is_upper(c)) return take_binary_set(input, answer);
   if (is_lower(c)) return take_ascii_set(input, answer);
-  // "^" is the II's and III's control mode, so the two characters "^c" are no stop.
+  // "^" sets the control mode of the II and III, so the two characters "^c" do not mean stop.
   const std::size_t size = c == '^' ? 2 : 1;
   if (input.size() < size) return 0;
   add(kUnknown, answer);
@@ -205,7 +206,7 @@ std::size_t CyberGloveEmulator::take_touch(std::string_view input, Bytes& answer
 std::size_t CyberGloveEmulator::take_level_one(std::string_view input, Bytes& answer) {
   constexpr std::size_t kSize = 3;
   if (input.size() < 2) return 0;
-  if (input[1] == 'S' || input[1] == 'G') {  // the echo has no end mark: records follow at once
+  if (input[1] == 'S' || input[1] == 'G') {  // the echo has no end mark; records follow at once
     add(input.substr(0, 2), answer);
     if (input[1] == 'S') start(Streaming::k16Bit);
     if (input[1] == 'G') add_record(answer);
@@ -235,7 +236,7 @@ std::array<unsigned, 3> CyberGloveEmulator::parameter_flags() const {
           flags_.at('Q')};
 }
 
-// What a query of this letter answers; words of 16 bits for T, bytes for all others.
+// The answer to a query of this letter: 16-bit words for T, bytes for all others.
 std::optional<CyberGloveEmulator::Values> CyberGloveEmulator::state_of(char letter) const {
   switch (letter) {
     case 'A':
@@ -283,7 +284,8 @@ bool CyberGloveEmulator::set_state(char letter, const Values& values) {
     flags_['Q'] = values[2] & 1;
   } else {
     flags_[letter] = values[0];
-    if (letter == 'Y' && values[0] != 0) start(Streaming::k8Bit);  // our period is the sync
+    // The emulator's own period serves as the sync input.
+    if (letter == 'Y' && values[0] != 0) start(Streaming::k8Bit);
   }
   return true;
 }

@@ -1,6 +1,6 @@
-// The bytes of CyberGlove I, II and III. No I/O here: what is drawn below is all there is to know.
-// Sources: the maker's library as it lives in VR Juggler (vt_glove.cpp), the CyberGlove III
-// manual's appendix C, FreeVR, Vista, puppet, Shadow's and asr's drivers.
+// The bytes of CyberGlove I, II and III. No I/O here; the drawings below are the whole format.
+// Sources: the maker's library as found in VR Juggler (vt_glove.cpp), appendix C of the CyberGlove
+// III manual, and the drivers of FreeVR, Vista, puppet, Shadow and asr.
 //
 // 8-bit form (I, II, and III in its compatible mode):
 //      0        1 .. N       [5 bytes]       [1]      [pairs]      last
@@ -10,7 +10,7 @@
 //    lead     S streamed, G polled, Y by external sync
 //    sensors  N bytes of 1 to 255, those of the mask in ascending order
 //    stamp    flags, then u32 LE [1/115200 s]; a counter byte of 0 is sent as 1 with its flag set
-//    status   bit 0 glove device in, 1 switch, 2 light, 7 always set
+//    status   bit 0 glove plugged in, 1 switch, 2 light, 7 always set
 //    pairs    e s: sampled too fast; e g: glove unplugged
 //
 // 16-bit form (III): 61 bytes
@@ -18,7 +18,7 @@
 //   +------------------+-----+-----------------+----------+
 //   | HH:MM:SS:ff:n    |  S  | 22 x u16 BE     | 0D 0A 00 |
 //   +------------------+-----+-----------------+----------+
-//    ff  frame of 30 a second, n sub-frame; values of 12 bits, 1 to 4094
+//    ff  frame of 30 per second, n sub-frame; values of 12 bits, 1 to 4094
 #pragma once
 
 #include <array>
@@ -39,7 +39,7 @@ enum SensorIndex : std::size_t {
   kIndexMcp,
   kIndexPip,
   kIndexDip,
-  kIndexAbd,  // no sensor: its angle comes from the others
+  kIndexAbd,  // has no sensor; its angle is computed from the other sensors
   kMiddleMcp,
   kMiddlePip,
   kMiddleDip,
@@ -63,14 +63,14 @@ inline constexpr std::uint32_t kAllSensors = (1U << kSensors) - 1;
 enum class Form : std::uint8_t { k8Bit, k16Bit };
 enum class Mode : std::uint8_t { kStream, kPoll, kSync };
 
-// What a stream looks like, agreed with the glove at the start.
+// The format of a stream, agreed with the glove at the start.
 struct Layout {
   Form form = Form::k8Bit;
   Mode mode = Mode::kStream;
-  std::uint32_t mask = kMask22;  // the sensors that are sent
+  std::uint32_t mask = kMask22;  // the sensors in each sample
   bool time = true;
   bool status = true;
-  int multiplier = 3;  // 16-bit form: sub-frames of a frame
+  int multiplier = 3;  // 16-bit form: sub-frames per frame
 };
 
 [[nodiscard]] constexpr std::byte lead(Mode mode) noexcept {
@@ -78,7 +78,8 @@ struct Layout {
   return kLeads[static_cast<std::size_t>(mode)];
 }
 
-inline constexpr double kTicks_hz = 115200.0;  // of the time stamp and of the sample period
+// Rate of the time stamp and unit of the sample period.
+inline constexpr double kTicks_hz = 115200.0;
 inline constexpr std::size_t kStampBytes = 5;
 inline constexpr std::size_t kMaxPairs = 2;
 // Lead, sensors, stamp, status, pairs, end.
@@ -89,11 +90,11 @@ inline constexpr std::byte kSwitch{0x02};
 inline constexpr std::byte kLight{0x04};
 inline constexpr std::byte kStatusMark{0x80};
 
-// CyberTouch: 'A', n, then n times (motor, strength 0 to 255); motors 0 to 4 are thumb to
-// little, 5 the palm. The answer is 'A' 00, between two samples.
+// CyberTouch: 'A', n, then n times (motor, strength 0 to 255); motors 0 to 4 are thumb to little
+// finger, 5 is the palm. The answer is 'A' 00, between two samples.
 inline constexpr std::byte kTouch{'A'};
 
-// Bytes before the pairs and the end: lead, sensors, stamp, status. RT-safe.
+// Number of bytes before the pairs and the end: lead, sensors, stamp, status. RT-safe.
 [[nodiscard]] std::size_t sample_bytes(const Layout& layout) noexcept;
 
 // False when a flag does not fit its byte. RT-safe.
@@ -108,7 +109,7 @@ inline constexpr int kFrames_hz = 30;
 inline constexpr int kMaxMultiplier = 4;
 inline constexpr std::array<std::byte, 3> kRecordEnd{std::byte{0x0D}, std::byte{0x0A},
                                                      std::byte{0x00}};
-// "dd:dd:dd:dd:dS": d any digit.
+// The shape of "dd:dd:dd:dd:dS", where d is any digit.
 inline constexpr std::string_view kRecordPattern = "dd:dd:dd:dd:dS";
 
 [[nodiscard]] constexpr bool fits_pattern(std::size_t place, std::byte byte) noexcept {
@@ -117,8 +118,8 @@ inline constexpr std::string_view kRecordPattern = "dd:dd:dd:dd:dS";
   return want == 'd' ? got >= '0' && got <= '9' : got == want;
 }
 
-// Sub-frames since midnight of a head that fits the pattern; negative when it is no time of day.
-// RT-safe.
+// Sub-frames since midnight from a head that fits the pattern; negative when it is not a valid time
+// of day. RT-safe.
 [[nodiscard]] std::int64_t decode_time_of_day(std::span<const std::byte, kRecordHead> head,
                                               int multiplier) noexcept;
 [[nodiscard]] std::array<std::byte, kRecordHead> encode_time_of_day(std::int64_t sub_frames,
@@ -127,8 +128,8 @@ inline constexpr std::string_view kRecordPattern = "dd:dd:dd:dd:dS";
   return std::int64_t{24} * 3600 * kFrames_hz * multiplier;
 }
 
-// The sample period as `T` sets it, w1 * w2 ticks: as near to `rate_hz` as it goes; 0, 0 (as fast
-// as possible) for 0.
+// The sample period in the form that `T` takes, w1 * w2 ticks: as close to `rate_hz` as possible;
+// 0, 0 (as fast as possible) for 0.
 struct Period {
   std::uint16_t w1 = 0, w2 = 0;
   [[nodiscard]] std::int64_t ticks() const noexcept { return std::int64_t{w1} * w2; }

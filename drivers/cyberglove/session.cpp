@@ -5,11 +5,12 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kQuiet{60};     // a box at 1 Hz is caught by the answers' own check
-constexpr milliseconds kAfterSet{20};  // what may come behind the answer to a set command
+// A box at 1 Hz may still send; the check of the answers notices that.
+constexpr milliseconds kQuiet{60};
+constexpr milliseconds kAfterSet{20};  // time for bytes after the answer to a set command
 constexpr milliseconds kInfo{2000};    // the text may take a second
 constexpr milliseconds kAnswer{1000};
-constexpr std::size_t kMostText = 4096;  // a stream of another device ends the wait
+constexpr std::size_t kMostText = 4096;  // limit for a device that streams and never ends its text
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// StampClock: the glove's time stamps as a time that ascends, whatever a noisy line makes of them.
+// StampClock: turns the glove's time stamps into an increasing time, even on a noisy line.
 #pragma once
 
 #include <algorithm>
@@ -8,15 +8,15 @@
 namespace posed::drivers::cyberglove {
 
 // Counts modulo `range`. Stamps have no checksum, so a step of more than `plausible` counts (or
-// backwards) is believed only when the next stamp confirms it; until then time goes on by one. A
-// confirmed step forward (a pause) is taken in full, one backwards (a restart) goes on from where
-// time was.
+// backwards) is accepted only when the next stamp confirms it; until then time advances by one tick
+// per stamp. A confirmed step forward (a pause) is taken in full; after a confirmed step backwards
+// (a restart) time continues from where it was.
 class StampClock {
  public:
   StampClock(std::int64_t range, std::int64_t plausible) noexcept
       : range_(range), plausible_(plausible) {}
 
-  // Ticks since the first stamp; ascends from call to call. RT-safe.
+  // Ticks since the first stamp; increases with every call. RT-safe.
   std::int64_t to(std::int64_t count) noexcept {
     if (!last_) {
       last_ = count;
@@ -46,7 +46,7 @@ class StampClock {
   std::int64_t range_, plausible_;
   std::optional<std::int64_t> last_, doubted_;  // counts
   std::int64_t known_ = 0;                      // ticks at last_
-  std::int64_t ticks_ = 0;                      // given last
+  std::int64_t ticks_ = 0;                      // last value returned
 };
 
 }  // namespace posed::drivers::cyberglove

@@ -26,7 +26,7 @@ Result<> check_device(Session& session, const RequestedConfig& requested) {
   const auto printable = std::ranges::count_if(
       *info, [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\0'; });
   if (printable < static_cast<std::ptrdiff_t>(info->size() * 3 / 4)) {
-    return fail(session.name() + " answers what makes no sense" + rate +
+    return fail(session.name() + " sends answers that make no sense" + rate +
                 ": set baud as the CyberGlove's box is set (9600 to 115200), or name another port");
   }
   return fail(session.name() + " is another device, not a CyberGlove: name the right port or id");
@@ -36,7 +36,7 @@ Result<> check_glove(Session& session) {
   const auto state = session.query('G', 1);
   if (!state) return std::unexpected(state.error());
   if (((*state)[0] & kGloveIn) == 0) {
-    return fail("the glove is not device into its box on " + session.name() + ": plug it in");
+    return fail("the glove is not plugged into its box on " + session.name() + ": plug it in");
   }
   if (((*state)[0] & kInitialised) != 0) return {};
   return session.set("\x09", "\x09");  // the box reads the glove's data again
@@ -52,8 +52,8 @@ Result<> check_hand(Session& session, Side hand) {
               "\", or plug the other glove in");
 }
 
-// The mask of the fitted sensors. Gloves of 18 and 22 are known; of others the box's own word is
-// taken when it agrees with itself.
+// Reads the mask of the fitted sensors. Gloves with 18 and 22 sensors are known; for others the
+// box's mask is used if its sensor count agrees.
 Result<std::uint32_t> read_mask(Session& session, int wanted) {
   const auto count = session.query('S', 1);
   if (!count) return std::unexpected(count.error());
@@ -69,8 +69,8 @@ Result<std::uint32_t> read_mask(Session& session, int wanted) {
   if (sensors == std::popcount(kMask18)) return kMask18;
   if (sensors == std::popcount(kMask22)) return kMask22;
   if (sensors > 0 && std::popcount(mask) == sensors) return mask;
-  return fail("the box on " + session.name() + " says it has " + std::to_string(sensors) +
-              " sensors, and a mask of others: check the glove's plug");
+  return fail("the box on " + session.name() + " reports " + std::to_string(sensors) +
+              " sensors, but a mask with another number: check the glove's plug");
 }
 
 Result<> set_and_read_back(Session& session, char letter, bool on) {
@@ -82,7 +82,7 @@ Result<> set_and_read_back(Session& session, char letter, bool on) {
               "'; switch its box off and on again");
 }
 
-// Left over from the program before, these would change a sample's length without a word.
+// These settings may be left over from another program and would silently change a sample's length.
 Result<> set_layout(Session& session, const Layout& layout) {
   const std::string mask{'M', byte_of(layout.mask), byte_of(layout.mask >> 8),
                          byte_of(layout.mask >> 16)};
@@ -98,7 +98,7 @@ Result<> start_8bit(Session& session, const RequestedConfig& requested, const La
   if (auto ok = set_layout(session, layout); !ok) return ok;
   if (auto ok = session.set(std::string{'F', requested.filter ? '\x01' : '\0'}, "F"); !ok)
     return ok;
-  // In ASCII: sources differ on the byte order of the binary form.
+  // Sent in ASCII, because sources differ on the byte order of the binary form.
   const std::string period =
       "t " + std::to_string(requested.period.w1) + " " + std::to_string(requested.period.w2) + "\r";
   if (auto ok = session.set(period, "t"); !ok) return ok;

@@ -1,4 +1,4 @@
-// The session with a CyberGlove before it streams: who it is, what it wears, how it shall send.
+// Starts a CyberGlove: checks the device, the hand and the sensors, and sets the stream's format.
 #pragma once
 
 #include "drivers/cyberglove/protocol.hpp"
@@ -8,21 +8,21 @@
 
 namespace posed::drivers::cyberglove {
 
-// What the options ask for.
+// The settings that the options request.
 struct RequestedConfig {
   Side hand = Side::kRight;
-  int sensors = 0;  // 0: as many as there are
+  int sensors = 0;  // 0: accept any number
   Layout layout;    // without the mask
   bool filter = true;
-  Period period;          // of the 8-bit form
-  int divider = 1;        // of the 16-bit form
-  bool over_tcp = false;  // a III's Wi-Fi
-  std::int64_t baud = 0;  // for the sentence about a wrong one
+  Period period;          // for the 8-bit form
+  int divider = 1;        // for the 16-bit form
+  bool over_tcp = false;  // Wi-Fi of a III
+  std::int64_t baud = 0;  // for the error message about a wrong one
 };
 
-// Stops what runs, asks, sets and starts; gives the layout with the glove's own mask. Errors are
-// one sentence: nothing answers, another device, glove not in its box, other hand, other sensors.
-// Cold: a second or two.
+// Stops a running stream, queries and sets the box, and starts it. Returns the layout with the
+// glove's own mask. Errors: no answer, another device, glove not plugged into its box, wrong hand,
+// wrong number of sensors. Cold: takes a second or two.
 [[nodiscard]] Result<Layout> start(Connection& link, const RequestedConfig& requested);
 
 }  // namespace posed::drivers::cyberglove

@@ -10,7 +10,7 @@ namespace posed::drivers::described {
 namespace {
 
 bool in_range(const Field& field, double value) noexcept {
-  // A value that is no number is refused where it would bend a finger, and missing elsewhere.
+  // NaN is rejected for a sensor, where it would bend a finger; for an extra it means missing.
   if (std::isnan(value)) return field.kind == FieldKind::kExtra;
   return value >= field.low && value <= field.high;
 }
@@ -56,8 +56,8 @@ std::size_t DescribedDecoder::take_stream(std::span<const std::byte> bytes, Sink
       continue;
     }
     const bool good = take_packet(*look.rule, bytes.subspan(at, look.bytes), sink);
-    // A checksum says that the packet is one, whatever its values; without it the header may have
-    // been data.
+    // With a checksum it is certain that this is a packet, whatever its values; without one the
+    // header may have been data.
     const bool sure = good || look.rule->checksum.kind != ChecksumKind::kNone;
     at += sure ? look.bytes : 1;
   }
@@ -79,7 +79,7 @@ std::size_t DescribedDecoder::take_delimited(std::span<const std::byte> bytes,
     searched_ = 0;
   }
   const std::size_t rest = bytes.size() - begin;
-  if (rest > kMaxPacketBytes) {  // no packet is so long; what follows up to a delimiter is none
+  if (rest > kMaxPacketBytes) {  // longer than any packet: discard up to the next delimiter
     if (!std::exchange(skipping_, true)) take_piece(bytes.subspan(begin), sink);
     begin = bytes.size() - (delimiter.size() - 1);
   }
@@ -90,7 +90,7 @@ std::size_t DescribedDecoder::take_delimited(std::span<const std::byte> bytes,
 
 // RT-safe.
 void DescribedDecoder::take_piece(std::span<const std::byte> piece, Sink& sink) noexcept {
-  in_step_ = true;  // the delimiter bounds the damage: each piece counts
+  in_step_ = true;  // the delimiter limits the damage, so each piece is counted
   if (piece.size() > kMaxPacketBytes) return damaged(Outcome::kShort, sink);
   const Look look = look_for_packet(*table_, piece);
   if (look.found == Look::Found::kPacket && look.bytes == piece.size()) {

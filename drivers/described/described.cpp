@@ -24,10 +24,10 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kQuiet{50};
 constexpr milliseconds kFirstPacket{2000};
-constexpr double kSilence_s = 1.0;  // or so many periods of a slow device:
+constexpr double kSilence_s = 1.0;  // at least this, or this many periods of a slow device:
 constexpr double kSilentPeriods = 5.0;
 
-// A log's text: one line of greeting, then the description as it stood in its file.
+// The text in a log: one line of device info, then the device's description as in its file.
 std::string text_of(Side side, const std::string& toml) {
   return "described hand=" + std::string(glove::side_name(side)) + "\n" + toml;
 }
@@ -79,7 +79,7 @@ Result<glove::Model> glove_model(const Description& description) {
   return std::move(made->table.model);
 }
 
-// What the options name: which hand, and a description that was checked. Its errors name the file.
+// The settings from the options: the hand, and a checked description. Errors name the file.
 struct Chosen {
   Options options;
   Side side = Side::kRight;
@@ -126,8 +126,8 @@ bool has_packet(const Table& table, std::span<const std::byte> bytes) {
   return false;
 }
 
-// Stops what it sends, starts it, and waits for the first packet that fits the description: with a
-// wrong baud rate or another device on the port none does.
+// Stops the device's stream, starts it, and waits for the first packet that fits the description.
+// With a wrong baud rate or another device on the port, none does.
 Result<> start(const Table& table, Connection& link) {
   if (!table.link.stop.empty()) {
     if (auto ok = link.write(table.link.stop); !ok) return ok;

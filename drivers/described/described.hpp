@@ -1,4 +1,5 @@
-// The described driver: a device that a TOML file describes (device_file.hpp), without code.
+// The driver named `described` is table-driven: a TOML file (device_file.hpp) describes the device;
+// no code is needed.
 #pragma once
 
 #include "drivers/driver.hpp"

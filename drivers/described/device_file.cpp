@@ -112,7 +112,7 @@ Result<Table> parse_device(const std::string& toml, const std::string& file) {
 std::vector<std::string> shipped_devices() {
   std::vector<std::string> names;
   for (const ProfileText& text : device_texts()) {
-    if (!describes_packets(text.toml)) continue;  // another driver's angle map
+    if (!describes_packets(text.toml)) continue;  // an angle map for another driver
     names.emplace_back(text.file.substr(0, text.file.find('.')));
   }
   return names;
@@ -122,7 +122,7 @@ Result<std::string> device_text(const std::string& device) {
   if (device.ends_with(".toml")) {
     return load_file(device, {.what = kWhat, .max_bytes = kMaxDeviceFile});
   }
-  // A config makes every path whole, a name among them: its last part is the name.
+  // The config reader makes every path absolute, including a plain name: the name is its last part.
   const std::string name = std::filesystem::path(device).filename().string();
   for (const ProfileText& text : device_texts()) {
     if (text.file == name + ".toml" && describes_packets(text.toml)) return std::string(text.toml);

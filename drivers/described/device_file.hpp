@@ -1,4 +1,4 @@
-// A device's description as a person writes it: one TOML file. README.md goes through an example.
+// A device description written by a person: one TOML file. README.md explains an example.
 #pragma once
 
 #include <filesystem>
@@ -12,14 +12,14 @@ namespace posed::drivers::described {
 
 inline constexpr std::size_t kMaxDeviceFile = 64 * 1024;  // bytes
 
-// A mistake is named with `file`, line and what is allowed there. Cold.
+// An error names `file`, the line and the allowed values. Cold.
 [[nodiscard]] Result<Table> parse_device(const std::string& toml, const std::string& file);
 
-// The text that `device` names: a description built into posed ("vmg30") or, when it ends in
-// ".toml", a file. Cold.
+// Returns the text of the description that `device` names: one built into posed ("vmg30") or, when
+// it ends in ".toml", a file. Cold.
 [[nodiscard]] Result<std::string> device_text(const std::string& device);
 
-// The names of the descriptions that are built in. Cold.
+// The names of the built-in descriptions. Cold.
 [[nodiscard]] std::vector<std::string> shipped_devices();
 
 }  // namespace posed::drivers::described

@@ -9,9 +9,9 @@ namespace posed::drivers::described {
 namespace {
 
 constexpr double kDefaultRate_hz = 100.0;
-constexpr std::size_t kMaxHeard = 256;  // more than any command
+constexpr std::size_t kMaxHeard = 256;  // longer than any command
 
-// The raw value of a two-point curve.
+// The inverse of a two-point curve: returns the raw value.
 double raw_of(const glove::Curve& curve, double value) {
   const double raw0 = static_cast<double>(curve.raw[0]);
   const double value0 = static_cast<double>(curve.value[0]);
@@ -61,7 +61,8 @@ bool DescribedEmulator::was_told(const std::vector<std::byte>& command) const {
 
 void DescribedEmulator::emit(std::int64_t now_ns, Bytes& out) {
   if (!pace_.running()) return;
-  for (const bool poses : {false, true}) {  // what goes with a pose comes before it
+  // Packets without a pose first, so that their values go with the pose.
+  for (const bool poses : {false, true}) {
     for (const PacketRule& rule : table_->packets) {
       if (!rule.fields.empty() && rule.poses == poses) add_packet(rule, out);
     }

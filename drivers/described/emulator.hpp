@@ -1,5 +1,5 @@
-// Any described device's other side: sends all its packets at the described rate, from its start
-// bytes to its stop bytes (from power-on where it has none).
+// Emulates any table-driven device: sends all its packets at the rate in its description, from its
+// start bytes to its stop bytes (from power-on if it has no start bytes).
 #pragma once
 
 #include <array>
@@ -18,13 +18,13 @@ class DescribedEmulator final : public Emulator {
   DescribedEmulator(std::shared_ptr<const Table> table,
                     std::shared_ptr<const glove::Calibration> calibration);
 
-  // A sensor stands where its first share in the angle map puts it.
+  // Sets each sensor from the pose, by its first entry in the angle map.
   void pose(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
 
-  // What the next packets carry: raw values of sensors, values of extras in their units.
+  // Sets the content of the next packets: raw values of sensors, values of extras in their units.
   void set_sensor(std::size_t sensor, double raw) { raw_.at(sensor) = raw; }
   void set_extra(std::size_t extra, double value) { extra_.at(extra) = value; }
   void set_ticks(std::uint64_t ticks);
@@ -32,7 +32,7 @@ class DescribedEmulator final : public Emulator {
  private:
   void add_packet(const PacketRule& rule, Bytes& out) const;
   [[nodiscard]] double value_of(const Field& field) const;
-  // Whether `heard_` ends in these bytes.
+  // True when `heard_` ends with these bytes.
   [[nodiscard]] bool was_told(const std::vector<std::byte>& command) const;
 
   std::shared_ptr<const Table> table_;
@@ -41,7 +41,7 @@ class DescribedEmulator final : public Emulator {
   std::array<double, kMaxExtras> extra_{};
   std::vector<std::byte> heard_;
   glove::Pace pace_;
-  std::int64_t clock_ns_ = 0;  // the device's own
+  std::int64_t clock_ns_ = 0;  // the device's own time
 };
 
 }  // namespace posed::drivers::described

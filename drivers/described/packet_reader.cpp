@@ -104,8 +104,8 @@ void PacketReader::read_checksum(const toml::table& from, PacketRule& packet) {
   rule.to = at("to", rule.at);
   rule.big = toml_.word(*sum, "order", kOrders, 0) == 1;
   const auto length = static_cast<int>(packet.min_bytes);
-  // It has to fit the shortest packet; a longer one moves only what counts from the end, away from
-  // the rest.
+  // The position must fit in the shortest packet. In a longer packet only positions counted from
+  // the end move, away from the rest.
   const auto resolved = [length](int place) { return place < 0 ? length + place : place; };
   if (resolved(rule.at) < 0 || resolved(rule.at) + width > length || resolved(rule.from) < 0 ||
       resolved(rule.to) > length || resolved(rule.from) >= resolved(rule.to)) {
@@ -257,7 +257,7 @@ BitPlace PacketReader::place(const toml::node& blamed, std::int64_t bit, std::in
                                 std::to_string(packet.min_bytes) + " bytes, counted from 0");
   }
   if (bytes > 8) toml_.add_error(blamed, "a 64-bit value begins at a whole byte");
-  // Little: bit 0 is the lowest of the first byte. Big: it is the highest.
+  // Little-endian: bit 0 is the lowest of the first byte. Big-endian: it is the highest.
   return {.first = static_cast<std::uint16_t>(bit / 8),
           .bytes = static_cast<std::uint8_t>(bytes),
           .shift = static_cast<std::uint8_t>(big ? 8 * bytes - shift - bits : shift),

@@ -1,4 +1,4 @@
-// PacketReader: the [[packet]] tables of a device's description into a Table.
+// PacketReader: reads the [[packet]] tables of a device description into a Table.
 #pragma once
 
 #include <set>
@@ -11,7 +11,7 @@ namespace posed::drivers::described {
 
 class PacketReader {
  public:
-  // Adds to `table`, whose link and delimiter are known already.
+  // Adds to `table`, whose link and delimiter have been read already.
   PacketReader(TomlReader& toml, Table& table) : toml_(toml), table_(table) {}
 
   void read_packet(const toml::table& from);
@@ -20,7 +20,7 @@ class PacketReader {
   void read_length(const toml::table& from, PacketRule& packet);
   void read_checksum(const toml::table& from, PacketRule& packet);
   void read_fields(const toml::table& from, PacketRule& packet);
-  // One [[packet.field]]: one value, or several of one kind in a row.
+  // Reads one [[packet.field]]: one value, or several consecutive ones of one kind.
   void read_field(const toml::table& from, PacketRule& packet);
   void read_range(const toml::table& from, Field& field);
   void add_field(const toml::table& from, const std::string& name, Field field, PacketRule& packet);

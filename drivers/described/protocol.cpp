@@ -16,12 +16,14 @@ constexpr std::uint64_t mask_of(int bits) noexcept {
   return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
 }
 
-// The bytes of a place as one number, in their order; what lies above them is of the bytes behind.
+// Loads the bytes of a BitPlace as one number, in their order; higher bits may hold following
+// bytes.
 std::uint64_t gather(const BitPlace& place, std::span<const std::byte> packet) noexcept {
   const auto behind = packet.subspan(place.first);
   std::uint64_t all = 0;  // the host is little-endian
   if (behind.size() >= sizeof all) {
-    std::memcpy(&all, behind.data(), sizeof all);  // one load, where a copy of few bytes is a call
+    // A single load; copying a variable number of bytes would be a call.
+    std::memcpy(&all, behind.data(), sizeof all);
   } else {
     std::memcpy(&all, behind.data(), behind.size());
   }
@@ -82,8 +84,8 @@ bool ends_in(std::span<const std::byte> bytes, std::span<const std::byte> end) n
   return std::ranges::equal(bytes.last(end.size()), end);
 }
 
-// How long a packet of this rule is; 0 when that is not known yet, more than any packet when it is
-// none.
+// Length of a packet of this rule; 0 when it is not known yet, more than kMaxPacketBytes when it is
+// invalid.
 std::size_t length_of(const PacketRule& rule, std::span<const std::byte> bytes) noexcept {
   if (rule.length.fixed) return rule.max_bytes;
   const BitPlace& place = rule.length.place;

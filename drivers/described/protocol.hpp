@@ -1,12 +1,12 @@
-// Bytes and values of a described device, both ways, by its Table. Pure; no I/O.
+// Converts between bytes and values of a table-driven device, using its Table. Pure; no I/O.
 //
 //   offset 0      header.size()                                 length
 //   +------------+---------- ... ----------+----------+-------+
 //   |  header    |  fields, at their bits  | checksum |  end  |
 //   +------------+---------- ... ----------+----------+-------+
 //
-// Each part may be missing, but something has to tell where a packet begins. The checksum may stand
-// anywhere; the length is fixed or read from a field.
+// Each part may be missing, but something must mark where a packet begins. The checksum may be at
+// any position; the length is fixed or read from a field.
 #pragma once
 
 #include <cstddef>
@@ -18,29 +18,29 @@
 
 namespace posed::drivers::described {
 
-// What stands at the beginning of `bytes`.
+// What is found at the start of `bytes`.
 struct Look {
   enum class Found : std::uint8_t { kNothing, kMayCome, kPacket };
   Found found = Found::kNothing;
-  Outcome why = Outcome::kForeign;  // of kNothing: how near it was to a packet
+  Outcome why = Outcome::kForeign;  // for kNothing: how far the bytes resembled a packet
   const PacketRule* rule = nullptr;
-  std::size_t bytes = 0;  // of kPacket
+  std::size_t bytes = 0;  // for kPacket: its length
 };
 
-// kMayCome: what is there agrees with a packet that is not whole yet. RT-safe.
+// kMayCome: the bytes could be the beginning of a packet that is not complete yet. RT-safe.
 [[nodiscard]] Look look_for_packet(const Table& table, std::span<const std::byte> bytes) noexcept;
 
-// The raw value in these bits of a whole packet. RT-safe.
+// The raw value of a field in a complete packet. RT-safe.
 [[nodiscard]] double read_field(const Field& field, std::span<const std::byte> packet) noexcept;
 [[nodiscard]] std::uint64_t read_bits(const BitPlace& place,
                                       std::span<const std::byte> packet) noexcept;
 
-// The other way: the value is rounded to what the bits hold and cut to the field's range.
+// The inverse: `raw` is rounded to the field's bits and limited to its range.
 void write_field(const Field& field, double raw, std::span<std::byte> packet) noexcept;
 
-// Zeros, and the header, length, end and delimiter of the shortest packet of this rule.
+// The shortest packet of this rule: zeros, with its header, length, end and delimiter.
 [[nodiscard]] std::vector<std::byte> blank_packet(const Table& table, const PacketRule& rule);
-// Fills in the checksum; last, when the fields are written.
+// Writes the checksum; call it after all fields are written.
 void seal_packet(const PacketRule& rule, std::span<std::byte> packet) noexcept;
 
 }  // namespace posed::drivers::described

@@ -13,8 +13,9 @@ constexpr std::int64_t kSilence_ns = 1'000'000'000;
 constexpr std::int64_t kBaud_ns = 500'000'000;
 constexpr std::int64_t kBurst_ns = 500'000'000;
 
-// What a receiver at half the sender's rate makes of bytes (8N1, least bit first): it samples every
-// second bit of start bit, data and stop bit, so two bytes become one of broken framing.
+// The byte that a receiver at half the sender's rate gets (8N1, least significant bit first): it
+// samples every second bit of start bit, data and stop bit, so two bytes become one with a framing
+// error.
 std::byte at_half_rate(std::byte first, std::byte second) {
   const auto wire = static_cast<unsigned>(std::to_integer<unsigned>(first) << 1 | 1U << 9 |
                                           std::to_integer<unsigned>(second) << 11);

@@ -1,5 +1,5 @@
-// FaultInjector: what goes wrong between a glove and a host, put between an emulator and its link.
-// Pure and repeatable: the same kind, rate, seed and packets give the same bytes.
+// FaultInjector: simulates faults between a glove and a host; it sits between an emulator and its
+// link. Pure and repeatable: the same kind, rate, seed and packets give the same bytes.
 #pragma once
 
 #include <cstddef>
@@ -18,12 +18,12 @@ enum class FaultKind : std::uint8_t {
   kDrop,       // a byte is lost; rate: share of bytes
   kZero,       // a byte becomes 0; share of bytes
   kFlip,       // one bit of a byte flips; share of bytes
-  kInsert,     // a byte comes in between; share of bytes
-  kNoise,      // drop, flip or insert, each as often; share of bytes
-  kDuplicate,  // a packet comes twice; share of packets
+  kInsert,     // an extra byte is inserted; share of bytes
+  kNoise,      // drop, flip or insert, equally often; share of bytes
+  kDuplicate,  // a packet is sent twice; share of packets
   kSilence,    // half a packet, then nothing for a second; share of packets
-  kBaud,       // for half a second bytes are read at another baud rate; share of packets
-  kBurst,      // nothing for half a second, then all of it at once; share of packets
+  kBaud,       // half a second of bytes is received at another baud rate; share of packets
+  kBurst,      // nothing for half a second, then everything at once; share of packets
   kCount
 };
 
@@ -42,22 +42,22 @@ class FaultInjector {
 
   FaultInjector(Fault fault, std::uint64_t seed) noexcept : fault_(fault), random_(seed) {}
 
-  // The packet that is sent at `now_ns`: adds to `out` what arrives of it, or of earlier ones.
-  // Whether it arrives as it was sent.
+  // Passes a packet sent at `now_ns`: adds to `out` the bytes of it, or of earlier packets, that
+  // arrive now. Returns true when it arrives unchanged.
   bool pass(std::span<const std::byte> packet, std::int64_t now_ns, Bytes& out);
 
  private:
   [[nodiscard]] bool strikes();
   bool pass_bytes(std::span<const std::byte> packet, Bytes& out);
   bool pass_packet(std::span<const std::byte> packet, std::int64_t now_ns, Bytes& out);
-  // A byte with this fault, or the byte and what was put before it.
+  // Adds a byte with this fault, or the byte and one inserted before it.
   void spoil(FaultKind kind, std::byte byte, Bytes& out);
   [[nodiscard]] std::byte any_byte() { return static_cast<std::byte>(random_() & 0xFF); }
 
   Fault fault_;
   std::mt19937_64 random_;
-  std::int64_t until_ns_ = INT64_MIN;  // how long a fault in time goes on
-  Bytes held_;                         // of a burst
+  std::int64_t until_ns_ = INT64_MIN;  // end of a fault that lasts for a time
+  Bytes held_;                         // bytes held back during a burst
 };
 
 }  // namespace posed::drivers::emulate

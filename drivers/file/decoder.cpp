@@ -11,8 +11,8 @@
 namespace posed::drivers {
 namespace {
 
-// Words that are numbers, but none a pose can have (nan, inf, 1e300), are the device's mistake;
-// other words are another device's. RT-safe.
+// A word that is a number but not a plausible one (nan, inf, 1e300) counts as out of range; any
+// other word as foreign. RT-safe.
 Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
   switch (parsed.fault) {
     case clip::FrameFault::kNone:
@@ -52,7 +52,7 @@ void ClipDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_
     if (c == '\n' || c == '\r') {
       end_line(sink);
     } else if (size_ + 1 < text_.size()) {
-      text_[size_++] = c;  // the last place is kept for the line's end
+      text_[size_++] = c;  // the last byte is reserved for the line end
     } else if (!skipping_) {
       skipping_ = true;
       drop_frame(Outcome::kForeign, sink);
@@ -83,8 +83,8 @@ void ClipDecoder::end_line(Sink& sink) noexcept {
     return;
   }
   line_begin_ = size_;
-  // A block has no end mark. It is whole once every bone is there, so that a frame need not wait
-  // for the next one to begin.
+  // A block has no end mark. It is complete once every bone is present, so that a frame need not
+  // wait for the start of the next.
   if (++lines_ >= format_.parser.lines()) finish_frame(sink);
 }
 
@@ -103,7 +103,7 @@ void ClipDecoder::begin_block(std::string_view line, Sink& sink) noexcept {
 void ClipDecoder::finish_frame(Sink& sink) noexcept {
   const clip::FrameOutcome parsed = format_.parser.parse({text_.data(), size_}, values_);
   const Outcome outcome = outcome_of(parsed);
-  // A bone may be spread over two lines; garbage without an end is not waited for.
+  // A bone may span two lines; the limit keeps garbage from being collected without end.
   if (outcome == Outcome::kShort && lines_ > 0 && lines_ < 2 * format_.parser.lines()) return;
   if (outcome != Outcome::kOk) {
     drop_frame(outcome, sink);
@@ -145,7 +145,7 @@ std::int64_t ClipDecoder::next_given_time_ns(double given_s) noexcept {
   const bool repeats = given_ns_ != kNoTime_ns && time_ns == given_ns_;
   given_ns_ = time_ns;
   const std::int64_t proper_ns = repeats ? following_ns : round_ns_ + time_ns;
-  // A frame without a time may have been placed later than this one really is.
+  // An earlier frame without a time may have been placed later than this one really is.
   last_ns_ = is_first ? proper_ns : std::max(proper_ns, last_ns_ + 1);
   return last_ns_;
 }

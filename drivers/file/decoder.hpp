@@ -1,5 +1,5 @@
-// A clip's text to frames, one by one: the lines of a BVH's motion or of a hand CSV, an AMC's
-// blocks of lines.
+// Decodes the text of a clip into frames, one by one: the motion lines of a BVH, the lines of a
+// hand CSV, or the blocks of lines of an AMC.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,9 @@
 
 namespace posed::drivers {
 
-// Device time is the clip's: frame n, counted over all loops and with the frames that could not be
-// read, is at n / rate. A hand CSV's frames bring their times: one without comes a step after the
-// frame before, one that lies before the times already given begins the next round.
+// Device time is the clip's time: frame n, counted over all loops and including unreadable frames,
+// is at n / rate. The frames of a hand CSV carry their times: a frame without one comes one step
+// after the frame before; a time earlier than the times before it begins the next loop.
 class ClipDecoder final : public Decoder {
  public:
   explicit ClipDecoder(clip::ClipFormat format);
@@ -35,14 +35,14 @@ class ClipDecoder final : public Decoder {
   std::vector<double> values_;  // [channels]
   std::vector<char> text_;      // of fixed size: the frame being collected, line by line
   std::size_t size_ = 0;        // of text_ in use
-  std::size_t line_begin_ = 0;  // of the open line in text_
-  std::size_t lines_ = 0;       // complete ones in text_
-  bool skipping_ = false;       // the open line is too long and already counted
+  std::size_t line_begin_ = 0;  // start of the unfinished line in text_
+  std::size_t lines_ = 0;       // complete lines in text_
+  bool skipping_ = false;       // the unfinished line is too long and already counted
   std::int64_t frames_ = 0;     // so far
-  // Of frames that bring their times:
+  // For frames that carry times:
   std::int64_t last_ns_ = kNoTime_ns;   // time of the frame before
-  std::int64_t given_ns_ = kNoTime_ns;  // the last time that a frame brought
-  std::int64_t round_ns_ = 0;           // added to what the frames of this round bring
+  std::int64_t given_ns_ = kNoTime_ns;  // the last time carried by a frame
+  std::int64_t round_ns_ = 0;           // added to the times carried by the frames of this loop
 };
 
 }  // namespace posed::drivers

@@ -30,7 +30,7 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   return std::make_unique<ClipDecoder>(std::move(*format));
 }
 
-// One chunk a frame, ended as a line is ended, so that the decoder knows it for whole.
+// One chunk per frame, with a line end so that the decoder knows that it is complete.
 Chunks frames_of(const clip::TextClip& clip) {
   Chunks chunks;
   for (const std::string_view frame : clip.frames) {
@@ -39,7 +39,7 @@ Chunks frames_of(const clip::TextClip& clip) {
   return chunks;
 }
 
-// An option that says nothing about this kind of clip is refused: it would be silently ignored.
+// Rejects an option that does not apply to this kind of clip, instead of silently ignoring it.
 Result<> check_options(const std::filesystem::path& path, const Options& options) {
   const std::string kind = clip::lower(path.extension().string());
   const auto others = [&path](const char* name, const char* of, const char* instead) {

@@ -1,4 +1,4 @@
-// Packets of a 5DT glove to a hand and a sample each.
+// Decodes each packet of a 5DT glove into a frame and a sample.
 #pragma once
 
 #include <array>
@@ -12,14 +12,14 @@
 
 namespace posed::drivers::fivedt {
 
-// A wide glove's values where a hand is straight and where it is closed: by default, for want of a
-// calibration. VRPN's own thresholds lie at 1490 and 3030.
+// Default values of a 12-bit glove's sensor when the finger is straight and when it is closed, used
+// without a calibration. VRPN's own thresholds are 1490 and 3030.
 inline constexpr double kStraight = 1500.0;
 inline constexpr double kBent = 3000.0;
 
 struct Settings {
   Form form = Form::kFive;
-  bool polled = false;  // an exact repeat is the same measurement again
+  bool polled = false;  // in polled mode an exact repeat is the same measurement again
   bool port_b = false;  // which glove of an Ultra Wireless kit
 };
 
@@ -44,7 +44,7 @@ class FiveDtDecoder final : public glove::GloveDecoder, private Readings {
 
   Settings settings_;
   Framer framer_;
-  Sink* sink_ = nullptr;  // of the feed() under way
+  Sink* sink_ = nullptr;  // of the current call of feed()
   std::array<std::uint16_t, kMaxValues> before_{};
   bool has_before_ = false;
 };

@@ -9,13 +9,13 @@ namespace {
 
 constexpr int kInfoEvery = 64;  // records of a Data Glove 16
 
-// Packets a second: what the line carries of 9 or 36 bytes, or a likely rate.
+// Sample periods: as long as the line needs for 9 or 36 bytes, or a likely rate.
 constexpr std::array<std::int64_t, 6> kPeriod_ns{10'000'000, 12'500'000, 20'000'000,
                                                  13'333'333, 16'666'667, 16'666'667};
 
 constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-// What whole bends mean, as config/devices/fivedt-*.toml have it: a finger's three joints, a
+// Angles of a fully bent sensor, as in config/devices/fivedt-*.toml: a finger's three joints, a
 // thumb's last two.
 constexpr std::array<double, kFingerJoints> kFinger_rad{radians(90.0), radians(100.0),
                                                         radians(70.0)};
@@ -31,7 +31,7 @@ double spread(const HandAngles& angles, std::size_t finger) {
   return angles[finger * kFingerChannels + 1] / kSpread_rad;
 }
 
-// How far each sensor is bent: of a finger the mean of its joints.
+// How far each sensor is bent: the mean of its finger's joints.
 std::array<double, kMaxValues> narrow_bends(const HandAngles& angles) {
   std::array<double, kMaxValues> bends{};
   bends[0] = 0.5 * (share(angles, 0, 1) + share(angles, 0, 2));
@@ -77,7 +77,7 @@ void FiveDtEmulator::pose(const HandAngles& angles) {
 }
 
 void FiveDtEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) {
-  if (settings_.form != Form::kFive) return;  // the others do not listen
+  if (settings_.form != Form::kFive) return;  // the other models ignore commands
   for (const std::byte byte : bytes) {
     switch (static_cast<char>(byte)) {
       case 'A':
@@ -96,7 +96,7 @@ void FiveDtEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_
         if (!pace_.running()) pace_.start(now_ns);
         break;
       default:
-        break;  // nothing is known of an answer
+        break;  // the answer is not known
     }
   }
 }

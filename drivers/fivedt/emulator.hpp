@@ -1,4 +1,4 @@
-// The other side of a 5DT glove of each form.
+// Emulates a 5DT glove of any form.
 #pragma once
 
 #include "drivers/emulator.hpp"
@@ -9,7 +9,7 @@ namespace posed::drivers::fivedt {
 
 class FiveDtEmulator final : public Emulator {
  public:
-  // A Data Glove 5 is silent until it is told D or asked C; all others stream at once.
+  // A Data Glove 5 sends nothing until it receives D or C; all others stream at once.
   FiveDtEmulator(Side side, const Settings& settings);
 
   void pose(const HandAngles& angles) override;

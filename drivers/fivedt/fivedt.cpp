@@ -18,9 +18,9 @@ namespace fivedt {
 namespace {
 
 constexpr std::string_view kName = "fivedt";
-constexpr double kSilence_s = 2.0;  // as VRPN has it
+constexpr double kSilence_s = 2.0;  // as in VRPN
 constexpr std::uint16_t kVendor = 0x5D70;
-constexpr std::int64_t kMaxPoll_hz = 200;  // what 19200 baud carry of nine bytes and a letter
+constexpr std::int64_t kMaxPoll_hz = 200;  // limit of 19200 baud for nine bytes and the request
 constexpr std::array<std::string_view, 2> kModes{"stream", "poll"};
 constexpr std::array<std::string_view, 2> kKitPorts{"a", "b"};
 
@@ -84,7 +84,7 @@ Result<Description> describe(const std::string& text, const std::string& identit
                      .rate_hz = 0.0};
 }
 
-// The baud of the glove's own line, for who gives none.
+// The usual baud rate of a model, when the options give none.
 std::int64_t usual_baud(Form form) {
   if (form == Form::kFiveWireless) return 9600;
   return form == Form::kUltraWireless ? 115200 : 19200;
@@ -126,7 +126,8 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
                                          glove->settings);
 }
 
-// Bit 0 of the product is a left hand, 1 and 2 a wireless kit and its port B, 4 five sensors.
+// Bits of the product id: bit 0 is a left hand, 1 and 2 a wireless kit and its port B, 4 five
+// sensors.
 std::vector<std::uint16_t> products(const Greeted& glove) {
   const int base =
       (glove.side == Side::kLeft ? 0x01 : 0) | (glove.settings.form == Form::kUltraUsb5 ? 0x10 : 0);

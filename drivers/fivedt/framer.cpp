@@ -13,7 +13,7 @@ void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept
   }
 }
 
-// Uses up bytes at the front; false when it takes more of them to go on. RT-safe.
+// Consumes bytes from the front; returns false when it needs more bytes. RT-safe.
 bool Framer::advance(Readings& readings) noexcept {
   return in_step_ ? advance_in_step(readings) : advance_hunting();
 }
@@ -35,7 +35,7 @@ bool Framer::advance_in_step(Readings& readings) noexcept {
   if (outcome == Outcome::kOk && is_usb(form_) && !is_half_used(packet)) {
     outcome = Outcome::kForeign;
   }
-  // Who the glove is, is no measurement.
+  // An info packet is not a measurement and is not counted.
   if (reading.kind == Reading::Kind::kData) readings.outcome(outcome);
   in_step_ = outcome == Outcome::kOk;
   just_lost_ = !in_step_;
@@ -47,7 +47,7 @@ bool Framer::advance_in_step(Readings& readings) noexcept {
   return true;
 }
 
-// Looks for the next packet that cannot be chance. RT-safe.
+// Searches for the next packet that cannot be a coincidence. RT-safe.
 bool Framer::advance_hunting() noexcept {
   if (just_lost_) return skip_damaged();
   const std::size_t length = packet_length(form_, pending());
@@ -59,9 +59,9 @@ bool Framer::advance_hunting() noexcept {
   return true;
 }
 
-// Where bytes were changed but none lost, the next packet stands in its place. It is tried first:
-// in a Data Glove 5's packets any byte 80 looks like the start of one, with a good checksum, too,
-// while the hand lies still. RT-safe.
+// When bytes were changed but none lost, the next packet is at its expected position, which is
+// tried first: in the packets of a Data Glove 5 any byte 80 looks like a start, even with a valid
+// checksum while the hand does not move. RT-safe.
 bool Framer::skip_damaged() noexcept {
   const std::size_t length = packet_bytes(form_);
   if (pending_bytes_ <= length) return false;
@@ -75,22 +75,22 @@ bool Framer::skip_damaged() noexcept {
   return true;
 }
 
-// `bytes` begins with a whole packet, and one byte more of an Ultra Wireless kit if it is there.
-// RT-safe.
+// True when `bytes` begins with a whole packet, and for an Ultra Wireless kit with one more byte if
+// it is available. RT-safe.
 bool Framer::is_packet(std::span<const std::byte> bytes) noexcept {
   const std::size_t length = packet_length(form_, bytes);
   const auto packet = bytes.first(length);
   Reading reading;
   if (decode_packet(form_, packet, reading) != Outcome::kOk) return false;
   if (form_ == Form::kUltraWireless) {
-    // Only the next record's start says that this is one, and a hand that lies still repeats its
-    // bytes, too: at first only a port is believed that was heard before.
+    // Only the start of the next record confirms this one, and a hand that does not move repeats
+    // its bytes: at first only ports that were seen before are accepted.
     constexpr std::size_t kShy = 256;  // bytes
     const bool known = ports_[std::to_integer<std::size_t>(packet[1])];
     const bool followed = bytes.size() == length || packet_length(form_, bytes.subspan(length)) > 0;
     return followed && (known || ports_.none() || hunted_ > kShy);
   }
-  // Zeros fit everywhere: a report begins with a sensor that measures.
+  // Zeros fit everywhere, so a report must begin with a sensor that measures.
   return !is_usb(form_) || (reading.value[0] != 0 && is_half_used(packet));
 }
 
@@ -100,7 +100,7 @@ bool Framer::is_tail(std::byte byte) const noexcept {
          (form_ == Form::kFiveWireless && is_capability(byte));
 }
 
-// One byte may follow a packet of a Data Glove 5. RT-safe.
+// Consumes the byte that may follow a packet of a Data Glove 5. RT-safe.
 bool Framer::take_tail() noexcept {
   if (!after_packet_) return false;
   after_packet_ = false;
@@ -111,7 +111,7 @@ bool Framer::take_tail() noexcept {
   return true;
 }
 
-// Reports of a glove that leaves its second half zero have to go on doing so: over USB nothing
+// True when a glove that leaves the second half of its reports zero still does so: over USB nothing
 // shifts, but a report of another kind is noticed. RT-safe.
 bool Framer::is_half_used(std::span<const std::byte> report) noexcept {
   const bool zero = std::ranges::all_of(report.subspan(2 * kMaxValues),

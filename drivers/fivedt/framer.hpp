@@ -1,5 +1,5 @@
-// Framer: a stream of bytes of a 5DT glove to packets. Where a packet begins is certain by its
-// checksum (Data Glove 5), by its shape (16, USB) or only by its cadence (Ultra Wireless).
+// Framer: splits the byte stream of a 5DT glove into packets. The start of a packet is found by its
+// checksum (Data Glove 5), its shape (16, USB) or only its regular spacing (Ultra Wireless).
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace posed::drivers::fivedt {
 
-// Where a Framer puts what it finds. RT-safe.
+// Receives the packets that a Framer finds. RT-safe.
 class Readings {
  public:
   Readings() = default;
@@ -19,7 +19,7 @@ class Readings {
   Readings& operator=(const Readings&) = delete;
   virtual ~Readings() = default;
 
-  virtual void reading(const Reading& reading) noexcept = 0;  // after its kOk
+  virtual void reading(const Reading& reading) noexcept = 0;  // called after its kOk
   virtual void outcome(Outcome outcome) noexcept = 0;
 };
 
@@ -27,10 +27,10 @@ class Framer {
  public:
   explicit Framer(Form form) noexcept : form_(form) {}
 
-  // Bytes in any cut. RT-safe.
+  // Takes bytes cut at any position. RT-safe.
   void feed(std::span<const std::byte> bytes, Readings& readings) noexcept;
 
-  // The last byte a wireless type sent behind a packet; -1: none yet. RT-safe.
+  // The last byte that a wireless glove sent after a packet; -1: none yet. RT-safe.
   [[nodiscard]] int capability() const noexcept { return capability_; }
 
  private:
@@ -50,11 +50,11 @@ class Framer {
   Form form_;
   std::array<std::byte, 2 * kMaxPacket + 1> pending_{};  // a packet, its tail and the next one
   std::size_t pending_bytes_ = 0;
-  bool in_step_ = true;        // false while hunting: one outcome a hunt, not one a byte
-  bool just_lost_ = false;     // the packet behind the damaged one was not tried yet
+  bool in_step_ = true;        // false while searching; one outcome per search, not per byte
+  bool just_lost_ = false;     // the packet after the damaged one was not tried yet
   bool after_packet_ = false;  // a tail may follow
   int capability_ = -1;
-  std::size_t hunted_ = 0;  // bytes thrown away since the last packet
+  std::size_t hunted_ = 0;  // bytes discarded since the last packet
   std::bitset<256> ports_;  // second bytes of an Ultra Wireless kit's records so far
   enum class Tail : std::uint8_t { kUnknown, kZero, kUsed } usb_tail_ = Tail::kUnknown;
 };

@@ -1,25 +1,25 @@
 // The packets of 5DT data gloves. No I/O here.
 //
-//   Data Glove 5, serial, 19200 8N1. The host sends one letter: A starts anew, answered by 55; G
-//   asks who it is, answered by 32 bytes ("BR", major, minor, bit 0: right, bit 4: pitch and roll
-//   fitted,
-//   .. name from byte 16); C asks for one packet; D for packets without end.
+//   Data Glove 5, serial, 19200 8N1. The host sends one letter: A resets it, answered by 55; G asks
+//   for its info, answered by 32 bytes ("BR", major, minor, bit 0: right, bit 4: pitch and roll
+//   fitted, .. name from byte 16); C asks for one packet; D starts continuous packets.
 //      0      1       2       3       4       5        6       7       8
 //   +------+-------+-------+-------+------+--------+-------+------+----------+
 //   |  80  | thumb | index | middle| ring | little | pitch | roll | checksum |  then sometimes 55
 //   +------+-------+-------+-------+------+--------+-------+------+----------+
 //     bends 0 (straight) to 255; pitch and roll 0 to 255 for 0 to 180 degrees; checksum: XOR of
-//     bytes 1 to 7. 80 may be data, too.
-//   Data Glove 5 of the wireless type, 9600 8N1: the same without being asked, with a tenth byte
-//     that says which hand (01 or 00 right, 40 or 06 left: sources differ).
-//   Data Glove 16, serial, 19200 8N1, without being asked:
+//     bytes 1 to 7. 80 may also be data.
+//   Data Glove 5 of the wireless type, 9600 8N1: the same without a request, with a tenth byte
+//     for the hand (01 or 00 right, 40 or 06 left: sources differ).
+//   Data Glove 16, serial, 19200 8N1, without a request:
 //     '<' 'I' hw-major hw-minor flags(bit 0: right) flags(bit 0: wired) ?             7 bytes
-//     '<' 'D' 16 values of 12 bits as u16 BE, 2 bytes that nobody has explained      36 bytes
+//     '<' 'D' 16 values of 12 bits as u16 BE, 2 bytes of unknown meaning             36 bytes
 //   Ultra Wireless kit, serial: 29 bytes
 //     3C, port (low nibble 2 or 3: A, else B), ?, 14 values of 12 bits packed most significant bit
-//     first (21 bytes), 5 bytes that nobody has explained. 3C may be data, too.
-//   Ultra USB, HID: reports of 64 bytes without a number; 16 values of 12 bits as i16 BE, then 32
-//     bytes that nobody has explained. Five sensors are values 0, 3, 6, 9 and 12.
+//     first (21 bytes), 5 bytes of unknown meaning. 3C may also be data.
+//   Ultra USB, HID: reports of 64 bytes without a report number; 16 values of 12 bits as i16 BE,
+//   then 32
+//     bytes of unknown meaning. Five sensors are values 0, 3, 6, 9 and 12.
 //
 // Order of the wide gloves' values: thumb near, thumb far, thumb/index, index near, index far,
 // index/middle, middle near, far, middle/ring, ring near, far, ring/little, little near, far, and
@@ -53,15 +53,15 @@ inline constexpr std::array<std::string_view, 6> kFormNames{
 
 inline constexpr std::size_t kMaxPacket = 64;
 inline constexpr std::size_t kMaxValues = 16;
-inline constexpr std::byte kReady{0x55};  // the answer to A, and what may follow a packet
+inline constexpr std::byte kReady{0x55};  // the answer to A; may also follow a packet
 
-[[nodiscard]] bool is_usb(Form form) noexcept;               // reports, no byte stream; RT-safe
+[[nodiscard]] bool is_usb(Form form) noexcept;  // sends reports, not a byte stream; RT-safe
 [[nodiscard]] std::size_t sensors_of(Form form) noexcept;    // RT-safe
-[[nodiscard]] std::size_t packet_bytes(Form form) noexcept;  // of a measurement; RT-safe
-// Where sensor `index` stands among the values of a packet. RT-safe.
+[[nodiscard]] std::size_t packet_bytes(Form form) noexcept;  // of a measurement packet; RT-safe
+// Index of sensor `index` among the values of a packet. RT-safe.
 [[nodiscard]] std::size_t value_of_sensor(Form form, std::size_t index) noexcept;
 
-// One packet.
+// The content of one packet.
 struct Reading {
   enum class Kind : std::uint8_t { kData, kInfo };
   Kind kind = Kind::kData;
@@ -71,22 +71,24 @@ struct Reading {
   bool right = true;                 // of an info packet
 };
 
-// Length of the packet that begins with these bytes; 0 when none begins so. One byte is enough to
-// say 0 or not; until the length is certain it is a lower bound above bytes.size(). RT-safe.
+// Length of the packet that begins with these bytes; 0 when no packet begins like this. One byte is
+// enough to tell whether it is 0; until the length is certain, it is a lower bound greater than
+// bytes.size(). RT-safe.
 [[nodiscard]] std::size_t packet_length(Form form, std::span<const std::byte> bytes) noexcept;
 
-// `bytes` is one packet. kOk fills `reading`; kBadChecksum, kOutOfRange (more than 12 bits),
-// kForeign. RT-safe.
+// `bytes` is one packet. Fills `reading` and returns kOk; otherwise kBadChecksum, kOutOfRange (more
+// than 12 bits) or kForeign. RT-safe.
 [[nodiscard]] Outcome decode_packet(Form form, std::span<const std::byte> bytes,
                                     Reading& reading) noexcept;
 
-// What the glove would send; `side` goes into a wireless type's tenth byte.
+// The bytes that the glove would send; `side` goes into the tenth byte of a wireless type.
 [[nodiscard]] std::vector<std::byte> encode_packet(Form form, const Reading& reading, Side side);
-// The answer to G of a Data Glove 5; only its hand is read.
+// Length of a Data Glove 5's answer to G; only its hand is used.
 inline constexpr std::size_t kInfoBytes = 32;
 [[nodiscard]] std::vector<std::byte> encode_info(Side side);
 
-// Whether a wireless type's tenth byte is one at all, and says left. RT-safe.
+// True when the byte is a valid tenth byte of a wireless type; and when it means a left hand.
+// RT-safe.
 [[nodiscard]] bool is_capability(std::byte byte) noexcept;
 [[nodiscard]] bool says_left(std::byte capability) noexcept;
 

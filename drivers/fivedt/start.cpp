@@ -12,12 +12,12 @@ using Bytes = std::vector<std::byte>;
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPatience{2000};  // as VRPN has it
+constexpr milliseconds kPatience{2000};  // as in VRPN
 constexpr milliseconds kOneRead{50};
 constexpr milliseconds kQuiet{30};
-constexpr int kPackets = 2;  // behind the first stands which hand a wireless type is
+constexpr int kPackets = 2;  // a wireless type gives its hand after the first packet
 
-// Adds what comes to `bytes` until `enough` of it; false when the patience is over first.
+// Appends received bytes to `bytes` until `enough` of it; returns false on a timeout.
 template <typename Enough>
 Result<bool> collect(Connection& link, Bytes& bytes, const Enough& enough) {
   const auto begin = Clock::now();
@@ -36,7 +36,7 @@ std::unexpected<Error> other_hand(const Connection& link, Side found) {
               link.name());
 }
 
-// A Data Glove 5 with a cable both ways: asked who it is, then told to stream.
+// Starts a Data Glove 5 with a two-way cable: asks for its info, then starts the stream.
 Result<> start_wired(Connection& link, Side side, bool polled) {
   if (auto ok = link.drain(kQuiet); !ok) return ok;
   if (auto ok = link.write("A"); !ok) return ok;
@@ -66,7 +66,7 @@ Result<> start_wired(Connection& link, Side side, bool polled) {
   return polled ? Result<>() : link.write("D");
 }
 
-// What a glove that streams by itself has said so far.
+// What a streaming glove has sent so far.
 class Heard final : public Readings {
  public:
   void reading(const Reading& reading) noexcept override {

@@ -1,5 +1,4 @@
-// What is said to a 5DT glove before it is read: its model and hand are checked, its stream
-// started.
+// Starts a 5DT glove before it is read: checks its model and hand, and starts its stream.
 #pragma once
 
 #include <string>
@@ -11,8 +10,8 @@
 
 namespace posed::drivers::fivedt {
 
-// Up to a few seconds; an error says what came instead, or that the glove is of the other hand.
-// Returns what the user should look at all the same. Cold.
+// Takes up to a few seconds. An error states what came instead, or that the glove is of the other
+// hand. Returns warnings for the user. Cold.
 [[nodiscard]] Result<std::vector<std::string>> start(Connection& link, Side side,
                                                      const Settings& settings);
 

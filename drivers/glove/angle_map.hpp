@@ -1,13 +1,13 @@
-// The angle map: which joints of the hand a glove's calibrated values bend, as a table in
-// config/devices/<name>.toml. It holds for both hands: what mirrors a left one is the skeleton.
+// The angle map: a table in config/devices/<name>.toml that states which joints of the hand follow
+// a glove's calibrated values. It is the same for both hands; the skeleton mirrors a left one.
 //
 //   [angles]                # calibrated value, its shares in channels of hand45
 //   index_mcp = [{channel = "index1_x", gain = -1.0, offset_deg = 0.0}]
 //   index_curl = [{channel = "index1_x", gain = 1.57}, {channel = "index2_x", gain = 1.75}]
 //
 // channel: finger, joint 1 to 3 from the palm outwards, x flexion, y spread, z twist. gain: radians
-// a unit of the value, 1 when left out; offset_deg: 0 when left out. Shares of one channel add up;
-// a channel that nothing names stays at zero. Other tables of the file are not looked at.
+// per unit of the value, default 1; offset_deg: default 0. Several entries for one channel add up;
+// a channel without an entry stays at zero. Other tables of the file are ignored.
 #pragma once
 
 #include <string>
@@ -20,15 +20,15 @@
 
 namespace posed::drivers::glove {
 
-// The text of config/devices/<name>.toml, as it was built in. Cold.
+// Returns the text of config/devices/<name>.toml as built into posed. Cold.
 [[nodiscard]] Result<std::string> device_table(std::string_view name);
 
-// Errors name `file` and line: unknown value or channel, no number. Cold.
+// Errors name `file` and line: unknown value or channel, invalid number. Cold.
 [[nodiscard]] Result<std::vector<MapRow>> parse_angle_map(const std::string& toml,
                                                           const std::string& file,
                                                           const std::vector<Sensor>& sensors);
 
-// "index1_x" to its place in HandAngles; -1 when there is no such channel. Cold.
+// Turns "index1_x" into its index in HandAngles; -1 when there is no such channel. Cold.
 [[nodiscard]] int hand_channel(std::string_view name);
 
 }  // namespace posed::drivers::glove

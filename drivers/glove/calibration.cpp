@@ -16,7 +16,7 @@ Curve Curve::line(double raw0, double value0, double raw1, double value1) noexce
 
 // RT-safe.
 float Curve::value_at(float raw_value) const noexcept {
-  std::size_t piece = 1;  // ends at this point; the first and the last go on beyond theirs
+  std::size_t piece = 1;  // ends at this point; the first and the last are extended outwards
   while (piece + 1 < points && raw_value > raw[piece]) ++piece;
   const float share = (raw_value - raw[piece - 1]) / (raw[piece] - raw[piece - 1]);
   return value[piece - 1] + share * (value[piece] - value[piece - 1]);

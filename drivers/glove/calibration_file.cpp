@@ -15,10 +15,10 @@ namespace posed::drivers::glove {
 namespace {
 
 constexpr int kFormat = 1;
-// A glove has at most 32 sensors of 8 points.
+// Large enough for 32 sensors of 8 points, the most that a glove has.
 constexpr TomlLimits kLimits{
     .what = "calibration", .bytes = kMaxCalibrationFile, .depth = 4, .items = 2048};
-constexpr double kMaxNumber = 1e6;  // of raw values, calibrated values and parameters
+constexpr double kMaxNumber = 1e6;  // limit for raw values, calibrated values and parameters
 
 class FileReader : private FirstError {
  public:
@@ -118,7 +118,7 @@ Result<std::string> load_calibration_text(const std::filesystem::path& path) {
 }
 
 std::string format_calibration(const CalibrationFile& file) {
-  // toml++ quotes and escapes what a name or a serial number may hold.
+  // toml++ quotes and escapes the characters of names and serial numbers.
   std::ostringstream out;
   out << "format = " << kFormat << "\ndriver = " << toml::value<std::string>(file.driver)
       << "\nglove = " << toml::value<std::string>(file.glove)

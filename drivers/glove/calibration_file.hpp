@@ -1,4 +1,4 @@
-// A calibration as a person keeps it: one TOML file for one user and one glove.
+// A calibration as a user keeps it: one TOML file for one user and one glove.
 //
 //   format = 1
 //   driver = "cyberglove"
@@ -32,22 +32,22 @@ struct CalibrationFile {
   std::map<std::string, std::vector<std::array<double, 2>>> sensors;  // raw, calibrated
 };
 
-// A compiled calibration with the text it came from, which the log keeps.
+// A compiled calibration with the text from which it was made; the log stores the text.
 struct OwnedCalibration {
   std::shared_ptr<const Calibration> calibration;
   std::string text;
-  std::string name{};  // of its file, for people
+  std::string name{};  // file name, for people
 };
 
-// Errors name file and line: cut in half, not finite, raw values that do not ascend. Cold.
+// Errors name file and line: truncated, not finite, raw values that do not increase. Cold.
 [[nodiscard]] Result<CalibrationFile> parse_calibration(const std::string& toml,
                                                         const std::filesystem::path& file);
 [[nodiscard]] std::string format_calibration(const CalibrationFile& file);
 
-// The model's default calibration, or what `file` makes of it (sensors it does not name keep their
-// default). Refused with a sentence: another driver, another hand, another glove (`identity` empty
-// is not compared), unknown sensors, a sensor whose raw values span less than 10 counts (4 % of the
-// range of a coarser one). Cold.
+// The model's default calibration, and the one made from `file` (a sensor that the file does not
+// name keeps its default). An error for: another driver, another hand, another glove (not checked
+// when `identity` is empty), unknown sensors, or a sensor whose raw values span less than 10 counts
+// (4 % of the range of a coarser one). Cold.
 [[nodiscard]] Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model);
 [[nodiscard]] Result<std::shared_ptr<const Calibration>> make_calibration(
     const Model& model, const CalibrationFile& file, Side hand, const std::string& identity);

@@ -1,4 +1,4 @@
-// From a model, and what a file says of one user's glove, to the Calibration that decoders use.
+// Combines a model and a user's calibration file into the Calibration that decoders use.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +11,7 @@
 namespace posed::drivers::glove {
 namespace {
 
-// A driver's own mistake shows in the first test that opens it.
+// A mistake in a driver's curve appears in the first test that opens the driver.
 bool is_sound(const Curve& curve) {
   bool sound = curve.points >= 2 && curve.points <= kMaxCurvePoints;
   for (std::size_t i = 0; sound && i < curve.points; ++i) {
@@ -93,7 +93,7 @@ Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>
 
 }  // namespace
 
-// A sensor that hardly moved while it was calibrated would turn its noise into motion.
+// A sensor that hardly moved during calibration would turn its noise into motion.
 double least_span(const Sensor& sensor) {
   constexpr double kCounts = 10.0;
   constexpr double kShareOfRange = 0.04;

@@ -1,5 +1,5 @@
-// How a glove with a byte stream is reached: the options that all such drivers share, and the link
-// they lead to.
+// Connections to gloves that send a byte stream: the options that all such drivers share, and the
+// link that these options select.
 #pragma once
 
 #include <cstdint>
@@ -10,21 +10,21 @@
 
 namespace posed::drivers::glove {
 
-// port, id, hand and baud.
+// The options port, id, hand and baud.
 [[nodiscard]] std::vector<OptionSpec> serial_options(std::int64_t baud);
-// link, listen and peers, for gloves that may come over TCP, too.
+// The options link, listen and peers, for gloves that can also connect over TCP.
 [[nodiscard]] std::vector<OptionSpec> tcp_options(std::string_view listen);
 
-// Of completed options. Cold.
+// Takes options that complete_options() has completed. Cold.
 [[nodiscard]] Result<Side> hand_option(const Options& options);
 
-// Whether connect() could do with these completed options, without opening anything: what a
-// driver's expect() asks, so that options that make no sense are refused before a glove is there.
-// Cold.
+// Checks that connect() could use these completed options, without opening anything. A driver's
+// expect() calls it, so that invalid options are an error before a glove is connected. Cold.
 [[nodiscard]] Result<> check_connection(const Options& options);
 
-// The link that completed options lead to; without port and id one of `usb_ids`
-// (vendor << 16 | product). Cold: may wait half a second for a glove that connects to us.
+// Opens the link that completed options select; without port and id, the one whose USB id is in
+// `usb_ids` (vendor_id << 16 | product_id). Cold: may wait half a second for a glove that connects
+// to posed.
 [[nodiscard]] Result<Connection> connect(const Options& options, TransportFactory& ports,
                                          std::vector<std::uint32_t> usb_ids);
 

@@ -75,10 +75,10 @@ Side Greeting::side() { return static_cast<Side>(choice("hand", kSides)); }
 
 Result<> Greeting::finish() const {
   std::string wrong = wrong_;
-  // Keys may be garbage from a damaged log: they are not repeated to the terminal.
+  // Keys from a damaged log may be garbage, so they are not shown on the terminal.
   if (wrong.empty() && !unread_.empty()) wrong = "has a key that this driver does not know";
   if (wrong.empty()) return {};
-  return fail("the greeting of a " + in_quotes(driver_) + " " + wrong +
+  return fail("the device info of a " + in_quotes(driver_) + " " + wrong +
                   "; the log is damaged or was made by another version",
               identity_);
 }

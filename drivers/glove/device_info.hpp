@@ -1,5 +1,5 @@
-// Greeting: a glove's Description::text, "driver key=value key=value": what its driver learned of
-// it at the start, enough to decode it again from a log.
+// The device info of a glove, stored in Description::text as "driver key=value key=value": what its
+// driver learned from it at the start, enough to decode its bytes again from a log.
 #pragma once
 
 #include <map>
@@ -15,8 +15,8 @@ namespace posed::drivers::glove {
 [[nodiscard]] std::string_view side_name(Side side) noexcept;  // "right", "left"
 [[nodiscard]] Result<Side> parse_side(std::string_view name);
 
-// Reads a greeting key by key. What is missing, twice there, unknown or out of range is remembered
-// and told by finish(); until then a bad key reads as the least it may be. Cold.
+// Reads a device info key by key. A key that is missing, repeated, unknown or out of range is
+// remembered and reported by finish(); until then it reads as its smallest allowed value. Cold.
 class Greeting {
  public:
   Greeting(const std::string& text, std::string_view driver, std::string identity);
@@ -26,7 +26,7 @@ class Greeting {
   [[nodiscard]] Side side();  // "hand"
   [[nodiscard]] std::string word(std::string_view key);
 
-  // One sentence about the first thing wrong, keys that nobody read included.
+  // Reports the first error as one sentence; a key that was never read is also an error.
   [[nodiscard]] Result<> finish() const;
 
  private:
@@ -34,7 +34,7 @@ class Greeting {
 
   std::string driver_, identity_;
   std::map<std::string, std::string, std::less<>> unread_;
-  std::string wrong_;  // empty: nothing so far
+  std::string wrong_;  // empty: no error so far
 };
 
 }  // namespace posed::drivers::glove

@@ -10,7 +10,7 @@
 namespace posed::drivers::glove {
 namespace {
 
-constexpr double kSame = 0.05;  // rad or share: two poses that differ less do not move a sensor
+constexpr double kSame = 0.05;  // rad or share: poses that differ by less do not move a sensor
 
 std::size_t channel(std::string_view name) { return static_cast<std::size_t>(hand_channel(name)); }
 
@@ -59,7 +59,8 @@ Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand
   std::vector<double> values(sensors, kUnknown);
   for (std::size_t i = 0; i < sensors; ++i) {
     if (count[i] > 0.0) values[i] = sum[i] / count[i];
-    // A share of a finger's way is none or all of it in a pose, whatever its joints' limits are.
+    // For a value that is a share of the finger's range, a pose counts as 0 or 1, whatever the
+    // joints' limits are.
     if (count[i] > 0.0 && model.sensors[i].unit == "1") {
       values[i] = std::clamp(std::round(values[i]), -1.0, 1.0);
     }
@@ -85,7 +86,7 @@ Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Reco
   std::vector<SensorPoses> found;
   for (std::size_t i = 0; i < model.sensors.size(); ++i) {
     const Held& flat = recorded[0][i];
-    if (flat.count == 0) continue;  // a sensor that this glove lacks
+    if (flat.count == 0) continue;  // the glove does not have this sensor
     std::size_t most = 0;
     for (std::size_t p = 1; p < kPoses; ++p) {
       const double moves = std::abs(wanted[p][i] - wanted[0][i]);

@@ -1,4 +1,4 @@
-// Fit: a user's calibration from a few poses of the hand, held still. Cold.
+// Computes a user's calibration from a few poses of the hand, held still. Cold.
 #pragma once
 
 #include <array>
@@ -20,18 +20,18 @@ namespace posed::drivers::glove {
 enum class Pose : std::uint8_t { kFlat, kFist, kThumb, kSpread };
 inline constexpr std::size_t kPoses = 4;
 inline constexpr std::array<std::string_view, kPoses> kPoseNames{"flat", "fist", "thumb", "spread"};
-// What the user is asked to do.
+// Instructions to the user.
 inline constexpr std::array<std::string_view, kPoses> kPoseHints{
     "lay the hand flat on the table, fingers together and straight, thumb beside the index",
     "make a fist, tight, with the thumb outside",
     "fingers straight, the thumb bent across the palm to the root of the little finger",
     "spread all fingers as far as they go, hand flat"};
 
-// How the hand stands in a pose [rad]: an average of what people do, so fitted angles are as
-// good as the user's own poses.
+// Joint angles of a hand in a pose [rad]: an average over people, so the fitted angles are only as
+// accurate as the user's poses.
 [[nodiscard]] HandAngles hand_in(Pose pose);
 
-// Raw values of one sensor while a pose was held.
+// The raw values of one sensor while a pose was held.
 struct Held {
   double sum = 0.0;
   std::size_t count = 0;
@@ -42,40 +42,41 @@ struct Held {
     ++count;
   }
   [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
-  // Standard deviation: how still the sensor was.
+  // Standard deviation: a measure of how still the sensor was.
   [[nodiscard]] double deviation() const;
 };
 using Recorded = std::array<std::array<Held, kMaxSensors>, kPoses>;  // [pose][sensor]
 
-// The two poses that a sensor's calibration rests on: the flat hand and the one that moves it most.
+// The two poses that define a sensor's calibration: the flat hand and the pose that moves it most.
 struct SensorPoses {
   std::size_t sensor = 0;
   Pose pose = Pose::kFist;
   double flat_raw = 0.0, pose_raw = 0.0;
-  double flat_value = 0.0, pose_value = 0.0;  // calibrated values wanted there
+  double flat_value = 0.0, pose_value = 0.0;  // calibrated values at these poses
 
-  [[nodiscard]] double span() const;  // of the raw values
+  [[nodiscard]] double span() const;  // difference of the raw values
 };
 
-// Of each sensor that was measured while the hand was flat and that a recorded pose moves.
+// For each sensor that was measured with the flat hand and that a recorded pose moves.
 [[nodiscard]] Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model,
                                                                 const Recorded& recorded);
 
 struct Fitted {
   std::map<std::string, std::vector<std::array<double, 2>>> sensors;  // for CalibrationFile
-  std::vector<std::string> warnings;  // sensors that keep their default though a pose moves them
+  // About sensors that keep their default although a pose should move them.
+  std::vector<std::string> warnings;
 };
 
-// Two points a sensor: the flat hand and the pose that moves it most. A sensor that no pose moves
-// keeps its default; one that moved less than 10 counts, too, with a warning. An error when no
-// flat hand was recorded, or no sensor moved at all.
+// Takes two points per sensor: the flat hand and the pose that moves it most. A sensor that no pose
+// moves keeps its default; so does one that moved less than 10 counts, with a warning. Fails when
+// no flat hand was recorded, or no sensor moved at all.
 [[nodiscard]] Result<Fitted> fit_poses(const Model& model, const Recorded& recorded);
 
-// The calibrated values [sensor] that a hand in this pose gives, before the device's own formula;
-// not finite for a sensor that the map does not name.
+// The calibrated values [sensor] of a hand in this pose, before the device's own formula; not
+// finite for a sensor that the map does not name.
 [[nodiscard]] Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand);
 
-// The least movement of a sensor that a calibration may rest on [counts].
+// The smallest movement of a sensor that is accepted for a calibration [counts].
 [[nodiscard]] double least_span(const Sensor& sensor);
 
 }  // namespace posed::drivers::glove

@@ -10,7 +10,8 @@
 namespace posed::drivers::glove {
 namespace {
 
-// Beyond it nothing is a hand's: what a bent calibration or a foreign raw value may give.
+// A value larger than this cannot belong to a hand; it results from a wrong calibration or a
+// foreign raw value.
 constexpr float kMaxValue = 1e6F;
 
 void drop_what_is_no_number(std::span<const float> value,
@@ -20,7 +21,7 @@ void drop_what_is_no_number(std::span<const float> value,
   }
 }
 
-// Takes out what no finger can do; false when there was any. RT-safe.
+// Removes angles that no finger can have; returns false when there were any. RT-safe.
 bool drop_implausible(HandAngles& angles) noexcept {
   bool plausible = true;
   for (double& angle_rad : angles) {
@@ -31,7 +32,7 @@ bool drop_implausible(HandAngles& angles) noexcept {
   return plausible;
 }
 
-// Fills a Sample's values from the first on.
+// Fills the values of a Sample in order.
 class SampleWriter {
  public:
   explicit SampleWriter(Sample& sample) noexcept : sample_(sample) {}
@@ -117,7 +118,7 @@ void GloveDecoder::pose(std::span<const float> value, const std::bitset<kMaxSens
   if (skeleton_ == nullptr) return;
   HandAngles angles;
   calibration_->map_to_hand(value, valid, angles);
-  // A sensor that is broken or badly calibrated costs its own joint, not the whole hand.
+  // A broken or badly calibrated sensor invalidates only its own joint, not the whole hand.
   if (!drop_implausible(angles)) sink.outcome(Outcome::kOutOfRange);
   const auto mapped = std::span(calibration_->map).first(calibration_->map_rows);
   const bool any = std::ranges::any_of(

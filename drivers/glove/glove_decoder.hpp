@@ -1,6 +1,6 @@
-// GloveDecoder: the half of a decoder that all gloves share. A device's own decoder frames the
-// bytes and hands over raw values; this calibrates them, lets the device compute what it computes
-// from them, poses the hand and emits a Sample and a Frame.
+// GloveDecoder: the part of a decoder that all gloves share. A device's own decoder splits the
+// bytes into packets and passes raw values on; this class calibrates them, applies the device's own
+// formula, poses the hand and emits a Sample and a Frame.
 #pragma once
 
 #include <bitset>
@@ -13,10 +13,10 @@
 
 namespace posed::drivers::glove {
 
-// One packet. Spans are read at once.
+// The content of one packet. Its spans are only used during the call.
 struct Packet {
   std::span<const float> raw;      // [sensor of the Model]
-  std::bitset<kMaxSensors> valid;  // sensors the device has and believes
+  std::bitset<kMaxSensors> valid;  // sensors that the device has and reports as valid
   std::span<const float> extra;    // buttons, sticks, battery; unit 1
   std::int64_t device_ns = kNoTime_ns;
   Quality quality = Quality::kMeasured;  // kHeld: the same measurement as in the packet before
@@ -28,22 +28,22 @@ struct Packet {
 
 class GloveDecoder : public Decoder {
  public:
-  // A calibration for another number of sensors than the glove has is not used. RT-safe.
+  // A calibration with a different number of sensors is ignored. RT-safe.
   void calibrate(const Calibration& calibration) noexcept override {
     if (calibration.sensors == default_->sensors) calibration_ = &calibration;
   }
 
  protected:
-  // `skeleton` is a hand45 skeleton; null for a glove that poses nothing.
+  // `skeleton` is a hand45 skeleton; null for a glove without a pose.
   GloveDecoder(std::shared_ptr<const Skeleton> skeleton,
                std::shared_ptr<const Calibration> default_calibration);
 
-  // Emits the Sample, then the Frame (no Frame when no channel of the map is known). What is not a
-  // number of a sensible size is not valid, and zero in the Sample. RT-safe.
+  // Emits the Sample, then the Frame (no Frame when no channel of the map is known). A value that
+  // is not finite or too large is marked as not valid and is zero in the Sample. RT-safe.
   void emit(const Packet& packet, Sink& sink) noexcept;
 
-  // The device's formula on calibrated values, in place (relative abductions, computed joints); may
-  // make values valid. RT-safe.
+  // Applies the device's formula to calibrated values, in place (relative abductions, computed
+  // joints); may make values valid. RT-safe.
   virtual void compute(std::span<float> value, std::bitset<kMaxSensors>& valid) const noexcept;
 
   [[nodiscard]] const Calibration& calibration() const noexcept { return *calibration_; }

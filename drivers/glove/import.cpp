@@ -41,7 +41,7 @@ Result<CalibrationFile> import_calibration(const std::filesystem::path& path, co
                     (hand == Side::kLeft ? "right" : "left"),
                 file);
   }
-  // Each kind allows what no hand does: the compiled form has the last word.
+  // A file may parse and still be impossible for a hand: compiling it is the final check.
   const auto compiled = make_calibration(model, made, hand, {});
   if (!compiled) return fail(compiled.error().message, file);
   return made;

@@ -1,5 +1,5 @@
-// Calibrations that other programs made of a CyberGlove: VirtualHand and Device Configuration
-// Utility (.cal), asr_cyberglove_lib (.cal, "rad:raw rad:raw"), Shadow's ROS driver (XML).
+// Imports CyberGlove calibrations of other programs: VirtualHand and Device Configuration Utility
+// (.cal), asr_cyberglove_lib (.cal, "rad:raw rad:raw"), Shadow's ROS driver (XML).
 #pragma once
 
 #include <filesystem>
@@ -11,9 +11,9 @@
 
 namespace posed::drivers::glove {
 
-// The file's kind is told by its content. The glove's identity and the user stay empty: the files
-// do not say them. Errors name file and line: of no known kind, cut off, a sensor that hardly
-// moved, another hand, another driver than cyberglove. Cold.
+// The kind of file is detected from its content. The glove's identity and the user stay empty,
+// because the files do not contain them. Errors name file and line: unknown kind, truncated file, a
+// sensor that hardly moved, another hand, a driver other than cyberglove. Cold.
 [[nodiscard]] Result<CalibrationFile> import_calibration(const std::filesystem::path& path,
                                                          const Model& model, Side hand);
 

@@ -1,7 +1,7 @@
 // The calibration of asr_cyberglove_lib: 22 lines "rad1:raw1 rad2:raw2", wrist first, a straight
-// line through two points each. The middle finger's abduction is always 0 there (it is what the
-// others are measured against), so its line names no sensor; that the other fingers' lines are the
-// sensors between the fingers is inferred.
+// line through two points each. There the middle finger's abduction is always 0 (the other fingers
+// are measured relative to it), so its line belongs to no sensor. That the other fingers' lines are
+// the sensors between the fingers is inferred.
 #include <array>
 
 #include "drivers/glove/import_parts.hpp"
@@ -18,7 +18,7 @@ constexpr std::array<std::string_view, 22> kAsrNames{
     "middle_pip", "middle_dip",  "ring_mcp",   "ring_abd",   "ring_pip",   "ring_dip",
     "little_mcp", "little_abd",  "little_pip", "little_dip"};
 
-// "0.300000:46.000000"
+// Reads a point such as "0.300000:46.000000".
 bool read_point(std::string_view word, std::array<double, 2>& point) {
   const std::size_t colon = word.find(':');
   if (colon == std::string_view::npos) return false;
@@ -41,7 +41,7 @@ Result<> import_asr(std::string_view text, const std::string& file, CalibrationF
         !clip::trim(line).empty()) {
       return cut_off(file, number);
     }
-    if (kAsrNames[i].empty() || first[1] == second[1]) continue;  // the default stays
+    if (kAsrNames[i].empty() || first[1] == second[1]) continue;  // the sensor keeps its default
     if (first[0] > second[0]) std::swap(first, second);
     if (second[0] - first[0] < kLeastCounts) {
       return fail("sensor '" + std::string(kAsrNames[i]) +

@@ -1,4 +1,4 @@
-// The three kinds of import.hpp, each in its own file. Cold.
+// The parsers for the three kinds of file in import.hpp, each in its own source file. Cold.
 #pragma once
 
 #include <string>

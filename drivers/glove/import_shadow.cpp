@@ -1,5 +1,5 @@
-// The calibration of Shadow's ROS driver: XML, raw values from 0 to 1 for 1 to 254 counts above 1,
-// calibrated values in degrees, flexion and spread positive, two points or more in any order.
+// The calibration of Shadow's ROS driver: XML; a raw value from 0 to 1 stands for 1 to 255 counts;
+// calibrated values in degrees, flexion and spread positive; two points or more in any order.
 #include <algorithm>
 #include <array>
 
@@ -12,7 +12,7 @@ namespace {
 
 struct Name {
   std::string_view theirs, ours;
-  double sign = -1.0;  // ours: flexion negative; only the index spreads the positive way
+  double sign = -1.0;  // flexion is negative in posed; only this spread keeps its sign
 };
 constexpr std::array<Name, 22> kShadowNames{{
     {"G_ThumbRotate", "thumb_roll"},
@@ -39,7 +39,7 @@ constexpr std::array<Name, 22> kShadowNames{{
     {"G_WristYaw", "wrist_yaw"},
 }};
 
-// The value of key="..." in a tag; empty when it is not there.
+// Returns the value of key="..." in a tag; empty when it is missing.
 std::string_view attribute(std::string_view tag, std::string_view key) {
   const std::string start = " " + std::string(key) + "=\"";
   const std::size_t at = tag.find(start);

@@ -1,7 +1,7 @@
-// VirtualHand's user calibration, as vt_read_user_cal.cpp in VR Juggler reads it: six blocks of
-// four lines "joint offset gain gesture", numbers apart by any blanks. An angle is -gain (raw -
-// offset); the "index abduction" gain scales the sensor between index and middle, the "middle
-// abduction" gain is the bias.
+// The user calibration of VirtualHand, as read by vt_read_user_cal.cpp in VR Juggler: six blocks of
+// four lines "joint offset gain gesture", separated by any blanks. An angle is -gain (raw -
+// offset). The "index abduction" gain scales the sensor between index and middle finger; the
+// "middle abduction" gain is the bias.
 #include <array>
 #include <vector>
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kJoints = 24;
 constexpr std::size_t kIndexAbd = 7, kMiddleAbd = 11;
-constexpr double kCounts = 100.0;  // between the two points that a line is written with
+constexpr double kCounts = 100.0;  // distance between the two points that are written for a line
 
 constexpr std::array<std::string_view, kJoints> kVirtualHandNames{
     "thumb_roll", "thumb_mcp",  "thumb_ip",   "thumb_abd",   "index_mcp",  "index_pip",
@@ -26,7 +26,7 @@ struct Row {
   double gain = 0.0;
 };
 
-// The numbers of a line: joint, offset, gain and what follows; empty for a label or a comment.
+// Returns the numbers of a line: joint, offset, gain and the rest; empty for a label or a comment.
 std::vector<double> numbers_of(std::string_view line) {
   std::vector<double> numbers;
   while (!line.empty()) {

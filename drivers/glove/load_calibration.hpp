@@ -1,4 +1,4 @@
-// The text of a calibration file, bounded. What it says is parse_calibration's business.
+// Loads the text of a calibration file, with a size limit. parse_calibration() checks its content.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,10 @@
 
 namespace posed::drivers::glove {
 
-inline constexpr std::size_t kMaxCalibrationFile = 64 * 1024;  // bytes, ours or another program's
+// Bytes; for posed's format and those of other programs.
+inline constexpr std::size_t kMaxCalibrationFile = 64 * 1024;
 
-// A regular file of at most kMaxCalibrationFile, or an Error that names it. Cold.
+// Loads a regular file of at most kMaxCalibrationFile; an Error names it. Cold.
 [[nodiscard]] Result<std::string> load_calibration_text(const std::filesystem::path& path);
 
 }  // namespace posed::drivers::glove

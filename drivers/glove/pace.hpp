@@ -1,5 +1,5 @@
-// Pace: when an emulated glove's next record is due. On an absolute schedule, so that late calls do
-// not add up; what a long pause missed is not made up for, as a real glove would not.
+// Pace: the time at which an emulated glove's next record is due. The schedule is absolute, so late
+// calls do not add up. Records missed during a long pause are skipped, as on a real glove.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class Pace {
   void start(std::int64_t now_ns) noexcept { due_ns_ = now_ns; }
   void stop() noexcept { due_ns_ = kNoTime_ns; }
 
-  // The record due was sent.
+  // Call it when the due record was sent.
   void step(std::int64_t now_ns) noexcept {
     constexpr std::int64_t kMostLate = 10;  // periods
     const bool paused = now_ns - due_ns_ > kMostLate * period_ns_;

@@ -6,21 +6,22 @@
 namespace posed::drivers::glove {
 namespace {
 
-// Measured on three real CyberGlove recordings of grasps (GraspDB14), windows of 2 s: a hand that
-// holds still moves no sensor by more than 0.10 of its way (standard deviation; median 0.02), but
-// for one window with 0.12; one that grasps moves 0.38 to all of them by more (median 0.2 to 0.4).
+// Measured on three real CyberGlove recordings of grasps (GraspDB14) in windows of 2 s. While a
+// hand holds still, no sensor moves by more than 0.10 of its span (standard deviation; median
+// 0.02), except in one window with 0.12. While it grasps, between 38 % and all of the sensors move
+// by more (median 0.2 to 0.4).
 constexpr double kMovedShare = 0.1;
-// A sensor whose way is shorter than this share of its range is judged by the range: noise.
+// A sensor with a span below this share of its range is measured relative to the range: noise.
 constexpr double kShortestWay = 0.04;
-// Of the way that the driver's default says a sensor goes between two poses.
+// Share of the span between two poses that the driver's default predicts.
 constexpr double kStuckShare = 0.1;
-constexpr double kFailedShare = 0.25;  // of a pose's sensors
+constexpr double kFailedShare = 0.25;  // share of a pose's sensors
 
-constexpr std::size_t kNamed = 3;  // sensors in a sentence
+constexpr std::size_t kNamed = 3;  // sensors named in a sentence
 
 double range_of(const Sensor& sensor) { return sensor.raw_max - sensor.raw_min; }
 
-// How far the raw value goes by default while the calibrated one goes from `from` to `to`.
+// By how much the raw value changes, by default, while the calibrated one goes from `from` to `to`.
 double default_span(const Sensor& sensor, double from, double to) {
   const auto at = [&](double raw) {
     return static_cast<double>(sensor.curve.value_at(static_cast<float>(raw)));

@@ -1,4 +1,4 @@
-// Whether the poses of a calibration were held well enough to rest on: the hand was still in each,
+// Checks whether the poses of a calibration were held well enough: the hand was still in each pose,
 // and its sensors moved between them. Cold.
 #pragma once
 
@@ -11,30 +11,30 @@
 
 namespace posed::drivers::glove {
 
-// One pose that was recorded, and the sensors whose calibration rests on it.
+// One recorded pose, and the sensors whose calibration uses it.
 struct PoseFinding {
   Pose pose = Pose::kFlat;
   int sensors = 0;
-  std::vector<std::string> moved;  // while the pose was held
-  std::vector<std::string> stuck;  // hardly another value than with the flat hand
-  double unrest = 0.0;  // median over the sensors: standard deviation as a share of their way
+  std::vector<std::string> moved;  // sensors that moved while the pose was held
+  std::vector<std::string> stuck;  // sensors whose value hardly differs from the flat hand
+  double unrest = 0.0;  // median over the sensors: standard deviation as a share of their span
 
-  // Too many of its sensors moved, or did not get there: hold it again.
+  // True when too many of its sensors moved, or did not reach the pose: hold it again.
   [[nodiscard]] bool failed() const;
   [[nodiscard]] std::string sentence() const;  // "thumb failed: ... : hold it again"
 };
 
 struct PoseCheck {
-  std::vector<PoseFinding> poses;  // recorded ones, in their order
-  int sensors = 0;                 // that any pose moves
+  std::vector<PoseFinding> poses;  // the recorded ones, in their order
+  int sensors = 0;                 // number of sensors that any pose moves
 
   [[nodiscard]] std::vector<Pose> failed() const;
   [[nodiscard]] bool usable() const { return failed().empty(); }
-  // One sentence: which poses failed and why, or how good the calibration is.
+  // One sentence: the poses that failed and why, or how good the calibration is.
   [[nodiscard]] std::string verdict() const;
 };
 
-// An error when the device's map cannot be read.
+// Fails when the device's map cannot be read.
 [[nodiscard]] Result<PoseCheck> check_poses(const Model& model, const Recorded& recorded);
 
 }  // namespace posed::drivers::glove

@@ -1,4 +1,5 @@
-// The beat of a stream without a device, to frames: each one is a place for a performed pose.
+// Turns the clock ticks of a stream without a device into frames, to be filled with synthesised
+// poses.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +11,7 @@
 
 namespace posed::drivers {
 
-// Device time is the beat's: frame n is at n / rate. The pose is the hand at rest, held.
+// Device time follows the ticks: frame n is at n / rate. The pose is the hand at rest, held.
 class LabelsDecoder final : public Decoder {
  public:
   static constexpr std::string_view kBeat = "\n";
@@ -25,7 +26,7 @@ class LabelsDecoder final : public Decoder {
   std::shared_ptr<const Skeleton> skeleton_;
   double rate_hz_;
   std::int64_t beats_ = 0;
-  bool foreign_ = false;  // in bytes that are no beat, which are already counted
+  bool foreign_ = false;  // inside foreign bytes, which are already counted
 };
 
 }  // namespace posed::drivers

@@ -23,7 +23,7 @@ std::string text_of(const std::string& side, double rate_hz) {
   return side + " " + std::to_string(rate_hz);
 }
 
-// "right 30.000000"
+// Parses "right 30.000000".
 Result<Header> parse_text(const std::string& text, const std::string& identity) {
   std::istringstream words(text);
   std::string side, rest;
@@ -78,7 +78,8 @@ Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
 const Driver& labels_driver() {
   static const Driver driver{
       .name = "labels",
-      .summary = "a hand without a device, which performs labels (needs a [stream.generate] table)",
+      .summary =
+          "a hand without a device that performs gesture labels (needs a [stream.generate] table)",
       .options = {{.name = "side", .default_value = std::string("right"), .help = "left or right"},
                   {.name = "rate_hz", .default_value = 30.0, .help = "frames a second"}},
       .open = labels::open,

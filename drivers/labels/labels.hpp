@@ -1,4 +1,4 @@
-// A stream without a device: a hand that only performs labels.
+// A stream without a device: a hand that performs gesture labels only.
 #pragma once
 
 #include "drivers/driver.hpp"

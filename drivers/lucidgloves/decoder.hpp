@@ -1,4 +1,4 @@
-// Lines of a LucidGlove to a hand and a sample each.
+// Decodes each line of a LucidGlove into a frame and a sample.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace posed::drivers::lucidgloves {
 
-// What the decoder needs to know of a glove: its greeting, in numbers.
+// The settings of a glove that the decoder needs, from its device info.
 struct Settings {
   Encoding encoding = Encoding::kAuto;
   int max_analog = 4095;
@@ -36,7 +36,7 @@ class LucidDecoder final : public glove::GloveDecoder {
             Sink& sink) noexcept override;
 
  protected:
-  // A glove without splay holds its fingers side by side. RT-safe.
+  // A glove without splay sensors gets splay zero. RT-safe.
   void compute(std::span<float> value,
                std::bitset<glove::kMaxSensors>& valid) const noexcept override;
 
@@ -49,10 +49,10 @@ class LucidDecoder final : public glove::GloveDecoder {
   Settings settings_;
   std::array<char, kMaxLine> text_{};
   std::size_t length_ = 0;
-  bool overlong_ = false;        // the rest of the line is thrown away
-  std::bitset<kSplay> usual_{};  // fingers and joints that the glove sends
-  int unusual_lines_ = 0;        // in a row that lacked one of them
-  std::array<int, 3> info_{};    // as last heard
+  bool overlong_ = false;        // the rest of the line is discarded
+  std::bitset<kSplay> usual_{};  // fingers and joints that the glove normally sends
+  int unusual_lines_ = 0;        // consecutive lines that lacked one of them
+  std::array<int, 3> info_{};    // last values received
   std::bitset<3> has_info_{};
 };
 

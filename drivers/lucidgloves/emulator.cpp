@@ -12,8 +12,8 @@ constexpr int kFirmware = 5;
 
 constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-// What a whole curl means, as config/devices/lucidgloves.toml has it; joints 0 to 3. A joint of 0
-// is not sent.
+// Angles of a fully curled finger, as in config/devices/lucidgloves.toml; joints 0 to 3. A joint
+// with 0 is not sent.
 constexpr std::array<double, kJoints> kThumb_rad{0.0, radians(60.0), radians(80.0), 0.0};
 constexpr std::array<double, kJoints> kFinger_rad{0.0, radians(90.0), radians(100.0),
                                                   radians(70.0)};
@@ -44,7 +44,7 @@ void LucidEmulator::pose(const HandAngles& angles) {
     int joints = 0;
     for (std::size_t j = 0; j < kJoints; ++j) {
       if (whole[j] == 0.0) continue;
-      // The thumb's joint 1 is hand45's second, a finger's is its first.
+      // Joint 1 of the thumb is hand45's second joint; of a finger it is the first.
       const std::size_t joint = f == 0 ? j : j - 1;
       const double share = angles[f * kFingerChannels + 3 * joint] / whole[j];
       set(kJoint + f * kJoints + j, share);
@@ -56,7 +56,7 @@ void LucidEmulator::pose(const HandAngles& angles) {
   }
   set(kJoyX, 0.5);
   set(kJoyY, 0.5);
-  // The firmware's gestures: more than half closed.
+  // The firmware recognises gestures: more than half closed counts as pressed.
   const auto curl = [&](std::size_t f) { return line_.value[kCurl + f]; };
   line_.pressed[1] = 2 * curl(1) > max_;                                // trigger
   line_.pressed[4] = curl(1) + curl(2) + curl(3) + curl(4) > 2 * max_;  // grab

@@ -1,4 +1,4 @@
-// A LucidGlove's other side: streams from power-on, tells who it is when asked, and hears force
+// Emulates a LucidGlove: streams from power-on, sends its info when asked, and accepts force
 // feedback and vibration.
 #pragma once
 
@@ -13,16 +13,16 @@ namespace posed::drivers::lucidgloves {
 
 class LucidEmulator final : public Emulator {
  public:
-  // kAuto speaks alpha.
+  // kAuto sends the alpha encoding.
   LucidEmulator(Side side, Encoding encoding, int max_analog);
 
   void pose(const HandAngles& angles) override;
-  // Commands end with a line end; others than (ZA), (ZZ), Z and forces are not obeyed.
+  // Commands end with a line end; all except (ZA), (ZZ), Z and forces are ignored.
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
 
-  // How far each finger's motor blocks it, as last told, and the last vibration's line.
+  // How strongly each finger's motor blocks it, as last received, and the last vibration line.
   [[nodiscard]] const Forces& forces() const { return forces_; }
   [[nodiscard]] const std::string& vibration() const { return vibration_; }
 
@@ -36,7 +36,7 @@ class LucidEmulator final : public Emulator {
   Line line_;
   Forces forces_{};
   std::string vibration_;
-  std::string command_;  // so far
+  std::string command_;  // received so far
 };
 
 }  // namespace posed::drivers::lucidgloves

@@ -16,8 +16,8 @@ constexpr std::size_t kMinMessage = 5;     // the firmware ignores shorter ones
 bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 bool is_key(char c) noexcept { return c >= 'A' && c <= 'Z'; }
 
-// A number at the front of `text`, which loses it. Clamped far above every range; -1 without a
-// digit.
+// Removes a number from the front of `text` and returns it. Limited to far above every range; -1
+// without a digit.
 int take_number(std::string_view& text) noexcept {
   constexpr int kTop = 10'000'000;
   int value = 0;
@@ -29,7 +29,8 @@ int take_number(std::string_view& text) noexcept {
   return digits == 0 ? -1 : value;
 }
 
-// The key at the front of `text`, which loses it; without its parentheses, empty when it is none.
+// Removes the key at the front of `text` and returns it without parentheses; empty when there is
+// none.
 std::string_view take_key(std::string_view& text) noexcept {
   std::string_view key;
   if (text.front() == '(') {
@@ -48,7 +49,7 @@ std::string_view take_key(std::string_view& text) noexcept {
 bool is_finger(char c) noexcept { return c >= 'A' && c < 'A' + kFingers; }
 std::size_t finger_of(char c) noexcept { return static_cast<std::size_t>(c - 'A'); }
 
-// Where a key's value goes; nothing for a key that is no value.
+// Index of the value that belongs to a key; empty when the key has no value.
 std::optional<std::size_t> value_place(std::string_view key) noexcept {
   const char first = key.front();
   if (key.size() == 1) {
@@ -77,7 +78,7 @@ std::optional<std::size_t> info_place(std::string_view key) noexcept {
   return {};
 }
 
-// One key and its number (-1: none) into the line. Keys that nobody knows are left out.
+// Stores one key and its number (-1: none) in the line. Unknown keys are ignored.
 Outcome take_pair(std::string_view key, int number, int max, Line& line) noexcept {
   if (const auto place = value_place(key)) {
     if (number < 0 || line.has[*place]) return Outcome::kForeign;

@@ -9,14 +9,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPatience{3000};     // for a line: an ESP32 starts in about a second
-constexpr milliseconds kInfoPatience{150};  // for the answer who it is; most firmware has none
+constexpr milliseconds kPatience{3000};  // for a line: an ESP32 starts in about a second
+// For the answer to the info request; most firmware sends none.
+constexpr milliseconds kInfoPatience{150};
 constexpr milliseconds kOneRead{50};
-constexpr std::string_view kAsk = "(ZA)Z\n";  // stream, and who are you
+constexpr std::string_view kAsk = "(ZA)Z\n";  // start the stream, and send your info
 
-// What was seen of a glove so far.
+// What has been received from a glove so far.
 struct Seen {
-  std::string text;  // the line that has no end yet
+  std::string text;  // the unfinished line
   bool any = false;
   bool hand = false;
   bool too_large = false;  // a line with a value above the range

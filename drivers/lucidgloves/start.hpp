@@ -1,4 +1,4 @@
-// What is said to a LucidGlove before it is read: its stream is awaited and checked.
+// Starts a LucidGlove before it is read: waits for its stream and checks it.
 #pragma once
 
 #include <array>
@@ -10,13 +10,13 @@
 
 namespace posed::drivers::lucidgloves {
 
-// CP210x and CH340, the serial chips of the boards the firmware is made for (vendor << 16 |
-// product).
+// CP210x and CH340, the serial chips of the boards for which the firmware is made (vendor_id << 16
+// | product_id).
 inline constexpr std::array<std::uint32_t, 2> kUsbIds{0x10C4EA60, 0x1A867523};
 
-// Waits for a good line, a few seconds at most: a board that starts when its port is opened talks
-// of other things first. An error says what came instead, or that the glove is of the other hand.
-// The link is left at the end of a line where possible. Cold.
+// Waits a few seconds at most for a valid line, because a board that restarts when its port opens
+// sends other text first. An error states what came instead, or that the glove is of the other
+// hand. If possible, the link is left at the end of a line. Cold.
 [[nodiscard]] Result<> start(Connection& link, Side side, const Settings& settings);
 
 }  // namespace posed::drivers::lucidgloves

@@ -10,9 +10,9 @@ namespace posed::drivers::p5 {
 namespace {
 
 constexpr double kInch_m = 0.0254;
-constexpr double kFocal = 512.0;         // counts at the tangent 1
-constexpr double kMaxDistance_m = 10.0;  // farther than any cable is long
-// How the heads of glove type 0 lean; of other types nothing is known.
+constexpr double kFocal = 512.0;         // counts at a tangent of 1
+constexpr double kMaxDistance_m = 10.0;  // longer than any cable
+// Tilt of the heads of glove type 0; for other types it is not known.
 constexpr double kLean1_deg = 17.0;
 constexpr double kLean2_deg = -10.0;
 
@@ -30,7 +30,7 @@ std::int16_t counts(double tangent) {
   return static_cast<std::int16_t>(std::lround(std::clamp(kFocal * tangent, -615.0, 615.0)));
 }
 
-// LEDs whose distances to two others are right. RT-safe.
+// Returns the LEDs whose distances to at least two others are correct. RT-safe.
 std::bitset<kLeds> agreeing(const CameraRig& rig,
                             const std::array<Eigen::Vector3d, kLeds>& position_m,
                             const std::bitset<kLeds>& seen) noexcept {
@@ -105,9 +105,9 @@ bool fit_hand(const CameraRig& rig, const std::array<Eigen::Vector3d, kLeds>& po
   for (std::size_t i = 0; i < kLeds; ++i) {
     if (good[i]) spread += (position_m[i] - found_m) * (rig.led_m[i] - known_m).transpose();
   }
-  // The rotation that turns the known LEDs best into the found ones (Kabsch).
+  // The rotation that maps the known LEDs best onto the measured ones (Kabsch algorithm).
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(spread, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // LEDs on one line leave the turn about it open.
+  // With LEDs on one line, the rotation about that line is undetermined.
   if (!(svd.singularValues()[1] > 1e-3 * svd.singularValues()[0])) return false;
   Eigen::Matrix3d keep = Eigen::Matrix3d::Identity();
   keep(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0 ? -1.0 : 1.0;

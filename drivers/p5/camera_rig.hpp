@@ -1,5 +1,6 @@
-// CameraRig: what the P5's feature reports say about its camera heads and LEDs, and where a hand is
-// by them. Metres, in the rig's frame as libp5glove has it: x to one side, y up, z away from it.
+// CameraRig: geometry of the P5's camera heads and LEDs from its feature reports, and the hand pose
+// computed from it. Metres, in the rig's frame as in libp5glove: x to one side, y up, z away from
+// it.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -13,28 +14,28 @@
 namespace posed::drivers::p5 {
 
 struct CameraRig {
-  double tilt1_rad = 0.0, tilt2_rad = 0.0;   // of the heads that give v1 and v2
+  double tilt1_rad = 0.0, tilt2_rad = 0.0;   // of the heads that measure v1 and v2
   double distance_m = 0.0;                   // between the heads
   std::array<Eigen::Vector3d, kLeds> led_m;  // in the hand's frame
 
-  // Of feature reports 6 and 12, whole. Cold.
+  // Made from the complete feature reports 6 and 12. Cold.
   [[nodiscard]] static CameraRig of(std::span<const std::byte, kHeadsBytes> heads,
                                     std::span<const std::byte, kLedsBytes> leds);
 
-  // Where a LED is, of unwrapped values; false where the heads' lines do not meet in front of them.
-  // RT-safe.
+  // Computes the position of a LED from unwrapped values; false when the lines of sight from the
+  // heads do not meet in front of them. RT-safe.
   [[nodiscard]] bool locate(const LedObservation& spot, Eigen::Vector3d& position_m) const noexcept;
-  // How the heads see it, values not wrapped; for what is in front of them.
+  // The inverse: the values that the heads measure, not wrapped, for a LED in front of them.
   [[nodiscard]] LedObservation project(std::size_t led, const Eigen::Vector3d& position_m) const;
 };
 
 struct RigidPose {
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  // of the LEDs' origin
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  // of the origin of the LEDs' frame
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
 };
 
-// The hand that fits three or more seen LEDs; false when fewer agree with each other's distances
-// (20 %). RT-safe.
+// Computes the hand pose from three or more seen LEDs; false when fewer have consistent distances
+// (within 20 %). RT-safe.
 [[nodiscard]] bool fit_hand(const CameraRig& rig,
                             const std::array<Eigen::Vector3d, kLeds>& position_m,
                             std::bitset<kLeds> seen, RigidPose& place) noexcept;

@@ -9,8 +9,9 @@
 namespace posed::drivers::p5 {
 namespace {
 
-constexpr int kForgotten = 25;       // reports, half a second: what a LED showed before is no help
-constexpr std::size_t kPlaceAt = 4;  // among the extras
+// Reports, half a second: older observations of a LED do not help to unwrap.
+constexpr int kForgotten = 25;
+constexpr std::size_t kPlaceAt = 4;  // index among the extras
 const std::array<std::string, 11> kExtras{"button_a", "button_b", "button_c", "leds",
                                           "palm_x",   "palm_y",   "palm_z",   "palm_qx",
                                           "palm_qy",  "palm_qz",  "palm_qw"};
@@ -48,7 +49,7 @@ void P5Decoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns
   }
 }
 
-// Over USB reports come whole; a log or a test may cut and damage them. RT-safe.
+// Over USB reports arrive complete; a log or a test may split and damage them. RT-safe.
 bool P5Decoder::advance(Sink& sink) noexcept {
   const bool begins = pending_[0] == std::byte{1};
   if (!begins) {
@@ -59,7 +60,7 @@ bool P5Decoder::advance(Sink& sink) noexcept {
   }
   if (pending_bytes_ < kReportBytes + (in_step_ ? 0 : 1)) return false;
   if (!in_step_) {
-    // The last byte is unused, and another report follows.
+    // The last byte is unused and zero, and another report must follow.
     in_step_ = pending_[kReportBytes - 1] == std::byte{0} && pending_[kReportBytes] == pending_[0];
     if (!in_step_) drop(1);
     return true;

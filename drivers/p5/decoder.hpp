@@ -1,5 +1,5 @@
-// Reports of a P5 to a hand and a sample each: bends, buttons and, where three or more LEDs are
-// seen, where the hand is.
+// Decodes each report of a P5 into a frame and a sample: bends, buttons and, when three or more
+// LEDs are seen, the pose of the hand.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ namespace posed::drivers::p5 {
 
 class P5Decoder final : public glove::GloveDecoder {
  public:
-  // Without a rig the hand's place is never known.
+  // Without a rig the hand's pose is never known.
   P5Decoder(std::shared_ptr<const Skeleton> skeleton,
             std::shared_ptr<const glove::Calibration> calibration, std::optional<CameraRig> rig)
       : GloveDecoder(std::move(skeleton), std::move(calibration)), rig_(std::move(rig)) {}
@@ -38,8 +38,8 @@ class P5Decoder final : public glove::GloveDecoder {
   std::array<std::byte, kReportBytes + 1> pending_{};
   std::size_t pending_bytes_ = 0;
   bool in_step_ = true;
-  std::array<LedObservation, kLeds> before_{};  // unwrapped, as last seen
-  std::array<int, kLeds> unseen_{};             // reports since then
+  std::array<LedObservation, kLeds> before_{};  // last observation, unwrapped
+  std::array<int, kLeds> unseen_{};             // reports since the last observation
 };
 
 }  // namespace posed::drivers::p5

@@ -21,7 +21,7 @@ std::string hex_of(const std::vector<std::byte>& bytes) {
   return text;
 }
 
-// False when it is not that report, whole.
+// Returns false when the text is not this report, complete.
 bool read_hex(const std::string& text, std::uint8_t number, std::size_t size,
               std::vector<std::byte>& bytes) {
   if (text == kNone) return true;
@@ -60,7 +60,7 @@ Result<Greeted> read_greeting(const std::string& text, const std::string& identi
   if (!read_hex(firmware, kFirmwareReport, kFirmwareBytes, glove.firmware) ||
       !read_hex(heads, kHeadsReport, kHeadsBytes, glove.heads) ||
       !read_hex(leds, kLedsReport, kLedsBytes, glove.leds)) {
-    return fail("the greeting of a 'p5' has a feature report that is none; the log is damaged",
+    return fail("the device info of a 'p5' has an invalid feature report; the log is damaged",
                 identity);
   }
   return glove;

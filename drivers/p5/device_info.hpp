@@ -1,6 +1,7 @@
-// A P5's greeting: its feature reports as they came, in hexadecimal, so that a log decodes with the
-// very rig it was recorded with.
-//   p5 hand=right firmware=090403 heads=06.. leds=0c..       a report that is not known: none
+// The device info of a P5: its feature reports as received, in hexadecimal, so that a log is
+// decoded with the same rig geometry with which it was recorded. A missing report is written as
+// none.
+//   p5 hand=right firmware=090403 heads=06.. leds=0c..
 #pragma once
 
 #include <optional>
@@ -16,7 +17,7 @@ struct Greeted {
   Side side = Side::kRight;
   std::vector<std::byte> firmware, heads, leds;  // feature reports 9, 6 and 12; empty: not known
 
-  // Nothing unless both its reports are known.
+  // Empty unless both of its reports are known.
   [[nodiscard]] std::optional<CameraRig> rig() const;
 };
 

@@ -7,11 +7,11 @@
 namespace posed::drivers::p5 {
 namespace {
 
-constexpr std::int64_t kPeriod_ns = 20'000'000;  // libp5glove's users tell of 40 to 60 a second
+constexpr std::int64_t kPeriod_ns = 20'000'000;  // users of libp5glove report 40 to 60 per second
 
 constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-// What a whole bend means, as config/devices/p5.toml has it.
+// Angles of a fully bent finger, as in config/devices/p5.toml.
 constexpr std::array<double, kFingerJoints> kFinger_rad{radians(90.0), radians(100.0),
                                                         radians(70.0)};
 constexpr std::array<double, kFingerJoints> kThumb_rad{0.0, radians(60.0), radians(80.0)};
@@ -78,7 +78,7 @@ void P5Emulator::pose(const HandAngles& angles) {
 
 void P5Emulator::receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
                          Bytes& /*answer*/) {
-  // What a P5 is asked goes over control transfers, not into this stream.
+  // The host queries a P5 by control transfers, not in this stream.
 }
 
 void P5Emulator::emit(std::int64_t now_ns, Bytes& out) {

@@ -1,4 +1,4 @@
-// The other side of a P5: its input reports and what it answers to feature requests.
+// Emulates a P5: its input reports and its answers to feature requests.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace posed::drivers::p5 {
 
-// Feature reports of an emulated P5: heads that lean as libp5glove has it, LEDs of our invention.
+// Feature reports of an emulated P5: head tilts as in libp5glove, LED positions invented for posed.
 [[nodiscard]] std::array<std::byte, kHeadsBytes> emulated_heads();
 [[nodiscard]] std::array<std::byte, kFirmwareBytes> emulated_firmware();
 [[nodiscard]] std::array<std::byte, kLedsBytes> emulated_leds();
@@ -18,7 +18,7 @@ class P5Emulator final : public Emulator {
  public:
   P5Emulator();
 
-  // The hand stands still half a metre before the rig; four of its LEDs are seen.
+  // The hand keeps still half a metre in front of the rig; four of its LEDs are seen.
   void pose(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }

@@ -17,7 +17,7 @@ namespace {
 constexpr std::string_view kName = "p5";
 constexpr std::uint16_t kVendor = 0x0D7F;
 constexpr std::uint16_t kProduct = 0x0100;
-constexpr int kInterface = 1;  // of two, the one that is no mouse
+constexpr int kInterface = 1;  // of two interfaces, the one that is not a mouse
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto glove = read_greeting(text, identity);
@@ -53,13 +53,13 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   return std::make_unique<P5Decoder>(description.skeleton, std::move(*calibration), glove->rig());
 }
 
-// A feature report, whole; empty with a warning when the glove does not give it.
+// Reads a complete feature report; returns empty with a warning when the glove does not send it.
 std::vector<std::byte> feature(UsbLink& link, std::uint8_t number, std::size_t bytes,
                                std::vector<std::string>& warnings) {
   auto report = link.feature(number, bytes);
   if (report && report->size() == bytes && (*report)[0] == std::byte{number}) return *report;
-  warnings.push_back("the glove does not give its feature report " + std::to_string(number) +
-                     (number == kFirmwareReport ? "" : "; where the hand is stays unknown"));
+  warnings.push_back("the glove does not send its feature report " + std::to_string(number) +
+                     (number == kFirmwareReport ? "" : "; the position of the hand stays unknown"));
   return {};
 }
 
@@ -81,7 +81,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   glove.leds = feature(*link, kLedsReport, kLedsBytes, warnings);
   auto device = make_device(p5_driver(), greeting_of(glove), link->identity());
   if (!device) return device;
-  // A device that idles sends no reports: silence is no reason to open it anew.
+  // An idle device sends no reports, so silence is no reason to reopen it.
   device->transport = make_usb_transport(std::move(*link));
   device->warnings = std::move(warnings);
   return device;

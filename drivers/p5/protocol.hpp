@@ -14,7 +14,7 @@
 //    9   09 major minor      firmware
 //   12   0C type, then 10 LEDs x 3 x i16 BE in 1/100 inch, x negated     62 bytes
 //
-// Source: libp5glove (ezrec/libp5glove); written anew from what it does.
+// Source: libp5glove (ezrec/libp5glove); newly written from its behaviour.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ namespace posed::drivers::p5 {
 
 inline constexpr std::size_t kReportBytes = 24;
 inline constexpr std::size_t kSpots = 4;
-inline constexpr std::size_t kLeds = 8;  // that a report can name
+inline constexpr std::size_t kLeds = 8;  // the LEDs that a report can name
 inline constexpr int kMaxBend = 63;
 
 inline constexpr std::uint8_t kHeadsReport = 6;
@@ -39,9 +39,9 @@ inline constexpr std::size_t kFirmwareBytes = 3;
 inline constexpr std::uint8_t kLedsReport = 12;
 inline constexpr std::size_t kLedsBytes = 62;
 
-// One LED as the heads see it. Counts of 1/512 of the distance in front of the head.
+// One LED as seen by the heads. A count is 1/512 of the distance in front of the head.
 struct LedObservation {
-  std::uint8_t led = 8;  // 8: none was seen
+  std::uint8_t led = 8;  // 8: no LED was seen
   std::int16_t v2 = 0, v1 = 0, h = 0;
 };
 
@@ -55,7 +55,7 @@ struct Report {
 [[nodiscard]] Outcome decode_report(std::span<const std::byte> bytes, Report& report) noexcept;
 [[nodiscard]] std::array<std::byte, kReportBytes> encode_report(const Report& report) noexcept;
 
-// What a 10-bit value means that follows `before` (an unwrapped one). RT-safe.
+// Unwraps a 10-bit value, given the value `before` it (already unwrapped). RT-safe.
 [[nodiscard]] std::int16_t unwrapped(std::int16_t value, std::int16_t before) noexcept;
 
 }  // namespace posed::drivers::p5

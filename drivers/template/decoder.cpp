@@ -26,7 +26,7 @@ void BendDecoder::take_packet(Sink& sink) noexcept {
   Packet packet;
   const Outcome outcome = decode_packet(pending_, packet);
   if (outcome == Outcome::kBadChecksum) {
-    // What looked like a start may have been data: the next one inside these bytes may be real.
+    // An apparent start may have been data: the real start may be inside these bytes.
     if (in_step_) sink.outcome(outcome);
     in_step_ = false;
     resynchronise();
@@ -49,7 +49,7 @@ void BendDecoder::resynchronise() noexcept {
 // RT-safe.
 std::int64_t BendDecoder::device_time_ns(std::uint8_t count) noexcept {
   if (has_count_) {
-    // Equal counts are a whole turn of the counter apart: time never stands still.
+    // Equal counts are a whole turn of the counter apart: time always advances.
     const int step = (count - count_ + 255) % 256 + 1;
     packets_ += step;
   }

@@ -1,4 +1,5 @@
-// Packets of the bend sensor to a frame (palm and finger) and a sample (bend, battery) each.
+// Decodes each packet of the bend sensor into a frame (palm and finger) and a sample (bend,
+// battery).
 #pragma once
 
 #include <array>
@@ -24,17 +25,17 @@ class BendDecoder final : public Decoder {
   void take_packet(Sink& sink) noexcept;
   void resynchronise() noexcept;
   void emit(const Packet& packet, Sink& sink) noexcept;
-  // Unrolls the packet counter.
+  // Turns the packet counter into a time that does not wrap.
   [[nodiscard]] std::int64_t device_time_ns(std::uint8_t count) noexcept;
 
   std::shared_ptr<const Skeleton> skeleton_;
   double period_ns_;
   std::array<std::byte, kPacketBytes> pending_{};  // the packet being collected
   std::size_t pending_bytes_ = 0;
-  bool in_step_ = true;  // false while hunting for a start: one outcome a hunt, not one a byte
+  bool in_step_ = true;  // false while searching for a start; one outcome per search, not per byte
   bool has_count_ = false;
   std::uint8_t count_ = 0;    // of the last packet
-  std::int64_t packets_ = 0;  // the device has sent since the first one seen
+  std::int64_t packets_ = 0;  // sent by the device since the first one received
 };
 
 }  // namespace posed::drivers::bend

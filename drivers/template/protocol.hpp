@@ -1,8 +1,8 @@
 // The bytes of the template device, a bend sensor on one finger, invented for posed. No I/O here:
-// what is drawn below is all there is to know, and tests build packets with the same functions.
+// the drawing below is the whole format, and tests build packets with the same functions.
 //
-// On connecting it says who it is, in one line of text:  BEND1 rate=100
-// Then one packet of six bytes at each period:
+// On connection it sends its device info, one line of text:  BEND1 rate=100
+// Then it sends one packet of six bytes per period:
 //
 //      0        1        2   3        4         5
 //   +--------+--------+--------+---------+----------+
@@ -34,15 +34,16 @@ struct Packet {
   float battery = 0.0F;  // 0 to 1
 };
 
-// kOk fills `packet`; kForeign when the first byte is no start, kBadChecksum, kOutOfRange. RT-safe.
+// kOk fills `packet`; kForeign when the first byte is not a start; kBadChecksum; kOutOfRange.
+// RT-safe.
 [[nodiscard]] Outcome decode_packet(std::span<const std::byte, kPacketBytes> bytes,
                                     Packet& packet) noexcept;
 
-// What the device would send. Values beyond the sensor's range are the device's mistake, so they
-// may be encoded.
+// The bytes that the device would send. Values outside the sensor's range can be encoded too, to
+// imitate a faulty device.
 [[nodiscard]] std::array<std::byte, kPacketBytes> encode_packet(const Packet& packet) noexcept;
 
-// The greeting and the rate [Hz] in it.
+// The device info, and the rate [Hz] in it.
 [[nodiscard]] std::string greeting(double rate_hz);
 [[nodiscard]] Result<double> parse_greeting(const std::string& text, const std::string& identity);
 

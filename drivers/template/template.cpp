@@ -50,8 +50,8 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
   return std::make_unique<BendDecoder>(description.skeleton, description.rate_hz);
 }
 
-// A finger that closes and opens once in one turn of the packet counter, so that it loops smoothly.
-// A real driver opens its port here and reads the greeting from it.
+// A finger that closes and opens once per turn of the packet counter, so that it loops smoothly. A
+// real driver would open its port here and read the device info from it.
 Chunks simulated_packets() {
   constexpr int kPackets = 256;
   constexpr double kHalfRange_rad = 0.7;

@@ -1,5 +1,5 @@
-// The template driver: what a device needs to become a stream, on one small invented device. Copy
-// this folder to begin a driver; drivers/README.md goes through it step by step.
+// The template driver: everything that a device needs to become a stream, shown on a small invented
+// device. Copy this folder to begin a driver; drivers/README.md explains the steps.
 #pragma once
 
 #include "drivers/driver.hpp"

@@ -1,5 +1,5 @@
-// Gloves that connect to us over TCP. Nothing is encrypted there, so only loopback listens without
-// a list of peers.
+// Accepts gloves that connect over TCP. TCP is not encrypted here, so without a list of peers posed
+// listens on loopback only.
 #include <arpa/inet.h>
 #include <netdb.h>
 #include <netinet/in.h>
@@ -21,7 +21,8 @@ namespace {
 
 constexpr int kPatience_ms = 500;
 constexpr int kBacklog = 8;
-constexpr int kMostAtOnce = 64;  // connections in one call: a stranger may open them without end
+// Connections per call: an untrusted client may open them without end.
+constexpr int kMostAtOnce = 64;
 
 struct Address {
   sockaddr_storage storage{};
@@ -45,7 +46,7 @@ std::string host_of(const Address& address) {
 
 bool is_loopback(const std::string& host) { return host.starts_with("127.") || host == "::1"; }
 
-// "127.0.0.1:5200" or "[::1]:5200", numbers only: a name could lead elsewhere tomorrow.
+// Parses "127.0.0.1:5200" or "[::1]:5200". Numbers only: a name may resolve differently tomorrow.
 Result<Address> parse_endpoint(const std::string& endpoint) {
   const auto colon = endpoint.rfind(':');
   const auto wrong = [&] {
@@ -93,7 +94,7 @@ Result<int> listen_at(const ListenSettings& settings) {
   return fd;
 }
 
-// A glove that loses its radio says nothing; keep-alive finds out within five seconds.
+// A glove that loses its radio link sends nothing; keep-alive detects that within five seconds.
 void make_prompt(int fd) {
   const int yes = 1, idle_s = 2, interval_s = 1, tries = 3;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
@@ -103,7 +104,7 @@ void make_prompt(int fd) {
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &tries, sizeof(tries));
 }
 
-// The glove waits in the listener's queue meanwhile, so it is taken as soon as there is one.
+// Meanwhile the glove waits in the listener's queue and is accepted once a descriptor is free.
 std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
   return fail("a glove has connected to " + settings.endpoint +
               ", but posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
@@ -133,7 +134,8 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
                                 {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
   ::poll(wanted.data(), wanted.size(), kPatience_ms);
   if (cancel_->fired()) return Cancel::error();
-  // Of several that wait the newest counts: a glove that started anew leaves its old one behind.
+  // If several are waiting, the newest is used: a glove that restarts leaves its old connection
+  // behind.
   std::optional<Connection> newest;
   for (int i = 0; i < kMostAtOnce; ++i) {
     Address peer;

@@ -1,5 +1,5 @@
-// Cancel: ends every wait of a device's opening (its start-up talk, a glove that may connect) when
-// the daemon is told to stop. Once fired it stays fired.
+// Cancel: ends every wait while a device opens (its start-up session, a glove that may connect)
+// when the daemon is asked to stop. Once fired it stays fired.
 #pragma once
 
 #include <sys/eventfd.h>
@@ -29,10 +29,10 @@ class Cancel {
   }
   [[nodiscard]] bool fired() const noexcept { return fired_.load(); }
 
-  // Readable once it is fired; -1 without a descriptor left: then waits end in their own time.
+  // Readable once fired; -1 when no descriptor was available: then waits end at their own timeout.
   [[nodiscard]] int fd() const noexcept { return fd_; }
 
-  // What a wait that was ended says; nobody is told.
+  // The result of a cancelled wait; it is not shown to the user.
   [[nodiscard]] static std::unexpected<Error> error() {
     return fail("posed stops: the device is left as it is");
   }

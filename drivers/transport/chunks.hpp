@@ -1,4 +1,4 @@
-// Chunks: raw pieces of input back to back in one block, in order; what file and replay play.
+// Chunks: raw pieces of input, stored one after the other in one block; played by file and replay.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ class Chunks {
 
  private:
   std::vector<std::byte> bytes_;
-  std::vector<std::size_t> ends_;  // [chunk], first byte behind it
+  std::vector<std::size_t> ends_;  // [chunk], index of the first byte after it
 };
 
 }  // namespace posed::drivers

@@ -15,7 +15,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr std::size_t kRead = 4096;  // bytes; a HID report and a terminal's buffer fit in one
+constexpr std::size_t kRead = 4096;  // bytes; enough for a HID report or a terminal's buffer
 constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
 constexpr int kMostWaiting = 256;  // reads; hidraw keeps 64 reports
@@ -24,7 +24,7 @@ bool not_now(int error) noexcept {
   return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
 }
 
-// send() for sockets, where a plain write() to a peer that has gone would end the process.
+// Uses send() for sockets, because write() to a peer that has gone would end the process.
 ssize_t write_some(int fd, std::span<const std::byte> bytes) noexcept {
   const ssize_t sent = ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   if (sent >= 0 || errno != ENOTSOCK) return sent;
@@ -55,21 +55,21 @@ class LinkTransport final : public Transport {
 
   Connection link_;
   std::array<std::byte, kRead> buffer_;
-  // What the device took only in part; nothing else may go between its halves.
+  // The rest of a message that the device accepted only in part; no other bytes may come between.
   std::array<std::byte, kRead> unsent_;
   std::size_t unsent_from_ = 0, unsent_to_ = 0;
 };
 
-// What came while other devices were opened is old, and all of it would get one arrival time: the
-// device begins with what comes now. Bounded, for one that never stops.
+// Discards bytes that came while other devices were being opened: they are old, and all would get
+// one arrival time. Bounded, because a device may send without pause.
 Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
   for (int i = 0; i < kMostWaiting && ::read(link_.fd(), buffer_.data(), buffer_.size()) > 0; ++i) {
   }
   return {};
 }
 
-// One read a call, so that one HID report is one chunk. All devices are opened such that 0 bytes
-// mean a hang-up (VMIN is 1). RT-safe but for the read.
+// One read per call, so that one HID report is one chunk. All devices are opened such that 0 bytes
+// mean a hang-up (VMIN is 1). RT-safe except for the read.
 Chunk LinkTransport::read(std::int64_t /*now_ns*/) noexcept {
   flush();
   const ssize_t got = ::read(link_.fd(), buffer_.data(), buffer_.size());
@@ -78,7 +78,7 @@ Chunk LinkTransport::read(std::int64_t /*now_ns*/) noexcept {
   return {.bytes = {}, .lost = true};
 }
 
-// RT-safe but for the write.
+// RT-safe except for the write.
 bool LinkTransport::flush() noexcept {
   while (unsent_from_ < unsent_to_) {
     const ssize_t sent =
@@ -89,7 +89,7 @@ bool LinkTransport::flush() noexcept {
   return true;
 }
 
-// RT-safe but for the write.
+// RT-safe except for the write.
 bool LinkTransport::send(std::span<const std::byte> bytes) noexcept {
   if (bytes.size() > unsent_.size() || !flush()) return false;
   const ssize_t sent = write_some(link_.fd(), bytes);

@@ -1,6 +1,6 @@
 // Connection: an open connection to a device on one descriptor (serial port, pseudo-terminal, TCP
-// socket, hidraw node). First cold code speaks through it (the start-up sequence), then a
-// LinkTransport takes it over for the reader thread.
+// socket, hidraw node). Cold code uses it first for the start-up sequence; then a LinkTransport
+// takes it over for the reader thread.
 #pragma once
 
 #include <chrono>
@@ -19,8 +19,8 @@ namespace posed::drivers {
 
 class Connection {
  public:
-  // Takes the descriptor over: non-blocking, closed in the end. `name` is for people
-  // ("/dev/ttyUSB0"), `identity` is stable ("0403:6001 A9XYZ").
+  // Takes ownership of the descriptor, makes it non-blocking and closes it in the end. `name` is
+  // for people ("/dev/ttyUSB0"); `identity` is stable ("0403:6001 A9XYZ").
   Connection(int fd, std::string name, std::string identity) noexcept;
   ~Connection();
   Connection(Connection&& other) noexcept;
@@ -32,15 +32,16 @@ class Connection {
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   [[nodiscard]] const std::string& identity() const noexcept { return identity_; }
 
-  // Every wait of the cold functions below ends with an error once this is fired.
+  // Once this is fired, every wait of the cold functions below ends with an error.
   void heed(std::shared_ptr<const Cancel> cancel) noexcept { cancel_ = std::move(cancel); }
 
-  // Cold. All bytes, within a second; an error says what happened to the device.
+  // Cold. Writes all bytes, within a second; an error states what happened to the device.
   [[nodiscard]] Result<> write(std::span<const std::byte> bytes);
   [[nodiscard]] Result<> write(std::string_view text);
-  // Cold. What came within `patience`, at once when there is something; empty when nothing came.
+  // Cold. Returns the bytes that came within `patience`, as soon as there are any; empty when none
+  // came.
   [[nodiscard]] Result<std::vector<std::byte>> read(std::chrono::milliseconds patience);
-  // Cold. Throws away what comes until nothing has come for `quiet` (at most a second in all).
+  // Cold. Discards bytes until none has come for `quiet` (at most a second in all).
   [[nodiscard]] Result<> drain(std::chrono::milliseconds quiet);
 
  private:
@@ -52,10 +53,10 @@ class Connection {
   std::shared_ptr<const Cancel> cancel_;
 };
 
-// Reads what the link has, at most 4 KB a call; a hang-up or an error of the descriptor is `lost`.
-// For serial ports and sockets, whose writes do not block.
+// Reads the available bytes, at most 4 KB per call; a hang-up or an error of the descriptor sets
+// `lost`. For serial ports and sockets, whose writes do not block.
 [[nodiscard]] std::unique_ptr<Transport> make_link_transport(Connection link);
-// The same for a link of TransportFactory::hid(), whose writes block: it is a ColdWriter, too.
+// The same for a link from TransportFactory::hid(), whose writes block: it is also a ColdWriter.
 [[nodiscard]] std::unique_ptr<Transport> make_hid_transport(Connection link);
 
 }  // namespace posed::drivers

@@ -47,7 +47,7 @@ bool DeviceInfo::answers_to(std::string_view id) const {
   return id == serial || id == port_path || id == identity() || (is_usb && id == at_interface);
 }
 
-// libserialport leaves out the ports that are only a driver's promise (ttyS4 and on).
+// libserialport omits ports that exist only as a driver's placeholder (ttyS4 and on).
 std::vector<DeviceInfo> list_serial_ports() {
   std::vector<DeviceInfo> found;
   sp_port** ports = nullptr;

@@ -11,19 +11,19 @@
 namespace posed::drivers {
 
 struct PlaybackOptions {
-  double rate_hz = 0.0;  // of the recording, in chunks
-  double pace = 1.0;     // of its clock; 0 is as fast as it can be used
+  double rate_hz = 0.0;  // chunks per second of the recording
+  double pace = 1.0;     // factor on the speed of the recording; 0 is as fast as possible
   bool loop = true;
-  // When each chunk is due on the recording's clock [s], increasing; empty: evenly at rate_hz.
+  // Due time of each chunk on the recording's clock [s], increasing; empty: evenly at rate_hz.
   std::vector<double> time_s{};
 };
 
 // Chunk n is due n / (rate * pace) after start(), or at its own time / pace, on an absolute
-// schedule (a round after the last chunk's time comes one step later): what was late once does not
-// stay late, nothing drifts, and after a stop of the process all that fell due comes at once.
+// schedule (a new loop begins one step after the last chunk's time). So one late chunk does not
+// delay the next, nothing drifts, and after the process was stopped all due chunks come at once.
 class FileTransport final : public Transport {
  public:
-  // At least one chunk, none longer than kMaxChunk. An impossible pace or rate is misuse.
+  // Needs at least one chunk, and none longer than kMaxChunk. An invalid pace or rate is misuse.
   [[nodiscard]] static Result<std::unique_ptr<Transport>> open(Chunks chunks,
                                                                const PlaybackOptions& playback);
 
@@ -33,7 +33,7 @@ class FileTransport final : public Transport {
   [[nodiscard]] double rate_hz() const noexcept override {
     return lossless() ? 0.0 : 1e9 / period_ns_;
   }
-  // Whether it begins again after the last chunk, so that it never ends.
+  // True when it starts again after the last chunk, so that it never ends.
   [[nodiscard]] bool loops() const noexcept { return loop_; }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   // Ends with an empty chunk after the last. RT-safe: no system call at all.
@@ -45,10 +45,10 @@ class FileTransport final : public Transport {
   Chunks chunks_;
   double period_ns_;  // 0: always due
   bool loop_;
-  std::vector<double> due_ns_;  // [chunk] after the round's begin; empty: evenly
-  double round_ns_ = 0.0;       // how long a round lasts
+  std::vector<double> due_ns_;  // [chunk] from the start of the loop; empty: evenly
+  double round_ns_ = 0.0;       // duration of a loop
   std::int64_t start_ns_ = 0;
-  std::uint64_t given_ = 0;  // chunks, over all loops
+  std::uint64_t given_ = 0;  // chunks given so far, over all loops
 };
 
 }  // namespace posed::drivers

@@ -1,6 +1,6 @@
-// HID gloves. hidapi says which there are; the reports are read from the hidraw node's own
-// descriptor, since hidapi hides it and a reader thread that polls all devices at once needs one.
-// The node gives one whole report a read, which is all that hidapi's hid_read does, too.
+// HID gloves. hidapi lists the devices; the reports are read from the hidraw node's own descriptor,
+// because hidapi hides it and a reader thread that polls all devices at once needs one. Each read
+// of the node returns one whole report, which is all that hidapi's hid_read does.
 #include <linux/hidraw.h>
 #include <sys/ioctl.h>
 

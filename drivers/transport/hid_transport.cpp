@@ -33,13 +33,13 @@ void HidTransport::write_waiting() noexcept {
   std::uint64_t rung = 0;
   [[maybe_unused]] const ssize_t cleared = ::read(waiting_, &rung, sizeof rung);
   while (queue_.read_available() > 0) {
-    // What piled up behind a write that took long: the newest say all that still matters.
+    // Messages that piled up behind a slow write: only the newest still matter.
     while (queue_.read_available() > kBacklog) {
       queue_.pop();
       dropped_.fetch_add(1, std::memory_order_relaxed);
     }
     queue_.consume_one([this](const Report& report) {
-      // A device that is gone is found by the reader; one that does not take it loses it.
+      // If the device is gone, the reader notices; a report that it does not accept is lost.
       [[maybe_unused]] const ssize_t sent = ::write(fd_, report.bytes.data(), report.size);
     });
   }

@@ -1,5 +1,5 @@
-// HidTransport: a hidraw node's reports, one a read, and one a write, which the device's supervisor
-// does (cold_writer.hpp says why).
+// HidTransport: reads one report per read from a hidraw node. Each report to the device is one
+// write, which the device's supervisor does (cold_writer.hpp explains why).
 #pragma once
 
 #include <array>
@@ -25,7 +25,8 @@ class HidTransport final : public Transport, public ColdWriter {
   [[nodiscard]] int poll_fd() const noexcept override { return reader_->poll_fd(); }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override { return reader_->start(now_ns); }
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override { return reader_->read(now_ns); }
-  // Queues the report and tells the supervisor with one write to an eventfd. RT-safe but for that.
+  // Queues the report and wakes the supervisor with one write to an eventfd. RT-safe except for
+  // that.
   [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
 
   [[nodiscard]] int waiting_fd() const noexcept override { return waiting_; }
@@ -33,9 +34,9 @@ class HidTransport final : public Transport, public ColdWriter {
   [[nodiscard]] std::uint64_t dropped() const noexcept override { return dropped_.load(); }
 
  private:
-  static constexpr std::size_t kMaxReport = 1024;  // bytes; full speed has 64
+  static constexpr std::size_t kMaxReport = 1024;  // bytes; full-speed USB has 64
   static constexpr std::size_t kQueue = 16;        // reports
-  static constexpr std::size_t kBacklog = 4;       // reports that are still worth sending
+  static constexpr std::size_t kBacklog = 4;       // number of reports that are still worth sending
   struct Report {
     std::size_t size = 0;
     std::array<std::byte, kMaxReport> bytes;
@@ -45,7 +46,7 @@ class HidTransport final : public Transport, public ColdWriter {
   int waiting_;
   std::unique_ptr<Transport> reader_;
   boost::lockfree::spsc_queue<Report, boost::lockfree::capacity<kQueue>> queue_;
-  Report sending_;  // the reader's: kept here because it is large
+  Report sending_;  // belongs to the reader thread; a member because it is large
   std::atomic<std::uint64_t> dropped_{0};
 };
 

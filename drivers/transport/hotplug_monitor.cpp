@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A rule that opens a node to us changes its attributes a moment after it was made.
+// A udev rule that gives posed access changes the node's attributes shortly after it was created.
 constexpr std::uint32_t kNews = IN_CREATE | IN_MOVED_TO | IN_ATTRIB | IN_ONLYDIR;
 
 }  // namespace
@@ -26,7 +26,7 @@ HotplugMonitor::~HotplugMonitor() {
   if (fd_ >= 0) ::close(fd_);
 }
 
-// Watching a folder again changes nothing, so all are named anew whenever something has come.
+// Watching a folder twice has no effect, so all of them are watched again after every event.
 void HotplugMonitor::watch_folders() {
   if (fd_ < 0) return;
   const fs::path buses = fs::path(root_) / "bus/usb";

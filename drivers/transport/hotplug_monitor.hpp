@@ -1,6 +1,6 @@
-// HotplugMonitor: tells when a device may have come, so that a glove that is device in again is
-// tried at once and not at the next turn of a timer. It watches the folders of device nodes with
-// inotify, which needs no udev daemon: it works in a container and in an initramfs, too.
+// HotplugMonitor: reports when a device may have been connected, so that a replugged glove is tried
+// at once and not at the next timer event. It watches the folders of device nodes with inotify,
+// which needs no udev daemon: it also works in a container and in an initramfs.
 #pragma once
 
 #include <string>
@@ -10,18 +10,18 @@ namespace posed::drivers {
 
 class HotplugMonitor {
  public:
-  // Watches /dev and the folders below /dev/bus/usb; a folder that is missing is watched as soon as
-  // it is there. `root` replaces /dev in tests.
+  // Watches /dev and the folders below /dev/bus/usb; a missing folder is watched as soon as it
+  // exists. `root` replaces /dev in tests.
   explicit HotplugMonitor(std::string root = "/dev");
   ~HotplugMonitor();
   HotplugMonitor(const HotplugMonitor&) = delete;
   HotplugMonitor& operator=(const HotplugMonitor&) = delete;
 
-  // Readable when a node came or its permissions changed; -1 when the system has no watch left:
-  // then trying now and again is all there is.
+  // Readable when a node appeared or its permissions changed; -1 when the system has no inotify
+  // watch left: then the caller can only retry from time to time.
   [[nodiscard]] int poll_fd() const noexcept { return fd_; }
 
-  // Takes what was told; whether a node came since the last call. Cold.
+  // Consumes the pending events; returns true when a node appeared since the last call. Cold.
   bool take();
 
  private:

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool holds(const fs::path& descriptors, const fs::path& node) {
-  std::error_code ignored;  // processes come and go, and those of others may not be read
+  std::error_code ignored;  // processes come and go, and those of other users may be unreadable
   for (fs::directory_iterator fd(descriptors, ignored), end; !ignored && fd != end;
        fd.increment(ignored)) {
     std::error_code unreadable;
@@ -26,7 +26,7 @@ bool holds(const fs::path& descriptors, const fs::path& node) {
   return false;
 }
 
-// " by NAME (process ID)" of another process that has the node open; empty when none may be seen.
+// " by NAME (process ID)" of another process that has the node open; empty when none is visible.
 std::string holder_of(const std::string& path) {
   std::error_code ignored;
   const fs::path node = fs::canonical(path, ignored);
@@ -48,7 +48,7 @@ std::string group_of(const std::string& path) {
   struct stat info{};
   if (::stat(path.c_str(), &info) != 0) return "dialout";
   const group* found = ::getgrgid(info.st_gid);
-  // A node of root's own group is mended by the udev rule, never by joining that group.
+  // A node in root's own group needs the udev rule; nobody should join that group.
   return found == nullptr || info.st_gid == 0 ? "" : found->gr_name;
 }
 

@@ -1,4 +1,4 @@
-// Device nodes: opening one, and saying in a sentence why it does not open.
+// Device nodes: opens one, and explains in one sentence why it cannot be opened.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace posed::drivers {
 
-// The node opened for reading and writing, non-blocking, not inherited, locked against a second
+// Opens the node for reading and writing, non-blocking, not inherited, locked against a second
 // posed. The caller closes it. Cold.
 [[nodiscard]] Result<int> open_node(const std::string& path);
 
-// Why a node did not open and what mends it. Cold.
+// Why a node could not be opened, and how to fix it. Cold.
 [[nodiscard]] std::string node_trouble(const std::string& path, int error);
 
 }  // namespace posed::drivers

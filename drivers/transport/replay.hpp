@@ -1,4 +1,4 @@
-// ReplayTransport: plays what was recorded of a device, at the times it came.
+// ReplayTransport: plays the recorded chunks of a device at their recorded times.
 #pragma once
 
 #include <cstdint>
@@ -29,12 +29,12 @@ class Recording {
   std::vector<std::int64_t> arrival_ns_;  // [chunk]
 };
 
-// A chunk is due (arrival - origin) / speed after start(). Several streams of one log share an
-// origin, the log's first arrival, and so keep their places among each other.
+// A chunk is due (arrival - origin) / speed after start(). Streams of one log share an origin, the
+// log's first arrival, so the time between them is kept.
 class ReplayTransport final : public Transport {
  public:
-  // `speed` 1 is the recorded pace, 0 as fast as possible. A recording may be empty: it ends at
-  // once. A chunk longer than kMaxChunk or a speed that is no factor is an error.
+  // `speed` 1 is the recorded pace, 0 as fast as possible. An empty recording ends at once. A chunk
+  // longer than kMaxChunk or an invalid speed is an error.
   [[nodiscard]] static Result<std::unique_ptr<Transport>> open(Recording recording,
                                                                std::int64_t origin_ns,
                                                                double speed);

@@ -1,6 +1,5 @@
-// Serial ports by the kernel's own interface: termios2 takes any baud rate as a number, and a
-// pseudo-terminal, which serves emulators and tests, is opened like a port (libserialport refuses
-// it).
+// Serial ports by the kernel's own interface: termios2 accepts any baud rate as a number, and a
+// pseudo-terminal, used by emulators and tests, is opened like a port (libserialport rejects it).
 #include <asm/termbits.h>
 #include <linux/serial.h>
 #include <sys/ioctl.h>
@@ -20,7 +19,7 @@
 namespace posed::drivers {
 namespace {
 
-constexpr double kBaudError = 0.03;  // of which a UART reads every bit of a byte, still
+constexpr double kBaudError = 0.03;  // with this error a UART still reads every bit of a byte
 constexpr unsigned kFirstPtyMajor = 136, kLastPtyMajor = 143;  // Unix98 pseudo-terminals
 
 bool is_pseudo_terminal(int fd) {
@@ -30,8 +29,8 @@ bool is_pseudo_terminal(int fd) {
   return number >= kFirstPtyMajor && number <= kLastPtyMajor;
 }
 
-// Raw 8N1 without flow control. A read without bytes fails with EAGAIN and gives 0 only after a
-// hang-up (VMIN 1). Closing leaves DTR up: boards with a boot loader start anew when it drops.
+// Sets raw 8N1 without flow control. A read without bytes fails with EAGAIN and returns 0 only
+// after a hang-up (VMIN 1). Closing keeps DTR set: boards with a boot loader restart when it drops.
 Result<> set_raw(int fd, const std::string& port, int baud) {
   termios2 mode{};
   if (::ioctl(fd, TCGETS2, &mode) != 0) {
@@ -56,8 +55,8 @@ Result<> set_raw(int fd, const std::string& port, int baud) {
   return {};
 }
 
-// USB adapters save interrupts by batching bytes, an FTDI chip for 16 ms; this asks for them at
-// once. TransportFactory without the choice refuse, rightly.
+// USB adapters batch bytes to save interrupts, an FTDI chip for 16 ms; this requests immediate
+// delivery. Ports that do not offer it return an error, which is ignored.
 void ask_for_low_latency(int fd) {
   serial_struct port{};
   if (::ioctl(fd, TIOCGSERIAL, &port) != 0) return;
@@ -88,15 +87,16 @@ Result<Connection> TransportFactory::serial(const SerialSettings& settings) {
   Connection link(*fd, port->node, port->identity());
   link.heed(cancel_);
   if (auto ok = set_raw(*fd, port->node, settings.baud); !ok) return std::unexpected(ok.error());
-  // flock keeps a second posed out; this keeps out the programs that know nothing of flock. Not on
-  // a pseudo-terminal: there it would outlast us while the other side keeps the node open.
+  // flock keeps out a second posed; TIOCEXCL keeps out programs that do not use flock. Not on a
+  // pseudo-terminal: there it would remain set while the other side keeps the node open.
   if (!is_pseudo_terminal(*fd) && ::ioctl(*fd, TIOCEXCL) != 0) {
     return fail(node_trouble(port->node, errno));
   }
   const int lines = TIOCM_DTR | TIOCM_RTS;
-  ::ioctl(*fd, TIOCMBIS, &lines);  // a port without modem lines answers with an error, rightly
+  ::ioctl(*fd, TIOCMBIS, &lines);  // a port without modem lines returns an error, which is ignored
   ask_for_low_latency(*fd);
-  ::ioctl(*fd, TCFLSH, TCIOFLUSH);  // what lies there was sent to someone else, at another rate
+  // Discards old bytes, which were meant for another program or came at another rate.
+  ::ioctl(*fd, TCFLSH, TCIOFLUSH);
   return link;
 }
 

@@ -1,6 +1,6 @@
-// TransportFactory: how drivers reach devices. One object belongs to one cold thread; it keeps what
-// has to stay open while a device is away (listening sockets), and ends every wait when it is told
-// to.
+// TransportFactory: gives drivers access to devices. One object belongs to one cold thread. It
+// keeps open what must stay open while a device is away (listening sockets), and ends every wait on
+// cancel().
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,11 @@ struct SerialSettings {
   std::string port{};  // "/dev/ttyUSB0"; empty: found by `id`
   std::string id{};    // USB serial number or port path, as `posed devices` lists it
   int baud = 115200;   // 8N1, no flow control
-  // Without port and id: the one port whose USB ids are among these.
+  // Without port and id: the one port whose USB ids are in this list.
   std::vector<std::uint32_t> usb_ids{};  // vendor << 16 | product
 };
 
-// For gloves that connect to us.
+// For gloves that connect to posed.
 struct ListenSettings {
   std::string endpoint{};            // "127.0.0.1:5200"
   std::vector<std::string> peers{};  // addresses that may connect; empty: loopback only
@@ -37,7 +37,7 @@ struct HidSettings {
   std::string path{};                     // "/dev/hidraw0" instead of all of the above
 };
 
-// Whether these settings make sense, without listening. Cold.
+// Checks these settings without listening. Cold.
 [[nodiscard]] Result<> check_listen(const ListenSettings& settings);
 
 class TransportFactory {
@@ -47,30 +47,31 @@ class TransportFactory {
   TransportFactory& operator=(const TransportFactory&) = delete;
   ~TransportFactory();
 
-  // Raw mode, exclusive, DTR set. Errors are one sentence: not there, no permission (with the udev
-  // rule or group that mends it), in use (by whom, if known). Cold.
+  // Opens a port in raw mode, exclusive, DTR set. Errors are one sentence: missing, no permission
+  // (with the udev rule or group that fixes it), in use (by whom, if known). Cold.
   [[nodiscard]] Result<Connection> serial(const SerialSettings& settings);
 
-  // Waits up to half a second for a glove to connect; listens from the first call on, so that a
-  // glove that tries in between is kept. Others than the peers are dropped and counted. Cold.
+  // Waits up to half a second for a glove to connect. Listens from the first call on, so that a
+  // glove that connects between two calls is kept. Connections from addresses not in `peers` are
+  // dropped and counted. Cold.
   [[nodiscard]] Result<Connection> accept(const ListenSettings& settings);
 
-  // The device's reports: one a read, and one a write. Cold.
+  // Opens a hidraw node: one report per read and per write. Cold.
   [[nodiscard]] Result<Connection> hid(const HidSettings& settings);
 
-  // A USB device without a node of its own kind, its interface claimed. Cold.
+  // Opens a USB device without a node of its own kind and claims its interface. Cold.
   [[nodiscard]] Result<UsbLink> usb(const UsbSettings& settings);
 
-  // Ends what is waited for now and later, here and on the links that came from here: for whoever
-  // stops while a device is opened. Any thread.
+  // Ends present and future waits, here and on the links made here; for a thread that stops posed
+  // while a device is being opened. Any thread.
   void cancel() noexcept { cancel_->fire(); }
 
   // While it is on, nothing is opened or waited for: the functions above check their settings,
-  // begin to listen and return an error. So a daemon finds at its start what makes no sense, and a
-  // glove that connects at once is kept. Cold.
+  // begin to listen and return an error. So a daemon finds invalid settings when it starts, and
+  // keeps a glove that connects at once. Cold.
   void only_prepare(bool on) noexcept { only_prepare_ = on; }
 
-  // Connections dropped so far because no peer in the list made them.
+  // Number of connections dropped so far because their address is not in the list of peers.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:

@@ -22,8 +22,7 @@ constexpr std::uint16_t kFeature = 3 << 8;                    // report type in 
 
 std::string libusb_says(int code) { return libusb_error_name(code); }
 
-// A context that only handles the one device it is given: without discovery libusb starts no
-// thread of its own.
+// A context that only handles the given device: without discovery libusb starts no thread.
 Result<libusb_context*> make_context() {
   libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY);
   libusb_context* context = nullptr;
@@ -33,8 +32,8 @@ Result<libusb_context*> make_context() {
   return context;
 }
 
-// The interface's endpoint that reports come from; 0 when it has none. A device numbers its
-// endpoints as its hardware likes, so the number is read and not assumed.
+// The interface's endpoint that delivers reports; 0 when it has none. The number differs between
+// devices, so it is read and not assumed.
 std::uint8_t interrupt_in(libusb_device_handle* handle, int interface) {
   libusb_config_descriptor* config = nullptr;
   if (libusb_get_active_config_descriptor(libusb_get_device(handle), &config) != 0) return 0;
@@ -71,7 +70,7 @@ Result<> UsbLink::Impl::claim() {
     handle_ = nullptr;
     return fail(name_ + " does not open as a USB device (" + libusb_says(failed) + ")");
   }
-  // Such as usbmouse, which takes a P5 for a mouse; it gets the interface back in the end.
+  // For example usbmouse, which takes a P5 for a mouse; it gets the interface back at the end.
   libusb_set_auto_detach_kernel_driver(handle_, 1);
   const int failed = libusb_claim_interface(handle_, settings_.interface);
   if (failed == LIBUSB_ERROR_BUSY) return fail(node_trouble(name_, EBUSY));

@@ -1,5 +1,5 @@
-// What UsbLink hides: the node, libusb's context and the claimed interface. Only usb.cpp and
-// usb_transport.cpp see it.
+// The private part of UsbLink: the node, libusb's context and the claimed interface. Included only
+// by usb.cpp and usb_transport.cpp.
 #pragma once
 
 #include <libusb.h>
@@ -27,7 +27,7 @@ class UsbLink::Impl {
 
   [[nodiscard]] Result<> claim();
 
-  // A transfer that has begun takes up to a second; after a cancel none is begun.
+  // A transfer that has begun takes up to a second; after a cancel no transfer is begun.
   [[nodiscard]] bool cancelled() const noexcept { return cancel_->fired(); }
 
   [[nodiscard]] libusb_context* context() const noexcept { return context_; }

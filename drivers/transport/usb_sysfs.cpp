@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 std::string read_line(const fs::path& file) {
   std::string line;
   std::getline(std::ifstream(file), line);
-  // A device chooses these strings: what is no printable text must not reach a terminal.
+  // A device chooses these strings: unprintable characters must not reach a terminal.
   std::erase_if(line, [](unsigned char c) { return c < ' ' || c == 0x7F; });
   const auto first = line.find_first_not_of(' ');
   const auto last = line.find_last_not_of(' ');
@@ -46,7 +46,7 @@ void describe_device(const fs::path& device, DeviceInfo& info) {
   info.port_path = device.filename();
   const std::string maker = read_line(device / "manufacturer");
   const std::string product = read_line(device / "product");
-  // Many products begin with their maker's name themselves.
+  // Many product names already begin with the maker's name.
   info.name = maker.empty() || product.starts_with(maker) ? product
               : product.empty()                           ? maker
                                                           : maker + " " + product;
@@ -68,7 +68,7 @@ void describe_usb(const fs::path& device, DeviceInfo& info) {
   }
 }
 
-// access() goes by the real user, which is the effective one: posed is never made set-uid.
+// access() uses the real user id, which equals the effective one: posed is never set-uid.
 std::string open_error_of(const std::string& node) {
   return ::access(node.c_str(), R_OK | W_OK) == 0 ? "" : node_trouble(node, errno);
 }

@@ -1,4 +1,4 @@
-// The hot half of a UsbLink: its reports, one a chunk.
+// The hot part of a UsbLink: delivers its reports, one per chunk.
 #include <sys/epoll.h>
 #include <unistd.h>
 
@@ -12,14 +12,14 @@ namespace posed::drivers {
 namespace {
 
 constexpr std::size_t kMaxReport = 64;  // bytes of a full-speed interrupt packet
-constexpr std::size_t kTransfers = 16;  // reports that may come between two reads
-constexpr int kMaxFailures = 16;        // in a row: every transfer once
+constexpr std::size_t kTransfers = 16;  // reports that may arrive between two reads
+constexpr int kMaxFailures = 16;        // in a row: as many as there are transfers
 constexpr int kCloseTurns = 10;         // waits for cancelled transfers, a second in all
 constexpr timeval kCloseTurn{.tv_sec = 0, .tv_usec = 100'000};
 
-// Reports come in by libusb's callbacks, all of them on the thread that calls read(). A transfer
-// waits with its report until that is handed over and used, then it goes out again: nothing is
-// copied and nothing can overflow but the device's own patience.
+// libusb delivers reports through callbacks, all on the thread that calls read(). A transfer keeps
+// its report until that has been handed over and used, then it is submitted again: nothing is
+// copied, and no queue can overflow except the device's own.
 class UsbTransport final : public Transport {
  public:
   explicit UsbTransport(std::unique_ptr<UsbLink::Impl> link);
@@ -49,7 +49,7 @@ class UsbTransport final : public Transport {
   std::unique_ptr<UsbLink::Impl> link_;
   int epoll_;
   std::array<Slot, kTransfers> slots_{};
-  std::array<Slot*, kTransfers> waiting_{};  // with a report, oldest first from first_
+  std::array<Slot*, kTransfers> waiting_{};  // transfers with a report, oldest first from first_
   std::size_t first_ = 0, count_ = 0;
   Slot* handed_over_ = nullptr;  // its bytes are in use until the next read
   int failures_ = 0;             // in a row
@@ -60,7 +60,7 @@ UsbTransport::UsbTransport(std::unique_ptr<UsbLink::Impl> link)
     : link_(std::move(link)), epoll_(::epoll_create1(EPOLL_CLOEXEC)) {
   const libusb_pollfd** descriptors = libusb_get_pollfds(link_->context());
   for (const libusb_pollfd** at = descriptors; at != nullptr && *at != nullptr; ++at) {
-    // libusb means poll()'s flags, which epoll shares.
+    // libusb uses the flags of poll(), which have the same values for epoll.
     epoll_event wanted{};
     wanted.events = static_cast<std::uint32_t>((*at)->events);
     ::epoll_ctl(epoll_, EPOLL_CTL_ADD, (*at)->fd, &wanted);
@@ -71,7 +71,7 @@ UsbTransport::UsbTransport(std::unique_ptr<UsbLink::Impl> link)
 UsbTransport::~UsbTransport() {
   cancel_all();
   for (Slot& slot : slots_) {
-    // A transfer that the kernel did not give back stays allocated: closing the device forgets it.
+    // A transfer that the kernel did not return stays allocated; closing the device releases it.
     if (!slot.in_flight) libusb_free_transfer(slot.transfer);
   }
   ::close(epoll_);
@@ -125,7 +125,7 @@ void UsbTransport::take(Slot& slot) noexcept {
       lost_ = true;
       return;
     default:
-      // A bad cable disturbs single packets; an unplugged device fails at every one.
+      // A bad cable disturbs single packets; an unplugged device fails on every one.
       if (++failures_ >= kMaxFailures) lost_ = true;
       return submit(slot);
   }
@@ -146,7 +146,7 @@ bool UsbTransport::any_in_flight() const noexcept {
 }
 
 void UsbTransport::cancel_all() noexcept {
-  lost_ = true;  // nothing is submitted from here on
+  lost_ = true;  // no transfer is submitted from here on
   for (Slot& slot : slots_) {
     if (slot.in_flight) libusb_cancel_transfer(slot.transfer);
   }

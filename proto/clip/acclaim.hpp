@@ -1,8 +1,9 @@
-// ASF/AMC (Acclaim 1.10): the reader's parts. read_clip() in clip.hpp is the way in for files.
+// ASF/AMC (Acclaim 1.10): parts of the clip reader. To read a file, call read_clip() in clip.hpp.
 //
-// An ASF is a skeleton, an AMC the motion of one. A posed joint is the *start* of an Acclaim bone:
-// its offset is its parent bone's direction * length. With C the bone's axis rotation and M the
-// turn of its degrees of freedom (listed innermost first), L = C M C^-1 (protocol notes 5f).
+// An ASF file holds a skeleton, an AMC file a motion of it. A posed joint sits at the *start* of an
+// Acclaim bone: its offset is its parent bone's direction * length. With C the bone's axis rotation
+// and M the rotation by its degrees of freedom (listed innermost first), the joint's local rotation
+// is L = C M C^-1.
 #pragma once
 
 #include <string>
@@ -13,23 +14,23 @@
 
 namespace posed::clip {
 
-// How one bone's values in an AMC become channels.
+// Maps the values of one bone in an AMC to channels.
 struct AcclaimBone {
   std::string name;
-  std::vector<int> channels;  // of the values in the AMC's order
+  std::vector<int> channels;  // [value, in the AMC's order] index of the channel
 };
 
 struct Acclaim {
-  Skeleton skeleton;  // not finished; metres, radians
+  Skeleton skeleton;  // metres, radians; Skeleton::finish() has not run yet
   double metres_per_unit = 1.0;
-  bool degrees = true;             // values of an AMC that does not say
+  bool degrees = true;             // unit of angles in an AMC that does not state one
   std::vector<AcclaimBone> bones;  // [joint]
 };
 
-// `name` stands in the errors.
+// `name` is used in error messages.
 [[nodiscard]] Result<Acclaim> parse_asf(std::string_view text, const std::string& name);
 
-// Whole texts of the two files.
+// Both take the whole text of a file.
 [[nodiscard]] Result<Clip> parse_amc(std::string_view amc, const std::string& amc_name,
                                      std::string_view asf, const std::string& asf_name,
                                      const ReadOptions& options = {});

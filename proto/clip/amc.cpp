@@ -12,10 +12,10 @@ bool is_frame_number(std::string_view line) {
   return !line.empty() && std::ranges::all_of(line, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-// Cuts `amc` into its header and the frames' blocks, and notes what the header says of angles.
+// Splits `amc` into its header and the blocks of the frames; reads the header's unit of angles.
 Result<> split(std::string_view amc, const std::string& name, Draft& draft, bool& degrees) {
   std::string_view rest = amc;
-  std::optional<std::size_t> frame;  // where the open block begins
+  std::optional<std::size_t> frame;  // where the block being read begins
   int frame_line = 0;
   const auto close = [&](std::size_t end) {
     if (frame)

@@ -72,7 +72,8 @@ Result<> AsfReader::section(const std::string& key) {
   if (key == ":bonedata") return bone_data();
   if (key == ":hierarchy") return hierarchy();
   if (!key.starts_with(':')) return error(in_quotes(key) + " stands outside any section");
-  skip_section();  // :version, :name, :documentation, :skin and what else there may be
+  skip_section();  // :version, :name, :documentation, :skin and other sections that posed does not
+                   // need
   return {};
 }
 
@@ -189,7 +190,7 @@ Result<> AsfReader::bone_entry(AsfBone& bone, const std::string& key) {
 Result<> AsfReader::axis(AsfBone& bone) {
   if (auto ok = numbers("axis of bone '" + bone.name + "'", bone.axis.data(), 3); !ok) return ok;
   const std::string_view word = words_.peek();
-  if (word.size() != 3 || lower(word) == "dof") return {};  // XYZ where none is named
+  if (word.size() != 3 || lower(word) == "dof") return {};  // XYZ when no order is given
   return order(bone, words_.take());
 }
 
@@ -236,7 +237,7 @@ Result<> AsfReader::limits(AsfBone& bone) {
   return {};
 }
 
-// Lines of a parent and its children between begin and end.
+// Reads the lines between begin and end; each names a parent and its children.
 Result<> AsfReader::hierarchy() {
   has_hierarchy_ = true;
   if (lower(words_.take()) != "begin") return error("'begin' should follow :hierarchy");

@@ -1,4 +1,4 @@
-// What an ASF says, before it becomes a Skeleton; private to the ASF reader.
+// The content of an ASF file before it becomes a Skeleton; private to the ASF reader.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace posed::clip {
 
-// Words of an ASF: `#` begins a comment, commas and parentheses are white space.
+// Splits an ASF into words. `#` begins a comment; commas and parentheses count as white space.
 class Words {
  public:
   explicit Words(std::string_view text) : text_(without_bom(text)) { fill(); }
@@ -23,8 +23,8 @@ class Words {
     fill();
     return word;
   }
-  [[nodiscard]] int line() const { return line_; }                   // of the word taken last
-  [[nodiscard]] int next_line_number() const { return word_line_; }  // of the word to come
+  [[nodiscard]] int line() const { return line_; }                   // line of the word taken last
+  [[nodiscard]] int next_line_number() const { return word_line_; }  // line of the next word
   [[nodiscard]] bool starts_section() const { return first_ && word_.starts_with(':'); }
 
  private:
@@ -52,11 +52,11 @@ class Words {
   }
 
   std::string_view text_;
-  std::string_view rest_;  // of the line
+  std::string_view rest_;  // rest of the current line
   std::string_view word_;
   int word_line_ = 0;
   int line_ = 1;
-  bool first_ = false;  // `word_` is the first of its line
+  bool first_ = false;  // `word_` is the first on its line
 };
 
 struct AsfBone {
@@ -66,7 +66,7 @@ struct AsfBone {
   std::array<double, 3> axis{};
   std::string axis_order = "xyz";
   std::vector<std::string> dof;
-  std::vector<std::array<double, 2>> limits;  // one pair a dof, or none at all
+  std::vector<std::array<double, 2>> limits;  // one pair per dof, or empty
   std::vector<int> children;
   bool has_parent = false;
 };
@@ -74,11 +74,11 @@ struct AsfBone {
 struct AsfFile {
   std::vector<AsfBone> bones;  // the root is the first
   Eigen::Vector3d root_position = Eigen::Vector3d::Zero();
-  double length_unit = 1.0;  // of an inch, as CMU's 0.45
+  double length_unit = 1.0;  // in inches; 0.45 in CMU's files
   bool degrees = true;
 };
 
-// `name` stands in the errors.
+// `name` is used in error messages.
 [[nodiscard]] Result<Acclaim> acclaim_of(const AsfFile& file, const std::string& name);
 
 }  // namespace posed::clip

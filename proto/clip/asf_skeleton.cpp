@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kInch_m = 0.0254;
 
-// Translations in listed order, then the rotations reversed: posed lists the outermost first.
+// Adds translations in listed order, then the rotations reversed: posed lists the outermost first.
 void add_channels(const AsfBone& bone, double radians, Acclaim& out) {
   AcclaimBone values{.name = bone.name, .channels = std::vector<int>(bone.dof.size())};
   const auto add = [&](std::size_t i, bool translation) {
@@ -34,7 +34,7 @@ void add_channels(const AsfBone& bone, double radians, Acclaim& out) {
   out.bones.push_back(std::move(values));
 }
 
-// Depth first. A bone has at most one parent and the root none, so this ends.
+// Recurses depth first. It ends, because a bone has at most one parent and the root none.
 void add_bone(const AsfFile& file, int index, const AsfBone* parent, int parent_joint,
               Acclaim& out) {
   const AsfBone& bone = file.bones[index];

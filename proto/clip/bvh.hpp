@@ -1,8 +1,9 @@
-// BVH: the reader's parts. read_clip() in clip.hpp is the way in for files; these read from memory
-// (tests, fuzzing, a log's device description).
+// BVH: parts of the clip reader. To read a file, call read_clip() in clip.hpp; the functions here
+// read from memory (for tests, fuzzing and the device description in a log).
 //
-// The format (reference: protocol notes 5f): a joint's rotation is the product of its channels in
-// listed order, the first outermost; position channels replace OFFSET; degrees; units unknown.
+// The format: a joint's rotation is the product of its channels in listed order, the first
+// outermost. Position channels replace OFFSET. Angles are in degrees; the unit of length is not
+// stated.
 #pragma once
 
 #include <string>
@@ -13,19 +14,19 @@
 
 namespace posed::clip {
 
-// What stands before the motion lines; offsets still in the file's units.
+// Everything before the motion lines. Offsets are still in the file's units.
 struct BvhHeader {
-  Skeleton skeleton;  // not finished
+  Skeleton skeleton;  // Skeleton::finish() has not run yet
   double frame_rate_hz = 0.0;
-  std::string_view declared_frames;  // what `Frames:` says, which may lie
+  std::string_view declared_frames;  // the count after `Frames:`; may be wrong
   std::size_t motion_offset = 0;     // of the first motion line in the text
   int motion_line = 0;               // its line number
 };
 
-// `name` stands in the errors. Views in the result point into `text`.
+// `name` is used in error messages. Views in the result point into `text`.
 [[nodiscard]] Result<BvhHeader> parse_bvh_header(std::string_view text, const std::string& name);
 
-// A whole BVH text.
+// Reads a whole BVH text.
 [[nodiscard]] Result<Clip> parse_bvh(std::string_view text, const std::string& name,
                                      const ReadOptions& options = {});
 

@@ -24,7 +24,7 @@ constexpr std::array<ChannelName, 6> kChannelNames{{{"xposition", Axis::kX, true
                                                     {"yrotation", Axis::kY, false},
                                                     {"zrotation", Axis::kZ, false}}};
 
-// "Frame \t Time " to "frametime".
+// Turns "Frame \t Time " into "frametime".
 std::string lower_packed(std::string_view text) {
   std::string packed = lower(text);
   std::erase_if(packed, is_space);
@@ -42,7 +42,7 @@ class HeaderReader {
     int joint = 0;
     bool has_offset = false;
     bool has_channels = false;
-    bool has_child = false;  // a joint or an end site
+    bool has_child = false;  // has a child joint or an end site
   };
 
   [[nodiscard]] std::unexpected<Error> error(std::string message) const {
@@ -53,7 +53,7 @@ class HeaderReader {
     return "joint " + in_quotes(header_.skeleton.joints[open_.back().joint].name);
   }
 
-  Result<> entry();  // one entry of the innermost open joint
+  Result<> entry();  // reads one entry of the innermost open joint
   Result<> begin_joint();
   Result<> end_joint();
   Result<> end_site();
@@ -144,7 +144,7 @@ Result<> HeaderReader::end_joint() {
 
 Result<> HeaderReader::end_site() {
   if (lower(cursor_.word()) != "site") return error("'End' is not followed by 'Site'");
-  (void)cursor_.name();  // some exporters name it
+  (void)cursor_.name();  // some exporters give the end site a name
   if (cursor_.word() != "{") return error("'{' should follow End Site in " + place());
   Eigen::Vector3d tip = Eigen::Vector3d::Zero();
   if (lower(cursor_.word()) != "offset") return error("End Site without OFFSET in " + place());
@@ -200,10 +200,10 @@ Result<> HeaderReader::channels() {
   return {};
 }
 
-// "Frames: N" and "Frame Time: s", each on a line; the colon may stand apart.
+// Reads "Frames: N" and "Frame Time: s", each on its own line; space may precede the colon.
 Result<> HeaderReader::motion() {
   const auto labelled = [this](std::string_view label) -> std::optional<std::string_view> {
-    (void)cursor_.peek();  // over blank lines
+    (void)cursor_.peek();  // skips blank lines
     const std::string_view line = cursor_.rest();
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos || lower_packed(line.substr(0, colon)) != label) {
@@ -221,7 +221,7 @@ Result<> HeaderReader::motion() {
     return error("Frame Time " + in_quotes(*time) +
                  " is not a time between two frames; it should be more than 0 and at most 10 s");
   }
-  // Written with few digits ('.0083333'): a rate this near to a whole number is that number.
+  // Files round the frame time ('.0083333'): a rate very near a whole number means that number.
   const double rate_hz = 1.0 / *frame_time_s;
   const double whole_hz = std::round(rate_hz);
   const bool is_whole = whole_hz > 0 && std::abs(rate_hz - whole_hz) < 1e-4 * whole_hz;

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kDegreesPerRad = 180.0 / std::numbers::pi;
 
-// Fixed notation, as readers in the wild expect; nine digits keep an angle to 1e-6 deg through any
-// number of round trips.
+// Writes fixed notation, because some readers do not accept exponents. Nine digits keep an angle
+// within 1e-6 deg over any number of round trips.
 void append(std::string& out, double value) {
   std::array<char, 512> buffer{};
   const auto [end, error] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,

@@ -19,7 +19,7 @@ bool is_acclaim(const Skeleton& skeleton) {
 
 Clip with_zyx_channels(const Clip& clip) {
   auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
-  std::vector<int> translations;  // columns of the source, in the new order of translations
+  std::vector<int> translations;  // source columns, in the new order of the translation channels
   skeleton->channels.clear();
   for (int j = 0; j < std::ssize(skeleton->joints); ++j) {
     skeleton->joints[j].channel_frame.setIdentity();
@@ -33,7 +33,7 @@ Clip with_zyx_channels(const Clip& clip) {
       skeleton->channels.push_back({.joint = static_cast<std::uint16_t>(j), .axis = axis});
     }
   }
-  (void)skeleton->finish();  // the same joints passed it before; only the id is new
+  (void)skeleton->finish();  // cannot fail: the same joints passed before; this only updates the id
 
   Clip out{.path = clip.path,
            .skeleton = skeleton,

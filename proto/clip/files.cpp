@@ -7,9 +7,9 @@ namespace posed::clip {
 namespace {
 
 constexpr FileRule kClip{.what = "clip", .max_bytes = 2'000'000'000};
-constexpr std::uintmax_t kMaxSkeletonFile = 16'000'000;  // bytes; real ones have some 10 KB
+constexpr std::uintmax_t kMaxSkeletonFile = 16'000'000;  // bytes; real files have about 10 KB
 
-// NN.asf beside NN_MM.amc.
+// Returns the path of NN.asf beside NN_MM.amc.
 std::filesystem::path asf_beside(const std::filesystem::path& amc) {
   const std::string stem = amc.stem().string();
   return amc.parent_path() / (stem.substr(0, stem.find('_')) + ".asf");

@@ -1,4 +1,4 @@
-// The files that make up one clip, as text; private to proto/clip.
+// Loads the files that make up one clip as text; private to proto/clip.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@ namespace posed::clip {
 enum class ClipKind : std::uint8_t { kBvh, kAmc, kHandCsv };
 
 struct ClipFiles {
-  std::string name;  // of the clip, for errors
-  std::string text;  // of the .bvh, .amc or .csv
+  std::string name;  // name of the clip, for error messages
+  std::string text;  // content of the .bvh, .amc or .csv
   ClipKind kind = ClipKind::kBvh;
   std::string asf_name;  // AMC only
   std::string asf;
 };
 
-// By extension: .bvh, .csv, or .amc, the latter with its skeleton.
+// Loads a .bvh, a .csv, or an .amc with its skeleton, chosen by extension.
 [[nodiscard]] Result<ClipFiles> load_files(const std::filesystem::path& path,
                                            const ReadOptions& options);
 

@@ -97,7 +97,8 @@ FrameParser FrameParser::hand_csv() {
 
 bool FrameParser::keep(double value, std::size_t channel, std::span<double> values) const noexcept {
   values[channel] = value * scale_[channel];
-  return !(std::abs(values[channel]) > limit_[channel]);  // NaN is a value that is missing
+  // NaN marks a missing value and is accepted.
+  return !(std::abs(values[channel]) > limit_[channel]);
 }
 
 FrameOutcome FrameParser::parse(std::string_view text, std::span<double> values) const noexcept {

@@ -1,6 +1,6 @@
-// FrameParser: one frame's text, as it stands in a clip, to channel values, NaN where a hand CSV's
-// field is empty. The readers and the
-// file driver's decoder share it, so a recorded log decodes exactly as the clip does.
+// FrameParser: turns the text of one frame of a clip into channel values, NaN where a field of a
+// hand CSV is empty. The clip readers and the decoder of the file driver share it, so a recorded
+// log decodes exactly as the clip does.
 #pragma once
 
 #include <cstddef>
@@ -18,8 +18,8 @@ namespace posed::clip {
 
 enum class FrameFault : std::uint8_t {
   kNone,
-  kNotANumber,    // a word that is no finite number
-  kImplausible,   // a number beyond what a pose can have (proto/frame/plausible.hpp)
+  kNotANumber,    // a word that is not a finite number
+  kImplausible,   // a number outside the plausible range (proto/frame/plausible.hpp)
   kTooFew,        // values missing
   kTooMany,       // values left over
   kUnknownBone,   // AMC: a name the skeleton does not have
@@ -30,45 +30,45 @@ enum class FrameFault : std::uint8_t {
 
 struct FrameOutcome {
   FrameFault fault = FrameFault::kNone;
-  std::string_view where;    // the word or bone to add_error; into the text or the parser
-  std::size_t offset = 0;    // of the fault in the text
-  std::size_t expected = 0;  // values wanted and found, for too few and too many
+  std::string_view where;    // the word or bone at fault; points into the text or the parser
+  std::size_t offset = 0;    // byte offset of the fault in the text
+  std::size_t expected = 0;  // for too few and too many: values expected and found
   std::size_t found = 0;
-  std::int64_t number = 0;                                   // AMC: the frame's number
-  double time_s = std::numeric_limits<double>::quiet_NaN();  // hand CSV, where it is given
+  std::int64_t number = 0;                                   // AMC: the frame's own number
+  double time_s = std::numeric_limits<double>::quiet_NaN();  // hand CSV: the frame's time, if given
 
   [[nodiscard]] bool ok() const noexcept { return fault == FrameFault::kNone; }
-  // One sentence for people. Cold.
+  // The outcome as one sentence for people. Cold.
   [[nodiscard]] std::string sentence() const;
 };
 
 class FrameParser {
  public:
-  // A BVH motion line: the values of all channels, in order, degrees and file units.
+  // Parses a BVH motion line: the values of all channels in order, in degrees and file units.
   [[nodiscard]] static FrameParser bvh(const Skeleton& skeleton, double metres_per_unit);
 
-  // An AMC block: the frame's number, then a bone's name and its values for each bone.
+  // Parses an AMC block: the frame's number, then for each bone its name and its values.
   [[nodiscard]] static FrameParser amc(const Acclaim& acclaim, bool degrees);
 
-  // A line of a hand CSV: the time and 45 angles in hand45 order, in radians; an empty field is a
-  // missing value.
+  // Parses a line of a hand CSV: the time and 45 angles in hand45 order, in radians. An empty field
+  // is a missing value.
   [[nodiscard]] static FrameParser hand_csv();
 
-  // Values parse() writes: the skeleton's channels.
+  // Number of values that parse() writes: the skeleton's channels.
   [[nodiscard]] std::size_t channels() const noexcept { return scale_.size(); }
 
-  // Frames carry a number of their own (AMC).
+  // True when frames carry a number of their own (AMC).
   [[nodiscard]] bool numbered() const noexcept { return !bones_.empty(); }
 
-  // Frames may carry a time of their own (hand CSV).
+  // True when frames may carry a time of their own (hand CSV).
   [[nodiscard]] bool timed() const noexcept { return timed_; }
 
-  // Lines that a frame's text has at least: one; for an AMC its number and a line for each bone
-  // with channels.
+  // The least number of lines in a frame's text: one; for an AMC one for the frame number and one
+  // for each bone with channels.
   [[nodiscard]] std::size_t lines() const noexcept { return lines_; }
 
-  // `text` to `values` [channels(), rad and m]; they are unspecified unless the outcome is ok.
-  // White space and line ends do not matter. RT-safe.
+  // Parses `text` into `values` [channels(), rad and m]. They are unspecified unless the outcome is
+  // ok. White space and line ends do not matter. RT-safe.
   [[nodiscard]] FrameOutcome parse(std::string_view text, std::span<double> values) const noexcept;
 
  private:
@@ -77,12 +77,12 @@ class FrameParser {
   FrameOutcome parse_fields(std::string_view text, std::span<double> values) const noexcept;
   [[nodiscard]] int find_bone(std::string_view name) const noexcept;
 
-  // Scales and keeps one value; false when no pose can have it. RT-safe.
+  // Scales and stores one value; returns false when it is not plausible. RT-safe.
   [[nodiscard]] bool keep(double value, std::size_t channel,
                           std::span<double> values) const noexcept;
 
-  std::vector<double> scale_;       // [channel], file value to rad or m
-  std::vector<double> limit_;       // [channel], rad or m: no value is larger
+  std::vector<double> scale_;       // [channel], factor from file value to rad or m
+  std::vector<double> limit_;       // [channel], largest allowed value, rad or m
   std::vector<AcclaimBone> bones_;  // sorted by name; empty for a BVH
   std::size_t lines_ = 1;
   bool timed_ = false;

@@ -91,21 +91,21 @@ void FramesClip::add_angles(const Frame& frame) {
   }
 }
 
-// Back from where the root joint is in the world to the position of the moving joint in its
-// parent's frame, past the bones between them.
+// A frame holds the position of the root joint in the world. This computes the position of the
+// moving joint in its parent's frame from it, through the bones between them.
 void FramesClip::add_root_position(const Frame& frame) {
   if (moving_ < 0) return;
-  std::vector<int> chain;  // from the moving joint's parent up
+  std::vector<int> chain;  // from the moving joint's parent towards the root
   for (int j = skeleton_->joints[moving_].parent; j >= 0; j = skeleton_->joints[j].parent) {
     chain.push_back(j);
   }
-  Eigen::Quaterniond above = Eigen::Quaterniond::Identity();  // the parent's frame to the world
+  Eigen::Quaterniond above = Eigen::Quaterniond::Identity();  // parent's frame to world
   Eigen::Vector3d parent = Eigen::Vector3d::Zero();
   for (auto j = chain.rbegin(); j != chain.rend(); ++j) {
     parent += above * skeleton_->joints[*j].offset_m;
     above = above * rotation_of(frame, *j);
   }
-  Eigen::Vector3d below = Eigen::Vector3d::Zero();  // the root joint in the moving one's frame
+  Eigen::Vector3d below = Eigen::Vector3d::Zero();  // root joint in the moving joint's frame
   for (int j = skeleton_->root_joint; j != moving_; j = skeleton_->joints[j].parent) {
     below = skeleton_->joints[j].offset_m + rotation_of(frame, j) * below;
   }
@@ -140,7 +140,7 @@ void hold_missing(Clip& clip) {
     auto column = clip.channels.col(c);
     double last = 0.0;
     for (Eigen::Index i = column.size() - 1; i >= 0; --i) {
-      if (std::isfinite(column[i])) last = column[i];  // the first of all
+      if (std::isfinite(column[i])) last = column[i];  // the first finite value
     }
     for (double& value : column) {
       if (std::isfinite(value)) {

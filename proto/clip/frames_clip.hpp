@@ -1,6 +1,6 @@
-// FramesClip: a clip made of published frames, one after the other. A frame carries rotations, the
-// angles of its channels and where its root joint is; the other position channels of the skeleton
-// stand at its offsets.
+// FramesClip: builds a clip from published frames, added one after the other. A frame carries
+// rotations, the angles of its channels and the position of its root joint. Other position channels
+// of the skeleton keep the joint's offset.
 #pragma once
 
 #include <memory>
@@ -16,11 +16,11 @@ class FramesClip {
  public:
   explicit FramesClip(std::shared_ptr<const Skeleton> skeleton);
 
-  // A frame of the skeleton. A channel without a value is NaN.
+  // Adds a frame of the skeleton. A channel without a value becomes NaN.
   void add(const Frame& frame);
 
-  // `time_s` of every frame, increasing. At `rate_hz`; 0: one over the median step. An error with
-  // fewer than two frames.
+  // `time_s` holds the time of every frame, increasing. `rate_hz` is the rate of the clip; 0: one
+  // over the median step. Fails with fewer than two frames.
   [[nodiscard]] Result<Clip> finish(const std::string& path, double rate_hz,
                                     std::vector<double> time_s) const;
 
@@ -29,14 +29,14 @@ class FramesClip {
   void add_root_position(const Frame& frame);
 
   std::shared_ptr<const Skeleton> skeleton_;
-  bool exact_;               // the channels are the source's own
-  int moving_;               // the joint, root_joint or above, whose position channels are written
+  bool exact_;  // frames give the channel values themselves, so nothing is recomputed
+  int moving_;  // the joint (root_joint or above it) whose position channels are written
   std::vector<double> row_;  // [channel]
   std::vector<double> values_;
 };
 
-// Lets every channel without a value hold the one before, the first one its first; says in
-// `warnings` how many. For formats that cannot leave a gap.
+// Fills every missing value with the value before it, at the start with the channel's first one.
+// Reports the number in `warnings`. For formats that cannot hold missing values.
 void hold_missing(Clip& clip);
 
 }  // namespace posed::clip

@@ -10,11 +10,11 @@
 namespace posed::clip {
 namespace {
 
-using JointsOfHand = std::array<int, kHandJoints>;  // index in the clip's skeleton
+using JointsOfHand = std::array<int, kHandJoints>;  // joint index in the clip's skeleton
 
 std::string_view side_name(Side side) { return side == Side::kLeft ? "left" : "right"; }
 
-// The finger joints of one side, and the first bone that is missing.
+// The finger joints found on one side, and the first bone that is missing.
 struct FoundHand {
   JointsOfHand joints{};
   std::optional<Bone> missing;
@@ -38,7 +38,7 @@ Result<Side> side_of(const Clip& clip, const ReadOptions& options) {
   return left ? Side::kLeft : Side::kRight;
 }
 
-// The rotation that our hand's joint has when it is posed canonically as the clip's joint is.
+// The rotation of a joint of our hand when it has the same canonical pose as the clip's joint.
 Eigen::Quaterniond ours(const Skeleton& theirs, int joint, const Skeleton& hand, int hand_joint,
                         const Eigen::Quaterniond& local) {
   const auto T_parent = [](const Skeleton& skeleton, int of) {

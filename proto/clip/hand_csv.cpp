@@ -1,4 +1,4 @@
-// The hand CSV: its header, its times, and writing one.
+// The hand CSV: reads its header and times, and writes one.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,10 +13,10 @@
 namespace posed::clip {
 namespace {
 
-constexpr double kSameTime_s = 1e-6;  // two stamps closer than this are one
-constexpr double kEven = 0.01;        // steps that differ by less are one step
+constexpr double kSameTime_s = 1e-6;  // times closer than this count as the same
+constexpr double kEven = 0.01;        // relative difference below which steps count as equal
 
-// Column names without the time: thumb1_x_rad ... little3_z_rad.
+// Column names without the time column: thumb1_x_rad ... little3_z_rad.
 const std::array<std::string, kHandChannels>& column_names() {
   static const auto names = [] {
     std::array<std::string, kHandChannels> all;
@@ -61,7 +61,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// 1 / median step; of an even clock, whose stamps are only rounded, 1 / mean step.
+// 1 / median step; for an even clock, whose stamps are only rounded, 1 / mean step.
 double rate_of(const std::vector<double>& steps_s) {
   const double middle_s = median(steps_s);
   const bool is_even = std::ranges::all_of(
@@ -72,7 +72,7 @@ double rate_of(const std::vector<double>& steps_s) {
   return static_cast<double>(steps_s.size()) / sum_s;
 }
 
-// Times between two that are known lie on the line between them, outside of them a step apart.
+// Interpolates missing times between known ones; before and after them it extrapolates by `step_s`.
 void interpolate(std::vector<double>& time_s, double step_s) {
   const auto known = [](double t) { return !std::isnan(t); };
   auto at = std::ranges::find_if(time_s, known);
@@ -124,7 +124,7 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
                       double& rate_hz, std::vector<std::string>& warnings) {
   std::vector<double> steps_s;
   double last_s = 0.0;
-  std::size_t last = time_s.size();  // index of the last known time; none yet
+  std::size_t last = time_s.size();  // index of the last known time; none so far
   int missing = 0;
   for (std::size_t i = 0; i < time_s.size(); ++i) {
     double& now_s = time_s[i];

@@ -14,15 +14,16 @@ namespace posed::clip {
 namespace {
 
 constexpr double kHtkUnit_s = 1e-7;
-constexpr double kHtkFrom = 10'000.0;  // a last time above it that is an integer is HTK's
+// Times that are all integers with the last above this are HTK's.
+constexpr double kHtkFrom = 10'000.0;
 constexpr std::uintmax_t kMaxLabelFile = 64'000'000;  // bytes
-constexpr double kSlack_s = 1e-6;  // of the six decimals that people and tools write
+constexpr double kSlack_s = 1e-6;                     // times are written with six decimals
 
 bool is_integer(std::string_view word) {
   return std::ranges::all_of(word, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-// One line as it stands: times not yet in seconds.
+// Parses one line; times are not yet in seconds.
 Result<LabelSegment> parse_line(std::string_view line, const std::string& file, int number,
                                 bool& all_integers) {
   std::array<double, 2> times{};

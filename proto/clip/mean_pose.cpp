@@ -5,7 +5,7 @@
 namespace posed::clip {
 namespace {
 
-// The line from the right to the left upper leg in the hips' frame; zero when they are not known.
+// The line from the right to the left upper leg in the hips' frame; zero when either is unknown.
 Eigen::Vector3d hip_line(const Skeleton& skeleton) {
   const int left = skeleton.joint_of(Bone::kLeftUpperLeg);
   const int right = skeleton.joint_of(Bone::kRightUpperLeg);

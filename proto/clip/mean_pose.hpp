@@ -1,4 +1,4 @@
-// The pose in which a figure stands on average over a clip.
+// The mean pose of a figure over a clip.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,9 @@
 
 namespace posed::clip {
 
-// Mean global rotation of each joint, the heading of each frame (from the line between the upper
-// legs) removed. For t_frames_from_standing(), where the clip walks or stands.
+// Mean global rotation of each joint [joint], with the heading of each frame (from the line between
+// the upper legs) removed. Input of t_frames_from_standing(), when the figure walks or stands in
+// the clip.
 [[nodiscard]] std::vector<Eigen::Quaterniond> standing_rotations(const Clip& clip);
 
 }  // namespace posed::clip

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kSameLength_m = 0.001;
 
-// [frames x channels]; grows with what was really read, whatever a header promised. Fills `time_s`
-// where frames carry times.
+// Returns [frames x channels]. The memory grows with the frames actually read, not with the count
+// in the header. Fills `time_s` where frames carry times.
 Result<std::vector<double>> read_rows(const Draft& draft, const std::string& name,
                                       std::vector<double>& time_s) {
   std::vector<double> values;
@@ -46,7 +46,7 @@ bool varies(const ChannelMatrix& channels, std::size_t c) {
   return column.maxCoeff() - column.minCoeff() > kSameLength_m;
 }
 
-// The joint whose position is the figure's: the first, from the root on, that the clip moves.
+// Finds the joint whose position moves the figure: the first from the root that moves in the clip.
 int find_root_joint(const Skeleton& skeleton, const ChannelMatrix& channels) {
   for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
     if (skeleton.channels[c].translation && varies(channels, c)) return skeleton.channels[c].joint;
@@ -54,8 +54,8 @@ int find_root_joint(const Skeleton& skeleton, const ChannelMatrix& channels) {
   return 0;
 }
 
-// Position channels of a joint below the root joint replace its OFFSET; a bone keeps its length, so
-// they are constant and become the offset. One that moves is told.
+// Position channels of a joint below the root joint replace its OFFSET. Bones keep their length, so
+// these channels should be constant; their value becomes the offset. Warns when one moves.
 void settle_offsets(Clip& clip, Skeleton& skeleton) {
   int told = -1;
   for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
@@ -74,7 +74,8 @@ void settle_offsets(Clip& clip, Skeleton& skeleton) {
   }
 }
 
-// Bones, root joint, offsets and T frames, which need each other in this order.
+// Sets bones, root joint, offsets and T frames in this order, because each step needs the one
+// before.
 Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const Hints& hints) {
   if (profile == nullptr) {
     name_bones(skeleton);
@@ -125,7 +126,7 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
 
   auto skeleton = std::make_shared<Skeleton>(std::move(draft.skeleton));
   clip.skeleton = skeleton;
-  if (draft.parser.timed()) {  // a hand: its skeleton is ours
+  if (draft.parser.timed()) {  // a hand: posed supplies the skeleton
     const auto ok = settle_times(draft, name, clip.time_s, clip.frame_rate_hz, clip.warnings);
     if (!ok) return std::unexpected(ok.error());
     return clip;

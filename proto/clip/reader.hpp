@@ -12,15 +12,15 @@
 
 namespace posed::clip {
 
-// One frame as it stands in the file.
+// The text of one frame in the file.
 struct FrameSpan {
   std::string_view text;
-  int line = 0;  // of its first word
+  int line = 0;  // line of its first word
 };
 
-// A clip whose header has been read: what it takes to read the frames.
+// A clip whose header has been read, with everything needed to read the frames.
 struct Draft {
-  Skeleton skeleton;  // metres; not finished, but for a hand's
+  Skeleton skeleton;  // metres; not finished, except for a hand
   const Profile* profile = nullptr;
   FrameParser parser;
   double frame_rate_hz = 0.0;
@@ -28,7 +28,7 @@ struct Draft {
   std::string_view header;  // everything before the first frame
   std::vector<FrameSpan> frames;
   std::vector<std::string> warnings;
-  double untimed_rate_hz = 30.0;  // of a clip whose frames should carry times and do not
+  double untimed_rate_hz = 30.0;  // rate of a format with times whose file has none
 };
 
 [[nodiscard]] Result<Draft> draft_bvh(std::string_view text, const std::string& name,
@@ -40,14 +40,14 @@ struct Draft {
 [[nodiscard]] Result<Draft> draft_hand_csv(std::string_view text, const std::string& name,
                                            const ReadOptions& options);
 
-// The times of the frames of a clip that carries them, completed as hand_clip.hpp says; `time_s`
-// holds NaN where one is missing. `rate_hz` becomes 1 / median step.
+// Completes the times of the frames as hand_clip.hpp describes. `time_s` holds NaN where one is
+// missing. Sets `rate_hz` to 1 / median step.
 [[nodiscard]] Result<> settle_times(const Draft& draft, const std::string& name,
                                     std::vector<double>& time_s, double& rate_hz,
                                     std::vector<std::string>& warnings);
 
-// What is found by looking at all frames, where only the first is at hand (a log's device
-// description).
+// Facts that take all frames to find, supplied when only the first is available (the device
+// description in a log).
 struct Hints {
   std::optional<int> root_joint;
   KnownT T;

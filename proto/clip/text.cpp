@@ -14,7 +14,7 @@
 namespace posed::clip {
 namespace {
 
-// from_chars gives no value for a number a double cannot hold; one too small is as good as zero.
+// from_chars returns no value for a number outside double's range; one too small counts as zero.
 bool underflows(std::string_view word) noexcept {
   const std::size_t exponent = word.find_first_of("eE");
   return exponent != std::string_view::npos && exponent + 1 < word.size() &&

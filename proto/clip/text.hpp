@@ -1,5 +1,5 @@
-// Reading text that people and many programs wrote: words with their line numbers, and numbers that
-// do not depend on the locale.
+// Tools to read text from people and other programs: words with their line numbers, and numbers
+// independent of the locale.
 #pragma once
 
 #include <cstddef>
@@ -14,39 +14,40 @@
 
 namespace posed::clip {
 
-// A finite number of plausible size, written plain or with an exponent; a leading '+' is allowed,
-// one too small for a double is 0. RT-safe.
+// Parses a finite number of at most kMaxValue in size, with or without an exponent. A leading '+'
+// is allowed; a number too small for a double becomes 0. RT-safe.
 [[nodiscard]] std::optional<double> parse_number(std::string_view word) noexcept;
 
-// The shortest text that is read back as the same number.
+// The shortest text that reads back as the same number.
 [[nodiscard]] std::string number_text(double value);
 
-// The number of a joint angle or length: |value| at most 1e9. RT-safe.
+// Largest |value| of a joint angle or length that parse_number() accepts.
 inline constexpr double kMaxValue = 1e9;
 
+// RT-safe.
 [[nodiscard]] constexpr bool is_space(char c) noexcept {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
 }
 [[nodiscard]] std::string_view trim(std::string_view text) noexcept;
 [[nodiscard]] std::string lower(std::string_view text);
 
-// The word at the start of `text`, which then begins after it; empty at the end. RT-safe.
+// Removes the first word from `text` and returns it; empty at the end. RT-safe.
 [[nodiscard]] std::string_view next_word(std::string_view& text) noexcept;
 
-// The line at the start of `text` without its end (\n, \r\n or a bare \r); `text` then begins after
-// it. RT-safe.
+// Removes the first line from `text` and returns it without its end (\n, \r\n or a bare \r).
+// RT-safe.
 [[nodiscard]] std::string_view next_line(std::string_view& text) noexcept;
 
-// Walks a text word by word and knows the line it is on. Braces are words of their own.
+// Walks through a text word by word and tracks the line number. Braces are words of their own.
 class Cursor {
  public:
   explicit Cursor(std::string_view text) : text_(text), all_(text) {}
 
-  [[nodiscard]] std::string_view word();            // next word, over line ends; empty at the end
-  [[nodiscard]] std::string_view peek();            // the same without taking it
-  [[nodiscard]] std::string_view rest();            // rest of this line, trimmed; takes its end too
-  [[nodiscard]] std::string_view name();            // rest of this line up to a brace, trimmed
-  [[nodiscard]] int line() const { return line_; }  // of what was taken last, from 1
+  [[nodiscard]] std::string_view word();  // next word, across line ends; empty at the end
+  [[nodiscard]] std::string_view peek();  // like word(), without taking it
+  [[nodiscard]] std::string_view rest();  // rest of this line, trimmed; also takes the line end
+  [[nodiscard]] std::string_view name();  // rest of this line up to a brace, trimmed
+  [[nodiscard]] int line() const { return line_; }  // line of the last word taken, from 1
   [[nodiscard]] std::size_t offset() const { return all_.size() - text_.size(); }
 
  private:
@@ -58,8 +59,8 @@ class Cursor {
   int line_ = 1;
 };
 
-// Writes a file beside the target first: a full disk leaves no half-written clip behind under its
-// name.
+// Writes to a temporary file beside the target first, so that a full disk leaves no half-written
+// clip under the target's name.
 [[nodiscard]] Result<> write_text(const std::filesystem::path& path,
                                   const std::function<void(std::ostream&)>& write);
 

@@ -10,8 +10,8 @@
 namespace posed::clip {
 namespace {
 
-// The first line of a description, "posed-clip bvh key=value ...": what the header's text does not
-// say. Its names are parts of the log format.
+// The first line of a description, "posed-clip bvh key=value ...", holds what the header's text
+// does not state. Its names are part of the log format.
 constexpr std::string_view kMagic = "posed-clip";
 
 constexpr std::array<std::string_view, 3> kKinds{"bvh", "amc", "csv"};  // by ClipKind
@@ -32,7 +32,7 @@ std::string describe(const ClipFiles& files, const Draft& draft, const Clip& cli
   } else if (!options.profile.empty()) {
     out += " profile=" + options.profile;
   }
-  // Only the whole clip could say it; the others follow from the header.
+  // Only the whole clip shows this; the other facts follow from the header.
   if (files.kind != ClipKind::kHandCsv && draft.profile == nullptr && !zero_pose_is_t(skeleton)) {
     out += " T=";
     for (const Joint& joint : skeleton.joints) out += axes_text(joint.T_world_joint);
@@ -44,7 +44,7 @@ std::string describe(const ClipFiles& files, const Draft& draft, const Clip& cli
 
 using Facts = std::map<std::string, std::string, std::less<>>;
 
-// A whole number or, for those that are read as such, any; nothing when it is missing or bad.
+// The value of `key` as a number, which must be whole for some keys; empty when missing or invalid.
 std::optional<double> fact(const Facts& facts, std::string_view key) {
   const auto at = facts.find(key);
   return at == facts.end() ? std::nullopt : parse_number(at->second);
@@ -67,7 +67,7 @@ Result<std::unique_ptr<const TextClip>> open_text_clip(const std::filesystem::pa
   out->description = describe(*files, *draft, *clip, options);
   out->warnings = std::move(clip->warnings);
   out->time_s = std::move(clip->time_s);
-  // The views move with the text: same offsets in its new place.
+  // The text has moved, so the views are rebased: same offsets, new address.
   const char* const before = files->text.data();
   out->text = std::move(files->text);
   for (const FrameSpan& frame : draft->frames) {

@@ -1,5 +1,5 @@
-// A clip seen as a device: its frames as pieces of text exactly as they stand in the file, and a
-// description from which they can be decoded again, one by one, with nothing else at hand.
+// A clip treated as a device: its frames as pieces of text exactly as in the file, and a
+// description from which each frame can be decoded again with no other input.
 #pragma once
 
 #include <filesystem>
@@ -13,27 +13,27 @@
 
 namespace posed::clip {
 
-// What it takes to decode the frames of a clip.
+// Everything needed to decode the frames of a clip.
 struct ClipFormat {
-  std::shared_ptr<const Skeleton> skeleton;  // the same, id included, as read_clip() gives
+  std::shared_ptr<const Skeleton> skeleton;  // identical, including id, to the one from read_clip()
   double frame_rate_hz = 0.0;
   FrameParser parser;
 };
 
-// The whole clip has been read once, so every frame is known to be good.
+// The whole clip has been read once, so every frame is known to be valid.
 struct TextClip {
   ClipFormat format;
-  std::string description;  // for parse_description(): the clip's header and its first frame
+  std::string description;               // views into `text`
   std::vector<std::string_view> frames;  // into `text`
   std::vector<double> time_s;            // [frame], as Clip::time_s
   std::vector<std::string> warnings;
-  std::string text;  // the file
+  std::string text;  // content of the file
 };
 
 [[nodiscard]] Result<std::unique_ptr<const TextClip>> open_text_clip(
     const std::filesystem::path& path, const ReadOptions& options = {});
 
-// `name` stands in the errors.
+// `name` is used in error messages.
 [[nodiscard]] Result<ClipFormat> parse_description(std::string_view description,
                                                    const std::string& name);
 

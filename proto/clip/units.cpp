@@ -18,8 +18,8 @@ constexpr std::array<Unit, 4> kUnits{{{1.0, "metres"},
                                       {kCmuUnit_m, "inches / 0.45"},
                                       {0.001, "millimetres"}}};
 
-// Joints that only carry the figure through the world: the root and an only child below it that
-// has position channels. Their OFFSET is a place, no length of bone.
+// Joints that only move the figure through the world: the root, and an only child below it that has
+// position channels. Their OFFSET is a location, not a bone length.
 std::vector<char> carriers(const Skeleton& skeleton) {
   std::vector<char> carries(skeleton.joints.size(), 0);
   std::vector<int> children(skeleton.joints.size(), 0);
@@ -36,11 +36,11 @@ std::vector<char> carriers(const Skeleton& skeleton) {
   return carries;
 }
 
-// The longest way through the figure from leaf to leaf: foot to head or hand to hand, both about
-// the height of a person however the zero pose is folded.
+// The longest path through the figure from leaf to leaf: foot to head or hand to hand. Both are
+// about a person's height, however the zero pose is folded.
 double longest_way(const Skeleton& skeleton) {
   const std::vector<char> carries = carriers(skeleton);
-  std::vector<double> reach(skeleton.joints.size(), 0.0);  // from the joint down to its far leaf
+  std::vector<double> reach(skeleton.joints.size(), 0.0);  // from the joint to its farthest leaf
   double longest = 0.0;
   for (int j = static_cast<int>(skeleton.joints.size()) - 1; j >= 0; --j) {
     const Joint& joint = skeleton.joints[j];

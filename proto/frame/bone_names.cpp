@@ -9,10 +9,10 @@ namespace {
 
 enum class Side : std::uint8_t { kNone, kLeft, kRight };
 
-// "mixamorig:LeftUpLeg" to side left, part "upleg".
+// "mixamorig:LeftUpLeg" splits into side left, part "upleg".
 struct Name {
   Side side = Side::kNone;
-  std::string part;  // lower case letters and digits only
+  std::string part;  // lower-case letters and digits only
 };
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
@@ -30,7 +30,7 @@ std::string plain(std::string_view text) {
   return out;
 }
 
-// Parts that the CMU skeletons put one letter before: lfemur, RThumb, LHipJoint.
+// Parts that CMU skeletons prefix with one letter for the side: lfemur, RThumb, LHipJoint.
 constexpr std::array<std::string_view, 12> kOneLetterParts{
     "hipjoint", "femur",  "tibia", "foot", "toes",    "clavicle",
     "humerus",  "radius", "wrist", "hand", "fingers", "thumb"};
@@ -69,7 +69,7 @@ Name split_name(std::string_view joint_name) {
 
 struct Part {
   std::string_view name;
-  Bone left;  // the only one where the part has no side
+  Bone left;  // the left bone, or the only one when the part has no side
 };
 
 constexpr std::array<Part, 5> kMiddle{{{"hips", Bone::kHips},
@@ -124,7 +124,7 @@ Bone mirrored(Bone left, Side side) {
   return *bone_from_name(right);
 }
 
-// "handindex2", "index02", "indexproximal" of a side.
+// Matches "handindex2", "index02" or "indexproximal" of a side.
 std::optional<Bone> finger(std::string_view part) {
   if (part.starts_with("hand")) part.remove_prefix(4);
   constexpr std::array<std::pair<std::string_view, Bone>, 6> kFingers{
@@ -153,15 +153,15 @@ std::optional<Bone> bone_of(const Name& name, bool has_collars) {
     const auto at = std::ranges::find(kMiddle, name.part, &Part::name);
     return at == kMiddle.end() ? std::nullopt : std::optional(at->left);
   }
-  // Where the collar has a name of its own, the "shoulder" is the joint of the upper arm.
+  // When the collar has its own name, "shoulder" means the joint of the upper arm.
   if (has_collars && name.part == "shoulder") return mirrored(Bone::kLeftUpperArm, name.side);
   const auto at = std::ranges::find(kLimbs, name.part, &Part::name);
   const auto left = at == kLimbs.end() ? finger(name.part) : std::optional(at->left);
   return left ? std::optional(mirrored(*left, name.side)) : std::nullopt;
 }
 
-// The trunk's joints in order: one is the spine, two spine and chest, three also the upper chest;
-// of more, the first two and the last.
+// Names the trunk's joints in order: one is the spine; two are spine and chest; three add the upper
+// chest; of more, the first two and the last are named.
 void name_trunk(Skeleton& skeleton, const std::vector<int>& trunk) {
   if (trunk.empty()) return;
   skeleton.joints[trunk[0]].bone = Bone::kSpine;

@@ -1,5 +1,5 @@
-// Which canonical bone a joint is, by the names that mocap programs and figures use: CMU (BVH and
-// ASF), Mixamo, Axis Neuron, VRM / Unity, and the many that spell them alike.
+// Finds each joint's canonical bone by its name, as mocap programs and figures spell it: CMU (BVH
+// and ASF), Mixamo, Axis Neuron, VRM / Unity, and many similar ones.
 #pragma once
 
 #include <optional>
@@ -11,8 +11,8 @@
 
 namespace posed {
 
-// Sets Joint::bone where a joint's name says it. A bone is given once, to the joint nearest the
-// root; the trunk between hips and neck is shared out by how many joints it has. Cold.
+// Sets Joint::bone where a joint's name identifies it. Each bone goes to one joint, the one nearest
+// the root. The trunk between hips and neck is divided by its number of joints. Cold.
 void name_bones(Skeleton& skeleton);
 
 }  // namespace posed

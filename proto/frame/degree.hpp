@@ -1,4 +1,4 @@
-// Angles are radians everywhere; texts that people write and read have degrees.
+// Angles are radians everywhere in the code; texts for people use degrees.
 #pragma once
 
 #include <numbers>

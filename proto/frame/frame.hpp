@@ -14,9 +14,9 @@
 namespace posed {
 
 inline constexpr int kMaxJoints = 96;
-inline constexpr int kMaxChannels = 288;  // three a joint
+inline constexpr int kMaxChannels = 288;  // three per joint
 inline constexpr int kMaxSampleValues = 64;
-inline constexpr int kMaxLabel = 16;  // bytes, closing zero included
+inline constexpr int kMaxLabel = 16;  // bytes, including the closing zero
 
 using Vec3f = std::array<float, 3>;
 using Quatf = std::array<float, 4>;  // x, y, z, w; unit length
@@ -25,19 +25,19 @@ inline constexpr Quatf kIdentity{0.0F, 0.0F, 0.0F, 1.0F};
 enum class Quality : std::uint8_t { kMeasured, kPredicted, kHeld, kStale };
 enum class Source : std::uint8_t { kDevice, kFile, kReplay, kLabels };
 
-// When each step finished with the frame, host time [ns]; kNoTime_ns while it has not.
+// Host time [ns] at which each step finished with the frame; kNoTime_ns before that.
 struct StageStamps {
   std::int64_t decoded_ns = kNoTime_ns;
   std::int64_t published_ns = kNoTime_ns;  // handed to the publisher
 };
 
-// Who and when, common to frames and samples.
+// Origin and times, common to frames and samples.
 struct Header {
   std::uint32_t stream = 0;              // index of the stream in the daemon's config
   std::uint64_t sequence = 0;            // counts the stream's decoded frames from 1; never repeats
-  std::int64_t device_ns = kNoTime_ns;   // the device's own time, where it has one
+  std::int64_t device_ns = kNoTime_ns;   // the device's own time; kNoTime_ns if it has none
   std::int64_t arrival_ns = kNoTime_ns;  // host time, taken right after the read
-  ClockMapping clock;                    // how device time maps to host time, as far as known
+  ClockMapping clock;                    // mapping from device time to host time, as far as known
 };
 
 struct Frame {
@@ -54,7 +54,7 @@ struct Frame {
   Vec3f root_position_m{};  // the skeleton's root_joint in the world
   StageStamps stamps;
   std::array<float, 8> stage_us{};  // spent in each stage of the stream, in their order
-  std::bitset<kMaxJoints> valid;    // joint was measured; its rotation is identity otherwise
+  std::bitset<kMaxJoints> valid;    // joint was measured; otherwise its rotation is identity
   std::array<Quatf, kMaxJoints> rotation_xyzw{};  // [joint], parent-relative
   std::array<float, kMaxChannels> angle_rad{};    // [rotation channel], in Skeleton::channels order
 };
@@ -65,7 +65,7 @@ struct Sample {
   std::uint16_t value_count = 0;
   Quality quality = Quality::kMeasured;
   std::bitset<kMaxSampleValues> valid;
-  std::array<float, kMaxSampleValues> value{};  // units as the device's SampleLayout says
+  std::array<float, kMaxSampleValues> value{};  // in the units of the device's SampleLayout
 };
 static_assert(std::is_trivially_copyable_v<Sample>);
 

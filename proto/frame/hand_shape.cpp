@@ -17,7 +17,7 @@ namespace posed {
 namespace {
 
 constexpr double kMillimetre = 1e-3;
-constexpr double kLongest_m = 1.0;  // of anything in a hand
+constexpr double kLongest_m = 1.0;  // largest length anywhere in a hand
 
 class HandReader : private FirstError {
  public:
@@ -89,7 +89,7 @@ class HandReader : private FirstError {
     }
   }
 
-  // Three numbers of at most `most` in size; zeros after a mistake.
+  // Reads three numbers of at most `most` in size; returns zeros after a mistake.
   Eigen::Vector3d numbers(const toml::node& node, double most) {
     const toml::array* const array = node.as_array();
     Eigen::Vector3d read = Eigen::Vector3d::Zero();
@@ -132,7 +132,7 @@ std::span<const HandShape> hand_shapes() {
     std::vector<HandShape> read;
     for (const ProfileText& text : hand_texts()) {
       auto shape = parse_hand_shape(text.toml, std::string(text.file));
-      if (!shape) {  // our own bug: the program was built with it
+      if (!shape) {  // a bug in posed: the text is built into the program
         std::fprintf(stderr, "posed: %s\n", shape.error().text().c_str());
         std::abort();
       }

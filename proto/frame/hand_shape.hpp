@@ -1,7 +1,7 @@
-// HandShape: how long and thick a hand's bones are and how far its joints turn. Read from
-// config/hands/*.toml, which is built into the binary. Always the right hand, palm down, fingers
-// along +Z, thumb at +X, in the wrist's frame; hand_skeleton() and models/hand mirror it for a left
-// one. Cold.
+// HandShape: lengths and thicknesses of a hand's bones and ranges of its joints. Read from
+// config/hands/*.toml, which is built into the binary. It is always the right hand, palm down,
+// fingers along +Z, thumb at +X, in the wrist's frame; hand_skeleton() and models/hand mirror it
+// for a left hand. Cold.
 #pragma once
 
 #include <array>
@@ -22,9 +22,9 @@ struct AngleRange {
 };
 
 struct FingerShape {
-  Eigen::Vector3d base_m = Eigen::Vector3d::Zero();  // its first joint
-  // How the straight finger lies: its bones point along frame * Z and its channels turn in `frame`.
-  // Identity but for the thumb.
+  Eigen::Vector3d base_m = Eigen::Vector3d::Zero();  // position of its first joint
+  // Orientation of the straight finger: its bones point along frame * Z and its channels turn in
+  // `frame`. Identity for all fingers except the thumb.
   Eigen::Quaterniond frame = Eigen::Quaterniond::Identity();
   std::array<double, kFingerJoints> length_m{};
   std::array<double, kFingerJoints> radius_m{};                  // of the capsule around each bone
@@ -36,10 +36,10 @@ struct HandShape {
   std::array<FingerShape, kFingers> fingers;
 };
 
-// `text` is TOML; `file` stands in the errors, which name the line.
+// `text` is TOML; `file` is used in error messages, which name the line.
 [[nodiscard]] Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file);
 
-// All that are built in, and the one called `name`; an unknown name is an error that lists them.
+// All built-in shapes, and the one called `name`; an unknown name is an error that lists them.
 [[nodiscard]] std::span<const HandShape> hand_shapes();
 [[nodiscard]] Result<const HandShape*> find_hand_shape(const std::string& name);
 

@@ -6,9 +6,7 @@
 namespace posed {
 namespace {
 
-constexpr int kFirstMirroredFinger = 3;  // ring and little lie beyond the middle finger
-
-// Fingers lie along +Z and shall lie along the side's own X axis, palm down either way.
+constexpr int kFirstMirroredFinger = 3;  // ring and little, beyond the middle finger
 Eigen::Quaterniond t_frame(Side side) {
   const double quarter = std::numbers::pi / 2;
   return axis_rotation(Axis::kY, side == Side::kLeft ? quarter : -quarter);
@@ -69,7 +67,7 @@ Skeleton hand_skeleton(Side side, const HandShape& shape) {
   const Bone wrist = side == Side::kLeft ? Bone::kLeftHand : Bone::kRightHand;
   skeleton.joints.push_back(named_joint(side, wrist, -1));
   for (int finger = 0; finger < kFingers; ++finger) add_finger(side, shape, finger, skeleton);
-  // Cannot fail: the joints are ours, and a shape's lengths were checked when it was read.
+  // Cannot fail: the joints are fixed, and a shape's lengths were checked when it was read.
   if (!skeleton.finish()) std::abort();
   return skeleton;
 }

@@ -1,11 +1,12 @@
-// The skeleton of a hand that stands alone: a wrist for root and fifteen finger joints, named as
-// the canonical bones they are. Zero angles are a flat hand, palm down, fingers along +Z.
+// The skeleton of a single hand: the wrist as root and fifteen finger joints, named as their
+// canonical bones. Zero angles are a flat hand, palm down, fingers along +Z.
 //
 // Joints: the wrist (no channels, at the origin), then finger by finger, thumb to little, from the
 // palm outwards. Channels of a joint: z, x, y, because R = Rz(twist) Rx(flexion) Ry(spread). A
-// Frame's angle_rad holds hand45 angles with hand45's signs. What mirrors them is the joint's
-// channel_frame: a left hand is the mirror image of the right, and ring and little turn (spread
-// and twist) as a mirror image of the index does, so that spread is positive away from the middle.
+// Frame's angle_rad holds hand45 angles with hand45's signs. The joint's channel_frame does the
+// mirroring: a left hand is the mirror image of the right, and ring and little turn (spread and
+// twist) as a mirror image of the index does, so that spread is positive away from the middle
+// finger.
 #pragma once
 
 #include <array>
@@ -32,7 +33,7 @@ inline constexpr int kHandSkeletonJoints = 1 + kHandJoints;
   return static_cast<Bone>(static_cast<int>(first) + joint);
 }
 
-// [channel of the skeleton] = index in HandAngles, and back.
+// [channel of the skeleton] index in HandAngles, and the inverse.
 inline constexpr std::array<std::size_t, kHandChannels> kAngleOfChannel = [] {
   constexpr std::array<std::size_t, 3> kOrder{2, 0, 1};  // z, x, y
   std::array<std::size_t, kHandChannels> table{};
@@ -45,22 +46,22 @@ inline constexpr std::array<std::size_t, kHandChannels> kChannelOfAngle = [] {
   return table;
 }();
 
-// "hand45 right adult"; finished, with bones, T frames and the shape's limits. Cold.
+// Named "hand45 right adult" and so on; finished, with bones, T frames and the shape's limits.
+// Cold.
 [[nodiscard]] Skeleton hand_skeleton(Side side, const HandShape& shape = default_hand_shape());
 
-// The frame in which a finger's channels turn, and the joints' offsets, mirrored for a left hand.
+// The frame in which a finger's channels turn, and the joints' offsets; mirrored for a left hand.
 [[nodiscard]] Eigen::Quaterniond channel_frame(Side side, const HandShape& shape, int finger);
 [[nodiscard]] Eigen::Vector3d mirrored(Side side, const Eigen::Vector3d& right_m) noexcept;
 
-// Which hand a skeleton is, when it is one of hand_skeleton()'s make (of any shape).
+// The side of a skeleton made by hand_skeleton() (of any shape); empty for other skeletons.
 [[nodiscard]] std::optional<Side> hand_side(const Skeleton& skeleton);
 
-// The angles that a frame of a hand skeleton carries; not finite where its source lacked one.
-// RT-safe.
+// The angles in a frame of a hand skeleton; not finite where the source had no value. RT-safe.
 [[nodiscard]] HandAngles hand_angles(const Frame& frame) noexcept;
 
-// Poses the frame of a hand skeleton: rotations, validity and angle_rad. A joint with an angle that
-// is not finite is not valid. Leaves header, label, quality and stamps alone. RT-safe.
+// Poses the frame of a hand skeleton: sets rotations, validity and angle_rad. A joint with an angle
+// that is not finite is not valid. Does not change header, label, quality or stamps. RT-safe.
 void set_hand_angles(const Skeleton& skeleton, const HandAngles& angles, Frame& frame) noexcept;
 
 }  // namespace posed

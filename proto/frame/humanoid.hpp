@@ -1,5 +1,5 @@
-// The canonical humanoid: VRM / Unity bone names, body plus fifteen finger joints a hand. In T-pose
-// every rotation is identity, the person faces +Z, the left hand points to +X.
+// The canonical humanoid: VRM / Unity bone names, a body plus fifteen finger joints per hand. In
+// T-pose every rotation is identity, the person faces +Z and the left hand points to +X.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The name of a gesture: what a label file, a play command, a model and a frame can all hold.
+// The name of a gesture, short enough for label files, play commands, models and frames.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace posed {
 
-// 1 to 15 signs of ASCII, no blank.
+// 1 to 15 ASCII characters, without blanks.
 [[nodiscard]] constexpr bool is_label_name(std::string_view name) noexcept {
   return !name.empty() && name.size() < kMaxLabel &&
          std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < '\x7F'; });

@@ -115,7 +115,7 @@ std::span<const Profile> profiles() {
     std::vector<Profile> read;
     for (const ProfileText& text : profile_texts()) {
       auto profile = parse_profile(text.toml, std::string(text.file));
-      if (!profile) {  // our own bug: the program was built with it
+      if (!profile) {  // a bug in posed: the text is built into the program
         std::fprintf(stderr, "posed: %s\n", profile.error().text().c_str());
         std::abort();
       }

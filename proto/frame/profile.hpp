@@ -1,5 +1,5 @@
-// Skeleton profiles: what the names, units and zero pose of a well-known figure mean, where the
-// names and OFFSETs alone do not say it. config/skeletons/*.toml, built into the binary.
+// Skeleton profiles: names, units and zero pose of a well-known figure, where its joint names and
+// OFFSETs alone do not define them. From config/skeletons/*.toml, built into the binary.
 #pragma once
 
 #include <map>
@@ -17,30 +17,31 @@ namespace posed {
 
 struct Profile {
   std::string name;
-  std::optional<double> metres_per_unit;  // of a file that names no unit
-  bool person = true;              // stands as high as people do, by which its unit is checked
-  std::vector<std::string> match;  // a figure with all these joints is this one,
-  std::map<std::string, std::string> along;     // if these joints' OFFSETs point so ("-y")
-  std::map<std::string, Bone> bones;            // joint name -> canonical bone
-  std::map<std::string, Eigen::Quaterniond> T;  // joint name -> T; the rule finds the others
+  std::optional<double> metres_per_unit;  // of a file that does not state its unit
+  bool person = true;              // as tall as a person, so the unit can be checked by the height
+  std::vector<std::string> match;  // the profile fits a figure with all these joints,
+  std::map<std::string, std::string> along;  // if these joints' OFFSETs point this way ("-y")
+  std::map<std::string, Bone> bones;         // joint name -> canonical bone
+  // Joint name -> T; other joints get theirs by the rule in t_pose.hpp.
+  std::map<std::string, Eigen::Quaterniond> T;
 };
 
-// All profiles, read once. They are part of the program: a mistake in one is a bug, which the unit
-// tests find. Cold.
+// All profiles, read once. They are built into the program; a mistake in one is a bug, which the
+// unit tests find. Cold.
 [[nodiscard]] std::span<const Profile> profiles();
 
-// `text` is TOML; `name` stands in the errors. Cold.
+// `text` is TOML; `name` is used in error messages. Cold.
 [[nodiscard]] Result<Profile> parse_profile(std::string_view text, const std::string& name);
 
-// The profile called `name`; with an empty name the first that matches the skeleton, or null. An
-// unknown name is an error that lists the known ones. Cold.
+// Returns the profile called `name`; with an empty name, the first that matches the skeleton, or
+// null. An unknown name is an error that lists the known ones. Cold.
 [[nodiscard]] Result<const Profile*> find_profile(const Skeleton& skeleton,
                                                   const std::string& name);
 
-// Sets the bones as the profile says. An error names its joints that are missing. Cold.
+// Sets the bones as the profile defines them. An error names the joints that are missing. Cold.
 [[nodiscard]] Result<> name_bones(const Profile& profile, Skeleton& skeleton);
 
-// The T frames that the profile gives, for set_t_frames(). Cold.
+// The T frames that the profile defines, for set_t_frames(). Cold.
 [[nodiscard]] KnownT known_t(const Profile& profile, const Skeleton& skeleton);
 
 }  // namespace posed

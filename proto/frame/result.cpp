@@ -5,7 +5,7 @@
 namespace posed {
 namespace {
 
-constexpr std::size_t kMaxPathBytes = 4096;  // of a path in Linux
+constexpr std::size_t kMaxPathBytes = 4096;  // longest path in Linux
 
 }  // namespace
 

@@ -1,6 +1,5 @@
-// Result<T>: how cold code reports failure. A failure is one sentence that tells the user what to
-// do, with the place in the file where there is one. Hot code never uses it (see Outcome in
-// sink.hpp).
+// Result<T>: how cold code reports failure. A failure is one sentence that states what to do, with
+// the file and line if there is one. Hot code never uses it (see Outcome in sink.hpp).
 #pragma once
 
 #include <expected>
@@ -13,12 +12,12 @@ namespace posed {
 enum class ExitCode : int { kDone = 0, kFailed = 1, kWrongUse = 2 };
 
 struct Error {
-  std::string message;  // one sentence, no trailing newline, says what to do
-  std::string file;     // empty when no file is to add_error
-  int line = 0;         // 1-based; 0 when the place is not a line
+  std::string message;  // one sentence that states what to do; no trailing newline
+  std::string file;     // empty when the error concerns no file
+  int line = 0;         // 1-based; 0 when the error concerns no line
   ExitCode exit_code = ExitCode::kFailed;
 
-  // "file:line: message", leaving out what is not known.
+  // "file:line: message", without the parts that are not known.
   [[nodiscard]] std::string text() const;
 };
 

@@ -1,6 +1,6 @@
-// Rotations, the few forms that posed needs of them: Frame's plain quaternions to Eigen and back,
-// rotation vectors, swing and twist, elementary and minimal rotations.
-// Everything here is a pure function, RT-safe, in float or double as its argument is.
+// The rotation functions that posed needs: conversion between Frame's plain quaternions and Eigen,
+// rotation vectors, swing and twist, rotations about one axis and minimal rotations. All are pure
+// functions, RT-safe, in float or double according to their argument.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ enum class Axis : std::uint8_t { kX, kY, kZ };
   return {q[3], q[0], q[1], q[2]};
 }
 
-// The same in double, made unit length again: a float quaternion is short of it by up to 1e-7.
+// The same in double, normalised: a float quaternion's length is off by up to 1e-7.
 [[nodiscard]] inline Eigen::Quaterniond to_eigen_double(const Quatf& q) noexcept {
   return to_eigen(q).cast<double>().normalized();
 }
@@ -37,26 +37,26 @@ template <typename T>
   const T sign = q.w() < T(0) ? T(-1) : T(1);
   const Eigen::Matrix<T, 3, 1> v = q.vec() * sign;
   const T sine = v.norm();
-  if (sine < T(1e-6)) return v * T(2);  // angle / sin(angle / 2) is 2 to the last bit down here
+  if (sine < T(1e-6)) return v * T(2);  // angle / sin(angle / 2) rounds to 2 here
   return v * (T(2) * std::atan2(sine, q.w() * sign) / sine);
 }
 
 template <typename T>
 [[nodiscard]] Eigen::Quaternion<T> rotation_exp(const Eigen::Matrix<T, 3, 1>& v) noexcept {
   const T angle = v.norm();
-  // sin(angle / 2) / angle; the series is exact to the last bit for the small angles it serves
+  // sin(angle / 2) / angle; the series is exact to rounding for these small angles
   const T scale = angle < T(1e-3) ? T(0.5) - angle * angle / T(48) : std::sin(angle / T(2)) / angle;
   return {std::cos(angle / T(2)), v.x() * scale, v.y() * scale, v.z() * scale};
 }
 
 template <typename T>
 struct SwingTwist {
-  Eigen::Quaternion<T> swing;  // turns `axis` the shortest way
-  Eigen::Quaternion<T> twist;  // turns about `axis`
+  Eigen::Quaternion<T> swing;  // rotates `axis` along the shortest arc
+  Eigen::Quaternion<T> twist;  // rotates about `axis`
 };
 
-// q = swing * twist about the unit vector `axis`. A half turn that leaves the twist undetermined
-// has identity for twist.
+// q = swing * twist about the unit vector `axis`. For a half turn, which leaves the twist
+// undetermined, the twist is identity.
 template <typename T>
 [[nodiscard]] SwingTwist<T> swing_twist(const Eigen::Quaternion<T>& q,
                                         const Eigen::Matrix<T, 3, 1>& axis) noexcept {
@@ -83,24 +83,25 @@ template <typename T>
   return Eigen::Vector3d::Unit(static_cast<int>(axis));
 }
 
-// Turn about one axis. A product of them in listed order has its first factor outermost.
+// Rotation about one axis. In a product of them in listed order, the first factor is outermost.
 [[nodiscard]] inline Eigen::Quaterniond axis_rotation(Axis axis, double angle_rad) noexcept {
   const Eigen::Vector3d v = unit(axis) * std::sin(angle_rad / 2);
   return {std::cos(angle_rad / 2), v.x(), v.y(), v.z()};
 }
 
-// The smallest rotation that turns `from` onto `to`; identity when either has no length.
+// The smallest rotation that turns `from` onto `to`; identity when either has zero length.
 [[nodiscard]] Eigen::Quaterniond minimal_rotation(const Eigen::Vector3d& from,
                                                   const Eigen::Vector3d& to) noexcept;
 
-// Angle between two rotations [rad], 0 to pi; accurate for small angles, unlike acos of the dot.
+// Angle between two rotations [rad], 0 to pi; accurate for small angles, unlike acos of the dot
+// product.
 [[nodiscard]] inline double angle_between_rad(const Eigen::Quaterniond& a,
                                               const Eigen::Quaterniond& b) noexcept {
   const Eigen::Quaterniond d = a.conjugate() * b;
   return 2.0 * std::atan2(d.vec().norm(), std::abs(d.w()));
 }
 
-// `angle_rad` moved by whole turns to within half a turn of `near_rad`.
+// `angle_rad` shifted by whole turns to within half a turn of `near_rad`.
 [[nodiscard]] inline double unwrap_near(double angle_rad, double near_rad) noexcept {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   return angle_rad - kTurn * std::round((angle_rad - near_rad) / kTurn);

@@ -1,4 +1,4 @@
-// Sink: where a decoder puts what it made of the bytes, and the named outcomes of decoding.
+// Sink: receives what a decoder makes of the bytes; Outcome: the possible results of decoding.
 #pragma once
 
 #include <cstdint>
@@ -7,12 +7,13 @@
 
 namespace posed {
 
-// What became of a piece of input. Each is counted per stream and published in `stats`.
+// The result of decoding a piece of input. Each is counted per stream and published in `stats`.
 enum class Outcome : std::uint8_t { kOk, kShort, kBadChecksum, kOutOfRange, kForeign, kCount };
 inline constexpr int kOutcomes = static_cast<int>(Outcome::kCount);
 
 // All calls are RT-safe and come from the one thread that feeds the decoder. The decoder fills what
-// it knows (pose, device_ns, quality); the owner of the sink stamps stream, sequence and arrival.
+// it knows (pose, device_ns, quality); the owner of the sink sets stream, sequence and arrival
+// time.
 class Sink {
  public:
   Sink() = default;

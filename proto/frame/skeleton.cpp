@@ -13,8 +13,8 @@
 namespace posed {
 namespace {
 
-// Content of a skeleton as bytes. Lengths and rotations are rounded to 1e-6, so that two machines
-// whose maths libraries differ in the last bit name the same skeleton alike.
+// The content of a skeleton as bytes, for its id. Lengths and rotations are rounded to 1e-6, so
+// that two machines whose maths libraries differ in the last bit compute the same id.
 class Content {
  public:
   void add(std::string_view text) { bytes_.append(text).push_back('\0'); }
@@ -37,7 +37,7 @@ class Content {
   std::string bytes_;
 };
 
-// The joint has position channels.
+// True when the joint has position channels.
 bool moves(const Skeleton& skeleton, int joint) {
   return std::ranges::any_of(skeleton.channels, [joint](const Channel& channel) {
     return channel.joint == joint && channel.translation;
@@ -51,7 +51,7 @@ std::uint32_t content_id(const Skeleton& skeleton) {
     const Joint& joint = skeleton.joints[j];
     content.add(joint.name);
     content.add(joint.parent);
-    // Where a take began is written into the OFFSET of its root: no part of the figure.
+    // Files write a take's start position into the OFFSET of the root: not part of the figure.
     const bool says_where = j <= skeleton.root_joint && moves(skeleton, j);
     for (int i = 0; i < 3 && !says_where; ++i) content.add(joint.offset_m[i]);
     content.add(joint.bone ? bone_name(*joint.bone) : std::string_view());
@@ -95,7 +95,7 @@ Result<> check_joints(const Skeleton& skeleton) {
 Result<> check_channels(const Skeleton& skeleton) {
   int rotations = 0;
   int before = 0;
-  unsigned seen = 0;  // bit axis, + 3 for a translation
+  unsigned seen = 0;  // bit: axis, + 3 for a translation
   for (const Channel& channel : skeleton.channels) {
     if (channel.joint >= skeleton.joints.size() || channel.joint < before) {
       return fail("the skeleton's channels do not follow the order of its joints");
@@ -125,29 +125,29 @@ std::span<const Channel> channels_of(const Skeleton& skeleton, int joint) noexce
   return {range.begin(), range.end()};
 }
 
-// q * v as Eigen has it, bit for bit, without its call: a sixth of what a glove's packet costs.
-// RT-safe.
+// q * v, bit for bit as Eigen computes it, but inlined: Eigen's call would take a sixth of the time
+// of a glove's packet. RT-safe.
 Eigen::Vector3d turned(const Eigen::Quaterniond& q, const Eigen::Vector3d& v) noexcept {
   const Eigen::Vector3d axis = q.vec();
   const Eigen::Vector3d across = 2.0 * axis.cross(v);
   return v + q.w() * across + axis.cross(across);
 }
 
-// L = C M C^-1 with M the product in listed order, first outermost. Not finite when a channel is
-// not. RT-safe.
+// L = C M C^-1, where M is the product in listed order, first outermost. Not finite when a channel
+// is not finite. RT-safe.
 Eigen::Quaterniond local_rotation(const Joint& joint, std::span<const Channel> channels,
                                   const double* values) noexcept {
   Eigen::Quaterniond m = Eigen::Quaterniond::Identity();
   bool any = false;
   for (std::size_t i = 0; i < channels.size(); ++i) {
-    // Most channels of a glove's hand stand at zero and turn nothing; to leave them out halves the
-    // time that its packets take.
+    // Most channels of a glove's hand are zero and rotate nothing; skipping them halves the time
+    // per packet.
     if (channels[i].translation || values[i] == 0.0) continue;
     const Eigen::Quaterniond turn = axis_rotation(channels[i].axis, values[i]);
     m = any ? m * turn : turn;
     any = true;
   }
-  // C M C^-1 turns M's axis by C and leaves its angle alone.
+  // C M C^-1 rotates M's axis by C and keeps its angle.
   if (any) m.vec() = turned(joint.channel_frame, m.vec());
   return m;
 }
@@ -162,8 +162,8 @@ Eigen::Vector3d local_position(const Joint& joint, std::span<const Channel> chan
   return position;
 }
 
-// The closest product of turns about axes a, b to q: dot(q, qa(x) qb(y)) is bilinear in the half
-// angles' (cos, sin), so the optimum is the top singular pair of a 2 x 2 matrix.
+// The product of rotations about axes a and b that is closest to q: dot(q, qa(x) qb(y)) is bilinear
+// in the (cos, sin) of the half angles, so the optimum is the top singular pair of a 2 x 2 matrix.
 std::array<double, 3> two_axes(const Eigen::Quaterniond& q, int a, int b) {
   const double cyclic = (b - a + 3) % 3 == 1 ? 1.0 : -1.0;
   const int c = 3 - a - b;
@@ -186,8 +186,8 @@ std::array<double, 3> unwrap_near(std::array<double, 3> angles, const std::array
   return angles;
 }
 
-// R = Ri(x) Rj(y) Rk(z) for three different axes. Of the two solutions the one nearest to `near`;
-// at gimbal lock x keeps its value from `near`.
+// Solves R = Ri(x) Rj(y) Rk(z) for three different axes. Of the two solutions it returns the one
+// nearest to `near`; at gimbal lock x keeps its value from `near`.
 std::array<double, 3> three_axes(const Eigen::Quaterniond& q, int i, int j, int k,
                                  const std::array<double, 3>& near) {
   const Eigen::Matrix3d r = q.toRotationMatrix();

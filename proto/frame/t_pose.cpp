@@ -32,7 +32,7 @@ Part part_of(Bone bone) {
   }
 }
 
-// Where the bone points in T.
+// The direction of the bone in T-pose.
 Eigen::Vector3d t_direction(Bone bone) {
   switch (part_of(bone)) {
     case Part::kTrunk:
@@ -50,7 +50,7 @@ Eigen::Vector3d t_direction(Bone bone) {
                                              : Eigen::Vector3d(-Eigen::Vector3d::UnitX());
 }
 
-// From `joint` to the nearest thing below it that lies anywhere else: a child or the end site.
+// From `joint` to the nearest descendant at another position: a joint or the end site.
 Eigen::Vector3d to_next(const Skeleton& skeleton, int joint) {
   for (int child = joint + 1; child < std::ssize(skeleton.joints); ++child) {
     if (skeleton.joints[child].parent != joint) continue;
@@ -70,11 +70,11 @@ Eigen::Vector3d to_bone(const Skeleton& skeleton, int joint, Bone bone) {
   return at == joint ? direction : Eigen::Vector3d::Zero();
 }
 
-// From the bone to the one its limb goes on with, in the zero pose and the joint's frame; zero when
-// nothing says it. A trunk bone looks up the trunk, past bones that a format dropped.
+// From the bone to the next one of its limb, in the zero pose and in the joint's frame; zero when
+// it is unknown. For a trunk bone the next one up the trunk, skipping bones that a format omits.
 Eigen::Vector3d rest_direction(const Skeleton& skeleton, int joint) {
   const Bone bone = *skeleton.joints[joint].bone;
-  // Shoulders, arms, legs and fingers stand in the enum one after the other, and so does the trunk.
+  // Consecutive bones of the shoulders, arms, legs, fingers and trunk are consecutive in the enum.
   const auto after = [](Bone b) { return static_cast<Bone>(static_cast<int>(b) + 1); };
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   if (part_of(bone) == Part::kTrunk) {
@@ -93,8 +93,9 @@ Eigen::Vector3d rest_direction(const Skeleton& skeleton, int joint) {
   return direction.norm() > kShort_m ? direction : to_next(skeleton, joint);
 }
 
-// The bone goes on as its parent does, so that its parent's T can be its own: the turn of a forearm
-// or hand about its length differs between people's walks, that of the upper arm less.
+// True when the bone continues its parent straight on, so that it can take its parent's T. The
+// twist of a forearm or hand about its length differs between people's walks; that of the upper arm
+// differs less.
 bool follows_parent(Bone bone) {
   switch (bone) {
     case Bone::kLeftLowerArm:
@@ -111,7 +112,7 @@ double angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-// The rotation of axes to axes that is nearest.
+// The nearest rotation that maps axes to axes.
 Eigen::Quaterniond snapped(const Eigen::Quaterniond& q) {
   constexpr std::array<std::array<int, 3>, 6> kOrders{
       {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};

@@ -1,5 +1,5 @@
-// Time in posed: signed nanoseconds. Host times are CLOCK_MONOTONIC; device times count from an
-// origin of the device's own. Nothing below daemon/ reads a clock: time is always handed in.
+// Time in posed: signed nanoseconds. Host times are CLOCK_MONOTONIC; device times count from the
+// device's own origin. Nothing below daemon/ reads a clock: the caller passes the time in.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ inline constexpr std::int64_t kNanosPerSecond = 1'000'000'000;
   return static_cast<std::int64_t>(duration_s * 1e9 + (duration_s < 0 ? -0.5 : 0.5));
 }
 
-// A clock is a plain function, so tests and replay can hand in their own.
+// A clock is a plain function, so that tests and replay can supply their own.
 using Clock = std::int64_t (*)() noexcept;
 
 // host_ns = device_ns + offset_ns + drift_ppm * 1e-6 * (device_ns - origin_ns)

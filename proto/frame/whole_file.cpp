@@ -11,7 +11,7 @@
 namespace posed {
 namespace {
 
-// Signals that end the process, held back in this thread: they come right after.
+// Blocks the signals that end the process in this thread; they are delivered afterwards.
 class HeldSignals {
  public:
   HeldSignals() {

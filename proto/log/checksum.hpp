@@ -1,6 +1,7 @@
-// Checksum of a log's row: zlib's CRC-32 over its columns in their order, the crc itself left out.
-// An integer goes in as 8 little-endian bytes; a text or blob as its length, in 8 little-endian
-// bytes, and its own bytes. Any tool can so compute it from what SQLite shows.
+// Checksum of a row in a log: zlib's CRC-32 over its columns in order, without the crc column
+// itself. An integer counts as 8 little-endian bytes; a text or blob as its length, in 8
+// little-endian bytes, followed by its bytes. Any tool can therefore compute it from what SQLite
+// shows.
 #pragma once
 
 #include <array>
@@ -24,13 +25,13 @@ class Checksum {
 
   void add(std::span<const std::byte> bytes) {
     add(static_cast<std::int64_t>(bytes.size()));
-    // zlib takes a null pointer for the wish to begin anew.
+    // zlib takes a null pointer as a request to start anew.
     if (!bytes.empty()) {
       crc_ = crc32_z(crc_, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
     }
   }
 
-  // 0 to 2^32 - 1, as the column `crc` holds it.
+  // 0 to 2^32 - 1, as stored in the column `crc`.
   [[nodiscard]] std::int64_t value() const { return static_cast<std::int64_t>(crc_); }
 
  private:

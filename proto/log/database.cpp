@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMaxValue = 256 * 1024 * 1024;  // bytes; a log's largest value is a model file
 
-// One sentence for what SQLite refused, telling what to do where we know it.
+// Turns an SQLite failure into one sentence, with advice where there is some.
 std::unexpected<Error> failure(sqlite3* handle, const std::string& file) {
   const int code = handle == nullptr ? SQLITE_NOMEM : sqlite3_errcode(handle);
   const int place = handle == nullptr ? 0 : sqlite3_system_errno(handle);
@@ -126,7 +126,7 @@ bool Statement::checksum_matches() const {
         checksum.add(bytes(column));
         break;
       default:
-        return false;  // no column of a log is a real number or nothing
+        return false;  // the columns of a log are never real numbers or NULL
     }
   }
   return checksum.value() == integer(last);
@@ -143,7 +143,7 @@ Result<Database> Database::open(const std::filesystem::path& path, Mode mode) {
   Database database(handle, path.string());
   if (code != SQLITE_OK) return failure(handle, path.string());
   sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxValue);
-  // A log may come from a stranger: nothing in its schema gets to run.
+  // A log may come from an untrusted source: nothing in its schema may run.
   sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
@@ -181,7 +181,7 @@ void Database::set_patience_ms(int patience_ms) {
 }
 
 void Database::rollback() {
-  // Fails when SQLite has already rolled back by itself, which is just as well.
+  // Fails when SQLite has already rolled back by itself, which has the same effect.
   if (sqlite3_get_autocommit(handle_.get()) == 0) {
     sqlite3_exec(handle_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
   }

@@ -1,4 +1,4 @@
-// SQLite behind Result: what the log's writer and reader share. One thread; cold.
+// Wraps SQLite for the log's writer and reader, with Result for errors. One thread; cold.
 #pragma once
 
 #include <cstddef>
@@ -17,32 +17,32 @@ struct sqlite3_stmt;
 
 namespace posed::log {
 
-// A prepared statement; must not outlive its Database. Bound text and bytes are not copied: they
-// must live until the next reset().
+// A prepared statement; must not outlive its Database. Bound text and bytes are not copied and must
+// stay valid until the next reset().
 class Statement {
  public:
   Statement(sqlite3_stmt* statement, std::string file);
 
-  // Binds the next parameter, from the first after each reset().
+  // Binds the next parameter; the first one after each reset().
   Statement& bind(std::int64_t value);
   Statement& bind(std::string_view text);
   Statement& bind(std::span<const std::byte> bytes);
-  // The checksum of what was bound since the last reset().
+  // Binds the checksum of all parameters bound since the last reset().
   Statement& bind_checksum();
 
-  // True: a row stands ready. False: done, and so for every call until reset().
+  // True: a row is available. False: there are no more rows, until reset().
   [[nodiscard]] Result<bool> step();
-  // For statements without rows: step, then reset.
+  // For statements without rows: runs step(), then reset().
   [[nodiscard]] Result<> execute();
   void reset();
 
-  // Columns of the row that stands ready; views are valid until the next step() or reset().
+  // Columns of the current row; views are valid until the next step() or reset().
   [[nodiscard]] std::int64_t integer(int column) const;
   [[nodiscard]] double real(int column) const;
   [[nodiscard]] std::string_view text(int column) const;
   [[nodiscard]] std::span<const std::byte> bytes(int column) const;
-  // Whether the row's last column is the checksum of all before it. Call it before the columns are
-  // read: SQLite converts them in place to what is asked for.
+  // True when the row's last column is the checksum of all columns before it. Call it before
+  // reading the columns: SQLite converts them in place to the requested type.
   [[nodiscard]] bool checksum_matches() const;
 
  private:
@@ -61,16 +61,16 @@ class Database {
   enum class Mode : std::uint8_t { kCreate, kReadWrite, kRead };
   [[nodiscard]] static Result<Database> open(const std::filesystem::path& path, Mode mode);
 
-  // Any number of statements without parameters; their rows are thrown away.
+  // Runs any number of statements without parameters and discards their rows.
   [[nodiscard]] Result<> run(const char* sql);
   [[nodiscard]] Result<Statement> prepare(std::string_view sql);
-  // The first column of the first row of `sql`, as SQLite prints it.
+  // Returns the first column of the first row of `sql`, as SQLite prints it.
   [[nodiscard]] Result<std::string> value(std::string_view sql);
 
   [[nodiscard]] std::int64_t last_insert_id() const;
-  // How long to wait for another process that holds the file.
+  // Sets how long to wait for another process that holds the file.
   void set_patience_ms(int patience_ms);
-  // Undoes what was written since the last commit; fine when there is nothing.
+  // Discards everything written since the last commit; harmless when there is nothing.
   void rollback();
 
  private:

@@ -12,7 +12,7 @@ std::string sha256_hex(std::span<const std::byte> bytes) {
                      bytes.size());
   std::string hex(2 * digest.size() + 1, '\0');
   sodium_bin2hex(hex.data(), hex.size(), digest.data(), digest.size());
-  hex.pop_back();  // libsodium's closing zero
+  hex.pop_back();  // removes libsodium's closing zero
   return hex;
 }
 

@@ -1,4 +1,4 @@
-// The name under which a log keeps a file's bytes: their SHA-256 in lower-case hex.
+// The key under which a log stores a file's bytes: their SHA-256 in lower-case hex.
 #pragma once
 
 #include <cstddef>

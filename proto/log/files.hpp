@@ -1,5 +1,5 @@
-// The files of a device log: what stands behind its name. SQLite keeps the rest beside it while the
-// log is open, or after a crash.
+// The files that make up a device log. SQLite keeps further files beside the log while it is open,
+// or after a crash.
 #pragma once
 
 #include <array>

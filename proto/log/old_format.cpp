@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// The kinds of the old decision table.
+// The values of the column `kind` in the old decision table.
 enum class Kind : std::int64_t {
   kAlpha = 1,
   kModel = 2,
@@ -27,7 +27,7 @@ enum class Kind : std::int64_t {
   kStopPlaying = 7
 };
 
-// A number that a column of one byte cannot hold is none that a row may have.
+// A number that does not fit a one-byte column becomes a value that no valid row has.
 std::uint8_t byte_of(std::int64_t stored) {
   constexpr std::int64_t kMost = std::numeric_limits<std::uint8_t>::max();
   return static_cast<std::uint8_t>(stored < 0 ? kMost : std::min(stored, kMost));
@@ -35,7 +35,7 @@ std::uint8_t byte_of(std::int64_t stored) {
 
 std::uint64_t unsigned_of(std::int64_t stored) { return static_cast<std::uint64_t>(stored); }
 
-// An old stream had its stages as members of its settings, and the style's model in a column.
+// In the old formats the stages were members of a stream's settings and the style model a column.
 ordered_json stages_of(const ordered_json& old, const std::string& style_model) {
   ordered_json stages = ordered_json::array();
   const std::string name = old.value("model_name", "");
@@ -74,7 +74,7 @@ Result<std::string> stages_json(const std::string& config, const std::string& st
   }
 }
 
-// "0 4 1" is labels 0, 4 and 1; of what is no label nothing is left, which no play order is.
+// "0 4 1" means labels 0, 4 and 1. An invalid word empties the list; no valid play order is empty.
 void read_labels(std::string_view text, v1::DecisionValue::PlayOrder& order) {
   while (!text.empty()) {
     std::uint16_t label = 0;
@@ -131,7 +131,7 @@ Result<Statement> select_decisions(Database& database) {
   const auto labels =
       database.value("SELECT count(*) FROM pragma_table_info('decision') WHERE name='labels'");
   if (!labels) return std::unexpected(labels.error());
-  // Nothing could be played when format 1 was written.
+  // Format 1 had no play command, so its rows have no labels.
   return database.prepare("SELECT id, stream, kind, sequence, count, now_ns, alpha, model_hash, " +
                           std::string(*labels == "1" ? "labels" : "''") +
                           " FROM decision ORDER BY id");

@@ -1,5 +1,5 @@
-// The column `sequences` of a chunk: of each stream of its source {u32 stream id, u64 number of its
-// next frame, u64 number of its next sample}, little-endian, one after the other.
+// The column `sequences` of a chunk: for each stream of its source {u32 stream id, u64 number of
+// its next frame, u64 number of its next sample}, little-endian, one after the other.
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,9 @@
 
 namespace posed::log {
 
-// Both replace what `out` held; it is handed in so that its memory is used again.
+// Both replace the content of `out`; the caller passes it in so that its memory is reused.
 void pack_places(std::span<const StreamPlace> places, std::vector<std::byte>& out);
-// False: the bytes are no whole number of places.
+// Returns false when the bytes are not a whole number of entries.
 [[nodiscard]] bool unpack_places(std::span<const std::byte> bytes, std::vector<StreamPlace>& out);
 
 }  // namespace posed::log

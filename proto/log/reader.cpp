@@ -16,7 +16,7 @@ constexpr int kPatience_ms = 2000;
 
 std::uint64_t unsigned_of(std::int64_t stored) { return static_cast<std::uint64_t>(stored); }
 
-// The format of a log that we know how to read, before anything in it is touched.
+// Checks the format of the log before reading anything else in it.
 Result<int> check_marks(Database& database, const std::string& file) {
   const auto application = database.value("PRAGMA application_id");
   if (!application) return std::unexpected(application.error());
@@ -35,8 +35,8 @@ Result<int> check_marks(Database& database, const std::string& file) {
   return format;
 }
 
-// After a crash the -wal belongs to the log. Folding it in fails while another process has the log
-// open or the file may only be read; reading works all the same.
+// After a crash the -wal file is part of the log; this merges it into the main file. That fails
+// when another process has the log open or the file is read-only; reading works all the same.
 void fold_in_wal(Database& database) {
   const auto folded = database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;");
   static_cast<void>(folded);
@@ -51,7 +51,7 @@ Result<> check_whole(Database& database, const std::string& file) {
   if (!page) return std::unexpected(page.error());
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
-  // SQLite itself reads a cut last page as if it ended in zeros.
+  // SQLite itself reads a truncated last page as if it ended in zeros.
   if (error || size % std::stoul(*page) != 0) return damaged("cut short");
   const auto verdict = database.value("PRAGMA quick_check(1)");
   if (!verdict) return std::unexpected(verdict.error());
@@ -71,7 +71,7 @@ Result<std::map<std::string, std::string>> read_meta(Database& database) {
   }
 }
 
-// The next row of a table whose first column is its id and whose last is its checksum.
+// Steps to the next row of a table whose first column is its id and whose last is its checksum.
 Result<bool> step_checked(Statement& select, const char* table, const std::string& file) {
   auto row = select.step();
   if (!row || !*row || select.checksum_matches()) return row;
@@ -131,15 +131,15 @@ struct Reader::State {
   std::vector<SourceRow> sources;
   std::vector<StreamRow> streams;
   std::optional<Statement> chunks;
-  std::vector<StreamPlace> places;  // of the last chunk
+  std::vector<StreamPlace> places;  // from the last chunk
 
-  // Rows of the old formats carry no checksum.
+  // Rows of the old formats have no checksum, so it is not checked for them.
   Result<bool> step(Statement& select, const char* table) const {
     return old ? select.step() : step_checked(select, table, file);
   }
 
   Result<> read_described();
-  // A row may name only what the log describes.
+  // Fails when a row names a source or stream that the log does not describe.
   Result<> check_owner(std::int64_t id, const char* table, std::int64_t row, bool is_source) const;
   Result<> check_stream(std::uint32_t id, const char* table, std::int64_t row) const {
     return check_owner(id, table, row, false);

@@ -1,5 +1,5 @@
-// Reader of a device log: what the writer wrote, in order, from a file that may be damaged, cut
-// short or foreign. One thread; cold.
+// Reader of a device log: returns the rows in order, from a file that may be damaged, cut short or
+// not a log at all. One thread; cold.
 #pragma once
 
 #include <cstddef>
@@ -24,11 +24,11 @@ class Database;
 
 class Reader {
  public:
-  // Opens, folds in the -wal that a crash left, and checks the whole file. A file that is no log,
-  // of a newer posed, or damaged is refused with one sentence. A log that is being recorded may be
-  // read as far as it is committed. Logs of formats 1 and 2 look as if they were of format 3. Each
-  // row's checksum is looked at when the row is read; the error of one that does not match names
-  // log, table and row.
+  // Opens the log, merges the -wal file that a crash left, and checks the whole file. A file that
+  // is not a log, is from a newer posed, or is damaged is an error. A log that is still being
+  // recorded can be read up to its last commit. Logs of formats 1 and 2 are presented as format 3.
+  // Each row's checksum is verified when the row is read; the error for a mismatch names log, table
+  // and row.
   [[nodiscard]] static Result<Reader> open(const std::filesystem::path& path);
 
   Reader(Reader&&) noexcept;
@@ -40,26 +40,26 @@ class Reader {
   [[nodiscard]] const std::vector<SourceRow>& sources() const;  // by id
   [[nodiscard]] const std::vector<StreamRow>& streams() const;  // by id
   [[nodiscard]] const SourceRow& source_of(const StreamRow& stream) const;
-  // Where a stream stands in streams(); nothing when the log does not describe it.
+  // Index of a stream in streams(); empty when the log does not describe it.
   [[nodiscard]] std::optional<std::size_t> place_of_stream(std::uint32_t id) const;
-  // Whether items are counted: false for formats 1 and 2.
+  // True when items are counted; false for formats 1 and 2.
   [[nodiscard]] bool counts_items() const;
 
-  // The bytes kept under a hash; an error when there are none or they do not match it.
+  // The bytes stored under a hash; an error when they are missing or do not match it.
   [[nodiscard]] Result<std::vector<std::byte>> blob(std::string_view sha256) const;
 
-  // The next chunk of all sources in log order; nothing after the last. Its bytes and places are
+  // The next chunk of all sources in log order; empty after the last. Its bytes and places are
   // valid until the next call.
   [[nodiscard]] Result<std::optional<ChunkRow>> next_chunk();
 
-  // How much there is to go through: when the first and the last chunk came that a device sent.
-  // Nothing when none was logged. Cheap.
+  // Arrival times of the first and the last chunk from a device, which bound the length of the log.
+  // Empty when none was logged. Cheap.
   struct Extent {
     std::int64_t first_ns = 0, last_ns = 0;
   };
   [[nodiscard]] Result<std::optional<Extent>> extent() const;
 
-  // Of all streams, in log order.
+  // Decisions of all streams, in log order.
   [[nodiscard]] Result<std::vector<DecisionRow>> decisions() const;
   [[nodiscard]] Result<std::vector<GapRow>> gaps() const;
   [[nodiscard]] Result<std::vector<TakeRow>> takes() const;
@@ -71,7 +71,7 @@ class Reader {
     Frames(Frames&&) noexcept;
     Frames& operator=(Frames&&) noexcept;
     ~Frames();
-    // Nothing after the last; the bytes are valid until the next call.
+    // Empty after the last; the bytes are valid until the next call.
     [[nodiscard]] Result<std::optional<FrameRow>> next();
 
    private:

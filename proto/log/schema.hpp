@@ -1,4 +1,5 @@
-// The tables of a device log (drawn in proto/README.md) and how a file says that it is one.
+// The tables of a device log (drawn in proto/README.md) and the marks that identify the file as
+// one.
 #pragma once
 
 #include <cstdint>
@@ -6,10 +7,10 @@
 namespace posed::log {
 
 inline constexpr std::int32_t kApplicationId = 0x504F5345;  // "POSE" in the SQLite header
-inline constexpr std::int32_t kFormatVersion = 3;           // user_version; grows with the tables
-inline constexpr std::int32_t kLastOldVersion = 2;          // read through old_format.hpp
+inline constexpr std::int32_t kFormatVersion = 3;  // user_version; increases when the tables change
+inline constexpr std::int32_t kLastOldVersion = 2;  // read through old_format.hpp
 
-// STRICT: a value of the wrong type cannot get in, so a reader need not ask each row.
+// STRICT: SQLite rejects values of the wrong type, so a reader need not check each row.
 inline constexpr const char* kSchema = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE source(id INTEGER PRIMARY KEY, name TEXT NOT NULL, driver TEXT NOT NULL,

@@ -13,9 +13,9 @@
 namespace posed::log {
 namespace {
 
-constexpr int kPatience_ms = 2000;  // a reader folding the -wal in is quicker than that
+constexpr int kPatience_ms = 2000;  // merging the -wal takes a reader less time than this
 
-// The tables whose ids the writer gives, in the order of rows.
+// The tables whose ids the writer assigns, in the order of the row types.
 enum Table : std::size_t { kChunk, kDecision, kFrame, kGap, kNumbered };
 constexpr std::array<const char*, kNumbered> kNames{"chunk", "decision", "frame", "gap"};
 
@@ -33,7 +33,7 @@ constexpr std::array<std::string_view, kSqlCount> kSql{
     "COMMIT",
 };
 
-// SQLite knows signed integers only; sequences keep their bits.
+// SQLite has only signed integers; the bits of a sequence number are kept.
 std::int64_t stored(std::uint64_t value) { return static_cast<std::int64_t>(value); }
 
 Result<> make_room_for(const std::filesystem::path& path, bool overwrite) {
@@ -57,7 +57,7 @@ Result<> write_meta(Database& database, const std::map<std::string, std::string>
   return {};
 }
 
-// Tables, marks and meta in one transaction: a log is there whole or not at all.
+// Writes tables, marks and meta in one transaction, so that a log exists complete or not at all.
 Result<> write_birth(Database& database, const std::map<std::string, std::string>& meta) {
   const std::string tables = "BEGIN;" + std::string(kSchema) +
                              "PRAGMA application_id=" + std::to_string(kApplicationId) +
@@ -82,12 +82,12 @@ struct Writer::State {
   bool in_transaction = false;
   Ids last_id{};
   Ids committed_id{};
-  std::vector<std::byte> sequences;  // of the chunk that is being written
+  std::vector<std::byte> sequences;  // of the chunk being written
 
-  // A statement with the id of the next row of its table bound.
+  // Returns the table's statement with the id of the next row bound.
   Statement& numbered(Table table) { return statements[table].bind(last_id[table] + 1); }
 
-  // Runs a bound statement in the transaction, which the first row opens.
+  // Runs a bound statement; the first row opens a transaction.
   Result<> insert(Statement& bound) {
     if (!in_transaction) {
       if (auto begun = statements[kBegin].execute(); !begun) {

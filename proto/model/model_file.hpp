@@ -1,7 +1,7 @@
 // The envelope of a model file: 8 bytes POSEDMDL, u32 version, u64 payload length, u32 CRC-32
 // (zlib's) of the payload, all little-endian, then posed.v1.ModelFile (drawn in proto/README.md).
-// Nothing of the bytes is believed before it is checked; what lies inside is checked by the model's
-// own room. Cold.
+// The bytes are untrusted: this checks the envelope, and the module of each model checks its
+// content. Cold.
 #pragma once
 
 #include <cstddef>
@@ -14,19 +14,19 @@
 
 namespace posed::model_file {
 
-// The payload of a whole model file. `name` is only for error messages. Whatever the bytes are: an
-// Error, never a crash.
+// Returns the payload of a whole model file. `name` is used in error messages only. Invalid bytes
+// of any kind give an Error, never a crash.
 [[nodiscard]] Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& name);
 
-// The whole file that holds `file`; the writer's version is filled in. The same model gives the
+// Returns the whole file that contains `file`; fills in posed's version. The same model gives the
 // same bytes.
 [[nodiscard]] std::string seal(v1::ModelFile file);
 
-// The largest model that is read, far above what `posed train` writes.
+// The largest model file that is read; far larger than any that `posed train` writes.
 inline constexpr std::size_t kMaxModelFile = std::size_t{256} * 1024 * 1024;  // bytes
 
-// A model file's bytes from and to the disk. Written whole or not at all; only a regular file of at
-// most kMaxModelFile is read.
+// Read and write the bytes of a model file. A file is written completely or not at all; only a
+// regular file of at most kMaxModelFile is read.
 [[nodiscard]] Result<std::string> load(const std::filesystem::path& path);
 [[nodiscard]] Result<> save(const std::string& bytes, const std::filesystem::path& path);
 

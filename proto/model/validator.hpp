@@ -1,5 +1,5 @@
-// Collects the first thing that is wrong with a model that is being read, so that the reading stays
-// one straight line.
+// Keeps the first error found in a model while it is read, so that the reading code needs no branch
+// after each check.
 #pragma once
 
 #include <string>
@@ -8,7 +8,8 @@
 
 namespace posed::model_file {
 
-inline constexpr double kMaxNumber = 1e30;  // what the hot path's floats can still hold, multiply
+// Small enough that products stay within the hot path's floats.
+inline constexpr double kMaxNumber = 1e30;
 
 class Validator {
  public:

@@ -11,12 +11,12 @@ constexpr std::string_view kEllipsis = "...";
 constexpr std::uint32_t kNoCharacter = 0xFFFFFFFF;
 
 struct Character {
-  std::uint32_t code = kNoCharacter;  // kNoCharacter: the byte begins no valid UTF-8
+  std::uint32_t code = kNoCharacter;  // kNoCharacter: the byte does not begin valid UTF-8
   std::size_t bytes = 1;
 };
 
-// The character that `text` (not empty) begins with. Overlong forms, surrogates and codes beyond
-// Unicode are no characters: terminals differ in what they make of them.
+// Decodes the first character of `text`, which is not empty. Overlong forms, surrogates and codes
+// beyond Unicode are invalid: terminals differ in how they treat them.
 Character first_character(std::string_view text) {
   const auto lead = static_cast<unsigned char>(text[0]);
   if (lead < 0x80) return {lead, 1};
@@ -34,8 +34,9 @@ Character first_character(std::string_view text) {
   return {code, bytes};
 }
 
-// What a terminal obeys (C0, DEL, C1) or what changes how the rest of a line is shown: line and
-// paragraph separators, marks, embeddings, overrides and isolates of the writing direction.
+// True for characters that control a terminal (C0, DEL, C1) or change how the rest of a line is
+// displayed: line and paragraph separators, and the marks, embeddings, overrides and isolates of
+// the writing direction.
 bool is_control(std::uint32_t code) {
   return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x061C ||
          (code >= 0x200B && code <= 0x200F) || (code >= 0x2028 && code <= 0x202E) ||
@@ -48,7 +49,7 @@ std::string escaped(const char* format, unsigned value) {
   return text.data();
 }
 
-// One character as it may be shown.
+// One character as it is displayed: itself, or escaped.
 std::string shown(const Character& character, std::string_view text) {
   if (character.code == kNoCharacter) {
     return escaped("\\x%02x", static_cast<unsigned char>(text[0]));

@@ -39,7 +39,7 @@ Result<std::string> load_file(const std::filesystem::path& path, const FileRule&
   const auto refused = [&path](const std::string& sentence) {
     return fail(sentence, path.string());
   };
-  // Without O_NONBLOCK the opening of a pipe waits until somebody writes into it.
+  // Without O_NONBLOCK, opening a pipe would wait until another process writes into it.
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   if (file.get() < 0) {
     return refused("cannot read the " + what + ": " + reason() + "; check the path");
@@ -54,7 +54,7 @@ Result<std::string> load_file(const std::filesystem::path& path, const FileRule&
       "is larger than " + size_text(rule.max_bytes) + ": that is no " + what;
   const auto promised = static_cast<std::uintmax_t>(std::max<off_t>(about.st_size, 0));
   if (promised > rule.max_bytes) return refused(too_large);
-  // One byte more than promised, to meet the end; files of the kernel (/proc) promise nothing.
+  // Reads one byte more than the size, to see the end; kernel files (/proc) report size 0.
   std::string bytes;
   std::size_t size = 0;
   while (true) {

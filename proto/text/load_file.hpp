@@ -1,5 +1,5 @@
-// The one way to read a whole file: regular files only, and never more of one than it may hold. A
-// folder, a pipe that nobody fills and /dev/zero are refused with a sentence, at once. Cold.
+// The one way to read a whole file: regular files only, up to a size limit. A folder, a pipe
+// without a writer and /dev/zero are an error at once. Cold.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace posed {
 
-// What is read, and how large it may be at most.
+// The kind of file and its maximum size.
 struct FileRule {
-  std::string_view what = "file";  // names the kind in sentences: "calibration"
+  std::string_view what = "file";  // the kind in error messages, for example "calibration"
   std::uintmax_t max_bytes = 0;
 };
 
-// All bytes of the file. An Error names the path and says why it cannot be read.
+// Returns all bytes of the file. An Error names the path and the reason.
 [[nodiscard]] Result<std::string> load_file(const std::filesystem::path& path,
                                             const FileRule& rule);
 

@@ -8,7 +8,7 @@
 namespace posed {
 namespace {
 
-// Levenshtein, one row at a time.
+// Levenshtein distance, computed one row at a time.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -26,7 +26,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest(std::string_view word, const std::set<std::string>& known) {
-  constexpr std::size_t kLongest = 64;  // longer words are near to nothing, and cost n^2
+  constexpr std::size_t kLongest = 64;  // longer words match nothing; the cost is n^2
   const std::string_view start = word.substr(0, kLongest);
   const auto best = std::ranges::min_element(
       known, {}, [&](const std::string& candidate) { return edit_distance(start, candidate); });

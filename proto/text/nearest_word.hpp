@@ -1,4 +1,4 @@
-// Words that people mistype.
+// Suggestions for mistyped words.
 #pragma once
 
 #include <set>
@@ -7,8 +7,8 @@
 
 namespace posed {
 
-// The one of `known` that `word` is a misspelling of: the nearest by edit distance, when no more
-// than one letter and a quarter of it differ; else empty.
+// Returns the entry of `known` that `word` most likely means: the nearest by edit distance, if at
+// most one letter plus a quarter of its letters differ; otherwise empty.
 [[nodiscard]] std::string nearest(std::string_view word, const std::set<std::string>& known);
 
 }  // namespace posed

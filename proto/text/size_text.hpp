@@ -1,4 +1,4 @@
-// A limit in bytes as a sentence says it: "64 KB", "1 MB", "2 GB".
+// A size in bytes as text for a sentence: "64 KB", "1 MB", "2 GB".
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,7 @@
 namespace posed {
 namespace {
 
-constexpr std::size_t kMaxDescription = 300;  // bytes; toml++ repeats a whole key in its sentence
+constexpr std::size_t kMaxDescription = 300;  // bytes; toml++ can repeat a whole key in its message
 
 int line_of(const toml::source_region& source) { return static_cast<int>(source.begin.line); }
 

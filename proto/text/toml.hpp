@@ -1,5 +1,5 @@
-// TOML that people write or that comes from elsewhere: the only way in. Checked for size and depth
-// before it is parsed, and read whole or refused with the first thing wrong in it. Cold.
+// The only way to parse TOML, which may be untrusted. The text is checked for size and depth before
+// it is parsed; the first error rejects the whole text. Cold.
 #pragma once
 
 #include <filesystem>
@@ -14,16 +14,16 @@
 
 namespace posed {
 
-// The table of a text that keeps within `limits`; `file` is what an Error names. No exception
-// leaves it, and the table is shallow enough to be walked and destroyed by recursion.
+// Returns the table of a text that stays within `limits`; `file` is the name in an Error. Throws
+// nothing. The table is shallow enough to be walked and destroyed by recursion.
 [[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file,
                                              const TomlLimits& limits);
 
-// The same of a file, which is bounded by limits.bytes.
+// The same for a file, whose size is limited by limits.bytes.
 [[nodiscard]] Result<toml::table> load_toml(const std::filesystem::path& path,
                                             const TomlLimits& limits);
 
-// What a reader of such a table derives from: it remembers the first mistake, with its line.
+// Base class for code that reads such a table: remembers the first error, with its line.
 class FirstError {
  public:
   explicit FirstError(std::string file) : file_(std::move(file)) {}

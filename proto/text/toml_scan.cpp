@@ -10,11 +10,11 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-// An open array or inline table, or (the first of them) the line itself.
+// An open array or inline table; the first level is the line itself.
 struct Level {
-  bool keyed = false;  // holds keys: the line itself and inline tables
+  bool keyed = false;  // contains keys: the line itself or an inline table
   bool in_key = false;
-  int parts = 0;  // of the key that is being read, or whose value is
+  int parts = 0;  // parts of the key being read, or of the key whose value is being read
 };
 
 class Scanner {
@@ -22,7 +22,7 @@ class Scanner {
   Scanner(std::string_view text, const TomlLimits& limits)
       : text_(text), limits_(limits), levels_{Level{.keyed = true, .in_key = true, .parts = 1}} {}
 
-  // What is wrong; empty when nothing is.
+  // Returns the problem found; empty when there is none.
   [[nodiscard]] std::string scan() {
     while (!text_.empty()) {
       const char c = text_.front();
@@ -63,7 +63,7 @@ class Scanner {
         if (levels_.size() == 1) begin_line();
         break;
       case '.':
-        if (level.in_key) ++level.parts;  // else of a number or a date
+        if (level.in_key) ++level.parts;  // a dot outside a key belongs to a number or a date
         break;
       case '=':
         if (level.in_key) ++items_;
@@ -101,7 +101,7 @@ class Scanner {
     in_header_ = false;
   }
 
-  // The header's parts are counted as a key's while it is read, then apply to all keys below it.
+  // While a header is read its parts count as a key's; then they add to every key below it.
   void begin_header() {
     header_parts_ = 0;
     in_header_ = true;
@@ -121,7 +121,7 @@ class Scanner {
     text_.remove_prefix(multi_line ? 3 : 1);
     while (!text_.empty()) {
       const char c = text_.front();
-      if (c == '\n' && !multi_line) return;  // is not TOML: the parser ends here
+      if (c == '\n' && !multi_line) return;  // not valid TOML: the parser will stop here
       if (c == quote && (!multi_line || text_.starts_with(closing))) {
         // Up to two quotes before the closing three belong to the string.
         std::size_t run = multi_line ? 3 : 1;
@@ -129,7 +129,7 @@ class Scanner {
         text_.remove_prefix(run);
         return;
       }
-      if (c == '\\' && quote == '"') text_.remove_prefix(1);  // what it escapes is no end
+      if (c == '\\' && quote == '"') text_.remove_prefix(1);  // an escaped quote does not end it
       if (!text_.empty()) {
         if (text_.front() == '\n') ++line_;
         text_.remove_prefix(1);
@@ -137,7 +137,7 @@ class Scanner {
     }
   }
 
-  std::string_view text_;  // what is not read yet
+  std::string_view text_;  // the rest of the text
   const TomlLimits& limits_;
   std::vector<Level> levels_;
   int header_parts_ = 0;

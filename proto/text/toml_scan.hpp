@@ -1,6 +1,6 @@
-// A look at TOML before it is parsed. toml++ nests one table for each part of a dotted key, without
-// a limit, and ends such a chain of tables by recursion: 62 KB of "a.a.a..." overflow its stack. So
-// nothing is parsed that this has not passed. Cold.
+// Checks TOML before it is parsed. toml++ nests one table for each part of a dotted key, without a
+// limit, and destroys such a chain of tables by recursion: 62 KB of "a.a.a..." overflow its stack.
+// Therefore every text passes this check before it is parsed. Cold.
 #pragma once
 
 #include <cstddef>
@@ -11,17 +11,17 @@
 
 namespace posed {
 
-// How much TOML one kind of file may hold.
+// Limits for one kind of TOML file.
 struct TomlLimits {
-  std::string_view what = "file";  // names the kind in sentences: "calibration"
+  std::string_view what = "file";  // the kind in error messages, for example "calibration"
   std::size_t bytes = 64 * 1024;
   int depth = 8;  // parts of the header and of the key, and brackets and braces, added up
   std::size_t items = 4096;  // keys, table headers and commas
 };
 
-// An Error with the line where a limit is passed. Comments and strings are stepped over as TOML 1.0
-// reads them; of a text that is not TOML it may say anything, but never passes what toml++ would
-// nest deeper. Uses no recursion, one pass, and memory of at most `depth` levels.
+// Returns an Error with the line where a limit is exceeded. Comments and strings are skipped as
+// TOML 1.0 defines them. For a text that is not TOML the result may be either, but it never accepts
+// a text that toml++ would nest deeper. No recursion, one pass, memory for at most `depth` levels.
 [[nodiscard]] Result<> check_toml(std::string_view text, const std::string& file,
                                   const TomlLimits& limits);
 
