@@ -1,4 +1,4 @@
-// What lies inside the envelope of a style model's file (proto/model/model_file.hpp).
+// The payload of a style model's file, inside the envelope (proto/model/model_file.hpp).
 #include <cmath>
 #include <cstdint>
 #include <set>

@@ -21,12 +21,12 @@ int subjects_in(const Dataset& dataset, const Subject& like) {
   return count;
 }
 
-// The difference that a source subject's frames are taught, at these phases.
+// The difference that training assigns to a source subject's frames, at these phases.
 MatrixXd taught(const MatrixXd& delta, const VectorXd& phase) {
   return harmonic_basis(phase, kCycleHarmonics) * delta;
 }
 
-// One fold per source subject that has companions: the others are trained on.
+// One fold for each source subject whose group has other subjects; those are trained on.
 std::vector<Fold> subject_folds(const Dataset& dataset, const std::vector<SubjectCycle>& cycles,
                                 const std::string& target, const std::string& first_source) {
   std::vector<Fold> folds;
@@ -46,7 +46,7 @@ std::vector<Fold> subject_folds(const Dataset& dataset, const std::vector<Subjec
   return folds;
 }
 
-// The clip's rows [first, first + count), with the phase they start at.
+// The clip's rows [first, first + count), with the phase at which they start.
 AlignedClip part_of(const AlignedClip& clip, Eigen::Index first, Eigen::Index count) {
   AlignedClip part;
   part.group = clip.group;
@@ -132,7 +132,7 @@ std::vector<Pairing> make_pairings(const Dataset& dataset, const std::vector<Sub
   for (const std::string& motion : dataset.motions) {
     const MatrixXd goal = group_cycle(dataset, cycles, target, motion);
     if (goal.size() == 0) continue;
-    std::vector<Pairing> own;  // the target's: nothing to add
+    std::vector<Pairing> own;  // of the target: the difference is zero
     bool covered = false;
     for (const SubjectCycle& cycle : cycles) {
       const Subject& subject = dataset.subjects[cycle.subject];
