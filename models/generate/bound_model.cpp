@@ -8,8 +8,8 @@
 namespace posed::generate {
 namespace {
 
-// Of the label sequence: with 20 frames of 30 Hz a streamed trajectory's jerk is within 3 % of the
-// full solution's (models/trajectory/README.md, "Look-ahead").
+// Look-ahead into the label sequence: with 20 frames at 30 Hz the jerk of a streamed trajectory is
+// within 3 % of the full solution's (models/trajectory/README.md, "Look-ahead").
 constexpr double kLookAhead_s = 20.0 / 30.0;
 
 }  // namespace

@@ -31,7 +31,7 @@ void GenerateStage::step(const Frame* in, std::int64_t now_ns, Emit& emit) noexc
   emit_ = &emit;
   if (in != nullptr && in->skeleton != skeleton_->id) {
     smoother_.flush(*this);
-    emit.frame(*in);  // not our hand
+    emit.frame(*in);  // a frame of another skeleton
   } else if (in != nullptr && in->source == Source::kLabels) {
     last_ = *in;
     has_last_ = true;
@@ -42,7 +42,7 @@ void GenerateStage::step(const Frame* in, std::int64_t now_ns, Emit& emit) noexc
   } else {
     smoother_.step(nullptr, now_ns, *this);
     if (!performs() || !has_last_) return;
-    // The last frame again, as it would have come by now.
+    // The last frame with its header advanced in time.
     Header& header = last_.header;
     if (header.device_ns != kNoTime_ns) header.device_ns += now_ns - header.arrival_ns;
     header.arrival_ns = now_ns;
@@ -74,7 +74,7 @@ void GenerateStage::frame(const Frame& frame) noexcept {
   show(last_, &live_);
 }
 
-// What the playback makes of the frame goes out. RT-safe.
+// Emits the frame with the gesture player's pose. RT-safe.
 void GenerateStage::show(Frame& frame, const HandAngles* live) noexcept {
   const GesturePlayer::Pose& pose = player_.step(live);
   if (pose.what != GesturePlayer::What::kLive) {

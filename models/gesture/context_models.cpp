@@ -15,11 +15,12 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr double kFloorShare = 0.01;  // of each feature's variance over all recordings
-constexpr double kNoise_rad = 0.2 * std::numbers::pi / 180.0;   // what a sensor has at least
-constexpr double kStill_rad = 1e-4 * std::numbers::pi / 180.0;  // less spread: a constant channel
-constexpr double kOwnModelFrom = 3;  // examples; below, a context trusts its label's model
+constexpr double kNoise_rad = 0.2 * std::numbers::pi / 180.0;  // lower bound of a sensor's noise
+constexpr double kStill_rad =
+    1e-4 * std::numbers::pi / 180.0;  // a channel with a smaller deviation is constant
+constexpr double kOwnModelFrom = 3;   // examples; with fewer, a context uses its label's model
 
-// One segment: what it shows and which frames of which recording.
+// One segment: its context, and its frames within a recording.
 struct Example {
   std::size_t recording, segment;
   int context;
@@ -105,14 +106,15 @@ class Trainer {
     context_models_.resize(out_.contexts.size());
   }
 
-  // Least variances: a share of what each feature does anyway, and what the sensor's noise does to
-  // the value, its delta (1/2 of it) and its delta-delta (6 of it).
+  // Variance floors: a share of each feature's total variance, and what sensor noise adds to the
+  // value, its delta (1/2 of the noise variance) and its delta-delta (6 times).
   void set_floor() {
     const Index dims = features_.front().cols();
     VectorXd first = VectorXd::Zero(dims);
     VectorXd second = VectorXd::Zero(dims);
     double frames = 0.0;
-    const Eigen::RowVectorXd origin = features_.front().row(0);  // near the data: no cancellation
+    const Eigen::RowVectorXd origin =
+        features_.front().row(0);  // near the data, which avoids cancellation
     for (const FeatureMatrix& features : features_) {
       const FeatureMatrix off = features.rowwise() - origin;
       first += off.colwise().sum();
@@ -214,7 +216,7 @@ class Trainer {
   std::vector<FeatureMatrix> features_;     // [recording]
   std::vector<Example> examples_;           // in the order of recordings and segments
   std::vector<StateModel> label_models_;    // [label]; empty where it was not recorded
-  std::vector<StateModel> context_models_;  // [context]; empty where its label's model serves
+  std::vector<StateModel> context_models_;  // [context]; empty where its label's model is used
   ContextModels out_;
 };
 

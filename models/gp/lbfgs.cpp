@@ -107,7 +107,8 @@ class History {
 
   void add(VectorXd step, VectorXd change) {
     const double product = step.dot(change);
-    if (product <= 1e-12 * change.squaredNorm()) return;  // the approximation would not stay positive definite
+    if (product <= 1e-12 * change.squaredNorm())
+      return;  // the approximation would not stay positive definite
     pairs_.push_back({std::move(step), std::move(change), 1.0 / product});
     if (static_cast<int>(pairs_.size()) > memory_) pairs_.pop_front();
   }

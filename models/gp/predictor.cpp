@@ -123,7 +123,8 @@ Result<Predictor> Predictor::build(const Trained& trained, bool gate) {
   const Eigen::VectorXd constant =
       trained.offset + trained.b * trained.weights.colwise().sum().transpose();
   for (int o = 0; o < parts->outputs; ++o) parts->constant[o] = static_cast<float>(constant[o]);
-  static_cast<void>(kernel::target());  // Highway detects the CPU here and not in the first hot call
+  static_cast<void>(
+      kernel::target());  // Highway detects the CPU here and not in the first hot call
   return Predictor(std::move(parts));
 }
 

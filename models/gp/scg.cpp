@@ -38,7 +38,8 @@ bool probe(Search& s, const Gradient& gradient) {
   const double sigma = kProbe / std::sqrt(s.kappa);
   const Eigen::VectorXd ahead = gradient(s.x + sigma * s.direction);
   const double theta = s.direction.dot(ahead - s.gradient) / sigma;
-  s.curvature = std::isfinite(theta) ? theta : 0.0;  // no quadratic model there: the scale alone decides
+  s.curvature =
+      std::isfinite(theta) ? theta : 0.0;  // no quadratic model there: the scale alone decides
   return true;
 }
 

@@ -10,8 +10,9 @@
 namespace posed::gp {
 
 struct SyntheticProcess {
-  Trained process;          // [poses x dims] -> dims, length 85 degrees, noise 0.1 of the signal
-  Eigen::MatrixXd queries;  // [256 x dims]: frames of a walker who is not among the training poses, rad
+  Trained process;  // [poses x dims] -> dims, length 85 degrees, noise 0.1 of the signal
+  Eigen::MatrixXd
+      queries;  // [256 x dims]: frames of a walker who is not among the training poses, rad
 };
 
 // The same arguments give the same numbers everywhere.

@@ -1,5 +1,6 @@
-// ConstrainStage: the constraint solver as the pipeline's last stage on a hand: fingers keep their
-// limits and do not go through each other. Frames of another skeleton pass through.
+// ConstrainStage: the constraint solver as the pipeline's last stage on a hand: joints keep their
+// limits and fingers do not go through each other. Frames of another skeleton pass through. One
+// thread.
 #pragma once
 
 #include <memory>
@@ -13,12 +14,12 @@ namespace posed::hand {
 
 class ConstrainStage {
  public:
-  // `skeleton` is a hand's (hand_side() knows it); the shape that it is named after is used.
+  // `skeleton` is a hand (hand_side() recognises it); its name selects the hand shape.
   explicit ConstrainStage(std::shared_ptr<const Skeleton> skeleton);
 
-  // Moves the frame's angles to the nearest that are allowed. `variance_rad2` is the posterior's, a
-  // rotation channel each; empty: all angles are equally sure. A hand that lacks an angle is left
-  // alone. RT-safe.
+  // Moves the frame's angles to the nearest allowed pose. `variance_rad2` has the posterior
+  // variance of each rotation channel; empty: all angles have the same weight. A frame that lacks
+  // an angle is not changed. RT-safe.
   void step(Frame& frame, std::span<const double> variance_rad2) noexcept;
 
  private:

@@ -7,8 +7,8 @@
 namespace posed::perform {
 namespace {
 
-// How long the cursor's state lasts. Away from tempo 1 what rounding takes is handed on, so that a
-// fast string does not drift from its tempo.
+// Sets the duration of the cursor's state. At a tempo other than 1 the rounding error is carried to
+// the next state, so that a long sequence does not drift from its tempo.
 void begin_state(Cursor& cursor, const LabelSequence& script,
                  const trajectory::StateInformation& evidence, double tempo) noexcept {
   const gesture::DurationGaussian duration = evidence.duration(script.context(cursor.position));

@@ -11,9 +11,9 @@ namespace posed::perform {
 namespace {
 
 constexpr int kStride = trajectory::padded(kHandChannels);
-constexpr int kSettling = 3;  // frames that an elimination for good needs (pentadiagonal.hpp)
+constexpr int kSettling = 3;  // frames that a permanent elimination needs (pentadiagonal.hpp)
 
-// The lead-in lasts 1.5 times what the farthest channel would take at this speed.
+// The lead-in lasts 1.5 times as long as the farthest channel would need at this speed.
 constexpr double kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
 constexpr double kMinLead_s = 0.2, kMaxLead_s = 0.8;
 
@@ -27,8 +27,9 @@ int frames_in(double seconds, double rate_hz) {
   return static_cast<int>(std::ceil(seconds * rate_hz));
 }
 
-// What two poses that are certain say of the two frames after them, through curves of precision p2
-// and mean 0 centred on the second pose and on the first frame after it: the kernel's carry rows.
+// Writes the solver's carry rows for two poses that are known exactly: the information about the
+// next two frames through delta-delta windows of precision p2 and mean 0, centred on the second
+// pose and on the first frame after it (models/perform/README.md, "Lead-in").
 void clamp_to(const HandAngles& before, const HandAngles& last, const double* p2,
               double* carry) noexcept {
   for (int c = 0; c < kHandChannels; ++c) {
@@ -89,7 +90,7 @@ void LabelSequencePlayer::start(const HandAngles& before, const HandAngles& last
   glide();
 }
 
-// The lead-in: from the last two poses into the cursor's state. RT-safe.
+// Starts the lead-in from the last two poses into the cursor's state. RT-safe.
 void LabelSequencePlayer::glide() noexcept {
   double* lead = states_.row(0, trajectory::kPosition);
   evidence_.fill(script_.context(cursor_.position), 0, lead);
@@ -101,15 +102,15 @@ void LabelSequencePlayer::glide() noexcept {
   }
   const double lead_s = std::clamp(1.5 * farthest_rad / kLeadSpeed_rad_s, kMinLead_s, kMaxLead_s);
   lead_left_ = frames_in(lead_s, evidence_.rate_hz());
-  std::fill_n(lead, kHandChannels, 0.0);  // of the first state only the curve's precision is left
+  std::fill_n(lead, kHandChannels, 0.0);  // only the first state's delta-delta precision is kept
   std::fill(lead + trajectory::kPositionMean * kStride, lead + trajectory::kCurve * kStride, 0.0);
   std::fill(lead + trajectory::kCurveMean * kStride, lead + trajectory::kRows * kStride, 0.0);
   clamp_to(before_, last_, lead + trajectory::kCurve * kStride, carry_.get());
   carries_ = true;
 }
 
-// Writes the evidence of the frames that are not settled into frames_ and returns their number;
-// `shown` becomes the cursor of the frame to give out. RT-safe.
+// Writes pointers to the information of the frames that are not final into frames_ and returns
+// their number; `shown` becomes the cursor of the frame to output. RT-safe.
 int LabelSequencePlayer::plan(Cursor& shown) noexcept {
   const int most = lead_left_ + look_ahead_ + 1;
   int frames = 0;
@@ -149,7 +150,8 @@ void LabelSequencePlayer::advance(int frames) noexcept {
 // RT-safe.
 bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
   if (!started_) return false;
-  if (cursor_.frames_left == 0 && script_.has_next(cursor_.position)) {  // a label ends the rest
+  if (cursor_.frames_left == 0 &&
+      script_.has_next(cursor_.position)) {  // an appended label ends the rest
     step(cursor_, script_, evidence_, tempo_);
     glide();
   }

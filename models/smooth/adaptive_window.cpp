@@ -19,11 +19,11 @@ constexpr double kCurveBase = 5.0 * kDegree2;      // [rad^2/s^3]
 constexpr double kCurveSlope = 20.0;               // [1/s], times the squared speed
 constexpr double kDeltaBase = 0.002 * kDegree2;    // [rad^2/s]
 constexpr double kDeltaSlope = 0.1;                // [s], times the squared speed
-constexpr double kSpeedReach_s = 0.067;            // the speed's mean is over so much on each side
-constexpr double kHandShare = 0.1;                 // of the mean speed of all channels
+constexpr double kSpeedReach_s = 0.067;  // the speed is averaged over this time on each side
+constexpr double kHandShare = 0.1;       // of the mean speed of all channels
 constexpr int kPasses = 2;
 
-constexpr double kEven = 1e-3;  // a clock that is off by less is even
+constexpr double kEven = 1e-3;  // frames whose skew is below this count as evenly spaced
 
 constexpr int kEvenWindow = 26;
 constexpr double kWindow_s = 26.0 / kEvenRate_hz;
@@ -95,8 +95,7 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
       held_rad_[c] = measured_rad[c];
       last_measured_[c] = pushed_;
     }
-    // No precision at all would leave a channel that is missing in the whole window without a
-    // value.
+    // With zero precision, a channel that is missing in the whole window would have no value.
     position[c] = measured ? precision : kNothing;
     mean[c] = position[c] * held_rad_[c];
   }
@@ -110,8 +109,8 @@ void AdaptiveWindow::take_sensed(int slot) noexcept {
   std::copy_n(sensed(slot) + stride(), stride(), evidence_.row(slot, trajectory::kPositionMean));
 }
 
-// A channel that is measured for the first time was there before, too: its earlier frames hold the
-// value, so that nothing pulls it from where it starts. RT-safe.
+// Sets the earlier frames of a channel that is measured for the first time to its value, so that
+// nothing pulls it away from where it starts. RT-safe.
 void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   const long from = std::max<long>(0, pushed_ - kMaxWindow + 1);
   for (long i = from; i < pushed_; ++i) {
@@ -121,7 +120,7 @@ void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   }
 }
 
-// The window's frames and how their times lie. RT-safe.
+// Collects the window's frames and the times between them. RT-safe.
 void AdaptiveWindow::begin(double period_s) noexcept {
   period_s_ = period_s > 0.0 ? period_s : 1.0 / kEvenRate_hz;
   frames_ = static_cast<int>(std::min<long>(pushed_, window_frames(period_s)));
@@ -141,8 +140,8 @@ void AdaptiveWindow::begin(double period_s) noexcept {
   }
 }
 
-// What the last solve was told beyond the sensors. The precisions of deltas and curves are written
-// anew each time, their means are zero otherwise. RT-safe.
+// Removes the information that WindowEvidence added for the last solve. The precisions of delta and
+// delta-delta are rewritten for each solve; their means are zero otherwise. RT-safe.
 void AdaptiveWindow::forget_extra() noexcept {
   if (!std::exchange(extra_, false)) return;
   for (int i = 0; i < frames_; ++i) {
@@ -170,12 +169,12 @@ void AdaptiveWindow::speed_prior() noexcept {
   for (int c = 0; c < channels_; ++c) active += active_[static_cast<std::size_t>(c)];
   const double reach_s = kSpeedReach_s + 0.5 * period_s_;
   int from = 0;
-  int to = 0;  // frames from <= j < to lie within reach
+  int to = 0;  // frames from <= j < to are within the averaging time
   for (int i = 1; i + 1 < frames_; ++i) {
     const auto at = [this](int index) { return time_s_[static_cast<std::size_t>(index)]; };
     while (at(from) < at(i) - reach_s) ++from;
     while (to < frames_ && at(to) <= at(i) + reach_s) ++to;
-    // Frame j stands for the step before it; the first for the one after.
+    // Frame j represents the step before it; the first frame represents the step after it.
     const double first_s = from > 0 ? at(from - 1) : at(0) - step_s_[1];
     const double per_s = 1.0 / (at(to - 1) - first_s);
     const double hand =
@@ -214,7 +213,7 @@ void AdaptiveWindow::solve_once(double period_s) noexcept {
 // RT-safe.
 void AdaptiveWindow::solve(double period_s, WindowEvidence* extra) noexcept {
   solve_once(period_s);
-  if (frames_ < 3) return;  // no window fits: what was measured is all there is
+  if (frames_ < 3) return;  // too few frames for a delta window: only the first solve is done
   for (int pass = 0; pass < kPasses; ++pass) {
     speed_prior();
     forget_extra();
@@ -227,8 +226,8 @@ void AdaptiveWindow::solve(double period_s, WindowEvidence* extra) noexcept {
   forget_extra();
 }
 
-// Curve's variance over q: a second difference in time units, squared, over the time it stands for
-// (the even clock's dt^3). RT-safe.
+// Variance of the delta-delta divided by Q: dt^3 for even frames (models/smooth/README.md, "Uneven
+// frames"). RT-safe.
 double AdaptiveWindow::curve_time_s3(int index) const noexcept {
   const double before_s = step_s_[static_cast<std::size_t>(index)];
   const double after_s = step_s_[static_cast<std::size_t>(index + 1)];

@@ -15,7 +15,8 @@ struct ApplyOptions {
   // True: start exactly as live, with alpha ramping up from 0 and the heading found on the way.
   // False: alpha and heading are settled from the first frame.
   bool cold = false;
-  std::function<bool(int done, int total)> progress;  // may be empty; returning false stops the work
+  std::function<bool(int done, int total)>
+      progress;  // may be empty; returning false stops the work
 };
 
 struct Applied {

@@ -244,7 +244,8 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips, const std::
   auto spec = motion::describe_space(options.space, *sources->front().motion.skeleton);
   if (!spec) return std::unexpected(in_clip(spec.error(), sources->front().clip->clip.path));
   dataset.spec = std::move(*spec);
-  std::vector<const motion::Motion*> taught;  // the mean rotations are those of the filter's input, the sources
+  std::vector<const motion::Motion*>
+      taught;  // the mean rotations are those of the filter's input, the sources
   for (const Source& source : *sources) {
     if (source.clip->group != target) taught.push_back(&source.motion);
   }

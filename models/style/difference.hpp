@@ -13,8 +13,9 @@
 
 namespace posed::style {
 
-inline constexpr int kCycleHarmonics = 4;  // mean and 4 harmonics describe a cycle down to its noise
-inline constexpr int kGridFrames = 28;     // points of a cycle that the process is trained on
+inline constexpr int kCycleHarmonics =
+    4;                                  // mean and 4 harmonics describe a cycle down to its noise
+inline constexpr int kGridFrames = 28;  // points of a cycle that the process is trained on
 
 // One training pair of cycles, as harmonic coefficients [2 * kCycleHarmonics + 1 x D].
 struct Pairing {

@@ -39,7 +39,7 @@ void FixedLag::push(const double* evidence) noexcept {
   ++pushed_;
   const int frames = static_cast<int>(open) + 1;
   const auto held = std::min<long>(pushed_, static_cast<long>(factors_.size()));
-  // The first of the open frames is eliminated for good as soon as there are three.
+  // The first of the open frames is eliminated permanently as soon as there are three.
   kernel::eliminate({.evidence = tail_.data(),
                      .frames = frames,
                      .stride = stride(),

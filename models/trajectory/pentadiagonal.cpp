@@ -2,12 +2,13 @@
 
 #include "models/trajectory/information_form.hpp"
 
-// The targets of the predictor's kernels (models/gp), so that one choice of instruction set holds
-// for both.
+// The same targets as the predictor's kernels (models/gp), so that one choice of instruction set
+// applies to both.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "models/trajectory/pentadiagonal.cpp"
-// Highway compiles this file once per target; its own macros are not written for our warnings.
+// Highway compiles this file once per target; Highway's own macros do not compile without warnings
+// under our flags.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wsign-conversion"
 #include <hwy/foreach_target.h>
@@ -28,8 +29,7 @@ HWY_INLINE Vec plus_times(Vec sum, double factor, Vec v) {
   return hn::MulAdd(hn::Set(Doubles(), factor), v, sum);
 }
 
-// A frame that still waits for its elimination: its diagonal, its band to the next frame, its right
-// side.
+// A frame that is not eliminated yet: its diagonal, its band to the next frame, its right side.
 struct Pending {
   Vec d0, d1, r;
 };
@@ -39,7 +39,7 @@ HWY_INLINE Pending nothing() {
   return {zero, zero, zero};
 }
 
-// The dynamic rows of one frame.
+// The delta and delta-delta rows of one frame.
 struct Dynamics {
   Vec p1, m1, p2, m2;
 };
@@ -69,7 +69,7 @@ HWY_INLINE Vec add_centred(Pending& a, Pending& b, Pending& c, const Dynamics& d
   return plus_times(d.p2, -0.25, d.p1);
 }
 
-// The same with the curve window [1 + k, -2, 1 - k].
+// The same with the delta-delta window [1 + k, -2, 1 - k].
 HWY_INLINE Vec add_skewed(Pending& a, Pending& b, Pending& c, const Dynamics& d, double k) {
   const double left = 1.0 + k;
   const double right = 1.0 - k;
@@ -85,8 +85,8 @@ HWY_INLINE Vec add_skewed(Pending& a, Pending& b, Pending& c, const Dynamics& d,
   return hn::Sub(times(left * right, d.p2), delta);
 }
 
-// The two coefficients that the boundary rule leaves of a window which loses one to the outside, at
-// the string's beginning; at its end they stand in the opposite order, the delta's negated.
+// The two coefficients that the boundary rule gives a window with one coefficient outside, at the
+// beginning of the sequence; at its end they are in the opposite order, those of the delta negated.
 struct Cut {
   double delta[2], curve[2];
 };
@@ -110,14 +110,14 @@ HWY_INLINE void add_cut(Pending& a, Pending& b, const Dynamics& d, const Cut& cu
   b.r = plus_times(plus_times(b.r, cut.delta[1], d.m1), cut.curve[1], d.m2);
 }
 
-// A string of one frame: what is left of its windows lies on the frame itself.
+// A sequence of one frame: what the boundary rule leaves of its windows is on the frame itself.
 HWY_INLINE void add_lone(Pending& a, const Dynamics& d, Boundary boundary) {
-  if (boundary != Boundary::kZero) return;  // hold: both windows are 0 whatever the frame is
+  if (boundary != Boundary::kZero) return;  // hold: both windows are 0 for any value
   a.d0 = plus_times(a.d0, 4.0, d.p2);
   a.r = plus_times(a.r, -2.0, d.m2);
 }
 
-// x_a = z - f1 x_b - f2 x_c, and what that says of b and c.
+// x_a = z - f1 x_b - f2 x_c, and what that adds to b and c.
 HWY_INLINE void settle(const Pending& a, Vec d2, Pending& b, Pending& c, double* factor,
                        std::ptrdiff_t stride) {
   const Vec v = hn::Div(hn::Set(Doubles(), 1.0), a.d0);
@@ -135,8 +135,8 @@ HWY_INLINE void settle(const Pending& a, Vec d2, Pending& b, Pending& c, double*
   hn::Store(v, d, factor + 3 * stride);
 }
 
-// One pass over the frames for `count` vectors of channels from `column` on; several, because each
-// frame waits for the division of the one before.
+// One pass over the frames for `count` vectors of channels from `column` on; several vectors at
+// once, because each frame waits for the division of the frame before it.
 template <int count>
 HWY_INLINE void eliminate_columns(const System& s, std::ptrdiff_t column, double* const* factors) {
   const std::ptrdiff_t stride = s.stride;
