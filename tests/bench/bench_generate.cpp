@@ -1,5 +1,5 @@
-// posed_bench generate: what trajectories cost against SPTK and LAPACK, and whether any string lets
-// fingers go through each other.
+// posed_bench generate: the cost of trajectories beside SPTK and LAPACK, and whether fingers go
+// through each other in any label sequence.
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -52,7 +52,7 @@ Result<gesture::GestureModel> synthetic_model() {
   return gesture::train_gesture({*recording}, {});
 }
 
-// Every sequence of four of the labels g c p 1 3 4, or `count` of them evenly spread.
+// Every sequence of four of the labels g c p 1 3 4, or `count` of them, evenly spaced.
 Result<json> bench_strings(const trajectory::StateInformation& evidence, int count) {
   const auto alphabet = perform::labels_of(evidence.model(), "g c p 1 3 4");
   if (!alphabet) return std::unexpected(alphabet.error());

@@ -27,7 +27,7 @@ using trajectory::InformationForm;
 using trajectory::Row;
 using Steady = std::chrono::steady_clock;
 
-constexpr int kRepeats = 3;  // of everything beside SPTK; the median counts
+constexpr int kRepeats = 3;  // of everything except SPTK; the median counts
 
 double since_us(Steady::time_point start) {
   return std::chrono::duration<double, std::micro>(Steady::now() - start).count();
@@ -45,7 +45,7 @@ json quantiles(std::vector<double> us) {
           {"max_us", quantile(us, 1.0)}};
 }
 
-// A folder of its own under the system's temporary one.
+// A new folder in the system's temporary folder.
 struct Scratch {
   std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("posed-bench-" + std::to_string(::getpid()));
@@ -58,7 +58,8 @@ struct Scratch {
   }
 };
 
-// The first `frames` frames of a random script; channels past the hand's repeat it.
+// The first `frames` frames of a random label sequence; channels beyond those of the hand repeat
+// it.
 InformationForm script_evidence(const trajectory::StateInformation& model, int frames,
                                 int channels) {
   std::mt19937 random(1);
@@ -106,7 +107,7 @@ std::vector<const double*> frames_of(const InformationForm& evidence) {
 
 struct Streamed {
   std::vector<double> us;  // of each frame
-  double total_us = 0.0;   // of all, the clock read twice
+  double total_us = 0.0;   // of all frames, with only two clock readings
   double error_deg = 0.0;  // rms against the full solve
 };
 

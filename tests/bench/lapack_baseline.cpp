@@ -16,7 +16,7 @@ Result<LapackBaseline> LapackBaseline::load() {
 void LapackBaseline::solve(const trajectory::InformationForm& evidence, std::vector<double>& x) {
   using trajectory::Row;
   constexpr int kBand = 2;
-  constexpr int kRows = kBand + 1;  // LAPACK's lower band storage, a column a frame
+  constexpr int kRows = kBand + 1;  // LAPACK's lower band storage, one column per frame
   const int frames = evidence.frames();
   bands_.resize(static_cast<std::size_t>(frames) * kRows);
   x.resize(static_cast<std::size_t>(frames) * static_cast<std::size_t>(evidence.channels()));

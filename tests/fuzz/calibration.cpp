@@ -1,5 +1,5 @@
-// Any text as a glove's calibration file and as its greeting: a mistake is a sentence, and what is
-// accepted can be used.
+// Any text as a glove's calibration file and as its device info (greeting): a mistake gives an
+// error message, and an accepted text can be used.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// Every decoder of the registry on any bytes in any cut, and the description that a log hands back.
-// The first byte picks what is tried, the second how the rest is cut.
+// Every decoder of the registry on any bytes in chunks of any size, and the device description that
+// a log stores. The first byte selects the decoder, the second one how the rest is cut into chunks.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>

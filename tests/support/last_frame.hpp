@@ -1,4 +1,4 @@
-// An Emit that keeps the last frame and counts them all.
+// An Emit that keeps the last frame and counts all frames.
 #pragma once
 
 #include "proto/frame/sink.hpp"
