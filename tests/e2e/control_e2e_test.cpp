@@ -1,4 +1,4 @@
-// The clients against a running daemon: what they print, how they end, what they are refused.
+// The client commands with a running daemon: their output, exit codes and refusals.
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 
@@ -50,7 +50,7 @@ TEST_CASE("monitor and top show the daemon, to people and to scripts") {
   int count = 0;
   for (std::string line; std::getline(lines, line); ++count) {
     const auto frame = json::parse(line);
-    CHECK(frame.at("stream") == "walker");  // never walker-raw
+    CHECK(frame.at("stream") == "walker");  // not walker-raw
     const std::uint64_t sequence = std::stoull(frame.at("sequence").get<std::string>());
     CHECK(sequence > last);
     last = sequence;
@@ -129,7 +129,8 @@ TEST_CASE("check tells what a config would run, or all that is wrong with it") {
   CHECK(has(all.err, "bad.toml:1: unknown key 'strem'; the nearest known one here is 'stream'"));
   CHECK(has(all.err, "bad.toml:2: realtime must be true or false"));
   const auto as_json = posed({"check", "--config", bad.string(), "--json"});
-  CHECK(json::parse(as_json.out).at("errors").size() == 3);  // and that there is no stream
+  CHECK(json::parse(as_json.out).at("errors").size() ==
+        3);  // the third error is that there is no stream
   CHECK(posed({"check", "--config", served.path("none.toml")}).code == 2);
 
   std::filesystem::remove(served.folder.path() / "one.style");
@@ -183,10 +184,10 @@ TEST_CASE("strangers get in nowhere, and a withdrawn key is cut off") {
   INFO(served.daemon->errors());
   CHECK(connected.exit_code() == 1);
   CHECK(has(connected.errors(), "refuses this key"));
-  while (other.line(std::chrono::milliseconds(0))) {  // what it had before
+  while (other.line(std::chrono::milliseconds(0))) {  // frames from before
   }
-  CHECK(other.line());  // was not cut
-  // A config that lost its [security] opens no door and ends no daemon.
+  CHECK(other.line());  // this client was not cut off
+  // A config without its [security] table neither gives access nor ends the daemon.
   served.write_config("");
   served.daemon->send(SIGHUP);
   CHECK_FALSE(served.daemon->exit_code(std::chrono::milliseconds(500)));

@@ -1,5 +1,5 @@
-// TOML that would overflow the parser's stack and files that are none, given to the real binary by
-// every way there is: it answers with a sentence and goes on.
+// TOML that would overflow the parser's stack, and paths that are not regular files, given to the
+// real binary in every possible way: it prints an error message and goes on.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace posed::test {
 namespace {
 
-// One sentence on stderr, and no signal ended it.
+// Checks for one error message on stderr, and that no signal ended the process.
 void check_refused(const std::vector<std::string>& arguments, const std::string& part) {
   const Outcome outcome = posed(arguments);
   INFO(arguments[0] << " " << arguments[1] << ": " << outcome.err.substr(0, 500));
@@ -29,8 +29,8 @@ std::string stream_with(const std::string& more) {
   return std::string(Stage::kEndpoints) + "[[stream]]\nname = \"hand\"\n" + more;
 }
 
-// Puts `value` into a column of each row of a log's table where `where` holds, with a checksum that
-// is right, as a stranger who sends a log would. Returns how many rows there were.
+// Writes `value` into a column of each row of a log's table that matches `where`, with a recomputed
+// checksum, as an untrusted sender of a log could. Returns the number of rows.
 int forge(const std::string& path, const std::string& table, const std::string& column,
           const std::string& value, const std::string& where = "1") {
   sqlite3* log = nullptr;
@@ -106,7 +106,7 @@ TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its l
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
 
-  // The same in a log that a stranger sent.
+  // The same in a log from an untrusted source.
   CHECK(forge(stage.path("take.plog"), "chunk", "bytes", toml_bombs()[0], "direction=3") == 1);
   const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
   INFO(replay.err.substr(0, 1000));

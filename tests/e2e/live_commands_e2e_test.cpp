@@ -1,5 +1,5 @@
-// The live commands tell the truth: about a daemon that died, about what was changed and since
-// when, about a replay, about the file that was written, about what they wait for.
+// The live commands report the true state: of a daemon that died, of what changed and since when,
+// of a replay, of the file that was written, and of what they wait for.
 #include <catch2/catch.hpp>
 
 #include <chrono>
@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-// Waits until the process has said this on stderr; false after half a minute.
+// Waits until stderr of the process contains this text; false after half a minute.
 bool comes_to_say(const Process& process, const std::string& part) {
   for (int i = 0; i < 600; ++i) {
     if (process.errors().contains(part)) return true;
@@ -36,7 +36,7 @@ std::string line_with(Process& process, const std::string& part) {
   return {};
 }
 
-// The text of the next event that says this; `events` prints JSON.
+// The text of the next event that contains this; `events` prints JSON.
 std::string event_with(Process& events, const std::string& part) {
   while (const auto line = events.line()) {
     const std::string text = json::parse(*line).at("text");
@@ -117,7 +117,7 @@ TEST_CASE("a status is as new as the acknowledgement before it, and events say w
   served.start();
   Process events({"monitor", "--connect", served.publish, "--topic", "event", "--json"});
   Process all({"monitor", "--connect", served.publish, "--topic", "stats"});
-  REQUIRE(all.line());  // subscriptions take a moment; this one came later
+  REQUIRE(all.line());  // subscriptions take a moment; this one was made last
   const auto stream = [&] {
     return json::parse(served.ctl({"--json", "status"}).out).at("status").at("stream").at(0);
   };
@@ -183,7 +183,7 @@ TEST_CASE("a published replay says that it is one, and its times make sense") {
   cut.send(SIGINT);
   CHECK(cut.exit_code() == 1);
   CHECK(has(cut.errors(), "holds only those"));
-  CHECK(has(cut.errors(), "replayed 0 of "));  // it was not silent
+  CHECK(has(cut.errors(), "replayed 0 of "));  // the interrupted replay reported its progress
 }
 
 TEST_CASE("a recording ends with what was written") {

@@ -1,4 +1,4 @@
-// `posed smooth` on the real binary: the live stage offline, gaps filled, wrong use told.
+// `posed smooth` with the real binary: the live stage offline, filled gaps, messages on wrong use.
 #include <cmath>
 #include <fstream>
 #include <iterator>

@@ -1,5 +1,6 @@
-// `posed train gesture` through the real binary: a glove recording and its labels become a model,
-// the same bytes each time; labels are proposed; every mistake is one sentence and an exit code.
+// `posed train gesture` with the real binary: a glove recording and its labels give a model, with
+// the same bytes each time; labels are proposed; every mistake gives one error message and an exit
+// code.
 #include <fstream>
 #include <iterator>
 
@@ -20,7 +21,7 @@ std::string bytes_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// A made-up signer's recording with its labels, and the first examples of them.
+// A synthetic signer's recording with its labels, and a file with only the first labels.
 struct Glove {
   TempFolder folder;
   std::string clip = (folder.path() / "take.csv").string();
@@ -39,7 +40,7 @@ struct Glove {
     return (folder.path() / name).string();
   }
 
-  // train gesture with the recording, its labels and `more`.
+  // Runs `train gesture` with the recording, its labels and the arguments `more`.
   [[nodiscard]] Outcome train(const std::string& out, std::vector<std::string> more = {},
                               const std::string& with = {}) const {
     std::vector<std::string> arguments{"train", "gesture",  "--clip",

@@ -1,5 +1,5 @@
-// A process has only so many descriptors: strangers may not take them all, nor make libzmq's
-// listener try in vain over and over to accept.
+// A process has a limited number of file descriptors. Untrusted clients must not take them all, nor
+// make libzmq's listener retry accept() in a busy loop.
 #include <vector>
 
 #include "tests/strangers/target.hpp"

@@ -1,4 +1,4 @@
-// `posed devices` on gloves that umockdev plugs in.
+// `posed devices` with gloves that umockdev simulates.
 #include <catch2/catch.hpp>
 
 #include <nlohmann/json.hpp>
@@ -59,7 +59,7 @@ TEST_CASE("posed devices lists a glove on hidraw and a P5, and what becomes of t
 
   const json usb = only(both, p5.node());
   CHECK(usb.at("bus") == "usb");
-  CHECK(usb.at("id") == "1-3");  // it has no serial number, so the socket names it
+  CHECK(usb.at("id") == "1-3");  // it has no serial number, so its USB port path identifies it
   CHECK(usb.at("serial").is_null());
   CHECK(usb.at("port_path") == "1-3");
   CHECK(usb.at("name") == "Essential Reality P5 Virtual Reality");

@@ -1,4 +1,4 @@
-// A P5 through libusb: feature reports, a stream of reports, and a device that goes.
+// A P5 through libusb: feature reports, a stream of reports, and unplugging.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ std::map<std::uint8_t, P5Glove::Bytes> p5_features() {
           {kLedsReport, all(emulated_leds())}};
 }
 
-// umockdev's usbfs node is a file, which no epoll waits for: so it is asked again and again.
+// umockdev's usbfs node is a file, which epoll cannot wait for, so this polls.
 Chunk next(Transport& transport) {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   while (std::chrono::steady_clock::now() < deadline) {
@@ -99,7 +99,7 @@ TEST_CASE("reports of a USB device come in order, one a read, until it is unplug
     const auto transport = drivers::make_usb_transport(std::move(*link));
     REQUIRE(transport->start(0));
     for (int n = 0; n < 100; ++n) {
-      // Now and then more at once than there are transfers.
+      // Sometimes more reports at once than there are transfers.
       const int burst = n % 10 == 0 ? 40 : 1;
       for (int i = 0; i < burst; ++i) {
         glove.say(P5Glove::Bytes(24, static_cast<std::byte>(n + i)));
