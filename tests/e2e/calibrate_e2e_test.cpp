@@ -147,7 +147,7 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
   CHECK(replayed.code == 0);
 }
 
-TEST_CASE("a hand that moved, or never took a pose, makes no calibration") {
+TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
   CalibrationStage stage;
   stage.launch("run");
   stage.put_on();
@@ -193,7 +193,7 @@ TEST_CASE("a hand that moved, or never took a pose, makes no calibration") {
   CHECK(has(useless.err, "add --seconds"));
 }
 
-TEST_CASE("calibrate --connect says what is wrong with what was asked") {
+TEST_CASE("calibrate --connect reports what is wrong with a request") {
   CalibrationStage stage;
   stage.launch("run");
   const auto refused = [&](const std::vector<std::string>& options, const std::string& sentence) {
@@ -212,7 +212,7 @@ TEST_CASE("calibrate --connect says what is wrong with what was asked") {
 }
 
 TEST_CASE(
-    "a stream's calibration waits for its glove; another glove is turned away with a sentence") {
+    "a stream's calibration waits for its glove; another glove is refused with an error message") {
   CalibrationStage stage;
   const std::string toml =
       "format = 1\ndriver = \"lucidgloves\"\nhand = \"right\"\nuser = \"ann\"\n"

@@ -7,7 +7,7 @@ namespace {
 
 using nlohmann::json;
 
-TEST_CASE("ctl changes a running daemon and says from which frame on") {
+TEST_CASE("ctl changes a running daemon and reports from which frame on") {
   Served served;
   served.start();
   const auto ctl = [&](std::vector<std::string> what) {
@@ -77,7 +77,7 @@ TEST_CASE("monitor and top show the daemon, to people and to scripts") {
   CHECK(served.daemon->exit_code() == 0);
 }
 
-TEST_CASE("completion is made from the commands there are") {
+TEST_CASE("completion is generated from the existing commands") {
   const auto bash = posed({"completion", "bash"});
   CHECK(bash.code == 0);
   CHECK(has(bash.out,
@@ -88,7 +88,7 @@ TEST_CASE("completion is made from the commands there are") {
   CHECK(posed({"completion", "tcsh"}).code == 2);
 }
 
-TEST_CASE("nobody there is one sentence") {
+TEST_CASE("an absent daemon gives one error message") {
   const auto ctl = posed({"ctl", "--connect", "tcp://127.0.0.1:9", "--timeout", "0.3", "status"});
   CHECK(ctl.code == 1);
   CHECK(has(ctl.err, "posed: nobody answers at tcp://127.0.0.1:9"));
@@ -97,7 +97,7 @@ TEST_CASE("nobody there is one sentence") {
   CHECK(has(wrong.err, "an endpoint reads like"));
 }
 
-TEST_CASE("a busy port is one sentence, exit 1") {
+TEST_CASE("a busy port gives one error message and exit code 1") {
   Served served;
   served.start();
   Served second;
@@ -111,7 +111,7 @@ TEST_CASE("a busy port is one sentence, exit 1") {
   CHECK(has(busy.err, served.publish + " is in use"));
 }
 
-TEST_CASE("check tells what a config would run, or all that is wrong with it") {
+TEST_CASE("check reports what a config would run, or everything that is wrong with it") {
   Served served;
   const auto good = posed({"check", "--config", served.path("posed.toml"), "--json"});
   INFO(good.err);
@@ -139,7 +139,7 @@ TEST_CASE("check tells what a config would run, or all that is wrong with it") {
   CHECK(has(gone.err, "one.style"));
 }
 
-TEST_CASE("strangers get in nowhere, and a withdrawn key is cut off") {
+TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {
   Served served;
   for (const char* name : {"server", "viewer", "director", "stranger", "other"}) {
     REQUIRE(posed({"keygen", name, "--out", served.folder.path().string()}).code == 0);

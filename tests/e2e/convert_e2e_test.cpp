@@ -88,7 +88,7 @@ TEST_CASE("convert writes what a log's streams published") {
   }
 }
 
-TEST_CASE("convert says what a log lacks and how it is misused") {
+TEST_CASE("convert reports what a log lacks and wrong use") {
   Take stage;
   stage.record();
   (void)stage.convert_all("walk.out.bvh", "walk");

@@ -28,7 +28,7 @@ std::string on_free_ports(std::string toml) {
 
 }  // namespace
 
-TEST_CASE("the demo streams from any folder and learns once", "[demo]") {
+TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   const TempFolder folder;
   const auto kept = folder.path() / "kept";
   const auto prepare = [&] { return posed({"demo", "--prepare", kept.string()}); };
@@ -57,7 +57,7 @@ TEST_CASE("the demo streams from any folder and learns once", "[demo]") {
   CHECK(text_of(kept / "march-to-sway.style") == model);
 }
 
-TEST_CASE("the demo leaves a folder alone that is not its own", "[demo]") {
+TEST_CASE("the demo does not touch a folder that is not its own", "[demo]") {
   const TempFolder folder;
   const auto mine = folder.write("march_1.bvh", "mine");
   const Outcome refused = posed({"demo", "--prepare", folder.path().string()});

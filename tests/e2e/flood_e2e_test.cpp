@@ -116,7 +116,7 @@ std::string config_with_port(std::uint16_t port) {
 
 // The log of a flood replays bit for bit as far as it goes; only data of the flooding stream is
 // missing.
-TEST_CASE("a glove that floods a daemon that records costs its neighbour's log nothing") {
+TEST_CASE("a glove that floods a recording daemon loses nothing of its neighbour's log") {
   Stage stage;
   const std::uint16_t port = free_port();
   stage.folder.write("posed.toml", config_with_port(port));
@@ -141,7 +141,7 @@ TEST_CASE("a glove that floods a daemon that records costs its neighbour's log n
   CHECK(nlohmann::json::parse(replay.out).at("compared") > 100);
 }
 
-TEST_CASE("a glove that floods the daemon over TCP costs its neighbour no frame") {
+TEST_CASE("a glove that floods the daemon over TCP loses no frame of its neighbour") {
   Stage stage;
   const std::uint16_t port = free_port();
   stage.folder.write("posed.toml", config_with_port(port));

@@ -67,7 +67,7 @@ class GloveStage : public Stage {
   }
 };
 
-TEST_CASE("a glove comes late, goes and comes back; the others never notice") {
+TEST_CASE("a glove comes late, is unplugged and comes back; the others are not affected") {
   GloveStage stage;
   stage.record();  // nothing is plugged in yet
   std::optional<Process> right, left;

@@ -42,7 +42,8 @@ bool bends_as(const v1::Frame& frame, Pose pose) {
 
 }  // namespace
 
-TEST_CASE("a CyberGlove III that connects over TCP is read, lost and found; no frame is of two") {
+TEST_CASE(
+    "a CyberGlove III that connects over TCP is read, lost and found; no frame mixes two records") {
   Stage stage;
   const std::string endpoint = "127.0.0.1:" + std::to_string(free_port());
   stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +

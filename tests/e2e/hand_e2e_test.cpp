@@ -108,7 +108,7 @@ TEST_CASE("labels are performed on a live hand and on a stream without a device"
   CHECK(served.daemon->exit_code() == 0);
 }
 
-TEST_CASE("a play that cannot be is one sentence and an exit code") {
+TEST_CASE("an impossible play gives one error message and an exit code") {
   Served served;
   write_hands(served);
   served.folder.write("posed.toml", std::string(kTwoHands) +
@@ -167,7 +167,7 @@ TEST_CASE("a config that cannot be performed is refused with the stream's name")
   CHECK(fine.code == 0);
 }
 
-TEST_CASE("a live hand comes out as `posed smooth` writes it") {
+TEST_CASE("a live hand is published as `posed smooth` writes it") {
   Served served;
   write_hands(served);
   served.folder.write("posed.toml", R"(realtime = false

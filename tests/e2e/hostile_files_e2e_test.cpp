@@ -69,7 +69,7 @@ int forge(const std::string& path, const std::string& table, const std::string& 
   return static_cast<int>(forged.size());
 }
 
-TEST_CASE("TOML nested 31,000 deep is one sentence, whichever file it stands in") {
+TEST_CASE("TOML nested 31,000 deep gives one error message, whichever file contains it") {
   const Served served;
   const std::string deep = served.folder.write("deep.toml", toml_bombs()[0]).string();
   const std::string config = served.path("posed.toml");
@@ -115,7 +115,7 @@ TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its l
   CHECK(replay.err.size() < 2000);
 }
 
-TEST_CASE("what is no file is one sentence, whichever option or key names it") {
+TEST_CASE("a path that is not a file gives one error message, whichever option or key names it") {
   const Served served;
   const std::string config = served.path("posed.toml");
   const std::string folder = served.folder.path().string();
@@ -139,8 +139,7 @@ TEST_CASE("what is no file is one sentence, whichever option or key names it") {
   }
 }
 
-TEST_CASE(
-    "a log whose driver has a wild name is refused without a word of it reaching the terminal") {
+TEST_CASE("a log with escape sequences in its driver's name is refused without printing them") {
   Served stage;
   stage.record();
   stage.daemon->send(SIGTERM);
@@ -158,7 +157,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("check says that a glove is away, and that it would be waited for") {
+TEST_CASE("check reports that a glove is not connected, and that the daemon would wait for it") {
   const Served served;
   served.folder.write("posed.toml", stream_with("driver = \"cyberglove\"\nport = \"/dev/none\"\n"));
   const Outcome text = posed({"check", "--config", served.path("posed.toml")});

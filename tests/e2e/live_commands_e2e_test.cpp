@@ -47,7 +47,7 @@ std::string event_with(Process& events, const std::string& part) {
 
 constexpr const char* kNobody = "tcp://127.0.0.1:9";
 
-TEST_CASE("monitor prints a glove's loss and return, and lives on") {
+TEST_CASE("monitor prints a glove's loss and return, and continues") {
   Stage stage;
   stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +
                                        "[[stream]]\nname = \"right\"\ndriver = \"lucidgloves\"\n"
@@ -95,7 +95,7 @@ TEST_CASE("a daemon that is gone is not shown as live") {
   }
 }
 
-TEST_CASE("whoever waits for a daemon is told what for") {
+TEST_CASE("commands that wait for a daemon report what they wait for") {
   for (const char* command : {"top", "monitor"}) {
     Process waits({command, "--connect", kNobody, "--json"});
     CHECK(comes_to_say(waits, "posed: waiting: nobody answers at tcp://127.0.0.1:9"));
@@ -138,7 +138,7 @@ TEST_CASE("a status is as new as the acknowledgement before it, and events say w
   CHECK(std::stoull(stream().at("frames").get<std::string>()) > before);
 }
 
-TEST_CASE("a published replay says that it is one, and its times make sense") {
+TEST_CASE("a published replay is marked as one, and its times are consistent") {
   const TempFolder folder;
   const auto log = (folder.path() / "staged.plog").string();
   std::filesystem::copy_file(golden("replay/staged.plog"), log);
@@ -205,7 +205,7 @@ TEST_CASE("a recording ends with what was written") {
   CHECK(has(served.daemon->errors(), "nothing is missing"));
 }
 
-TEST_CASE("ctl knows the file it is given before it sends it") {
+TEST_CASE("ctl checks a file before it sends it") {
   Served served;
   served.start();
   const auto fit =
@@ -230,7 +230,7 @@ TEST_CASE("ctl knows the file it is given before it sends it") {
   CHECK(served.ctl({"haptics", "walker"}).code == 2);
 }
 
-TEST_CASE("a piped status has whole names, and no line ends in blanks") {
+TEST_CASE("a piped status has complete names, and no line ends in blanks") {
   Served served;
   const std::string name = "a-style-with-a-rather-long-name-that-was-cut-before.style";
   std::filesystem::copy_file(served.path("one.style"), served.path(name));

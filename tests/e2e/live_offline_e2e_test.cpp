@@ -199,7 +199,7 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
   }
 }
 
-TEST_CASE("run --until-end ends with 0, and a client hears the last frame and the end") {
+TEST_CASE("run --until-end ends with 0, and a client receives the last frame and the end") {
   Served served;
   const clip::Clip offline = applied_cold(served);
   served.folder.write("posed.toml", config_of("", "path = \"walk.bvh\"\nloop = false"));
@@ -258,7 +258,7 @@ TEST_CASE("a source that falls silent turns stale, holds its pose and recovers")
   CHECK(held >= 2);
 }
 
-TEST_CASE("bad input is one sentence that says what to do, and the exit code says whose fault") {
+TEST_CASE("bad input gives one error message that states what to do, and a matching exit code") {
   Served served;
   write_bad_files(served);
   served.start();

@@ -113,7 +113,7 @@ TEST_CASE("a stderr that nobody reads costs no frame, and SIGTERM still ends the
   stop(served);
 }
 
-TEST_CASE("what the log could not say while nobody read it comes once somebody does") {
+TEST_CASE("log lines that nobody read are written once somebody reads") {
   Served served;
   Pipe err;
   const std::size_t held = err.fill();
@@ -127,7 +127,7 @@ TEST_CASE("what the log could not say while nobody read it comes once somebody d
   CHECK(has(log.substr(held), "ending"));
 }
 
-TEST_CASE("a stderr that is closed under it ends neither run nor record") {
+TEST_CASE("a closed stderr ends neither run nor record") {
   for (const bool recording : {false, true}) {
     Served served;
     Pipe err;

@@ -145,7 +145,7 @@ TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
   CHECK(lost_s[1] <= 0.5);
 }
 
-TEST_CASE("record and replay refuse what they must with one sentence") {
+TEST_CASE("record and replay refuse wrong use with one error message") {
   Walkers stage;
   stage.folder.write("take.plog", "not a log, but somebody's");
   const Outcome kept =

@@ -45,7 +45,7 @@ std::vector<v1::Frame> frames_of(const std::filesystem::path& path) {
 
 }  // namespace
 
-TEST_CASE("a replay keeps the take's own pace and publishes as the run did") {
+TEST_CASE("a replay keeps the recording's own timing and publishes as the run did") {
   const TempFolder folder;
   const std::string log = staged_log(folder);
   const auto begin = std::chrono::steady_clock::now();
@@ -71,7 +71,7 @@ TEST_CASE("a replay keeps the take's own pace and publishes as the run did") {
   CHECK(took.count() >= 10.0 * take_s);
 }
 
-TEST_CASE("one far time in a log keeps a paced replay from nothing: it is skipped and told") {
+TEST_CASE("one wrong time in a log does not stop a timed replay: it is skipped and reported") {
   const TempFolder folder;
   const std::string log = staged_log(folder);
   run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 86400000000000 WHERE id = 20");
@@ -126,7 +126,7 @@ TEST_CASE("a replay on another instruction set differs in the last bits at most"
   CHECK(worst <= 1e-5F);
 }
 
-TEST_CASE("a full disk stops the recording and not the stream, and is counted and told") {
+TEST_CASE("a full disk stops the recording and not the stream, and is counted and reported") {
   Served served;
   served.daemon.emplace(std::vector<std::string>{"record", "--config", served.path("posed.toml"),
                                                  "--out", served.path("take.plog")});

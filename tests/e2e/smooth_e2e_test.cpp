@@ -80,7 +80,7 @@ TEST_CASE("smooth never destroys a recording", "[smooth]") {
   CHECK(posed({"smooth", in, "--out", other, "--overwrite"}).code == 0);
 }
 
-TEST_CASE("wrong use of smooth is one sentence", "[smooth]") {
+TEST_CASE("wrong use of smooth gives one error message", "[smooth]") {
   const TempFolder folder;
   const std::string in = folder.path() / "in.csv";
   const std::string out = folder.path() / "out.csv";

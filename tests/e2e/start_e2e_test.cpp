@@ -84,7 +84,7 @@ class SilentGloves : public Stage {
 
 }  // namespace
 
-TEST_CASE("eight silent gloves hold up neither the start, nor the walker, nor the end") {
+TEST_CASE("eight silent gloves delay neither the start, nor the walker, nor the end") {
   SilentGloves stage;
   const auto begin = SteadyClock::now();
   stage.launch("run");
@@ -130,7 +130,7 @@ TEST_CASE("a second signal changes nothing") {
   CHECK(posed({"replay", stage.path("take.plog"), "--speed", "max"}).code == 0);
 }
 
-TEST_CASE("options of a glove that make no sense are refused at the start, glove or not") {
+TEST_CASE("invalid options of a glove are refused at the start, with or without the glove") {
   Stage stage;
   for (const auto& [options, sentence] : std::vector<std::pair<std::string, std::string>>{
            {"baud = -1\n", "stream 'right': baud should be 1 to 4000000"},
@@ -149,7 +149,7 @@ TEST_CASE("options of a glove that make no sense are refused at the start, glove
   }
 }
 
-TEST_CASE("--until-end waits for what can end, and is refused where nothing can") {
+TEST_CASE("--until-end waits for streams that can end, and is refused where none can") {
   SilentGloves stage;
   const Outcome refused = posed({"run", "--config", stage.path("posed.toml"), "--until-end"});
   CHECK(refused.code == 2);
@@ -169,7 +169,7 @@ TEST_CASE("--until-end waits for what can end, and is refused where nothing can"
   CHECK(json::parse(replay.out).at("compared") > 100);
 }
 
-TEST_CASE("a stdout that is full holds up neither the start nor the end") {
+TEST_CASE("a full stdout delays neither the start nor the end") {
   SilentGloves stage;
   Pipe out;
   out.fill();

@@ -71,7 +71,7 @@ struct Studio {
 
 }  // namespace
 
-TEST_CASE("what the command line says beside an experiment file overrides it or is refused",
+TEST_CASE("command line options beside an experiment file override it or are refused",
           "[train_style]") {
   const Studio studio;
   const auto usual = studio.experiment({}, "default.style");
@@ -101,7 +101,7 @@ TEST_CASE("what the command line says beside an experiment file overrides it or 
   }
 }
 
-TEST_CASE("nothing is trained from nonsense", "[train_style]") {
+TEST_CASE("no model is trained from useless data", "[train_style]") {
   const Studio studio;
   const auto refused = [&](const std::string& from, const std::string& to, const std::string& why) {
     const auto done =

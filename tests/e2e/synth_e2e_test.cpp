@@ -46,7 +46,7 @@ std::string output_of(const std::string& command) {
   return said;
 }
 
-TEST_CASE("synth tells its states and keeps fingers apart, as CSV and as BVH") {
+TEST_CASE("synth reports its states and keeps fingers apart, as CSV and as BVH") {
   const Studio studio;
   for (const std::string out : {"hand.csv", "hand.bvh"}) {
     const Outcome made = studio.synth(kString, out, {"--hand", "left"});
@@ -92,7 +92,7 @@ TEST_CASE("an independent program solves the model file to the same trajectory")
   CHECK(worst_rad < 1e-6);
 }
 
-TEST_CASE("synth refuses what it cannot perform with one sentence and exit code 2") {
+TEST_CASE("synth refuses what it cannot perform with one error message and exit code 2") {
   const Studio studio;
   const Outcome unknown = studio.synth("g 7", "hand.csv");
   CHECK(unknown.code == 2);

@@ -7,7 +7,7 @@
 namespace posed::test {
 namespace {
 
-TEST_CASE("connections beyond what the daemon has descriptors for are cut, and cost no CPU") {
+TEST_CASE("connections beyond the daemon's descriptor limit are cut, and cost no CPU") {
   Target target;
   target.most_files = 64;
   target.start();

@@ -77,14 +77,14 @@ std::string repeated(std::string_view bytes) {
   return all;
 }
 
-TEST_CASE("messages without end do not fill the memory of the publisher") {
+TEST_CASE("endless messages do not fill the memory of the publisher") {
   Persistent peer("SUB");
   const std::string parts = repeated(zmtp::frame("", 1));
   check_bounded("endless parts to publish",
                 [&](const Target& target) { peer.send(target.publish, parts); });
 }
 
-TEST_CASE("messages without end do not fill the memory of control") {
+TEST_CASE("endless messages do not fill the memory of control") {
   Persistent peer("DEALER");
   const std::string parts = repeated(zmtp::frame("", 1));
   check_bounded("endless parts to control",
@@ -101,7 +101,7 @@ TEST_CASE("large messages do not fill the memory of the publisher") {
   });
 }
 
-TEST_CASE("handshakes that do not end fill no memory") {
+TEST_CASE("unfinished handshakes do not fill the memory") {
   std::vector<RawPeer> peers;
   const Target* attacked = nullptr;
   check_bounded("unfinished handshakes to control", [&](const Target& target) {
@@ -115,7 +115,7 @@ TEST_CASE("handshakes that do not end fill no memory") {
   });
 }
 
-TEST_CASE("random subscriptions cost the others nothing") {
+TEST_CASE("random subscriptions do not affect other clients") {
   Persistent peer("SUB");
   std::mt19937 random(5);
   check_bounded("random subscriptions", [&](const Target& target) {
@@ -129,7 +129,7 @@ TEST_CASE("random subscriptions cost the others nothing") {
   });
 }
 
-TEST_CASE("subscriptions to streams that are not there have an end") {
+TEST_CASE("subscriptions to streams that do not exist are limited") {
   Persistent peer("SUB");
   std::mt19937 random(6);
   check_bounded("subscriptions to possible streams", [&](const Target& target) {
@@ -144,14 +144,14 @@ TEST_CASE("subscriptions to streams that are not there have an end") {
   });
 }
 
-TEST_CASE("skeletons asked for over and over cost the others nothing") {
+TEST_CASE("repeated requests for skeletons do not affect other clients") {
   Persistent peer("SUB");
   const std::string asked = repeated(zmtp::subscribe("skeleton/"));
   check_bounded("skeletons over and over",
                 [&](const Target& target) { peer.send(target.publish, asked); });
 }
 
-TEST_CASE("requests with damaged texts write no flood of lines") {
+TEST_CASE("requests with invalid texts do not flood the log") {
   Target target;
   target.start();
   v1::ControlRequest request;
@@ -168,7 +168,7 @@ TEST_CASE("requests with damaged texts write no flood of lines") {
   CHECK(target.daemon->errors().size() < 2000);
 }
 
-TEST_CASE("requests whose answers nobody reads fill no memory") {
+TEST_CASE("requests whose replies nobody reads do not fill the memory") {
   Persistent peer("DEALER");
   v1::ControlRequest status;
   status.mutable_status();

@@ -12,7 +12,7 @@ std::string old_frame(std::string_view body, bool more) {
   return bytes.append(body);
 }
 
-TEST_CASE("the body of a web page's POST is no message: nobody is stopped by it") {
+TEST_CASE("the body of a web page's POST is not a message and stops nothing") {
   Target target;
   target.start();
   v1::ControlRequest stop;

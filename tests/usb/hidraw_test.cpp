@@ -88,7 +88,7 @@ void check_driver(const std::string& name, const Options& options, HidGlove& glo
 
 }  // namespace
 
-TEST_CASE("reports of a hidraw node come one a read, until the glove is unplugged") {
+TEST_CASE("a hidraw node gives one report per read, until the glove is unplugged") {
   Bench bench;
   HidGlove glove(bench, kUltra), other(bench, kMine);
   glove.plug();
@@ -116,7 +116,7 @@ TEST_CASE("reports of a hidraw node come one a read, until the glove is unplugge
   CHECK(gone.error().message.find("no HID node") != std::string::npos);
 }
 
-TEST_CASE("a replugged glove is announced, and found by what it is where it is now") {
+TEST_CASE("a replugged glove is reported, and found by its identity on its new node") {
   Bench bench;
   HidGlove glove(bench, kUltra);
   drivers::HotplugMonitor arrivals;
@@ -150,7 +150,7 @@ TEST_CASE("the 5DT driver opens an Ultra USB, decodes it, loses it and opens it 
                glove, "5d70:0001 ULTRA-7");
 }
 
-TEST_CASE("a HID glove that only a description knows is opened, started and decoded") {
+TEST_CASE("a HID glove with only a description is opened, started and decoded") {
   const TempFolder folder;
   const auto description = folder.write("mine.toml", readme_description());
   Bench bench;

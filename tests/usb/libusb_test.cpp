@@ -57,7 +57,7 @@ bool mentions(const Error& error, const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("feature reports go to and from a USB device, and one that it has not is an error") {
+TEST_CASE("feature reports go to and from a USB device, and a missing one is an error") {
   Bench bench;
   P5Glove glove(bench, kP5, p5_features());
   glove.plug();
@@ -88,7 +88,7 @@ TEST_CASE("feature reports go to and from a USB device, and one that it has not 
   CHECK(ports.usb(p5_settings()));
 }
 
-TEST_CASE("reports of a USB device come in order, one a read, until it is unplugged") {
+TEST_CASE("reports of a USB device come in order, one per read, until it is unplugged") {
   Bench bench;
   P5Glove glove(bench, kP5, p5_features());
   TransportFactory ports;
@@ -150,7 +150,7 @@ TEST_CASE("the P5 driver reads heads, LEDs and reports from libusb") {
   CHECK_FALSE(same_pose(live.frames.front(), live.frames[25]));
 }
 
-TEST_CASE("a P5 that gives no feature report bends its fingers all the same, with a warning") {
+TEST_CASE("a P5 without feature reports still gives finger bends, with a warning") {
   Bench bench;
   P5Glove glove(bench, kP5, {});
   glove.plug();

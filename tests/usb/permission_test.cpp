@@ -33,7 +33,7 @@ void forbid(const Bench& bench, const std::string& node) {
 
 }  // namespace
 
-TEST_CASE("a glove that may not be opened says which rule mends that") {
+TEST_CASE("a glove without permission names the udev rule that gives access") {
   Bench bench;
   HidGlove ultra(bench, kUltra);
   P5Glove p5(bench, kP5, {});
@@ -68,7 +68,7 @@ TEST_CASE("a glove that may not be opened says which rule mends that") {
   CHECK(driver.error().message == usb_trouble);
 }
 
-TEST_CASE("a node of a group is mended by joining it, too; a node for all has no trouble") {
+TEST_CASE("joining a node's group gives access, too; a node for everyone has no error") {
   Bench bench;
   HidGlove ultra(bench, kUltra);
   ultra.plug();
@@ -94,7 +94,7 @@ TEST_CASE("a node of a group is mended by joining it, too; a node for all has no
   CHECK(ports.hid({.vendor = kUltra.vendor}));
 }
 
-TEST_CASE("a daemon that may not open a glove says so, runs, and opens it once it may") {
+TEST_CASE("a daemon without permission for a glove reports it, runs, and opens it once permitted") {
   Bench bench;
   HidGlove ultra(bench, kUltra);
   const Speaker speaker(

@@ -63,7 +63,7 @@ std::string config(const std::string& description) {
 
 }  // namespace
 
-TEST_CASE("gloves on hidraw go and come back on another node; the log has what they said") {
+TEST_CASE("gloves on hidraw are unplugged and return on another node; the log has all reports") {
   const TempFolder folder;
   const std::string description = folder.write("mine.toml", readme_description());
   const std::string log = folder.path() / "take.plog";

@@ -1,5 +1,5 @@
-// The trajectory solver against Debian's SPTK: its recursive mlpg comes to the full solve as its
-// influence range grows (models/trajectory/README.md, measured figures).
+// The trajectory solver against Debian's SPTK: its recursive mlpg converges to the full solve as
+// its influence range grows (models/trajectory/README.md, measured figures).
 #include "tests/bench/sptk.hpp"
 
 #include <cmath>

@@ -1,4 +1,5 @@
-// A glove's greeting comes back key by key, and a damaged one is refused in one sentence.
+// A glove's device info (greeting) is read back key by key, and a damaged one gives one error
+// message.
 #include "drivers/glove/device_info.hpp"
 
 #include <catch2/catch.hpp>
@@ -10,7 +11,7 @@ namespace {
 
 constexpr std::array<std::string_view, 2> kForms{"alpha", "legacy"};
 
-// Reads what a made-up glove says; empty when all is well.
+// Reads the device info of a fictitious glove and returns the error; empty when it is accepted.
 std::string complaint(const std::string& text) {
   Greeting greeting(text, "toy", "A9");
   (void)greeting.side();
@@ -22,7 +23,7 @@ std::string complaint(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("a greeting gives back what a driver put into it") {
+TEST_CASE("device info (greeting) gives back what a driver put into it") {
   Greeting greeting("toy form=legacy sensors=22 hand=left name=x=y", "toy", "A9");
   CHECK(greeting.side() == Side::kLeft);
   CHECK(greeting.whole("sensors", 18, 22) == 22);
@@ -31,7 +32,7 @@ TEST_CASE("a greeting gives back what a driver put into it") {
   CHECK(greeting.finish());
 }
 
-TEST_CASE("a damaged greeting is refused, and the sentence says what is wrong with it") {
+TEST_CASE("damaged device info (greeting) is refused, and the message states what is wrong") {
   CHECK(complaint("toy hand=right sensors=18 form=alpha").empty());
   CHECK(complaint("other hand=right sensors=18 form=alpha").find("its name") != std::string::npos);
   CHECK(complaint("toy hand=right form=alpha").find("lacks 'sensors'") != std::string::npos);

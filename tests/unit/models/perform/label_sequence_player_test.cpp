@@ -1,4 +1,4 @@
-// Durations with tempo (tests/golden/durations.json) and scripts played frame by frame.
+// Durations with tempo (tests/golden/durations.json) and label sequences played frame by frame.
 #include "models/perform/label_sequence_player.hpp"
 
 #include <cmath>
@@ -75,7 +75,8 @@ TEST_CASE("states last as the fixture's, natural and with tempo", "[generate]") 
   }
 }
 
-TEST_CASE("a string at tempo 0.5 to 2 lasts its natural length over the tempo", "[generate]") {
+TEST_CASE("a sequence at tempo 0.5 to 2 lasts its natural length divided by the tempo",
+          "[generate]") {
   const auto evidence = toy();
   for (const std::string labels : {"g1c34p", "g", "pc"}) {
     const auto natural = static_cast<double>(played(evidence, labels).size());
@@ -87,7 +88,7 @@ TEST_CASE("a string at tempo 0.5 to 2 lasts its natural length over the tempo", 
   }
 }
 
-TEST_CASE("a played string is the full solve but for the look-ahead", "[generate]") {
+TEST_CASE("a played sequence equals the full solve except for the look-ahead", "[generate]") {
   const auto evidence = toy();
   const auto frames = played(evidence, "g1c34p");
   perform::LabelSequence script(8);
@@ -120,7 +121,7 @@ TEST_CASE("a played string is the full solve but for the look-ahead", "[generate
   CHECK(frames.back().state == gesture::kStates - 1);
 }
 
-TEST_CASE("labels may come while it plays, and change nothing but what lies ahead", "[generate]") {
+TEST_CASE("labels may be appended while it plays, and change only later frames", "[generate]") {
   const auto evidence = toy();
   const auto whole = played(evidence, "gcp");
   for (const int when : {1, 20, 40}) {
@@ -141,7 +142,7 @@ TEST_CASE("labels may come while it plays, and change nothing but what lies ahea
   }
 }
 
-TEST_CASE("playback takes up the live hand's pose and velocity without a snap", "[generate]") {
+TEST_CASE("the lead-in continues the live hand's pose and velocity without a snap", "[generate]") {
   for (const double rate_hz : {30.0, 60.0, 120.0}) {
     const auto evidence = toy(rate_hz);
     LabelSequencePlayer player(evidence, {});
@@ -167,7 +168,7 @@ TEST_CASE("playback takes up the live hand's pose and velocity without a snap", 
   }
 }
 
-TEST_CASE("a looped script begins anew, a resting one waits for its next label", "[generate]") {
+TEST_CASE("a looped sequence starts again, a resting one waits for its next label", "[generate]") {
   const auto evidence = toy();
   const int natural = static_cast<int>(played(evidence, "gc").size());
   LabelSequencePlayer looped(evidence, {});
@@ -196,7 +197,7 @@ TEST_CASE("a looped script begins anew, a resting one waits for its next label",
   CHECK(after.back().angle[9] > 1.0);
 }
 
-TEST_CASE("a player takes nothing from the heap and says when it is full", "[generate]") {
+TEST_CASE("a player does not allocate and reports when it is full", "[generate]") {
   const auto evidence = toy();
   LabelSequencePlayer player(evidence, {.capacity = 4});
   PlayedFrame frame;
@@ -209,7 +210,7 @@ TEST_CASE("a player takes nothing from the heap and says when it is full", "[gen
   player.start(HandAngles{}, HandAngles{});
   for (int t = 0; t < 150; ++t) static_cast<void>(player.next(frame));
   player.set_tempo(1.7);
-  CHECK(player.append(1));  // room again: labels that were performed are forgotten
+  CHECK(player.append(1));  // there is space again, because performed labels are forgotten
   while (player.next(frame)) {
   }
   player.clear();

@@ -1,5 +1,5 @@
-// Whole strings: their plan, the look-ahead against the full solve, gestures that nobody recorded,
-// global variance.
+// Whole label sequences: their states, the look-ahead against the full solve, gestures that were
+// not recorded, global variance.
 #include "models/perform/perform.hpp"
 
 #include <cmath>
@@ -56,8 +56,8 @@ double jerk_deg(const Performance& p) {
   return kDegrees * std::sqrt(sum / static_cast<double>((p.angles.size() - 3) * kHandChannels));
 }
 
-// Mean over states 3 and 4 of a label against real poses: rms over the flexion angles, thumb left
-// out.
+// Mean over states 3 and 4 of a label against real poses: rms over the flexion angles without the
+// thumb.
 double held_off_deg(const Performance& p, int label, const Eigen::VectorXd& real) {
   Eigen::VectorXd held = Eigen::VectorXd::Zero(kHandChannels);
   int frames = 0;
@@ -81,7 +81,7 @@ double held_off_deg(const Performance& p, int label, const Eigen::VectorXd& real
 
 }  // namespace
 
-TEST_CASE("a performance tells its states, from the first frame to the last", "[generate]") {
+TEST_CASE("a performance lists its states, from the first frame to the last", "[generate]") {
   const auto evidence = evidence_of(test::toy_gesture_model());
   const auto p = performed(evidence, "g 1 c");
   REQUIRE(p.states.size() == 3 * gesture::kStates);
@@ -97,7 +97,7 @@ TEST_CASE("a performance tells its states, from the first frame to the last", "[
   CHECK(p.states[7].leaf[1] == 2);
 }
 
-TEST_CASE("strings of no label and of unknown labels are refused by name", "[generate]") {
+TEST_CASE("empty sequences and unknown labels are refused by name", "[generate]") {
   const auto model = test::toy_gesture_model();
   const auto unknown = perform::labels_of(model, "g 2 c five");
   REQUIRE_FALSE(unknown);
@@ -108,8 +108,8 @@ TEST_CASE("strings of no label and of unknown labels are refused by name", "[gen
 }
 
 // The table in models/trajectory/README.md, "Look-ahead", is of one corpus; corpora differ by a
-// factor of two, so ten are asked.
-TEST_CASE("a look-ahead of 15 or 20 frames is the full solve for the eye", "[generate]") {
+// factor of two, so ten are used.
+TEST_CASE("a look-ahead of 15 or 20 frames is nearly the full solve", "[generate]") {
   constexpr int kCorpora = 10;
   double at_15_deg = 0.0;
   double at_20_deg = 0.0;
@@ -137,7 +137,7 @@ TEST_CASE("a look-ahead of 15 or 20 frames is the full solve for the eye", "[gen
   CHECK(std::abs(jerk_ratio - 1.0) <= 0.03);
 }
 
-TEST_CASE("gestures of a real hand that nobody recorded are near the real ones", "[real]") {
+TEST_CASE("gestures of a real hand that were not recorded are near the real ones", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   auto model = gesture::train_gesture({test::real_pose_corpus(*folder, 7)}, {});
@@ -164,8 +164,8 @@ TEST_CASE("gestures of a real hand that nobody recorded are near the real ones",
   }
 }
 
-// All 1,296 strings of four labels are asked in `posed bench generate`.
-TEST_CASE("no finger goes through another in strings of a real hand's gestures", "[real]") {
+// `posed bench generate` runs all 1,296 sequences of four labels.
+TEST_CASE("no finger goes through another in sequences of a real hand's gestures", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   auto model = gesture::train_gesture({test::real_pose_corpus(*folder, 7)}, {});
@@ -180,10 +180,10 @@ TEST_CASE("no finger goes through another in strings of a real hand's gestures",
     CHECK(perform::smallest_gap_m(p, default_hand_shape()) >= 0.0);
     before_m = std::min(before_m, kept.before_m);
   }
-  CHECK(before_m < 0.0);  // else the stage had nothing to do, and nothing was shown
+  CHECK(before_m < 0.0);  // otherwise the test would prove nothing
 }
 
-TEST_CASE("global variance gives range back, within its limit", "[generate]") {
+TEST_CASE("global variance restores the range, within its limit", "[generate]") {
   auto model = gesture::train_gesture({test::study_corpus(3)}, {});
   REQUIRE(model.has_value());
   const auto evidence = evidence_of(std::move(*model));

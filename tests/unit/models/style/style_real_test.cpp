@@ -1,5 +1,5 @@
-// The style model's figures on real recordings: acted walks and runs at 30 Hz, takes 001 taught and
-// takes 002 held out.
+// The style model's figures on real recordings: acted walks and runs at 30 Hz, trained on takes 001
+// and evaluated on takes 002.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -39,7 +39,7 @@ struct Lesson {
   std::string motion, group;
 };
 
-// A model of the lessons' takes 001, the target feminine.
+// A model trained on takes 001 of the lessons, with the target feminine.
 style::StyleModel taught(const std::vector<Lesson>& lessons) {
   std::vector<style::TrainingClip> clips;
   for (const Lesson& lesson : lessons) {
@@ -96,8 +96,7 @@ clip::Clip upsampled(const clip::Clip& clip, double rate_hz) {
 
 }  // namespace
 
-TEST_CASE("a walk taught from one take each comes near the style's held-out take",
-          "[style][real]") {
+TEST_CASE("a walk trained on one take each comes near the style's held-out take", "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
   const auto result = score(taught_walk(), take("walk_masculine_002"), take("walk_feminine_002"));
   CHECK(result.cycle_ratio <= 0.15);
@@ -117,8 +116,9 @@ TEST_CASE("walk and run in one model: the run is styled, the walk is not hurt", 
   CHECK(score(both, source, target).cycle_ratio <= alone.cycle_ratio + 0.005);
 }
 
-TEST_CASE("a normal walk among the sources is styled; a walk in the style is left as it is",
-          "[style][real]") {
+TEST_CASE(
+    "a normal walk among the sources is styled; a walk already in the style is hardly changed",
+    "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
   const auto model = taught({{"walk", "masculine"}, {"walk", "normal"}, {"walk", "feminine"}});
   const auto target = take("walk_feminine_002");
@@ -129,7 +129,7 @@ TEST_CASE("a normal walk among the sources is styled; a walk in the style is lef
   CHECK(score(taught_walk(), target, take("walk_feminine_001")).component_rms_deg <= 2.0);
 }
 
-TEST_CASE("a model taught at 30 Hz serves the same walk at 120 Hz, frame by frame",
+TEST_CASE("a model trained at 30 Hz works on the same walk at 120 Hz, frame by frame",
           "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
   const auto model = taught_walk();

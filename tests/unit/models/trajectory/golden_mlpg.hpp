@@ -1,4 +1,5 @@
-// Readers of the trajectory fixture (tests/golden/mlpg.json): evidence and expected trajectories.
+// Readers of the trajectory fixture (tests/golden/mlpg.json): information rows and expected
+// trajectories.
 #pragma once
 
 #include <algorithm>
@@ -49,7 +50,7 @@ inline double off(const double* row, const std::vector<double>& expected) {
   double worst = 0.0;
   for (std::size_t c = 0; c < expected.size(); ++c) {
     const double difference = std::abs(row[c] - expected[c]);
-    worst = difference <= worst ? worst : difference;  // so that not a number counts
+    worst = difference <= worst ? worst : difference;  // so that NaN counts as a difference
   }
   return worst;
 }

@@ -1,4 +1,5 @@
-// Trajectories from evidence against the numpy fixture (tests/golden/mlpg.json), 1e-8.
+// Trajectories from information rows against the numpy fixture (tests/golden/mlpg.json), within
+// 1e-8.
 #include <limits>
 
 #include <catch2/catch.hpp>
@@ -28,7 +29,7 @@ double worst_of(const trajectory::Window& window, const nlohmann::json& expected
 
 }  // namespace
 
-TEST_CASE("a whole string is solved under all boundary rules", "[generate]") {
+TEST_CASE("a whole sequence is solved under all boundary rules", "[generate]") {
   const auto golden = test::golden_json("mlpg.json");
   const auto evidence = test::evidence_of(golden, false);
   const auto frames = test::frames_of(evidence);
@@ -47,7 +48,7 @@ TEST_CASE("a whole string is solved under all boundary rules", "[generate]") {
   CHECK(worst_of(window, golden["x_hold"]) < kExact);
 }
 
-TEST_CASE("observations with a dropout are evidence like any other", "[generate]") {
+TEST_CASE("observations with a dropout are information like any other", "[generate]") {
   const auto golden = test::golden_json("mlpg.json");
   const auto evidence = test::evidence_of(golden, true);
   trajectory::Window window(evidence.channels(), evidence.frames());
@@ -55,7 +56,7 @@ TEST_CASE("observations with a dropout are evidence like any other", "[generate]
   CHECK(worst_of(window, golden["x_obs"]) < kExact);
 }
 
-TEST_CASE("strings of one and two frames are solved", "[generate]") {
+TEST_CASE("sequences of one and two frames are solved", "[generate]") {
   trajectory::InformationForm evidence(1, 2);
   for (int t = 0; t < 2; ++t) {
     evidence.row(t, trajectory::kPosition)[0] = 4.0;
@@ -72,7 +73,7 @@ TEST_CASE("strings of one and two frames are solved", "[generate]") {
   CHECK(window.x(0)[0] == Approx(0.5));  // 4 / (4 + 2^2)
   window.solve(frames);
   CHECK(window.x(1)[0] == Approx(2.0));
-  // Held edges: both curves are +-(x1 - x0) = 0 with precision 1 each.
+  // Held edges: both delta-deltas are +-(x1 - x0) = 0 with precision 1 each.
   window.solve(frames, Boundary::kHold);
   CHECK(window.x(0)[0] + window.x(1)[0] == Approx(3.0));
   CHECK(window.x(1)[0] - window.x(0)[0] == Approx(0.5));
@@ -125,7 +126,7 @@ TEST_CASE("the fixed-lag variance is that of the frames so far", "[generate]") {
   }
 }
 
-TEST_CASE("a solve takes nothing from the heap, and every width gives the same", "[generate]") {
+TEST_CASE("a solve does not allocate, and every vector width gives the same", "[generate]") {
   const auto golden = test::golden_json("mlpg.json");
   const auto narrow = test::evidence_of(golden, true);
   trajectory::InformationForm wide(66, narrow.frames());
