@@ -50,14 +50,16 @@ class Trainer {
 
   bool train_isolated() {
     for (std::size_t label = 0; label < label_models_.size(); ++label) {
-      if (!tell(0.5 * static_cast<double>(label) / static_cast<double>(label_models_.size()))) {
+      if (!report_progress(0.5 * static_cast<double>(label) /
+                           static_cast<double>(label_models_.size()))) {
         return false;
       }
       train_label(static_cast<int>(label));
     }
     out_.log_likelihood = 0.0;
     for (std::size_t c = 0; c < out_.contexts.size(); ++c) {
-      if (!tell(0.5 + 0.5 * static_cast<double>(c) / static_cast<double>(out_.contexts.size()))) {
+      if (!report_progress(0.5 + 0.5 * static_cast<double>(c) /
+                                     static_cast<double>(out_.contexts.size()))) {
         return false;
       }
       train_context(c);
@@ -67,7 +69,7 @@ class Trainer {
 
   bool train_embedded() {
     for (int round = 0; round < options_.embedded_rounds; ++round) {
-      if (!tell(1.0)) return false;
+      if (!report_progress(1.0)) return false;
       embedded_round();
     }
     return true;
@@ -76,7 +78,9 @@ class Trainer {
   ContextModels finish() { return std::move(out_); }
 
  private:
-  bool tell(double fraction) const { return !options_.progress || options_.progress(fraction); }
+  bool report_progress(double fraction) const {
+    return !options_.progress || options_.progress(fraction);
+  }
 
   void list_examples(const std::vector<Label>& labels) {
     const auto index_of = [&](const Segment& segment) {

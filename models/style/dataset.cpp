@@ -244,12 +244,12 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips, const std::
   auto spec = motion::describe_space(options.space, *sources->front().motion.skeleton);
   if (!spec) return std::unexpected(in_clip(spec.error(), sources->front().clip->clip.path));
   dataset.spec = std::move(*spec);
-  std::vector<const motion::Motion*>
-      taught;  // the mean rotations are those of the filter's input, the sources
+  // The mean rotations are those of the filter's input, that is of the sources.
+  std::vector<const motion::Motion*> source_motions;
   for (const Source& source : *sources) {
-    if (source.clip->group != target) taught.push_back(&source.motion);
+    if (source.clip->group != target) source_motions.push_back(&source.motion);
   }
-  if (auto set = motion::set_mean_rotations(taught, dataset.spec); !set) {
+  if (auto set = motion::set_mean_rotations(source_motions, dataset.spec); !set) {
     return std::unexpected(set.error());
   }
   for (const Source& source : *sources) {

@@ -22,7 +22,7 @@ int subjects_in(const Dataset& dataset, const Subject& like) {
 }
 
 // The difference that training assigns to a source subject's frames, at these phases.
-MatrixXd taught(const MatrixXd& delta, const VectorXd& phase) {
+MatrixXd difference_at(const MatrixXd& delta, const VectorXd& phase) {
   return harmonic_basis(phase, kCycleHarmonics) * delta;
 }
 
@@ -41,7 +41,7 @@ std::vector<Fold> subject_folds(const Dataset& dataset, const std::vector<Subjec
     }
     const MatrixXd delta = goal - group_cycle(dataset, others, clip.group, clip.motion);
     folds.push_back({make_pairings(dataset, others, target, first_source), clip.q,
-                     taught(delta, clip.phase()), clip.phase(), goal, delta.row(0)});
+                     difference_at(delta, clip.phase()), clip.phase(), goal, delta.row(0)});
   }
   return folds;
 }
@@ -88,8 +88,8 @@ std::vector<Fold> half_folds(const Dataset& dataset, const std::string& target,
       const MatrixXd goal = group_cycle(halves, cycles, target, test.motion);
       if (goal.size() == 0) continue;
       const MatrixXd delta = goal - group_cycle(halves, cycles, test.group, test.motion);
-      folds.push_back(
-          {training_pairs, test.q, taught(delta, test.phase()), test.phase(), goal, delta.row(0)});
+      folds.push_back({training_pairs, test.q, difference_at(delta, test.phase()), test.phase(),
+                       goal, delta.row(0)});
     }
   }
   return folds;

@@ -233,14 +233,14 @@ TEST_CASE(
   stage.launch("run");
   Process events(
       {"monitor", "--connect", stage.publish, "--topic", "event", "--stream", "right", "--json"});
-  bool told = false;
-  for (int i = 0; i < 10 && !told; ++i) {
+  bool refusal_seen = false;
+  for (int i = 0; i < 10 && !refusal_seen; ++i) {
     stage.put_on();  // posed hangs up; the glove reconnects
-    for (std::optional<std::string> line; !told && (line = events.line(2s));) {
-      told = line->contains("this calibration is for glove 'tcp 10.0.0.7'");
+    for (std::optional<std::string> line; !refusal_seen && (line = events.line(2s));) {
+      refusal_seen = line->contains("this calibration is for glove 'tcp 10.0.0.7'");
     }
   }
-  CHECK(told);
+  CHECK(refusal_seen);
   const auto status = json::parse(stage.ctl({"--json", "status"}).out).at("status");
   const auto& right = status.at("stream").at(1);
   CHECK(right.at("away") == true);

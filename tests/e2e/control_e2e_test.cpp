@@ -116,11 +116,11 @@ TEST_CASE("check reports what a config would run, or everything that is wrong wi
   const auto good = posed({"check", "--config", served.path("posed.toml"), "--json"});
   INFO(good.err);
   REQUIRE(good.code == 0);
-  const auto told = json::parse(good.out);
-  CHECK(told.at("ok") == true);
-  CHECK(told.at("streams").at(0).at("name") == "walker");
-  CHECK(told.at("streams").at(0).at("joints") == 5);
-  CHECK(told.at("streams").at(0).at("model") == "one.style");
+  const auto checked_config = json::parse(good.out);
+  CHECK(checked_config.at("ok") == true);
+  CHECK(checked_config.at("streams").at(0).at("name") == "walker");
+  CHECK(checked_config.at("streams").at(0).at("joints") == 5);
+  CHECK(checked_config.at("streams").at(0).at("model") == "one.style");
   CHECK(posed({"check", "--config", served.path("posed.toml")}).code == 0);
 
   const auto bad = served.folder.write("bad.toml", "strem = 1\nrealtime = 2\n");

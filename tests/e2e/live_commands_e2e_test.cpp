@@ -194,13 +194,13 @@ TEST_CASE("a recording ends with what was written") {
   CHECK(served.daemon->exit_code() == 0);
   const auto line = served.daemon->line();
   REQUIRE(line);
-  const json told = json::parse(*line);
-  CHECK(told.at("file") == served.path("take.plog"));
-  CHECK(told.at("bytes") == std::filesystem::file_size(served.path("take.plog")));
-  CHECK(told.at("frames") > 10);
-  CHECK(told.at("streams").at(0).at("stream") == "walker");
-  CHECK(told.at("missing_chunks") == 0);
-  CHECK(told.at("seconds") >= 0.7);
+  const json summary = json::parse(*line);
+  CHECK(summary.at("file") == served.path("take.plog"));
+  CHECK(summary.at("bytes") == std::filesystem::file_size(served.path("take.plog")));
+  CHECK(summary.at("frames") > 10);
+  CHECK(summary.at("streams").at(0).at("stream") == "walker");
+  CHECK(summary.at("missing_chunks") == 0);
+  CHECK(summary.at("seconds") >= 0.7);
   CHECK(has(served.daemon->errors(), "take.plog: "));
   CHECK(has(served.daemon->errors(), "nothing is missing"));
 }

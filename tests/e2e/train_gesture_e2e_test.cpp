@@ -63,10 +63,10 @@ TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") 
   const auto first = glove.train(
       "a.gesture", {"--json", "--tree-svg", glove.file("t.svg"), "--trees", "middle:4"});
   REQUIRE(first.code == 0);
-  const auto told = nlohmann::json::parse(first.out);
-  CHECK(told["gestures"] == 40);
-  CHECK(told["leaves"] > 25);
-  CHECK(told["leaves_by_state"].size() == 5);
+  const auto printed = nlohmann::json::parse(first.out);
+  CHECK(printed["gestures"] == 40);
+  CHECK(printed["leaves"] > 25);
+  CHECK(printed["leaves_by_state"].size() == 5);
   CHECK(bytes_of(glove.file("t.svg")).find("state 4, middle") != std::string::npos);
   REQUIRE(glove.train("b.gesture").code == 0);
   CHECK(bytes_of(glove.file("a.gesture")) == bytes_of(glove.file("b.gesture")));
@@ -77,7 +77,7 @@ TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") 
   const auto sample = (source_dir() / "config/gestures/gcp134.toml").string();
   const auto asked = glove.train("c.gesture", {"--json", "--questions", sample});
   REQUIRE(asked.code == 0);
-  CHECK(nlohmann::json::parse(asked.out)["leaves"] == told["leaves"]);
+  CHECK(nlohmann::json::parse(asked.out)["leaves"] == printed["leaves"]);
 }
 
 TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
@@ -91,13 +91,14 @@ TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
                             glove.file("lag.svg"), "--tree-dot", glove.file("t.dot")});
   INFO(judged.err);
   REQUIRE(judged.code == 0);
-  const auto told = nlohmann::json::parse(judged.out);
-  CHECK(told["leaves"]["states"].size() == 5);
-  CHECK(told["min_gap_cm"] >= 0.0);
-  CHECK(told["reference"]["nearest_reference_deg"] < 10.0);
-  CHECK(told["reference"]["frechet"] > 0.0);
-  for (const char* figure : {"jerk", "ldlj", "sparc"}) CHECK(told["performed"][figure].is_number());
-  const auto& curve = told["curve"];
+  const auto printed = nlohmann::json::parse(judged.out);
+  CHECK(printed["leaves"]["states"].size() == 5);
+  CHECK(printed["min_gap_cm"] >= 0.0);
+  CHECK(printed["reference"]["nearest_reference_deg"] < 10.0);
+  CHECK(printed["reference"]["frechet"] > 0.0);
+  for (const char* figure : {"jerk", "ldlj", "sparc"})
+    CHECK(printed["performed"][figure].is_number());
+  const auto& curve = printed["curve"];
   REQUIRE(curve.size() > 5);
   CHECK(curve.back()["channel_rms_deg"] < curve.front()["channel_rms_deg"]);
   CHECK(bytes_of(glove.file("lag.svg")).find("<svg") == 0);

@@ -102,9 +102,9 @@ TEST_CASE("every header is included somewhere", "[tidy]") {
 }
 
 TEST_CASE("every module has a README", "[tidy]") {
-  for (const char* room : {"proto", "models", "drivers", "daemon", "tests", "config"}) {
-    INFO(room);
-    std::ifstream readme(posed::test::source_dir() / room / "README.md");
+  for (const char* module_name : {"proto", "models", "drivers", "daemon", "tests", "config"}) {
+    INFO(module_name);
+    std::ifstream readme(posed::test::source_dir() / module_name / "README.md");
     const std::string text{std::istreambuf_iterator<char>(readme), {}};
     CHECK(text.size() > 200);
   }

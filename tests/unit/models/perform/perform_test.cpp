@@ -164,7 +164,7 @@ TEST_CASE("gestures of a real hand that were not recorded are near the real ones
   }
 }
 
-// `posed bench generate` runs all 1,296 sequences of four labels.
+// `posed_bench generate` runs all 1,296 sequences of four labels.
 TEST_CASE("no finger goes through another in sequences of a real hand's gestures", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();

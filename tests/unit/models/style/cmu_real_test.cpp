@@ -52,8 +52,8 @@ style::Dataset aligned(style::MgpmStart start, std::uint64_t seed) {
 }
 
 // Training pairs from everybody except these: `delta` at the poses of each person's own cycle.
-std::vector<style::Pairing> lessons(const std::vector<style::SubjectCycle>& cycles,
-                                    const MatrixXd& delta, const std::vector<int>& without) {
+std::vector<style::Pairing> pairs_without(const std::vector<style::SubjectCycle>& cycles,
+                                          const MatrixXd& delta, const std::vector<int>& without) {
   std::vector<style::Pairing> training_pairs;
   for (int s = 0; s < std::ssize(cycles); ++s) {
     if (std::ranges::find(without, s) != without.end()) continue;
@@ -101,12 +101,12 @@ void ask(const style::Dataset& dataset, const std::vector<style::SubjectCycle>& 
   std::vector<style::Fold> folds;
   for (int s = 0; s < std::ssize(cycles); ++s) {
     if (s == a || s == b || s == asked) continue;
-    folds.push_back(fold_of(dataset, lessons(cycles, delta, {a, b, asked, s}), delta, s));
+    folds.push_back(fold_of(dataset, pairs_without(cycles, delta, {a, b, asked, s}), delta, s));
   }
   const auto candidates = style::candidate_lengths_rad(dataset.dims());
   const double length_rad =
       style::choose_length_rad(folds, candidates, kPersonNoise, candidates[2]).length_rad;
-  const auto fold = fold_of(dataset, lessons(cycles, delta, {a, b, asked}), delta, asked);
+  const auto fold = fold_of(dataset, pairs_without(cycles, delta, {a, b, asked}), delta, asked);
   const auto values = static_cast<double>(fold.truth.size());
   const auto found = style::fold_error(fold, length_rad, kPersonNoise);
   errors.process += found.error / values;
