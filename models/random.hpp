@@ -1,5 +1,6 @@
-// Random numbers that are the same everywhere: uniform and normal from the generator's raw bits,
-// because the standard library's distributions may differ between libraries. Cold.
+// Random numbers that are the same on every platform. Uniform and normal values are computed here
+// from the generator's raw bits, because the distributions of the standard library may differ
+// between libraries. Cold.
 #pragma once
 
 #include <cmath>
@@ -22,7 +23,7 @@ class PortableRandom {
     return static_cast<int>(static_cast<double>(bits_()) / 4294967296.0 * count);
   }
 
-  // Mean 0, deviation 1: Box-Muller.
+  // Mean 0, standard deviation 1 (Box-Muller method).
   double normal() {
     const double u = (static_cast<double>(bits_()) + 1.0) / 4294967297.0;
     const double v = static_cast<double>(bits_()) / 4294967296.0;

@@ -47,7 +47,8 @@ void LogWriterLoop::drain(std::int64_t now_ns) {
   rings_.drain_chunks([&](const ChunkHeader& header, std::span<const std::byte> bytes) {
     put_gap(header.stream, GapKind::kChunks, header.lost_before, now_ns);
     // Each source has one body.
-    const std::array places{log::StreamPlace{header.stream, header.next.frame, header.next.sample}};
+    const std::array places{
+        log::StreamPosition{header.stream, header.next.frame, header.next.sample}};
     const log::ChunkRow row{.source = header.stream,
                             .socket = header.socket,
                             .direction = static_cast<std::uint8_t>(header.direction),

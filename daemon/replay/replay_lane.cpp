@@ -131,7 +131,7 @@ void ReplayLane::notice_gap(std::int64_t chunk) {
 
 // Formats 1 and 2 count frames only; the rest goes on by itself.
 Result<> ReplayLane::find_place(const log::ChunkRow& chunk) {
-  const auto place = std::ranges::find(chunk.places, stream_id_, &log::StreamPlace::stream);
+  const auto place = std::ranges::find(chunk.places, stream_id_, &log::StreamPosition::stream);
   if (place == chunk.places.end() || place->next_frame == 0 || !possible(chunk.arrival_ns)) {
     return log::damaged_row(file_, "chunk", chunk.id, "has an impossible time or place");
   }

@@ -90,7 +90,7 @@ Result<RequestedConfig> requested_config_of_given(const Options& given) {
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto glove = read_greeting(text, identity);
+  const auto glove = read_device_info(text, identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = glove_model(glove->hand);
   if (!model) return std::unexpected(model.error());
@@ -111,19 +111,19 @@ Result<Description> expect(const Options& given) {
   if (!requested) return std::unexpected(requested.error());
   if (auto sound = glove::check_connection(*options); !sound) return std::unexpected(sound.error());
   return describe(
-      greeting_of(
+      device_info_of(
           {.hand = requested->hand, .layout = requested->layout, .ticks = ticks_of(*requested)}),
       option<std::string>(*options, "id"));
 }
 
 Result<glove::Model> model_of(const Description& description) {
-  const auto glove = read_greeting(description.text, description.identity);
+  const auto glove = read_device_info(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   return glove_model(glove->hand);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto glove = read_greeting(description.text, description.identity);
+  const auto glove = read_device_info(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = glove_model(glove->hand);
   if (!model) return std::unexpected(model.error());
@@ -156,7 +156,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   if (!layout) return std::unexpected(layout.error());
   auto device = make_device(
       cyberglove_driver(),
-      greeting_of({.hand = requested->hand, .layout = *layout, .ticks = ticks_of(*requested)}),
+      device_info_of({.hand = requested->hand, .layout = *layout, .ticks = ticks_of(*requested)}),
       link->identity());
   if (!device) return device;
   device->transport = make_link_transport(std::move(*link));

@@ -12,7 +12,7 @@ constexpr int kMostTicks = 65535 * 1024;
 
 }  // namespace
 
-std::string greeting_of(const Greeted& glove) {
+std::string device_info_of(const GloveSettings& glove) {
   const Layout& layout = glove.layout;
   return "cyberglove hand=" + std::string(glove::side_name(glove.hand)) +
          " sensors=" + std::to_string(std::popcount(layout.mask)) +
@@ -24,20 +24,20 @@ std::string greeting_of(const Greeted& glove) {
          " multiplier=" + std::to_string(layout.multiplier);
 }
 
-Result<Greeted> read_greeting(const std::string& text, const std::string& identity) {
-  glove::Greeting greeting(text, "cyberglove", identity);
-  Greeted glove;
-  glove.hand = greeting.side();
-  const int sensors = greeting.whole("sensors", 1, static_cast<int>(kSensors));
+Result<GloveSettings> read_device_info(const std::string& text, const std::string& identity) {
+  glove::DeviceInfoReader reader(text, "cyberglove", identity);
+  GloveSettings glove;
+  glove.hand = reader.side();
+  const int sensors = reader.whole("sensors", 1, static_cast<int>(kSensors));
   glove.layout.mask =
-      static_cast<std::uint32_t>(greeting.whole("mask", 1, static_cast<int>(kAllSensors)));
-  glove.layout.form = static_cast<Form>(greeting.choice("form", kForms));
-  glove.layout.mode = static_cast<Mode>(greeting.choice("mode", kModes));
-  glove.layout.time = greeting.whole("time", 0, 1) == 1;
-  glove.layout.status = greeting.whole("status", 0, 1) == 1;
-  glove.ticks = greeting.whole("ticks", 0, kMostTicks);
-  glove.layout.multiplier = greeting.whole("multiplier", 1, kMaxMultiplier);
-  if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
+      static_cast<std::uint32_t>(reader.whole("mask", 1, static_cast<int>(kAllSensors)));
+  glove.layout.form = static_cast<Form>(reader.choice("form", kForms));
+  glove.layout.mode = static_cast<Mode>(reader.choice("mode", kModes));
+  glove.layout.time = reader.whole("time", 0, 1) == 1;
+  glove.layout.status = reader.whole("status", 0, 1) == 1;
+  glove.ticks = reader.whole("ticks", 0, kMostTicks);
+  glove.layout.multiplier = reader.whole("multiplier", 1, kMaxMultiplier);
+  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
   if (std::popcount(glove.layout.mask) != sensors) {
     return fail(
         "the device info of a 'cyberglove' and its mask have different numbers of sensors; the log "

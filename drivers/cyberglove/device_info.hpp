@@ -15,13 +15,14 @@ namespace posed::drivers::cyberglove {
 inline constexpr std::array<std::string_view, 2> kForms{"8bit", "16bit"};           // as Form
 inline constexpr std::array<std::string_view, 3> kModes{"stream", "poll", "sync"};  // as Mode
 
-struct Greeted {
+struct GloveSettings {
   Side hand = Side::kRight;
   Layout layout;
   std::int64_t ticks = 0;
 };
 
-[[nodiscard]] std::string greeting_of(const Greeted& glove);
-[[nodiscard]] Result<Greeted> read_greeting(const std::string& text, const std::string& identity);
+[[nodiscard]] std::string device_info_of(const GloveSettings& glove);
+[[nodiscard]] Result<GloveSettings> read_device_info(const std::string& text,
+                                                     const std::string& identity);
 
 }  // namespace posed::drivers::cyberglove

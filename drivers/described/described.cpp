@@ -39,10 +39,10 @@ struct Described {
 
 Result<Described> parse_text(const std::string& text, const std::string& identity) {
   const std::size_t line_end = std::min(text.find('\n'), text.size());
-  glove::Greeting greeting(text.substr(0, line_end), "described", identity);
+  glove::DeviceInfoReader reader(text.substr(0, line_end), "described", identity);
   Described made;
-  made.side = greeting.side();
-  if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
+  made.side = reader.side();
+  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
   if (line_end == text.size()) return fail("lacks the device's description", identity);
   auto table = parse_device(text.substr(line_end + 1), identity);
   if (!table) return std::unexpected(table.error());

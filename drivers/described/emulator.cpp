@@ -75,7 +75,7 @@ void DescribedEmulator::emit(std::int64_t now_ns, Bytes& out) {
 void DescribedEmulator::add_packet(const PacketRule& rule, Bytes& out) const {
   std::vector<std::byte> packet = blank_packet(*table_, rule);
   for (const Field& field : rule.fields) write_field(field, value_of(field), packet);
-  seal_packet(rule, packet);
+  write_checksum(rule, packet);
   out.insert(out.end(), packet.begin(), packet.end());
 }
 

@@ -180,7 +180,7 @@ std::vector<std::byte> blank_packet(const Table& table, const PacketRule& rule) 
   return packet;
 }
 
-void seal_packet(const PacketRule& rule, std::span<std::byte> packet) noexcept {
+void write_checksum(const PacketRule& rule, std::span<std::byte> packet) noexcept {
   if (rule.checksum.kind == ChecksumKind::kNone) return;
   write_bits(checksum_place(rule.checksum, packet.size()), checksum(rule.checksum, packet), packet);
 }

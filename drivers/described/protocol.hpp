@@ -41,6 +41,6 @@ void write_field(const Field& field, double raw, std::span<std::byte> packet) no
 // The shortest packet of this rule: zeros, with its header, length, end and delimiter.
 [[nodiscard]] std::vector<std::byte> blank_packet(const Table& table, const PacketRule& rule);
 // Writes the checksum; call it after all fields are written.
-void seal_packet(const PacketRule& rule, std::span<std::byte> packet) noexcept;
+void write_checksum(const PacketRule& rule, std::span<std::byte> packet) noexcept;
 
 }  // namespace posed::drivers::described

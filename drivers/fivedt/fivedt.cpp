@@ -24,23 +24,23 @@ constexpr std::int64_t kMaxPoll_hz = 200;  // limit of 19200 baud for nine bytes
 constexpr std::array<std::string_view, 2> kModes{"stream", "poll"};
 constexpr std::array<std::string_view, 2> kKitPorts{"a", "b"};
 
-struct Greeted {
+struct GloveSettings {
   Side side = Side::kRight;
   Settings settings;
 };
 
-Result<Greeted> read_greeting(const std::string& text, const std::string& identity) {
-  glove::Greeting greeting(text, kName, identity);
-  Greeted glove;
-  glove.side = greeting.side();
-  glove.settings.form = static_cast<Form>(greeting.choice("model", kFormNames));
-  glove.settings.polled = greeting.choice("mode", kModes) == 1;
-  glove.settings.port_b = greeting.choice("kit_port", kKitPorts) == 1;
-  if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
+Result<GloveSettings> read_device_info(const std::string& text, const std::string& identity) {
+  glove::DeviceInfoReader reader(text, kName, identity);
+  GloveSettings glove;
+  glove.side = reader.side();
+  glove.settings.form = static_cast<Form>(reader.choice("model", kFormNames));
+  glove.settings.polled = reader.choice("mode", kModes) == 1;
+  glove.settings.port_b = reader.choice("kit_port", kKitPorts) == 1;
+  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
   return glove;
 }
 
-std::string greeting_of(const Greeted& glove) {
+std::string device_info_of(const GloveSettings& glove) {
   const Settings& settings = glove.settings;
   return std::string(kName) + " hand=" + std::string(glove::side_name(glove.side)) +
          " model=" + std::string(kFormNames[static_cast<std::size_t>(settings.form)]) +
@@ -48,7 +48,7 @@ std::string greeting_of(const Greeted& glove) {
          " kit_port=" + std::string(kKitPorts[settings.port_b ? 1 : 0]);
 }
 
-Result<Greeted> from_options(const Options& options) {
+Result<GloveSettings> from_options(const Options& options) {
   const auto side = glove::hand_option(options);
   if (!side) return std::unexpected(side.error());
   const auto model =
@@ -66,13 +66,13 @@ Result<Greeted> from_options(const Options& options) {
   const auto& kit_port = option<std::string>(options, "kit_port");
   const auto port = std::ranges::find(kKitPorts, std::string_view(kit_port));
   if (port == kKitPorts.end()) return misuse("kit_port should be \"a\" or \"b\"");
-  return Greeted{
+  return GloveSettings{
       .side = *side,
       .settings = {.form = form, .polled = poll_hz > 0, .port_b = port != kKitPorts.begin()}};
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto glove = read_greeting(text, identity);
+  const auto glove = read_device_info(text, identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = fivedt::model(glove->settings.form);
   if (!model) return std::unexpected(model.error());
@@ -90,7 +90,7 @@ std::int64_t usual_baud(Form form) {
   return form == Form::kUltraWireless ? 115200 : 19200;
 }
 
-Options with_baud(Options options, const Greeted& glove) {
+Options with_baud(Options options, const GloveSettings& glove) {
   if (option<std::int64_t>(options, "baud") == 0) {
     options["baud"] = usual_baud(glove.settings.form);
   }
@@ -106,17 +106,17 @@ Result<Description> expect(const Options& given) {
     const auto sound = glove::check_connection(with_baud(*options, *glove));
     if (!sound) return std::unexpected(sound.error());
   }
-  return describe(greeting_of(*glove), option<std::string>(*options, "id"));
+  return describe(device_info_of(*glove), option<std::string>(*options, "id"));
 }
 
 Result<glove::Model> glove_model(const Description& description) {
-  const auto glove = read_greeting(description.text, description.identity);
+  const auto glove = read_device_info(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   return model(glove->settings.form);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto glove = read_greeting(description.text, description.identity);
+  const auto glove = read_device_info(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = fivedt::model(glove->settings.form);
   if (!model) return std::unexpected(model.error());
@@ -128,14 +128,15 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
 
 // Bits of the product id: bit 0 is a left hand, 1 and 2 a wireless kit and its port B, 4 five
 // sensors.
-std::vector<std::uint16_t> products(const Greeted& glove) {
+std::vector<std::uint16_t> products(const GloveSettings& glove) {
   const int base =
       (glove.side == Side::kLeft ? 0x01 : 0) | (glove.settings.form == Form::kUltraUsb5 ? 0x10 : 0);
   const auto product = [base](int bits) { return static_cast<std::uint16_t>(base | bits); };
   return {product(0), product(0x02), product(0x06)};
 }
 
-Result<Connection> reach(const Options& options, const Greeted& glove, TransportFactory& ports) {
+Result<Connection> reach(const Options& options, const GloveSettings& glove,
+                         TransportFactory& ports) {
   if (is_usb(glove.settings.form)) {
     return ports.hid({.vendor = kVendor,
                       .products = products(glove),
@@ -154,7 +155,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   if (!link) return std::unexpected(link.error());
   auto warnings = start(*link, glove->side, glove->settings);
   if (!warnings) return std::unexpected(warnings.error());
-  auto device = make_device(fivedt_driver(), greeting_of(*glove), link->identity());
+  auto device = make_device(fivedt_driver(), device_info_of(*glove), link->identity());
   if (!device) return device;
   device->transport = is_usb(glove->settings.form) ? make_hid_transport(std::move(*link))
                                                    : make_link_transport(std::move(*link));

@@ -21,7 +21,8 @@ Result<Side> parse_side(std::string_view name) {
   return misuse("hand should be \"right\" or \"left\", not \"" + std::string(name) + "\"");
 }
 
-Greeting::Greeting(const std::string& text, std::string_view driver, std::string identity)
+DeviceInfoReader::DeviceInfoReader(const std::string& text, std::string_view driver,
+                                   std::string identity)
     : driver_(driver), identity_(std::move(identity)) {
   std::istringstream words(text);
   std::string word;
@@ -36,11 +37,11 @@ Greeting::Greeting(const std::string& text, std::string_view driver, std::string
   }
 }
 
-void Greeting::add_error(std::string what) {
+void DeviceInfoReader::add_error(std::string what) {
   if (wrong_.empty()) wrong_ = std::move(what);
 }
 
-std::string Greeting::word(std::string_view key) {
+std::string DeviceInfoReader::word(std::string_view key) {
   const auto at = unread_.find(key);
   if (at == unread_.end()) {
     add_error("lacks " + in_quotes(key));
@@ -52,7 +53,7 @@ std::string Greeting::word(std::string_view key) {
   return value;
 }
 
-int Greeting::whole(std::string_view key, int least, int most) {
+int DeviceInfoReader::whole(std::string_view key, int least, int most) {
   const std::string text = word(key);
   int value = 0;
   const char* const end = text.data() + text.size();
@@ -63,7 +64,8 @@ int Greeting::whole(std::string_view key, int least, int most) {
   return least;
 }
 
-std::size_t Greeting::choice(std::string_view key, std::span<const std::string_view> names) {
+std::size_t DeviceInfoReader::choice(std::string_view key,
+                                     std::span<const std::string_view> names) {
   const std::string text = word(key);
   const auto at = std::ranges::find(names, std::string_view(text));
   if (at != names.end()) return static_cast<std::size_t>(at - names.begin());
@@ -71,9 +73,9 @@ std::size_t Greeting::choice(std::string_view key, std::span<const std::string_v
   return 0;
 }
 
-Side Greeting::side() { return static_cast<Side>(choice("hand", kSides)); }
+Side DeviceInfoReader::side() { return static_cast<Side>(choice("hand", kSides)); }
 
-Result<> Greeting::finish() const {
+Result<> DeviceInfoReader::finish() const {
   std::string wrong = wrong_;
   // Keys from a damaged log may be garbage, so they are not shown on the terminal.
   if (wrong.empty() && !unread_.empty()) wrong = "has a key that this driver does not know";

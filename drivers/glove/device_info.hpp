@@ -17,9 +17,9 @@ namespace posed::drivers::glove {
 
 // Reads a device info key by key. A key that is missing, repeated, unknown or out of range is
 // remembered and reported by finish(); until then it reads as its smallest allowed value. Cold.
-class Greeting {
+class DeviceInfoReader {
  public:
-  Greeting(const std::string& text, std::string_view driver, std::string identity);
+  DeviceInfoReader(const std::string& text, std::string_view driver, std::string identity);
 
   [[nodiscard]] int whole(std::string_view key, int least, int most);
   [[nodiscard]] std::size_t choice(std::string_view key, std::span<const std::string_view> names);

@@ -25,29 +25,29 @@ constexpr double kSilence_s = 2.0;  // the firmware streams all the time
 constexpr std::int64_t kForceRange = 1000;
 constexpr std::int64_t kMaxForceRange = 65535;
 
-struct Greeted {
+struct GloveSettings {
   Side side = Side::kRight;
   Settings settings;
 };
 
-Result<Greeted> read_greeting(const std::string& text, const std::string& identity) {
-  glove::Greeting greeting(text, kName, identity);
-  Greeted glove;
-  glove.side = greeting.side();
-  glove.settings.encoding = static_cast<Encoding>(greeting.choice("encoding", kEncodingNames));
-  glove.settings.max_analog = greeting.whole("max", 1, kMaxAnalog);
-  if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
+Result<GloveSettings> read_device_info(const std::string& text, const std::string& identity) {
+  glove::DeviceInfoReader reader(text, kName, identity);
+  GloveSettings glove;
+  glove.side = reader.side();
+  glove.settings.encoding = static_cast<Encoding>(reader.choice("encoding", kEncodingNames));
+  glove.settings.max_analog = reader.whole("max", 1, kMaxAnalog);
+  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
   return glove;
 }
 
-std::string greeting_of(const Greeted& glove) {
+std::string device_info_of(const GloveSettings& glove) {
   const auto encoding = static_cast<std::size_t>(glove.settings.encoding);
   return std::string(kName) + " hand=" + std::string(glove::side_name(glove.side)) +
          " encoding=" + std::string(kEncodingNames[encoding]) +
          " max=" + std::to_string(glove.settings.max_analog);
 }
 
-Result<Greeted> from_options(const Options& options) {
+Result<GloveSettings> from_options(const Options& options) {
   const auto side = glove::hand_option(options);
   if (!side) return std::unexpected(side.error());
   const auto& encoding = option<std::string>(options, "encoding");
@@ -59,13 +59,13 @@ Result<Greeted> from_options(const Options& options) {
   if (max < 1 || max > kMaxAnalog) {
     return misuse("max_analog_value should be 1 to 65535; it is 4095 on an ESP32, 1023 on an AVR");
   }
-  return Greeted{.side = *side,
-                 .settings = {.encoding = static_cast<Encoding>(at - kEncodingNames.begin()),
-                              .max_analog = static_cast<int>(max)}};
+  return GloveSettings{.side = *side,
+                       .settings = {.encoding = static_cast<Encoding>(at - kEncodingNames.begin()),
+                                    .max_analog = static_cast<int>(max)}};
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto glove = read_greeting(text, identity);
+  const auto glove = read_device_info(text, identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = lucidgloves::model(glove->settings);
   if (!model) return std::unexpected(model.error());
@@ -83,17 +83,17 @@ Result<Description> expect(const Options& given) {
   const auto glove = from_options(*options);
   if (!glove) return std::unexpected(glove.error());
   if (auto sound = glove::check_connection(*options); !sound) return std::unexpected(sound.error());
-  return describe(greeting_of(*glove), option<std::string>(*options, "id"));
+  return describe(device_info_of(*glove), option<std::string>(*options, "id"));
 }
 
 Result<glove::Model> glove_model(const Description& description) {
-  const auto glove = read_greeting(description.text, description.identity);
+  const auto glove = read_device_info(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   return model(glove->settings);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto glove = read_greeting(description.text, description.identity);
+  const auto glove = read_device_info(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = lucidgloves::model(glove->settings);
   if (!model) return std::unexpected(model.error());
@@ -112,7 +112,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   if (!link) return std::unexpected(link.error());
   const auto started = start(*link, glove->side, glove->settings);
   if (!started) return std::unexpected(started.error());
-  auto device = make_device(lucidgloves_driver(), greeting_of(*glove), link->identity());
+  auto device = make_device(lucidgloves_driver(), device_info_of(*glove), link->identity());
   if (!device) return device;
   device->transport = make_link_transport(std::move(*link));
   device->reopen_after_s = kSilence_s;

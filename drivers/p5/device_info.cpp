@@ -38,25 +38,25 @@ bool read_hex(const std::string& text, std::uint8_t number, std::size_t size,
 
 }  // namespace
 
-std::optional<CameraRig> Greeted::rig() const {
+std::optional<CameraRig> GloveSettings::rig() const {
   if (heads.size() != kHeadsBytes || leds.size() != kLedsBytes) return {};
   return CameraRig::of(std::span(heads).first<kHeadsBytes>(), std::span(leds).first<kLedsBytes>());
 }
 
-std::string greeting_of(const Greeted& glove) {
+std::string device_info_of(const GloveSettings& glove) {
   return "p5 hand=" + std::string(glove::side_name(glove.side)) +
          " firmware=" + hex_of(glove.firmware) + " heads=" + hex_of(glove.heads) +
          " leds=" + hex_of(glove.leds);
 }
 
-Result<Greeted> read_greeting(const std::string& text, const std::string& identity) {
-  glove::Greeting greeting(text, "p5", identity);
-  Greeted glove;
-  glove.side = greeting.side();
-  const std::string firmware = greeting.word("firmware");
-  const std::string heads = greeting.word("heads");
-  const std::string leds = greeting.word("leds");
-  if (auto ok = greeting.finish(); !ok) return std::unexpected(ok.error());
+Result<GloveSettings> read_device_info(const std::string& text, const std::string& identity) {
+  glove::DeviceInfoReader reader(text, "p5", identity);
+  GloveSettings glove;
+  glove.side = reader.side();
+  const std::string firmware = reader.word("firmware");
+  const std::string heads = reader.word("heads");
+  const std::string leds = reader.word("leds");
+  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
   if (!read_hex(firmware, kFirmwareReport, kFirmwareBytes, glove.firmware) ||
       !read_hex(heads, kHeadsReport, kHeadsBytes, glove.heads) ||
       !read_hex(leds, kLedsReport, kLedsBytes, glove.leds)) {

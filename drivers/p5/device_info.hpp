@@ -13,7 +13,7 @@
 
 namespace posed::drivers::p5 {
 
-struct Greeted {
+struct GloveSettings {
   Side side = Side::kRight;
   std::vector<std::byte> firmware, heads, leds;  // feature reports 9, 6 and 12; empty: not known
 
@@ -21,7 +21,8 @@ struct Greeted {
   [[nodiscard]] std::optional<CameraRig> rig() const;
 };
 
-[[nodiscard]] std::string greeting_of(const Greeted& glove);
-[[nodiscard]] Result<Greeted> read_greeting(const std::string& text, const std::string& identity);
+[[nodiscard]] std::string device_info_of(const GloveSettings& glove);
+[[nodiscard]] Result<GloveSettings> read_device_info(const std::string& text,
+                                                     const std::string& identity);
 
 }  // namespace posed::drivers::p5

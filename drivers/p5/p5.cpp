@@ -20,7 +20,7 @@ constexpr std::uint16_t kProduct = 0x0100;
 constexpr int kInterface = 1;  // of two interfaces, the one that is not a mouse
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto glove = read_greeting(text, identity);
+  const auto glove = read_device_info(text, identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = p5::model();
   if (!model) return std::unexpected(model.error());
@@ -37,14 +37,14 @@ Result<Description> expect(const Options& given) {
   if (!options) return std::unexpected(options.error());
   const auto side = glove::hand_option(*options);
   if (!side) return std::unexpected(side.error());
-  const Greeted unknown{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
-  return describe(greeting_of(unknown), option<std::string>(*options, "id"));
+  const GloveSettings unknown{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
+  return describe(device_info_of(unknown), option<std::string>(*options, "id"));
 }
 
 Result<glove::Model> glove_model(const Description& /*description*/) { return model(); }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto glove = read_greeting(description.text, description.identity);
+  const auto glove = read_device_info(description.text, description.identity);
   if (!glove) return std::unexpected(glove.error());
   const auto model = p5::model();
   if (!model) return std::unexpected(model.error());
@@ -75,11 +75,11 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
                          .report_bytes = kReportBytes});
   if (!link) return std::unexpected(link.error());
   std::vector<std::string> warnings;
-  Greeted glove{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
+  GloveSettings glove{.side = *side, .firmware = {}, .heads = {}, .leds = {}};
   glove.firmware = feature(*link, kFirmwareReport, kFirmwareBytes, warnings);
   glove.heads = feature(*link, kHeadsReport, kHeadsBytes, warnings);
   glove.leds = feature(*link, kLedsReport, kLedsBytes, warnings);
-  auto device = make_device(p5_driver(), greeting_of(glove), link->identity());
+  auto device = make_device(p5_driver(), device_info_of(glove), link->identity());
   if (!device) return device;
   // An idle device sends no reports, so silence is no reason to reopen it.
   device->transport = make_usb_transport(std::move(*link));

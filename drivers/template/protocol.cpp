@@ -14,7 +14,7 @@ constexpr int kMinBend = -2000;
 constexpr int kMaxBend = 12000;
 constexpr int kMaxBattery = 100;
 constexpr double kUnit_rad = 0.01 * kDegree;
-constexpr std::string_view kGreeting = "BEND1 rate=";
+constexpr std::string_view kDeviceInfoPrefix = "BEND1 rate=";
 
 std::byte checksum(std::span<const std::byte, kPacketBytes> bytes) noexcept {
   unsigned sum = 0;
@@ -48,13 +48,16 @@ std::array<std::byte, kPacketBytes> encode_packet(const Packet& packet) noexcept
   return bytes;
 }
 
-std::string greeting(double rate_hz) { return std::string(kGreeting) + clip::number_text(rate_hz); }
+std::string device_info_text(double rate_hz) {
+  return std::string(kDeviceInfoPrefix) + clip::number_text(rate_hz);
+}
 
-Result<double> parse_greeting(const std::string& text, const std::string& identity) {
+Result<double> parse_device_info(const std::string& text, const std::string& identity) {
   double rate_hz = 0.0;
-  if (text.starts_with(kGreeting)) {
+  if (text.starts_with(kDeviceInfoPrefix)) {
     const char* const end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data() + kGreeting.size(), end, rate_hz);
+    const auto [stop, error] =
+        std::from_chars(text.data() + kDeviceInfoPrefix.size(), end, rate_hz);
     if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= 1e6) return rate_hz;
   }
   return fail("does not greet as a bend sensor ('BEND1 rate=100'); is it another device?",

@@ -44,7 +44,8 @@ struct Packet {
 [[nodiscard]] std::array<std::byte, kPacketBytes> encode_packet(const Packet& packet) noexcept;
 
 // The device info, and the rate [Hz] in it.
-[[nodiscard]] std::string greeting(double rate_hz);
-[[nodiscard]] Result<double> parse_greeting(const std::string& text, const std::string& identity);
+[[nodiscard]] std::string device_info_text(double rate_hz);
+[[nodiscard]] Result<double> parse_device_info(const std::string& text,
+                                               const std::string& identity);
 
 }  // namespace posed::drivers::bend

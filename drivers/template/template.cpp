@@ -34,7 +34,7 @@ Result<std::shared_ptr<const Skeleton>> finger_skeleton() {
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto rate_hz = parse_greeting(text, identity);
+  const auto rate_hz = parse_device_info(text, identity);
   if (!rate_hz) return std::unexpected(rate_hz.error());
   const auto skeleton = finger_skeleton();
   if (!skeleton) return std::unexpected(skeleton.error());
@@ -70,7 +70,7 @@ Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const auto options = complete_options(template_driver(), given);
   if (!options) return std::unexpected(options.error());
   const double rate_hz = option<double>(*options, "rate_hz");
-  auto device = make_device(template_driver(), greeting(rate_hz), "simulated");
+  auto device = make_device(template_driver(), device_info_text(rate_hz), "simulated");
   if (!device) return misuse("rate_hz should be more than 0 and at most 1000000");
   auto transport = FileTransport::open(simulated_packets(), {.rate_hz = rate_hz});
   if (!transport) return std::unexpected(transport.error());

@@ -8,11 +8,11 @@ namespace {
 constexpr double kMinPeriod_ns = 1'000.0;
 constexpr double kMaxPeriod_ns = 3'600e9;
 
-Result<double> period_of(const PlaybackOptions& playback) {
-  if (!(playback.rate_hz > 0.0)) return misuse("the frame rate should be more than 0 Hz");
-  if (playback.pace == 0.0) return 0.0;
-  const double period_ns = 1e9 / (playback.rate_hz * playback.pace);
-  if (playback.pace > 0.0 && period_ns >= kMinPeriod_ns && period_ns <= kMaxPeriod_ns) {
+Result<double> period_of(const PlaybackOptions& options) {
+  if (!(options.rate_hz > 0.0)) return misuse("the frame rate should be more than 0 Hz");
+  if (options.pace == 0.0) return 0.0;
+  const double period_ns = 1e9 / (options.rate_hz * options.pace);
+  if (options.pace > 0.0 && period_ns >= kMinPeriod_ns && period_ns <= kMaxPeriod_ns) {
     return period_ns;
   }
   return misuse(
@@ -24,8 +24,8 @@ Result<double> period_of(const PlaybackOptions& playback) {
 }  // namespace
 
 Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks,
-                                                       const PlaybackOptions& playback) {
-  const auto period_ns = period_of(playback);
+                                                       const PlaybackOptions& options) {
+  const auto period_ns = period_of(options);
   if (!period_ns) return std::unexpected(period_ns.error());
   if (chunks.count() == 0) return fail("there is nothing to play");
   for (std::size_t i = 0; i < chunks.count(); ++i) {
@@ -34,14 +34,14 @@ Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks,
                   std::to_string(kMaxChunk) + " bytes, so it cannot be played");
     }
   }
-  return std::unique_ptr<Transport>(new FileTransport(std::move(chunks), *period_ns, playback));
+  return std::unique_ptr<Transport>(new FileTransport(std::move(chunks), *period_ns, options));
 }
 
-FileTransport::FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& playback)
-    : chunks_(std::move(chunks)), period_ns_(period_ns), loop_(playback.loop) {
-  if (playback.pace == 0.0 || playback.time_s.size() != chunks_.count()) return;
-  const double begin_s = playback.time_s.front();
-  for (const double t : playback.time_s) due_ns_.push_back((t - begin_s) * 1e9 / playback.pace);
+FileTransport::FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& options)
+    : chunks_(std::move(chunks)), period_ns_(period_ns), loop_(options.loop) {
+  if (options.pace == 0.0 || options.time_s.size() != chunks_.count()) return;
+  const double begin_s = options.time_s.front();
+  for (const double t : options.time_s) due_ns_.push_back((t - begin_s) * 1e9 / options.pace);
   round_ns_ = due_ns_.back() + period_ns_;
 }
 

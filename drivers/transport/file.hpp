@@ -25,7 +25,7 @@ class FileTransport final : public Transport {
  public:
   // Needs at least one chunk, and none longer than kMaxChunk. An invalid pace or rate is misuse.
   [[nodiscard]] static Result<std::unique_ptr<Transport>> open(Chunks chunks,
-                                                               const PlaybackOptions& playback);
+                                                               const PlaybackOptions& options);
 
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
@@ -40,7 +40,7 @@ class FileTransport final : public Transport {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 
  private:
-  FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& playback);
+  FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& options);
 
   Chunks chunks_;
   double period_ns_;  // 0: always due

@@ -54,7 +54,7 @@ std::string group_of(const std::string& path) {
 
 }  // namespace
 
-std::string node_trouble(const std::string& path, int error) {
+std::string node_open_error(const std::string& path, int error) {
   switch (error) {
     case ENOENT:
     case ENODEV:
@@ -81,10 +81,10 @@ std::string node_trouble(const std::string& path, int error) {
 
 Result<int> open_node(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (fd < 0) return fail(node_trouble(path, errno));
+  if (fd < 0) return fail(node_open_error(path, errno));
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     ::close(fd);
-    return fail(node_trouble(path, EBUSY));
+    return fail(node_open_error(path, EBUSY));
   }
   return fd;
 }

@@ -12,6 +12,6 @@ namespace posed::drivers {
 [[nodiscard]] Result<int> open_node(const std::string& path);
 
 // Why a node could not be opened, and how to fix it. Cold.
-[[nodiscard]] std::string node_trouble(const std::string& path, int error);
+[[nodiscard]] std::string node_open_error(const std::string& path, int error);
 
 }  // namespace posed::drivers

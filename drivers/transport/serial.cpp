@@ -90,7 +90,7 @@ Result<Connection> TransportFactory::serial(const SerialSettings& settings) {
   // flock keeps out a second posed; TIOCEXCL keeps out programs that do not use flock. Not on a
   // pseudo-terminal: there it would remain set while the other side keeps the node open.
   if (!is_pseudo_terminal(*fd) && ::ioctl(*fd, TIOCEXCL) != 0) {
-    return fail(node_trouble(port->node, errno));
+    return fail(node_open_error(port->node, errno));
   }
   const int lines = TIOCM_DTR | TIOCM_RTS;
   ::ioctl(*fd, TIOCMBIS, &lines);  // a port without modem lines returns an error, which is ignored

@@ -73,7 +73,7 @@ Result<> UsbLink::Impl::claim() {
   // For example usbmouse, which takes a P5 for a mouse; it gets the interface back at the end.
   libusb_set_auto_detach_kernel_driver(handle_, 1);
   const int failed = libusb_claim_interface(handle_, settings_.interface);
-  if (failed == LIBUSB_ERROR_BUSY) return fail(node_trouble(name_, EBUSY));
+  if (failed == LIBUSB_ERROR_BUSY) return fail(node_open_error(name_, EBUSY));
   if (failed != 0) return fail(name_ + " gives no interface away (" + libusb_says(failed) + ")");
   claimed_ = true;
   endpoint_ = interrupt_in(handle_, settings_.interface);

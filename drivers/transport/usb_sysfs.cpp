@@ -70,7 +70,7 @@ void describe_usb(const fs::path& device, DeviceInfo& info) {
 
 // access() uses the real user id, which equals the effective one: posed is never set-uid.
 std::string open_error_of(const std::string& node) {
-  return ::access(node.c_str(), R_OK | W_OK) == 0 ? "" : node_trouble(node, errno);
+  return ::access(node.c_str(), R_OK | W_OK) == 0 ? "" : node_open_error(node, errno);
 }
 
 std::vector<DeviceInfo> list_usb_devices() {

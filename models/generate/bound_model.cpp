@@ -8,8 +8,8 @@
 namespace posed::generate {
 namespace {
 
-// Of the label sequence: with 20 frames of 30 Hz a streamed trajectory's jerk is within 3 % of the
-// full solution's (models/trajectory/README.md, "Look-ahead").
+// Look-ahead into the label sequence: with 20 frames at 30 Hz the jerk of a streamed trajectory is
+// within 3 % of the full solution's (models/trajectory/README.md, "Look-ahead").
 constexpr double kLookAhead_s = 20.0 / 30.0;
 
 }  // namespace
@@ -28,7 +28,7 @@ Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model
       BoundModel{trajectory::StateInformation(std::move(shared), stream_rate_hz(rate_hz)), nullptr,
                  std::move(*live), std::move(name)});
   bound->player = std::make_unique<perform::LabelSequencePlayer>(
-      bound->evidence,
+      bound->information,
       perform::PlayerOptions{.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4});
   return bound;
 }

@@ -1,6 +1,7 @@
-// BoundModel: a gesture model at one stream's rate, the player that performs it and what the live
-// generator knows by it, ready for hot use. Built cold; the hot side borrows a plain pointer. Of
-// all of it only the player changes, and only its stream uses it.
+// BoundModel: a gesture model prepared for one stream: its state information at the stream's rate,
+// the player that performs it, and the live smoother's model (models/generate/README.md, "Binding a
+// model"). Built cold; the hot side borrows a plain pointer. Only the player changes, and only its
+// stream uses it.
 #pragma once
 
 #include <algorithm>
@@ -15,23 +16,26 @@
 
 namespace posed::generate {
 
-inline constexpr int kMostWaiting = 1024;  // labels of one stream that wait to be performed
+inline constexpr int kMostWaiting = 1024;  // most labels of one stream that wait to be performed
 
 struct BoundModel {
-  trajectory::StateInformation evidence;  // holds the gesture model
+  trajectory::StateInformation information;  // holds the gesture model
   std::unique_ptr<perform::LabelSequencePlayer> player;
   std::unique_ptr<const smooth::LiveModel> live;
-  std::string name;  // of its file, for people
+  std::string name;  // of its file, for messages
 
-  [[nodiscard]] const gesture::GestureModel& gesture() const noexcept { return evidence.model(); }
+  [[nodiscard]] const gesture::GestureModel& gesture() const noexcept {
+    return information.model();
+  }
 };
 
-// The rate at which a stream is taken to come, [Hz], when it says `nominal_hz` (0: unknown).
+// The assumed rate of a stream [Hz] that states `nominal_hz` (0: unknown).
 [[nodiscard]] constexpr double stream_rate_hz(double nominal_hz) noexcept {
   return nominal_hz > 0.0 ? std::clamp(nominal_hz, 10.0, 1000.0) : 60.0;
 }
 
-// Refuses a skeleton that is no hand. `rate_hz` of the stream, 0 unknown.
+// Returns an error for a skeleton that is not a hand. `rate_hz` is the stream's, 0 if unknown.
+// Cold.
 [[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
                                                                    const Skeleton& skeleton,
                                                                    double rate_hz,

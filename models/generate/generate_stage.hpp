@@ -1,7 +1,8 @@
-// GenerateStage: the live smoother on any skeleton, and on hands the playback behind it. Frames of
-// a stream that only performs (Source::kLabels) are not smoothed and have no lag. A performed frame
-// is, to a client, a frame like any other: measured quality, its stream's own sequence and times;
-// `source` says labels, and label and probability say what.
+// GenerateStage: the live smoother on any skeleton, followed on hands by the gesture player
+// (models/generate/README.md, "Pipeline stage"). Frames of a stream that only performs
+// (Source::kLabels) are not smoothed and have no lag. For a client a performed frame is a frame
+// like any other: it has measured quality and its stream's own sequence numbers and times; its
+// source is kLabels, and label and probability name the gesture. One thread.
 #pragma once
 
 #include <array>
@@ -20,7 +21,8 @@ namespace posed::generate {
 
 class GenerateStage final : public Stage {
  public:
-  // `model` outlives its use here; may be null, and must be for a skeleton that is no hand's.
+  // `model` is not owned and must outlive its use here; it may be null, and must be null for a
+  // skeleton that is not a hand.
   GenerateStage(std::shared_ptr<const Skeleton> skeleton, const smooth::LiveOptions& options,
                 double rate_hz, const BoundModel* model);
 
@@ -35,7 +37,7 @@ class GenerateStage final : public Stage {
   void flush(StageOut& out) noexcept override;
   [[nodiscard]] bool performs() const noexcept override { return player_.busy(); }
 
-  // All RT-safe; in effect from the next frame that is emitted.
+  // All RT-safe; they take effect at the next emitted frame.
   [[nodiscard]] bool play(const gesture::PlayOrder& order) noexcept { return player_.play(order); }
   void stop_playing() noexcept { player_.stop(); }
   void set_model(const BoundModel* model) noexcept;
@@ -63,10 +65,10 @@ class GenerateStage final : public Stage {
   std::int64_t last_tick_ns_ = kNoTime_ns;  // in this silence
   int entered_ = 0;                         // frames that wait in the smoother
   bool has_last_ = false;
-  bool live_seen_ = false;  // a hand came; else the stream only performs
-  Frame last_;              // that went out
+  bool live_seen_ = false;  // a live hand was received; else the stream only performs
+  Frame last_;              // the last emitted frame
   HandAngles live_{};
-  std::size_t channels_ = 0;  // of the frame emitted last
+  std::size_t channels_ = 0;  // of the last emitted frame
   std::array<double, kMaxChannels> variance_rad2_{};
 };
 

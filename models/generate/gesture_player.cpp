@@ -8,7 +8,7 @@ namespace posed::generate {
 namespace {
 
 constexpr double kWayBack_s = 0.8;
-// Labels of a loop that are planned ahead: what the player looks ahead to, and a neighbour.
+// Labels of a loop that are planned ahead: those within the look-ahead, and one neighbour.
 constexpr int kLoopAhead = 3;
 
 }  // namespace
@@ -26,7 +26,7 @@ bool GesturePlayer::play(const gesture::PlayOrder& order) noexcept {
   const std::size_t known = model_->gesture().labels.size();
   const auto is_known = [known](std::uint16_t label) { return label < known; };
   if (!std::ranges::all_of(order.labels(), is_known)) return false;
-  if (stopping_) {  // what it was is over, however the hand still moves
+  if (stopping_) {  // the stopped performance is dropped, even while the hand is led back
     model_->player->clear();
     phase_ = Phase::kIdle;
     stopping_ = false;
@@ -88,7 +88,7 @@ bool GesturePlayer::next_performed() noexcept {
   keep_looping();
   const int before = played_.state;
   if (!model_->player->next(played_)) return false;
-  if (played_.state == 0 && before != 0) --ahead_;  // another label begins
+  if (played_.state == 0 && before != 0) --ahead_;  // the next label begins
   return true;
 }
 

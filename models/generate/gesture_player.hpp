@@ -1,7 +1,8 @@
-// GesturePlayer: performs label strings on a hand, and leads from the live hand into them and back
-// (models/generate/README.md, "Gesture player"): in by the player's lead-in, from the hand's last
-// two poses; back by the live hand plus a decaying offset. The script is the future, so there is no
-// lag. Frames are the stream's own, at the rate that the model is bound to.
+// GesturePlayer: performs label sequences on a hand, and leads from the live hand into them and
+// back (models/generate/README.md, "Gesture player"). The way in is the lead-in of
+// LabelSequencePlayer, from the hand's last two poses; the way back is the live hand plus a
+// decaying offset. The future is the label sequence, so there is no lag. Frames are those of the
+// stream, at the rate to which the model is bound.
 //
 // Without a live hand (a stream that only performs) it holds its last pose between performances.
 #pragma once
@@ -20,28 +21,28 @@ class GesturePlayer {
  public:
   explicit GesturePlayer(double rate_hz) noexcept : rate_hz_(rate_hz) {}
 
-  // Ends what is performed, as stop() does; the old model is no longer read. May be null.
+  // Ends the performance as stop() does; the old model is no longer read. May be null.
   void set_model(const BoundModel* model) noexcept;
 
-  // Performs these labels after those that wait; its tempo counts from the next state on. A loop
-  // ends with the labels that are planned ahead already. False: without a model, with labels that
-  // it has not, or with no room for so many.
+  // Performs these labels after those that wait; the order's tempo applies from the next state on.
+  // A loop that is running ends after the labels already planned ahead. Returns false without a
+  // model, with label indices that the model does not have, or when too many labels would wait.
   [[nodiscard]] bool play(const gesture::PlayOrder& order) noexcept;
-  // Back to the live hand, from where it is.
+  // Leads back to the live hand at once, from the present pose.
   void stop() noexcept;
 
-  // One frame. `live` is the hand at this frame, finite; null: there is none. Returns the pose to
-  // show, and what it is.
+  // One frame. `live` is the hand at this frame, with finite angles; null: there is no live hand.
+  // Returns the pose to show and its kind.
   enum class What : std::uint8_t { kLive, kHeld, kPerformed, kLeadingBack };
   struct Pose {
     What what = What::kLive;
-    int label = -1;  // index into the model's labels while performed
+    int label = -1;  // index into the model's labels while performing, else -1
     HandAngles angles{};
-    HandAngles variance_rad2{};  // 0 where it is not a performance's
+    HandAngles variance_rad2{};  // 0 unless performed
   };
   [[nodiscard]] const Pose& step(const HandAngles* live) noexcept;
 
-  // Whether the next step would show anything but the live or held hand.
+  // Whether the next step shows anything other than the live or held hand.
   [[nodiscard]] bool busy() const noexcept { return phase_ != Phase::kIdle || ahead_ > 0; }
 
  private:
@@ -58,13 +59,13 @@ class GesturePlayer {
   bool started_ = false;  // past_ holds poses
   bool stopping_ = false;
 
-  int ahead_ = 0;            // labels that wait in the player
-  gesture::PlayOrder loop_;  // what begins again; empty: nothing
+  int ahead_ = 0;            // number of labels that wait in the player
+  gesture::PlayOrder loop_;  // the order that repeats; empty: none
   int loop_next_ = 0;
   perform::PlayedFrame played_;
 
   QuinticOffset way_back_;
-  HandAngles hold_{};                 // what is shown without a live hand
+  HandAngles hold_{};                 // the pose shown without a live hand
   std::array<HandAngles, 2> past_{};  // the last two poses shown, newest last
   std::array<HandAngles, 2> live_{};  // the last two live ones
   Pose pose_;

@@ -1,19 +1,21 @@
-// The way back from a performance to the live hand (models/generate/README.md, "Return to the live
-// hand"). Pure arithmetic on hand45 angles, RT-safe.
+// The return from a performance to the live hand (models/generate/README.md, "Return to the live
+// hand"). Only arithmetic on hand45 angles, RT-safe.
 #pragma once
 
 #include "proto/frame/hand.hpp"
 
 namespace posed::generate {
 
-// An offset that decays from a position and a velocity to nothing, as a polynomial of fifth degree:
-// it begins without acceleration and ends at rest. Added to a live hand it leads back to it.
+// An offset that decays from an initial position and velocity to zero along a polynomial of fifth
+// degree, which starts without acceleration and ends at rest. Added to the live hand, it leads back
+// to it.
 class QuinticOffset {
  public:
-  // `velocity` in radians a frame; the offset is gone after `frames`.
+  // `velocity` is in radians per frame; the offset is zero after `frames` frames.
   void start(const HandAngles& offset, const HandAngles& velocity, int frames) noexcept;
 
-  // The next frame's offset, the first one frame after the start; zero when done().
+  // The next frame's offset, the first call gives the one a frame after the start; zero when
+  // done().
   [[nodiscard]] HandAngles next() noexcept;
   [[nodiscard]] bool done() const noexcept { return frame_ >= frames_; }
 

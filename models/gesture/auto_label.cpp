@@ -15,9 +15,10 @@ using Eigen::VectorXd;
 
 constexpr double kSmooth_s = 0.07;   // half width of the moving average against sensor noise
 constexpr double kShortest_s = 0.3;  // no gesture is shorter
-constexpr double kSearch_s = 0.5;    // a move's fastest moment is so near the change of pose
-constexpr double kRestShare = 0.1;   // of the peak's energy above rest: the hand has set off
-constexpr double kForbidden = 1e9;   // cost of another label inside an example
+constexpr double kSearch_s =
+    0.5;  // a move's fastest moment is at most this far from the change of pose
+constexpr double kRestShare = 0.1;  // of the peak's energy above rest: here the move starts
+constexpr double kForbidden = 1e9;  // cost of another label inside an example
 
 FeatureMatrix smoothed(const FeatureMatrix& angles, int half) {
   FeatureMatrix out(angles.rows(), angles.cols());
@@ -87,7 +88,7 @@ class Proposer {
     }
     for (const Segment& example : recording_.segments) {
       const int middle =
-          example.begin + example.frames() / 2;  // its move may still look like before
+          example.begin + example.frames() / 2;  // the first half may still show the previous pose
       for (Index k = 0; k < labels; ++k) {
         if (poses_[k].name == example.label) continue;
         cost.col(k).segment(middle, example.end - middle).setConstant(kForbidden);
@@ -96,7 +97,7 @@ class Proposer {
     return cost;
   }
 
-  // The cheapest labelling of all frames, where each change of label has its price.
+  // The cheapest labelling of all frames, where each change of label has a cost.
   [[nodiscard]] std::vector<int> best_labels() const {
     const MatrixXd cost = costs();
     const Index labels = cost.cols();
@@ -134,7 +135,7 @@ class Proposer {
     return segments;
   }
 
-  // The frame at which the hand sets off on the move that changes its pose at `change`.
+  // The frame at which the move starts that changes the pose at `change`.
   [[nodiscard]] int onset(int change) const {
     const auto count = static_cast<int>(energy_.size());
     const int from = std::max(change - frames(kSearch_s), 0);
@@ -146,7 +147,7 @@ class Proposer {
     return t;
   }
 
-  // How far from the onset people put the border, by the examples: the median.
+  // The median distance of the examples' borders from the onset of the move.
   [[nodiscard]] int learnt_shift(const std::vector<Segment>& segments) const {
     std::vector<int> shifts;
     for (const Segment& example : recording_.segments) {
@@ -161,8 +162,8 @@ class Proposer {
     return shifts[shifts.size() / 2];
   }
 
-  // The examples as they are, the proposals around them; what is left of a proposal beside an
-  // example and too short for a gesture goes to its other neighbour.
+  // The examples unchanged, with the proposals around them. Where the rest of a proposal beside an
+  // example is too short for a gesture, it is added to its other neighbour.
   [[nodiscard]] std::vector<Segment> with_examples(const std::vector<Segment>& proposed) const {
     std::vector<Segment> left;
     for (Segment rest : proposed) {

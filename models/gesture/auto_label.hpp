@@ -1,7 +1,8 @@
-// Annotation help: from a few labelled examples to proposed segments for the whole recording, for a
-// person to correct. Where the pose changes from one label's to another's is found by the nearest
-// labelled pose over time; where that move begins, by its motion energy. Two gestures of the same
-// label in a row look like one. Cold.
+// Labelling aid: from a few labelled examples it proposes segments for the whole recording, which a
+// person then corrects. The change from one label's pose to another's is found by the nearest
+// labelled pose over time; the start of that move is found by its motion energy
+// (models/gesture/README.md, "Proposed labels"). Two gestures of the same label in a row look like
+// one. Cold.
 #pragma once
 
 #include <vector>
@@ -11,9 +12,9 @@
 
 namespace posed::gesture {
 
-// `recording.segments` are the examples, one or more of each label; they come back unchanged among
-// the proposals. Where in a move people put the border is learnt from the examples. Refuses
-// examples of fewer than two labels, and poses that are all alike.
+// `recording.segments` are the examples, one or more of each label; they are returned unchanged
+// among the proposals. Where in a move the person puts the border is learnt from the examples.
+// Returns an error for examples of fewer than two labels and for poses that are all alike.
 [[nodiscard]] Result<std::vector<Segment>> propose_segments(const Recording& recording);
 
 }  // namespace posed::gesture

@@ -15,11 +15,12 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr double kFloorShare = 0.01;  // of each feature's variance over all recordings
-constexpr double kNoise_rad = 0.2 * std::numbers::pi / 180.0;   // what a sensor has at least
-constexpr double kStill_rad = 1e-4 * std::numbers::pi / 180.0;  // less spread: a constant channel
-constexpr double kOwnModelFrom = 3;  // examples; below, a context trusts its label's model
+constexpr double kNoise_rad = 0.2 * std::numbers::pi / 180.0;  // lower bound of a sensor's noise
+constexpr double kStill_rad =
+    1e-4 * std::numbers::pi / 180.0;  // a channel with a smaller deviation is constant
+constexpr double kOwnModelFrom = 3;   // examples; with fewer, a context uses its label's model
 
-// One segment: what it shows and which frames of which recording.
+// One segment: its context, and its frames within a recording.
 struct Example {
   std::size_t recording, segment;
   int context;
@@ -49,14 +50,16 @@ class Trainer {
 
   bool train_isolated() {
     for (std::size_t label = 0; label < label_models_.size(); ++label) {
-      if (!tell(0.5 * static_cast<double>(label) / static_cast<double>(label_models_.size()))) {
+      if (!report_progress(0.5 * static_cast<double>(label) /
+                           static_cast<double>(label_models_.size()))) {
         return false;
       }
       train_label(static_cast<int>(label));
     }
     out_.log_likelihood = 0.0;
     for (std::size_t c = 0; c < out_.contexts.size(); ++c) {
-      if (!tell(0.5 + 0.5 * static_cast<double>(c) / static_cast<double>(out_.contexts.size()))) {
+      if (!report_progress(0.5 + 0.5 * static_cast<double>(c) /
+                                     static_cast<double>(out_.contexts.size()))) {
         return false;
       }
       train_context(c);
@@ -66,7 +69,7 @@ class Trainer {
 
   bool train_embedded() {
     for (int round = 0; round < options_.embedded_rounds; ++round) {
-      if (!tell(1.0)) return false;
+      if (!report_progress(1.0)) return false;
       embedded_round();
     }
     return true;
@@ -75,7 +78,9 @@ class Trainer {
   ContextModels finish() { return std::move(out_); }
 
  private:
-  bool tell(double fraction) const { return !options_.progress || options_.progress(fraction); }
+  bool report_progress(double fraction) const {
+    return !options_.progress || options_.progress(fraction);
+  }
 
   void list_examples(const std::vector<Label>& labels) {
     const auto index_of = [&](const Segment& segment) {
@@ -105,14 +110,15 @@ class Trainer {
     context_models_.resize(out_.contexts.size());
   }
 
-  // Least variances: a share of what each feature does anyway, and what the sensor's noise does to
-  // the value, its delta (1/2 of it) and its delta-delta (6 of it).
+  // Variance floors: a share of each feature's total variance, and what sensor noise adds to the
+  // value, its delta (1/2 of the noise variance) and its delta-delta (6 times).
   void set_floor() {
     const Index dims = features_.front().cols();
     VectorXd first = VectorXd::Zero(dims);
     VectorXd second = VectorXd::Zero(dims);
     double frames = 0.0;
-    const Eigen::RowVectorXd origin = features_.front().row(0);  // near the data: no cancellation
+    const Eigen::RowVectorXd origin =
+        features_.front().row(0);  // near the data, which avoids cancellation
     for (const FeatureMatrix& features : features_) {
       const FeatureMatrix off = features.rowwise() - origin;
       first += off.colwise().sum();
@@ -214,7 +220,7 @@ class Trainer {
   std::vector<FeatureMatrix> features_;     // [recording]
   std::vector<Example> examples_;           // in the order of recordings and segments
   std::vector<StateModel> label_models_;    // [label]; empty where it was not recorded
-  std::vector<StateModel> context_models_;  // [context]; empty where its label's model serves
+  std::vector<StateModel> context_models_;  // [context]; empty where its label's model is used
   ContextModels out_;
 };
 

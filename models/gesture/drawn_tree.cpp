@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::array<const char*, 3> kPositions{"previous", "current", "next"};
 
-// Which classes a label at each position may still have.
+// The classes that a label at each position can have at a node.
 using Allowed = std::array<std::array<bool, kClasses>, 3>;
 
 class Words {

@@ -1,4 +1,4 @@
-// A tree with the words that its drawings share; private to models/gesture. Cold.
+// A tree with the texts that all its drawings share; private to models/gesture. Cold.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace posed::gesture {
 
 struct DrawnNode {
   std::string words;      // the question, or the leaf's number and frames
-  std::string reach;      // the contexts that get here: {g,1}-c-*
+  std::string reach;      // the contexts that reach this node: {g,1}-c-*
   int yes = -1, no = -1;  // -1: a leaf
   int depth = 0;
 };
@@ -21,7 +21,7 @@ struct DrawnTree {
   std::vector<DrawnNode> nodes;  // as in the model: node 0 is the root
 };
 
-// Finger by finger, each with its states.
+// Ordered by finger, then by state.
 [[nodiscard]] std::vector<DrawnTree> draw_trees(const GestureModel& model,
                                                 const TreeChoice& choice);
 

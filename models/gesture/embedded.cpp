@@ -11,7 +11,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Segments [first, last) that touch one another, with all frames between.
+// Segments [first, last) that touch one another, with all their frames.
 class Chain {
  public:
   Chain(const FeatureMatrix& features, const std::vector<Segment>& segments,
@@ -49,7 +49,7 @@ class Chain {
   }
 
  private:
-  // Frame t, from the chain's begin, may be in each segment that is not farther off than `slack`.
+  // Frame t, counted from the chain's start, may be in any segment at most `slack` frames away.
   void set_band(int slack) {
     const auto count = static_cast<int>(last_ - first_);
     std::vector<int> lowest;

@@ -1,6 +1,6 @@
-// One round over whole recordings: the models of the labels in a row against all frames of their
-// stretch, so that a label's borders are only hints (models/gesture/README.md, "Embedded rounds").
-// Cold.
+// One round of alignment over whole recordings: the models of successive labels are chained and
+// aligned with all frames that the labels cover, so that the labels' borders are only hints
+// (models/gesture/README.md, "Embedded rounds"). Cold.
 #pragma once
 
 #include <functional>
@@ -11,12 +11,13 @@
 
 namespace posed::gesture {
 
-// The part of an example that one segment was aligned with.
+// Receives the frames that one segment was aligned with, their state probabilities and expected
+// stays.
 using TakePart = std::function<void(std::size_t segment, const Frames& frames,
                                     const Eigen::MatrixXd& gamma, const Eigen::VectorXd& stays)>;
 
-// `models` has one model a segment; a border moves by at most `slack` frames. Segments that do not
-// touch are aligned apart. The log likelihood of all of it.
+// `models` has one model per segment; a border moves by at most `slack` frames. Segments that do
+// not touch are aligned separately. Returns the log likelihood of the whole recording.
 double align_embedded(const FeatureMatrix& features, const std::vector<Segment>& segments,
                       const std::vector<const StateModel*>& models, int slack,
                       const TakePart& take);

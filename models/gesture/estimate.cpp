@@ -11,9 +11,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kMinStay = 1e-3;
-constexpr double kMinOccupancy = 1e-6;  // frames; below it a state's mean would be noise
+constexpr double kMinOccupancy = 1e-6;  // frames; with less, a state's mean would be noise
 
-// What a hard alignment says: in each state all frames but its last were followed by a stay.
+// Counts of a hard alignment: in each state, every frame but the last one was followed by a stay.
 void add_path(Statistics& sums, const Frames& frames, const std::vector<int>& path) {
   MatrixXd gamma = MatrixXd::Zero(frames.rows(), sums.occupancy.size());
   VectorXd stays = VectorXd::Zero(sums.occupancy.size());

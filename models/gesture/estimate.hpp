@@ -1,5 +1,6 @@
-// Statistics of aligned frames and the models made of them: flat start, segmental k-means and
-// Baum-Welch on isolated examples (models/gesture/README.md, "Estimation" and "Durations"). Cold.
+// Statistics of aligned frames and the models estimated from them: flat start, segmental k-means
+// and Baum-Welch on isolated examples (models/gesture/README.md, "Estimation" and "Durations").
+// Cold.
 #pragma once
 
 #include <vector>
@@ -10,7 +11,7 @@ namespace posed::gesture {
 
 inline constexpr double kMinDurationVariance = 0.25;  // of a state [frames^2]: half a frame
 
-// Sums over examples; states x dimensions where two words are needed.
+// Sums over examples; matrices are states x dimensions.
 struct Statistics {
   Eigen::VectorXd occupancy;      // expected frames in each state
   Eigen::MatrixXd first, second;  // sums of o and o^2, weighted by gamma
@@ -26,24 +27,25 @@ struct Statistics {
 };
 
 // Means and variances, these at least `floor` [dimension]; stay within 0.001 and 0.999. A state
-// that nothing is in keeps what `before` says.
+// without any frames keeps the values of `before`.
 [[nodiscard]] StateModel estimate(const Statistics& sums, const Eigen::VectorXd& floor,
                                   const StateModel& before);
 
 // Every example cut into equal parts, frame t of T in state t * states / T.
 [[nodiscard]] Statistics flat_start(const std::vector<Frames>& examples, int states);
-// Every example along its best path through the model.
+// Aligns every example along its best path through the model.
 [[nodiscard]] Statistics align_hard(const std::vector<Frames>& examples, const StateModel& model);
-// Every example as the model expects it: the E step.
+// Aligns every example by the posterior of its states (E step of Baum-Welch).
 [[nodiscard]] Statistics align_soft(const std::vector<Frames>& examples, const StateModel& model);
 
-// How long the examples stay in each state [frames], over the examples; variances at least 0.25.
+// How long the examples stay in each state: mean [frames] and variance [frames^2] over the
+// examples; variances at least 0.25.
 struct Durations {
   Eigen::VectorXd mean, variance;
 };
 [[nodiscard]] Durations durations_of(const Statistics& sums);
 
-// `rounds` times estimate and align; `model` is what the last alignment was made with.
+// Runs estimate and align `rounds` times; `model` is the one of the last alignment.
 struct Fit {
   StateModel model;
   Statistics sums;

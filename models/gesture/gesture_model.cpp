@@ -9,7 +9,7 @@ int label_at(const Context& context, int position) noexcept {
   return position == 0 ? context.previous : position == 1 ? context.current : context.next;
 }
 
-// Walks a tree down; `class_of(label)` answers its questions.
+// Descends a tree from its root to a leaf; `class_of(label)` decides its questions.
 template <typename Gaussian, typename ClassOf>
 int walk(const Tree<Gaussian>& tree, const Context& context, const ClassOf& class_of) noexcept {
   int node = 0;

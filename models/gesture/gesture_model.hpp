@@ -1,7 +1,7 @@
-// GestureModel: what training makes of a labelled hand recording, and all that generation, the
-// live generator and the model file need. Five states a gesture, left to right without skips; one
-// decision tree per state and finger picks a diagonal Gaussian over that finger's features from
-// the gesture and its two neighbours, so that labels that were never recorded are answered too
+// GestureModel: the result of training on labelled hand recordings, used by generation, the live
+// smoother and the model file. A gesture has five states, left to right without skips. One decision
+// tree per state and finger selects a diagonal Gaussian over that finger's features from the
+// gesture and its two neighbours, so that labels that were never recorded get a Gaussian, too
 // (models/gesture/README.md, "Decision trees" and "Questions and unseen labels").
 //
 // Units: radians per frame at `rate_hz` to the power of the window's order. Immutable after load;
@@ -28,20 +28,20 @@ struct FingerGaussian {
   std::array<std::array<double, kFingerChannels>, kDeltaWindows> variance{};
 };
 
-// Frames that each state lasts.
+// Duration of each state [frames].
 struct DurationGaussian {
   std::array<double, kStates> mean{};
   std::array<double, kStates> variance{};
 };
 
-// A gesture among its neighbours, as indices into GestureModel::labels. At the edges of a string
+// A gesture among its neighbours, as indices into GestureModel::labels. At the ends of a sequence
 // the missing neighbour is the gesture itself.
 struct Context {
   int previous, current, next;
 };
 
-// Inner nodes ask question 3 * position + class, position 0 previous, 1 current, 2 next: is that
-// label of that class for this tree's finger?
+// Inner nodes ask question 3 * position + class, position 0 previous, 1 current, 2 next: does that
+// label belong to that class for this tree's finger?
 struct TreeNode {
   int question = -1;  // -1: a leaf
   int yes = -1, no = -1;
@@ -52,31 +52,31 @@ template <typename Gaussian>
 struct Tree {
   std::vector<TreeNode> nodes;  // node 0 is the root
   std::vector<Gaussian> leaves;
-  std::vector<double> occupancy;  // [leaf] training frames in it (duration tree: gestures)
+  std::vector<double> occupancy;  // [leaf] training frames in the leaf (duration tree: gestures)
 };
 
 struct Label {
   std::string name;                          // see proto/frame/label.hpp
   std::array<int, kFingers> finger_class{};  // 0 to kClasses - 1
-  bool trained = false;                      // it was in the recordings
+  bool trained = false;                      // it occurs in the training recordings
 };
 
-// The class that most fingers of the label have, the lowest where they tie. RT-safe.
+// The class that most fingers of the label have, the lowest one in a tie. RT-safe.
 [[nodiscard]] int majority_class(const Label& label) noexcept;
 
 struct GestureModel {
   double rate_hz = 30.0;
   std::vector<Label> labels;
   std::array<std::array<Tree<FingerGaussian>, kFingers>, kStates> trees;
-  Tree<DurationGaussian> durations;  // asked with the class that most fingers have
+  Tree<DurationGaussian> durations;  // uses the class that most fingers have
   HandAngles low{}, high{};          // range of the training recordings [rad]
-  std::string report_json;           // how it was made, for people
+  std::string report_json;           // report of the training, for people
 
   [[nodiscard]] int label_index(std::string_view name) const noexcept;  // -1 when unknown
 };
 
-// The index of the leaf, and the Gaussian, that a finger's tree gives a state in its context.
-// `state` from 0. RT-safe.
+// The leaf that a finger's tree selects for a state in its context, as an index and as its
+// Gaussian. `state` from 0. RT-safe.
 [[nodiscard]] int leaf_index(const GestureModel& model, int state, int finger,
                              const Context& context) noexcept;
 [[nodiscard]] const FingerGaussian& leaf(const GestureModel& model, int state, int finger,

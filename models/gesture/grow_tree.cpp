@@ -12,7 +12,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using Rows = std::vector<int>;
 
-constexpr double kTie = 1e-9;  // gains closer than this are equal: rounding must not choose
+constexpr double kTie =
+    1e-9;  // gains closer than this are equal: rounding must not decide between them
 
 struct Pool {
   double occupancy = 0.0, examples = 0.0;
@@ -34,7 +35,7 @@ class Grower {
                       std::log(sums.occupancy.sum());
   }
 
-  // Appends the subtree over `rows`; its root's index.
+  // Appends the subtree over `rows` and returns its root's index.
   int grow(Rows rows) {
     const auto index = static_cast<int>(tree_.nodes.size());
     tree_.nodes.emplace_back();

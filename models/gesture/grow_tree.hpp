@@ -1,7 +1,7 @@
-// Growing a decision tree over the contexts of gestures: which contexts share one Gaussian
-// (models/gesture/README.md, "Decision trees"). Greedy: the question that gains most likelihood
-// splits, while its gain pays for the parameters that it adds (MDL) and both halves have seen
-// enough. Cold.
+// Grows a decision tree over the contexts of gestures, which determines the contexts that share one
+// Gaussian (models/gesture/README.md, "Decision trees"). Greedy: a node is split by the question
+// that gains most likelihood, as long as the gain exceeds the description length of the added
+// parameters (MDL) and both halves have enough data. Cold.
 #pragma once
 
 #include <vector>
@@ -12,7 +12,7 @@
 
 namespace posed::gesture {
 
-// What training saw of every context: one row each.
+// Statistics of the contexts, one row each.
 struct ContextSums {
   Eigen::VectorXd occupancy;      // frames (durations: gestures)
   Eigen::VectorXd examples;       // gestures
@@ -23,19 +23,20 @@ struct ContextSums {
 using Answers = std::vector<std::vector<bool>>;
 
 struct GrowOptions {
-  double mdl_factor = 1.0;  // of the description length's price of a split
+  double mdl_factor = 1.0;  // factor on the description length of a split
   double min_occupancy = 20.0;
   double min_examples = 2.0;
-  std::vector<int> counted;  // the dimensions that move: likelihood and price count only these
+  std::vector<int>
+      counted;  // the dimensions that move; likelihood and MDL threshold use only these
 };
 
 struct GrownTree {
-  std::vector<TreeNode> nodes;            // parents before children; leaves numbered as they stand
-  std::vector<double> gain;               // [node] likelihood that its question gained; 0 at a leaf
-  Eigen::MatrixXd mean, variance;         // [leaf][dimension]
-  Eigen::VectorXd occupancy;              // [leaf]
+  std::vector<TreeNode> nodes;     // parents before children; leaves numbered in this order
+  std::vector<double> gain;        // [node] log likelihood gained by its question; 0 at a leaf
+  Eigen::MatrixXd mean, variance;  // [leaf][dimension]
+  Eigen::VectorXd occupancy;       // [leaf]
   std::vector<std::vector<int>> members;  // [leaf] rows of the contexts in it
-  double threshold = 0.0;                 // what a split had to gain
+  double threshold = 0.0;                 // least gain of a split
 };
 
 // Ties go to the first question. Variances are at least `floor` [dimension].

@@ -19,7 +19,7 @@ double log_add(double a, double b) {
   return high + std::log1p(std::exp(std::min(a, b) - high));
 }
 
-// Reads a banded matrix by state; what lies outside the band never happens.
+// Reads a banded matrix by state; states outside the band have probability zero.
 class Banded {
  public:
   Banded(const MatrixXd& values, const Band& band) : values_(values), band_(band) {}
@@ -130,7 +130,8 @@ Path viterbi(const MatrixXd& density, const VectorXd& stay) {
   best[0] = density(0, 0);
   Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> came(frames, states);
   for (Index t = 1; t < frames; ++t) {
-    for (int j = states - 1; j >= 0; --j) {  // from the last: state j - 1 is still the old one
+    for (int j = states - 1; j >= 0;
+         --j) {  // from the last state on, so that state j - 1 still holds the previous frame
       const double stayed = best[j] + log_stay[j];
       const double moved = j > 0 ? best[j - 1] + log_leave[j - 1] : kNever;
       came(t, j) = moved > stayed;

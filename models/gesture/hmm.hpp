@@ -1,6 +1,6 @@
-// Left-to-right hidden Markov models without skips: one diagonal Gaussian a state, a start in the
-// first state and an exit from the last (models/gesture/README.md, "Hidden Markov model"). The
-// recursions run in the log domain: the linear ones overflow on real gloves. Cold.
+// Left-to-right hidden Markov models without skips: one diagonal Gaussian per state, start in the
+// first state, exit from the last (models/gesture/README.md, "Hidden Markov model"). The recursions
+// run in the log domain: the linear ones overflow on real gloves. Cold.
 #pragma once
 
 #include <vector>
@@ -17,14 +17,14 @@ struct StateModel {
   Eigen::VectorXd stay;
 };
 
-using Frames = Eigen::Ref<const FeatureMatrix>;  // a stretch of a recording's features
+using Frames = Eigen::Ref<const FeatureMatrix>;  // consecutive frames of a recording's features
 
 // ln N(o_t; mean_j, variance_j): [frame][state].
 [[nodiscard]] Eigen::MatrixXd log_density(const Frames& frames, const StateModel& model);
 
-// A chain of states against a stretch of frames. Frame t may only be in the states
+// A chain of states and the frames that it is aligned with. Frame t may only be in the states
 // [first[t], first[t] + width), `first` rising; column k of a row stands for state first[t] + k.
-// A model against its own example is the chain whose band is all of it.
+// When one model is aligned with one example, the band covers all states.
 struct Band {
   std::vector<int> first;  // [frame]
   int width = 0;
@@ -32,9 +32,9 @@ struct Band {
 [[nodiscard]] Band whole_band(Eigen::Index frames, int states);
 
 struct Posterior {
-  Eigen::MatrixXd gamma;    // [frame][band column]: probability of the state
-  Eigen::VectorXd stays;    // [state] expected number of frames after which it stayed
-  double log_likelihood{};  // -infinity when no path fits: gamma and stays are then zero
+  Eigen::MatrixXd gamma;  // [frame][band column]: probability of the state
+  Eigen::VectorXd stays;  // [state] expected number of times that the state was followed by itself
+  double log_likelihood{};  // -infinity when no path exists; gamma and stays are then zero
 };
 
 // `density` is [frame][band column], `stay` [state].
@@ -46,7 +46,7 @@ struct Path {
   double score{};          // log probability of the path with its frames
 };
 
-// The best path of one model; frames are at least as many as states.
+// The best path through one model; needs at least as many frames as states.
 [[nodiscard]] Path viterbi(const Eigen::MatrixXd& density, const Eigen::VectorXd& stay);
 
 }  // namespace posed::gesture

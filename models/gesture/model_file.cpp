@@ -14,8 +14,8 @@ using model_file::kMaxNumber;
 using model_file::Validator;
 
 constexpr int kMaxLabels = 1'000;
-constexpr int kMaxLeaves = 1 << kQuestions;  // no path asks a question twice
-constexpr double kMinVariance = 1e-20;       // its inverse is still a number that can be summed
+constexpr int kMaxLeaves = 1 << kQuestions;  // because no path asks a question twice
+constexpr double kMinVariance = 1e-20;       // its inverse can still be summed without overflow
 
 constexpr int kRow = kDeltaWindows * kFingerChannels;
 
@@ -26,8 +26,9 @@ std::span<double> mean_row(DurationGaussian& leaf) { return leaf.mean; }
 std::span<double> variance_row(DurationGaussian& leaf) { return leaf.variance; }
 static_assert(sizeof(FingerGaussian::mean) == kRow * sizeof(double));
 
-// One tree and no other shape: children stand behind their parent, so a walk ends; every node but
-// the root is the child of one node, every leaf Gaussian is the leaf of one node.
+// Checks that the nodes form one tree: children come after their parent, so every descent ends;
+// every node but the root is the child of exactly one node; every leaf Gaussian belongs to exactly
+// one node.
 template <typename Gaussian>
 void read_nodes(const v1::GestureTree& from, Tree<Gaussian>& tree, Validator& check) {
   const int count = from.question_size();
@@ -180,7 +181,7 @@ std::string serialize_model(const GestureModel& model) {
   gesture.mutable_low_rad()->Add(model.low.begin(), model.low.end());
   gesture.mutable_high_rad()->Add(model.high.begin(), model.high.end());
   gesture.set_report_json(model.report_json);
-  return model_file::seal(std::move(file));
+  return model_file::wrap(std::move(file));
 }
 
 Result<> save_model(const GestureModel& model, const std::filesystem::path& path) {

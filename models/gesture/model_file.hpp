@@ -1,5 +1,6 @@
 // The gesture model's file: the envelope of proto/model/model_file.hpp around
-// posed.v1.GestureModel; proto/README.md says how a stranger reads a motion out of it. Cold.
+// posed.v1.GestureModel; proto/README.md describes the format and how another program generates a
+// motion from it. Cold.
 #pragma once
 
 #include <cstddef>
@@ -12,11 +13,11 @@
 
 namespace posed::gesture {
 
-// Everything a lookup relies on is checked: each tree is one tree, its numbers are finite, its
-// variances positive, every label is in one class per finger.
+// Everything that a lookup relies on is checked: each tree is a single tree, its numbers are
+// finite, its variances positive, and every label is in exactly one class per finger.
 [[nodiscard]] Result<GestureModel> load_model(const std::filesystem::path& path);
-// The same from bytes (control message, device log). `name` is only for error messages. Whatever
-// the bytes are: an Error, never a crash.
+// The same from bytes (control message, device log). `name` is only for error messages. Any bytes
+// give a model or an Error, never a crash.
 [[nodiscard]] Result<GestureModel> parse_model(std::span<const std::byte> bytes,
                                                const std::string& name);
 [[nodiscard]] std::string serialize_model(const GestureModel& model);

@@ -1,5 +1,5 @@
-// PlayOrder: a string of labels to perform, as indices into one model, small enough to cross a
-// ring.
+// PlayOrder: a label sequence to perform, as indices into one model; trivially copyable and small
+// enough for a lock-free ring.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace posed::gesture {
 
-inline constexpr int kMostLabels = 256;  // labels
+inline constexpr int kMostLabels = 256;  // most labels of one order
 inline constexpr double kMinTempo = 0.5;
 inline constexpr double kMaxTempo = 2.0;
 
@@ -30,8 +30,8 @@ struct PlayOrder {
 };
 static_assert(std::is_trivially_copyable_v<PlayOrder>);
 
-// The order to perform these names. A name that the model does not know is refused with those it
-// does, as are no labels, too many, and a tempo out of range. Cold.
+// The order for these label names. Errors: a name that the model does not know (the message lists
+// the known ones), no labels, too many labels, a tempo (duration scale) out of range. Cold.
 [[nodiscard]] Result<PlayOrder> make_play_order(const GestureModel& model,
                                                 std::span<const std::string> names, double tempo,
                                                 bool loop);

@@ -12,7 +12,7 @@
 namespace posed::gesture {
 namespace {
 
-constexpr int kRounds = 50;  // of k-means; a handful of labels settles in three
+constexpr int kRounds = 50;  // of k-means; a few labels converge in three
 constexpr const char* kClassNames = "ABC";
 
 using Finger = std::array<double, kFingerChannels>;
@@ -39,7 +39,7 @@ int nearest(const Finger& finger, const std::vector<Finger>& centres) {
   return best;
 }
 
-// Starts: the most closed pose, then always the pose farthest from all starts.
+// Start centres: the most closed pose, then repeatedly the pose farthest from all chosen ones.
 std::vector<Finger> first_centres(const std::vector<Finger>& poses) {
   std::vector<Finger> centres{*std::ranges::max_element(poses, {}, flexion)};
   while (centres.size() < std::min<std::size_t>(kClasses, poses.size())) {
@@ -50,7 +50,7 @@ std::vector<Finger> first_centres(const std::vector<Finger>& poses) {
   return centres;
 }
 
-// The class of every pose, 0 the most closed.
+// The class of every pose; class 0 is the most closed.
 std::vector<int> cluster(const std::vector<Finger>& poses) {
   std::vector<Finger> centres = first_centres(poses);
   std::vector<int> member(poses.size());
@@ -79,7 +79,7 @@ std::vector<int> cluster(const std::vector<Finger>& poses) {
 
 std::string finger_word(int finger) { return std::string(kFingerNames[finger]); }
 
-// The one class of a finger that has the label, or why there is none.
+// The class of the finger that contains the label; an error when there is none or more than one.
 Result<int> class_of(const ClassLists& lists, int finger, const std::string& name) {
   int found = -1;
   for (int k = 0; k < kClasses; ++k) {

@@ -10,9 +10,10 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kEven = 0.25;        // of a frame: how far times may stray and still be the grid
-constexpr double kMaxFrames = 1e7;    // 90 hours at 30 Hz
-constexpr double kMaxAngle_rad = 20;  // three turns: no finger, surely degrees
+constexpr double kEven = 0.25;      // of a frame: largest deviation of times from an even grid
+constexpr double kMaxFrames = 1e7;  // 90 hours at 30 Hz
+constexpr double kMaxAngle_rad =
+    20;  // three turns: no finger has such an angle, so the values are degrees
 
 auto row_of(const clip::HandClip& clip, std::size_t frame) {
   return Eigen::Map<const Eigen::RowVectorXd>(clip.angles[frame].data(), kHandChannels);
@@ -41,7 +42,7 @@ Result<> check_values(const clip::HandClip& clip) {
   return {};
 }
 
-// Whether the frames already stand on the grid of `rate_hz`.
+// Whether the frames' times are already those of `rate_hz`.
 bool is_even(const clip::HandClip& clip, double rate_hz) {
   for (std::size_t t = 0; t < clip.time_s.size(); ++t) {
     const double on_grid = (clip.time_s[t] - clip.time_s[0]) * rate_hz;
@@ -69,7 +70,7 @@ double duration_s(const clip::HandClip& clip) {
   if (clip.time_s.size() < 2) return 0.0;
   const double span_s = clip.time_s.back() - clip.time_s.front();
   const auto steps = static_cast<double>(clip.time_s.size() - 1);
-  return span_s * (steps + 1.0) / steps;  // the last frame lasts as long as the mean one
+  return span_s * (steps + 1.0) / steps;  // the last frame lasts one mean frame period
 }
 
 Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz) {
@@ -98,7 +99,8 @@ Result<> cut(Recording& recording, const std::vector<clip::LabelSegment>& labels
   for (const clip::LabelSegment& label : labels) {
     const double begin = std::round(label.start_s * recording.rate_hz);
     const double end = std::round(label.end_s * recording.rate_hz);
-    if (!(end <= frames + 1)) {  // one frame: whether the last one lasts is a matter of taste
+    if (!(end <= frames + 1)) {  // one frame of tolerance: files differ in whether the last frame
+                                 // has a duration
       return fail("the segment ends at " + std::to_string(label.end_s) + " s, after the end of " +
                       recording.file,
                   file, label.line);

@@ -1,4 +1,4 @@
-// A labelled hand recording as training sees it: angles at one even rate, segments in frames. Cold.
+// A labelled hand recording for training: angles at one even rate, segments in frames. Cold.
 #pragma once
 
 #include <string>
@@ -25,16 +25,17 @@ struct Recording {
   std::vector<Segment> segments;
 };
 
-// From the first frame to the end of the last [s].
+// Time from the first frame to the end of the last frame [s].
 [[nodiscard]] double duration_s(const clip::HandClip& clip);
 
-// At `rate_hz`, by linear interpolation where the clip's own times are not already that. Refuses a
-// clip that has fewer frames than a gesture has states, lacks a value (fill gaps with `posed
-// smooth`) or has times that do not rise.
+// The clip at `rate_hz`, interpolated linearly unless its times already have that rate. Errors:
+// fewer frames than a gesture has states, missing values (`posed smooth` fills gaps), times that do
+// not increase.
 [[nodiscard]] Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz);
 
-// Cuts the recording at the labels; `file` is the label file's name for errors. Refuses a segment
-// past the end, and one shorter than a gesture has states.
+// Cuts the recording at the labels; `file` is the label file's name for errors. Returns an error
+// for a segment past the end of the recording and for one with fewer frames than a gesture has
+// states.
 [[nodiscard]] Result<> cut(Recording& recording, const std::vector<clip::LabelSegment>& labels,
                            const std::string& file);
 

@@ -12,7 +12,7 @@
 namespace posed::gesture {
 namespace {
 
-using Hand = Eigen::RowVectorXd;  // 45 angles [deg] while performing
+using Hand = Eigen::RowVectorXd;  // 45 angles [deg]
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 enum class Stance : std::uint8_t { kClosed, kStraight, kSpread };
@@ -29,7 +29,7 @@ constexpr std::array<Gesture, 6> kGestures{{{"g", {kC, kC, kC, kC, kC}},
                                             {"3", {kC, kW, kW, kW, kC}},
                                             {"4", {kC, kW, kW, kW, kW}}}};
 
-// A channel that a glove's sensor measures, in each stance [deg].
+// A channel that a glove's sensor measures, with its angle in each stance [deg].
 struct Sensor {
   int finger, joint, axis;
   std::array<double, 3> angle_deg;  // closed, straight, spread
@@ -46,7 +46,7 @@ int channel_of(const Sensor& sensor) {
   return sensor.finger * kFingerChannels + 3 * sensor.joint + sensor.axis;
 }
 
-// What is this person's own.
+// What distinguishes this person.
 struct Person {
   std::array<double, kSensors.size()> carriage_deg{}, range{};
   std::array<double, kFingers> late_s{};
@@ -67,7 +67,7 @@ double minimum_jerk(double t) {
 
 class SyntheticSigner {
  public:
-  explicit SyntheticSigner(const PerformerOptions& options)
+  explicit SyntheticSigner(const SignerOptions& options)
       : options_(options), random_(options.person * 2654435761U + 29U), person_(random_) {}
 
   Performance perform(const std::vector<int>& script) {
@@ -94,7 +94,7 @@ class SyntheticSigner {
     return static_cast<double>(frame) / options_.rate_hz;
   }
 
-  // The pose as it comes out this time.
+  // The pose of this repetition, with its random deviation.
   Hand pose(int gesture) {
     std::array<double, kFingers> vigour{};
     for (double& value : vigour) value = 1.0 + 0.04 * random_.normal();
@@ -109,7 +109,7 @@ class SyntheticSigner {
     return hand;
   }
 
-  // One gesture from `from`; where the hand is at its end.
+  // Performs one gesture from `from` and returns the hand's pose at its end.
   Hand make(int gesture, const Hand& from) {
     const Hand target = pose(gesture);
     const double move_s = random_.uniform(0.4, 0.7) / person_.pace;
@@ -129,7 +129,7 @@ class SyntheticSigner {
     return rows_.back();
   }
 
-  // What the glove makes of it.
+  // The glove's measurement of the motion.
   clip::HandClip measure() {
     clip::HandClip clip;
     clip.path = "synthetic signer";
@@ -148,7 +148,7 @@ class SyntheticSigner {
     return clip;
   }
 
-  const PerformerOptions& options_;
+  const SignerOptions& options_;
   PortableRandom random_;
   Person person_;
   std::vector<Hand> rows_;
@@ -157,7 +157,7 @@ class SyntheticSigner {
 
 }  // namespace
 
-Result<Performance> make_performance(const PerformerOptions& options) {
+Result<Performance> make_performance(const SignerOptions& options) {
   SyntheticSigner signer(options);
   if (options.script.empty()) return signer.perform(signer.random_script());
   std::vector<int> script;

@@ -19,9 +19,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kMinDurationExamples = 5.0;
-constexpr double kTreesFrom = 0.95;  // of the progress: the alignments take nearly all the time
+constexpr double kTreesFrom =
+    0.95;  // of the progress, because the alignments take nearly all of the time
 
-// The label of every segment has its classes; marks those that were recorded.
+// Checks that the label of every segment has classes, and marks the recorded labels.
 Result<> mark_trained(const std::vector<Recording>& recordings, std::vector<Label>& labels) {
   for (const Recording& recording : recordings) {
     if (recording.segments.empty()) return fail("no gesture is labelled", recording.file);
@@ -39,7 +40,7 @@ Result<> mark_trained(const std::vector<Recording>& recordings, std::vector<Labe
   return {};
 }
 
-// [question][context]: is the label at the question's position of its class?
+// [question][context]: does the label at the question's position belong to its class?
 template <typename ClassOf>
 Answers answers_of(const std::vector<Context>& contexts, const ClassOf& class_of) {
   Answers answers(kQuestions);
@@ -52,7 +53,7 @@ Answers answers_of(const std::vector<Context>& contexts, const ClassOf& class_of
   return answers;
 }
 
-// The features of one finger among those of all: [window][channel of the finger].
+// Indices of one finger's features among those of all fingers: [window][channel of the finger].
 std::vector<int> features_of_finger(int finger) {
   std::vector<int> features;
   for (int w = 0; w < kDeltaWindows; ++w) {
@@ -105,7 +106,7 @@ GrownTree grow_durations(const ContextModels& models, const std::vector<Label>& 
   return grow_tree(sums, answers, VectorXd::Constant(kStates, kMinDurationVariance), options);
 }
 
-// A row of values in the order of the Gaussian's arrays.
+// Copies a row of values into one of the Gaussian's arrays.
 void fill(std::array<std::array<double, kFingerChannels>, kDeltaWindows>& to, const VectorXd& row) {
   for (int w = 0; w < kDeltaWindows; ++w) {
     for (int c = 0; c < kFingerChannels; ++c) to[w][c] = row[w * kFingerChannels + c];

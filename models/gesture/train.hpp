@@ -1,6 +1,6 @@
-// Training: labelled recordings in, a GestureModel out (models/gesture/README.md, "Estimation": one
-// model for each label, from it one for each context, one tree for each state and finger). Cold; no
-// clock, no printing: progress goes to a callback.
+// Training of a GestureModel from labelled recordings (models/gesture/README.md, "Estimation": one
+// model for each label, from it one for each context, one tree for each state and finger). Cold; it
+// reads no clock and prints nothing; progress goes to a callback.
 #pragma once
 
 #include <functional>
@@ -17,22 +17,22 @@ namespace posed::gesture {
 struct TrainOptions {
   std::vector<Label> labels = built_in_labels();  // with the classes of every label
   int segmental_rounds = 2;                       // k-means along best paths
-  int rounds = 8;                                 // of Baum-Welch, mono and then per context
-  int embedded_rounds = 0;        // over whole recordings, where the labels are coarse
+  int rounds = 8;                                 // of Baum-Welch, for labels and then for contexts
+  int embedded_rounds = 0;        // over whole recordings, for labels with imprecise borders
   double embedded_slack_s = 0.5;  // how far a border may then move from its label
-  double mdl_factor = 1.0;        // of the trees' stop
+  double mdl_factor = 1.0;        // factor on the trees' stopping threshold
   // Called with the step and how much of it is done; false stops the training.
   std::function<bool(std::string_view step, double fraction)> progress;
 };
 
-// All recordings are at one rate, which becomes the model's. Refuses recordings without segments
-// and labels that are in no class. The report (what `train --json` prints, less the seconds) is in
-// the model.
+// All recordings are at one rate, which becomes the model's. Returns an error for recordings
+// without segments and for labels that are in no class. The report (what `train --json` prints,
+// without the seconds) is in the model.
 [[nodiscard]] Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
                                                  const TrainOptions& options);
 
-// Each recorded label's pose while it is held: the mean over the last half of its segments, less
-// their last tenth.
+// The held pose of each recorded label: the mean over the last half of its segments, without their
+// last tenth.
 [[nodiscard]] std::vector<LabelPose> label_poses(const std::vector<Recording>& recordings);
 
 }  // namespace posed::gesture

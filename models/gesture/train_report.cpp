@@ -15,10 +15,11 @@ namespace {
 using nlohmann::json;
 
 constexpr int kFewGestures =
-    20;  // below, unseen labels go astray (models/gesture/README.md, measured figures)
+    20;  // with fewer, unseen labels get wrong poses (models/gesture/README.md, measured figures)
 constexpr int kFewExamples = 2;
 constexpr std::array<int, 2> kHold{2, 3};  // the states in which a gesture's pose is held
-constexpr double kAlike_rad = 10.0 * std::numbers::pi / 180.0;  // poses nearer are the same
+constexpr double kAlike_rad =
+    10.0 * std::numbers::pi / 180.0;  // poses closer than this count as the same
 
 using Counts = std::array<std::array<int, kFingers>, kStates>;
 
@@ -52,7 +53,7 @@ TrainReport::TrainReport(const std::vector<Recording>& recordings, const Context
                          const std::vector<Label>& labels)
     : recordings_(recordings), contexts_(contexts), labels_(labels) {}
 
-// How far the classes of a leaf's members are apart in the channel where they differ most.
+// The distance between the classes of a leaf's members in the channel where they differ most [rad].
 double TrainReport::apart_rad(int state, int finger, const std::vector<int>& members) const {
   struct Sum {
     Eigen::VectorXd angles = Eigen::VectorXd::Zero(kFingerChannels);

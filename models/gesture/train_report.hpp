@@ -1,5 +1,4 @@
-// What a training tells people: what it learnt from, how large the trees became, what to beware of.
-// Cold.
+// The report of a training for people: its data, the size of the trees, and warnings. Cold.
 #pragma once
 
 #include <array>
@@ -25,7 +24,7 @@ class TrainReport {
 
  private:
   [[nodiscard]] std::vector<std::string> warnings() const;
-  [[nodiscard]] std::string mixed_warning() const;  // empty: no leaf mixes
+  [[nodiscard]] std::string mixed_warning() const;  // empty: no leaf mixes classes
   [[nodiscard]] double apart_rad(int state, int finger, const std::vector<int>& members) const;
   [[nodiscard]] int gestures_of(const std::string& label) const;
 
@@ -33,8 +32,8 @@ class TrainReport {
   const ContextModels& contexts_;
   const std::vector<Label>& labels_;
   std::array<std::array<int, kFingers>, kStates> leaves_{};
-  // Leaves whose members' current labels are of different classes; those that matter are leaves of
-  // the hold (states 3 and 4) in which these classes are also different poses.
+  // Numbers of leaves whose members' current labels belong to different classes. They matter in the
+  // hold (states 3 and 4) where these classes also have different poses.
   std::array<std::array<int, kFingers>, kStates> mixed_{};
   std::array<int, kFingers> astray_{};
 };

@@ -1,6 +1,6 @@
 // The decision trees for people: as text, as Graphviz source and as an SVG picture (figure 3 of
 // Takamido et al.; models/gesture/README.md, "References"). Each node shows its question and the
-// contexts that reach it, written as there: {g,1}-c-* is c after g or 1, before anything. Cold.
+// contexts that reach it, written as there: {g,1}-c-* is c after g or 1, before any label. Cold.
 #pragma once
 
 #include <string>
@@ -14,7 +14,8 @@ namespace posed::gesture {
 struct TreeChoice {
   int state = -1, finger = -1;  // from 0; -1: all of them
 };
-// "all", "middle" (all its states), "4" (state 4 of all fingers) or "middle:4". A misuse otherwise.
+// Parses "all", "middle" (all its states), "4" (state 4 of all fingers) or "middle:4"; anything
+// else is a usage error.
 [[nodiscard]] Result<TreeChoice> tree_choice(std::string_view text);
 
 [[nodiscard]] std::string trees_text(const GestureModel& model, const TreeChoice& choice);

@@ -1,5 +1,5 @@
-// The SVG drawing of the trees: leaves side by side, every other node above the middle of its
-// children, one tree below the other.
+// The SVG drawing of the trees: leaves are side by side, every other node is above the middle of
+// its children, and the trees are stacked.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,11 +11,11 @@
 namespace posed::gesture {
 namespace {
 
-constexpr double kLetter = 7.0;  // width a letter of 12 px
+constexpr double kLetter = 7.0;  // width of a letter at 12 px
 constexpr double kBoxHeight = 40.0, kLevel = 84.0, kGap = 14.0, kTitle = 34.0, kMargin = 16.0;
 
 struct Placed {
-  double x = 0.0, width = 0.0;  // of the box, its middle and its width
+  double x = 0.0, width = 0.0;  // of the box: centre and width
 };
 
 std::string number(double value) {
@@ -70,7 +70,7 @@ class Picture {
   }
 
  private:
-  // Puts the leaves below `node` to the right of `right`, and the node above them.
+  // Places the leaves below `node` to the right of `right`, and the node above them.
   void place(const DrawnTree& tree, int node, std::vector<Placed>& placed, double& right) const {
     const DrawnNode& at = tree.nodes[node];
     Placed& here = placed[node];

@@ -14,15 +14,16 @@ namespace {
 
 using kernel::kLanes;
 
-// At least so many inducing poses; more, up to the limit, while the worst training pose is left
-// unexplained by more than kResidual sqrt(s). Measured on six walks: that keeps the confidence
-// within 0.02 of the exact one for lengths from 75 degrees, and within 0.035 at 50 degrees.
+// The least number of inducing poses. More are added, up to the limit, while the unexplained
+// variance of some training pose exceeds kResidual sqrt(s). Measured on six walks, this keeps the
+// confidence within 0.02 of the exact one for lengths from 75 degrees, and within 0.035 at 50
+// degrees.
 constexpr int kInducing = 128;
 constexpr double kResidual = 0.015;
-// Below this a pose adds nothing that single precision could show.
+// A pose whose residual variance is below this adds nothing in single precision.
 constexpr double kResidualMin = 1e-6;
 
-// Noise over signal; a process without noise still needs a regular matrix.
+// Noise over signal variance. The lower bound keeps the matrix regular for a process without noise.
 double noise_ratio(const Trained& t) { return std::max(t.noise / std::exp(t.lambda), 1e-6); }
 
 struct Inducing {
@@ -30,7 +31,7 @@ struct Inducing {
   int count = 0;
 };
 
-// Greedy pivoted Cholesky: each time the pose that the chosen ones explain least.
+// Greedy pivoted Cholesky: each step adds the pose that the chosen ones explain least.
 Inducing choose(const Trained& t, int limit) {
   const auto points = static_cast<int>(t.inputs.rows());
   Inducing chosen;

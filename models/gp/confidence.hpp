@@ -1,4 +1,4 @@
-// What the predictor's confidence needs, worked out once when a model is loaded. Cold.
+// The matrices of the predictor's confidence, computed once when a model is loaded. Cold.
 //
 // g(q) = 1 - v(q) / e^lambda with v the posterior variance of the RBF part (README.md,
 // "Confidence"). With k^ = k / e^lambda and s = noise / e^lambda, g = k^' M k^ = |L k^|^2 for a
@@ -17,12 +17,12 @@
 namespace posed::gp {
 
 struct Confidence {
-  std::vector<int> order;       // of the training poses: those that the triangle reads come first
+  std::vector<int> order;       // of the training poses: those that the triangle uses come first
   int rows = 0;                 // of the triangle, a multiple of 16
-  std::vector<float> triangle;  // blocks as kernel.hpp draws them
+  std::vector<float> triangle;  // blocks as drawn in kernel.hpp
 };
 
-// Exact up to `limit` poses; above it at most so many inducing ones.
+// Exact up to `limit` poses; above that, at most `limit` inducing poses.
 [[nodiscard]] Confidence confidence_of(const Trained& trained, int limit);
 
 }  // namespace posed::gp

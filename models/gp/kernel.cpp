@@ -5,12 +5,13 @@
 
 #include "models/gp/isa.hpp"
 
-// Four are enough: the baseline, SSE4, AVX2 and AVX-512. The first two have no fused multiply-add,
-// give the same bits and go by the name "portable".
+// Four targets are enough: the baseline, SSE4, AVX2 and AVX-512. The first two have no fused
+// multiply-add, give the same bits and are named "portable".
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "models/gp/kernel.cpp"
-// Highway compiles this file once per target; its own macros are not written for our warnings.
+// Highway compiles this file once per target; Highway's own macros do not compile without warnings
+// under our flags.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wsign-conversion"
 #include <hwy/foreach_target.h>
@@ -25,8 +26,8 @@ using Floats = hn::CappedTag<float, kLanes>;
 using Vec = hn::Vec<Floats>;
 constexpr int kWide = static_cast<int>(hn::MaxLanes(Floats()));  // floats in a vector
 
-// 2^x for x <= 0. Degree 6, so that rounding and not the polynomial is the error; Remez on
-// [-0.5, 0.5] for the relative error 1.9e-9. Below -125 the result is 0, not a denormal.
+// 2^x for x <= 0. The polynomial has degree 6, so that its error is below rounding: relative error
+// 1.9e-9 on [-0.5, 0.5], by the Remez algorithm. Below -125 the result is 0, not a denormal.
 HWY_INLINE Vec exp2_negative(Vec x) {
   const Floats d;
   const auto tiny = hn::Lt(x, hn::Set(d, -125.0F));
@@ -78,7 +79,8 @@ HWY_INLINE void kernel_tile(const float* X, int width, const Query& query, float
   for (; column < width; column += kWide) kernel_columns<1>(X + column, width, query, k + column);
 }
 
-// Adds k_i A_i of one tile for `count` vectors of outputs; even and odd points apart.
+// Adds k_i A_i of one tile for `count` vectors of outputs, with separate sums for even and odd
+// points.
 template <int count>
 HWY_INLINE void accumulate(const float* HWY_RESTRICT A, int stride, int width,
                            const float* HWY_RESTRICT k, float* HWY_RESTRICT even_sum,

@@ -1,6 +1,6 @@
 // The predictor's inner loops, compiled once per instruction set by Highway. All are RT-safe.
 //
-// Memory is one stream, read front to back. A tile is up to 64 training points:
+// Data lie in memory in the order in which they are read. A tile is up to 64 training points:
 //
 //   X [dims][width]        one row a dimension, one column a point
 //   A [width][padded]      one row a point: its weights, padded with zeros to 16 floats
@@ -8,11 +8,12 @@
 // A triangle L (for |L k|^2) is cut in blocks of 16 rows; block b holds columns 0 .. 16 b + 15,
 // each 16 floats tall.
 //
-// Software prefetch was measured and left out: up to a tenth off a cold call, a third on a hot one.
+// There is no software prefetch: it makes a call up to a tenth faster with cold caches and a third
+// slower with hot ones.
 //
-// Every sum has one fixed order that does not depend on the vector's length: distances by
-// dimension, outputs in two partial sums by point parity, triangle rows in four by column. With
-// fused multiply-adds AVX2 and AVX-512 therefore give the same bits.
+// Every sum has one fixed order that does not depend on the vector's length: distances run by
+// dimension, outputs in two partial sums (even and odd points), triangle rows in four partial sums
+// by column. With fused multiply-adds AVX2 and AVX-512 therefore give the same bits.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,7 @@ namespace posed::gp::kernel {
 inline constexpr int kTile = 64;      // points in a full tile
 inline constexpr int kLanes = 16;     // floats: rows and blocks are padded to this
 inline constexpr int kMaxDims = 288;  // inputs and outputs
-inline constexpr int kMaxGate = 256;  // points the confidence may use
+inline constexpr int kMaxGate = 256;  // most points that the confidence may use
 
 [[nodiscard]] constexpr int padded(int n) noexcept { return (n + kLanes - 1) / kLanes * kLanes; }
 [[nodiscard]] constexpr int triangle_floats(int rows) noexcept {
@@ -30,7 +31,8 @@ inline constexpr int kMaxGate = 256;  // points the confidence may use
   return kLanes * kLanes * blocks * (blocks + 1) / 2;
 }
 
-// A query. With dimensions missing, `present` lists the `present_count` available ones; null: all.
+// A query. `present` lists the `present_count` available dimensions; null means that all are
+// available.
 struct Query {
   const float* q;
   const std::uint16_t* present;

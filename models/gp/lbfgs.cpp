@@ -21,7 +21,7 @@ struct Point {
   VectorXd gradient;
 };
 
-// Where the cubic through two values and slopes is lowest, kept away from both ends.
+// The minimum of the cubic through two values and slopes, kept away from both ends.
 double cubic_minimum(const Point& a, const Point& b) {
   const double lo = std::min(a.step, b.step);
   const double hi = std::max(a.step, b.step);
@@ -41,8 +41,8 @@ class LineSearch {
   LineSearch(const Objective& objective, const VectorXd& x, const VectorXd& direction)
       : objective_(objective), x_(x), direction_(direction) {}
 
-  // A point that meets the strong Wolfe conditions, or the lowest one found; step 0 when none is
-  // lower.
+  // Returns a point that meets the strong Wolfe conditions, else the lowest point found; step 0
+  // when no point is lower than the start.
   Point search(const Point& start, double first_step) {
     Point previous = start;
     double step = first_step;
@@ -77,7 +77,8 @@ class LineSearch {
            point.value > start.value + kArmijo * point.step * start.slope;
   }
 
-  // `low` is the lowest point so far; the interval to `high` holds an acceptable one.
+  // `low` is the lowest point so far; the interval between it and `high` contains an acceptable
+  // point.
   Point zoom(const Point& start, Point low, Point high) {
     for (int i = 0; i < kMaxTrials; ++i) {
       if (std::abs(high.step - low.step) * low.gradient.lpNorm<Eigen::Infinity>() < 1e-16) break;
@@ -99,14 +100,15 @@ class LineSearch {
   int evaluations_ = 0;
 };
 
-// What the last steps taught about the curvature: applies the inverse Hessian to a gradient.
+// The last steps and gradient changes; applies the inverse Hessian that they imply to a gradient.
 class History {
  public:
   explicit History(int memory) : memory_(memory) {}
 
   void add(VectorXd step, VectorXd change) {
     const double product = step.dot(change);
-    if (product <= 1e-12 * change.squaredNorm()) return;  // would not be positive definite
+    if (product <= 1e-12 * change.squaredNorm())
+      return;  // the approximation would not stay positive definite
     pairs_.push_back({std::move(step), std::move(change), 1.0 / product});
     if (static_cast<int>(pairs_.size()) > memory_) pairs_.pop_front();
   }

@@ -1,7 +1,6 @@
-// Limited-memory BFGS (Nocedal and Wright 2006, their algorithms 7.4, 7.5, 3.5, 3.6; README.md,
-// "Limited-memory BFGS"): minimises a smooth
-// function of a few hundred variables. The caller scales the variables so that each is of order
-// one. Cold.
+// Limited-memory BFGS (Nocedal and Wright 2006, algorithms 7.4, 7.5, 3.5, 3.6; README.md,
+// "Limited-memory BFGS"): minimises a smooth function of a few hundred variables. The caller scales
+// the variables so that each is of order one. Cold.
 #pragma once
 
 #include <functional>
@@ -10,14 +9,15 @@
 
 namespace posed::gp {
 
-// Returns f(x) and fills its gradient. A value that is not finite rejects the trial step.
+// Returns f(x) and fills its gradient. A value that is not finite makes the optimiser reject the
+// trial step.
 using Objective = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd& gradient)>;
 
 struct LbfgsOptions {
   int max_iterations = 100;
   int memory = 30;
-  double relative_change = 1e-10;  // stop when one step lowers f by less, relative to |f|
-  double max_gradient = 1e-3;      // or when no gradient component is larger
+  double relative_change = 1e-10;  // stop when one step lowers f by less than this, relative to |f|
+  double max_gradient = 1e-3;      // or when no gradient component is larger than this
 };
 
 struct LbfgsResult {

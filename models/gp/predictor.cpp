@@ -49,7 +49,7 @@ Result<> validate(const Trained& t) {
   return {};
 }
 
-// The tiles of kernel.hpp, points in `order`.
+// Writes the tiles of kernel.hpp with the points in `order`.
 void lay_out(const Trained& t, const std::vector<int>& order, int points, int outputs_padded,
              float* out) {
   const auto dims = static_cast<int>(t.inputs.cols());
@@ -83,9 +83,9 @@ struct Predictor::Parts {
   int gate_rows = 0;
   std::array<float, kMaxDims> constant{};
   const float* triangle = nullptr;
-  hwy::AlignedFreeUniquePtr<float[]> data;  // the tiles, then the triangle: one stream to read
+  hwy::AlignedFreeUniquePtr<float[]> data;  // the tiles, then the triangle, in reading order
 
-  // k is only written where the gate asks for it. Returns false when no dimension is available.
+  // k is written only where the confidence needs it. Returns false when no dimension is available.
   bool sum(std::span<const float> q, std::span<const std::uint8_t> available, int keep, float* k,
            std::span<float> out) const noexcept;
 };
@@ -119,11 +119,12 @@ Result<Predictor> Predictor::build(const Trained& trained, bool gate) {
   lay_out(trained, order, parts->points, outputs_padded, parts->data.get());
   std::ranges::copy(triangle, parts->data.get() + tile_floats);
   parts->triangle = parts->data.get() + tile_floats;
-  // k = e^lambda exp(.) + b: e^lambda went into the weights, b sum w is a constant.
+  // k = e^lambda exp(.) + b: e^lambda is multiplied into the weights, b sum w is a constant.
   const Eigen::VectorXd constant =
       trained.offset + trained.b * trained.weights.colwise().sum().transpose();
   for (int o = 0; o < parts->outputs; ++o) parts->constant[o] = static_cast<float>(constant[o]);
-  static_cast<void>(kernel::target());  // the CPU is asked here, not in the first hot call
+  static_cast<void>(
+      kernel::target());  // Highway detects the CPU here and not in the first hot call
   return Predictor(std::move(parts));
 }
 

@@ -1,12 +1,12 @@
-// Predictor: the trained Gaussian process in the form the hot path wants: float32, precomputed
-// weights, tiles that fit the caches, SIMD chosen at run time (AVX2 and AVX-512 give the same
-// bits).
+// Predictor: the trained Gaussian process in a form for the hot path: float32, precomputed weights,
+// tiles that fit the caches, SIMD chosen at run time (AVX2 and AVX-512 give the same bits). Const
+// and shareable between threads after build().
 //
 //   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (README.md,
 //   "Kernel")
 //
-// Missing dimensions are marginalised: the distance runs over the available ones, scaled by D /
-// D_avail.
+// Missing dimensions are left out: the distance runs over the available ones and is scaled by D /
+// D_avail (README.md, "Missing dimensions").
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace posed::gp {
 
 class Predictor {
  public:
-  // Validates shapes and values; precomputes tiles and, with `gate`, what the confidence needs.
+  // Checks shapes and values; precomputes tiles and, with `gate`, the confidence's matrices. Cold.
   [[nodiscard]] static Result<Predictor> build(const Trained& trained, bool gate);
   Predictor(Predictor&&) noexcept;
   Predictor& operator=(Predictor&&) noexcept;
@@ -30,7 +30,7 @@ class Predictor {
   [[nodiscard]] int outputs() const noexcept;          // D_out
   [[nodiscard]] bool has_confidence() const noexcept;  // built with `gate`
 
-  // What f tends to far from all training poses: offset + b sum w [D_out]. RT-safe.
+  // The limit of f far from all training poses: offset + b sum w [D_out]. RT-safe.
   [[nodiscard]] std::span<const float> constant() const noexcept;
 
   // f(q) into out [D_out]; constant() where nothing is available. q must be finite; its missing

@@ -9,7 +9,7 @@
 namespace posed::gp {
 namespace {
 
-constexpr double kLogBound = 30.0;  // beyond it exp() leaves any sensible scale
+constexpr double kLogBound = 30.0;  // beyond it exp() gives values of no sensible scale
 
 Eigen::MatrixXd squared_distances(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   Eigen::MatrixXd d2(a.rows(), b.rows());
@@ -26,7 +26,7 @@ Eigen::LLT<Eigen::MatrixXd> factorise(const Eigen::MatrixXd& rbf_part, double b,
 }
 
 bool failed(const Eigen::LLT<Eigen::MatrixXd>& llt) {
-  // LLT reports Success on a NaN matrix; its diagonal tells.
+  // LLT reports Success on a NaN matrix, so its diagonal is checked.
   return llt.info() != Eigen::Success || !llt.matrixLLT().diagonal().allFinite();
 }
 

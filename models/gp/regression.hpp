@@ -1,5 +1,5 @@
-// Gaussian process regression with the kernel of Sato et al., eq. 4 (README.md, "Kernel") and one
-// set of kernel values for all outputs: the covariance is factorised once (README.md,
+// Gaussian process regression with the kernel of Sato et al., eq. 4 (README.md, "Kernel"). All
+// outputs share one set of kernel values, so the covariance is factorised once (README.md,
 // "Regression"). Double precision, cold, thread-safe.
 //
 //   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b,   C = K + sigma^2 I
@@ -13,7 +13,7 @@
 
 namespace posed::gp {
 
-// The kernel's values as the optimiser sees them. log_b = -infinity is b = 0.
+// The kernel's values as the optimiser's variables. log_b = -infinity is b = 0.
 struct Hyper {
   double lambda = 0.0;
   double log_mu = 0.0;
@@ -24,8 +24,9 @@ struct Hyper {
   [[nodiscard]] static Hyper of(const Eigen::Vector4d& h) { return {h[0], h[1], h[2], h[3]}; }
 };
 
-// Summed over the outputs; the gradient is by lambda, log mu, log b, log sigma^2. Where C is not
-// positive definite the log likelihood is minus infinity and the gradient zero.
+// The evidence (log marginal likelihood), summed over the outputs, and its gradient by lambda, log
+// mu, log b, log sigma^2 (README.md, "Evidence"). Where C is not positive definite the log
+// likelihood is minus infinity and the gradient zero.
 struct Evidence {
   double log_likelihood = 0.0;
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
@@ -40,16 +41,16 @@ struct Evidence {
 [[nodiscard]] Evidence log_marginal(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                     const Hyper& hyper);
 
-// SCG on -log L from `start`; log parameters are kept within +-30. The noise is min_noise +
-// exp(log noise), as in NETLAB: outputs that a smooth map explains to the last digit would else
-// drive it to nothing, and the weights to sizes whose sum no float holds. The result's x is the
-// Hyper's vector, min_noise included, its value -log L.
+// SCG on -log L from `start`; log parameters are kept within +-30. The noise is min_noise + exp(log
+// noise), as in NETLAB: otherwise outputs that a smooth map explains exactly would drive it to zero
+// and the weights beyond the range of single precision. The result's x is the Hyper's vector,
+// min_noise included, its value -log L.
 [[nodiscard]] ScgResult maximise_evidence(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                           const Hyper& start, double min_noise,
                                           const ScgOptions& options = {});
 
-// Weights C^-1 (Y - offset) for Y [N x D_out]. Fails when shapes differ, a value is not finite, or
-// C is not positive definite.
+// Weights C^-1 (Y - offset) for Y [N x D_out]. Returns an error when shapes differ, a value is not
+// finite, or C is not positive definite.
 [[nodiscard]] Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                   const Eigen::VectorXd& offset, const Hyper& hyper);
 
@@ -60,7 +61,7 @@ struct Posterior {
 };
 
 // The mean alone at the rows of `queries` [Q x D], offset included: [Q x D_out]. Without the
-// variance there is nothing to factorise.
+// variance no factorisation is needed.
 [[nodiscard]] Eigen::MatrixXd posterior_mean(const Trained& process,
                                              const Eigen::MatrixXd& queries);
 

@@ -11,7 +11,7 @@ constexpr double kScaleMin = 1e-15;
 constexpr double kScaleMax = 1e100;
 constexpr double kProbe = 1e-4;  // sigma_0: how far along the direction the curvature is probed
 
-// One run's state, in the letters of Moller's paper where they have no better name.
+// The state of one run; comments give the letters of Moller's paper.
 struct Search {
   Eigen::VectorXd x, gradient, direction;
   double value = 0.0;
@@ -26,7 +26,7 @@ struct Search {
 using Value = std::function<double(const Eigen::VectorXd&)>;
 using Gradient = std::function<Eigen::VectorXd(const Eigen::VectorXd&)>;
 
-// Second-order information along the direction; false where the direction has no length left.
+// Second-order information along the direction; false where the direction's length is zero.
 bool probe(Search& s, const Gradient& gradient) {
   s.slope = s.direction.dot(s.gradient);
   if (s.slope >= 0.0) {
@@ -38,7 +38,8 @@ bool probe(Search& s, const Gradient& gradient) {
   const double sigma = kProbe / std::sqrt(s.kappa);
   const Eigen::VectorXd ahead = gradient(s.x + sigma * s.direction);
   const double theta = s.direction.dot(ahead - s.gradient) / sigma;
-  s.curvature = std::isfinite(theta) ? theta : 0.0;  // no model there: the scale alone decides
+  s.curvature =
+      std::isfinite(theta) ? theta : 0.0;  // no quadratic model there: the scale alone decides
   return true;
 }
 

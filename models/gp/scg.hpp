@@ -17,21 +17,21 @@ struct ScgOptions {
 
 struct ScgStep {
   double value;       // after the iteration: of the accepted point
-  double scale;       // Moller's lambda, the trust put in the quadratic model
-  double comparison;  // how far the model foretold the change; negative: step refused
+  double scale;       // Moller's lambda, high where the quadratic model is not trusted
+  double comparison;  // actual over predicted change; negative: the step is refused
   Eigen::VectorXd x;  // the accepted point
 };
 
 struct ScgResult {
   Eigen::VectorXd x;
   double value = 0.0;
-  bool converged = false;      // by tolerance or a zero gradient; else the iterations ran out
-  std::vector<ScgStep> trace;  // one an iteration
+  bool converged = false;      // by tolerance or a zero gradient; false: the iterations ran out
+  std::vector<ScgStep> trace;  // one per iteration
 };
 
-// Minimises `value`, whose derivative is `gradient`, from `start`. A value that is not finite is a
-// refused step, so a function may answer infinity wherever it is not defined; it must be finite at
-// `start`.
+// Minimises `value`, whose derivative is `gradient`, from `start`. A step to a value that is not
+// finite is refused, so a function may return infinity where it is not defined; it must be finite
+// at `start`.
 [[nodiscard]] ScgResult scg_minimise(
     const std::function<double(const Eigen::VectorXd&)>& value,
     const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& gradient,

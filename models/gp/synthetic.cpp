@@ -16,7 +16,8 @@ constexpr int kFrames = 28;  // of one cycle
 constexpr int kWalkers = 6;
 constexpr int kQueries = 256;
 
-// std::normal_distribution differs between libraries; the sum of twelve uniforms does not.
+// Normal numbers as sums of twelve uniform ones, because std::normal_distribution differs between
+// libraries.
 class Numbers {
  public:
   explicit Numbers(unsigned seed) : engine_(seed) {}
@@ -35,7 +36,8 @@ class Numbers {
   std::mt19937 engine_;
 };
 
-// Cosine and sine rows of one gait, falling with the harmonic; `norm_deg` is the first's length.
+// Cosine and sine rows of one gait, smaller for higher harmonics; `norm_deg` is the norm of the
+// first harmonic.
 Eigen::MatrixXd gait(Numbers& numbers, int dims, double norm_deg) {
   Eigen::MatrixXd rows = numbers.matrix(2 * kHarmonics, dims, norm_deg * kDegree);
   for (int h = 0; h < kHarmonics; ++h) rows.middleRows(2 * h, 2) /= (h + 1) * (h + 1);

@@ -1,5 +1,5 @@
-// Trained: a Gaussian process with the kernel of Sato et al. after learning, double precision, as a
-// model file holds it.
+// Trained: a learnt Gaussian process with the kernel of Sato et al., in double precision, as a
+// model file stores it.
 //
 //   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (README.md,
 //   "Kernel")

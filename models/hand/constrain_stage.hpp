@@ -1,5 +1,6 @@
-// ConstrainStage: the constraint solver as the pipeline's last stage on a hand: fingers keep their
-// limits and do not go through each other. Frames of another skeleton pass through.
+// ConstrainStage: the constraint solver as the pipeline's last stage on a hand: joints keep their
+// limits and fingers do not go through each other. Frames of another skeleton pass through. One
+// thread.
 #pragma once
 
 #include <memory>
@@ -13,7 +14,7 @@ namespace posed::hand {
 
 class ConstrainStage final : public Stage {
  public:
-  // `skeleton` is a hand's (hand_side() knows it); the shape that it is named after is used.
+  // `skeleton` is a hand (hand_side() recognises it); its name selects the hand shape.
   explicit ConstrainStage(std::shared_ptr<const Skeleton> skeleton);
 
   // Moves the frame's angles to the nearest that are allowed; an angle that is known well moves

@@ -12,20 +12,20 @@
 namespace posed::hand {
 namespace {
 
-constexpr double kNear_m = 3e-3;            // pairs this near take part in the projection
-constexpr double kFar_m = 10e-3;            // gaps above need not be known
-constexpr double kHinge_rad = 4 * kDegree;  // a limit is felt this much before it is reached
+constexpr double kNear_m = 3e-3;            // pairs nearer than this take part in the projection
+constexpr double kFar_m = 10e-3;            // gaps above this are not computed
+constexpr double kHinge_rad = 4 * kDegree;  // bending starts this far inside a limit
 constexpr double kDone_rad = 1e-6;
-constexpr double kMaxStep_rad = 0.35;  // of one linearisation
+constexpr double kMaxStep_rad = 0.35;  // largest step of one linearisation
 constexpr double kDeep_m = 2e-3;
-constexpr double kSliver_m = 1e-5;  // a gap that outlives the rounding to a Frame's floats
-constexpr double kLoyalty = 0.7;    // another side must be this much cheaper
+constexpr double kSliver_m = 1e-5;  // a gap that stays positive after rounding to a Frame's floats
+constexpr double kLoyalty = 0.7;  // another side must cost less than this share of the present one
 constexpr int kMaxRounds = 16;
 constexpr int kHalvings = 10;
-constexpr double kLeastWeight = 1e-9;  // variances, of the largest one
+constexpr double kLeastWeight = 1e-9;  // smallest weight, relative to the largest one
 
-// `over` is how far an angle lies inside its limit, less than kHinge_rad: bent smoothly onto zero.
-// A quadratic and not a softplus, so that angles well inside stay as they are
+// `over` is the distance of an angle inside its limit, less than kHinge_rad; it is bent smoothly
+// onto zero. A quadratic is used instead of a softplus, so that angles well inside do not change
 // (models/hand/README.md, "Limits bent softly").
 double hinged(double over) noexcept {
   if (over <= -kHinge_rad) return 0.0;
@@ -39,8 +39,8 @@ double within(double q, double low, double high, bool soft) noexcept {
   return q;
 }
 
-// The same angles with straight fingers that lie side by side: they cannot cross, however far each
-// of them closes.
+// The same angles with spread and twist of the four fingers at zero, so that they are side by side:
+// they cannot cross, however far each of them closes.
 HandAngles parallel(const HandAngles& angles) noexcept {
   HandAngles out = angles;
   for (int c = kFingerChannels; c < kHandChannels; ++c) {
@@ -53,7 +53,7 @@ double largest_difference(const HandAngles& a, const HandAngles& b) noexcept {
   double largest = 0.0;
   for (std::size_t c = 0; c < a.size(); ++c) {
     const double difference = std::abs(a[c] - b[c]);
-    if (!(difference <= largest)) largest = difference;  // a NaN stays
+    if (!(difference <= largest)) largest = difference;  // keeps a NaN
   }
   return largest;
 }
@@ -74,8 +74,8 @@ struct ConstraintSolver::State {
   HandPose pose;
   Gaps gaps_m{};
   std::array<Row, kMaxRows> rows{};
-  HandAngles before{};   // what the frame before became
-  bool follows = false;  // and it was held apart
+  HandAngles before{};   // the result of the previous frame
+  bool follows = false;  // the previous frame was held apart
 
   double gap_of(const HandAngles& angles) noexcept {
     place(geometry, angles, pose);
@@ -83,8 +83,8 @@ struct ConstraintSolver::State {
     return smallest(gaps_m);
   }
 
-  // The constraints of the pairs that are near, linearised at `at`; the nearest where there is no
-  // room for all.
+  // The constraints of the pairs that are near, linearised at `at`; only the nearest ones where
+  // there are too many.
   std::span<const Row> near_rows(const HandAngles& at) noexcept {
     std::array<std::uint8_t, kBonePairs> order{};
     std::size_t count = 0;
@@ -113,12 +113,12 @@ struct ConstraintSolver::State {
     return {rows.data(), count};
   }
 
-  // One way to the nearest pose: where it begins, and how it ended.
+  // One descent to the nearest pose: its start and its result.
   struct Path {
     HandAngles angles;
     Forces forces;
     double gap_m = 0.0;
-    double cost = std::numeric_limits<double>::infinity();  // infinite: no gap was reached
+    double cost = std::numeric_limits<double>::infinity();  // infinite: fingers still overlap
     int rounds = 0;
   };
 
@@ -132,7 +132,7 @@ struct ConstraintSolver::State {
                                       options.limits ? &box : nullptr, path.forces);
       const double step_rad = largest_difference(next, path.angles);
       if (!std::isfinite(step_rad)) return;
-      // Far from where it was made, a linearisation means nothing.
+      // A linearisation is not valid far from where it was made.
       path.angles = between(path.angles, next, std::min(1.0, kMaxStep_rad / step_rad));
       path.gap_m = gap_of(path.angles);
       if (step_rad < kDone_rad) break;
@@ -146,9 +146,10 @@ struct ConstraintSolver::State {
   }
 
   // The nearest pose with gaps; infinite cost where none was found. Fingers that are deep in each
-  // other can come apart on more than one side: of the ways that begin at the pose itself, at the
-  // pose with its fingers side by side, and at what the frame before became, the cheapest is taken,
-  // the last of them unless another is far cheaper, so that the side does not change to and fro.
+  // other can come apart on more than one side, so three starts are tried: the pose itself, the
+  // pose with its fingers side by side, and the result of the previous frame. The cheapest is
+  // taken, but the last one is kept unless another is far cheaper, so that the side does not
+  // flicker (models/hand/README.md, "Sides and fallback").
   Path separate(const HandAngles& target, const HandAngles& variance) noexcept {
     Path best{.angles = target, .forces = {}};
     best.gap_m = gap_of(target);
@@ -170,7 +171,8 @@ struct ConstraintSolver::State {
     return same_side.cost * kLoyalty <= best.cost ? same_side : best;
   }
 
-  // The first pose on the way to `safe` that has a gap; the way's end where none is found earlier.
+  // Moves `angles` towards `safe` to the first pose that has a gap, or to `safe` itself; returns
+  // the gap.
   double retreat(const HandAngles& safe, HandAngles& angles) noexcept {
     const HandAngles from = angles;
     double gap_m = gap_of(safe);
@@ -203,7 +205,7 @@ struct ConstraintSolver::State {
       HandAngles safe = parallel(angles);
       report.min_gap_m = retreat(safe, angles);
       if (report.min_gap_m < 0.0) {
-        std::fill_n(safe.begin(), kFingerChannels, 0.0);  // the thumb aside
+        std::fill_n(safe.begin(), kFingerChannels, 0.0);  // all angles of the thumb, too
         report.min_gap_m = retreat(safe, angles);
       }
       if (report.min_gap_m < 0.0) report.min_gap_m = retreat({}, angles);

@@ -8,9 +8,9 @@
 namespace posed::hand {
 namespace {
 
-constexpr double kCrossed_m = 1e-9;  // centre lines that meet have no direction apart
+constexpr double kCrossed_m = 1e-9;  // centre lines closer than this have no direction between them
 
-// The direction that takes the pair apart. RT-safe.
+// The direction that separates the pair. RT-safe.
 Eigen::Vector3d direction_apart(const HandPose& pose, BonePair pair,
                                 const Eigen::Vector3d& apart) noexcept {
   const double distance_m = apart.norm();

@@ -1,6 +1,7 @@
-// Which bones of a hand are near each other, how near, and how each angle changes that. Bones of
-// two different fingers make a pair: 10 pairs of fingers, 9 of bones each. Bones of one finger, and
-// the palm, are no pairs: a fist presses them together, and gloves overstate how far it closes.
+// The gaps between bones of a hand, and how each angle changes them (models/hand/README.md, "Gaps
+// and their slopes"). A pair is two bones of different fingers: 10 pairs of fingers with 9 pairs of
+// bones each. Bones of one finger, and the palm, do not form pairs, because a fist presses them
+// together and gloves overstate how far it closes.
 #pragma once
 
 #include <array>
@@ -27,8 +28,8 @@ inline constexpr std::array<BonePair, kBonePairs> kPairs = [] {
   return pairs;
 }();
 
-// [pair] distance of the capsules [m], below zero where they overlap; exact below `far_m`, at least
-// that where it is more. RT-safe.
+// [pair] distance of the capsules [m], below zero where they overlap; exact below `far_m`,
+// otherwise some value of at least `far_m`. RT-safe.
 using Gaps = std::array<double, kBonePairs>;
 void find_gaps(const HandGeometry& geometry, const HandPose& pose, double far_m,
                Gaps& gaps_m) noexcept;

@@ -1,6 +1,6 @@
 // The bones of a hand as capsules that move with its 45 angles: forward kinematics and the axis
-// that each angle turns about. Right hand, in the wrist's frame, metres; a left hand's bones lie as
-// their mirror image, so distances are the same.
+// about which each angle turns (models/hand/README.md, "Capsules and forward kinematics"). Right
+// hand, in the wrist's frame, metres; a left hand is the mirror image, so distances are the same.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ namespace posed::hand {
 
 struct FingerGeometry {
   Eigen::Vector3d base_m = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // in which the channels turn
-  Eigen::Vector3d along = Eigen::Vector3d::UnitZ();     // where the straight bones point
+  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // in which the channels are defined
+  Eigen::Vector3d along = Eigen::Vector3d::UnitZ();  // direction of the bones of a straight finger
   std::array<double, kFingerJoints> length_m{};
   std::array<double, kFingerJoints> radius_m{};
 };
@@ -29,14 +29,15 @@ struct HandGeometry {
 // Cold.
 [[nodiscard]] HandGeometry hand_geometry(const HandShape& shape);
 
-// A hand in one pose. Bone b = 3 finger + joint runs from its joint to the next one or the tip.
+// A hand in one pose. Bone b = 3 finger + joint goes from its joint to the next joint or the tip.
 struct HandPose {
   std::array<Eigen::Vector3d, kHandJoints> from_m;
   std::array<Eigen::Vector3d, kHandJoints> to_m;
-  std::array<Eigen::Vector3d, kHandChannels> axis;  // unit; of each angle, as it is turned now
+  std::array<Eigen::Vector3d, kHandChannels>
+      axis;  // unit vector about which each angle turns in this pose
 };
 
-// R = Rz(twist) Rx(flexion) Ry(spread) down each finger. RT-safe.
+// Applies R = Rz(twist) Rx(flexion) Ry(spread) at each joint, from base to tip. RT-safe.
 void place(const HandGeometry& geometry, const HandAngles& angles, HandPose& pose) noexcept;
 
 }  // namespace posed::hand

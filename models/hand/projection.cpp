@@ -8,9 +8,9 @@ namespace posed::hand {
 namespace {
 
 constexpr int kMaxSweeps = 200;
-constexpr double kStill_rad = 1e-8;  // a sweep that moves no angle further is the last
+constexpr double kStill_rad = 1e-8;  // a sweep that moves no angle farther is the last one
 
-// One constraint's update. RT-safe.
+// Updates one constraint at a time. RT-safe.
 class Solver {
  public:
   Solver(const HandAngles& variance, HandAngles& y) noexcept : variance_(variance), y_(y) {}

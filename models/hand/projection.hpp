@@ -1,7 +1,7 @@
-// The quadratic step of the constraint stage: the point nearest to a target, in a metric, that
-// keeps linear constraints and a box (models/hand/README.md, "Quadratic step"). Dual Gauss-Seidel:
-// each constraint pushes with a force of its own that is never below zero; forces are kept between
-// calls as a warm start.
+// The quadratic step of the constraint stage: the point nearest to a target, in a weighted metric,
+// that satisfies linear constraints and lies in a box (models/hand/README.md, "Quadratic step").
+// Dual Gauss-Seidel: each constraint has a non-negative force, and forces are kept between calls as
+// a warm start.
 #pragma once
 
 #include <array>
@@ -34,8 +34,8 @@ struct Box {
   const HandAngles& high_rad;
 };
 
-// min (y - target)' diag(1/variance) (y - target) with all `rows` kept and, where `box` is given,
-// inside of it. Forces of pairs without a row count as none. RT-safe.
+// min (y - target)' diag(1/variance) (y - target) subject to all `rows` and, where `box` is given,
+// to the box. Forces of pairs without a row are dropped. RT-safe.
 [[nodiscard]] HandAngles project(const HandAngles& target, const HandAngles& variance,
                                  std::span<const Row> rows, const Box* box,
                                  Forces& forces) noexcept;

@@ -9,7 +9,7 @@
 namespace posed::hand {
 
 struct Closest {
-  double s = 0.0;                                   // place on the first segment, 0 to 1
+  double s = 0.0;                                   // position on the first segment, 0 to 1
   double t = 0.0;                                   // on the second
   Eigen::Vector3d apart = Eigen::Vector3d::Zero();  // from the second's point to the first's
 };
@@ -17,7 +17,7 @@ struct Closest {
 [[nodiscard]] inline Closest closest_points(const Eigen::Vector3d& p1, const Eigen::Vector3d& q1,
                                             const Eigen::Vector3d& p2,
                                             const Eigen::Vector3d& q2) noexcept {
-  constexpr double kPoint = 1e-18;  // squared length of what counts as a point
+  constexpr double kPoint = 1e-18;  // a segment of smaller squared length counts as a point
   const Eigen::Vector3d d1 = q1 - p1;
   const Eigen::Vector3d d2 = q2 - p2;
   const Eigen::Vector3d r = p1 - p2;

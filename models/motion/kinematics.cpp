@@ -17,7 +17,8 @@ WorldPose world_pose(const Skeleton& skeleton, const Frame& frame) {
           pose.position_m[joint.parent] + pose.rotation[joint.parent] * joint.offset_m;
     }
   }
-  // The offsets above the root joint say where a take began; its true place is the frame's.
+  // The offsets above the root joint only give where the recording began; the true root position is
+  // the frame's.
   Eigen::Vector3d root;
   for (int i = 0; i < 3; ++i) root[i] = frame.root_position_m[static_cast<std::size_t>(i)];
   const Eigen::Vector3d shift = root - pose.position_m[skeleton.root_joint];

@@ -1,4 +1,5 @@
-// Forward kinematics: where a frame's joints are and how they are turned, in the world.
+// Forward kinematics: world positions and rotations of a frame's joints (README.md, "Forward
+// kinematics").
 #pragma once
 
 #include <vector>
@@ -16,7 +17,7 @@ struct WorldPose {
 };
 
 // G = G_parent L and p = p_parent + G_parent offset, with the skeleton's root joint at the frame's
-// root position. Joints that were not measured count as not turned. Cold: allocates.
+// root position. A joint that was not measured counts as not rotated. Cold: allocates.
 [[nodiscard]] WorldPose world_pose(const Skeleton& skeleton, const Frame& frame);
 
 }  // namespace posed::motion

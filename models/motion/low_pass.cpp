@@ -11,12 +11,12 @@ namespace {
 constexpr int kOrder = 4;
 constexpr int kPadding = 3 * (kOrder + 1);  // frames, scipy's default for five coefficients
 
-// One second-order section, transposed direct form II, gain 1 at standstill.
+// One second-order section, transposed direct form II, gain 1 at frequency 0.
 struct Section {
   double b0, b1, b2, a1, a2;
 
   void run(Eigen::Ref<Eigen::VectorXd> x) const {
-    // The state in which a constant input of x[0] leaves the section unmoved.
+    // The initial state for which a constant input of x[0] gives a constant output.
     double z1 = (1.0 - b0) * x[0];
     double z2 = (b2 - a2) * x[0];
     for (double& value : x) {

@@ -34,8 +34,8 @@ Quaterniond world_rotation(const Skeleton& skeleton, const Frame& frame, int joi
   return world;
 }
 
-// Joint rotations as columns of quaternion components whose signs never jump, then the root: what
-// may be filtered component by component.
+// Joint rotations as columns of quaternion components whose signs never jump, followed by the root
+// position. Such columns may be filtered one by one.
 MatrixXd to_columns(const Motion& motion) {
   const int joints = motion.frames.front().joint_count;
   MatrixXd columns(motion.size(), 4 * joints + 3);
@@ -70,7 +70,7 @@ void fill_frame(const MatrixXd& columns, double position, Frame& frame) {
   }
 }
 
-// Between two frames, rms over the joints below the root.
+// Rotation between two frames [rad], rms over the joints below the root.
 double step_rad(const Frame& a, const Frame& b, int root) {
   double squares = 0.0;
   for (int j = root + 1; j < a.joint_count; ++j) {
@@ -119,7 +119,8 @@ Motion resample(const Motion& motion, double rate_hz) {
   if (step > 1.0) {
     columns = low_pass_zero_phase(columns, 2.0 * (rate_hz / 3.0) / motion.rate_hz);
   }
-  // A rate such as 119.88 is 120 to within the clock: whole steps stay whole.
+  // A rate such as 119.88 Hz is 120 Hz within the accuracy of clocks, so the step stays a whole
+  // number.
   const double whole = std::round(step);
   const double exact = std::abs(step - whole) < kSameRate * step ? whole : step;
   Motion out{motion.skeleton, rate_hz, {}};
@@ -127,7 +128,7 @@ Motion resample(const Motion& motion, double rate_hz) {
   for (int k = 0; k < count; ++k) {
     Frame frame = motion.frames[std::min(motion.size() - 1, static_cast<int>(k * exact + 0.5))];
     fill_frame(columns, k * exact, frame);
-    frame.angle_count = 0;  // not resampled; nothing here reads them
+    frame.angle_count = 0;  // channel angles are not resampled, because training does not read them
     out.frames.push_back(frame);
   }
   return out;
@@ -198,7 +199,8 @@ std::optional<VectorXd> leg_signal(const Motion& motion) {
   const int left = skeleton.joint_of(Bone::kLeftUpperLeg);
   const int right = skeleton.joint_of(Bone::kRightUpperLeg);
   if (left < 0 || right < 0) return std::nullopt;
-  // The thigh points down in T-pose; how far forward it points in the pelvis is its flexion.
+  // The thigh points down in the T-pose; its flexion is how far forward it points in the pelvis
+  // frame.
   const auto flexion = [&](const Frame& frame, int joint) {
     const int parent = skeleton.joints[joint].parent;
     const Quaterniond T_parent =

@@ -1,4 +1,4 @@
-// Motion: a clip as poses at one constant rate, ready for learning. Cold.
+// Motion: a clip as poses at one constant rate, prepared for training. Cold.
 #pragma once
 
 #include <memory>
@@ -27,17 +27,19 @@ struct Motion {
 // value that is not finite; the error names the clip and the frame.
 [[nodiscard]] Result<Motion> motion_of(const clip::Clip& clip);
 
-// Whether the first frame is no part of the motion: some converters put the figure's rest pose in
-// front (CMU's cgspeed BVH files), a jump to the second frame that nobody makes.
+// Whether the first frame does not belong to the motion. Some converters put the figure's rest pose
+// in front (CMU's cgspeed BVH files), so the step to the second frame is larger than any person
+// moves.
 [[nodiscard]] bool begins_with_added_pose(const Motion& motion);
 void drop_first_frame(Motion& motion);
 
-// The same motion at another rate. Downwards: zero-phase low-pass at a third of the new rate (10 Hz
-// at 30), then slerp, as upwards. The same rate is returned as it is.
+// The same motion at another rate. To a lower rate: a zero-phase low-pass at a third of the new
+// rate (10 Hz at 30), then slerp. To a higher rate: slerp alone. The same rate returns the motion
+// unchanged.
 [[nodiscard]] Motion resample(const Motion& motion, double rate_hz);
 
-// Which way the walk goes [rad about +Y, 0 is +Z]: the chord from the first to the last root
-// position, or the mean direction of the pelvis where the chord is shorter than half a metre.
+// Direction of the walk [rad about +Y, 0 is +Z]: the line from the first to the last root position,
+// or the mean direction of the pelvis where that line is shorter than half a metre.
 [[nodiscard]] double walk_heading_rad(const Motion& motion);
 
 // Root positions [frames x 3], m, seen from `heading_rad`.
@@ -47,13 +49,13 @@ void drop_first_frame(Motion& motion);
 [[nodiscard]] Eigen::MatrixXd pose_vectors(const Motion& motion, const PoseSpace& space,
                                            double heading_rad);
 
-// Sets the means of `spec` to the mean rotations over these motions, each counting alike. cmu43 has
-// none. Refuses a skeleton that cannot serve the space.
+// Sets the means of `spec` to the mean rotations over these motions, all with equal weight. cmu43
+// has no means. Returns an error for a skeleton that lacks joints of the space.
 [[nodiscard]] Result<> set_mean_rotations(std::span<const Motion* const> motions,
                                           PoseSpaceSpec& spec);
 
-// Right minus left flexion of the thigh [rad], forward positive, a value a frame. Nothing when the
-// skeleton names no upper legs.
+// Right minus left flexion of the thigh [rad], forward positive, one value per frame. Empty when
+// the skeleton names no upper legs.
 [[nodiscard]] std::optional<Eigen::VectorXd> leg_signal(const Motion& motion);
 
 // d/dt of each column: central differences, one-sided at the ends.

@@ -13,8 +13,8 @@ namespace posed::motion {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr double kMostHz = 10.0;          // of the spectrum that counts
-constexpr double kLeastAmplitude = 0.05;  // of the largest
+constexpr double kMostHz = 10.0;          // upper end of the part of the spectrum that counts
+constexpr double kLeastAmplitude = 0.05;  // relative to the largest amplitude
 constexpr int kPadLevel = 4;              // zero-padding: 2^4 times the next power of two
 constexpr Eigen::Index kWindow = 30;      // frames of a feature
 constexpr Eigen::Index kWindowsPerDimension = 10;
@@ -37,7 +37,7 @@ std::vector<double> amplitudes(std::span<const double> signal, std::size_t bins,
   return out;
 }
 
-// Of a window at every second frame: each channel's mean and its mean change a frame, size only.
+// For a window at every second frame: each channel's mean and the mean absolute change per frame.
 Rows windows_of(const Rows& rows) {
   const Eigen::Index count = rows.rows() > kWindow ? (rows.rows() - 1 - kWindow) / 2 + 1 : 0;
   Rows features(count, 2 * rows.cols());

@@ -1,6 +1,7 @@
-// How natural a motion is, in figures (README.md, "Naturalness"): jerk, log dimensionless jerk and
+// Measures of how natural a motion is (README.md, "Naturalness"): jerk, log dimensionless jerk and
 // spectral arc length of a speed profile, and the Frechet distance between the features of two
-// motions. Each says nothing alone; compare with a recording of the same person. Cold.
+// motions. A value alone has no meaning; compare it with that of a recording of the same person.
+// Cold.
 #pragma once
 
 #include <span>
@@ -11,11 +12,11 @@
 
 namespace posed::motion {
 
-// One row a frame, one column a channel.
+// One row per frame, one column per channel.
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Root mean square of the third difference over frames and channels, in units a frame^3; times
-// rate_hz^3 it is units/s^3. 0 for fewer than four frames.
+// Root mean square of the third difference over frames and channels, in units/frame^3; times
+// rate_hz^3 it is in units/s^3. 0 for fewer than four frames.
 [[nodiscard]] double jerk_rms(const Rows& rows);
 
 // Speed of every frame step: the length of the difference of two rows, times the rate.
@@ -27,8 +28,8 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMaj
 
 // Arc length of the speed's normalised amplitude spectrum up to 10 Hz or where it stays below 0.05
 // (Balasubramanian et al. 2015, zero-padded to 2^4 times the next power of two): closer to 0 is
-// smoother; a minimum-jerk reach has about -1.4. A ripple below the amplitude bound does not count:
-// report both. NaN for fewer than two values or a speed that is always 0.
+// smoother; a minimum-jerk reach has about -1.4. A ripple below the amplitude bound has no effect
+// on it, so report both measures. NaN for fewer than two values or a speed that is always 0.
 [[nodiscard]] double spectral_arc_length(std::span<const double> speed, double rate_hz);
 
 // Mean and covariance (over n - 1) of rows.
@@ -41,10 +42,11 @@ struct Gaussian {
 // |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), at least 0.
 [[nodiscard]] double frechet_distance(const Gaussian& a, const Gaussian& b);
 
-// Frechet distance of what two motions look like over windows of 30 frames (each channel's mean,
-// and the mean size of its change a frame), in the first `dimensions` principal components of both
-// together; fewer where the motions are too short for ten windows a dimension. An error says so
-// where even one is too many.
+// Frechet distance between features of two motions. Features are taken over windows of 30 frames:
+// each channel's mean, and the mean size of its change per frame, projected on the first
+// `dimensions` principal components of both motions together. Fewer dimensions are used where the
+// motions are too short for ten windows per dimension; an error is returned where even one
+// dimension is too many.
 [[nodiscard]] Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions = 20);
 
 }  // namespace posed::motion

@@ -29,7 +29,8 @@ bool below(const Skeleton& skeleton, int joint, int ancestor) {
   return false;
 }
 
-// Acclaim joints turn in frames of their own; a BVH made from them keeps the names of one list.
+// Each Acclaim joint turns in a frame of its own; a BVH converted from such a figure keeps a known
+// list of joint names.
 bool is_acclaim(const Skeleton& skeleton) {
   const int arm = skeleton.joint_index("lhumerus");
   return arm >= 0 && std::abs(skeleton.joints[arm].channel_frame.w()) < 0.99;
@@ -138,8 +139,8 @@ Result<PoseSpace> PoseSpace::bind(const PoseSpaceSpec& spec, const Skeleton& ske
     Item item;
     item.joint = joints[i];
     item.first_dim = static_cast<int>(space.joint_of_dim_.size());
-    // The root is seen from the world, a humanoid bone from the next bone of the space above it, so
-    // that a rig with a joint more in between still shows the same bone rotations.
+    // The root's rotation is relative to the world, a humanoid bone's to the next bone of the space
+    // above it, so that a rig with an additional joint in between gives the same bone rotations.
     const bool is_root = static_cast<int>(i) == spec.root;
     item.chain_begin = static_cast<int>(space.chain_.size());
     int parent = skeleton.joints[item.joint].parent;
@@ -178,7 +179,7 @@ bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {
   return all;
 }
 
-// All that stands before L in V, without the mean. RT-safe
+// The product of all factors before L in V, without the mean. RT-safe
 Quaterniond PoseSpace::base(const Item& item, const Frame& frame,
                             double heading_rad) const noexcept {
   Quaterniond rotation = item.before;
@@ -227,7 +228,7 @@ void PoseSpace::to_vector(const Frame& frame, double heading_rad, std::span<floa
 // V after the change; `rotation` is V as the frame has it. RT-safe
 Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rotation, const float* q,
                                const float* delta) const noexcept {
-  // A joint may turn about an axis that the space does not list (cmu43): that angle stays.
+  // A joint may turn about an axis that the space does not list (cmu43); that angle is kept.
   Vector3d now = euler_ ? euler_xyz_rad(rotation) : Vector3d::Zero();
   Vector3d change = Vector3d::Zero();
   for (int axis = 0, d = 0; axis < 3; ++axis) {

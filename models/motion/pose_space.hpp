@@ -1,14 +1,13 @@
-// PoseSpace: turns a frame into the vector q that a style model was trained on, and puts a change
-// of q back into the frame. Heading and position of the root are not style: removed before,
-// restored after.
+// PoseSpace: turns a frame into the vector q that a style model is trained on, and puts a change of
+// q back into the frame (README.md, "Pose spaces"). Heading and position of the root are not part
+// of the style; they are removed before and restored after.
 //
 //   native    rotation vectors [rad] of the source's own joints about the training mean,
-//             q_j = log(Rmean_j^T R_j), R_j' = Rmean_j exp(q_j'); 3 a joint, the root first with
+//             q_j = log(Rmean_j^T R_j), R_j' = Rmean_j exp(q_j'); 3 per joint, the root first with
 //             its heading removed
 //   humanoid  the same on the canonical skeleton
 //   cmu43     the Euler angles [rad] of Sato et al. (README.md, References) of an Acclaim skeleton
-//   (root 3 + 40), by the
-//             joints' names in an ASF or in the BVH files made from it
+//             (root 3 + 40); joints are found by their names in an ASF or in a BVH made from it
 #pragma once
 
 #include <cstdint>
@@ -42,8 +41,8 @@ struct PoseSpaceSpec {
   int root = 0;                          // index in `joints` of the joint whose heading is removed
 };
 
-// The spec of `space` on `skeleton`, with identity for every mean: the joints a model trained on
-// such clips should have. Names what is missing.
+// The spec of `space` on `skeleton`, with identity for every mean; it lists the joints that a model
+// trained on such clips has. The error names the joints that are missing.
 [[nodiscard]] Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton);
 
 // How many dimensions q has in this spec.
@@ -52,7 +51,7 @@ struct PoseSpaceSpec {
 // A spec bound to one skeleton. Const and shareable after bind().
 class PoseSpace {
  public:
-  // Refuses a skeleton that cannot serve the space, naming the missing joints.
+  // Returns an error that names the missing joints when the skeleton lacks joints of the space.
   [[nodiscard]] static Result<PoseSpace> bind(const PoseSpaceSpec& spec, const Skeleton& skeleton);
 
   [[nodiscard]] const Skeleton& skeleton() const noexcept { return *skeleton_; }
@@ -64,7 +63,7 @@ class PoseSpace {
   // RT-safe.
   [[nodiscard]] double heading_rad(const Frame& frame) const noexcept;
 
-  // False where this frame did not measure the root: heading_rad() then says nothing. RT-safe.
+  // False where this frame did not measure the root; heading_rad() then has no meaning. RT-safe.
   [[nodiscard]] bool has_heading(const Frame& frame) const noexcept;
 
   // q [dims] of `frame` seen from `heading_rad`; available[d] is 0 where the joint was not measured
@@ -73,8 +72,8 @@ class PoseSpace {
                  std::span<std::uint8_t> available) const noexcept;
 
   // Replaces the pose of `frame` by q + delta in the space's own sense, channel angles included;
-  // joints that are not available and joints outside the space stay as they are; zero delta leaves
-  // every bit as it was. RT-safe.
+  // joints that are not available and joints outside the space are unchanged; a zero delta leaves
+  // every bit of the frame unchanged. RT-safe.
   void add(Frame& frame, double heading_rad, std::span<const float> q,
            std::span<const float> delta) const noexcept;
 

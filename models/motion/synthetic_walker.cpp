@@ -17,7 +17,7 @@ struct JointSpec {
   const char* name;
   const char* parent;  // empty for the root
   std::array<double, 3> offset_m;
-  std::array<double, 3> end_site_m;  // all zero: not a leaf
+  std::array<double, 3> end_site_m;  // all zero: the joint has a child
 };
 
 // A person of 1.72 m in T-pose: Y up, facing +Z, left hand at +X.
@@ -53,9 +53,9 @@ struct Wave {
 };
 using JointWaves = std::array<Wave, 3>;  // about X, Y, Z
 
-// What a family does, about X (pitch), Y (turn), Z (roll). `march` and `sway` share one table so
-// that the difference between them is plain to see: the second figure of each pair is the swaying
-// walk's.
+// Amplitudes and offsets of a family about X (pitch), Y (turn), Z (roll). `march` and `sway` share
+// one table so that the difference between them is easy to see: the second value of each pair is
+// that of the swaying walk.
 struct FamilyAmounts {
   double arm_swing, arm_out, elbow, thigh_swing, thigh_in, knee, hip_roll, hip_turn, chest_turn,
       lean;
@@ -105,7 +105,7 @@ std::vector<JointWaves> family_waves(WalkerFamily family) {
   return joint;
 }
 
-// What is this person's own, whatever the family: carriage, vigour, cadence, size.
+// What distinguishes this person in either family: posture, vigour, cadence, size.
 struct Person {
   std::vector<std::array<double, 3>> carriage_deg;
   double vigour = 1.0, cadence_hz = 0.95, scale = 1.0, phase = 0.0;

@@ -1,7 +1,8 @@
-// Synthetic walkers: made-up people of two families, for the demo and for tests that must not need
-// a recording. Each joint turns by a short Fourier series of the walking phase; a person differs
-// from the family by a few degrees of carriage, by cadence, by leg length and by sensor noise. Not
-// anatomy: enough for a style filter to have something true to learn, and the truth is known.
+// Synthetic walkers of two families, for the demo and for tests that must run without recordings.
+// Each joint turns by a short Fourier series of the walking phase; a person differs from the family
+// by a few degrees of posture, by cadence, by leg length and by sensor noise. The walkers are not
+// anatomically correct, but they give a style filter something to learn whose truth is known
+// (README.md, "Synthetic walkers").
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ enum class WalkerFamily : std::uint8_t {
 
 struct WalkerOptions {
   WalkerFamily family = WalkerFamily::kMarch;
-  std::uint32_t person = 1;  // seeds everything personal; the same person walks in any family
+  std::uint32_t person = 1;  // seeds everything personal; one person can walk in either family
   double seconds = 6.0;
   double rate_hz = 30.0;
   double noise_deg = 0.3;  // of each rotation channel, white

@@ -1,6 +1,6 @@
-// "Degrees rms" of a change of poses, everywhere in posed: the root mean square, over frames and
-// over the joints that the change turns at all, of the angle of the rotation between the pose
-// before and the pose after. Cold.
+// TurnSum defines "degrees rms" of a change of poses everywhere in posed: the angle of the rotation
+// between the pose before and the pose after, root mean square over frames and over the joints that
+// the change turns at all. Cold.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace posed::motion {
 
 class TurnSum {
  public:
-  // One joint of the frame that is being added; a joint beyond kMaxJoints is left out.
+  // One joint of the current frame; a joint beyond kMaxJoints is ignored.
   void add(std::size_t joint, const Quatf& before, const Quatf& after) {
     if (before == after || joint >= kMaxJoints) return;
     turned_.set(joint);

@@ -1,4 +1,5 @@
-// A performance through the constraint stage: joint limits kept, no finger through another. Cold.
+// Applies the hand constraints to a whole performance: joint limits are kept and no finger goes
+// through another (models/perform/README.md, "Constraints"). Cold.
 #pragma once
 
 #include "models/perform/perform.hpp"
@@ -7,12 +8,12 @@
 namespace posed::perform {
 
 struct ConstrainReport {
-  double min_gap_m = 0.0;    // between any two bones, of all frames after it
-  double before_m = 0.0;     // the same before it; below zero: fingers overlapped
+  double min_gap_m = 0.0;    // smallest gap between bones over all frames, afterwards
+  double before_m = 0.0;     // the same beforehand; below zero: fingers overlapped
   double changed_rad = 0.0;  // largest change of an angle
 };
 
-// The same solver as live, frame after frame, weighted by the performance's variances.
+// Uses the same solver as live, frame by frame, weighted by the performance's variances.
 ConstrainReport constrain(Performance& performance, const HandShape& shape);
 
 // The smallest gap between two bones over all frames [m].

@@ -21,7 +21,7 @@ struct Moments {
 }  // namespace
 
 void restore_variance(const gesture::GestureModel& model, Performance& performance) {
-  constexpr double kStill_rad2 = 1e-8;  // a channel that does not move has no range to give back
+  constexpr double kStill_rad2 = 1e-8;  // a channel that does not move has no range to restore
   for (int c = 0; c < kHandChannels; ++c) {
     Moments states, shown;
     for (const PerformedState& state : performance.states) {

@@ -1,5 +1,5 @@
 // Global variance (models/perform/README.md, "Global variance"): the most likely trajectory stays
-// nearer to its mean than the gestures it was learnt from; this gives the range back. Cold.
+// closer to its mean than the gestures it was learnt from; this restores the range. Cold.
 #pragma once
 
 #include "models/perform/perform.hpp"
@@ -8,8 +8,8 @@ namespace posed::perform {
 
 inline constexpr double kMaxVarianceGain = 1.3;
 
-// Scales each channel about its mean over the string, by 1 to kMaxVarianceGain, towards the
-// variance over time that the means of the performed states have.
+// Scales each channel about its mean over the sequence, by 1 to kMaxVarianceGain, so that its
+// variance over time approaches that of the means of the performed states.
 void restore_variance(const gesture::GestureModel& model, Performance& performance);
 
 }  // namespace posed::perform

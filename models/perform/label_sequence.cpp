@@ -7,11 +7,11 @@
 namespace posed::perform {
 namespace {
 
-// How long the cursor's state lasts. Away from tempo 1 what rounding takes is handed on, so that a
-// fast string does not drift from its tempo.
+// Sets the duration of the cursor's state. At a tempo other than 1 the rounding error is carried to
+// the next state, so that a long sequence does not drift from its tempo.
 void begin_state(Cursor& cursor, const LabelSequence& script,
-                 const trajectory::StateInformation& evidence, double tempo) noexcept {
-  const gesture::DurationGaussian duration = evidence.duration(script.context(cursor.position));
+                 const trajectory::StateInformation& information, double tempo) noexcept {
+  const gesture::DurationGaussian duration = information.duration(script.context(cursor.position));
   const double mean = duration.mean[cursor.state];
   const double variance = duration.variance[cursor.state];
   const double rho = tempo_rho(duration, tempo);
@@ -59,16 +59,16 @@ void LabelSequence::forget_before(long position) noexcept {
 }
 
 // RT-safe.
-Cursor enter(const LabelSequence& script, const trajectory::StateInformation& evidence,
+Cursor enter(const LabelSequence& script, const trajectory::StateInformation& information,
              long position, double tempo) noexcept {
   Cursor cursor{.position = position};
-  begin_state(cursor, script, evidence, tempo);
+  begin_state(cursor, script, information, tempo);
   return cursor;
 }
 
 // RT-safe.
-void step(Cursor& cursor, const LabelSequence& script, const trajectory::StateInformation& evidence,
-          double tempo) noexcept {
+void step(Cursor& cursor, const LabelSequence& script,
+          const trajectory::StateInformation& information, double tempo) noexcept {
   if (cursor.frames_left > 1) {
     --cursor.frames_left;
     return;
@@ -82,7 +82,7 @@ void step(Cursor& cursor, const LabelSequence& script, const trajectory::StateIn
     cursor.frames_left = 0;
     return;
   }
-  begin_state(cursor, script, evidence, tempo);
+  begin_state(cursor, script, information, tempo);
 }
 
 }  // namespace posed::perform

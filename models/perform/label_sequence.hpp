@@ -1,7 +1,7 @@
 // LabelSequence: the labels to perform, and a cursor that walks over their states frame by frame.
-// The same code plans a whole string and plays labels that are still coming: what lies ahead is
-// looked up anew whenever it is asked for, so an appended label or a new tempo counts from the next
-// state on. Hot: no heap after construction; one thread.
+// The same code plans a whole sequence and plays labels that are still being appended: later states
+// are looked up anew whenever they are needed, so an appended label or a new tempo (duration scale)
+// takes effect from the next state on. Hot: no heap after construction; one thread.
 #pragma once
 
 #include <array>
@@ -15,10 +15,10 @@ class LabelSequence {
  public:
   explicit LabelSequence(int capacity);
 
-  // Label indices of the model; all RT-safe. append() is false when the script is full.
+  // Label indices of the model; all RT-safe. append() returns false when the sequence is full.
   [[nodiscard]] bool append(int label) noexcept;
   void clear() noexcept;
-  // A looped script begins anew after its last label and forgets none.
+  // A looped sequence starts again after its last label and forgets none.
   void set_loop(bool loop) noexcept { loop_ = loop; }
 
   [[nodiscard]] bool empty() const noexcept { return end_ == first_; }
@@ -29,7 +29,7 @@ class LabelSequence {
   // The label between its neighbours. A missing neighbour is the label itself.
   [[nodiscard]] gesture::Context context(long position) const noexcept;
 
-  // Gives back the room of what was performed, but for the neighbour before `position`.
+  // Frees the space of performed labels, except the neighbour before `position`.
   void forget_before(long position) noexcept;
 
  private:
@@ -38,26 +38,26 @@ class LabelSequence {
   }
 
   std::vector<int> labels_;   // ring
-  long first_ = 0, end_ = 0;  // positions count on for ever
+  long first_ = 0, end_ = 0;  // positions only ever increase
   bool loop_ = false;
 };
 
-// Where a performance is: in which state of which label, and for how many frames more.
+// The place of a performance: its label, state and remaining frames of that state.
 struct Cursor {
   long position = 0;
   int state = 0;
-  int frames = 0;        // that this state lasts
-  int frames_left = 0;   // of them, this one included; 0: the script is performed
-  double carried = 0.0;  // what rounding took so far, in frames
+  int frames = 0;        // duration of this state
+  int frames_left = 0;   // remaining ones, including the current frame; 0: the sequence is finished
+  double carried = 0.0;  // frames lost to rounding so far
 };
 
 // At the first state of `position`. RT-safe.
 [[nodiscard]] Cursor enter(const LabelSequence& script,
-                           const trajectory::StateInformation& evidence, long position,
+                           const trajectory::StateInformation& information, long position,
                            double tempo) noexcept;
 
-// One frame on; frames_left is 0 after the last, until a label is appended. RT-safe.
-void step(Cursor& cursor, const LabelSequence& script, const trajectory::StateInformation& evidence,
-          double tempo) noexcept;
+// Advances by one frame; frames_left is 0 after the last one, until a label is appended. RT-safe.
+void step(Cursor& cursor, const LabelSequence& script,
+          const trajectory::StateInformation& information, double tempo) noexcept;
 
 }  // namespace posed::perform

@@ -11,9 +11,9 @@ namespace posed::perform {
 namespace {
 
 constexpr int kStride = trajectory::padded(kHandChannels);
-constexpr int kSettling = 3;  // frames that an elimination for good needs (pentadiagonal.hpp)
+constexpr int kSettling = 3;  // frames that a permanent elimination needs (pentadiagonal.hpp)
 
-// The lead-in lasts 1.5 times what the farthest channel would take at this speed.
+// The lead-in lasts 1.5 times as long as the farthest channel would need at this speed.
 constexpr double kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
 constexpr double kMinLead_s = 0.2, kMaxLead_s = 0.8;
 
@@ -27,8 +27,9 @@ int frames_in(double seconds, double rate_hz) {
   return static_cast<int>(std::ceil(seconds * rate_hz));
 }
 
-// What two poses that are certain say of the two frames after them, through curves of precision p2
-// and mean 0 centred on the second pose and on the first frame after it: the kernel's carry rows.
+// Writes the solver's carry rows for two poses that are known exactly: the information about the
+// next two frames through delta-delta windows of precision p2 and mean 0, centred on the second
+// pose and on the first frame after it (models/perform/README.md, "Lead-in").
 void clamp_to(const HandAngles& before, const HandAngles& last, const double* p2,
               double* carry) noexcept {
   for (int c = 0; c < kHandChannels; ++c) {
@@ -42,16 +43,16 @@ void clamp_to(const HandAngles& before, const HandAngles& last, const double* p2
 
 }  // namespace
 
-LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& evidence,
+LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& information,
                                          const PlayerOptions& options)
-    : evidence_(evidence),
+    : information_(information),
       options_(options),
-      look_ahead_(std::max(kSettling, frames_in(options.look_ahead_s, evidence.rate_hz()))),
+      look_ahead_(std::max(kSettling, frames_in(options.look_ahead_s, information.rate_hz()))),
       script_(options.capacity),
       states_(kHandChannels, 2 + look_ahead_),
       carry_(rows(trajectory::kernel::kCarryRows)),
       variance_(rows(1)) {
-  const int most = frames_in(kMaxLead_s, evidence.rate_hz()) + look_ahead_ + 1;
+  const int most = frames_in(kMaxLead_s, information.rate_hz()) + look_ahead_ + 1;
   frames_.resize(static_cast<std::size_t>(most));
   x_ = rows(most);
   factor_rows_ = rows(most * trajectory::kernel::kFactorRows);
@@ -77,7 +78,7 @@ void LabelSequencePlayer::start() noexcept {
   started_ = !script_.empty();
   carries_ = false;
   lead_left_ = shown_ = 0;
-  if (started_) cursor_ = enter(script_, evidence_, script_.first(), tempo_);
+  if (started_) cursor_ = enter(script_, information_, script_.first(), tempo_);
 }
 
 // RT-safe.
@@ -89,10 +90,10 @@ void LabelSequencePlayer::start(const HandAngles& before, const HandAngles& last
   glide();
 }
 
-// The lead-in: from the last two poses into the cursor's state. RT-safe.
+// Starts the lead-in from the last two poses into the cursor's state. RT-safe.
 void LabelSequencePlayer::glide() noexcept {
   double* lead = states_.row(0, trajectory::kPosition);
-  evidence_.fill(script_.context(cursor_.position), 0, lead);
+  information_.fill(script_.context(cursor_.position), 0, lead);
   double farthest_rad = 0.0;
   for (int c = 0; c < kHandChannels; ++c) {
     const double goal =
@@ -100,16 +101,17 @@ void LabelSequencePlayer::glide() noexcept {
     farthest_rad = std::max(farthest_rad, std::abs(goal - last_[c]));
   }
   const double lead_s = std::clamp(1.5 * farthest_rad / kLeadSpeed_rad_s, kMinLead_s, kMaxLead_s);
-  lead_left_ = frames_in(lead_s, evidence_.rate_hz());
-  std::fill_n(lead, kHandChannels, 0.0);  // of the first state only the curve's precision is left
-  std::fill(lead + trajectory::kPositionMean * kStride, lead + trajectory::kCurve * kStride, 0.0);
-  std::fill(lead + trajectory::kCurveMean * kStride, lead + trajectory::kRows * kStride, 0.0);
-  clamp_to(before_, last_, lead + trajectory::kCurve * kStride, carry_.get());
+  lead_left_ = frames_in(lead_s, information_.rate_hz());
+  std::fill_n(lead, kHandChannels, 0.0);  // only the first state's delta-delta precision is kept
+  std::fill(lead + trajectory::kPositionMean * kStride, lead + trajectory::kDeltaDelta * kStride,
+            0.0);
+  std::fill(lead + trajectory::kDeltaDeltaMean * kStride, lead + trajectory::kRows * kStride, 0.0);
+  clamp_to(before_, last_, lead + trajectory::kDeltaDelta * kStride, carry_.get());
   carries_ = true;
 }
 
-// Writes the evidence of the frames that are not settled into frames_ and returns their number;
-// `shown` becomes the cursor of the frame to give out. RT-safe.
+// Writes pointers to the information of the frames that are not final into frames_ and returns
+// their number; `shown` becomes the cursor of the frame to output. RT-safe.
 int LabelSequencePlayer::plan(Cursor& shown) noexcept {
   const int most = lead_left_ + look_ahead_ + 1;
   int frames = 0;
@@ -119,13 +121,13 @@ int LabelSequencePlayer::plan(Cursor& shown) noexcept {
   for (bool entered = true; frames < most; ++frames) {
     if (ahead.frames_left == 0 && !options_.rest && !script_.has_next(ahead.position)) break;
     if (entered) {
-      evidence_.fill(script_.context(ahead.position), ahead.state,
-                     states_.row(++slot, trajectory::kPosition));
+      information_.fill(script_.context(ahead.position), ahead.state,
+                        states_.row(++slot, trajectory::kPosition));
     }
     if (frames == shown_) shown = ahead;
     frames_[frames] = states_.frame(slot);
     const Cursor before = ahead;
-    step(ahead, script_, evidence_, tempo_);
+    step(ahead, script_, information_, tempo_);
     entered = ahead.state != before.state || ahead.position != before.position;
   }
   return frames;
@@ -141,7 +143,7 @@ void LabelSequencePlayer::advance(int frames) noexcept {
   if (lead_left_ > 0) {
     --lead_left_;
   } else {
-    step(cursor_, script_, evidence_, tempo_);
+    step(cursor_, script_, information_, tempo_);
     script_.forget_before(cursor_.position);
   }
 }
@@ -149,14 +151,15 @@ void LabelSequencePlayer::advance(int frames) noexcept {
 // RT-safe.
 bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
   if (!started_) return false;
-  if (cursor_.frames_left == 0 && script_.has_next(cursor_.position)) {  // a label ends the rest
-    step(cursor_, script_, evidence_, tempo_);
+  if (cursor_.frames_left == 0 &&
+      script_.has_next(cursor_.position)) {  // an appended label ends the rest
+    step(cursor_, script_, information_, tempo_);
     glide();
   }
   Cursor shown = cursor_;
   const int frames = plan(shown);
   if (frames <= shown_) return false;
-  trajectory::kernel::eliminate({.evidence = frames_.data(),
+  trajectory::kernel::eliminate({.information = frames_.data(),
                                  .frames = frames,
                                  .stride = kStride,
                                  .carry_in = carries_ ? carry_.get() : nullptr,

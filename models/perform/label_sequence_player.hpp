@@ -1,12 +1,12 @@
-// LabelSequencePlayer: performs labels frame by frame while they come. Each frame is the most
-// likely one given the whole past, kept exactly, and the script up to `look_ahead_s`
-// (models/perform/README.md, "Look-ahead player"; the label sequence is the future: no latency).
-// What lies ahead is planned anew every frame: labels appended and a tempo set while it plays move
-// only what is not yet shown.
+// LabelSequencePlayer: performs labels frame by frame while more are being appended. Each frame is
+// the most likely one given the exact past and the label sequence up to `look_ahead_s` ahead
+// (models/perform/README.md, "Look-ahead player"). Because the future is the label sequence, there
+// is no latency. The frames ahead are planned anew in every frame, so labels appended and a tempo
+// set while it plays affect only frames that are not shown yet.
 //
-// Started from a live hand it takes up that hand's last two poses and glides into the first
-// gesture, the gesture's own pull off for the lead-in (models/perform/README.md, "Lead-in"). Angles
-// in radians. Hot: no heap after construction, no locks; one thread.
+// Started from a live hand, it continues that hand's last two poses and moves smoothly into the
+// first gesture; during this lead-in the gesture's own pull is off (models/perform/README.md,
+// "Lead-in"). Angles in radians. Hot: no heap after construction, no locks; one thread.
 #pragma once
 
 #include <memory>
@@ -19,37 +19,37 @@ namespace posed::perform {
 
 struct PlayerOptions {
   double look_ahead_s = 1.0;
-  int capacity = 1024;  // labels that wait
-  // After the last label: rest in its last state until another is appended (and glide into that one
-  // as out of a live hand), or end.
+  int capacity = 1024;  // most labels that wait
+  // After the last label: true: rest in its last state until another is appended (with a lead-in as
+  // from a live hand); false: end.
   bool rest = false;
 };
 
 struct PlayedFrame {
   HandAngles angle{};
-  HandAngles variance{};  // of each angle, given what was known
+  HandAngles variance{};  // posterior variance of each angle [rad^2]
   int label = -1;         // index into the model's labels
   int state = -1;         // 0 to 4; -1 in the lead-in and at rest
 };
 
 class LabelSequencePlayer {
  public:
-  // `evidence` outlives the player's use of it; its rate is the rate of the frames.
-  LabelSequencePlayer(const trajectory::StateInformation& evidence, const PlayerOptions& options);
+  // `information` must outlive the player; its rate is the frame rate.
+  LabelSequencePlayer(const trajectory::StateInformation& information,
+                      const PlayerOptions& options);
 
-  // False when so many labels wait already. `label` is an index into the model's labels.
+  // Returns false when `capacity` labels already wait. `label` is an index into the model's labels.
   [[nodiscard]] bool append(int label) noexcept { return script_.append(label); }
   void set_loop(bool loop) noexcept { script_.set_loop(loop); }
-  void set_tempo(double tempo) noexcept;  // kMinTempo to kMaxTempo, from the next state on
-  void clear() noexcept;                  // forgets labels and motion
+  void set_tempo(double tempo) noexcept;  // clamped to kMinTempo..kMaxTempo; from the next state on
+  void clear() noexcept;                  // forgets all labels and the motion
 
-  // Begins with the first appended label: out of nothing, or out of the last two poses of a hand,
-  // one frame apart. Labels must have been appended.
+  // Starts with the first appended label: without a past, or from the last two poses of a hand, one
+  // frame apart. At least one label must have been appended.
   void start() noexcept;
   void start(const HandAngles& before, const HandAngles& last) noexcept;
 
-  // The next frame; false when there is none (not started, or performed to the end and not at
-  // rest).
+  // The next frame; returns false when there is none (not started, or at the end and not resting).
   [[nodiscard]] bool next(PlayedFrame& out) noexcept;
 
   [[nodiscard]] bool started() const noexcept { return started_; }
@@ -60,17 +60,17 @@ class LabelSequencePlayer {
   int plan(Cursor& shown) noexcept;
   void advance(int frames) noexcept;
 
-  const trajectory::StateInformation& evidence_;
+  const trajectory::StateInformation& information_;
   PlayerOptions options_;
   int look_ahead_;  // frames
   LabelSequence script_;
   double tempo_ = 1.0;
   bool started_ = false, carries_ = false;
-  Cursor cursor_;      // of the first frame that is not settled
-  int lead_left_ = 0;  // frames of the lead-in before it
-  int shown_ = 0;      // frames not settled that were given out: the last ones of a script
+  Cursor cursor_;      // of the first frame that is not final
+  int lead_left_ = 0;  // remaining frames of the lead-in before it
+  int shown_ = 0;      // frames already shown but not final (only at the end of a sequence)
   HandAngles before_{}, last_{};        // the last two poses
-  trajectory::InformationForm states_;  // slot 0: the lead-in's; one for each state ahead
+  trajectory::InformationForm states_;  // slot 0: lead-in; then one for each state ahead
   std::vector<const double*> frames_;
   hwy::AlignedFreeUniquePtr<double[]> carry_, factor_rows_, x_, variance_;
   std::vector<double*> factors_;

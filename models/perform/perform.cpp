@@ -14,19 +14,20 @@ namespace {
 
 constexpr int kStride = trajectory::padded(kHandChannels);
 
-std::vector<PerformedState> plan(const trajectory::StateInformation& evidence,
+std::vector<PerformedState> plan(const trajectory::StateInformation& information,
                                  std::span<const int> labels, double tempo) {
   LabelSequence script(static_cast<int>(labels.size()));
   for (const int label : labels) static_cast<void>(script.append(label));
   std::vector<PerformedState> states;
   int start = 0;
-  for (Cursor cursor = enter(script, evidence, script.first(), tempo); cursor.frames_left > 0;
-       step(cursor, script, evidence, tempo)) {
+  for (Cursor cursor = enter(script, information, script.first(), tempo); cursor.frames_left > 0;
+       step(cursor, script, information, tempo)) {
     if (cursor.frames_left == cursor.frames) {
       PerformedState& entered = states.emplace_back(
           PerformedState{script.context(cursor.position), cursor.state, start, cursor.frames, {}});
       for (int f = 0; f < kFingers; ++f) {
-        entered.leaf[f] = gesture::leaf_index(evidence.model(), cursor.state, f, entered.context);
+        entered.leaf[f] =
+            gesture::leaf_index(information.model(), cursor.state, f, entered.context);
       }
     }
     ++start;
@@ -42,7 +43,7 @@ HandAngles angles_of(const double* row) {
 
 void solve_all(const std::vector<const double*>& frames, Performance& performance) {
   const auto count = static_cast<int>(frames.size());
-  trajectory::Window window(kHandChannels, count);
+  trajectory::SlidingWindow window(kHandChannels, count);
   window.solve(frames);
   const auto variances = hwy::AllocateAligned<double>(frames.size() * kStride);
   window.variances(variances.get());
@@ -96,14 +97,15 @@ Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::stri
   return labels;
 }
 
-Performance perform(const trajectory::StateInformation& evidence, std::span<const int> labels,
+Performance perform(const trajectory::StateInformation& information, std::span<const int> labels,
                     const PerformOptions& options) {
-  Performance performance{evidence.rate_hz(), plan(evidence, labels, options.tempo), {}, {}};
+  Performance performance{information.rate_hz(), plan(information, labels, options.tempo), {}, {}};
   trajectory::InformationForm rows(kHandChannels, static_cast<int>(performance.states.size()));
   std::vector<const double*> frames;
   for (std::size_t i = 0; i < performance.states.size(); ++i) {
     const PerformedState& state = performance.states[i];
-    evidence.fill(state.context, state.state, rows.row(static_cast<int>(i), trajectory::kPosition));
+    information.fill(state.context, state.state,
+                     rows.row(static_cast<int>(i), trajectory::kPosition));
     frames.insert(frames.end(), static_cast<std::size_t>(state.frames),
                   rows.frame(static_cast<int>(i)));
   }
@@ -112,7 +114,7 @@ Performance perform(const trajectory::StateInformation& evidence, std::span<cons
   } else {
     solve_all(frames, performance);
   }
-  if (options.global_variance) restore_variance(evidence.model(), performance);
+  if (options.global_variance) restore_variance(information.model(), performance);
   return performance;
 }
 

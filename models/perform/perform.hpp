@@ -1,5 +1,6 @@
-// A whole label string performed at once: what `posed synth` writes and `posed eval gesture`
-// judges. The same script, evidence and solver as the player's. Cold.
+// Performs a whole label sequence at once (models/perform/README.md, "Whole performance"); used by
+// `posed synth` and `posed eval gesture`. It uses the same label sequence, state information and
+// solver as the player. Cold.
 #pragma once
 
 #include <array>
@@ -15,8 +16,9 @@ namespace posed::perform {
 
 struct PerformOptions {
   double tempo = 1.0;
-  std::optional<int> look_ahead{};  // frames of the script known at each; none: all (full solve)
-  bool global_variance = false;     // give back the liveliness that averaging took
+  std::optional<int>
+      look_ahead{};  // frames of the sequence known ahead of each frame; empty: all (full solve)
+  bool global_variance = false;  // restore the range of motion that averaging reduces
 };
 
 struct PerformedState {
@@ -24,7 +26,7 @@ struct PerformedState {
   int state = 0;  // 0 to 4
   int start = 0;  // first frame
   int frames = 0;
-  std::array<int, kFingers> leaf{};  // of each finger's tree
+  std::array<int, kFingers> leaf{};  // leaf index of each finger's tree
 };
 
 struct Performance {
@@ -34,13 +36,13 @@ struct Performance {
   std::vector<HandAngles> variances;  // of each angle, rad^2
 };
 
-// Words between blanks, as label indices. Refuses an empty string and words that are no label of
-// the model, naming those that are.
+// Converts words separated by blanks into label indices. Returns an error for an empty text and for
+// words that are not labels of the model; the error lists the labels.
 [[nodiscard]] Result<std::vector<int>> labels_of(const gesture::GestureModel& model,
                                                  std::string_view text);
 
 // At the model's rate. `labels` has at least one.
-[[nodiscard]] Performance perform(const trajectory::StateInformation& evidence,
+[[nodiscard]] Performance perform(const trajectory::StateInformation& information,
                                   std::span<const int> labels, const PerformOptions& options);
 
 }  // namespace posed::perform

@@ -21,8 +21,8 @@ double tempo_rho(const gesture::DurationGaussian& duration, double tempo) noexce
   double wanted = 0.0;
   for (int s = 0; s < kStates; ++s) wanted += state_frames(duration.mean[s], 0.0, 0.0, 0.0);
   wanted /= tempo;
-  // States that the common rho would press below one frame stay at one and leave the sum; each
-  // round settles at least one of them or is the last.
+  // States that the common rho would press below one frame are set to one and left out of the sum;
+  // each round sets at least one of them or is the last.
   std::array<bool, kStates> shortest{};
   double rho = 0.0;
   for (int round = 0; round < kStates; ++round) {

@@ -19,11 +19,11 @@ constexpr double kCurveBase = 5.0 * kDegree2;      // [rad^2/s^3]
 constexpr double kCurveSlope = 20.0;               // [1/s], times the squared speed
 constexpr double kDeltaBase = 0.002 * kDegree2;    // [rad^2/s]
 constexpr double kDeltaSlope = 0.1;                // [s], times the squared speed
-constexpr double kSpeedReach_s = 0.067;            // the speed's mean is over so much on each side
-constexpr double kHandShare = 0.1;                 // of the mean speed of all channels
+constexpr double kSpeedReach_s = 0.067;  // the speed is averaged over this time on each side
+constexpr double kHandShare = 0.1;       // of the mean speed of all channels
 constexpr int kPasses = 2;
 
-constexpr double kEven = 1e-3;  // a clock that is off by less is even
+constexpr double kEven = 1e-3;  // frames whose skew is below this count as evenly spaced
 
 constexpr int kEvenWindow = 26;
 constexpr double kWindow_s = 26.0 / kEvenRate_hz;
@@ -38,16 +38,16 @@ int window_frames(double period_s) noexcept {
 
 AdaptiveWindow::AdaptiveWindow(int channels)
     : channels_(channels),
-      evidence_(channels, kMaxWindow),
-      sensed_(static_cast<std::size_t>(2 * kMaxWindow * evidence_.stride()), 1.0),
+      information_(channels, kMaxWindow),
+      sensed_(static_cast<std::size_t>(2 * kMaxWindow * information_.stride()), 1.0),
       window_(channels, kMaxWindow),
       whole_(kMaxWindow),
       ring_time_s_(kMaxWindow),
       last_measured_(static_cast<std::size_t>(channels)),
       held_rad_(static_cast<std::size_t>(channels)),
-      active_(hwy::AllocateAligned<double>(static_cast<std::size_t>(evidence_.stride()))),
+      active_(hwy::AllocateAligned<double>(static_cast<std::size_t>(information_.stride()))),
       speeds_(hwy::AllocateAligned<double>(static_cast<std::size_t>(kMaxWindow + 1) *
-                                           static_cast<std::size_t>(evidence_.stride()))),
+                                           static_cast<std::size_t>(information_.stride()))),
       hand_speeds_(kMaxWindow + 1),
       time_s_(kMaxWindow),
       step_s_(kMaxWindow),
@@ -62,7 +62,7 @@ void AdaptiveWindow::reset() noexcept {
   frames_ = 0;
   std::ranges::fill(last_measured_, -1);
   std::ranges::fill(held_rad_, 0.0);
-  std::fill_n(active_.get(), evidence_.stride(), 0.0);
+  std::fill_n(active_.get(), information_.stride(), 0.0);
 }
 
 // RT-safe.
@@ -81,7 +81,7 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
                           double noise_rad) noexcept {
   const int at = static_cast<int>(pushed_ % kMaxWindow);
   ring_time_s_[static_cast<std::size_t>(at)] = time_s;
-  evidence_.clear(at);
+  information_.clear(at);
   whole_[static_cast<std::size_t>(at)] = 1;
   double* const position = sensed_.data() + static_cast<std::ptrdiff_t>(2 * at) * stride();
   double* const mean = position + stride();
@@ -95,8 +95,7 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
       held_rad_[c] = measured_rad[c];
       last_measured_[c] = pushed_;
     }
-    // No precision at all would leave a channel that is missing in the whole window without a
-    // value.
+    // With zero precision, a channel that is missing in the whole window would have no value.
     position[c] = measured ? precision : kNothing;
     mean[c] = position[c] * held_rad_[c];
   }
@@ -106,12 +105,12 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
 
 // RT-safe.
 void AdaptiveWindow::take_sensed(int slot) noexcept {
-  std::copy_n(sensed(slot), stride(), evidence_.row(slot, trajectory::kPosition));
-  std::copy_n(sensed(slot) + stride(), stride(), evidence_.row(slot, trajectory::kPositionMean));
+  std::copy_n(sensed(slot), stride(), information_.row(slot, trajectory::kPosition));
+  std::copy_n(sensed(slot) + stride(), stride(), information_.row(slot, trajectory::kPositionMean));
 }
 
-// A channel that is measured for the first time was there before, too: its earlier frames hold the
-// value, so that nothing pulls it from where it starts. RT-safe.
+// Sets the earlier frames of a channel that is measured for the first time to its value, so that
+// nothing pulls it away from where it starts. RT-safe.
 void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   const long from = std::max<long>(0, pushed_ - kMaxWindow + 1);
   for (long i = from; i < pushed_; ++i) {
@@ -121,13 +120,13 @@ void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   }
 }
 
-// The window's frames and how their times lie. RT-safe.
+// Collects the window's frames and the times between them. RT-safe.
 void AdaptiveWindow::begin(double period_s) noexcept {
   period_s_ = period_s > 0.0 ? period_s : 1.0 / kEvenRate_hz;
   frames_ = static_cast<int>(std::min<long>(pushed_, window_frames(period_s)));
   for (int i = 0; i < frames_; ++i) {
     const auto index = static_cast<std::size_t>(i);
-    rows_[index] = evidence_.frame(slot(i));
+    rows_[index] = information_.frame(slot(i));
     time_s_[index] = ring_time_s_[static_cast<std::size_t>(slot(i))];
     step_s_[index] = i > 0 ? time_s_[index] - time_s_[index - 1] : 0.0;
   }
@@ -141,24 +140,24 @@ void AdaptiveWindow::begin(double period_s) noexcept {
   }
 }
 
-// What the last solve was told beyond the sensors. The precisions of deltas and curves are written
-// anew each time, their means are zero otherwise. RT-safe.
+// Removes the information that InformationSource added for the last solve. The precisions of delta
+// and delta-delta are rewritten for each solve; their means are zero otherwise. RT-safe.
 void AdaptiveWindow::forget_extra() noexcept {
   if (!std::exchange(extra_, false)) return;
   for (int i = 0; i < frames_; ++i) {
     take_sensed(slot(i));
-    std::fill_n(evidence_.row(slot(i), trajectory::kDeltaMean), stride(), 0.0);
-    std::fill_n(evidence_.row(slot(i), trajectory::kCurveMean), stride(), 0.0);
+    std::fill_n(information_.row(slot(i), trajectory::kDeltaMean), stride(), 0.0);
+    std::fill_n(information_.row(slot(i), trajectory::kDeltaDeltaMean), stride(), 0.0);
   }
 }
 
 // RT-safe.
 void AdaptiveWindow::loose_prior() noexcept {
   for (int i = 1; i + 1 < frames_; ++i) {
-    const double curve = 1.0 / (kLooseCurve * curve_time_s3(i));
-    std::fill_n(evidence_.row(slot(i), trajectory::kDelta), 2 * stride(), 0.0);
-    std::fill_n(evidence_.row(slot(i), trajectory::kCurve), stride(), curve);
-    std::fill_n(evidence_.row(slot(i), trajectory::kCurveMean), stride(), 0.0);
+    const double curve = 1.0 / (kLooseCurve * delta_delta_time_s3(i));
+    std::fill_n(information_.row(slot(i), trajectory::kDelta), 2 * stride(), 0.0);
+    std::fill_n(information_.row(slot(i), trajectory::kDeltaDelta), stride(), curve);
+    std::fill_n(information_.row(slot(i), trajectory::kDeltaDeltaMean), stride(), 0.0);
   }
 }
 
@@ -170,31 +169,31 @@ void AdaptiveWindow::speed_prior() noexcept {
   for (int c = 0; c < channels_; ++c) active += active_[static_cast<std::size_t>(c)];
   const double reach_s = kSpeedReach_s + 0.5 * period_s_;
   int from = 0;
-  int to = 0;  // frames from <= j < to lie within reach
+  int to = 0;  // frames from <= j < to are within the averaging time
   for (int i = 1; i + 1 < frames_; ++i) {
     const auto at = [this](int index) { return time_s_[static_cast<std::size_t>(index)]; };
     while (at(from) < at(i) - reach_s) ++from;
     while (to < frames_ && at(to) <= at(i) + reach_s) ++to;
-    // Frame j stands for the step before it; the first for the one after.
+    // Frame j represents the step before it; the first frame represents the step after it.
     const double first_s = from > 0 ? at(from - 1) : at(0) - step_s_[1];
     const double per_s = 1.0 / (at(to - 1) - first_s);
     const double hand =
         hand_speeds_[static_cast<std::size_t>(to)] - hand_speeds_[static_cast<std::size_t>(from)];
     const double delta_s =
         0.5 * (step_s_[static_cast<std::size_t>(i)] + step_s_[static_cast<std::size_t>(i + 1)]);
-    const double curve_s3 = curve_time_s3(i);
+    const double curve_s3 = delta_delta_time_s3(i);
     const kernel::Spread spread{.per_s = (1.0 - kHandShare) * per_s,
                                 .hand = active > 0.0 ? kHandShare * hand * per_s / active : 0.0,
                                 .delta_base = kDeltaBase * delta_s,
                                 .delta_slope = kDeltaSlope * delta_s,
-                                .curve_base = kCurveBase * curve_s3,
-                                .curve_slope = kCurveSlope * curve_s3};
+                                .delta_delta_base = kCurveBase * curve_s3,
+                                .delta_delta_slope = kCurveSlope * curve_s3};
     const auto row = [this](int index) {
       return speeds_.get() + static_cast<std::ptrdiff_t>(index) * stride();
     };
     kernel::set_precision(row(from), row(to), stride(), spread,
-                          evidence_.row(slot(i), trajectory::kDelta),
-                          evidence_.row(slot(i), trajectory::kCurve));
+                          information_.row(slot(i), trajectory::kDelta),
+                          information_.row(slot(i), trajectory::kDeltaDelta));
   }
 }
 
@@ -212,9 +211,9 @@ void AdaptiveWindow::solve_once(double period_s) noexcept {
 }
 
 // RT-safe.
-void AdaptiveWindow::solve(double period_s, WindowEvidence* extra) noexcept {
+void AdaptiveWindow::solve(double period_s, InformationSource* extra) noexcept {
   solve_once(period_s);
-  if (frames_ < 3) return;  // no window fits: what was measured is all there is
+  if (frames_ < 3) return;  // too few frames for a delta window: only the first solve is done
   for (int pass = 0; pass < kPasses; ++pass) {
     speed_prior();
     forget_extra();
@@ -227,9 +226,9 @@ void AdaptiveWindow::solve(double period_s, WindowEvidence* extra) noexcept {
   forget_extra();
 }
 
-// Curve's variance over q: a second difference in time units, squared, over the time it stands for
-// (the even clock's dt^3). RT-safe.
-double AdaptiveWindow::curve_time_s3(int index) const noexcept {
+// Variance of the delta-delta divided by Q: dt^3 for even frames (models/smooth/README.md, "Uneven
+// frames"). RT-safe.
+double AdaptiveWindow::delta_delta_time_s3(int index) const noexcept {
   const double before_s = step_s_[static_cast<std::size_t>(index)];
   const double after_s = step_s_[static_cast<std::size_t>(index + 1)];
   return 2.0 * before_s * before_s * after_s * after_s / (before_s + after_s);

@@ -1,10 +1,10 @@
 // AdaptiveWindow: the windowed solve with the speed-adaptive prior (models/smooth/README.md,
-// "Speed-adaptive prior") for a row of channels, no model needed. Solved once under one loose prior
-// for the acceleration, then twice more under priors whose variances follow the speed that the
-// solve before found.
+// "Speed-adaptive prior") for a row of channels; it needs no gesture model. The window is solved
+// once under a loose prior for the acceleration, then twice more under priors whose variances
+// follow the speed found by the previous solve.
 //
-// Units: radians and seconds; a frame lasts what its times say, even or not. Hot parts are RT-safe
-// and never allocate.
+// Units: radians and seconds; frames may be evenly spaced or not. Hot parts are RT-safe and never
+// allocate; one thread.
 #pragma once
 
 #include <cstdint>
@@ -16,20 +16,20 @@
 
 namespace posed::smooth {
 
-// Frames of window at a beat: 26 up to 60 Hz, 0.43 s above. RT-safe.
+// Frames in the window at a frame period: 26 up to 60 Hz, 0.43 s above. RT-safe.
 inline constexpr int kMaxWindow = 434;  // at 1000 Hz
 [[nodiscard]] int window_frames(double period_s) noexcept;
 
 class AdaptiveWindow;
 
-// What else is known of the window's frames: adds to their evidence before each solve but the
-// first, looking at what the solve before found. RT-safe.
-class WindowEvidence {
+// An additional source of information about the window's frames: add() is called before each solve
+// but the first and may use the result of the previous solve. RT-safe.
+class InformationSource {
  public:
-  WindowEvidence() = default;
-  WindowEvidence(const WindowEvidence&) = delete;
-  WindowEvidence& operator=(const WindowEvidence&) = delete;
-  virtual ~WindowEvidence() = default;
+  InformationSource() = default;
+  InformationSource(const InformationSource&) = delete;
+  InformationSource& operator=(const InformationSource&) = delete;
+  virtual ~InformationSource() = default;
 
   virtual void add(AdaptiveWindow& window) noexcept = 0;
 };
@@ -38,26 +38,26 @@ class AdaptiveWindow {
  public:
   explicit AdaptiveWindow(int channels);
 
-  // The next frame: [channels] rad, not a number where a channel is missing. Times increase.
+  // The next frame: [channels] rad, NaN where a channel is missing. Times increase.
   void push(double time_s, std::span<const double> measured_rad, double noise_rad) noexcept;
 
   // Solves the last frames, at most window_frames(period_s) of them.
-  void solve(double period_s, WindowEvidence* extra = nullptr) noexcept;
+  void solve(double period_s, InformationSource* extra = nullptr) noexcept;
 
-  // One solve under the loose prior alone: what the others are measured against.
+  // One solve under the loose prior alone; the benchmark compares the full solve with it.
   void solve_once(double period_s) noexcept;
 
   void reset() noexcept;
 
-  // Of the last solve; `back` frames before the newest, below frames().
+  // Results of the last solve for the frame `back` frames before the newest; `back` is below
+  // frames().
   [[nodiscard]] int frames() const noexcept { return frames_; }
   [[nodiscard]] const double* x(int back) const noexcept { return window_.x(frames_ - 1 - back); }
   // out: [stride()], 64-byte aligned
   void variance(int back, double* out) const noexcept { window_.variance(frames_ - 1 - back, out); }
-  // That frame's rows as the next solve will take them (InformationForm). Only WindowEvidence
-  // writes them.
+  // The frame's rows (InformationForm) for the next solve. Only InformationSource writes them.
   [[nodiscard]] double* row(int back, trajectory::Row row) noexcept {
-    return evidence_.row(slot(frames_ - 1 - back), row);
+    return information_.row(slot(frames_ - 1 - back), row);
   }
   [[nodiscard]] bool measured(int back, int channel) const noexcept {
     return sensed(slot(frames_ - 1 - back))[channel] > kNothing;
@@ -74,7 +74,7 @@ class AdaptiveWindow {
   // The channel was measured in one of the window's frames at least.
   [[nodiscard]] bool known(int channel) const noexcept;
 
-  [[nodiscard]] int stride() const noexcept { return evidence_.stride(); }
+  [[nodiscard]] int stride() const noexcept { return information_.stride(); }
 
  private:
   [[nodiscard]] int slot(int index) const noexcept;  // ring position of the window's frame
@@ -88,24 +88,24 @@ class AdaptiveWindow {
   void loose_prior() noexcept;
   void speed_prior() noexcept;
   void run() noexcept;
-  [[nodiscard]] double curve_time_s3(int index) const noexcept;
+  [[nodiscard]] double delta_delta_time_s3(int index) const noexcept;
 
-  static constexpr double kNothing = 3.3e-6;  // precision of what was not measured [rad^-2]
+  static constexpr double kNothing = 3.3e-6;  // precision of a value that was not measured [rad^-2]
 
   int channels_;
   long pushed_ = 0;
   int frames_ = 0;  // of the window
   double period_s_ = 0.0;
-  bool extra_ = false;                    // the window's positions hold more than was measured
-  bool even_ = true;                      // the window's frames stand evenly
-  trajectory::InformationForm evidence_;  // ring
-  std::vector<double> sensed_;            // the same ring: kPosition and kPositionMean as measured
-  trajectory::Window window_;
+  bool extra_ = false;  // the window's position rows hold more than measurements
+  bool even_ = true;    // the window's frames are evenly spaced
+  trajectory::InformationForm information_;  // ring
+  std::vector<double> sensed_;  // the same ring: kPosition and kPositionMean as measured
+  trajectory::SlidingWindow window_;
   std::vector<std::uint8_t> whole_;             // [kMaxWindow] ring
   std::vector<double> ring_time_s_;             // [kMaxWindow]
-  std::vector<long> last_measured_;             // [channels] when, counted in frames; -1 never
+  std::vector<long> last_measured_;             // [channels] number of the frame; -1: never
   std::vector<double> held_rad_;                // [channels] the last measured value
-  hwy::AlignedFreeUniquePtr<double[]> active_;  // [stride] 1 where a channel ever changed
+  hwy::AlignedFreeUniquePtr<double[]> active_;  // [stride] 1 for channels that have ever changed
   hwy::AlignedFreeUniquePtr<double[]> speeds_;  // [kMaxWindow + 1][stride]
   std::vector<double> hand_speeds_;             // [kMaxWindow + 1]
   std::vector<double> time_s_, step_s_, skew_;  // [kMaxWindow] of the window's frames

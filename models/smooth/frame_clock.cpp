@@ -9,9 +9,9 @@ namespace {
 constexpr double kShortestPeriod_s = 1e-3;  // 1000 Hz
 constexpr double kLongestPeriod_s = 0.2;    // a slower step is a gap
 constexpr double kFirstPeriod_s = 1.0 / 60.0;
-constexpr double kShortestStep = 0.5;  // of the beat
-constexpr double kArrivalGain = 0.1;   // how far an arrival time moves the beat's phase
-constexpr double kGap = 1.5;           // beats: from here on a step is a gap, not jitter
+constexpr double kShortestStep = 0.5;  // of the period
+constexpr double kArrivalGain = 0.1;   // share of the lateness that corrects a step
+constexpr double kGap = 1.5;           // periods: a step at least this long is a gap, not jitter
 
 }  // namespace
 
@@ -25,7 +25,7 @@ double FrameClock::tick(const Header& header) noexcept {
   const double beat_s = period_s_ > 0.0 ? period_s_ : kFirstPeriod_s;
   double step_s = beat_s;
   if (known) {
-    // Unsigned: two times may be further apart than a signed difference can say.
+    // Unsigned: the difference of two times may exceed the signed range.
     step_s = static_cast<double>(static_cast<std::uint64_t>(time_ns) -
                                  static_cast<std::uint64_t>(last_ns_)) *
              1e-9;

@@ -11,14 +11,14 @@ namespace {
 using gesture::kDeltaWindows;
 using gesture::kStates;
 
-constexpr double kTemper = 0.05;  // of the likelihoods at the model's rate
-// A hand may begin a gesture out of turn: the filter never locks itself in.
+constexpr double kTemper = 0.05;  // exponent of the likelihoods at the model's rate
+// A hand may begin a gesture at any time; this probability keeps the filter from locking up.
 const double kLogRestart = std::log(1e-4);
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr double kShortestStay = 1.5;  // frames
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kVanished = 1e-200;
-// What the sensors' noise adds to a feature, in variances of a value.
+// Variance that sensor noise adds to a feature, relative to the noise variance of a value.
 constexpr std::array<double, kDeltaWindows> kNoiseGain{1.0, 0.5, 6.0};
 
 // ln(e^a + e^b)
@@ -58,12 +58,12 @@ void HmmForwardFilter::reset() noexcept {
   log_choices_ = std::log(pairs ? labels - 1.0 : labels);
 }
 
-// A state as this stream's sensors see it at its rate. RT-safe.
+// Recomputes a state's Gaussian for this stream's rate and sensor noise. RT-safe.
 void HmmForwardFilter::renew_table(int state) noexcept {
   const auto s = static_cast<std::size_t>(state);
   const LiveState& from = model_->states[s];
   Table& table = tables_[s];
-  const RateRule rule = rate_rule(pace_);
+  const RateFactors rule = rate_factors(pace_);
   std::size_t k = 0;
   for (std::size_t w = 0; w < kDeltaWindows; ++w) {
     const double noise = kNoiseGain[w] * noise_rad_ * noise_rad_;
@@ -87,7 +87,7 @@ void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, dou
   period_s_ = period_s > 0.0 ? period_s : 1.0 / model_->rate_hz;
   noise_rad_ = noise_rad;
   pace_ = std::max(1.0 / (period_s_ * model_->rate_hz), 0.1);
-  // Beat and noise move slowly: a state a frame keeps up with them.
+  // Period and noise change slowly, so updating one state per frame is enough.
   for (int i = 0; i < (first ? states_ : 1); ++i) {
     renew_table(next_table_);
     next_table_ = (next_table_ + 1) % states_;
@@ -102,7 +102,7 @@ void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, dou
   advance(log_emission);
 }
 
-// The tempered log likelihood of every state; what is missing says nothing. RT-safe.
+// The tempered log likelihood of every state; missing values are left out. RT-safe.
 void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) const noexcept {
   std::array<double, kPaddedFeatures> feature{};
   std::array<double, kPaddedFeatures> weight{};
@@ -122,7 +122,7 @@ void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) con
   for (std::size_t s = 0; s < static_cast<std::size_t>(states_); ++s) {
     const Table& table = tables_[s];
     std::array<double, trajectory::kLanes>
-        sum{};  // several, because each addition waits for the one before
+        sum{};  // several sums, because each addition waits for the previous one
     for (std::size_t k = 0; k < kPaddedFeatures; k += trajectory::kLanes) {
       for (std::size_t i = 0; i < trajectory::kLanes; ++i) {
         const double off = feature[k + i] - table.mean[k + i];
@@ -136,7 +136,7 @@ void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) con
 // One step of the forward filter. RT-safe.
 void HmmForwardFilter::advance(const Row& log_emission) noexcept {
   const auto states = static_cast<std::size_t>(states_);
-  LabelRow leaving;  // a label's last states
+  LabelRow leaving;  // log probability of leaving each label's last states
   std::fill_n(leaving.begin(), model_->labels.size(), kNever);
   double leaving_any = kNever;
   for (std::size_t s = kStates - 1; s < states; s += kStates) {
@@ -171,8 +171,8 @@ void HmmForwardFilter::advance(const Row& log_emission) noexcept {
   ++pushed_;
 }
 
-// Backward probabilities from the newest frame on; beliefs in the linear domain, where a frame that
-// contradicts itself (all products vanish) keeps the forward filter's. RT-safe.
+// Backward recursion from the newest frame. State probabilities are computed in the linear domain;
+// a frame for which all products vanish keeps its forward probabilities. RT-safe.
 void HmmForwardFilter::sweep(int frames) noexcept {
   if (model_ == nullptr) return;
   const auto states = static_cast<std::size_t>(states_);
@@ -197,11 +197,11 @@ void HmmForwardFilter::sweep(int frames) noexcept {
   }
 }
 
-// From what lies ahead of each state to the frame before; the largest is 1. RT-safe.
+// One backward step, from a frame to the one before it; scaled so that the largest is 1. RT-safe.
 void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept {
   const auto states = static_cast<std::size_t>(states_);
   const double choice = std::exp(-log_choices_);
-  LabelRow entries;  // of the chains that follow a label
+  LabelRow entries;  // of the first states of the chains that follow a label
   std::fill_n(entries.begin(), model_->labels.size(), 0.0);
   double entries_any = 0.0;
   for (std::size_t s = 0; s < states; s += kStates) {
@@ -220,8 +220,8 @@ void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept
   for (std::size_t s = 0; s < states; ++s) backward[s] /= largest;
 }
 
-// What was measured at a frame describes the one before, so frame `back` is believed one sweep step
-// later. RT-safe.
+// The features taken at a frame describe the frame before it, so frame `back` uses the
+// probabilities of one step later in time. RT-safe.
 std::span<const double> HmmForwardFilter::states(int back) const noexcept {
   return {swept_[static_cast<std::size_t>(std::max(0, back - 1))].data(),
           static_cast<std::size_t>(states_)};

@@ -1,12 +1,13 @@
-// HmmForwardFilter: which gesture a live hand is in, and which state of it. A forward filter over
-// the model's chains in a loop, left to right within a chain and on to any that follows its label
-// (models/smooth/README.md, "HMM forward filter"),
-// with likelihoods tempered because a hand's features are far from independent; it runs in the log
-// domain. Backward sweeps over the window then say what is believed of each of its frames by now.
+// HmmForwardFilter: estimates which gesture a live hand is in, and which state of it. It is the
+// forward recursion of a hidden Markov model over the model's chains, left to right within a chain
+// and then to any chain that may follow its label (models/smooth/README.md, "HMM forward filter").
+// Likelihoods are tempered because a hand's features are far from independent; the recursion runs
+// in the log domain. Backward sweeps over the window then give the state probabilities of each of
+// its frames, given everything known by now.
 //
 // At another rate than the model's: models/trajectory/README.md, "State information and frame
-// rate". Features are causal, so what a frame measures describes the frame before it. RT-safe but
-// for construction.
+// rate". Features are causal, so the features taken at a frame describe the frame before it.
+// RT-safe except for construction; one thread.
 #pragma once
 
 #include <algorithm>
@@ -23,31 +24,31 @@ class HmmForwardFilter {
  public:
   explicit HmmForwardFilter(int max_window);
 
-  // Begins anew with this model, not owned; null recognises nothing. RT-safe.
+  // Restarts with this model, which is not owned; with null, no gesture is recognised. RT-safe.
   void set_model(const LiveModel* model) noexcept;
   [[nodiscard]] const LiveModel* model() const noexcept { return model_; }
 
-  // The next frame: [45 channels] rad, not a number where missing; `even`: it follows the one
-  // before by one beat. RT-safe.
+  // The next frame: [45 channels] rad, NaN where missing; `even`: it follows the previous frame by
+  // one period. RT-safe.
   void push(std::span<const double> measured_rad, bool even, double period_s,
             double noise_rad) noexcept;
 
   // Sweeps back over the last `frames` pushed frames. RT-safe.
   void sweep(int frames) noexcept;
 
-  // Whether the last sweep knows the frame `back` before the newest: not when it came before the
-  // model did. RT-safe.
+  // Whether the last sweep covers the frame `back` before the newest; false for frames that came
+  // before the model was set. RT-safe.
   [[nodiscard]] bool knows(int back) const noexcept {
     return std::max(back - 1, 0) < swept_frames_;
   }
 
-  // What the last sweep believes of that frame, which it knows: [states], sums to 1. The newest
-  // frame is believed to be as the one before. RT-safe.
+  // State probabilities of that frame from the last sweep; needs knows(back). [states], sums to 1.
+  // The newest frame gets those of the frame before it. RT-safe.
   [[nodiscard]] std::span<const double> states(int back) const noexcept;
 
-  // The likeliest label of that frame, its index and probability. RT-safe.
+  // The most probable label of that frame, its index and probability. RT-safe.
   struct Answer {
-    int label = -1;  // -1: nothing is known of the frame
+    int label = -1;  // -1: the last sweep does not cover the frame
     double probability = 0.0;
   };
   [[nodiscard]] Answer label(int back) const noexcept;
@@ -78,7 +79,7 @@ class HmmForwardFilter {
   const LiveModel* model_ = nullptr;
   int max_window_;
   int states_ = 0;
-  double log_choices_ = 0.0;  // of how many chains may follow a label
+  double log_choices_ = 0.0;  // of the number of labels that may follow a label
   double pace_ = 1.0;         // the stream's rate over the model's
   double period_s_ = 0.0, noise_rad_ = 0.0;
   int next_table_ = 0;
@@ -89,7 +90,7 @@ class HmmForwardFilter {
   Row log_now_{};                                            // forward filter, sums to 1
   std::vector<Row> forward_, likelihood_;                    // rings [max_window], linear
   std::vector<Row> swept_;                                   // [max_window], by frames back
-  int swept_frames_ = 0;                                     // of them, those of the last sweep
+  int swept_frames_ = 0;                                     // number of frames in the last sweep
 };
 
 }  // namespace posed::smooth

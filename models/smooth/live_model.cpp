@@ -14,9 +14,9 @@ using gesture::GestureModel;
 using gesture::kDeltaWindows;
 using gesture::kStates;
 
-constexpr double kStill_rad = 1e-6;  // a channel that ranges over less does not move
+constexpr double kStill_rad = 1e-6;  // a channel with a smaller range does not move
 
-// A label between all that may stand beside it.
+// All contexts of a label with the given neighbours.
 std::vector<Context> contexts_of(int label, std::span<const int> previous,
                                  std::span<const int> trained) {
   const auto beside = [label](std::span<const int> all) {
@@ -42,7 +42,7 @@ std::vector<int> trained_labels(const GestureModel& model) {
   return trained;
 }
 
-// Every label after every other, where that is not too many.
+// One chain for each ordered pair of labels, where that is not too many; else one for each label.
 std::vector<LiveChain> chains_of(int labels) {
   std::vector<LiveChain> chains;
   const bool pairs = labels * (labels - 1) <= kMaxLiveChains && labels > 1;
@@ -55,8 +55,8 @@ std::vector<LiveChain> chains_of(int labels) {
   return chains;
 }
 
-// Moments over the contexts: the mean of what each says, its variance with their spread
-// (models/smooth/README.md, "Live model").
+// Moment matching over the contexts: the mean of their means, and the mean of their variances plus
+// the spread of their means (models/smooth/README.md, "Live model").
 LiveState state_of(const GestureModel& model, const std::vector<Context>& contexts, int state) {
   LiveState pooled;
   const double share = 1.0 / static_cast<double>(contexts.size());

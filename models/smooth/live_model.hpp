@@ -1,7 +1,8 @@
-// LiveModel: a gesture model as the live generator uses it, bound to the skeleton of one hand. A
-// chain of five states per recorded label and label before it, one Gaussian over all channels a
-// state: the mean and spread over what may come next. Models with many labels have a chain a label,
-// whatever comes before. Immutable; shared between threads.
+// LiveModel: a gesture model in the form that the live smoother uses, bound to the skeleton of one
+// hand (models/smooth/README.md, "Live model"). There is a chain of five states for each ordered
+// pair (recorded label, label before it), with one Gaussian over all channels per state that pools
+// all labels which may follow. Models with many labels have one chain per label, whatever label
+// comes before. Immutable; shared between threads.
 #pragma once
 
 #include <array>
@@ -16,20 +17,21 @@
 
 namespace posed::smooth {
 
-inline constexpr int kMaxLiveChains = 64;  // as many labels at most; pairs of up to 8
+inline constexpr int kMaxLiveChains =
+    64;  // also the most labels; pairs are used with up to 8 labels
 
-// One row a window (value, delta, delta-delta), the hand skeleton's channels in their order;
+// One row per window (value, delta, delta-delta) with the hand skeleton's channels in their order;
 // radians per frame of the model's rate to the power of the window's order.
 using HandRows = std::array<std::array<double, kHandChannels>, gesture::kDeltaWindows>;
 
 struct LiveState {
   HandRows mean{}, variance{};
-  double frames = 1.0;  // that it lasts, at the model's rate
+  double frames = 1.0;  // duration at the model's rate
 };
 
 struct LiveChain {
   int label = 0;     // index into LiveModel::labels
-  int previous = 0;  // the same; kAny whatever came before
+  int previous = 0;  // index of the label before it; kAny: any label
 };
 inline constexpr int kAny = -1;
 
@@ -38,23 +40,24 @@ struct LiveModel {
   std::vector<std::array<char, kMaxLabel>> labels;
   std::vector<LiveChain> chains;
   std::vector<LiveState> states;            // [chain][kStates]
-  std::array<bool, kHandChannels> moves{};  // the channel moved in the recordings
+  std::array<bool, kHandChannels> moves{};  // true: the channel moves in the recordings
   std::uint32_t skeleton = 0;               // id of the skeleton it is bound to
 };
 
-// What a model's features become at a rate ratio of its own rate (models/trajectory/README.md,
-// "State information and frame rate"): means by the window's order; variances so that more frames
-// do not vote harder. RT-safe.
-struct RateRule {
+// Factors on a model's means and variances at a rate ratio (stream rate over model rate)
+// (models/trajectory/README.md, "State information and frame rate"): means scale with the window's
+// order; variances grow by a common factor, so that more frames do not add more information in
+// total. RT-safe.
+struct RateFactors {
   std::array<double, gesture::kDeltaWindows> mean, variance;
 };
-[[nodiscard]] constexpr RateRule rate_rule(double pace) noexcept {
+[[nodiscard]] constexpr RateFactors rate_factors(double pace) noexcept {
   return {.mean = {1.0, 1.0 / pace, 1.0 / (pace * pace)},
           .variance = {pace, 1.0 / pace, 1.0 / (pace * pace * pace)}};
 }
 
-// Refuses a skeleton that is not a hand's and a model with more labels than are served. `name` is
-// for errors.
+// Returns an error for a skeleton that is not a hand and for a model with more than kMaxLiveChains
+// labels. `name` is for errors.
 [[nodiscard]] Result<std::unique_ptr<const LiveModel>> bind_live_model(
     const gesture::GestureModel& model, const Skeleton& skeleton, const std::string& name);
 

@@ -9,7 +9,7 @@
 namespace posed::smooth {
 namespace {
 
-// A stream of 60 Hz whose clock is a little fast is still one of 60 Hz.
+// A 60 Hz stream whose clock is slightly fast still counts as 60 Hz.
 constexpr double kRateSlack = 1.02;
 
 std::unexpected<Error> bad_lag(std::string_view text) {
@@ -22,7 +22,7 @@ std::unexpected<Error> bad_lag(std::string_view text) {
 
 // RT-safe.
 int lag_frames(const LiveLag& lag, double period_s) noexcept {
-  if (period_s <= 0.0) period_s = 1.0 / kEvenRate_hz;  // not known yet
+  if (period_s <= 0.0) period_s = 1.0 / kEvenRate_hz;  // the period is not known yet
   const bool even = period_s * kEvenRate_hz * kRateSlack >= 1.0;
   const int most = even ? kMaxLagFrames : static_cast<int>(kMaxLag_s / period_s + 1e-6);
   const double wanted = lag.seconds > 0.0 ? std::round(lag.seconds / period_s) : lag.frames;
@@ -38,7 +38,7 @@ Result<LiveLag> parse_lag(std::string_view text) {
   LiveLag lag;
   if (in_ms) {
     if (*value > kMaxLag_s * 1e3) return bad_lag(text);
-    lag.frames = 0;  // what 0ms means
+    lag.frames = 0;  // "0ms" means no lag
     lag.seconds = *value * 1e-3;
     return lag;
   }

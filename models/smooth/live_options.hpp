@@ -1,5 +1,5 @@
-// What the operator chooses of the live generator: how far the output runs behind the hand, and how
-// much the sensors are trusted.
+// Options of the live smoother: how far the output lags behind the hand, and the assumed sensor
+// noise.
 #pragma once
 
 #include <string_view>
@@ -8,9 +8,9 @@
 
 namespace posed::smooth {
 
-// A lag in frames of the stream, or in time when `seconds` is above zero: then as many frames as
-// come nearest at the stream's own rate. 0 to 5 frames up to 60 Hz, up to 170 ms above; a stream
-// that is asked for more gets the bound, and the wire tells what it got.
+// A lag in frames of the stream, or in time when `seconds` is above zero: then the nearest number
+// of frames at the stream's own rate. Bounds: 0 to 5 frames up to 60 Hz, up to 170 ms above. A
+// larger lag is reduced to the bound, and published frames state the lag in use.
 struct LiveLag {
   int frames = 1;
   double seconds = 0.0;
@@ -18,12 +18,13 @@ struct LiveLag {
 
 inline constexpr int kMaxLagFrames = 5;
 inline constexpr double kMaxLag_s = 0.170;
-inline constexpr double kEvenRate_hz = 60.0;  // up to here bounds count frames, above time
+inline constexpr double kEvenRate_hz =
+    60.0;  // up to this rate the bound is in frames, above it in time
 
 // Frames of lag at a rate, within the bounds. RT-safe.
 [[nodiscard]] int lag_frames(const LiveLag& lag, double period_s) noexcept;
 
-// "1" (frames, as many as 170 ms can hold) or "33ms". Errors say what is allowed.
+// Parses "1" (frames, at most as many as 170 ms can hold) or "33ms". Errors state what is allowed.
 [[nodiscard]] Result<LiveLag> parse_lag(std::string_view text);
 
 struct LiveOptions {

@@ -16,10 +16,11 @@ namespace posed::smooth {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
-constexpr double kForgetAfter_s = 1.0;  // a longer silence leaves nothing to go on from
+constexpr double kForgetAfter_s = 1.0;  // after a longer silence the past is forgotten
 constexpr int kMaxPending = static_cast<int>(kMaxLag_s * 1000.0) + 2;  // frames at 1000 Hz
-constexpr long kMostWaiting = 8;   // frames that wait for a beat that may never be known
-constexpr double kEvenStep = 1.5;  // beats: a longer step is no neighbour
+constexpr long kMostWaiting = 8;  // most frames that wait until the period is known
+constexpr double kEvenStep =
+    1.5;  // periods: frames with a longer step between them are not neighbours
 
 int rotation_channels(const Skeleton& skeleton) {
   return static_cast<int>(std::ranges::count_if(
@@ -65,15 +66,15 @@ struct LiveSmoother::State {
   NoiseEstimate noise;
   AdaptiveWindow window;
   HmmForwardFilter filter{kMaxWindow};
-  ModelPrior live_evidence{filter};
-  std::vector<double> measured;  // [channels] of the frame at hand
+  ModelPrior model_prior{filter};
+  std::vector<double> measured;  // [channels] of the current frame
   hwy::AlignedFreeUniquePtr<double[]> variance;
-  std::vector<std::size_t> angle_value;  // where a rotation channel stands in all channels
+  std::vector<std::size_t> angle_value;  // index of a rotation channel among all channels
   std::vector<int> turning;              // joints with rotation channels
-  std::vector<double> values;            // [channels] of the frame that goes out
+  std::vector<double> values;            // [channels] of the emitted frame
   std::vector<Frame> pending;            // ring of the last frames
-  long taken = 0;                        // frames that came
-  long emitted = 0;                      // of them
+  long taken = 0;                        // number of frames received
+  long emitted = 0;                      // number of frames emitted
   double last_s = 0.0;
 };
 
@@ -90,9 +91,9 @@ bool LiveSmoother::State::serves(const Frame& frame) const noexcept {
          frame.joint_count == skeleton.joints.size();
 }
 
-// Takes the frame in and its channels out, unwrapped. What was not measured is not a number in
-// both: all channels of a joint that is not valid, but for those that its source does give beside
-// ones that it lacks. RT-safe.
+// Stores the frame and extracts its channels, unwrapped. Channels that were not measured become NaN
+// in both: all channels of a joint that is not valid, except those that the source does provide
+// beside missing ones. RT-safe.
 void LiveSmoother::State::take(const Frame& frame) noexcept {
   Frame& kept = pending[static_cast<std::size_t>(taken % kMaxPending)];
   kept = frame;
@@ -146,8 +147,9 @@ void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
     s.filter.push(s.measured, even, period_s, noise_rad());
     s.filter.sweep(window_frames(period_s));
   }
-  s.window.solve(period_s, s.filter.model() != nullptr ? &s.live_evidence : nullptr);
-  // Until the beat is known a lag in time is no number of frames yet: the first frames wait.
+  s.window.solve(period_s, s.filter.model() != nullptr ? &s.model_prior : nullptr);
+  // Until the period is known, a lag in time cannot be converted into frames, so the first frames
+  // wait.
   const bool in_time = s.options.lag.seconds > 0.0;
   if (in_time && !s.clock.settled() && s.taken - s.emitted < kMostWaiting) return;
   s.emit_until(s.taken - 1 - lag_frames(s.options.lag, period_s), out);
@@ -192,7 +194,7 @@ void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept {
   }
 }
 
-// The frame as the solve found it, `back` frames before the newest. RT-safe.
+// Writes the solve's result into the frame `back` frames before the newest. RT-safe.
 void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
   window.variance(back, variance.get());
   const double* const x = window.x(back);
@@ -222,7 +224,7 @@ void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
   frame.label_probability = static_cast<float>(answer.probability);
 }
 
-// Rotations from channels; a joint counts as valid when all its channels are known. RT-safe.
+// Computes rotations from channels; a joint is valid when all its channels are known. RT-safe.
 void LiveSmoother::State::turn_joints(Frame& frame) noexcept {
   for (std::size_t c = 0; c < angle_value.size(); ++c) {
     values[angle_value[c]] = static_cast<double>(frame.angle_rad[c]);

@@ -1,17 +1,17 @@
-// LiveSmoother: the live generator's stage. Of the last frames (26 up to 60 Hz, 0.43 s above) it
-// solves, at every frame anew, the smoothest trajectory under what the sensors measured, with a
-// prior that widens where the hand moves fast (models/smooth/README.md, "Speed-adaptive prior"); no
-// model is needed. The lag is what the operator chose and nothing more. Missing joints are bridged
+// LiveSmoother: the pipeline stage that smooths live frames. At every frame it solves for the most
+// likely trajectory over the last frames (26 up to 60 Hz, 0.43 s above), given the measurements and
+// a prior that widens where the hand moves fast (models/smooth/README.md, "Speed-adaptive prior").
+// No gesture model is needed. It adds no latency beyond the chosen lag. Missing joints are bridged
 // by the same solve.
 //
-// Serves every skeleton with rotation channels; a frame of another skeleton, or without angles,
-// passes through at once after the frames that still waited. Channels are unwrapped inside; root
-// position and whatever else a frame carries are those of the frame that goes out.
+// It works for every skeleton with rotation channels. A frame of another skeleton, or without
+// angles, passes through at once, after the frames that still wait. Channels are unwrapped
+// internally; root position and all other contents are those of the emitted frame.
 //
-// Times: the device's where a frame has them, else arrival; they may be uneven, jump or run
-// backwards. Constants are in radians and seconds, so any rate from 10 to 1000 Hz is served as it
-// is. A gesture model, where one is set, names the gesture, bridges gaps in its own vocabulary and
-// steadies poses that it knows; it leaves an unknown hand alone.
+// Times are the device's where a frame has them, else arrival times; they may be uneven, jump or
+// run backwards. Constants are in radians and seconds, so any rate from 10 to 1000 Hz works without
+// tuning. An optional gesture model names the gesture, bridges gaps within its own gestures and
+// steadies poses that it knows; it does not disturb an unknown hand.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,8 @@ namespace posed::smooth {
 
 class LiveSmoother final : public Stage {
  public:
-  // Allocates all it will ever need. `model` is bound to the same skeleton, not owned, may be null.
+  // Allocates all memory that it will use. `model` is bound to the same skeleton, not owned, and
+  // may be null.
   LiveSmoother(const Skeleton& skeleton, const LiveOptions& options,
                const LiveModel* model = nullptr);
   ~LiveSmoother() override;
@@ -44,10 +45,10 @@ class LiveSmoother final : public Stage {
   // or silence. The stream may go on after it. RT-safe.
   void flush(StageOut& out) noexcept override;
 
-  // Forgets the past: the next frame is a first one. RT-safe.
+  // Forgets the past; the next frame is treated as the first one. RT-safe.
   void reset() noexcept;
 
-  // From the next frame on; returns the model before. RT-safe.
+  // Takes effect at the next frame; returns the previous model. RT-safe.
   const LiveModel* set_model(const LiveModel* model) noexcept;
 
   // Sensor noise in use [rad]. RT-safe.

@@ -7,15 +7,15 @@ namespace {
 
 using gesture::kDeltaWindows;
 
-constexpr double kPull = 0.1;       // weight of a believed pose beside the sensors
-constexpr double kGapPull = 0.3;    // and where they are silent
-constexpr double kFit2 = 2.0;       // normalised square distance at which half of the fit is left
-constexpr double kBelieved = 1e-3;  // a state that is less likely is left out
+constexpr double kPull = 0.1;       // weight of the model's pose beside a measurement
+constexpr double kGapPull = 0.3;    // and where the channel is missing
+constexpr double kFit2 = 2.0;       // normalised squared distance at which the fit is one half
+constexpr double kBelieved = 1e-3;  // states with a smaller probability are left out
 constexpr double kLeastVariance = 1e-12;
 
 }  // namespace
 
-// Mean and variance of one frame over the states that it may be in. RT-safe.
+// Mean and variance of one frame over its state probabilities. RT-safe.
 void ModelPrior::believe(int back) noexcept {
   const LiveModel& model = *filter_.model();
   const auto states = filter_.states(back);
@@ -37,7 +37,7 @@ void ModelPrior::believe(int back) noexcept {
       }
     }
   }
-  const RateRule rule = rate_rule(filter_.pace());
+  const RateFactors rule = rate_factors(filter_.pace());
   for (std::size_t w = 0; w < kDeltaWindows; ++w) {
     for (std::size_t c = 0; c < kHandChannels; ++c) {
       const double m = mean[w][c] / sum;
@@ -63,7 +63,7 @@ void ModelPrior::measure_distance(const AdaptiveWindow& window, int back) noexce
   }
 }
 
-// How well each finger has followed the model's gestures where it was measured. RT-safe.
+// How well each finger follows the model's gestures in the frames where it is measured. RT-safe.
 void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
   std::array<double, kFingers> frames{};
   fit_.fill(0.0);
@@ -81,8 +81,8 @@ void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
   for (std::size_t f = 0; f < kFingers; ++f) fit_[f] /= std::max(frames[f], 1.0);
 }
 
-// Towards the believed pose: variance times (1 + e^2/2)^2, so that a finger which is elsewhere is
-// left alone. RT-safe.
+// Pulls towards the model's pose with its variance times (1 + e^2/2)^2, so that a finger which is
+// elsewhere is not disturbed. RT-safe.
 void ModelPrior::pull(AdaptiveWindow& window, int back, int channel) noexcept {
   const auto c = static_cast<std::size_t>(channel);
   const std::size_t finger = c / kFingerChannels;
@@ -94,13 +94,13 @@ void ModelPrior::pull(AdaptiveWindow& window, int back, int channel) noexcept {
   window.row(back, trajectory::kPositionMean)[c] += precision * belief_.mean[0][c];
 }
 
-// In a gap the gestures' own speed and curve take the adaptive prior's place, as far as the finger
-// fitted. RT-safe.
+// In a gap the gestures' own delta and delta-delta replace the adaptive prior in proportion to the
+// finger's fit. RT-safe.
 void ModelPrior::bridge(AdaptiveWindow& window, int back, int channel) noexcept {
   const auto c = static_cast<std::size_t>(channel);
   const double fit = fit_[c / kFingerChannels];
-  constexpr std::array kPrecision{trajectory::kDelta, trajectory::kCurve};
-  constexpr std::array kMean{trajectory::kDeltaMean, trajectory::kCurveMean};
+  constexpr std::array kPrecision{trajectory::kDelta, trajectory::kDeltaDelta};
+  constexpr std::array kMean{trajectory::kDeltaMean, trajectory::kDeltaDeltaMean};
   for (std::size_t w = 0; w < 2; ++w) {
     const double own = fit / belief_.variance[w + 1][c];
     double& precision = window.row(back, kPrecision[w])[c];
@@ -109,7 +109,8 @@ void ModelPrior::bridge(AdaptiveWindow& window, int back, int channel) noexcept 
   }
 }
 
-// The newest frame has nothing: what it measures speaks of the one before. RT-safe.
+// Nothing is added to the newest frame, because the features taken at it describe the frame before.
+// RT-safe.
 void ModelPrior::add(AdaptiveWindow& window) noexcept {
   const LiveModel& model = *filter_.model();
   bool gap = false;

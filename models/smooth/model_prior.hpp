@@ -1,8 +1,8 @@
-// ModelPrior: what a gesture model adds to the live window, and where it must keep silent. A
-// robust pull towards the poses that it believes in, with so little weight that a hand which is
-// elsewhere feels nothing; and, where the sensors are silent, how its gestures move, as far as the
-// hand fitted them before the gap (models/smooth/README.md, "Model prior"). RT-safe but for
-// construction.
+// ModelPrior: the information that a gesture model adds to the live window
+// (models/smooth/README.md, "Model prior"). Measured channels get a robust pull towards the poses
+// that the model considers probable, with so little weight that a hand which is elsewhere is not
+// affected. In gaps it adds how the gestures move, weighted by how well the hand fitted the model
+// before the gap. RT-safe except for construction; one thread.
 #pragma once
 
 #include <array>
@@ -12,15 +12,15 @@
 
 namespace posed::smooth {
 
-class ModelPrior final : public WindowEvidence {
+class ModelPrior final : public InformationSource {
  public:
   explicit ModelPrior(const HmmForwardFilter& filter) : filter_(filter) {}
 
   void add(AdaptiveWindow& window) noexcept override;
 
  private:
-  // Believed of one frame, at the stream's rate, and how far each finger is from it: the mean of
-  // its normalised square distances.
+  // The model's Gaussian for one frame, at the stream's rate, and each finger's distance from it:
+  // the mean of the normalised squared distances.
   struct Belief {
     HandRows mean{}, variance{};
     std::array<double, kFingers> distance2{};
@@ -34,7 +34,8 @@ class ModelPrior final : public WindowEvidence {
 
   const HmmForwardFilter& filter_;
   Belief belief_;
-  std::array<double, kFingers> fit_{};  // over the window's measured frames: 0 a stranger's, to 1
+  std::array<double, kFingers>
+      fit_{};  // over the window's measured frames, from 0 (unlike the model) to 1
 };
 
 }  // namespace posed::smooth

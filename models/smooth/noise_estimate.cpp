@@ -9,13 +9,14 @@ namespace posed::smooth {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
-constexpr double kFirstGuess_rad = 1.0 * kRadians;  // until there is something to go by
+constexpr double kFirstGuess_rad = 1.0 * kRadians;  // used until there are enough values
 constexpr double kLeast_rad = 0.02 * kRadians;
 constexpr double kSmallest_rad = 1e-6;  // the first bin's lower edge
-constexpr double kEnough = 40.0;        // values, before the median counts
-constexpr double kMemory = 12000.0;     // values, from here on the old ones count half
+constexpr double kEnough = 40.0;        // values needed before the median is used
+constexpr double kMemory = 12000.0;     // values; when reached, all counts are halved
 constexpr double kLowSide = 0.97;
-// |third difference| of white noise: its median is 0.6745 standard deviations, those are sqrt(20).
+// The median of |third difference| of white noise is 0.6745 standard deviations, and that standard
+// deviation is sqrt(20) times the noise.
 constexpr double kToNoise = kLowSide / (0.6745 * 4.47213595499958);
 
 }  // namespace

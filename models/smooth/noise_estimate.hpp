@@ -1,7 +1,8 @@
-// NoiseEstimate: the sensors' noise, out of what they send. The third difference of a smooth motion
-// is almost nothing, that of white noise has variance 20 R; its median over channels and the last
-// few hundred frames' worth of values is little moved by the motion that is left
-// (models/smooth/README.md, "Noise estimate"). Channels that never changed say nothing.
+// NoiseEstimate: estimates the sensors' noise from the measured values. The third difference of a
+// smooth motion is almost zero; that of white noise of variance R has variance 20 R. Its median
+// over channels and the last 12,000 values is little affected by the remaining motion
+// (models/smooth/README.md, "Noise estimate"). Channels that never changed are left out. One
+// thread.
 #pragma once
 
 #include <array>
@@ -14,11 +15,12 @@ class NoiseEstimate {
  public:
   explicit NoiseEstimate(int channels);
 
-  // The next frame's channels [rad], not a number where missing. `even`: it follows the one before
-  // by one beat. RT-safe.
+  // The next frame's channels [rad], NaN where missing. `even`: it follows the previous frame by
+  // one period. RT-safe.
   void push(std::span<const double> measured_rad, bool even) noexcept;
 
-  // A little below what was found, because too much trust costs less than too little. RT-safe.
+  // Slightly below the estimate, because an assumed noise that is too low costs less accuracy than
+  // one that is too high. RT-safe.
   [[nodiscard]] double noise_rad() const noexcept { return noise_rad_; }
 
   void reset() noexcept;  // RT-safe
@@ -36,7 +38,7 @@ class NoiseEstimate {
   std::vector<double> past_;          // [kOrder x channels], newest first
   std::vector<double> first_;         // [channels] the first value of each
   std::vector<bool> moved_;           // [channels]
-  int even_frames_ = 0;               // in a row, up to kOrder
+  int even_frames_ = 0;               // consecutive even frames, up to kOrder
   std::array<double, kBins> bins_{};  // counts of |third difference|, by its logarithm
   double total_ = 0.0;
   double noise_rad_;

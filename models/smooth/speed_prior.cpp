@@ -2,12 +2,13 @@
 
 #include "models/trajectory/information_form.hpp"
 
-// The targets of the predictor's kernels (models/gp), so that one choice of instruction set holds
-// for all.
+// The same targets as the predictor's kernels (models/gp), so that one choice of instruction set
+// applies to all.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "models/smooth/speed_prior.cpp"
-// Highway compiles this file once per target; its own macros are not written for our warnings.
+// Highway compiles this file once per target; Highway's own macros do not compile without warnings
+// under our flags.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wsign-conversion"
 #include <hwy/foreach_target.h>
@@ -22,7 +23,7 @@ using Doubles = hn::CappedTag<double, trajectory::kLanes>;
 using Vec = hn::Vec<Doubles>;
 constexpr int kWide = static_cast<int>(hn::MaxLanes(Doubles()));
 
-// The sum of kLanes channels in one order, however many a vector holds.
+// The sum of kLanes channels in one fixed order, whatever the vector's length.
 HWY_INLINE double lane_sum(const double* lanes) {
   return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) +
          ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
@@ -63,7 +64,7 @@ void set_precision(const double* sum_from, const double* sum_to, int stride, con
     const Vec delta_variance =
         hn::MulAdd(hn::Set(d, spread.delta_slope), s, hn::Set(d, spread.delta_base));
     const Vec curve_variance =
-        hn::MulAdd(hn::Set(d, spread.curve_slope), s, hn::Set(d, spread.curve_base));
+        hn::MulAdd(hn::Set(d, spread.delta_delta_slope), s, hn::Set(d, spread.delta_delta_base));
     hn::Store(hn::Div(one, delta_variance), d, delta + column);
     hn::Store(hn::Div(one, curve_variance), d, curve + column);
   }

@@ -32,8 +32,8 @@ Result<> check_clip(const clip::Clip& clip) {
   return {};
 }
 
-// The heading that has settled by the first frame: the low-pass run from the end of the clip to
-// its start, so that it knows the way the walk is about to go.
+// The settled heading at the first frame: the low-pass runs from the clip's end to its start, so
+// that at the first frame it reflects the direction that the walk takes from there.
 double settled_heading_rad(const clip::Clip& clip, const motion::PoseSpace& space) {
   Heading heading;
   for (int i = clip.frames() - 1; i >= 0; --i) {
@@ -44,7 +44,7 @@ double settled_heading_rad(const clip::Clip& clip, const motion::PoseSpace& spac
   return heading.value_rad();
 }
 
-// Puts the rotations that the style changed into the channels of a clip.
+// Writes the rotations that the style changed into the channels of a clip.
 class ChannelWriter {
  public:
   explicit ChannelWriter(clip::Clip& clip) : clip_(clip) {}

@@ -1,4 +1,4 @@
-// A whole clip through the style stage: the same code as live, one frame after the other. Cold.
+// Applies a style to a whole clip with the same stage as live, frame by frame. Cold.
 #pragma once
 
 #include <functional>
@@ -12,24 +12,25 @@ namespace posed::style {
 
 struct ApplyOptions {
   FilterOptions filter;
-  // Exactly a live start: alpha ramps up from 0, the heading is found on the way. Otherwise both
-  // are settled from the first frame.
+  // True: start exactly as live, with alpha ramping up from 0 and the heading found on the way.
+  // False: alpha and heading are settled from the first frame.
   bool cold = false;
-  std::function<bool(int done, int total)> progress;  // may be empty; false stops the work
+  std::function<bool(int done, int total)>
+      progress;  // may be empty; returning false stops the work
 };
 
 struct Applied {
-  // The input's joints, hierarchy, channels, rate and frame count. What no style changed keeps its
-  // channel values; the angles of what changed are the turn nearest to the frame before. An Acclaim
-  // clip comes back with Z, Y, X rotation channels on every joint.
+  // The input's joints, hierarchy, channels, rate and frame count. Joints that the style does not
+  // change keep their channel values; the angles of changed joints are chosen within half a turn of
+  // the previous frame. An Acclaim clip is returned with Z, Y, X rotation channels on every joint.
   clip::Clip clip;
   int joints_changed = 0;
   double rms_change_rad = 0.0;  // motion::TurnSum: over frames and changed joints
   double max_change_rad = 0.0;
 };
 
-// Refuses a clip without frames or with a value that is not finite, and a skeleton that cannot
-// serve the model; the error names what is missing. `model_name` is for errors.
+// Returns an error for a clip without frames or with a value that is not finite, and for a skeleton
+// that lacks joints of the model; the error names what is missing. `model_name` is for errors.
 [[nodiscard]] Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
                                             const clip::Clip& clip, const ApplyOptions& options);
 

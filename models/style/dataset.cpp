@@ -17,7 +17,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kStill = 1e-6;            // deviation below which a column says nothing
+constexpr double kStill = 1e-6;            // a column with a smaller standard deviation is constant
 constexpr double kMinLength_m = 0.02;      // a bone shorter than this has no direction
 constexpr double kSameZeroPose_rad = 0.8;  // how far bone directions of one joint may differ
 
@@ -33,7 +33,8 @@ Error in_clip(Error error, const std::string& path) {
   return error;
 }
 
-// Clips with the same joint names may still mean other rotations by them: another zero pose.
+// Clips with the same joint names may still have different zero poses, which give the same
+// rotations another meaning.
 Result<> check_same_figure(const Skeleton& first, const Skeleton& other, const std::string& path) {
   for (int j = first.root_joint + 1; j < std::ssize(first.joints); ++j) {
     const Joint& joint = first.joints[j];
@@ -84,7 +85,7 @@ Result<MatrixXd> vectors(const motion::PoseSpaceSpec& spec, const Source& source
   return motion::pose_vectors(source.motion, *space, source.heading_rad);
 }
 
-// Angles that turn over between two frames would teach a jump that nobody made.
+// Angles that jump by a turn between two frames would be learnt as a motion that nobody made.
 Result<> check_turns(const MatrixXd& q, const std::string& path) {
   for (int t = 1; t < q.rows(); ++t) {
     if ((q.row(t) - q.row(t - 1)).lpNorm<Eigen::Infinity>() > std::numbers::pi) {
@@ -129,8 +130,8 @@ AlignedClip aligned_clip(const Source& source, MatrixXd q, double rate_hz) {
   return clip;
 }
 
-// Where no skeleton names its legs: the motion's first principal component, the same for all clips,
-// so that their phases have one origin.
+// Used where no skeleton names its legs: the motion's first principal component, the same one for
+// all clips, so that their phases have one origin.
 void use_principal_component(Dataset& dataset, const std::string& motion) {
   const std::vector<int> members = dataset.clips_of(motion);
   if (std::ranges::all_of(members, [&](int c) { return dataset.clips[c].has_legs; })) return;
@@ -207,7 +208,7 @@ Result<> align_motion(Dataset& dataset, std::size_t motion, const DatasetOptions
     AlignedClip& clip = dataset.clips[members[m]];
     clip.theta0 = best.theta0[m];
     clip.dtheta = best.dtheta[m];
-    // The likelihood is free to slide a clip against the legs; the legs decide.
+    // The likelihood may shift a clip against its legs, so the phase is set by the legs.
     if (clip.has_legs) clip.theta0 -= first_harmonic_phase(clip.phase(), clip.leg);
     clip.theta0 = std::remainder(clip.theta0, 2.0 * std::numbers::pi);
   }
@@ -243,11 +244,12 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips, const std::
   auto spec = motion::describe_space(options.space, *sources->front().motion.skeleton);
   if (!spec) return std::unexpected(in_clip(spec.error(), sources->front().clip->clip.path));
   dataset.spec = std::move(*spec);
-  std::vector<const motion::Motion*> taught;  // the chart is about what the filter will see
+  // The mean rotations are those of the filter's input, that is of the sources.
+  std::vector<const motion::Motion*> source_motions;
   for (const Source& source : *sources) {
-    if (source.clip->group != target) taught.push_back(&source.motion);
+    if (source.clip->group != target) source_motions.push_back(&source.motion);
   }
-  if (auto set = motion::set_mean_rotations(taught, dataset.spec); !set) {
+  if (auto set = motion::set_mean_rotations(source_motions, dataset.spec); !set) {
     return std::unexpected(set.error());
   }
   for (const Source& source : *sources) {

@@ -1,5 +1,5 @@
-// Dataset: clips brought to one rate, one pose space and one phase: what a style model is learnt
-// from. Cold.
+// Dataset: clips at one rate, in one pose space and in common phase; the input of style training.
+// Cold.
 #pragma once
 
 #include <functional>
@@ -23,7 +23,7 @@ struct TrainingClip {
   std::string motion;   // "walk"
 };
 
-// Told what is being done and how far that is, 0..1; returning false stops the training.
+// Receives the current step and its fraction done, 0 to 1; returning false stops the training.
 using StepProgress = std::function<bool(std::string_view step, double fraction)>;
 
 struct DatasetOptions {
@@ -61,7 +61,8 @@ struct Dataset {
   std::vector<Subject> subjects;
   std::vector<MgpmFit> fits;     // the best fit of each motion, in the order of `motions`
   std::vector<MgpmData> states;  // what each was fitted to
-  // Which columns of `state` each fit saw (the others never move), and the means of all columns.
+  // The columns of `state` that each fit used (the others are constant), and the means of all
+  // columns.
   std::vector<std::vector<int>> live_columns;
   std::vector<Eigen::VectorXd> column_means;
 
@@ -69,14 +70,14 @@ struct Dataset {
   [[nodiscard]] std::vector<int> clips_of(const std::string& motion) const;
 };
 
-// Reads poses and strides, without phases of a common origin yet: theta0 is each clip's own leg
-// phase. The training mean of the pose space is over the clips of every group but `target`.
+// Reads poses and strides. Phases have no common origin yet: theta0 is each clip's own leg phase.
+// The training mean of the pose space is over the clips of every group but `target`.
 [[nodiscard]] Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
                                            const std::string& target,
                                            const DatasetOptions& options);
 
-// Phases by the MGPM, a motion at a time; then each clip turned so that its leg signal peaks at
-// phase 0 (README.md, "Phase alignment").
+// Estimates phases by the MGPM, one motion at a time, then shifts each clip's phase so that its leg
+// signal peaks at phase 0 (README.md, "Phase alignment").
 [[nodiscard]] Result<> align(Dataset& dataset, const DatasetOptions& options);
 
 }  // namespace posed::style

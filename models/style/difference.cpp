@@ -12,12 +12,12 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// 1e-3 deg^2, 0.03 degrees: what no joint angle is known better than. MGPM cycles are free of
-// noise.
+// 1e-3 deg^2, that is (0.03 degrees)^2: no joint angle is known more precisely. MGPM cycles contain
+// no noise of their own.
 constexpr double kMinNoise_rad2 = 3.05e-7;
 
-// Where the search for the kernel values of --mode paper starts: the data's own size, 50 degrees,
-// little noise.
+// Start of the search for the kernel values of --mode paper: the data's own variance, length 50
+// degrees, little noise.
 gp::Hyper paper_start(const MatrixXd& Y) {
   constexpr double kLength_rad = 50.0 * std::numbers::pi / 180.0;
   const Eigen::RowVectorXd mean = Y.colwise().mean();
@@ -66,8 +66,8 @@ std::vector<double> candidate_lengths_rad(int dims) {
 Result<gp::Trained> fit_difference(const std::vector<Pairing>& training_pairs, double length_rad,
                                    double noise) {
   const Grid grid = grid_of(training_pairs);
-  // The signal variance does not move the mean (noise is relative to it); it is what the residual
-  // shows, so that the process's variance means something.
+  // The signal variance does not change the mean, because the noise is relative to it. It is set to
+  // the residual's variance, so that the process's variance is meaningful.
   const MatrixXd residual = grid.outputs.rowwise() - grid.offset.transpose();
   const double variance =
       std::max(1e-12, residual.squaredNorm() / static_cast<double>(residual.size()));
@@ -125,7 +125,7 @@ ChosenLength choose_length_rad(const std::vector<Fold>& folds,
     double error = 0.0;
     Way way;
     for (const Fold& fold : folds) {
-      // Each fold counts alike, whatever its clip's length.
+      // Each fold has equal weight, whatever its clip's length.
       const FoldError found = fold_error(fold, length_rad, noise);
       error += found.error / static_cast<double>(fold.q.rows());
       way.add(found.way);

@@ -16,13 +16,13 @@ using Eigen::VectorXd;
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr int kRootDims = 3;           // the root is the first joint of the native space
-constexpr double kNothing_rad = 1e-6;  // what float poses can differ by
+constexpr double kNothing_rad = 1e-6;  // differences below this are rounding of float poses
 
 double rms(const MatrixXd& m) {
   return std::sqrt(m.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, m.size())));
 }
 
-// A clip as its joints' rotation vectors and their phases.
+// A clip as rotation vectors of its joints, and their phases.
 struct View {
   MatrixXd q;
   VectorXd phase;
@@ -75,7 +75,7 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
   if (!source_motion) return std::unexpected(source_motion.error());
   auto styled_motion = motion::motion_of(styled);
   if (!styled_motion) return std::unexpected(styled_motion.error());
-  if (motion::begins_with_added_pose(*source_motion)) {  // and so does its styled copy
+  if (motion::begins_with_added_pose(*source_motion)) {  // then the styled copy does, too
     motion::drop_first_frame(*source_motion);
     motion::drop_first_frame(*styled_motion);
   }

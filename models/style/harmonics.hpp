@@ -15,8 +15,8 @@ namespace posed::style {
 // Rows [1, cos theta .. cos H theta, sin theta .. sin H theta].
 [[nodiscard]] Eigen::MatrixXd harmonic_basis(const Eigen::VectorXd& theta, int harmonics);
 
-// Least-squares coefficients [2H+1 x D] of `y` (a row a phase), with a tiny ridge so that few
-// frames cannot make them run away.
+// Least-squares coefficients [2H+1 x D] of `y` (one row per phase), with a small ridge that keeps
+// them bounded when there are few frames.
 [[nodiscard]] Eigen::MatrixXd fit_harmonics(const Eigen::VectorXd& theta, const Eigen::MatrixXd& y,
                                             int harmonics);
 
@@ -30,14 +30,14 @@ struct Stride {
   double score = 0.0;   // relative residual of the fit, plus the penalty; 0 is a perfect stride
 };
 
-// The stride frequency of a leg signal sampled at `rate_hz`: the best of the periods 0.6 to 1.7 s
-// (and no longer than the signal) by three harmonics, with a penalty on a weak first harmonic,
-// which keeps two strides from being taken for one (README.md, "Stride"). Needs has_stride().
+// The stride frequency of a leg signal sampled at `rate_hz`: the period from 0.6 to 1.7 s (and no
+// longer than the signal) that three harmonics fit best, with a penalty on a weak first harmonic,
+// which prevents two strides from being taken for one (README.md, "Stride"). Needs has_stride().
 [[nodiscard]] Stride find_stride(const Eigen::VectorXd& signal, double rate_hz);
 
 // How badly strides fit a leg signal, 0 to about 1.2: the median of find_stride's scores over
-// windows of 3.5 s, so that a cadence which changes over a long clip counts as one that does not.
-// Walks and runs are below 0.06, a jump is 0.67, waving while standing 0.2 to 0.85. Needs
+// windows of 3.5 s, so that a cadence which changes slowly over a long clip does not count against
+// it. Walks and runs are below 0.06, a jump is 0.67, waving while standing 0.2 to 0.85. Needs
 // has_stride().
 [[nodiscard]] double stride_misfit(const Eigen::VectorXd& signal, double rate_hz);
 

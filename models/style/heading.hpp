@@ -1,5 +1,5 @@
-// Heading: which way the walker goes, as the style filter sees it: the pelvis' own direction with
-// the sway of the stride smoothed out (README.md, "Heading").
+// Heading: the walking direction that the style filter uses: the direction of the pelvis with the
+// sway of the stride smoothed out (README.md, "Heading").
 #pragma once
 
 #include <cmath>
@@ -9,15 +9,15 @@
 
 namespace posed::style {
 
-// A low-pass on the circle, first order. RT-safe.
+// A first-order low-pass on the circle. RT-safe.
 class Heading {
  public:
   static constexpr double kTau_s = 1.0;
-  // A turn of the pelvis within one frame that no body makes: the source jumped.
+  // A turn of the pelvis within one frame that no body can make: the source has jumped.
   static constexpr double kJump_rad = std::numbers::pi / 4;
 
-  // Takes the direction measured `dt_s` after the last one. True when the walker was put elsewhere
-  // and the low-pass began anew.
+  // Takes the direction measured `dt_s` after the last one. Returns true when the source has jumped
+  // and the low-pass restarts.
   bool update(double measured_rad, double dt_s) noexcept {
     const double moved = posed::unwrap_near(measured_rad - last_measured_rad_, 0.0);
     const double behind = posed::unwrap_near(measured_rad - value_rad_, 0.0);
@@ -32,7 +32,7 @@ class Heading {
     return false;
   }
 
-  // As if it had been `value_rad` for long.
+  // Sets the state that a long time at `value_rad` would lead to.
   void settle(double value_rad, double measured_rad) noexcept {
     started_ = true;
     value_rad_ = value_rad;

@@ -43,9 +43,8 @@ Basis basis_at(const VectorXd& theta, const CircularKernel& kernel) {
   return basis;
 }
 
-// One clip's share. The style point is constant within a clip, so all products with
-// Phi = xi (x) phi split into products with the clip's phi alone: blocks of 2H+1 instead of
-// q (2H+1) columns.
+// One clip's part of the sums. The style point is constant within a clip, so all products with Phi
+// = xi (x) phi reduce to products with the clip's phi alone: 2H+1 columns instead of q (2H+1).
 struct ClipBlock {
   int first = 0, frames = 0, subject = 0;
   VectorXd time;  // 0, 1, 2, ...
@@ -167,8 +166,9 @@ int MgpmData::subjects() const {
 }
 
 CircularKernel circular_kernel(double gamma, int harmonics) {
-  // e^-g I_n(g) by Miller's downward recurrence I_{n-1} = I_{n+1} + (2n/g) I_n, normalised with
-  // e^g = I_0 + 2 sum I_n. Starting well above both the order and g makes the start irrelevant.
+  // e^-g I_n(g) by Miller's downward recurrence I_{n-1} = I_{n+1} + (2n/g) I_n, normalised with e^g
+  // = I_0 + 2 sum I_n. The recursion starts well above both the order and g, so its start value
+  // does not matter.
   const int start = harmonics + 20 + static_cast<int>(2.0 * gamma);
   VectorXd bessel = VectorXd::Zero(start + 2);
   bessel[start] = 1e-300;

@@ -1,13 +1,13 @@
 // MGPM: the multifactor Gaussian process model of Sato et al., section 2.1 (README.md, "Model of
-// phases"). It gives each subject a style point, each clip a phase and a stride frequency, and puts
-// the average cycles of all of them in common phase.
+// phases"). It estimates a style point for each subject and a phase and a stride frequency for each
+// clip, which brings the average cycles of all clips into common phase.
 //
 //   theta_i = theta0_m + t dtheta_m
 //   cov(y_id, y_jd) = w_d^-2 (xi_i . xi_j exp(-gamma (1 - cos(theta_i - theta_j))) + noise [i = j])
 //
 // The circular kernel has an exact Fourier series, so the covariance has finite rank and every
-// figure below costs O(N) (README.md, "Cost of one likelihood"); the only approximation is the
-// number of harmonics kept. Cold, double precision, no I/O, thread-safe (no shared state).
+// quantity below costs O(N) (README.md, "Cost of one likelihood"); the only approximation is the
+// finite number of harmonics. Cold, double precision, no I/O, thread-safe (no shared state).
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@
 
 namespace posed::style {
 
-// What is learnt from. Rows of `y` are the frames of clip 0, clip 1, ... in order.
+// The training data. Rows of `y` are the frames of clip 0, clip 1, ... in order.
 struct MgpmData {
   Eigen::MatrixXd y;              // [N x D], channel means removed, no constant channel
   std::vector<int> clip_frames;   // [M], sums to N
@@ -34,8 +34,8 @@ struct MgpmParams {
   double log_noise = 0.0;  // of beta^-1 in README.md, "Model of phases"
 };
 
-// Weak priors (README.md, "Priors"); Sato et al. give none. They hold the period near its first
-// guess and fix the scale of xi, which the likelihood leaves free.
+// Weak priors (README.md, "Priors"); Sato et al. give none. They keep the period near its first
+// guess and fix the scale of xi, which the likelihood leaves undetermined.
 struct MgpmPrior {
   Eigen::VectorXd dtheta_mean;  // [M]; empty: no prior on the stride frequency
   double dtheta_relative_sd = 0.1;
@@ -47,9 +47,9 @@ struct MgpmValue {
   Eigen::VectorXd scale;  // w [D]
 };
 
-// The negative log posterior and its gradient at `params`. `scale` fixes w; null profiles it out
-// in closed form. `prior` may be null. `harmonics` = 10 is enough up to gamma = 4 (the kernel is
-// off by 3e-7 at gamma = 3, by 3e-6 at 4).
+// The negative log posterior and its gradient at `params`. `scale` gives w; with null, w is
+// profiled out in closed form. `prior` may be null. `harmonics` = 10 is enough up to gamma = 4 (the
+// kernel is off by 3e-7 at gamma = 3, by 3e-6 at 4).
 [[nodiscard]] MgpmValue mgpm_evaluate(const MgpmData& data, const MgpmParams& params,
                                       const MgpmPrior* prior, const Eigen::VectorXd* scale,
                                       int harmonics);
@@ -63,8 +63,8 @@ struct CircularKernel {
 };
 [[nodiscard]] CircularKernel circular_kernel(double gamma, int harmonics);
 
-// The mean cycle of an imagined subject with style `xi` at phases `theta` (rows) [T x D]; the GP
-// mean, linear in xi (README.md, "Mean cycles").
+// The mean cycle of a hypothetical subject with style `xi` at phases `theta` (rows) [T x D]: the GP
+// mean, which is linear in xi (README.md, "Mean cycles").
 [[nodiscard]] Eigen::MatrixXd mgpm_cycle(const MgpmData& data, const MgpmParams& params,
                                          const Eigen::VectorXd& xi, const Eigen::VectorXd& theta,
                                          int harmonics);

@@ -24,7 +24,7 @@ constexpr int kStageOneIterations = 60;
 constexpr int kStageTwoRounds = 12;
 constexpr int kStageTwoIterations = 50;
 constexpr double kSettled = 1e-6;       // relative change between rounds
-constexpr double kMaxLogKernel = 12.0;  // a trial step beyond is refused
+constexpr double kMaxLogKernel = 12.0;  // a trial step beyond it is refused
 
 int harmonics_for(double log_gamma) { return std::exp(log_gamma) > 4.0 ? 12 : 10; }
 
@@ -42,8 +42,9 @@ class Normal {
   std::mt19937_64 bits_;
 };
 
-// The scale (xi, noise, w) -> (c xi, c^2 noise, c w) changes the prior only: jump to its minimum,
-// or the optimiser crawls along it. Convex in log c, so Newton's steps with a limit converge.
+// The scaling (xi, noise, w) -> (c xi, c^2 noise, c w) changes only the prior. This sets c to the
+// prior's minimum, since the optimiser would approach it very slowly. The prior is convex in log c,
+// so Newton steps of limited size converge.
 void regauge(MgpmParams& p) {
   const MgpmParams start = p;
   double log_c = 0.0;
@@ -58,8 +59,8 @@ void regauge(MgpmParams& p) {
   p.log_noise = start.log_noise + 2.0 * log_c;
 }
 
-// The optimiser's variables: all of order one. The phase of a clip is held at its centre and its
-// rate scaled by the clip's time spread, so that the two do not trade against each other.
+// The optimiser's variables, all of order one. A clip's phase is taken at its centre and its rate
+// is scaled by the clip's time spread, so that the two are uncorrelated.
 class Variables {
  public:
   Variables(const MgpmData& data, const MgpmParams& start, bool phases_free)
@@ -76,8 +77,8 @@ class Variables {
         std::max(1e-6, std::sqrt(start.xi.squaredNorm() / static_cast<double>(start.xi.size())));
   }
 
-  // xi, then theta0 (without the first clip's, which fixes the common turn) and the rates, then the
-  // two kernel parameters.
+  // The variables are xi, then theta0 (without that of the first clip, which fixes the common turn)
+  // and the rates, then the two kernel parameters.
   [[nodiscard]] int size() const {
     return static_cast<int>(start_.xi.size()) + (phases_free_ ? 2 * clips() - 1 : 0) + 2;
   }
@@ -182,19 +183,19 @@ Error stopped() {
   return Error{"training was stopped before it was done", {}, 0, ExitCode::kFailed};
 }
 
-// One start. `tell(fraction)` returns false to stop.
-bool run_start(const MgpmData& data, const Progress& tell, MgpmFit& fit) {
+// Runs one start. `report(fraction)` returns false to stop.
+bool run_start(const MgpmData& data, const Progress& report, MgpmFit& fit) {
   const double rounds = kStageOneRounds + kStageTwoRounds;
   for (int round = 0; round < kStageOneRounds; ++round) {
     regauge(fit.params);
     optimise(data, false, kStageOneIterations, fit);
-    if (!tell((round + 1) / rounds)) return false;
+    if (!report((round + 1) / rounds)) return false;
   }
   double previous = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kStageTwoRounds; ++round) {
     regauge(fit.params);
     optimise(data, true, kStageTwoIterations, fit);
-    if (!tell((kStageOneRounds + round + 1) / rounds)) return false;
+    if (!report((kStageOneRounds + round + 1) / rounds)) return false;
     if (previous - fit.nlp < kSettled * std::abs(fit.nlp)) break;
     previous = fit.nlp;
   }
@@ -217,12 +218,12 @@ Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data, const VectorXd& th
     fit.params.xi = options.starts[k] == MgpmStart::kSvd
                         ? svd_styles(data, theta0, dtheta, q)
                         : random_styles(data.subjects(), q, options.seed * 1'000'003 + k);
-    const Progress tell = [&](double fraction) {
+    const Progress report = [&](double fraction) {
       if (!options.progress) return true;
       return options.progress((static_cast<double>(k) + fraction) /
                               static_cast<double>(options.starts.size()));
     };
-    if (!run_start(data, tell, fit)) return std::unexpected(stopped());
+    if (!run_start(data, report, fit)) return std::unexpected(stopped());
     fits.push_back(std::move(fit));
   }
   std::stable_sort(fits.begin(), fits.end(),

@@ -1,4 +1,4 @@
-// Learns an MGPM: several starts, each optimised in two stages (README.md, "Optimisation"). The
+// Trains an MGPM: several starts, each optimised in two stages (README.md, "Optimisation"). The
 // result is a function of the data and the seed alone. Cold; thread-safe.
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace posed::style {
 
-// Told how far the work is, 0..1; returning false asks it to stop soon.
+// Receives the fraction done, 0 to 1; returning false stops the training soon.
 using Progress = std::function<bool(double fraction)>;
 
 enum class MgpmStart : std::uint8_t { kSvd, kRandom };  // where the style points begin
@@ -32,8 +32,9 @@ struct MgpmFit {
   int evaluations = 0;
 };
 
-// The fits of all starts, the best first. The first clip's phase stays as given up to the common
-// turn that the likelihood leaves free. An error only when `progress` asked to stop.
+// The fits of all starts, the best first. The common turn of all phases, which the likelihood
+// leaves undetermined, is fixed by holding the first clip's phase. The only error is that
+// `progress` asked to stop.
 [[nodiscard]] Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data,
                                                       const Eigen::VectorXd& theta0,
                                                       const Eigen::VectorXd& dtheta,

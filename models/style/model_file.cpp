@@ -1,4 +1,4 @@
-// What lies inside the envelope of a style model's file (proto/model/model_file.hpp).
+// The payload of a style model's file, inside the envelope (proto/model/model_file.hpp).
 #include <cmath>
 #include <cstdint>
 #include <set>
@@ -159,7 +159,7 @@ std::string serialize_model(const StyleModel& model) {
   style.set_from(model.from);
   style.set_to(model.to);
   style.set_report_json(model.report_json);
-  return model_file::seal(std::move(file));
+  return model_file::wrap(std::move(file));
 }
 
 Result<> save_model(const StyleModel& model, const std::filesystem::path& path) {

@@ -19,17 +19,18 @@ constexpr double kMaxStep_s = 0.1;
 constexpr double kGateTau_s = 0.2;
 constexpr double kCalibrationTau_s = 10.0;
 constexpr float kCalibrationMax_rad = 20.0F * std::numbers::pi_v<float> / 180.0F;
-constexpr double kNoTurn_rad = 1e-6;  // what single precision cannot tell from none
+constexpr double kNoTurn_rad = 1e-6;  // too small for single precision
 constexpr float kInputSpread = 3.0F;  // standard deviations of the training inputs
 
 double smoothing(double dt_s, double tau_s) { return -std::expm1(-dt_s / tau_s); }
 
 bool usable(const Quatf& q) noexcept {
   const float norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-  return norm2 > 1e-6F && norm2 < 1e6F;  // false for what is not finite
+  return norm2 > 1e-6F && norm2 < 1e6F;  // false when not finite
 }
 
-// A joint that holds no rotation is no measurement, whatever its flag says. RT-safe.
+// A joint whose quaternion is not a rotation counts as not measured, whatever its flag says.
+// RT-safe.
 void drop_broken_joints(Frame& frame) noexcept {
   for (std::size_t j = 0; j < frame.joint_count; ++j) {
     if (usable(frame.rotation_xyzw[j])) continue;
@@ -107,13 +108,13 @@ void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
   heading_.settle(heading_rad, has_heading ? model_->space.heading_rad(frame) : heading_rad);
 }
 
-// Since the last frame, by the device's clock where there is one. RT-safe
+// Time since the last frame [s], by the device's clock where there is one. RT-safe
 double StyleFilter::elapsed_s(const Frame& frame) noexcept {
   const Header& header = frame.header;
   const std::int64_t now_ns = header.device_ns != kNoTime_ns ? header.device_ns : header.arrival_ns;
   const std::int64_t before_ns = std::exchange(last_ns_, now_ns);
   if (before_ns == kNoTime_ns || now_ns == kNoTime_ns || now_ns <= before_ns) return 0.0;
-  // Unsigned: two times may be further apart than a signed difference can say.
+  // Unsigned: the difference of two times may exceed the signed range.
   const auto gap_ns = static_cast<std::uint64_t>(now_ns) - static_cast<std::uint64_t>(before_ns);
   return std::min(static_cast<double>(gap_ns) * 1e-9, kMaxStep_s);
 }
@@ -130,7 +131,7 @@ void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   if (served) {
     style(frame, dt_s);
   } else {
-    last_joints_ = 0;  // the pose itself is another body's: nothing to blend from
+    last_joints_ = 0;  // the pose is that of another body, so there is nothing to blend from
   }
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
 }
@@ -162,7 +163,7 @@ void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   last_out_ = frame.rotation_xyzw;
 }
 
-// a f(q), gated and clamped. RT-safe
+// The model delta a f(q), gated and clamped. RT-safe
 void StyleFilter::answer(const Dims& q, const Flags& available, double dt_s, Dims& delta) noexcept {
   const gp::Predictor& predictor = model_->predictor;
   const auto dims = static_cast<std::size_t>(predictor.inputs());
@@ -193,8 +194,8 @@ float StyleFilter::smoothed_gate(float confidence, double dt_s) noexcept {
   return gate_;
 }
 
-// What the kernel sees: less the walker's own mean offset where that is asked for, and within the
-// range of the training poses (README.md, "Filter", Calibration). RT-safe
+// The kernel's input: q without the walker's own mean offset where calibration is on, clipped to
+// the range of the training poses (README.md, "Filter", Calibration). RT-safe
 void StyleFilter::kernel_input(const Dims& q, const Flags& available, double dt_s,
                                Dims& input) noexcept {
   const Eigen::VectorXf& mean = model_->input_mean;
@@ -214,8 +215,8 @@ void StyleFilter::kernel_input(const Dims& q, const Flags& available, double dt_
   }
 }
 
-// Per joint c = log(D_new^T D_old), so that R_styled exp(c) is what the old answer would have made
-// of this frame. RT-safe
+// Per joint c = log(D_new^T D_old), so that R_styled exp(c) is what the old model delta would have
+// given for this frame. RT-safe
 void StyleFilter::begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept {
   const int joints = std::min<int>(last_joints_, styled.joint_count);
   blend_weight_ = joints > 0 ? std::max(0.0, 1.0 - options_.alpha_slew_per_s * dt_s) : 0.0;

@@ -1,18 +1,20 @@
 // StyleFilter: the style stage of one stream, y = q + alpha f(q) (README.md, "Filter"), with the
-// same code live, offline (`apply`) and in replay. Memoryless but for what makes it safe to touch
-// while it runs: the heading low-pass, the alpha slew, the gate's smoothing and the blend after a
-// model swap. The bound on the step (README.md, "Bound on the step"). Let D(t) = R_in^T R_out be
-// what the filter adds to a joint at frame t. Then
+// same code live, offline (`apply`) and in replay. It has no memory of the pose; its only state is
+// the heading low-pass, the alpha slew, the gate's smoothing and the blend after a model swap,
+// which allow changes while it runs.
 //
-//   angle(D(t-1), D(t)) <= |c| slew dt + the change of the model's own answer from t-1 to t,
+// Continuity bound (README.md, "Bound on the step"): let D(t) = R_in^T R_out be what the filter
+// adds to a joint at frame t. Then
 //
-// where the model's own answer has its alpha moved by at most slew dt, and c is the rotation vector
-// between what went out at the last swap and what the new model would have said there (|c| <= pi;
-// 0 when no swap lies less than 1 / slew back). So neither a swap, nor a swap within the blend of
-// another, nor a change of alpha, nor a walker who is put elsewhere makes the pose jump.
+//   angle(D(t-1), D(t)) <= |c| slew dt + the change of the model delta from t-1 to t,
 //
-// Time is the frames': their device time where they have one, else their arrival. A step back
-// counts as none, a gap as at most 0.1 s.
+// where alpha in the model delta moves by at most slew dt per frame, and c is the rotation vector
+// between the rotation emitted at the last swap and the one that the new model would have given
+// there (|c| <= pi; 0 when the last swap was more than 1 / slew ago). So no swap, no swap within
+// the blend of another, no change of alpha and no jump of the source makes the pose jump.
+//
+// Time is taken from the frames: their device time where they have one, else their arrival time. A
+// step back in time counts as 0 s, a gap as at most 0.1 s.
 #pragma once
 
 #include <array>
@@ -28,8 +30,8 @@
 
 namespace posed::style {
 
-// A model bound to one skeleton and ready for hot use. Built cold, then const; the hot side gets a
-// plain pointer and hands the old one back to be freed.
+// A model bound to one skeleton, ready for the hot path. Built cold, then const; the hot side holds
+// a plain pointer and returns the old one to be freed by the cold side.
 struct BoundModel {
   motion::PoseSpace space;
   gp::Predictor predictor;
@@ -40,14 +42,14 @@ struct BoundModel {
 struct FilterOptions {
   double alpha = 1.0;  // -2..2
   double alpha_slew_per_s = 2.0;
-  bool gate = false;           // fade towards fallback * constant where the process knows nothing
+  bool gate = false;           // fade towards fallback * constant far from the training poses
   double gate_fallback = 1.0;  // kappa_c (README.md, "Filter")
   bool calibrate = false;      // remove the walker's own mean offset from the kernel's input
 };
 inline constexpr double kMaxAlpha = 2.0;
 
-// Refuses a skeleton that lacks joints of the model's pose space, naming them, and a model whose
-// parts do not fit each other.
+// Returns an error for a skeleton that lacks joints of the model's pose space (it names them) and
+// for a model whose parts do not fit each other.
 [[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
                                                                    const Skeleton& skeleton,
                                                                    const FilterOptions& options,
@@ -55,24 +57,24 @@ inline constexpr double kMaxAlpha = 2.0;
 
 class StyleFilter final : public Stage {
  public:
-  // `model` outlives its use here; null passes frames through until the first set_model.
+  // `model` is not owned and must outlive its use here; with null, frames pass through until the
+  // first set_model.
   StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept;
 
   // Emits one frame for each frame in, with its header, quality and variance. A joint
   // whose quaternion is not finite or has no length comes out as not measured. RT-safe.
   void process(const StageFrame& in, StageOut& out) noexcept override;
 
-  // Both take effect at the next frame; RT-safe. Alpha is clamped to +-2, one that is not a number
-  // is ignored. set_model returns the old pointer, which is no longer read; `model` is not null (to
-  // switch styling off, set alpha to 0).
+  // Both take effect at the next frame; RT-safe. Alpha is clamped to +-2; NaN is ignored. set_model
+  // returns the old pointer, which is no longer read; `model` is not null (to switch styling off,
+  // set alpha to 0).
   void set_alpha(float alpha) noexcept;
   [[nodiscard]] const BoundModel* set_model(const BoundModel* model) noexcept;
 
-  // Starts from the settled state that this frame would lead to (offline use): full alpha, heading
-  // found.
+  // Starts in the settled state for this frame (offline use): full alpha, known heading.
   void settle(const Frame& frame, double heading_rad) noexcept;
 
-  [[nodiscard]] float alpha() const noexcept;  // where the slew is now
+  [[nodiscard]] float alpha() const noexcept;  // the current value, while it slews
   [[nodiscard]] float alpha_target() const noexcept { return static_cast<float>(alpha_target_); }
 
  private:
@@ -94,13 +96,13 @@ class StyleFilter final : public Stage {
   double alpha_target_ = 0.0;
   std::int64_t last_ns_ = kNoTime_ns;
   Heading heading_;
-  float gate_ = -1.0F;  // smoothed confidence; below 0 before the first
-  Dims offset_{};       // of the walker's mean pose from the training's, for `calibrate`
+  float gate_ = -1.0F;  // smoothed confidence; negative before the first value
+  Dims offset_{};       // of the walker's mean pose from the training mean, for `calibrate`
 
   // The blend: R_out = R_styled exp(weight c) per joint.
-  bool discontinuity_ = false;  // the next frame begins one
+  bool discontinuity_ = false;  // the next frame begins a blend
   double blend_weight_ = 0.0;
-  int last_joints_ = 0;  // of the last frame that went out; 0 when there was none
+  int last_joints_ = 0;  // of the last emitted frame; 0 when there was none
   std::array<Vec3f, kMaxJoints> blend_from_{};
   Rotations last_in_{}, last_out_{};
 };

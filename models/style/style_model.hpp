@@ -1,5 +1,5 @@
-// StyleModel: what `posed train style` learns and `run`, `apply`, `replay` use. Its file is drawn
-// in proto/README.md: 24 bytes of header, then posed.v1.ModelFile.
+// StyleModel: the result of `posed train style`, used by `run`, `apply` and `replay`. Its file is
+// described in proto/README.md: 24 bytes of header, then posed.v1.ModelFile.
 #pragma once
 
 #include <cstddef>
@@ -21,16 +21,16 @@ struct StyleModel {
   gp::Trained process;        // q -> difference of q at alpha = 1
   Eigen::VectorXd limit_rad;  // clamp of |difference| per dimension (1.5 x the largest in training)
   Eigen::VectorXd input_mean;  // of q over the training data; input calibration and range check
-  Eigen::VectorXd input_sd;    // inputs are clipped to mean +- 3 sd before the kernel where gate or
-                               // calibration ask
-  double rate_hz = 30.0;       // of training; the filter is memoryless and right at any rate
+  Eigen::VectorXd input_sd;    // inputs are clipped to mean +- 3 sd before the kernel with gate or
+                               // calibration
+  double rate_hz = 30.0;       // of training; the filter has no memory and is correct at any rate
   std::string from, to;        // group names, for people
-  std::string report_json;     // what train printed with --json
+  std::string report_json;     // what `train --json` printed
 };
 
 [[nodiscard]] Result<StyleModel> load_model(const std::filesystem::path& path);
-// The same from bytes (control message, device log). `name` is only for error messages. Whatever
-// the bytes are: an Error, never a crash.
+// The same from bytes (control message, device log). `name` is only for error messages. Any bytes
+// give a model or an Error, never a crash.
 [[nodiscard]] Result<StyleModel> parse_model(std::span<const std::byte> bytes,
                                              const std::string& name);
 [[nodiscard]] std::string serialize_model(const StyleModel& model);

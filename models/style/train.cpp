@@ -22,17 +22,18 @@ using Eigen::VectorXd;
 using nlohmann::json;
 
 constexpr double kLimitFactor = 1.5;      // of the largest difference in training
-constexpr double kMeanCycleNoise = 1e-3;  // a group of one: its cycle is an average already
-constexpr double kPersonNoise = 0.1;      // several people: their cycles scatter about the group's
+constexpr double kMeanCycleNoise = 1e-3;  // a group of one subject: its cycle is already an average
+constexpr double kPersonNoise = 0.1;      // several people, whose cycles scatter about the group's
 
 struct Learnt {
   gp::Trained process;
-  MatrixXd differences;  // all that was taught [N x D]
+  MatrixXd differences;  // all differences in the training pairs [N x D]
   json kernel;
-  Way way{};  // of walkers held out; not measured where none could be
+  Way way{};  // of walkers held out; not measured where none could be held out
 };
 
-// Clips of a motion that lacks the target or a source teach nothing; every group must teach.
+// Clips of a motion that lacks the target or a source give no training pairs; every group must give
+// some.
 Result<> check_groups(const std::vector<TrainingClip>& clips, const std::string& target) {
   std::set<std::pair<std::string, std::string>> there;  // (motion, group)
   for (const TrainingClip& clip : clips) there.emplace(clip.motion, clip.group);
@@ -84,7 +85,7 @@ bool several_subjects(const Dataset& dataset, const std::string& target) {
 Result<Learnt> learn_default(const Dataset& dataset, const std::string& target,
                              const FoldProgress& progress) {
   const std::string first = first_source_of(dataset, target);
-  const auto training_pairs = make_pairings(dataset, subject_cycles(dataset), target, first);
+  const auto training_pairs = make_training_pairs(dataset, subject_cycles(dataset), target, first);
   const double noise = several_subjects(dataset, target) ? kPersonNoise : kMeanCycleNoise;
   const auto folds = make_folds(dataset, target, first);
   const auto candidates = candidate_lengths_rad(dataset.dims());
@@ -123,8 +124,8 @@ MatrixXd mgpm_group_cycle(const Dataset& dataset, std::size_t motion, const std:
   return all.middleCols(3, dataset.dims());
 }
 
-// The way of Sato et al. (--mode paper): mean source cycle -> difference of the mean cycles, kernel
-// values by evidence.
+// The method of Sato et al. (--mode paper): mean source cycle -> difference of the mean cycles,
+// kernel values by evidence.
 Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
   std::set<std::string> sources;
   for (const Subject& s : dataset.subjects) {
@@ -149,7 +150,7 @@ Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
   return Learnt{std::move(*process), Y, {{"length_chosen_by", "evidence"}}};
 }
 
-// The way that the finished process closes on the very clips it was learnt from.
+// How much of the distance to the target the process closes on its own training clips.
 Way way_on_training(const Dataset& dataset, const Learnt& learnt, const std::string& target) {
   const auto cycles = subject_cycles(dataset);
   Way way;
@@ -272,7 +273,7 @@ Result<TrainMode> mode_from_name(std::string_view name) {
 
 Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
                                const TrainOptions& options) {
-  const auto tell = [&](const char* step, double fraction) {
+  const auto report_step = [&](const char* step, double fraction) {
     return !options.dataset.progress || options.dataset.progress(step, fraction);
   };
   const auto stopped = [] { return fail("training was stopped before it was done"); };
@@ -280,16 +281,16 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
     return std::unexpected(checked.error());
   }
   if (auto checked = check_recordings(clips); !checked) return std::unexpected(checked.error());
-  if (!tell("reading poses", 0.0)) return stopped();
+  if (!report_step("reading poses", 0.0)) return stopped();
   auto dataset = make_dataset(clips, options.target, options.dataset);
   if (!dataset) return std::unexpected(dataset.error());
-  if (!tell("aligning phases", 0.0)) return stopped();
+  if (!report_step("aligning phases", 0.0)) return stopped();
   if (auto aligned = align(*dataset, options.dataset); !aligned) {
     return std::unexpected(aligned.error());
   }
-  bool wanted = tell("learning the difference", 0.0);
+  bool wanted = report_step("learning the difference", 0.0);
   const auto progress = [&](double fraction) {
-    return wanted = wanted && tell("learning the difference", fraction);
+    return wanted = wanted && report_step("learning the difference", fraction);
   };
   if (!wanted) return stopped();
   auto learnt = options.mode == TrainMode::kPaper
@@ -309,7 +310,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   set_input_statistics(*dataset, model);
   model.space = std::move(dataset->spec);
   model.process = std::move(learnt->process);
-  tell("learning the difference", 1.0);
+  report_step("learning the difference", 1.0);
   return model;
 }
 

@@ -1,4 +1,5 @@
-// Training: clips in, a StyleModel out. Cold; no clock, no printing: progress goes to a callback.
+// Training of a StyleModel from clips. Cold; it reads no clock and prints nothing; progress goes to
+// a callback.
 #pragma once
 
 #include <string>
@@ -22,9 +23,9 @@ struct TrainOptions {
   DatasetOptions dataset;
 };
 
-// Refuses clips that cannot be learnt from with one sentence naming the clip. The report (what
-// `train --json` prints, less the seconds) is in the model; its `usable`, `problems`, `warnings`
-// and `verdict` say whether the model is any good (training_check.hpp).
+// Clips that cannot be learnt from give an error of one sentence that names the clip. The report
+// (what `train --json` prints, without the seconds) is in the model; its `usable`, `problems`,
+// `warnings` and `verdict` state whether the model is fit for use (training_check.hpp).
 [[nodiscard]] Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
                                              const TrainOptions& options);
 

@@ -21,7 +21,7 @@ using Eigen::VectorXd;
 constexpr double kLeastSwing_deg = 6.0;
 constexpr double kMostMisfit = 0.3;
 
-// A whole sentence names a clip by its file's name alone.
+// The file name alone, for use within a sentence.
 std::string name_of(const std::string& file) {
   return std::filesystem::path(file).filename().string();
 }
@@ -73,7 +73,7 @@ double swing_deg(const VectorXd& leg) {
   return std::sqrt((leg.array() - leg.mean()).square().mean()) / kDegree;
 }
 
-// Phases rest on strides: without them a cycle is an average of unrelated poses.
+// Phases are derived from strides; without strides a cycle is an average of unrelated poses.
 void check_strides(const Dataset& dataset, TrainingCheck& check) {
   for (const AlignedClip& clip : dataset.clips) {
     if (!clip.has_legs) continue;

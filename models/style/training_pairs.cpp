@@ -21,12 +21,12 @@ int subjects_in(const Dataset& dataset, const Subject& like) {
   return count;
 }
 
-// The difference that a source subject's frames are taught, at these phases.
-MatrixXd taught(const MatrixXd& delta, const VectorXd& phase) {
+// The difference that training assigns to a source subject's frames, at these phases.
+MatrixXd difference_at(const MatrixXd& delta, const VectorXd& phase) {
   return harmonic_basis(phase, kCycleHarmonics) * delta;
 }
 
-// One fold per source subject that has companions: the others are trained on.
+// One fold for each source subject whose group has other subjects; those are trained on.
 std::vector<Fold> subject_folds(const Dataset& dataset, const std::vector<SubjectCycle>& cycles,
                                 const std::string& target, const std::string& first_source) {
   std::vector<Fold> folds;
@@ -40,13 +40,13 @@ std::vector<Fold> subject_folds(const Dataset& dataset, const std::vector<Subjec
       if (cycle.subject != clip.subject) others.push_back(cycle);
     }
     const MatrixXd delta = goal - group_cycle(dataset, others, clip.group, clip.motion);
-    folds.push_back({make_pairings(dataset, others, target, first_source), clip.q,
-                     taught(delta, clip.phase()), clip.phase(), goal, delta.row(0)});
+    folds.push_back({make_training_pairs(dataset, others, target, first_source), clip.q,
+                     difference_at(delta, clip.phase()), clip.phase(), goal, delta.row(0)});
   }
   return folds;
 }
 
-// The clip's rows [first, first + count), with the phase they start at.
+// The clip's rows [first, first + count), with the phase at which they start.
 AlignedClip part_of(const AlignedClip& clip, Eigen::Index first, Eigen::Index count) {
   AlignedClip part;
   part.group = clip.group;
@@ -83,13 +83,14 @@ std::vector<Fold> half_folds(const Dataset& dataset, const std::string& target,
       tests.push_back(trained_half == 0 ? second : first);
     }
     const std::vector<SubjectCycle> cycles = subject_cycles(halves);
-    const std::vector<Pairing> training_pairs = make_pairings(halves, cycles, target, first_source);
+    const std::vector<Pairing> training_pairs =
+        make_training_pairs(halves, cycles, target, first_source);
     for (const AlignedClip& test : tests) {
       const MatrixXd goal = group_cycle(halves, cycles, target, test.motion);
       if (goal.size() == 0) continue;
       const MatrixXd delta = goal - group_cycle(halves, cycles, test.group, test.motion);
-      folds.push_back(
-          {training_pairs, test.q, taught(delta, test.phase()), test.phase(), goal, delta.row(0)});
+      folds.push_back({training_pairs, test.q, difference_at(delta, test.phase()), test.phase(),
+                       goal, delta.row(0)});
     }
   }
   return folds;
@@ -126,13 +127,15 @@ MatrixXd group_cycle(const Dataset& dataset, const std::vector<SubjectCycle>& cy
   return subjects == 0 ? sum : MatrixXd(sum / subjects);
 }
 
-std::vector<Pairing> make_pairings(const Dataset& dataset, const std::vector<SubjectCycle>& cycles,
-                                   const std::string& target, const std::string& first_source) {
+std::vector<Pairing> make_training_pairs(const Dataset& dataset,
+                                         const std::vector<SubjectCycle>& cycles,
+                                         const std::string& target,
+                                         const std::string& first_source) {
   std::vector<Pairing> training_pairs;
   for (const std::string& motion : dataset.motions) {
     const MatrixXd goal = group_cycle(dataset, cycles, target, motion);
     if (goal.size() == 0) continue;
-    std::vector<Pairing> own;  // the target's: nothing to add
+    std::vector<Pairing> own;  // of the target: the difference is zero
     bool covered = false;
     for (const SubjectCycle& cycle : cycles) {
       const Subject& subject = dataset.subjects[cycle.subject];

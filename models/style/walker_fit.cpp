@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::MatrixXd;
 
-constexpr Eigen::Index kEnoughFrames = 600;  // of a long clip, evenly taken
+constexpr Eigen::Index kEnoughFrames = 600;  // at most, spread evenly over a long clip
 
 MatrixXd evenly_taken(const MatrixXd& rows) {
   const Eigen::Index step = std::max<Eigen::Index>(1, rows.rows() / kEnoughFrames);

@@ -27,11 +27,11 @@ FixedLag::FixedLag(int channels, int lag)
 }
 
 // RT-safe.
-void FixedLag::push(const double* evidence) noexcept {
+void FixedLag::push(const double* information) noexcept {
   if (pushed_ >= kOpen) std::ranges::rotate(tail_, tail_.begin() + 1);
   const long open = std::min<long>(pushed_, kOpen - 1);
   double* newest = recent_.row(static_cast<int>(pushed_ % kOpen), kPosition);
-  std::copy_n(evidence, kRows * stride(), newest);
+  std::copy_n(information, kRows * stride(), newest);
   tail_[static_cast<std::size_t>(open)] = newest;
   if (pushed_ >= static_cast<long>(factors_.size())) {
     std::ranges::rotate(factors_, factors_.begin() + 1);
@@ -39,8 +39,8 @@ void FixedLag::push(const double* evidence) noexcept {
   ++pushed_;
   const int frames = static_cast<int>(open) + 1;
   const auto held = std::min<long>(pushed_, static_cast<long>(factors_.size()));
-  // The first of the open frames is eliminated for good as soon as there are three.
-  kernel::eliminate({.evidence = tail_.data(),
+  // The first of the open frames is eliminated permanently as soon as there are three.
+  kernel::eliminate({.information = tail_.data(),
                      .frames = frames,
                      .stride = stride(),
                      .carry_in = pushed_ > kOpen ? carry_.get() : nullptr,

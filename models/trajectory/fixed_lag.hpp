@@ -1,7 +1,8 @@
-// FixedLag: the exact fixed-lag form (models/trajectory/README.md, "Fixed lag"). InformationForm
-// comes in frame by frame; `lag` frames later the estimate comes out that a solve of the whole past
-// and those `lag` frames would give. The past is eliminated once and kept, so a frame costs three
-// eliminations and `lag` steps back. No allocation after construction.
+// FixedLag: the trajectory solver as a stream (models/trajectory/README.md, "Fixed lag"). It takes
+// the rows of an InformationForm frame by frame; `lag` frames later it gives exactly the estimate
+// of a solve over the whole past and those `lag` frames. The past is eliminated only once, so a
+// frame costs three eliminations and `lag` steps back. No allocation after construction; one
+// thread.
 #pragma once
 
 #include <array>
@@ -16,13 +17,13 @@ class FixedLag {
  public:
   FixedLag(int channels, int lag);
 
-  // Adds the next frame: its rows are copied. RT-safe.
-  void push(const double* evidence) noexcept;
+  // Adds the next frame; its rows are copied. RT-safe.
+  void push(const double* information) noexcept;
 
-  // The estimate of the frame `back` frames before the last pushed one, given all that was pushed;
+  // The estimate of the frame `back` frames before the last pushed one, given all pushed frames;
   // `back` from 0 to min(lag, pushed() - 1). After push(), estimate(lag) is the stream's output; at
-  // the end of a string lag - 1 down to 0 are the rest. x, variance: [stride()], 64-byte aligned;
-  // variance may be null. RT-safe.
+  // the end of the sequence, `back` = lag - 1 down to 0 gives the remaining frames. x, variance:
+  // [stride()], 64-byte aligned; variance may be null. RT-safe.
   void estimate(int back, double* x, double* variance) noexcept;
 
   [[nodiscard]] int lag() const noexcept { return lag_; }
@@ -30,12 +31,12 @@ class FixedLag {
   [[nodiscard]] long pushed() const noexcept { return pushed_; }
 
  private:
-  static constexpr int kOpen = 3;  // the last frames, whose windows are not all known
+  static constexpr int kOpen = 3;  // the last frames, some of whose windows need later frames
 
   int lag_;
   long pushed_ = 0;
   InformationForm recent_;                 // ring of kOpen frames
-  std::array<const double*, kOpen> tail_;  // the same, oldest first
+  std::array<const double*, kOpen> tail_;  // the same frames, oldest first
   hwy::AlignedFreeUniquePtr<double[]> carry_, factor_rows_, x_;
   std::vector<double*> factors_;  // the last frames' factors, oldest first
 };

@@ -1,12 +1,14 @@
-// InformationForm: what is known of a hand's channels, frame by frame, in the form in which
-// trajectories are solved (models/trajectory/README.md, "Information form" and "Pentadiagonal
-// solve"). A frame is six rows of one value a channel: for each window (position; delta [-1/2 0
-// 1/2]; curve [1 -2 1], both centred on the frame) the precision p and the precision-weighted mean
-// p mu. InformationForm from several sources adds: a measured value y with variance R is p += 1/R,
-// p mu += y/R on the position's rows; no evidence is two zeros. Frames that share their evidence
-// share its memory: solvers take one pointer a frame.
+// InformationForm: what sensors and models state about each channel, frame by frame, as precision
+// and precision times mean; the input of the trajectory solvers (models/trajectory/README.md,
+// "Information form" and "Pentadiagonal solve"). A frame is six rows of one value per channel: for
+// each window (position; delta [-1/2 0 1/2]; delta-delta [1 -2 1], both centred on the frame) the
+// precision p and the precision-weighted mean p mu. Information from several sources adds: a
+// measured value y with variance R is p += 1/R, p mu += y/R in the position's rows; no information
+// is two zeros. Frames with the same information may share its memory, because solvers take one
+// pointer per frame.
 //
-// Any unit of angle serves (the product's is the radian), time is counted in frames.
+// Any unit of angle works (posed uses radians); time is counted in frames. kDeltaDelta names the
+// delta-delta rows.
 #pragma once
 
 #include <hwy/aligned_allocator.h>
@@ -23,13 +25,13 @@ enum Row : int {
   kPositionMean,  // precision times mean
   kDelta,
   kDeltaMean,
-  kCurve,
-  kCurveMean
+  kDeltaDelta,
+  kDeltaDeltaMean
 };
 inline constexpr int kRows = 6;
 
-// Frames of evidence side by side, zero at first; the padding's position has precision 1, so that
-// every column of a system can be solved.
+// The rows of consecutive frames, initially zero. The position precision of the padding is 1, so
+// that the padded columns can be solved, too.
 class InformationForm {
  public:
   InformationForm(int channels, int frames);
@@ -41,10 +43,10 @@ class InformationForm {
   [[nodiscard]] const double* row(int frame, Row row) const noexcept {
     return data_.get() + (static_cast<std::ptrdiff_t>(frame) * kRows + row) * stride_;
   }
-  // What solvers take: the frame's six rows.
+  // The frame's six rows, as solvers take them.
   [[nodiscard]] const double* frame(int frame) const noexcept { return row(frame, kPosition); }
 
-  // Forgets what is known of the frame. RT-safe.
+  // Sets the frame's information to zero. RT-safe.
   void clear(int frame) noexcept;
 
   [[nodiscard]] int channels() const noexcept { return channels_; }

@@ -2,12 +2,13 @@
 
 #include "models/trajectory/information_form.hpp"
 
-// The targets of the predictor's kernels (models/gp), so that one choice of instruction set holds
-// for both.
+// The same targets as the predictor's kernels (models/gp), so that one choice of instruction set
+// applies to both.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "models/trajectory/pentadiagonal.cpp"
-// Highway compiles this file once per target; its own macros are not written for our warnings.
+// Highway compiles this file once per target; Highway's own macros do not compile without warnings
+// under our flags.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wsign-conversion"
 #include <hwy/foreach_target.h>
@@ -28,8 +29,7 @@ HWY_INLINE Vec plus_times(Vec sum, double factor, Vec v) {
   return hn::MulAdd(hn::Set(Doubles(), factor), v, sum);
 }
 
-// A frame that still waits for its elimination: its diagonal, its band to the next frame, its right
-// side.
+// A frame that is not eliminated yet: its diagonal, its band to the next frame, its right side.
 struct Pending {
   Vec d0, d1, r;
 };
@@ -39,18 +39,18 @@ HWY_INLINE Pending nothing() {
   return {zero, zero, zero};
 }
 
-// The dynamic rows of one frame.
+// The delta and delta-delta rows of one frame.
 struct Dynamics {
   Vec p1, m1, p2, m2;
 };
-HWY_INLINE Dynamics dynamics_of(const double* evidence, std::ptrdiff_t stride) {
-  return {load(evidence + kDelta * stride), load(evidence + kDeltaMean * stride),
-          load(evidence + kCurve * stride), load(evidence + kCurveMean * stride)};
+HWY_INLINE Dynamics dynamics_of(const double* information, std::ptrdiff_t stride) {
+  return {load(information + kDelta * stride), load(information + kDeltaMean * stride),
+          load(information + kDeltaDelta * stride), load(information + kDeltaDeltaMean * stride)};
 }
 
-HWY_INLINE void add_position(Pending& frame, const double* evidence, std::ptrdiff_t stride) {
-  frame.d0 = hn::Add(frame.d0, load(evidence + kPosition * stride));
-  frame.r = hn::Add(frame.r, load(evidence + kPositionMean * stride));
+HWY_INLINE void add_position(Pending& frame, const double* information, std::ptrdiff_t stride) {
+  frame.d0 = hn::Add(frame.d0, load(information + kPosition * stride));
+  frame.r = hn::Add(frame.r, load(information + kPositionMean * stride));
 }
 
 // Windows centred between `a` and `c` (models/trajectory/README.md, "Pentadiagonal solve"). Returns
@@ -69,7 +69,7 @@ HWY_INLINE Vec add_centred(Pending& a, Pending& b, Pending& c, const Dynamics& d
   return plus_times(d.p2, -0.25, d.p1);
 }
 
-// The same with the curve window [1 + k, -2, 1 - k].
+// The same with the delta-delta window [1 + k, -2, 1 - k].
 HWY_INLINE Vec add_skewed(Pending& a, Pending& b, Pending& c, const Dynamics& d, double k) {
   const double left = 1.0 + k;
   const double right = 1.0 - k;
@@ -85,8 +85,8 @@ HWY_INLINE Vec add_skewed(Pending& a, Pending& b, Pending& c, const Dynamics& d,
   return hn::Sub(times(left * right, d.p2), delta);
 }
 
-// The two coefficients that the boundary rule leaves of a window which loses one to the outside, at
-// the string's beginning; at its end they stand in the opposite order, the delta's negated.
+// The two coefficients that the boundary rule gives a window with one coefficient outside, at the
+// beginning of the sequence; at its end they are in the opposite order, those of the delta negated.
 struct Cut {
   double delta[2], curve[2];
 };
@@ -110,14 +110,14 @@ HWY_INLINE void add_cut(Pending& a, Pending& b, const Dynamics& d, const Cut& cu
   b.r = plus_times(plus_times(b.r, cut.delta[1], d.m1), cut.curve[1], d.m2);
 }
 
-// A string of one frame: what is left of its windows lies on the frame itself.
+// A sequence of one frame: what the boundary rule leaves of its windows is on the frame itself.
 HWY_INLINE void add_lone(Pending& a, const Dynamics& d, Boundary boundary) {
-  if (boundary != Boundary::kZero) return;  // hold: both windows are 0 whatever the frame is
+  if (boundary != Boundary::kZero) return;  // hold: both windows are 0 for any value
   a.d0 = plus_times(a.d0, 4.0, d.p2);
   a.r = plus_times(a.r, -2.0, d.m2);
 }
 
-// x_a = z - f1 x_b - f2 x_c, and what that says of b and c.
+// x_a = z - f1 x_b - f2 x_c, and what that adds to b and c.
 HWY_INLINE void settle(const Pending& a, Vec d2, Pending& b, Pending& c, double* factor,
                        std::ptrdiff_t stride) {
   const Vec v = hn::Div(hn::Set(Doubles(), 1.0), a.d0);
@@ -135,8 +135,8 @@ HWY_INLINE void settle(const Pending& a, Vec d2, Pending& b, Pending& c, double*
   hn::Store(v, d, factor + 3 * stride);
 }
 
-// One pass over the frames for `count` vectors of channels from `column` on; several, because each
-// frame waits for the division of the one before.
+// One pass over the frames for `count` vectors of channels from `column` on; several vectors at
+// once, because each frame waits for the division of the frame before it.
 template <int count>
 HWY_INLINE void eliminate_columns(const System& s, std::ptrdiff_t column, double* const* factors) {
   const std::ptrdiff_t stride = s.stride;
@@ -151,7 +151,7 @@ HWY_INLINE void eliminate_columns(const System& s, std::ptrdiff_t column, double
       a[v] = {load(carry), load(carry + stride), load(carry + 2 * stride)};
       b[v] = {load(carry + 3 * stride), hn::Zero(Doubles()), load(carry + 4 * stride)};
     } else if (cuts) {
-      const Dynamics first = dynamics_of(at(s.evidence[0], v), stride);
+      const Dynamics first = dynamics_of(at(s.information[0], v), stride);
       if (last == 0) {
         add_lone(a[v], first, s.boundary);
       } else {
@@ -162,14 +162,14 @@ HWY_INLINE void eliminate_columns(const System& s, std::ptrdiff_t column, double
   for (int i = 0; i <= last; ++i) {
     for (int v = 0; v < count; ++v) {
       c[v] = nothing();
-      add_position(a[v], at(s.evidence[i], v), stride);
+      add_position(a[v], at(s.information[i], v), stride);
       Vec d2 = hn::Zero(Doubles());
       if (i + 2 <= last) {
-        const Dynamics dynamics = dynamics_of(at(s.evidence[i + 1], v), stride);
+        const Dynamics dynamics = dynamics_of(at(s.information[i + 1], v), stride);
         d2 = s.skew == nullptr ? add_centred(a[v], b[v], c[v], dynamics)
                                : add_skewed(a[v], b[v], c[v], dynamics, s.skew[i + 1]);
       } else if (cuts && i + 1 == last) {
-        add_cut(a[v], b[v], dynamics_of(at(s.evidence[last], v), stride),
+        add_cut(a[v], b[v], dynamics_of(at(s.information[last], v), stride),
                 mirrored(cut_of(s.boundary)));
       }
       settle(a[v], d2, b[v], c[v], factors[i] + column + v * kWide, stride);

@@ -2,7 +2,7 @@
 
 namespace posed::trajectory {
 
-Window::Window(int channels, int max_frames)
+SlidingWindow::SlidingWindow(int channels, int max_frames)
     : channels_(channels),
       stride_(padded(channels)),
       x_(hwy::AllocateAligned<double>(static_cast<std::size_t>(max_frames) *
@@ -17,20 +17,20 @@ Window::Window(int channels, int max_frames)
 }
 
 // RT-safe.
-void Window::solve(std::span<const double* const> evidence, Boundary boundary,
-                   const double* skew) noexcept {
-  frames_ = static_cast<int>(evidence.size());
-  kernel::eliminate({evidence.data(), frames_, stride_, boundary, skew}, factors_.data());
+void SlidingWindow::solve(std::span<const double* const> information, Boundary boundary,
+                          const double* skew) noexcept {
+  frames_ = static_cast<int>(information.size());
+  kernel::eliminate({information.data(), frames_, stride_, boundary, skew}, factors_.data());
   kernel::substitute(factors_.data(), frames_, 0, stride_, x_.get());
 }
 
 // RT-safe.
-void Window::variance(int frame, double* out) const noexcept {
+void SlidingWindow::variance(int frame, double* out) const noexcept {
   kernel::variance(factors_.data(), frames_, frame, stride_, out, 0);
 }
 
 // RT-safe.
-void Window::variances(double* out) const noexcept {
+void SlidingWindow::variances(double* out) const noexcept {
   kernel::variance(factors_.data(), frames_, 0, stride_, out, stride_);
 }
 

@@ -1,7 +1,7 @@
-// Window: the most likely trajectory over a few frames of all channels and its variance, solved at
-// once. InformationForm may be changed and solved again at any time: nothing is kept between
-// solves. For the live generator (a window that slides and is re-solved) and, with many frames, for
-// a whole string.
+// SlidingWindow: the most likely trajectory of all channels over some frames, and its variance, in
+// one solve (models/trajectory/README.md, "Sliding window"). Nothing is kept between solves, so the
+// information may change at any time. Used by the live smoother (a window that slides and is solved
+// again) and, with many frames, for a whole label sequence. One thread.
 #pragma once
 
 #include <span>
@@ -12,17 +12,17 @@
 
 namespace posed::trajectory {
 
-class Window {
+class SlidingWindow {
  public:
-  Window(int channels, int max_frames);
+  SlidingWindow(int channels, int max_frames);
 
   // Solves the given frames (1 to max_frames), each pointer to a frame's rows
-  // (InformationForm::frame() of this many channels). `skew`: [frames] of an uneven clock
-  // (kernel::System), else null. RT-safe.
-  void solve(std::span<const double* const> evidence, Boundary boundary = Boundary::kDrop,
+  // (InformationForm::frame() of this many channels). `skew`: [frames] for uneven frames
+  // (kernel::System::skew), else null. RT-safe.
+  void solve(std::span<const double* const> information, Boundary boundary = Boundary::kDrop,
              const double* skew = nullptr) noexcept;
 
-  // Of the last solve. [channels], padded; RT-safe.
+  // Results of the last solve. [channels], padded; RT-safe.
   [[nodiscard]] const double* x(int frame) const noexcept {
     return x_.get() + static_cast<std::ptrdiff_t>(frame) * stride_;
   }

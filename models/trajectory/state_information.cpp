@@ -11,7 +11,7 @@ using gesture::DurationGaussian;
 using gesture::kDeltaWindows;
 using gesture::kStates;
 
-// What a model's mean and variance of each window become at a rate r times its own.
+// Factors on a model's mean and variance of each window at a rate r times its own.
 struct WindowScale {
   std::array<double, kDeltaWindows> mean, variance;
 };

@@ -1,9 +1,10 @@
-// StateInformation: what a gesture model says of each state of a gesture, as evidence rows at one
-// frame rate, and how many frames the state lasts. Built cold, then const and shared.
+// StateInformation: the Gaussians of each state of a gesture model, as rows of an InformationForm
+// at one frame rate, and the state's duration in frames. Built cold, then const and shared between
+// threads.
 //
-// At a rate r times the model's, means are divided by r (delta) and r^2 (curve), variances
-// multiplied by r (position) and divided by r (delta) and r^3 (curve), durations multiplied by r
-// (models/trajectory/README.md, "State information and frame rate").
+// At a rate r times the model's, means are divided by r (delta) and r^2 (delta-delta), variances
+// multiplied by r (position) and divided by r (delta) and r^3 (delta-delta), durations multiplied
+// by r (models/trajectory/README.md, "State information and frame rate").
 #pragma once
 
 #include <array>

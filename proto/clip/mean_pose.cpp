@@ -15,7 +15,7 @@ Eigen::Vector3d hip_line(const Skeleton& skeleton) {
 
 }  // namespace
 
-std::vector<Eigen::Quaterniond> standing_rotations(const Clip& clip) {
+std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip) {
   const Skeleton& skeleton = *clip.skeleton;
   const Eigen::Vector3d line = hip_line(skeleton);
   const int hips = std::max(skeleton.joint_of(Bone::kHips), 0);

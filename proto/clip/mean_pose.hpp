@@ -10,8 +10,8 @@
 namespace posed::clip {
 
 // Mean global rotation of each joint [joint], with the heading of each frame (from the line between
-// the upper legs) removed. Input of t_frames_from_standing(), when the figure walks or stands in
+// the upper legs) removed. Input of t_frames_from_mean_pose(), when the figure walks or stands in
 // the clip.
-[[nodiscard]] std::vector<Eigen::Quaterniond> standing_rotations(const Clip& clip);
+[[nodiscard]] std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip);
 
 }  // namespace posed::clip

@@ -94,7 +94,7 @@ Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const 
   } else if (!hints.T.empty()) {
     set_t_frames(skeleton, hints.T);
   } else {
-    set_t_frames(skeleton, t_frames_from_standing(skeleton, standing_rotations(clip)));
+    set_t_frames(skeleton, t_frames_from_mean_pose(skeleton, mean_rotations(clip)));
     clip.warnings.emplace_back(
         "the zero pose is no T-pose and no skeleton profile fits; the T-pose is taken from the "
         "mean pose of the clip, which should walk or stand");

@@ -168,8 +168,8 @@ bool zero_pose_is_t(const Skeleton& skeleton) {
   return true;
 }
 
-KnownT t_frames_from_standing(const Skeleton& skeleton,
-                              std::span<const Eigen::Quaterniond> standing) {
+KnownT t_frames_from_mean_pose(const Skeleton& skeleton,
+                               std::span<const Eigen::Quaterniond> standing) {
   KnownT known(skeleton.joints.size());
   Eigen::Quaterniond T_parent = Eigen::Quaterniond::Identity();
   for (int j = 0; j < std::ssize(skeleton.joints); ++j) {

@@ -30,8 +30,8 @@ void set_t_frames(Skeleton& skeleton, const KnownT& known = {});
 // figure stands or walks, with the heading removed [joint]. Each bone's rotation is turned by the
 // smallest angle onto its axis and then snapped to the nearest of the 24 rotations that map axes to
 // axes. Forearms, hands and fingers that already fit with their parent's T take that one.
-[[nodiscard]] KnownT t_frames_from_standing(const Skeleton& skeleton,
-                                            std::span<const Eigen::Quaterniond> standing);
+[[nodiscard]] KnownT t_frames_from_mean_pose(const Skeleton& skeleton,
+                                             std::span<const Eigen::Quaterniond> standing);
 
 // The text form of a rotation that maps axes to axes: where x, y and z go, "+y-x+z". Parsing
 // rejects text that is not such a rotation.

@@ -176,7 +176,7 @@ Result<std::string> Database::value(std::string_view sql) {
 
 std::int64_t Database::last_insert_id() const { return sqlite3_last_insert_rowid(handle_.get()); }
 
-void Database::set_patience_ms(int patience_ms) {
+void Database::set_busy_timeout_ms(int patience_ms) {
   sqlite3_busy_timeout(handle_.get(), patience_ms);
 }
 

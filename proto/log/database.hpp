@@ -69,7 +69,7 @@ class Database {
 
   [[nodiscard]] std::int64_t last_insert_id() const;
   // Sets how long to wait for another process that holds the file.
-  void set_patience_ms(int patience_ms);
+  void set_busy_timeout_ms(int patience_ms);
   // Discards everything written since the last commit; harmless when there is nothing.
   void rollback();
 

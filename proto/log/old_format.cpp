@@ -114,7 +114,7 @@ Result<Statement> select_chunks(Database& database) {
       "SELECT id, stream, direction, arrival_ns, next_sequence, bytes FROM chunk ORDER BY id");
 }
 
-ChunkRow chunk(const Statement& row, std::vector<StreamPlace>& places) {
+ChunkRow chunk(const Statement& row, std::vector<StreamPosition>& places) {
   const auto stream = static_cast<std::uint32_t>(row.integer(1));
   places.assign(1, {stream, unsigned_of(row.integer(4)), 0});
   return {.id = row.integer(0),

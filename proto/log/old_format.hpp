@@ -19,7 +19,7 @@ struct Streams {
 
 // Statements that select the rows in order, and functions that convert the columns to rows.
 [[nodiscard]] Result<Statement> select_chunks(Database& database);
-[[nodiscard]] ChunkRow chunk(const Statement& row, std::vector<StreamPlace>& places);
+[[nodiscard]] ChunkRow chunk(const Statement& row, std::vector<StreamPosition>& places);
 
 [[nodiscard]] Result<Statement> select_decisions(Database& database);
 // An invalid kind or label list becomes a row that its reader rejects.

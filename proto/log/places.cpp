@@ -24,20 +24,20 @@ Int take(std::span<const std::byte>& bytes) {
 
 }  // namespace
 
-void pack_places(std::span<const StreamPlace> places, std::vector<std::byte>& out) {
+void pack_positions(std::span<const StreamPosition> places, std::vector<std::byte>& out) {
   out.clear();
-  for (const StreamPlace& place : places) {
+  for (const StreamPosition& place : places) {
     put(place.stream, out);
     put(place.next_frame, out);
     put(place.next_sample, out);
   }
 }
 
-bool unpack_places(std::span<const std::byte> bytes, std::vector<StreamPlace>& out) {
+bool unpack_positions(std::span<const std::byte> bytes, std::vector<StreamPosition>& out) {
   out.clear();
   if (bytes.size() % kPlaceBytes != 0) return false;
   while (!bytes.empty()) {
-    StreamPlace place;
+    StreamPosition place;
     place.stream = take<std::uint32_t>(bytes);
     place.next_frame = take<std::uint64_t>(bytes);
     place.next_sample = take<std::uint64_t>(bytes);

@@ -11,8 +11,9 @@
 namespace posed::log {
 
 // Both replace the content of `out`; the caller passes it in so that its memory is reused.
-void pack_places(std::span<const StreamPlace> places, std::vector<std::byte>& out);
+void pack_positions(std::span<const StreamPosition> places, std::vector<std::byte>& out);
 // Returns false when the bytes are not a whole number of entries.
-[[nodiscard]] bool unpack_places(std::span<const std::byte> bytes, std::vector<StreamPlace>& out);
+[[nodiscard]] bool unpack_positions(std::span<const std::byte> bytes,
+                                    std::vector<StreamPosition>& out);
 
 }  // namespace posed::log

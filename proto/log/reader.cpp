@@ -131,7 +131,7 @@ struct Reader::State {
   std::vector<SourceRow> sources;
   std::vector<StreamRow> streams;
   std::optional<Statement> chunks;
-  std::vector<StreamPlace> places;  // from the last chunk
+  std::vector<StreamPosition> places;  // from the last chunk
 
   // Rows of the old formats have no checksum, so it is not checked for them.
   Result<bool> step(Statement& select, const char* table) const {
@@ -190,7 +190,7 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
   const auto format = check_marks(*database, file);
   if (!format) return std::unexpected(format.error());
   fold_in_wal(*database);
-  database->set_patience_ms(kPatience_ms);
+  database->set_busy_timeout_ms(kPatience_ms);
   if (auto done = check_whole(*database, file); !done) return std::unexpected(done.error());
   auto meta = read_meta(*database);
   if (!meta) return std::unexpected(meta.error());
@@ -260,7 +260,7 @@ Result<std::optional<ChunkRow>> Reader::next_chunk() {
   if (auto known = state_->check_owner(source, "chunk", id, true); !known) {
     return std::unexpected(known.error());
   }
-  if (!unpack_places(select.bytes(6), state_->places)) {
+  if (!unpack_positions(select.bytes(6), state_->places)) {
     return damaged_row(state_->file, "chunk", id, "has sequences that are cut short");
   }
   constexpr std::int64_t kMostDirection = std::numeric_limits<std::uint8_t>::max();

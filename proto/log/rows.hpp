@@ -36,7 +36,7 @@ struct StreamRow {
 };
 
 // The numbers of the next frame and the next sample of a stream.
-struct StreamPlace {
+struct StreamPosition {
   std::uint32_t stream = 0;
   std::uint64_t next_frame = 0;
   std::uint64_t next_sample = 0;
@@ -52,7 +52,7 @@ struct ChunkRow {
   std::uint64_t first_item = 0;  // number of the first item made from it
   // For each stream of the source, so that a reader can resume after a gap. In a row from a reader,
   // these and the bytes are valid until its next call.
-  std::span<const StreamPlace> places{};
+  std::span<const StreamPosition> places{};
   std::span<const std::byte> bytes{};
 };
 

@@ -68,7 +68,7 @@ Result<> write_birth(Database& database, const std::map<std::string, std::string
 }
 
 Result<> make_durable(Database& database) {
-  database.set_patience_ms(kPatience_ms);
+  database.set_busy_timeout_ms(kPatience_ms);
   return database.run("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;");
 }
 
@@ -168,7 +168,7 @@ Result<> Writer::add(const StreamRow& row) {
 }
 
 Result<> Writer::add(const ChunkRow& row) {
-  pack_places(row.places, state_->sequences);
+  pack_positions(row.places, state_->sequences);
   state_->numbered(kChunk)
       .bind(std::int64_t{row.source})
       .bind(std::int64_t{row.socket})
@@ -223,14 +223,14 @@ Result<std::int64_t> Writer::chunk_before_frame(std::uint32_t source, std::uint3
       state_->database.prepare("SELECT id, sequences FROM chunk WHERE source=? ORDER BY id DESC");
   if (!backwards) return std::unexpected(backwards.error());
   backwards->bind(std::int64_t{source});
-  std::vector<StreamPlace> places;
+  std::vector<StreamPosition> places;
   for (bool holds_frame = false;;) {
     const auto row = backwards->step();
     if (!row) return std::unexpected(row.error());
     if (!*row) return 0;
     if (holds_frame) return backwards->integer(0);
-    if (!unpack_places(backwards->bytes(1), places)) continue;
-    const auto place = std::ranges::find(places, stream, &StreamPlace::stream);
+    if (!unpack_positions(backwards->bytes(1), places)) continue;
+    const auto place = std::ranges::find(places, stream, &StreamPosition::stream);
     holds_frame = place != places.end() && place->next_frame <= frame;
   }
 }

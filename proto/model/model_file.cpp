@@ -68,7 +68,7 @@ Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& 
   return file;
 }
 
-std::string seal(v1::ModelFile file) {
+std::string wrap(v1::ModelFile file) {
   file.set_posed_version("0.1.0");
   const std::string payload = file.SerializeAsString();
   std::string out(kMagic);

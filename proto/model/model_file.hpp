@@ -20,7 +20,7 @@ namespace posed::model_file {
 
 // Returns the whole file that contains `file`; fills in posed's version. The same model gives the
 // same bytes.
-[[nodiscard]] std::string seal(v1::ModelFile file);
+[[nodiscard]] std::string wrap(v1::ModelFile file);
 
 // The largest model file that is read; far larger than any that `posed train` writes.
 inline constexpr std::size_t kMaxModelFile = std::size_t{256} * 1024 * 1024;  // bytes

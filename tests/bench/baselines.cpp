@@ -13,7 +13,7 @@ namespace {
 
 using clip::ChannelMatrix;
 
-constexpr Eigen::Index kStart = 40;  // frames in which filters may settle
+constexpr Eigen::Index kStart = 40;  // frames for filters to settle, not counted
 constexpr Eigen::Index kEnd = 8;
 
 template <typename... Values>
@@ -23,14 +23,14 @@ std::string text(const char* format, Values... values) {
   return line.data();
 }
 
-// An answer that was made `lag` frames late, moved to the frames that it describes.
+// Shifts estimates that were made `lag` frames late to the frames that they describe.
 ChannelMatrix moved_back(const ChannelMatrix& made, const ChannelMatrix& measured, int lag) {
   ChannelMatrix moved = measured;
   moved.topRows(made.rows() - lag) = made.bottomRows(made.rows() - lag);
   return moved;
 }
 
-// Keeps the best setting of one baseline.
+// Stores the best setting of one baseline.
 class Best {
  public:
   Best(const std::string& name, std::span<const Trial> trials) : trials_(trials) {
@@ -109,7 +109,7 @@ double rms_deg(const ChannelMatrix& estimate, const ChannelMatrix& truth) {
 }
 
 ChannelMatrix local_polynomial(const ChannelMatrix& measured, int lag, int window, int order) {
-  // Row i of the basis is frame i of the window, time 0 where the answer is wanted.
+  // Row i of the basis is frame i of the window, time is 0 at the frame to estimate.
   Eigen::MatrixXd basis(window, order + 1);
   for (int i = 0; i < window; ++i) {
     const double t = static_cast<double>(i - (window - 1 - lag)) / window;
@@ -125,7 +125,8 @@ ChannelMatrix local_polynomial(const ChannelMatrix& measured, int lag, int windo
   return moved_back(made, measured, lag);
 }
 
-// Casiez, Roussel and Vogel 2012; the derivative against the last filtered value, as their code.
+// Casiez, Roussel and Vogel 2012; the derivative is taken against the last filtered value, as in
+// their code.
 ChannelMatrix one_euro(const ChannelMatrix& measured, double rate_hz, const OneEuro& setting) {
   const auto gain = [rate_hz](double cutoff_hz) {
     return 1.0 / (1.0 + rate_hz / (2.0 * std::numbers::pi * cutoff_hz));

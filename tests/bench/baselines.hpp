@@ -1,10 +1,10 @@
-// Rivals: the filters that people use on a hand today, each tuned on the very data it is judged by,
-// so that the live generator's figures stand beside the best they could be. Cold; for benches and
-// tests.
+// Baselines: filters in common use for hand tracking. Each is tuned on the very data on which it is
+// evaluated, so the live smoother is compared with their best possible result. Cold; for the
+// benchmark and tests.
 //
-// Motions are [frames x channels] in degrees, nothing missing; frames stand evenly. Row t of an
-// answer is the estimate of frame t from what was measured up to t + lag; rows for which there is
-// none hold the measured value.
+// Motions are [frames x channels] in degrees, without missing values and evenly spaced. Row t of a
+// result is the estimate of frame t from measurements up to t + lag; rows without an estimate hold
+// the measured value.
 #pragma once
 
 #include <span>
@@ -15,17 +15,17 @@
 
 namespace posed::bench {
 
-// A hand as it was and as the sensors saw it.
+// A hand's true motion and what the sensors measured.
 struct Trial {
   clip::ChannelMatrix truth, measured;
   double rate_hz = 60.0;
 };
 
-// Root of the mean square error, the first 40 and the last 8 frames left out. [deg]
+// Rms error [deg] without the first 40 and the last 8 frames.
 [[nodiscard]] double rms_deg(const clip::ChannelMatrix& estimate, const clip::ChannelMatrix& truth);
 
-// The value at `lag` frames before the newest of the polynomial that fits `window` frames best; of
-// order 0 the moving average.
+// The value, `lag` frames before the newest, of the polynomial that fits `window` frames best;
+// order 0 is the moving average.
 [[nodiscard]] clip::ChannelMatrix local_polynomial(const clip::ChannelMatrix& measured, int lag,
                                                    int window, int order);
 
@@ -41,11 +41,11 @@ struct OneEuro {
 
 struct Tuned {
   std::string name, setting;
-  double rms_deg = 0.0;  // over the trials, each weighing the same
+  double rms_deg = 0.0;  // over the trials, with equal weights
 };
 
-// Moving average, local polynomial, One-Euro, constant-velocity Kalman: the best of each over its
-// grid on these trials. Seconds of work.
+// Moving average, local polynomial, One-Euro, constant-velocity Kalman: the best setting of each
+// from a grid, on these trials. Takes seconds.
 [[nodiscard]] std::vector<Tuned> tuned_baselines(std::span<const Trial> trials, int lag,
                                                  double noise_deg);
 

@@ -1,4 +1,4 @@
-// The commands of posed_bench: posed timed beside other programs and methods in the same run.
+// The commands of posed_bench, which time posed beside other programs and methods in the same run.
 #pragma once
 
 namespace CLI {

@@ -1,5 +1,5 @@
-// posed_bench generate: what trajectories cost against SPTK and LAPACK, and whether any string lets
-// fingers go through each other.
+// posed_bench generate: the cost of trajectories beside SPTK and LAPACK, and whether fingers go
+// through each other in any label sequence.
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -52,9 +52,9 @@ Result<gesture::GestureModel> synthetic_model() {
   return gesture::train_gesture({*recording}, {});
 }
 
-// Every sequence of four of the labels g c p 1 3 4, or `count` of them evenly spread.
-Result<json> bench_strings(const trajectory::StateInformation& evidence, int count) {
-  const auto alphabet = perform::labels_of(evidence.model(), "g c p 1 3 4");
+// Every sequence of four of the labels g c p 1 3 4, or `count` of them, evenly spaced.
+Result<json> bench_strings(const trajectory::StateInformation& information, int count) {
+  const auto alphabet = perform::labels_of(information.model(), "g c p 1 3 4");
   if (!alphabet) return std::unexpected(alphabet.error());
   constexpr int kLength = 4;
   const auto letters = static_cast<int>(alphabet->size());
@@ -73,7 +73,7 @@ Result<json> bench_strings(const trajectory::StateInformation& evidence, int cou
       labels.push_back((*alphabet)[static_cast<std::size_t>(code % letters)]);
       code /= letters;
     }
-    auto performance = perform::perform(evidence, labels, {});
+    auto performance = perform::perform(information, labels, {});
     const auto kept = perform::constrain(performance, default_hand_shape());
     smallest_m = std::min(smallest_m, kept.min_gap_m);
     before_m = std::min(before_m, kept.before_m);
@@ -94,12 +94,12 @@ Result<json> bench(const BenchGenerateOptions& options) {
   auto model = options.model.empty() ? synthetic_model() : gesture::load_model(options.model);
   if (!model) return std::unexpected(model.error());
   const double rate_hz = model->rate_hz;
-  const trajectory::StateInformation evidence(
+  const trajectory::StateInformation information(
       std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
-  json report{{"streaming", bench_streaming(evidence)},
-              {"batch", bench_batch(evidence, options.samples)}};
+  json report{{"streaming", bench_streaming(information)},
+              {"batch", bench_batch(information, options.samples)}};
   if (options.strings != 0) {
-    auto strings = bench_strings(evidence, options.strings);
+    auto strings = bench_strings(information, options.strings);
     if (!strings) return std::unexpected(strings.error());
     report["strings"] = *strings;
   }

@@ -1,5 +1,5 @@
-// posed_bench smooth: what the live stage costs, and how close to the truth it stays beside
-// baselines that are tuned on the very motion they are judged by.
+// posed_bench smooth: the cost of the live smoother and its error, beside baselines that are tuned
+// on the very motion on which they are evaluated.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -81,7 +81,7 @@ Result<std::vector<Truth>> truths_of(const BenchSmoothOptions& options) {
   return truths;
 }
 
-// Noise on the channels that move; the others are left out of trials.
+// Adds noise to the channels that move; the other channels are not part of a trial.
 Trial trial_of(const Truth& truth, double noise_deg, unsigned seed) {
   std::vector<Eigen::Index> moving;
   for (Eigen::Index c = 0; c < truth.angles.cols(); ++c) {
@@ -97,7 +97,7 @@ Trial trial_of(const Truth& truth, double noise_deg, unsigned seed) {
   return trial;
 }
 
-// The live solve on any number of channels; row t is the estimate of frame t.
+// The live smoother's solve on any number of channels; row t is the estimate of frame t.
 ChannelMatrix live(const Trial& trial, int lag, double noise_deg) {
   const auto channels = static_cast<int>(trial.measured.cols());
   smooth::AdaptiveWindow window(channels);
@@ -123,7 +123,7 @@ double pooled(const std::vector<Trial>& trials, int lag, double noise_deg) {
   return std::sqrt(square / static_cast<double>(trials.size()));
 }
 
-// One table row a filter, a column a lag.
+// One table row per filter, one column per lag.
 json table(const std::vector<Trial>& trials, double noise_deg) {
   json rows = json::object();
   for (const int lag : {0, 1, 3}) {
@@ -135,7 +135,7 @@ json table(const std::vector<Trial>& trials, double noise_deg) {
   return rows;
 }
 
-// A glove that only tells changes larger than its dead band.
+// A glove that only reports changes larger than its dead band.
 Trial stairs_of(const Truth& truth, double band_deg) {
   Trial trial = trial_of(truth, 0.0, 0);
   for (Eigen::Index c = 0; c < trial.truth.cols(); ++c) {
@@ -148,7 +148,7 @@ Trial stairs_of(const Truth& truth, double band_deg) {
   return trial;
 }
 
-// Up and down between 0 and 60 degrees at one speed.
+// Ramps up and down between 0 and 60 degrees at a constant speed.
 Truth ramps_of(double deg_s) {
   Truth truth;
   truth.angles.resize(1800, 4);
@@ -180,7 +180,8 @@ json accuracy(const std::vector<Truth>& truths, unsigned seed) {
   return report;
 }
 
-// 45 channels, window 26: one bare solve, the whole solve, the whole stage. They take turns.
+// 45 channels, window of 26 frames: one bare solve, the whole solve and the whole stage, timed in
+// turns.
 json cost(unsigned seed) {
   constexpr int kFrames = 4000;
   const Skeleton skeleton = hand_skeleton(Side::kRight);

@@ -27,7 +27,7 @@ using trajectory::InformationForm;
 using trajectory::Row;
 using Steady = std::chrono::steady_clock;
 
-constexpr int kRepeats = 3;  // of everything beside SPTK; the median counts
+constexpr int kRepeats = 3;  // of everything except SPTK; the median counts
 
 double since_us(Steady::time_point start) {
   return std::chrono::duration<double, std::micro>(Steady::now() - start).count();
@@ -45,7 +45,7 @@ json quantiles(std::vector<double> us) {
           {"max_us", quantile(us, 1.0)}};
 }
 
-// A folder of its own under the system's temporary one.
+// A new folder in the system's temporary folder.
 struct Scratch {
   std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("posed-bench-" + std::to_string(::getpid()));
@@ -58,7 +58,8 @@ struct Scratch {
   }
 };
 
-// The first `frames` frames of a random script; channels past the hand's repeat it.
+// The first `frames` frames of a random label sequence; channels beyond those of the hand repeat
+// it.
 InformationForm script_evidence(const trajectory::StateInformation& model, int frames,
                                 int channels) {
   std::mt19937 random(1);
@@ -81,14 +82,14 @@ InformationForm script_evidence(const trajectory::StateInformation& model, int f
   return all;
 }
 
-SptkInput for_sptk(const InformationForm& evidence) {
-  SptkInput input{evidence.channels(), {}};
-  for (int t = 0; t < evidence.frames(); ++t) {
+SptkInput for_sptk(const InformationForm& information) {
+  SptkInput input{information.channels(), {}};
+  for (int t = 0; t < information.frames(); ++t) {
     for (const bool variance : {false, true}) {
       for (int w = 0; w < trajectory::kRows; w += 2) {
-        const double* precision = evidence.row(t, static_cast<Row>(w));
-        const double* mean = evidence.row(t, static_cast<Row>(w + 1));
-        for (int c = 0; c < evidence.channels(); ++c) {
+        const double* precision = information.row(t, static_cast<Row>(w));
+        const double* mean = information.row(t, static_cast<Row>(w + 1));
+        for (int c = 0; c < information.channels(); ++c) {
           input.values.push_back(
               static_cast<float>(variance ? 1.0 / precision[c] : mean[c] / precision[c]));
         }
@@ -98,26 +99,27 @@ SptkInput for_sptk(const InformationForm& evidence) {
   return input;
 }
 
-std::vector<const double*> frames_of(const InformationForm& evidence) {
+std::vector<const double*> frames_of(const InformationForm& information) {
   std::vector<const double*> frames;
-  for (int t = 0; t < evidence.frames(); ++t) frames.push_back(evidence.frame(t));
+  for (int t = 0; t < information.frames(); ++t) frames.push_back(information.frame(t));
   return frames;
 }
 
 struct Streamed {
   std::vector<double> us;  // of each frame
-  double total_us = 0.0;   // of all, the clock read twice
+  double total_us = 0.0;   // of all frames, with only two clock readings
   double error_deg = 0.0;  // rms against the full solve
 };
 
-Streamed stream(const InformationForm& evidence, const trajectory::Window& full, int delay) {
-  trajectory::FixedLag solver(evidence.channels(), delay);
-  InformationForm out(evidence.channels(), evidence.frames());
+Streamed stream(const InformationForm& information, const trajectory::SlidingWindow& full,
+                int delay) {
+  trajectory::FixedLag solver(information.channels(), delay);
+  InformationForm out(information.channels(), information.frames());
   Streamed result;
   const auto feed = [&](auto&& each) {
-    for (int t = 0; t < evidence.frames(); ++t) {
+    for (int t = 0; t < information.frames(); ++t) {
       each([&] {
-        solver.push(evidence.frame(t));
+        solver.push(information.frame(t));
         if (t >= delay) solver.estimate(delay, out.row(t - delay, Row::kPosition), nullptr);
       });
     }
@@ -126,14 +128,14 @@ Streamed stream(const InformationForm& evidence, const trajectory::Window& full,
   feed([](auto&& work) { work(); });
   result.total_us = since_us(start);
   double squares = 0.0;
-  for (int t = 0; t + delay < evidence.frames(); ++t) {
-    for (int c = 0; c < evidence.channels(); ++c) {
+  for (int t = 0; t + delay < information.frames(); ++t) {
+    for (int c = 0; c < information.channels(); ++c) {
       squares += std::pow(out.row(t, Row::kPosition)[c] - full.x(t)[c], 2);
     }
   }
   result.error_deg =
-      kDegrees * std::sqrt(squares / (evidence.frames() - delay) / evidence.channels());
-  solver = trajectory::FixedLag(evidence.channels(), delay);
+      kDegrees * std::sqrt(squares / (information.frames() - delay) / information.channels());
+  solver = trajectory::FixedLag(information.channels(), delay);
   feed([&](auto&& work) {
     const auto begin = Steady::now();
     work();
@@ -142,8 +144,8 @@ Streamed stream(const InformationForm& evidence, const trajectory::Window& full,
   return result;
 }
 
-double sptk_error_deg(const SptkRun& run, const trajectory::Window& full, int frames, int channels,
-                      int delay) {
+double sptk_error_deg(const SptkRun& run, const trajectory::SlidingWindow& full, int frames,
+                      int channels, int delay) {
   double squares = 0.0;
   for (int t = 0; t + delay < frames; ++t) {
     for (int c = 0; c < channels; ++c) {
@@ -159,10 +161,10 @@ double sptk_error_deg(const SptkRun& run, const trajectory::Window& full, int fr
 json bench_streaming(const trajectory::StateInformation& model) {
   constexpr int kFrames = 2040;
   constexpr int kChannels = 66;
-  const InformationForm evidence = script_evidence(model, kFrames, kChannels);
-  trajectory::Window full(kChannels, kFrames);
-  full.solve(frames_of(evidence));
-  const SptkInput input = for_sptk(evidence);
+  const InformationForm information = script_evidence(model, kFrames, kChannels);
+  trajectory::SlidingWindow full(kChannels, kFrames);
+  full.solve(frames_of(information));
+  const SptkInput input = for_sptk(information);
   const Scratch scratch;
   json rows = json::array();
   std::string missing;
@@ -171,7 +173,7 @@ json bench_streaming(const trajectory::StateInformation& model) {
     Streamed streamed;
     json row{{"delay", delay}};
     for (int repeat = 0; repeat < kRepeats; ++repeat) {
-      streamed = stream(evidence, full, delay);
+      streamed = stream(information, full, delay);
       ours.push_back(streamed.total_us / kFrames);
       if (delay != 5 && delay != 15 && delay != 30) continue;
       const auto run = run_sptk(input, delay - 1, scratch.path);
@@ -198,9 +200,9 @@ json bench_streaming(const trajectory::StateInformation& model) {
 
 json bench_batch(const trajectory::StateInformation& model, int samples) {
   constexpr int kFrames = 366;
-  const InformationForm evidence = script_evidence(model, kFrames, kHandChannels);
-  const auto frames = frames_of(evidence);
-  trajectory::Window window(kHandChannels, kFrames);
+  const InformationForm information = script_evidence(model, kFrames, kHandChannels);
+  const auto frames = frames_of(information);
+  trajectory::SlidingWindow window(kHandChannels, kFrames);
   auto lapack = LapackBaseline::load();
   std::vector<double> ours, theirs, x;
   for (int i = 0; i < samples; ++i) {
@@ -209,7 +211,7 @@ json bench_batch(const trajectory::StateInformation& model, int samples) {
     ours.push_back(since_us(start));
     if (!lapack) continue;
     start = Steady::now();
-    lapack->solve(evidence, x);
+    lapack->solve(information, x);
     theirs.push_back(since_us(start));
   }
   json report{{"frames", kFrames}, {"channels", kHandChannels}, {"ours", quantiles(ours)}};
@@ -229,7 +231,7 @@ json bench_batch(const trajectory::StateInformation& model, int samples) {
   }
   const Scratch scratch;
   constexpr int kRange = 30;
-  if (const auto sptk = run_sptk(for_sptk(evidence), kRange, scratch.path)) {
+  if (const auto sptk = run_sptk(for_sptk(information), kRange, scratch.path)) {
     report["sptk_us"] = 1e6 * sptk->seconds;
   } else {
     report["missing"].push_back(sptk.error().text());

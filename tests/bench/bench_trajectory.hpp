@@ -1,4 +1,4 @@
-// What trajectories cost, against SPTK and LAPACK in the same run; for `posed_bench generate`.
+// The cost of trajectories beside SPTK and LAPACK in the same run; for `posed_bench generate`.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -7,11 +7,13 @@
 
 namespace posed::bench {
 
-// A long script frame by frame on 66 channels: cost and error against the full solve by delay,
-// beside SPTK's mlpg at the same delay. What is not installed is named under "missing".
-[[nodiscard]] nlohmann::json bench_streaming(const trajectory::StateInformation& evidence);
+// A long label sequence frame by frame on 66 channels: for each delay, cost and error against the
+// full solve, beside SPTK's mlpg at the same delay. Programs that are not installed are listed
+// under "missing".
+[[nodiscard]] nlohmann::json bench_streaming(const trajectory::StateInformation& information);
 
 // 366 frames of 45 channels at once, beside LAPACK's dpbsv and SPTK.
-[[nodiscard]] nlohmann::json bench_batch(const trajectory::StateInformation& evidence, int samples);
+[[nodiscard]] nlohmann::json bench_batch(const trajectory::StateInformation& information,
+                                         int samples);
 
 }  // namespace posed::bench

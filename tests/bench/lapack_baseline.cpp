@@ -13,25 +13,25 @@ Result<LapackBaseline> LapackBaseline::load() {
   return LapackBaseline(reinterpret_cast<Dpbsv>(found));
 }
 
-void LapackBaseline::solve(const trajectory::InformationForm& evidence, std::vector<double>& x) {
+void LapackBaseline::solve(const trajectory::InformationForm& information, std::vector<double>& x) {
   using trajectory::Row;
   constexpr int kBand = 2;
-  constexpr int kRows = kBand + 1;  // LAPACK's lower band storage, a column a frame
-  const int frames = evidence.frames();
+  constexpr int kRows = kBand + 1;  // LAPACK's lower band storage, one column per frame
+  const int frames = information.frames();
   bands_.resize(static_cast<std::size_t>(frames) * kRows);
-  x.resize(static_cast<std::size_t>(frames) * static_cast<std::size_t>(evidence.channels()));
-  for (int c = 0; c < evidence.channels(); ++c) {
+  x.resize(static_cast<std::size_t>(frames) * static_cast<std::size_t>(information.channels()));
+  for (int c = 0; c < information.channels(); ++c) {
     double* r = x.data() + static_cast<std::ptrdiff_t>(c) * frames;
     std::ranges::fill(bands_, 0.0);
     for (int t = 0; t < frames; ++t) {
-      bands_[t * kRows] += evidence.row(t, Row::kPosition)[c];
-      r[t] = evidence.row(t, Row::kPositionMean)[c];
+      bands_[t * kRows] += information.row(t, Row::kPosition)[c];
+      r[t] = information.row(t, Row::kPositionMean)[c];
     }
     for (int t = 1; t + 1 < frames; ++t) {
-      const double p1 = 0.25 * evidence.row(t, Row::kDelta)[c];
-      const double m1 = 0.5 * evidence.row(t, Row::kDeltaMean)[c];
-      const double p2 = evidence.row(t, Row::kCurve)[c];
-      const double m2 = evidence.row(t, Row::kCurveMean)[c];
+      const double p1 = 0.25 * information.row(t, Row::kDelta)[c];
+      const double m1 = 0.5 * information.row(t, Row::kDeltaMean)[c];
+      const double p2 = information.row(t, Row::kDeltaDelta)[c];
+      const double m2 = information.row(t, Row::kDeltaDeltaMean)[c];
       double* band = bands_.data() + static_cast<std::ptrdiff_t>(t - 1) * kRows;
       band[0] += p1 + p2;
       band[1] -= 2.0 * p2;

@@ -1,5 +1,5 @@
-// LAPACK as a baseline of the batch solve: one banded system a channel, built and solved by dpbsv.
-// The library is loaded when asked for, because nothing but the bench wants it.
+// LAPACK as a baseline of the batch solve: one banded system per channel, solved by dpbsv. The
+// library is loaded at run time, because only the benchmark uses it.
 #pragma once
 
 #include <vector>
@@ -11,11 +11,11 @@ namespace posed::bench {
 
 class LapackBaseline {
  public:
-  // Refuses when liblapack.so.3 is not installed.
+  // Returns an error when liblapack.so.3 is not installed.
   [[nodiscard]] static Result<LapackBaseline> load();
 
-  // The trajectory of every channel, [channel][frame], from the evidence of all frames.
-  void solve(const trajectory::InformationForm& evidence, std::vector<double>& x);
+  // The trajectory of every channel, [channel][frame], from the information of all frames.
+  void solve(const trajectory::InformationForm& information, std::vector<double>& x);
 
  private:
   using Dpbsv = void (*)(const char* uplo, const int* n, const int* kd, const int* nrhs, double* ab,

@@ -1,5 +1,5 @@
-// posed_bench: posed beside other programs and methods. What measures the user's own machine is
-// `posed bench`.
+// posed_bench: compares posed with other programs and methods. Measurements of the user's own
+// machine are in `posed bench`.
 #include <CLI/CLI.hpp>
 
 #include "daemon/cli/cli.hpp"

@@ -1,4 +1,4 @@
-// The baseline that Debian packages: `mlpg` of SPTK 3.9, run as a process. For the bench and its
+// `mlpg` of SPTK 3.9 (a Debian package) as a baseline, run as a process. For the benchmark and its
 // test.
 #pragma once
 
@@ -11,7 +11,7 @@ namespace posed::bench {
 
 inline constexpr const char* kSptkMlpg = "/usr/libexec/sptk/bin/mlpg";
 
-// InformationForm as mlpg reads it: per frame the means, then the variances, each
+// An InformationForm in mlpg's input format: for each frame the means, then the variances, each
 // [window][channel].
 struct SptkInput {
   int channels = 0;
@@ -20,10 +20,11 @@ struct SptkInput {
 
 struct SptkRun {
   std::vector<float> trajectory;  // [frame][channel]
-  double seconds = 0.0;           // the whole process, files in memory where /tmp is
+  double seconds = 0.0;           // of the whole process; files are in memory if /tmp is
 };
 
-// With influence range `range` (-s), which has delay range + 1. Refuses when sptk is not installed.
+// Runs mlpg with the influence range `range` (-s), whose delay is range + 1. Returns an error when
+// sptk is not installed.
 [[nodiscard]] Result<SptkRun> run_sptk(const SptkInput& input, int range,
                                        const std::filesystem::path& folder);
 

@@ -1,5 +1,5 @@
-// A glove behind a running daemon, calibrated from outside: poses, the file, its use, and whose it
-// is.
+// Calibrates a glove through a running daemon: poses, the file, its use, and the glove to which it
+// belongs.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ using drivers::glove::Pose;
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-// A walker, and a LucidGlove that connects over TCP: its address is its identity.
+// A walker, and a LucidGlove that connects over TCP and is identified by its address.
 class CalibrationStage : public Stage {
  public:
   CalibrationStage() {
@@ -49,7 +49,7 @@ class CalibrationStage : public Stage {
 
   [[nodiscard]] std::string endpoint() const { return "127.0.0.1:" + std::to_string(port_); }
 
-  // `posed calibrate --connect`; the glove's hand does as it is told.
+  // `posed calibrate --connect`; the emulated hand takes each requested pose.
   Outcome calibrate(const std::vector<std::string>& options) {
     std::vector<std::string> arguments{"calibrate", "--connect", publish,         "--user",
                                        "ann",       "--out",     path("ann.toml")};
@@ -76,7 +76,7 @@ class CalibrationStage : public Stage {
     CHECK(posed({"monitor", "--connect", publish, "--stream", "right", "--count", "1"}).code == 0);
   }
 
-  // The calibrated value of a sensor, now.
+  // The present calibrated value of a sensor.
   [[nodiscard]] double value_of(const std::string& sensor) const {
     const Outcome seen = posed({"monitor", "--connect", publish, "--topic", "sensor", "--stream",
                                 "right", "--json", "--count", "1"});
@@ -124,11 +124,12 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
 
   stage.glove->hold(Pose::kFist);
   const double before = stage.value_of("index_joint1");
-  CHECK(before == Approx(80.0 / 90.0).margin(0.01));  // the default: a whole curl is 90 degrees
+  CHECK(before == Approx(80.0 / 90.0).margin(0.01));  // the default: a full curl is 90 degrees
   const Outcome applied = stage.ctl({"calibrate", "right", stage.path("ann.toml")});
   INFO(applied.err);
   CHECK(applied.code == 0);
-  CHECK(stage.value_of("index_joint1") == Approx(1.0).margin(0.01));  // ann's fist is all of it
+  CHECK(stage.value_of("index_joint1") ==
+        Approx(1.0).margin(0.01));  // ann's fist is the full range
 
   const auto other = stage.folder.write("other.toml", of_another_glove(mine));
   const Outcome refused = stage.ctl({"calibrate", "right", other.string()});
@@ -146,7 +147,7 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
   CHECK(replayed.code == 0);
 }
 
-TEST_CASE("a hand that moved, or never took a pose, makes no calibration") {
+TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
   CalibrationStage stage;
   stage.launch("run");
   stage.put_on();
@@ -168,7 +169,7 @@ TEST_CASE("a hand that moved, or never took a pose, makes no calibration") {
   }
   CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
 
-  // A hand that lies flat whatever is asked.
+  // A hand that stays flat in every requested pose.
   {
     const std::jthread lazy([&](const std::stop_token& stop) {
       for (; !stop.stop_requested(); std::this_thread::sleep_for(2ms)) {
@@ -181,7 +182,7 @@ TEST_CASE("a hand that moved, or never took a pose, makes no calibration") {
   }
   CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
 
-  // What is there is not replaced unasked, and an option that means nothing is told.
+  // An existing file is not replaced without --overwrite, and an option without effect is reported.
   stage.folder.write("ann.toml", "mine");
   const Outcome there = stage.calibrate(quick);
   CHECK(there.code == 2);
@@ -192,7 +193,7 @@ TEST_CASE("a hand that moved, or never took a pose, makes no calibration") {
   CHECK(has(useless.err, "add --seconds"));
 }
 
-TEST_CASE("calibrate --connect says what is wrong with what was asked") {
+TEST_CASE("calibrate --connect reports what is wrong with a request") {
   CalibrationStage stage;
   stage.launch("run");
   const auto refused = [&](const std::vector<std::string>& options, const std::string& sentence) {
@@ -211,7 +212,7 @@ TEST_CASE("calibrate --connect says what is wrong with what was asked") {
 }
 
 TEST_CASE(
-    "a stream's calibration waits for its glove; another glove is turned away with a sentence") {
+    "a stream's calibration waits for its glove; another glove is refused with an error message") {
   CalibrationStage stage;
   const std::string toml =
       "format = 1\ndriver = \"lucidgloves\"\nhand = \"right\"\nuser = \"ann\"\n"
@@ -219,7 +220,7 @@ TEST_CASE(
   stage.folder.write("mine.toml", toml);
   stage.folder.write("other.toml", of_another_glove(toml));
   stage.write_config("calibration = \"mine.toml\"\n");
-  stage.launch("run");  // the glove is away: whose it will be is not known
+  stage.launch("run");  // the glove is not connected, so its identity is not known yet
   stage.put_on();
   stage.glove->hold(Pose::kFist);
   stage.wait_for_frame();
@@ -232,14 +233,14 @@ TEST_CASE(
   stage.launch("run");
   Process events(
       {"monitor", "--connect", stage.publish, "--topic", "event", "--stream", "right", "--json"});
-  bool told = false;
-  for (int i = 0; i < 10 && !told; ++i) {
-    stage.put_on();  // posed hangs up; the glove tries again
-    for (std::optional<std::string> line; !told && (line = events.line(2s));) {
-      told = line->contains("this calibration is for glove 'tcp 10.0.0.7'");
+  bool refusal_seen = false;
+  for (int i = 0; i < 10 && !refusal_seen; ++i) {
+    stage.put_on();  // posed hangs up; the glove reconnects
+    for (std::optional<std::string> line; !refusal_seen && (line = events.line(2s));) {
+      refusal_seen = line->contains("this calibration is for glove 'tcp 10.0.0.7'");
     }
   }
-  CHECK(told);
+  CHECK(refusal_seen);
   const auto status = json::parse(stage.ctl({"--json", "status"}).out).at("status");
   const auto& right = status.at("stream").at(1);
   CHECK(right.at("away") == true);

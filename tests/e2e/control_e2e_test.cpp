@@ -1,4 +1,4 @@
-// The clients against a running daemon: what they print, how they end, what they are refused.
+// The client commands with a running daemon: their output, exit codes and refusals.
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 
@@ -7,7 +7,7 @@ namespace {
 
 using nlohmann::json;
 
-TEST_CASE("ctl changes a running daemon and says from which frame on") {
+TEST_CASE("ctl changes a running daemon and reports from which frame on") {
   Served served;
   served.start();
   const auto ctl = [&](std::vector<std::string> what) {
@@ -50,7 +50,7 @@ TEST_CASE("monitor and top show the daemon, to people and to scripts") {
   int count = 0;
   for (std::string line; std::getline(lines, line); ++count) {
     const auto frame = json::parse(line);
-    CHECK(frame.at("stream") == "walker");  // never walker-raw
+    CHECK(frame.at("stream") == "walker");  // not walker-raw
     const std::uint64_t sequence = std::stoull(frame.at("sequence").get<std::string>());
     CHECK(sequence > last);
     last = sequence;
@@ -77,7 +77,7 @@ TEST_CASE("monitor and top show the daemon, to people and to scripts") {
   CHECK(served.daemon->exit_code() == 0);
 }
 
-TEST_CASE("completion is made from the commands there are") {
+TEST_CASE("completion is generated from the existing commands") {
   const auto bash = posed({"completion", "bash"});
   CHECK(bash.code == 0);
   CHECK(has(bash.out,
@@ -88,7 +88,7 @@ TEST_CASE("completion is made from the commands there are") {
   CHECK(posed({"completion", "tcsh"}).code == 2);
 }
 
-TEST_CASE("nobody there is one sentence") {
+TEST_CASE("an absent daemon gives one error message") {
   const auto ctl = posed({"ctl", "--connect", "tcp://127.0.0.1:9", "--timeout", "0.3", "status"});
   CHECK(ctl.code == 1);
   CHECK(has(ctl.err, "posed: nobody answers at tcp://127.0.0.1:9"));
@@ -97,7 +97,7 @@ TEST_CASE("nobody there is one sentence") {
   CHECK(has(wrong.err, "an endpoint reads like"));
 }
 
-TEST_CASE("a busy port is one sentence, exit 1") {
+TEST_CASE("a busy port gives one error message and exit code 1") {
   Served served;
   served.start();
   Served second;
@@ -111,16 +111,16 @@ TEST_CASE("a busy port is one sentence, exit 1") {
   CHECK(has(busy.err, served.publish + " is in use"));
 }
 
-TEST_CASE("check tells what a config would run, or all that is wrong with it") {
+TEST_CASE("check reports what a config would run, or everything that is wrong with it") {
   Served served;
   const auto good = posed({"check", "--config", served.path("posed.toml"), "--json"});
   INFO(good.err);
   REQUIRE(good.code == 0);
-  const auto told = json::parse(good.out);
-  CHECK(told.at("ok") == true);
-  CHECK(told.at("streams").at(0).at("name") == "walker");
-  CHECK(told.at("streams").at(0).at("joints") == 5);
-  CHECK(told.at("streams").at(0).at("model") == "one.style");
+  const auto checked_config = json::parse(good.out);
+  CHECK(checked_config.at("ok") == true);
+  CHECK(checked_config.at("streams").at(0).at("name") == "walker");
+  CHECK(checked_config.at("streams").at(0).at("joints") == 5);
+  CHECK(checked_config.at("streams").at(0).at("model") == "one.style");
   CHECK(posed({"check", "--config", served.path("posed.toml")}).code == 0);
 
   const auto bad = served.folder.write("bad.toml", "strem = 1\nrealtime = 2\n");
@@ -129,7 +129,8 @@ TEST_CASE("check tells what a config would run, or all that is wrong with it") {
   CHECK(has(all.err, "bad.toml:1: unknown key 'strem'; the nearest known one here is 'stream'"));
   CHECK(has(all.err, "bad.toml:2: realtime must be true or false"));
   const auto as_json = posed({"check", "--config", bad.string(), "--json"});
-  CHECK(json::parse(as_json.out).at("errors").size() == 3);  // and that there is no stream
+  CHECK(json::parse(as_json.out).at("errors").size() ==
+        3);  // the third error is that there is no stream
   CHECK(posed({"check", "--config", served.path("none.toml")}).code == 2);
 
   std::filesystem::remove(served.folder.path() / "one.style");
@@ -138,7 +139,7 @@ TEST_CASE("check tells what a config would run, or all that is wrong with it") {
   CHECK(has(gone.err, "one.style"));
 }
 
-TEST_CASE("strangers get in nowhere, and a withdrawn key is cut off") {
+TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {
   Served served;
   for (const char* name : {"server", "viewer", "director", "stranger", "other"}) {
     REQUIRE(posed({"keygen", name, "--out", served.folder.path().string()}).code == 0);
@@ -183,10 +184,10 @@ TEST_CASE("strangers get in nowhere, and a withdrawn key is cut off") {
   INFO(served.daemon->errors());
   CHECK(connected.exit_code() == 1);
   CHECK(has(connected.errors(), "refuses this key"));
-  while (other.line(std::chrono::milliseconds(0))) {  // what it had before
+  while (other.line(std::chrono::milliseconds(0))) {  // frames from before
   }
-  CHECK(other.line());  // was not cut
-  // A config that lost its [security] opens no door and ends no daemon.
+  CHECK(other.line());  // this client was not cut off
+  // A config without its [security] table neither gives access nor ends the daemon.
   served.write_config("");
   served.daemon->send(SIGHUP);
   CHECK_FALSE(served.daemon->exit_code(std::chrono::milliseconds(500)));

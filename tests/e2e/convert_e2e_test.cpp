@@ -1,4 +1,4 @@
-// `posed convert` of a log that `posed record` writes: a body to a BVH, a hand to a CSV.
+// `posed convert` of a log written by `posed record`: a body to a BVH, a hand to a CSV.
 #include <catch2/catch.hpp>
 
 #include <chrono>
@@ -17,7 +17,8 @@ using namespace std::chrono_literals;
 
 constexpr int kFrames = 240;
 
-// A walker and a hand, each once from its file and as fast as possible, so that nothing is skipped.
+// A walker and a hand, each played once from its file as fast as possible, so that nothing is
+// skipped.
 class Take : public Stage {
  public:
   Take() {
@@ -87,11 +88,11 @@ TEST_CASE("convert writes what a log's streams published") {
   }
 }
 
-TEST_CASE("convert says what a log lacks and how it is misused") {
+TEST_CASE("convert reports what a log lacks and wrong use") {
   Take stage;
   stage.record();
   (void)stage.convert_all("walk.out.bvh", "walk");
-  stage.daemon->send(SIGKILL);  // the log of a daemon that was killed is as good
+  stage.daemon->send(SIGKILL);  // the log of a killed daemon works, too
   REQUIRE(stage.daemon->exit_code());
   const Outcome unclear = stage.convert("out.bvh");
   CHECK(unclear.code == 2);

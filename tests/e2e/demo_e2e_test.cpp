@@ -1,5 +1,5 @@
-// The demo from anywhere: what it needs lies in one folder, is made once, and is made anew when it
-// is not what this program would make.
+// The demo in any folder: its files are in one folder, are created once, and are created again when
+// they differ from what this version creates.
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -16,7 +16,7 @@ std::string text_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The demo's config on ports of the test's own.
+// The demo's config with free ports.
 std::string on_free_ports(std::string toml) {
   for (const char* port : {"127.0.0.1:5570", "127.0.0.1:5571"}) {
     const auto at = toml.find(port);
@@ -28,7 +28,7 @@ std::string on_free_ports(std::string toml) {
 
 }  // namespace
 
-TEST_CASE("the demo streams from any folder and learns once", "[demo]") {
+TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   const TempFolder folder;
   const auto kept = folder.path() / "kept";
   const auto prepare = [&] { return posed({"demo", "--prepare", kept.string()}); };
@@ -51,13 +51,13 @@ TEST_CASE("the demo streams from any folder and learns once", "[demo]") {
   CHECK_FALSE(streamed.err.contains("learning the style"));
   CHECK(streamed.out.contains("styled frames over ZeroMQ"));
 
-  // A model that was changed since is learnt again, to the same bits.
+  // A model that was modified is trained again, with the same bits.
   std::ofstream(kept / "march-to-sway.style") << "not a model";
   CHECK(prepare().code == 0);
   CHECK(text_of(kept / "march-to-sway.style") == model);
 }
 
-TEST_CASE("the demo leaves a folder alone that is not its own", "[demo]") {
+TEST_CASE("the demo does not touch a folder that is not its own", "[demo]") {
   const TempFolder folder;
   const auto mine = folder.write("march_1.bvh", "mine");
   const Outcome refused = posed({"demo", "--prepare", folder.path().string()});

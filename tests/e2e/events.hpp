@@ -11,7 +11,7 @@
 
 namespace posed::test {
 
-// The next event of this kind; its time.
+// Waits for the next event of this kind and returns its time.
 inline std::int64_t wait_for(Process& events, const std::string& kind) {
   while (const auto line = events.line()) {
     const auto event = nlohmann::json::parse(*line);

@@ -1,5 +1,5 @@
-// A device that sends valid data as fast as the network takes it must not cost the streams beside
-// it anything, nor the daemon its memory.
+// A device that sends valid data as fast as the network allows must neither disturb other streams
+// nor exhaust the daemon's memory.
 #include <catch2/catch.hpp>
 
 #include <arpa/inet.h>
@@ -32,7 +32,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr double kNeighbourRate_hz = 120.0;
 
-// 2 s; POSED_FLOOD_S says otherwise.
+// 2 s, or POSED_FLOOD_S seconds.
 std::chrono::milliseconds flood_time() {
   const char* const wanted = std::getenv("POSED_FLOOD_S");
   return wanted == nullptr ? 2000ms : std::chrono::milliseconds(1000 * std::atoi(wanted));
@@ -79,7 +79,7 @@ std::uint64_t resident_bytes(pid_t pid) {
   return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
-// The numbers of the frames of one stream that come to a subscriber within a time.
+// The sequence numbers of one stream's frames that a subscriber receives within a time.
 std::set<std::uint64_t> frames_within(const std::string& endpoint, const std::string& stream,
                                       std::chrono::milliseconds time) {
   const auto context = net::open_context().value();
@@ -102,7 +102,7 @@ std::set<std::uint64_t> frames_within(const std::string& endpoint, const std::st
   return sequences;
 }
 
-// A stream `bend` of 120 Hz, and one `flood` that a glove may connect to at this port.
+// A stream `bend` of 120 Hz, and a stream `flood` to which a glove can connect at this port.
 std::string config_with_port(std::uint16_t port) {
   return std::string(Stage::kEndpoints) +
          "[[stream]]\nname = \"bend\"\ndriver = \"template\"\n[stream.template]\n"
@@ -114,8 +114,9 @@ std::string config_with_port(std::uint16_t port) {
 
 }  // namespace
 
-// The log of a flood replays to the bit as far as it goes; what it lacks is the flooding stream's.
-TEST_CASE("a glove that floods a daemon that records costs its neighbour's log nothing") {
+// The log of a flood replays bit for bit as far as it goes; only data of the flooding stream is
+// missing.
+TEST_CASE("a glove that floods a recording daemon loses nothing of its neighbour's log") {
   Stage stage;
   const std::uint16_t port = free_port();
   stage.folder.write("posed.toml", config_with_port(port));
@@ -140,7 +141,7 @@ TEST_CASE("a glove that floods a daemon that records costs its neighbour's log n
   CHECK(nlohmann::json::parse(replay.out).at("compared") > 100);
 }
 
-TEST_CASE("a glove that floods the daemon over TCP costs its neighbour no frame") {
+TEST_CASE("a glove that floods the daemon over TCP loses no frame of its neighbour") {
   Stage stage;
   const std::uint16_t port = free_port();
   stage.folder.write("posed.toml", config_with_port(port));
@@ -152,7 +153,7 @@ TEST_CASE("a glove that floods the daemon over TCP costs its neighbour no frame"
   const auto time = flood_time();
   std::uint64_t sent = 0;
   std::jthread glove([&] { sent = flood(port, time + 500ms); });
-  std::this_thread::sleep_for(500ms);  // the daemon greets it
+  std::this_thread::sleep_for(500ms);  // the daemon exchanges the device info with it
   const auto during = frames_within(stage.publish, "bend", time);
   const std::uint64_t memory = resident_bytes(stage.daemon->pid());
   glove.join();

@@ -1,5 +1,5 @@
-// Gloves as a stage meets them: emulated ones on pseudo-terminals behind the real binary, unplugged
-// and plugged in again, calibrated and felt, recorded and replayed.
+// Gloves in a realistic session: emulated gloves on pseudo-terminals with the real binary,
+// unplugged and plugged in again, calibrated, with haptics, recorded and replayed.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ class GloveStage : public Stage {
     folder.write("posed.toml", config);
   }
 
-  // Plugs the glove in; the time on the daemon's clock at which it could be opened.
+  // Plugs the glove in and returns the time on the daemon's clock from which it could be opened.
   std::int64_t plug_in(const std::string& hand, std::optional<Process>& glove) const {
     glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", path(hand), "--set",
                                            "hand=" + hand});
@@ -58,7 +58,8 @@ class GloveStage : public Stage {
   }
 
   void expect_replay() const {
-    std::filesystem::remove(path("frames.bin"));  // of the replay before: replay overwrites nothing
+    std::filesystem::remove(
+        path("frames.bin"));  // of the previous replay, because replay overwrites nothing
     const auto replay = posed(
         {"replay", path("take.plog"), "--speed", "max", "--out", path("frames.bin"), "--expect"});
     INFO(replay.err);
@@ -66,7 +67,7 @@ class GloveStage : public Stage {
   }
 };
 
-TEST_CASE("a glove comes late, goes and comes back; the others never notice") {
+TEST_CASE("a glove comes late, is unplugged and comes back; the others are not affected") {
   GloveStage stage;
   stage.record();  // nothing is plugged in yet
   std::optional<Process> right, left;
@@ -84,7 +85,7 @@ TEST_CASE("a glove comes late, goes and comes back; the others never notice") {
     wait_for(events, "KIND_LOST");
   }
   WARN("plugged in to connected: at most " << slowest_ns / 1'000'000 << " ms");
-  CHECK(slowest_ns < 5'000'000'000);  // of a busy machine; an idle one needs half a second
+  CHECK(slowest_ns < 5'000'000'000);  // limit for a busy machine; an idle one needs half a second
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
   CHECK(check_frames_follow(stage.path("take.plog"), "walker") > 100);
@@ -131,7 +132,7 @@ TEST_CASE("a live calibration and haptics reach the glove, and the log repeats t
   stage.expect_replay();
 }
 
-// POSED_KILLS=20 for the figure; each takes two seconds.
+// POSED_KILLS=20 gives the figure in the README; each kill takes two seconds.
 TEST_CASE("kill -9 while gloves are recorded: the log opens and replays") {
   const char* const wanted = std::getenv("POSED_KILLS");
   const int kills = wanted == nullptr ? 2 : std::atoi(wanted);
@@ -148,7 +149,7 @@ TEST_CASE("kill -9 while gloves are recorded: the log opens and replays") {
     const std::int64_t killed_ns = system::monotonic_ns();
     stage.daemon->send(SIGKILL);
     CHECK(stage.daemon->exit_code() == 128 + SIGKILL);
-    stage.expect_replay();  // folds in the -wal and checks the whole file
+    stage.expect_replay();  // merges the -wal file and checks the whole file
     auto reader = log::Reader::open(stage.path("take.plog"));
     REQUIRE(reader);
     std::int64_t last_ns = 0;

@@ -1,5 +1,5 @@
-// A CyberGlove III on the network: the glove is the client and sends 16-bit records. Cut and
-// connected again while its hand moves, no frame may be made of two.
+// A CyberGlove III on the network: the glove is the client and sends 16-bit records. It is
+// disconnected and connected again while its hand moves, and no frame may mix two records.
 #include <catch2/catch.hpp>
 
 #include <chrono>
@@ -26,7 +26,7 @@ using namespace std::chrono_literals;
 
 constexpr double kCount_rad = 0.02;  // a count of the coarsest sensor is 0.0182 rad
 
-// Whether all finger joints bend as in this pose.
+// Whether all finger joints are bent as in this pose.
 bool bends_as(const v1::Frame& frame, Pose pose) {
   const HandAngles wanted = hand_in(pose);
   for (const char* finger : {"index", "middle", "ring", "little"}) {
@@ -42,7 +42,8 @@ bool bends_as(const v1::Frame& frame, Pose pose) {
 
 }  // namespace
 
-TEST_CASE("a CyberGlove III that connects over TCP is read, lost and found; no frame is of two") {
+TEST_CASE(
+    "a CyberGlove III that connects over TCP is read, lost and found; no frame mixes two records") {
   Stage stage;
   const std::string endpoint = "127.0.0.1:" + std::to_string(free_port());
   stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +

@@ -1,5 +1,5 @@
-// Hands through the real binary: labels performed on a live hand and on a stream without a device,
-// what the wire says of them, what is refused, and a log of it all that replays to the bit.
+// Hands with the real binary: labels performed on a live hand and on a stream without a device, the
+// published frames, refusals, and a log that replays bit for bit.
 #include <algorithm>
 #include <set>
 #include <sstream>
@@ -63,7 +63,7 @@ std::vector<json> frames_of(const Served& served, const std::string& stream, int
   return frames;
 }
 
-// Whether a frame with this source and label comes among the next `most`.
+// Whether one of the next `most` frames has this source and label.
 bool comes(const Served& served, const std::string& stream, const std::string& source,
            const std::string& label, int most) {
   return std::ranges::any_of(frames_of(served, stream, most), [&](const json& frame) {
@@ -108,7 +108,7 @@ TEST_CASE("labels are performed on a live hand and on a stream without a device"
   CHECK(served.daemon->exit_code() == 0);
 }
 
-TEST_CASE("a play that cannot be is one sentence and an exit code") {
+TEST_CASE("an impossible play gives one error message and an exit code") {
   Served served;
   write_hands(served);
   served.folder.write("posed.toml", std::string(kTwoHands) +
@@ -167,7 +167,7 @@ TEST_CASE("a config that cannot be performed is refused with the stream's name")
   CHECK(fine.code == 0);
 }
 
-TEST_CASE("a live hand comes out as `posed smooth` writes it") {
+TEST_CASE("a live hand is published as `posed smooth` writes it") {
   Served served;
   write_hands(served);
   served.folder.write("posed.toml", R"(realtime = false
@@ -206,7 +206,7 @@ enabled = false
     v1::Frame frame;
     REQUIRE(frame.ParseFromArray(row->bytes.data(), static_cast<int>(row->bytes.size())));
     REQUIRE(frame.sequence() == count + 1);
-    // What a starved machine let out early has less lag; the end has none.
+    // Frames that a busy machine emitted early have less lag, and the last frames have none.
     if (frame.lag_frames() != 2) continue;
     ++compared;
     double most = 0.0;

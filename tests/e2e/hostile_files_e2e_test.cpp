@@ -1,5 +1,5 @@
-// TOML that would overflow the parser's stack and files that are none, given to the real binary by
-// every way there is: it answers with a sentence and goes on.
+// TOML that would overflow the parser's stack, and paths that are not regular files, given to the
+// real binary in every possible way: it prints an error message and goes on.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace posed::test {
 namespace {
 
-// One sentence on stderr, and no signal ended it.
+// Checks for one error message on stderr, and that no signal ended the process.
 void check_refused(const std::vector<std::string>& arguments, const std::string& part) {
   const Outcome outcome = posed(arguments);
   INFO(arguments[0] << " " << arguments[1] << ": " << outcome.err.substr(0, 500));
@@ -29,8 +29,8 @@ std::string stream_with(const std::string& more) {
   return std::string(Stage::kEndpoints) + "[[stream]]\nname = \"hand\"\n" + more;
 }
 
-// Puts `value` into a column of each row of a log's table where `where` holds, with a checksum that
-// is right, as a stranger who sends a log would. Returns how many rows there were.
+// Writes `value` into a column of each row of a log's table that matches `where`, with a recomputed
+// checksum, as an untrusted sender of a log could. Returns the number of rows.
 int forge(const std::string& path, const std::string& table, const std::string& column,
           const std::string& value, const std::string& where = "1") {
   sqlite3* log = nullptr;
@@ -69,7 +69,7 @@ int forge(const std::string& path, const std::string& table, const std::string& 
   return static_cast<int>(forged.size());
 }
 
-TEST_CASE("TOML nested 31,000 deep is one sentence, whichever file it stands in") {
+TEST_CASE("TOML nested 31,000 deep gives one error message, whichever file contains it") {
   const Served served;
   const std::string deep = served.folder.write("deep.toml", toml_bombs()[0]).string();
   const std::string config = served.path("posed.toml");
@@ -106,7 +106,7 @@ TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its l
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
 
-  // The same in a log that a stranger sent.
+  // The same in a log from an untrusted source.
   CHECK(forge(stage.path("take.plog"), "chunk", "bytes", toml_bombs()[0], "direction=3") == 1);
   const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
   INFO(replay.err.substr(0, 1000));
@@ -115,7 +115,7 @@ TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its l
   CHECK(replay.err.size() < 2000);
 }
 
-TEST_CASE("what is no file is one sentence, whichever option or key names it") {
+TEST_CASE("a path that is not a file gives one error message, whichever option or key names it") {
   const Served served;
   const std::string config = served.path("posed.toml");
   const std::string folder = served.folder.path().string();
@@ -139,8 +139,7 @@ TEST_CASE("what is no file is one sentence, whichever option or key names it") {
   }
 }
 
-TEST_CASE(
-    "a log whose driver has a wild name is refused without a word of it reaching the terminal") {
+TEST_CASE("a log with escape sequences in its driver's name is refused without printing them") {
   Served stage;
   stage.record();
   stage.daemon->send(SIGTERM);
@@ -158,7 +157,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("check says that a glove is away, and that it would be waited for") {
+TEST_CASE("check reports that a glove is not connected, and that the daemon would wait for it") {
   const Served served;
   served.folder.write("posed.toml", stream_with("driver = \"cyberglove\"\nport = \"/dev/none\"\n"));
   const Outcome text = posed({"check", "--config", served.path("posed.toml")});

@@ -1,5 +1,5 @@
-// The live commands tell the truth: about a daemon that died, about what was changed and since
-// when, about a replay, about the file that was written, about what they wait for.
+// The live commands report the true state: of a daemon that died, of what changed and since when,
+// of a replay, of the file that was written, and of what they wait for.
 #include <catch2/catch.hpp>
 
 #include <chrono>
@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-// Waits until the process has said this on stderr; false after half a minute.
+// Waits until stderr of the process contains this text; false after half a minute.
 bool comes_to_say(const Process& process, const std::string& part) {
   for (int i = 0; i < 600; ++i) {
     if (process.errors().contains(part)) return true;
@@ -36,7 +36,7 @@ std::string line_with(Process& process, const std::string& part) {
   return {};
 }
 
-// The text of the next event that says this; `events` prints JSON.
+// The text of the next event that contains this; `events` prints JSON.
 std::string event_with(Process& events, const std::string& part) {
   while (const auto line = events.line()) {
     const std::string text = json::parse(*line).at("text");
@@ -47,7 +47,7 @@ std::string event_with(Process& events, const std::string& part) {
 
 constexpr const char* kNobody = "tcp://127.0.0.1:9";
 
-TEST_CASE("monitor prints a glove's loss and return, and lives on") {
+TEST_CASE("monitor prints a glove's loss and return, and continues") {
   Stage stage;
   stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +
                                        "[[stream]]\nname = \"right\"\ndriver = \"lucidgloves\"\n"
@@ -95,7 +95,7 @@ TEST_CASE("a daemon that is gone is not shown as live") {
   }
 }
 
-TEST_CASE("whoever waits for a daemon is told what for") {
+TEST_CASE("commands that wait for a daemon report what they wait for") {
   for (const char* command : {"top", "monitor"}) {
     Process waits({command, "--connect", kNobody, "--json"});
     CHECK(comes_to_say(waits, "posed: waiting: nobody answers at tcp://127.0.0.1:9"));
@@ -117,7 +117,7 @@ TEST_CASE("a status is as new as the acknowledgement before it, and events say w
   served.start();
   Process events({"monitor", "--connect", served.publish, "--topic", "event", "--json"});
   Process all({"monitor", "--connect", served.publish, "--topic", "stats"});
-  REQUIRE(all.line());  // subscriptions take a moment; this one came later
+  REQUIRE(all.line());  // subscriptions take a moment; this one was made last
   const auto stream = [&] {
     return json::parse(served.ctl({"--json", "status"}).out).at("status").at("stream").at(0);
   };
@@ -138,7 +138,7 @@ TEST_CASE("a status is as new as the acknowledgement before it, and events say w
   CHECK(std::stoull(stream().at("frames").get<std::string>()) > before);
 }
 
-TEST_CASE("a published replay says that it is one, and its times make sense") {
+TEST_CASE("a published replay is marked as one, and its times are consistent") {
   const TempFolder folder;
   const auto log = (folder.path() / "staged.plog").string();
   std::filesystem::copy_file(golden("replay/staged.plog"), log);
@@ -183,7 +183,7 @@ TEST_CASE("a published replay says that it is one, and its times make sense") {
   cut.send(SIGINT);
   CHECK(cut.exit_code() == 1);
   CHECK(has(cut.errors(), "holds only those"));
-  CHECK(has(cut.errors(), "replayed 0 of "));  // it was not silent
+  CHECK(has(cut.errors(), "replayed 0 of "));  // the interrupted replay reported its progress
 }
 
 TEST_CASE("a recording ends with what was written") {
@@ -194,18 +194,18 @@ TEST_CASE("a recording ends with what was written") {
   CHECK(served.daemon->exit_code() == 0);
   const auto line = served.daemon->line();
   REQUIRE(line);
-  const json told = json::parse(*line);
-  CHECK(told.at("file") == served.path("take.plog"));
-  CHECK(told.at("bytes") == std::filesystem::file_size(served.path("take.plog")));
-  CHECK(told.at("frames") > 10);
-  CHECK(told.at("streams").at(0).at("stream") == "walker");
-  CHECK(told.at("missing_chunks") == 0);
-  CHECK(told.at("seconds") >= 0.7);
+  const json summary = json::parse(*line);
+  CHECK(summary.at("file") == served.path("take.plog"));
+  CHECK(summary.at("bytes") == std::filesystem::file_size(served.path("take.plog")));
+  CHECK(summary.at("frames") > 10);
+  CHECK(summary.at("streams").at(0).at("stream") == "walker");
+  CHECK(summary.at("missing_chunks") == 0);
+  CHECK(summary.at("seconds") >= 0.7);
   CHECK(has(served.daemon->errors(), "take.plog: "));
   CHECK(has(served.daemon->errors(), "nothing is missing"));
 }
 
-TEST_CASE("ctl knows the file it is given before it sends it") {
+TEST_CASE("ctl checks a file before it sends it") {
   Served served;
   served.start();
   const auto fit =
@@ -230,7 +230,7 @@ TEST_CASE("ctl knows the file it is given before it sends it") {
   CHECK(served.ctl({"haptics", "walker"}).code == 2);
 }
 
-TEST_CASE("a piped status has whole names, and no line ends in blanks") {
+TEST_CASE("a piped status has complete names, and no line ends in blanks") {
   Served served;
   const std::string name = "a-style-with-a-rather-long-name-that-was-cut-before.style";
   std::filesystem::copy_file(served.path("one.style"), served.path(name));

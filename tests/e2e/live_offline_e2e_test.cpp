@@ -1,5 +1,6 @@
-// A clip once through the real binary: live is what `posed apply --cold` writes, the end and the
-// silences of a source are told on the wire, and bad input is one sentence and an exit code.
+// A clip played once through the real binary: live output equals what `posed apply --cold` writes,
+// the end and the silences of a source are reported to clients, and bad input gives one error
+// message and an exit code.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -32,7 +33,7 @@ std::string config_of(const std::string& stream, const std::string& file,
          stream + "\n[stream.file]\n" + file + "\n[stream.style]\nmodel = \"" + model + "\"\n";
 }
 
-// What the daemon says of its stream, heard as any client hears it.
+// Receives the daemon's events about its stream like any client.
 class Listener {
  public:
   explicit Listener(const std::string& endpoint) {
@@ -42,7 +43,7 @@ class Listener {
     REQUIRE(net::connect_socket(socket_.get(), endpoint));
   }
 
-  // Listens until `wanted` came so many times.
+  // Listens until `wanted` has arrived `times` times.
   void until(v1::Event::Kind wanted, int times) {
     const auto end = steady_clock::now() + std::chrono::seconds(30);
     while (count(wanted) < times && steady_clock::now() < end) {
@@ -112,7 +113,8 @@ std::vector<v1::Frame> published(const log::Reader& reader) {
   return frames;
 }
 
-// A starved machine sheds; from there on the live filter has seen another clip.
+// An overloaded machine sheds (skips) frames; from there on the live filter has had a different
+// input.
 std::uint64_t first_shed(const log::Reader& reader) {
   const auto decisions = reader.decisions();
   REQUIRE(decisions);
@@ -155,7 +157,7 @@ void write_bad_files(const Served& served) {
   REQUIRE(clip::write_bvh(renamed_walk(), served.folder.path() / "renamed.bvh"));
 }
 
-// What stderr says but for the log, whose lines begin with their time (a warning of the clip's
+// The text on stderr without log lines, which begin with their time (a warning about the clip's
 // unit).
 std::string without_log(const std::string& errors) {
   std::istringstream lines(errors);
@@ -173,7 +175,7 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
   const clip::Clip offline = applied_cold(served);
   const auto input = clip::read_clip(served.path("walk.bvh"));
   REQUIRE(input);
-  for (const char* pace : {"0.0", "1.0"}) {  // as fast as it can, and by its own clock
+  for (const char* pace : {"0.0", "1.0"}) {  // as fast as possible, and by the clip's own clock
     INFO("pace " << pace);
     const std::string file = std::string("path = \"walk.bvh\"\nloop = false\npace = ") + pace;
     served.folder.write("once.toml", config_of("", file));
@@ -184,7 +186,7 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
     const auto reader = log::Reader::open(served.path("take.plog"));
     REQUIRE(reader);
     const std::uint64_t end = first_shed(*reader);
-    if (*pace == '0') CHECK(end == kFrames + 1);  // a patient source is never shed
+    if (*pace == '0') CHECK(end == kFrames + 1);  // a lossless source is never shed
     std::vector<v1::Frame> live = published(*reader);
     std::erase_if(live, [end](const v1::Frame& frame) { return frame.sequence() >= end; });
     REQUIRE(live.size() == end - 1);
@@ -192,11 +194,12 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
     WARN("pace " << pace << ": " << live.size() << " frames, at most "
                  << largest_distance_rad(live, offline) << " rad from apply --cold");
     CHECK(largest_distance_rad(live, offline) <= kSame_rad);
-    if (end > kFrames / 2) CHECK(largest_distance_rad(live, *input) > 0.1);  // it was styled
+    if (end > kFrames / 2)
+      CHECK(largest_distance_rad(live, *input) > 0.1);  // the style had an effect
   }
 }
 
-TEST_CASE("run --until-end ends with 0, and a client hears the last frame and the end") {
+TEST_CASE("run --until-end ends with 0, and a client receives the last frame and the end") {
   Served served;
   const clip::Clip offline = applied_cold(served);
   served.folder.write("posed.toml", config_of("", "path = \"walk.bvh\"\nloop = false"));
@@ -210,7 +213,8 @@ TEST_CASE("run --until-end ends with 0, and a client hears the last frame and th
   CHECK(listener.events.back().sequence() == kFrames);
   REQUIRE(!listener.frames.empty());
   CHECK(listener.frames.back().sequence() == kFrames);
-  // What a starved machine sheds is told; only without it live and offline saw the same.
+  // Frames that an overloaded machine sheds are reported; without them live and offline had the
+  // same input.
   if (listener.count(v1::Event::KIND_SHED) == 0) {
     CHECK(largest_distance_rad(listener.frames, offline) <= kSame_rad);
   }
@@ -218,7 +222,7 @@ TEST_CASE("run --until-end ends with 0, and a client hears the last frame and th
 
 TEST_CASE("a source that falls silent turns stale, holds its pose and recovers") {
   Served served;
-  // 120 frames a second at 1/48 of its pace: 0.4 s of silence after each.
+  // 120 frames per second at 1/48 of the speed: 0.4 s of silence after each frame.
   served.folder.write("posed.toml", config_of("stale_after_s = 0.1\npublish_raw = false",
                                               "path = \"walk.bvh\"\npace = 0.0208333"));
   served.start();
@@ -227,7 +231,7 @@ TEST_CASE("a source that falls silent turns stale, holds its pose and recovers")
   served.daemon->send(SIGTERM);
   CHECK(served.daemon->exit_code() == 0);
 
-  // Silence and recovery take turns, each at the frame that it is about.
+  // Events of silence and recovery alternate, each at its frame.
   const v1::Event* before = nullptr;
   for (const v1::Event& event : listener.events) {
     if (event.kind() == v1::Event::KIND_STARTED) continue;
@@ -245,7 +249,7 @@ TEST_CASE("a source that falls silent turns stale, holds its pose and recovers")
     if (frame.quality() == v1::QUALITY_MEASURED) measured[frame.sequence()] = frame;
     if (frame.quality() != v1::QUALITY_STALE) continue;
     const auto same = measured.find(frame.sequence());
-    if (same == measured.end()) continue;  // measured before the client was there
+    if (same == measured.end()) continue;  // measured before the client subscribed
     ++held;
     for (int i = 0; i < frame.rotation_xyzw_size(); ++i) {
       CHECK(frame.rotation_xyzw(i) == same->second.rotation_xyzw(i));
@@ -254,7 +258,7 @@ TEST_CASE("a source that falls silent turns stale, holds its pose and recovers")
   CHECK(held >= 2);
 }
 
-TEST_CASE("bad input is one sentence that says what to do, and the exit code says whose fault") {
+TEST_CASE("bad input gives one error message that states what to do, and a matching exit code") {
   Served served;
   write_bad_files(served);
   served.start();

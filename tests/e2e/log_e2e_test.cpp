@@ -1,5 +1,5 @@
-// Whoever reads the log, or does not: stderr and stdout of the real binary that are full, closed or
-// left, while it streams and while control floods it.
+// Readers of the program's output that are slow or gone: stderr and stdout of the real binary are
+// full, closed or abandoned while it streams and while control messages flood it.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -24,11 +24,11 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-// An idle machine needs some 50 ms; this one may have much else to do.
+// An idle machine needs about 50 ms; the limit allows for a busy one.
 constexpr auto kStopsWithin = 5s;
 
-// Changes of alpha as fast as the daemon answers, a few under way at a time. Returns how many were
-// answered.
+// Sends changes of alpha as fast as the daemon replies, a few at a time. Returns the number of
+// replies.
 int flood(const std::string& endpoint, int count) {
   const auto context = net::open_context().value();
   const auto socket = net::open_socket(context.get(), ZMQ_DEALER).value();
@@ -55,7 +55,7 @@ int flood_size() {
   return wanted == nullptr ? 3000 : std::atoi(wanted);
 }
 
-// Watches `count` frames of the walker from its own process; whether none is missing among them.
+// Watches `count` frames of the walker in a separate process and determines whether any is missing.
 struct Watched {
   explicit Watched(const std::string& publish, int count)
       : monitor({"monitor", "--connect", publish, "--stream", "walker", "--json", "--count",
@@ -80,7 +80,8 @@ struct Watched {
   std::uint64_t first = 0;
 };
 
-// Whether the walker lost nothing but what a busy machine made the pipeline skip, which is counted.
+// Checks that the walker lost no frames except those that a busy machine made the pipeline skip,
+// which are counted.
 void check_nothing_lost(const Stage& stage, Watched& watched) {
   const int missing = watched.missing();
   const auto status = json::parse(stage.ctl({"--json", "status"}).out).at("status");
@@ -105,14 +106,14 @@ TEST_CASE("a stderr that nobody reads costs no frame, and SIGTERM still ends the
   err.fill();
   served.launch("run", {}, {err.write_end()});
   Watched watched(served.publish, 240);
-  // Beside it, for a monitor that nobody reads would lose frames itself.
+  // On another thread, because a monitor that nobody reads would itself lose frames.
   auto answered = std::async(std::launch::async, flood, served.control, flood_size());
   check_nothing_lost(served, watched);
   CHECK(answered.get() == flood_size());
   stop(served);
 }
 
-TEST_CASE("what the log could not say while nobody read it comes once somebody does") {
+TEST_CASE("log lines that nobody read are written once somebody reads") {
   Served served;
   Pipe err;
   const std::size_t held = err.fill();
@@ -126,7 +127,7 @@ TEST_CASE("what the log could not say while nobody read it comes once somebody d
   CHECK(has(log.substr(held), "ending"));
 }
 
-TEST_CASE("a stderr that is closed under it ends neither run nor record") {
+TEST_CASE("a closed stderr ends neither run nor record") {
   for (const bool recording : {false, true}) {
     Served served;
     Pipe err;

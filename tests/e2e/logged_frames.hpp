@@ -1,4 +1,4 @@
-// The frames that a recording daemon published, as its log keeps them.
+// The published frames of a recording daemon, from its log.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace posed::test {
 
-// The numbers of a stream's published frames, as the log keeps them, are without a hole. Returns
-// the last one; `look` sees each.
+// Checks that the sequence numbers of a stream's published frames in the log have no gap. Calls
+// `look` with each frame and returns the last number.
 inline std::uint64_t check_frames_follow(
     const std::string& log, const std::string& stream,
     const std::function<void(const v1::Frame&)>& look = [](const v1::Frame&) {}) {
@@ -29,7 +29,7 @@ inline std::uint64_t check_frames_follow(
       REQUIRE(frame);
       if (!*frame) break;
       const std::uint64_t sequence = (*frame)->sequence;
-      CHECK((sequence == last + 1 || sequence == last));  // once more while it is stale
+      CHECK((sequence == last + 1 || sequence == last));  // a stale frame is published again
       last = sequence;
       v1::Frame message;
       const auto bytes = (*frame)->bytes;

@@ -1,4 +1,4 @@
-// One run of the real binary, to its end.
+// Runs the real binary to its end.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The client that the top README prints, run as it stands there against a running daemon.
+// Runs the client from the top README, unchanged, with a running daemon.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>

@@ -1,4 +1,4 @@
-// The recorder and replay as a user meets them: the real binary, stopped, overtaken and killed.
+// Recorder and replay with the real binary: stopped, overloaded and killed.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -45,8 +45,8 @@ class Walkers : public Stage {
     CHECK(outcome.code == 0);
   }
 
-  // The reader and the pipeline share one processor and the pipeline gets what is left: after a
-  // stop, the reader decodes all that is due before the pipeline sees the first of it.
+  // The reader and the pipeline share one processor and the pipeline has lower priority: after a
+  // stop, the reader decodes everything that is due before the pipeline handles the first frame.
   void hold_back_pipeline(bool hold) const {
     const auto tasks = "/proc/" + std::to_string(daemon->pid()) + "/task";
     for (const auto& task : std::filesystem::directory_iterator(tasks)) {
@@ -110,7 +110,7 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
     REQUIRE(replay.code == 0);
     const json counts = json::parse(replay.out);
     CHECK(counts.at("compared") == counts.at("frames"));
-    // How many depends on how much a busy machine sheds; a take of seconds has hundreds.
+    // The number depends on how much a busy machine sheds; a recording of seconds has hundreds.
     CHECK(counts.at("compared") > 100);
   }
   CHECK(!bytes_of(stage.path("one.bin")).empty());
@@ -140,12 +140,12 @@ TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
     }
     lost_s.push_back(seconds(now.tv_sec * kNanosPerSecond + now.tv_nsec - last_ns));
   }
-  // The middle one: a busy machine may hold up one of three.
+  // The median, because a busy machine may delay one of the three.
   std::sort(lost_s.begin(), lost_s.end());
   CHECK(lost_s[1] <= 0.5);
 }
 
-TEST_CASE("record and replay refuse what they must with one sentence") {
+TEST_CASE("record and replay refuse wrong use with one error message") {
   Walkers stage;
   stage.folder.write("take.plog", "not a log, but somebody's");
   const Outcome kept =

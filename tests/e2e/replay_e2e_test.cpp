@@ -1,5 +1,5 @@
-// What a replay offers beside the comparison of frames: its pace, its publishing, its instruction
-// set; and what a recording does when the disk is full.
+// Options of a replay besides the comparison of frames: speed, publishing, instruction set; and a
+// recording on a full disk.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-// A copy of the golden log: opening one folds in its -wal.
+// A copy of the golden log, because opening a log modifies it (merges its -wal file).
 std::string staged_log(const TempFolder& folder) {
   const auto copy = folder.path() / "staged.plog";
   std::filesystem::copy_file(golden("replay/staged.plog"), copy);
@@ -45,7 +45,7 @@ std::vector<v1::Frame> frames_of(const std::filesystem::path& path) {
 
 }  // namespace
 
-TEST_CASE("a replay keeps the take's own pace and publishes as the run did") {
+TEST_CASE("a replay keeps the recording's own timing and publishes as the run did") {
   const TempFolder folder;
   const std::string log = staged_log(folder);
   const auto begin = std::chrono::steady_clock::now();
@@ -60,7 +60,7 @@ TEST_CASE("a replay keeps the take's own pace and publishes as the run did") {
   const json frame = json::parse(seen.out.substr(0, seen.out.find('\n')));
   CHECK(frame.contains("sequence"));
   REQUIRE(replay.exit_code() == 0);
-  // Slower is a busy machine; faster would be wrong.
+  // Slower is possible on a busy machine; faster would be wrong.
   const auto max =
       posed({"replay", log, "--speed", "max", "--out", (folder.path() / "f").string()});
   REQUIRE(max.code == 0);
@@ -71,7 +71,7 @@ TEST_CASE("a replay keeps the take's own pace and publishes as the run did") {
   CHECK(took.count() >= 10.0 * take_s);
 }
 
-TEST_CASE("one far time in a log keeps a paced replay from nothing: it is skipped and told") {
+TEST_CASE("one wrong time in a log does not stop a timed replay: it is skipped and reported") {
   const TempFolder folder;
   const std::string log = staged_log(folder);
   run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 86400000000000 WHERE id = 20");
@@ -126,7 +126,7 @@ TEST_CASE("a replay on another instruction set differs in the last bits at most"
   CHECK(worst <= 1e-5F);
 }
 
-TEST_CASE("a full disk stops the recording and not the stream, and is counted and told") {
+TEST_CASE("a full disk stops the recording and not the stream, and is counted and reported") {
   Served served;
   served.daemon.emplace(std::vector<std::string>{"record", "--config", served.path("posed.toml"),
                                                  "--out", served.path("take.plog")});
@@ -136,7 +136,7 @@ TEST_CASE("a full disk stops the recording and not the stream, and is counted an
   const auto ready = json::parse(*line);
   const std::string publish = ready.at("publish"), control = ready.at("control");
   std::this_thread::sleep_for(600ms);
-  const rlimit full{4096, 4096};  // of any file; what the daemon says on stderr still fits
+  const rlimit full{4096, 4096};  // limit for any file; the daemon's stderr output still fits
   REQUIRE(prlimit(served.daemon->pid(), RLIMIT_FSIZE, &full, nullptr) == 0);
 
   std::uint64_t errors = 0;

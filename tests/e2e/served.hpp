@@ -1,4 +1,4 @@
-// A daemon of a test's own: a walking toy, a style for it, keys if wanted, ephemeral ports.
+// A daemon for one test: a small walking skeleton, a style for it, optional keys, ephemeral ports.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ namespace posed::test {
 
 class Served : public Stage {
  public:
-  // `security` is TOML put before the streams; {} are the endpoints' defaults of a test.
+  // `security` is TOML text that is put before the streams.
   explicit Served(const std::string& security = "") {
     REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
     REQUIRE(style::save_model(toy_model(1, 0.3), folder.path() / "one.style"));

@@ -1,4 +1,4 @@
-// `posed smooth` on the real binary: the live stage offline, gaps filled, wrong use told.
+// `posed smooth` with the real binary: the live stage offline, filled gaps, messages on wrong use.
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -80,7 +80,7 @@ TEST_CASE("smooth never destroys a recording", "[smooth]") {
   CHECK(posed({"smooth", in, "--out", other, "--overwrite"}).code == 0);
 }
 
-TEST_CASE("wrong use of smooth is one sentence", "[smooth]") {
+TEST_CASE("wrong use of smooth gives one error message", "[smooth]") {
   const TempFolder folder;
   const std::string in = folder.path() / "in.csv";
   const std::string out = folder.path() / "out.csv";

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Performs a label string from a gesture model, written from proto/README.md and model.proto alone:
+"""Performs a label sequence from a gesture model, written from proto/README.md and model.proto alone:
 an independent check of `posed synth`.
-usage: solve_gesture.py PYTHON_SCHEMA_DIR MODEL "g 1 c" > OUT.csv   (a row of 45 angles a frame)"""
+usage: solve_gesture.py PYTHON_SCHEMA_DIR MODEL "g 1 c" > OUT.csv   (one row of 45 angles per frame)"""
 import math
 import struct
 import sys

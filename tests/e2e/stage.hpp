@@ -1,4 +1,4 @@
-// Stage: a daemon of a test's own, in a folder of its own, on ephemeral ports.
+// Stage: a daemon for one test, in its own folder, on ephemeral ports.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ namespace posed::test {
 
 class Stage {
  public:
-  // How a config begins here: the streams follow.
+  // The beginning of each config; the streams follow.
   static constexpr const char* kEndpoints =
       "realtime = false\n[publish]\nendpoint = \"tcp://127.0.0.1:*\"\n"
       "[control]\nendpoint = \"tcp://127.0.0.1:*\"\n";
@@ -49,7 +49,7 @@ class Stage {
   }
 
   TempFolder folder;
-  int most_files = 0;  // that the daemon may open; 0: as many as this process
+  int most_files = 0;  // limit of open files of the daemon; 0: that of this process
   std::optional<Process> daemon;
   std::string publish, control;
 };

@@ -1,5 +1,5 @@
-// The beginning and the end of the real binary beside gloves that do not answer: it streams what is
-// there, opens the rest beside it, and hears a signal at every moment.
+// Start and end of the real binary with gloves that do not respond: it streams the available
+// devices at once, opens the others in parallel, and reacts to a signal at every moment.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -21,14 +21,15 @@ using nlohmann::json;
 using namespace std::chrono_literals;
 using SteadyClock = std::chrono::steady_clock;
 
-// What an idle machine does in a tenth of it; opening eight silent gloves in a row took 16.6 s.
+// An idle machine needs a tenth of this; opening eight silent gloves one after the other took 16.6
+// s.
 constexpr auto kAtOnce = 5s;
 
 double ms_since(SteadyClock::time_point begin) {
   return std::chrono::duration<double, std::milli>(SteadyClock::now() - begin).count();
 }
 
-// A walker and eight gloves that are plugged in, but never say a word.
+// A walker and eight gloves that are plugged in but never send anything.
 class SilentGloves : public Stage {
  public:
   SilentGloves() {
@@ -45,7 +46,7 @@ class SilentGloves : public Stage {
     folder.write("posed.toml", config);
   }
 
-  // Starts a command and waits until it holds its stop signals back, which is the first it does.
+  // Starts a command and waits until it blocks its stop signals, which it does first.
   void start_and_catch(const std::string& command, const std::vector<std::string>& options = {}) {
     std::vector<std::string> arguments{command, "--config", path("posed.toml")};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -59,7 +60,8 @@ class SilentGloves : public Stage {
         const auto held = [bits = std::stoull(mask, nullptr, 16)](int signal) {
           return (bits >> (signal - 1) & 1) != 0;
         };
-        return held(SIGINT) && !held(SIGUSR1);  // all are, for a moment, while a thread is made
+        return held(SIGINT) &&
+               !held(SIGUSR1);  // all signals are blocked for a moment while a thread is created
       }
       return false;
     };
@@ -82,7 +84,7 @@ class SilentGloves : public Stage {
 
 }  // namespace
 
-TEST_CASE("eight silent gloves hold up neither the start, nor the walker, nor the end") {
+TEST_CASE("eight silent gloves delay neither the start, nor the walker, nor the end") {
   SilentGloves stage;
   const auto begin = SteadyClock::now();
   stage.launch("run");
@@ -92,7 +94,7 @@ TEST_CASE("eight silent gloves hold up neither the start, nor the walker, nor th
   CHECK(
       posed({"monitor", "--connect", stage.publish, "--stream", "walker", "--count", "30"}).code ==
       0);
-  // What the daemon tells of its streams is of the last second.
+  // The daemon reports the state of its streams once per second.
   const auto gloves_away = [&] {
     const auto status = json::parse(stage.ctl({"--json", "status"}).out).at("status");
     REQUIRE(status.at("stream").size() == 9);
@@ -101,7 +103,7 @@ TEST_CASE("eight silent gloves hold up neither the start, nor the walker, nor th
   };
   for (int i = 0; i < 100 && gloves_away() != 8; ++i) std::this_thread::sleep_for(100ms);
   CHECK(gloves_away() == 8);
-  stage.expect_end(SIGINT);  // while all eight are in their start-up talk
+  stage.expect_end(SIGINT);  // while all eight are in their start-up exchange
 }
 
 TEST_CASE("a signal that comes while posed starts ends it cleanly") {
@@ -114,7 +116,7 @@ TEST_CASE("a signal that comes while posed starts ends it cleanly") {
       if (command == "run") continue;
       const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
       INFO(replay.err);
-      CHECK(replay.code == 0);  // short, but whole
+      CHECK(replay.code == 0);  // short, but complete
     }
   }
 }
@@ -128,7 +130,7 @@ TEST_CASE("a second signal changes nothing") {
   CHECK(posed({"replay", stage.path("take.plog"), "--speed", "max"}).code == 0);
 }
 
-TEST_CASE("options of a glove that make no sense are refused at the start, glove or not") {
+TEST_CASE("invalid options of a glove are refused at the start, with or without the glove") {
   Stage stage;
   for (const auto& [options, sentence] : std::vector<std::pair<std::string, std::string>>{
            {"baud = -1\n", "stream 'right': baud should be 1 to 4000000"},
@@ -147,7 +149,7 @@ TEST_CASE("options of a glove that make no sense are refused at the start, glove
   }
 }
 
-TEST_CASE("--until-end waits for what can end, and is refused where nothing can") {
+TEST_CASE("--until-end waits for streams that can end, and is refused where none can") {
   SilentGloves stage;
   const Outcome refused = posed({"run", "--config", stage.path("posed.toml"), "--until-end"});
   CHECK(refused.code == 2);
@@ -167,7 +169,7 @@ TEST_CASE("--until-end waits for what can end, and is refused where nothing can"
   CHECK(json::parse(replay.out).at("compared") > 100);
 }
 
-TEST_CASE("a stdout that is full holds up neither the start nor the end") {
+TEST_CASE("a full stdout delays neither the start nor the end") {
   SilentGloves stage;
   Pipe out;
   out.fill();

@@ -1,5 +1,5 @@
-// train, apply and eval of a style through the real binary: no option is silent, nonsense is
-// refused, the last line is a verdict, and the exit code can be trusted.
+// train, apply and eval of a style with the real binary: no option is silently ignored, useless
+// input is refused, the last line is a verdict, and the exit code agrees with it.
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -23,7 +23,7 @@ bool has(const std::string& text, const std::string& what) {
   return text.contains(what);
 }
 
-// Two made-up walkers of each family, and an experiment file of the first of each.
+// Two synthetic walkers of each family, and an experiment file with the first of each.
 struct Studio {
   TempFolder folder;
 
@@ -53,7 +53,7 @@ struct Studio {
     return std::filesystem::exists(path(name));
   }
 
-  // train style with `what`, into `out`.
+  // Runs `train style` with the arguments `what` and writes `out`.
   [[nodiscard]] Outcome train(std::vector<std::string> what, const std::string& out) const {
     what.insert(what.begin(), {"train", "style"});
     what.insert(what.end(), {"--out", path(out), "--json"});
@@ -71,7 +71,7 @@ struct Studio {
 
 }  // namespace
 
-TEST_CASE("what the command line says beside an experiment file overrides it or is refused",
+TEST_CASE("command line options beside an experiment file override it or are refused",
           "[train_style]") {
   const Studio studio;
   const auto usual = studio.experiment({}, "default.style");
@@ -101,7 +101,7 @@ TEST_CASE("what the command line says beside an experiment file overrides it or 
   }
 }
 
-TEST_CASE("nothing is trained from nonsense", "[train_style]") {
+TEST_CASE("no model is trained from useless data", "[train_style]") {
   const Studio studio;
   const auto refused = [&](const std::string& from, const std::string& to, const std::string& why) {
     const auto done =
@@ -113,7 +113,7 @@ TEST_CASE("nothing is trained from nonsense", "[train_style]") {
       motion::make_walker({.family = WalkerFamily::kMarch, .person = 1, .seconds = 7.0});
   REQUIRE(clip::write_bvh(*longer, studio.folder.path() / "again.bvh"));
   CHECK(refused("march_1.bvh", "again.bvh", "there is no difference to learn"));
-  // --force writes it all the same, and says so.
+  // --force writes the model all the same and reports that.
   const auto forced = studio.train(
       {"--from", studio.path("march_1.bvh"), "--to", studio.path("again.bvh"), "--force"},
       "x.style");
@@ -149,7 +149,7 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
   CHECK(score["constant_cycle_ratio"] > score["cycle_ratio"]);
   CHECK(has(judged.err, "of the way to the target; a constant offset"));
 
-  // Towards another march the sway only leads away.
+  // Compared with another march, the sway style only increases the distance.
   const auto worse = studio.eval("march_1.bvh", "march_2.bvh");
   CHECK(worse.code == 1);
   CHECK(json::parse(worse.out)["helps"] == false);

@@ -1,6 +1,6 @@
-// Models and alphas changed over and over in a running daemon: every frame comes, nothing leaks
-// (under ASan the daemon's exit code tells), and no joint ever jumps. POSED_SWAP_SECONDS=60 is the
-// long run: 1,000 changes.
+// Repeated changes of models and alpha in a running daemon: every frame arrives, nothing leaks
+// (with ASan the daemon's exit code shows it), and no joint ever jumps. POSED_SWAP_SECONDS=60 is
+// the long run: 1,000 changes.
 #include <cstdlib>
 #include <map>
 #include <random>
@@ -21,7 +21,7 @@ constexpr double kSlew_per_s = 2.0;  // FilterOptions' default
 constexpr double kRate_hz = 120.0;
 constexpr milliseconds kChangeEvery{60};
 
-// A style that adds the same to every pose: all that moves then is what posed moves.
+// A style that adds the same change to every pose, so that every other movement is caused by posed.
 style::StyleModel constant_style(unsigned seed) {
   style::StyleModel model = toy_model(seed, 0.3);
   model.process.weights.setZero();
@@ -48,7 +48,7 @@ Rotations rotations_of(const v1::Frame& frame) {
   return rotations;
 }
 
-// What both published streams said, by sequence.
+// The frames of both published streams, by sequence number.
 struct Seen {
   std::map<std::uint64_t, Rotations> raw, styled;
 
@@ -62,12 +62,12 @@ struct Seen {
     CHECK(stream.emplace(frame.sequence(), rotations_of(frame)).second);
   }
 
-  // Frames that never came between the first and the last.
+  // The number of missing frames between the first and the last.
   [[nodiscard]] std::uint64_t gaps() const {
     return styled.rbegin()->first - styled.begin()->first + 1 - styled.size();
   }
 
-  // The largest step of what the style adds, from one frame to the next [rad].
+  // The largest change, from one frame to the next, of the rotation that the style adds [rad].
   [[nodiscard]] double largest_step_rad() const {
     double largest = 0.0;
     const Rotations* before = nullptr;
@@ -164,10 +164,11 @@ TEST_CASE("a thousand changes: no frame lost, no jump") {
 
   REQUIRE(seen.styled.size() > 20);
   CHECK(reply.status().stream(0).dropped() == 0);
-  // What a starved machine sheds is told; nothing else may be missing.
+  // Frames that an overloaded machine sheds are reported; no others may be missing.
   if (reply.status().stream(0).shed() == 0) CHECK(seen.gaps() == 0);
-  // Per frame alpha moves by slew dt, and a blend (between answers at most 2 reach long each) by
-  // as much of its length; the walk itself turns the same change by at most half of its own step.
+  // Per frame alpha moves by slew dt, and a blend (between model deltas of at most 2 reach each) by
+  // the same share of its length; the walk itself turns the same change by at most half of its own
+  // step.
   const double reach = std::max(reach_rad(styles[0]), reach_rad(styles[1]));
   const double walk_step_rad = 0.3 * std::sqrt(3.0) * 2.0 * kPi / kRate_hz;
   const double allowed_rad = 5.0 * reach * kSlew_per_s / kRate_hz + reach * walk_step_rad;
@@ -176,7 +177,7 @@ TEST_CASE("a thousand changes: no frame lost, no jump") {
                 << " missing, largest step " << largest_rad << " rad of " << allowed_rad
                 << " allowed");
   CHECK(largest_rad <= allowed_rad);
-  CHECK(largest_rad > 0.1 * allowed_rad);  // the changes did arrive
+  CHECK(largest_rad > 0.1 * allowed_rad);  // the changes did take effect
 }
 
 }  // namespace

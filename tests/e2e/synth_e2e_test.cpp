@@ -1,5 +1,5 @@
-// posed synth with the real binary: its forms, its errors, and a stranger who solves the same model
-// file.
+// `posed synth` with the real binary: its output formats, its errors, and an independent program
+// that solves the same model file.
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kString = "g 1 c 3 4 p";
 
-// A folder with a model in it.
+// A folder with a model.
 struct Studio {
   TempFolder folder;
   std::string model = (folder.path() / "toy.gesture").string();
@@ -46,7 +46,7 @@ std::string output_of(const std::string& command) {
   return said;
 }
 
-TEST_CASE("synth tells its states and keeps fingers apart, as CSV and as BVH") {
+TEST_CASE("synth reports its states and keeps fingers apart, as CSV and as BVH") {
   const Studio studio;
   for (const std::string out : {"hand.csv", "hand.bvh"}) {
     const Outcome made = studio.synth(kString, out, {"--hand", "left"});
@@ -92,7 +92,7 @@ TEST_CASE("an independent program solves the model file to the same trajectory")
   CHECK(worst_rad < 1e-6);
 }
 
-TEST_CASE("synth refuses what it cannot perform with one sentence and exit code 2") {
+TEST_CASE("synth refuses what it cannot perform with one error message and exit code 2") {
   const Studio studio;
   const Outcome unknown = studio.synth("g 7", "hand.csv");
   CHECK(unknown.code == 2);
@@ -102,7 +102,7 @@ TEST_CASE("synth refuses what it cannot perform with one sentence and exit code 
   CHECK(studio.synth("g", "hand.csv", {"--lookahead", "soon"}).code == 2);
   CHECK(studio.synth("g", "hand.csv", {"--tempo", "0"}).code == 2);
   CHECK(studio.synth("g", "hand.csv", {"--lookahead", "15", "--tempo", "2"}).code == 0);
-  // The same name again is not replaced unasked.
+  // An existing file is not replaced without --overwrite.
   CHECK(studio.synth("g", "hand.csv").code == 2);
   CHECK(studio.synth("g", "hand.csv", {"--overwrite"}).code == 0);
 }

@@ -1,5 +1,6 @@
-// `posed train gesture` through the real binary: a glove recording and its labels become a model,
-// the same bytes each time; labels are proposed; every mistake is one sentence and an exit code.
+// `posed train gesture` with the real binary: a glove recording and its labels give a model, with
+// the same bytes each time; labels are proposed; every mistake gives one error message and an exit
+// code.
 #include <fstream>
 #include <iterator>
 
@@ -20,7 +21,7 @@ std::string bytes_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// A made-up signer's recording with its labels, and the first examples of them.
+// A synthetic signer's recording with its labels, and a file with only the first labels.
 struct Glove {
   TempFolder folder;
   std::string clip = (folder.path() / "take.csv").string();
@@ -39,7 +40,7 @@ struct Glove {
     return (folder.path() / name).string();
   }
 
-  // train gesture with the recording, its labels and `more`.
+  // Runs `train gesture` with the recording, its labels and the arguments `more`.
   [[nodiscard]] Outcome train(const std::string& out, std::vector<std::string> more = {},
                               const std::string& with = {}) const {
     std::vector<std::string> arguments{"train", "gesture",  "--clip",
@@ -62,10 +63,10 @@ TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") 
   const auto first = glove.train(
       "a.gesture", {"--json", "--tree-svg", glove.file("t.svg"), "--trees", "middle:4"});
   REQUIRE(first.code == 0);
-  const auto told = nlohmann::json::parse(first.out);
-  CHECK(told["gestures"] == 40);
-  CHECK(told["leaves"] > 25);
-  CHECK(told["leaves_by_state"].size() == 5);
+  const auto printed = nlohmann::json::parse(first.out);
+  CHECK(printed["gestures"] == 40);
+  CHECK(printed["leaves"] > 25);
+  CHECK(printed["leaves_by_state"].size() == 5);
   CHECK(bytes_of(glove.file("t.svg")).find("state 4, middle") != std::string::npos);
   REQUIRE(glove.train("b.gesture").code == 0);
   CHECK(bytes_of(glove.file("a.gesture")) == bytes_of(glove.file("b.gesture")));
@@ -76,7 +77,7 @@ TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") 
   const auto sample = (source_dir() / "config/gestures/gcp134.toml").string();
   const auto asked = glove.train("c.gesture", {"--json", "--questions", sample});
   REQUIRE(asked.code == 0);
-  CHECK(nlohmann::json::parse(asked.out)["leaves"] == told["leaves"]);
+  CHECK(nlohmann::json::parse(asked.out)["leaves"] == printed["leaves"]);
 }
 
 TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
@@ -90,13 +91,14 @@ TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
                             glove.file("lag.svg"), "--tree-dot", glove.file("t.dot")});
   INFO(judged.err);
   REQUIRE(judged.code == 0);
-  const auto told = nlohmann::json::parse(judged.out);
-  CHECK(told["leaves"]["states"].size() == 5);
-  CHECK(told["min_gap_cm"] >= 0.0);
-  CHECK(told["reference"]["nearest_reference_deg"] < 10.0);
-  CHECK(told["reference"]["frechet"] > 0.0);
-  for (const char* figure : {"jerk", "ldlj", "sparc"}) CHECK(told["performed"][figure].is_number());
-  const auto& curve = told["curve"];
+  const auto printed = nlohmann::json::parse(judged.out);
+  CHECK(printed["leaves"]["states"].size() == 5);
+  CHECK(printed["min_gap_cm"] >= 0.0);
+  CHECK(printed["reference"]["nearest_reference_deg"] < 10.0);
+  CHECK(printed["reference"]["frechet"] > 0.0);
+  for (const char* figure : {"jerk", "ldlj", "sparc"})
+    CHECK(printed["performed"][figure].is_number());
+  const auto& curve = printed["curve"];
   REQUIRE(curve.size() > 5);
   CHECK(curve.back()["channel_rms_deg"] < curve.front()["channel_rms_deg"]);
   CHECK(bytes_of(glove.file("lag.svg")).find("<svg") == 0);

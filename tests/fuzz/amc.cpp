@@ -1,4 +1,4 @@
-// Any bytes as an ASF and an AMC, which a line "%%" divides: read or refused, never a crash.
+// Any bytes as an ASF and an AMC, separated by a line "%%": accepted or refused, never a crash.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

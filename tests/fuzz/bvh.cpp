@@ -1,4 +1,4 @@
-// Any bytes as a BVH: read or refused, never a crash, a hang or a pose that is not finite.
+// Any bytes as a BVH: accepted or refused, never a crash, a hang or a pose that is not finite.
 #include <cstddef>
 #include <cstdint>
 #include <string_view>

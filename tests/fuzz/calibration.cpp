@@ -1,5 +1,5 @@
-// Any text as a glove's calibration file and as its greeting: a mistake is a sentence, and what is
-// accepted can be used.
+// Any text as a glove's calibration file and as its device info: a mistake gives an
+// error message, and an accepted text can be used.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -45,11 +45,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (data[0] % 2 == 0) {
     try_calibration(text);
   } else {
-    Greeting greeting(text, "toy", "A9");
-    (void)greeting.side();
-    (void)greeting.whole("sensors", 18, 22);
-    (void)greeting.word("form");
-    const auto ok = greeting.finish();
+    DeviceInfoReader reader(text, "toy", "A9");
+    (void)reader.side();
+    (void)reader.whole("sensors", 18, 22);
+    (void)reader.word("form");
+    const auto ok = reader.finish();
     demand(ok || ok.error().text().find('\x1b') == std::string::npos);
   }
   return 0;

@@ -1,4 +1,4 @@
-// What must hold of every clip that a reader accepts.
+// Properties of every clip that a reader accepts.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Any bytes as a control message, models and plays included: an answer with a sentence, or a
-// command that is well formed; nothing crashes, hangs or leaks.
+// Any bytes as a control message, models and plays included: the result is a reply with an error
+// message, or a well-formed command; nothing crashes, hangs or leaks.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace posed;
 
-// What the pipeline takes for granted of a play.
+// What the pipeline assumes about a play command.
 void check_play(const pipeline::Command& command) {
   const auto& play = command.play;
   if (command.stream != 1 || play.size == 0 || play.size > play.label.size()) std::abort();

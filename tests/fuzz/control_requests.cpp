@@ -1,6 +1,6 @@
-// Control requests that are well formed outside and broken inside: models in pieces that overlap,
-// come out of order or say absurd sizes, models with a right checksum and wrong numbers, plays,
-// calibrations with lines of TOML exchanged. Several clients beside each other.
+// Control requests that are well formed but have invalid contents: models in pieces that overlap,
+// come out of order or state absurd sizes, models with a right checksum and wrong numbers, plays,
+// calibrations with lines of TOML exchanged. Several clients at once.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -25,7 +25,7 @@ namespace {
 
 using namespace posed;
 
-constexpr std::size_t kHeader = 24;  // of a model file, before its payload
+constexpr std::size_t kHeader = 24;  // bytes of a model file before its payload
 
 void demand(bool holds) {
   if (!holds) std::abort();
@@ -84,7 +84,7 @@ std::string calibration_text() {
   return drivers::glove::format_calibration(file);
 }
 
-// A whole, valid model with some bytes exchanged; its checksum is right again.
+// A complete, valid model with some bytes exchanged and a recomputed checksum.
 std::string broken_model(FuzzedDataProvider& data) {
   static const std::array<std::string, 2> kWhole{
       style::serialize_model(test::toy_model(1, 0.3)),
@@ -187,7 +187,8 @@ void send_other(FuzzedDataProvider& data, Fixture& fixture, const std::string& c
 }  // namespace
 
 extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
-  google::protobuf::SetLogHandler(nullptr);  // as in the daemon: no line for each broken string
+  google::protobuf::SetLogHandler(
+      nullptr);  // as in the daemon: no log line for each invalid string
   return 0;
 }
 

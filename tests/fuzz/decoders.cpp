@@ -1,5 +1,5 @@
-// Every decoder of the registry on any bytes in any cut, and the description that a log hands back.
-// The first byte picks what is tried, the second how the rest is cut.
+// Every decoder of the registry on any bytes in chunks of any size, and the device description that
+// a log stores. The first byte selects the decoder, the second one how the rest is cut into chunks.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -43,7 +43,7 @@ std::string amc_description() {
          std::to_string(kAsf.size()) + "\n" + std::string(kAsf) + "1\nroot 0 1 0 0 0 0\nb 1 2\n";
 }
 
-std::string cyberglove_greeting(const std::string& form) {
+std::string cyberglove_device_info(const std::string& form) {
   return "cyberglove hand=left sensors=18 mask=8108863 form=" + form +
          " mode=stream time=1 status=1 ticks=1152 multiplier=3";
 }
@@ -124,8 +124,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       (void)decoder_of("lucidgloves", text);
       break;
     case 6:
-      try_bytes("cyberglove", cyberglove_greeting("8bit"), piece, bytes);
-      try_bytes("cyberglove", cyberglove_greeting("16bit"), piece, bytes);
+      try_bytes("cyberglove", cyberglove_device_info("8bit"), piece, bytes);
+      try_bytes("cyberglove", cyberglove_device_info("16bit"), piece, bytes);
       (void)decoder_of("cyberglove", text);
       break;
     case 7:

@@ -1,5 +1,6 @@
-// Described devices: any bytes in any cut through tables of every kind of framing, and any text as
-// a description. The first byte picks what is tried, the second how the rest is cut.
+// Table-driven devices: any bytes in chunks of any size through tables of every kind of framing,
+// and any text as a device description. The first byte selects what is tested, the second one how
+// the rest is cut into chunks.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -26,7 +27,7 @@ void demand(bool holds) {
   if (!holds) std::abort();
 }
 
-// A delimiter, odd bits in both orders, and a packet that tells its length.
+// A delimiter, odd bits in both orders, and a packet that states its length.
 constexpr const char* kDelimited = R"(
 name = "delimited"
 delimiter = "ff fe"
@@ -147,19 +148,20 @@ void try_bytes(const std::shared_ptr<const Table>& table, std::size_t piece,
     bytes = bytes.subspan(length);
   }
   check(cut);
-  if (table->link.kind == posed::drivers::described::LinkKind::kHid) return;  // a chunk is reports
+  if (table->link.kind == posed::drivers::described::LinkKind::kHid)
+    return;  // a chunk consists of whole reports
   demand(cut.outcomes == whole.outcomes && cut.samples.size() == whole.samples.size());
   for (std::size_t i = 0; i < cut.samples.size(); ++i) {
     demand(posed::test::same_values(cut.samples[i], whole.samples[i]));
   }
 }
 
-// A description that is accepted decodes anything, and its own packets.
+// An accepted description decodes any bytes, and the packets that it encodes itself.
 void try_description(const std::string& toml, std::span<const std::byte> bytes) {
   auto table = parse_device(toml, "fuzz.toml");
   if (!table) {
     demand(!table.error().message.empty());
-    demand(table.error().text().find('\x1b') == std::string::npos);  // nothing a terminal obeys
+    demand(table.error().text().find('\x1b') == std::string::npos);  // no terminal escape sequences
     return;
   }
   const auto shared = std::make_shared<const Table>(std::move(*table));
@@ -167,7 +169,7 @@ void try_description(const std::string& toml, std::span<const std::byte> bytes) 
   for (const auto& rule : shared->packets) {
     auto packet = blank_packet(*shared, rule);
     for (const auto& field : rule.fields) write_field(field, field.high, packet);
-    seal_packet(rule, packet);
+    write_checksum(rule, packet);
     try_bytes(shared, 3, packet);
   }
 }

@@ -1,5 +1,5 @@
 // The gesture model's parse_model on any bytes, as a file and as the payload of a right header.
-// What is accepted is walked down every tree: a lookup never leaves its tree.
+// Every tree of an accepted model is searched, and no lookup may leave its tree.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -14,7 +14,7 @@ namespace {
 
 using namespace posed::gesture;
 
-constexpr int kWalkedLabels = 4;  // of each position; more cost time and find nothing new
+constexpr int kWalkedLabels = 4;  // of each position; more would cost time and find nothing new
 
 void walk_all(const GestureModel& model) {
   const int labels = std::min(kWalkedLabels, static_cast<int>(model.labels.size()));
@@ -35,7 +35,7 @@ void try_bytes(const std::string& bytes) {
   if (!model) return;
   walk_all(*model);
   static_cast<void>(trees_svg(*model, {}));
-  // What is accepted can be written, and reads back as the same bytes again.
+  // An accepted model can be written and read back with the same bytes.
   const std::string written = serialize_model(*model);
   const auto again = parse_model(std::as_bytes(std::span(written)), "fuzz");
   if (!again || serialize_model(*again) != written) std::abort();

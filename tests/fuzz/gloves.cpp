@@ -1,6 +1,6 @@
-// Every glove's decoder on any bytes, and on its own packets with any bytes in them. A decoder
-// lives on from input to input as it would on a line, so that millions of inputs are cheap
-// (`decoders` begins anew with each). A find may thus need the inputs before it: run again with the
+// Every glove's decoder on any bytes, and on its own packets with any bytes in them. A decoder is
+// kept from input to input, as on a serial line, so that millions of inputs are cheap (`decoders`
+// creates a new one for each). A finding may therefore depend on earlier inputs: run again with the
 // same -seed.
 #include <algorithm>
 #include <cstdint>
@@ -35,7 +35,7 @@ class SoundSink final : public posed::Sink {
 
 struct Glove {
   std::unique_ptr<posed::drivers::Decoder> decoder;
-  Bytes records;  // as its emulator sends them; none from one that has to be told to start
+  Bytes records;  // as its emulator sends them; empty if the emulator waits for a start command
 };
 
 Glove make_glove(const Driver& driver, const Options& options) {
@@ -75,7 +75,7 @@ std::vector<Glove> make_gloves() {
   return gloves;
 }
 
-// Pairs of a place and a byte that stands there instead.
+// `edits` has pairs of a position and the byte to put there.
 Bytes edited(const Bytes& records, std::span<const std::byte> edits) {
   Bytes bytes = records;
   for (; edits.size() >= 2 && !bytes.empty(); edits = edits.subspan(2)) {

@@ -1,5 +1,5 @@
-// Any bytes as a hand CSV: read or refused, never a crash or a hang; times increase, and what is
-// there is finite.
+// Any bytes as a hand CSV: accepted or refused, never a crash or a hang; times increase, and
+// present values are finite.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// parse_labels on any text: an error or segments in order, never a crash.
+// parse_labels on any text: an error or ordered segments, never a crash.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

@@ -1,6 +1,6 @@
-// A device log whose envelope is right (tables, types, checksums) and whose insides are anything:
-// it is refused with a sentence or replayed to its end; nothing crashes, hangs or takes memory
-// without bound. The input chooses the streams, their settings and models, and then row after row.
+// A device log with valid tables, types and checksums and arbitrary contents: it is refused with an
+// error message or replayed to its end; nothing crashes, hangs or takes unbounded memory. The input
+// chooses the streams, their settings and models, and then each row.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -36,7 +36,7 @@ std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text));
 }
 
-// A log that the input writes.
+// A log written from the fuzzer's input.
 class FuzzedLog {
  public:
   FuzzedLog(const std::uint8_t* data, std::size_t size, const std::filesystem::path& path)
@@ -105,7 +105,7 @@ class FuzzedLog {
     if (input_.ConsumeProbability<double>() < 0.02) return input_.ConsumeIntegral<std::uint32_t>();
     return ids_[input_.ConsumeIntegralInRange<std::size_t>(0, ids_.size() - 1)];
   }
-  // Mostly what a run would count, now and then anything.
+  // Mostly the count that a real run would write, sometimes an arbitrary one.
   std::uint64_t count(std::uint64_t next) {
     if (input_.ConsumeProbability<double>() < 0.05) return input_.ConsumeIntegral<std::uint64_t>();
     return next + input_.ConsumeIntegralInRange<std::uint64_t>(0, 3);
@@ -137,7 +137,7 @@ class FuzzedLog {
 
   void add_chunk() {
     const std::uint32_t source = id();
-    const std::vector<log::StreamPlace> places{{source, count(frames_), count(frames_)}};
+    const std::vector<log::StreamPosition> places{{source, count(frames_), count(frames_)}};
     frames_ += 1;
     items_ += 2;
     bytes_ = input_.PickValueInArray<std::string>(
@@ -212,14 +212,14 @@ class FuzzedLog {
     keep(writer_.add(row));
   }
 
-  // Two streams of one id are refused already by the writer.
+  // The writer refuses, for example, a second stream with the same id.
   static void keep(const Result<>& done) { static_cast<void>(done); }
 
   FuzzedDataProvider input_;
   log::Writer writer_;
   std::array<std::string, 5> hashes_;
   std::vector<std::uint32_t> ids_;
-  std::string bytes_;  // of the row that is being written
+  std::string bytes_;  // of the current row
   std::uint64_t frames_ = 1, items_ = 1;
   std::int64_t now_ns_ = 1'000'000'000;
 };
@@ -253,7 +253,7 @@ void replay(const std::filesystem::path& path) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  // In memory where there is such a file system: a log is always a file.
+  // On an in-memory file system where there is one, because a log is always a file.
   static const std::filesystem::path folder =
       std::filesystem::exists("/dev/shm") ? "/dev/shm" : std::filesystem::temp_directory_path();
   static const std::filesystem::path path =

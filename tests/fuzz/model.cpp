@@ -1,5 +1,5 @@
-// parse_model on any bytes. The header's checksum would stop nearly all of them at the door, so
-// each input is also tried as the payload of a right header.
+// parse_model on any bytes. The header's checksum rejects nearly all of them, so each input is also
+// tested as the payload of a valid header.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -14,7 +14,7 @@ namespace {
 void try_bytes(const std::string& bytes) {
   const auto model = posed::style::parse_model(std::as_bytes(std::span(bytes)), "fuzz");
   if (!model) return;
-  // What is accepted can be written, and reads back as the same bytes again.
+  // An accepted model can be written and read back with the same bytes.
   const std::string written = posed::style::serialize_model(*model);
   const auto again = posed::style::parse_model(std::as_bytes(std::span(written)), "fuzz");
   if (!again || posed::style::serialize_model(*again) != written) std::abort();

@@ -1,5 +1,5 @@
-// Any bytes as the payload of a model file whose header is right, so that a fuzz target gets past
-// the checksum at the door.
+// Wraps any bytes as the payload of a model file with a valid header, so that a fuzz target gets
+// past the checksum.
 #pragma once
 
 #include <cstddef>

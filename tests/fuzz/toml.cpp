@@ -1,6 +1,7 @@
-// Any text as any TOML that posed reads: the guarded entry point, and each reader behind it. What
-// passes the guard nests no deeper than it promises; a mistake is a sentence that a terminal may
-// show. Run with a small stack (ulimit -s 256) to see that no depth gets through.
+// Any text as any TOML that posed reads: the guarded entry point, and each reader behind it. Text
+// that passes the guard nests no deeper than the limit; a mistake gives an error message without
+// terminal escapes. Run with a small stack (ulimit -s 256) to check that no deep nesting gets
+// through.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -39,7 +40,7 @@ void check_result(const posed::Result<T>& result) {
   if (!result) check_sentence(result.error());
 }
 
-// Containers inside each other, the node itself included.
+// Depth of nested containers, the node itself included.
 int depth_of(const toml::node& node) {
   int deepest = 0;
   if (const toml::table* table = node.as_table()) {
@@ -55,11 +56,11 @@ int depth_of(const toml::node& node) {
 void try_guard(const std::string& text, const TomlLimits& limits) {
   const auto table = posed::parse_toml(text, "fuzz.toml", limits);
   if (!table) return check_sentence(table.error());
-  // Each part of a header may be an array and the table in it.
+  // Each part of a header may be an array with a table in it, that is two levels.
   demand(depth_of(*table) <= 2 * limits.depth + 1);
 }
 
-// The text as a file, for those who read files.
+// The text as an in-memory file, for readers that take a path.
 class MemoryFile {
  public:
   explicit MemoryFile(const std::string& text) : fd_(memfd_create("fuzz", MFD_CLOEXEC)) {

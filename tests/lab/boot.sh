@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # boot.sh BUILD_FOLDER: packs posed and posed_lab with busybox and the kernel's USB gadget modules
-# into an initramfs, boots Debian's kernel with it in QEMU and says how it went. No KVM is needed.
+# into an initramfs, boots Debian's kernel with it in QEMU and reports the result. KVM is not needed.
 set -euo pipefail
 build=$(realpath "$1")
 here=$(realpath "$(dirname "$0")")
-lab=$here/../../build/lab # the kernel stays when a build folder goes
+lab=$here/../../build/lab # outside the build folder, so that the downloaded kernel is kept
 root=$lab/root
 seconds=${POSED_LAB_SECONDS:-600}
 
-# The modules in the order in which they need each other; the rest of a line is options.
+# The modules in the order in which they need each other; the rest of a line is module options.
 modules="configfs
 usb-common
 usbcore
@@ -38,8 +38,8 @@ download_kernel() {
   kernel_version=${package#linux-image-}
 }
 
-# The kernel's package is downloaded and unpacked, never installed. What apt knows may be nothing, or too old
-# for the mirror: then it is told to look, which needs root.
+# The kernel's package is downloaded and unpacked, never installed. If apt's package lists are missing or too old
+# for the mirror, they are updated, which needs root.
 fetch_kernel() {
   local package
   package=$(newest_kernel)
@@ -74,9 +74,9 @@ pack() {
   (cd "$root" && find . | cpio --quiet -o -H newc | gzip -1) >"$lab/init.gz"
 }
 
-# The machine's clock goes by its instructions (a nanosecond each), and waiting takes it no time: so
-# its times do not depend on what else the host does. That needs one processor. POSED_LAB_SMP=2 gives it
-# two and the host's clock, to look for races.
+# The machine's clock counts its instructions (one nanosecond each), and waiting takes no time, so its times do
+# not depend on the host's load. This works with one processor only. POSED_LAB_SMP=2 gives it two processors and
+# the host's clock, to look for races.
 boot() {
   local clock="-smp 1 -icount shift=0,sleep=off -rtc clock=vm"
   [ -z "${POSED_LAB_SMP:-}" ] || clock="-smp $POSED_LAB_SMP"

@@ -27,8 +27,9 @@ using Speakers = std::vector<std::unique_ptr<Speaker>>;
 
 constexpr int kRounds = 10;
 constexpr std::size_t kSamplesARound = 60;
-constexpr auto kUnplugged = 100ms;  // after posed has told that the glove is gone
-constexpr auto kPatience = 15s;     // of the lab; what is measured is printed and judged apart
+constexpr auto kUnplugged = 100ms;  // after posed has reported that the glove is gone
+constexpr auto kPatience =
+    15s;  // timeout of the lab; measured times are printed and judged separately
 constexpr const char* kConfig = "/tmp/lab.toml";
 
 bool wait_until(const std::function<bool()>& what) {
@@ -40,7 +41,7 @@ bool wait_until(const std::function<bool()>& what) {
   return true;
 }
 
-// posed, streaming all gloves, and what was done to them and heard of them.
+// Runs posed with all gloves, unplugs and plugs them, and records what a client receives.
 class DaemonCheck {
  public:
   explicit DaemonCheck(Speakers speakers)
@@ -52,14 +53,15 @@ class DaemonCheck {
     Resources before;
     for (int round = 0; round < kRounds && streaming && trouble_.empty(); ++round) {
       for (const auto& glove : speakers_) replug(*glove);
-      // The first replug touches code and heap as no later one does.
+      // The first replug touches code and heap pages for the first time, so memory is compared from
+      // then on.
       if (round == 0) before = Resources::of(std::to_string(daemon_->pid()));
     }
     const Resources after = Resources::of(std::to_string(daemon_->pid()));
     int failed = check_resources(before, after) ? 0 : 1;
     for (const auto& glove : speakers_) failed += check(*glove) ? 0 : 1;
     std::printf("%s\nposed says: %s\n", trouble_.c_str(), daemon_->errors().c_str());
-    // A speaker may wait for its host to listen: without a plug it does not.
+    // A speaker may block until the host reads; without a plug it does not block.
     for (const auto& glove : speakers_) glove->device().unplug();
     return failed;
   }

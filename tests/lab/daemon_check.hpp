@@ -1,12 +1,12 @@
-// The real `posed` against the lab's gloves: all stream together, then each is unplugged and
-// plugged in again while the others go on.
+// Checks the real `posed` with the lab's gloves: all stream together, then each is unplugged and
+// plugged in again while the others continue.
 #pragma once
 
 #include "tests/lab/devices.hpp"
 
 namespace posed::lab {
 
-// Prints a line a glove; the number of them that failed.
+// Prints one line per glove and returns the number of gloves that failed.
 int check_daemon(const LabDevices& devices);
 
 }  // namespace posed::lab

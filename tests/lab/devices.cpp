@@ -29,7 +29,7 @@ constexpr std::array<std::uint8_t, 21> kVendorBytes{0x06, 0x00, 0xFF, 0x09, 0x01
                                                     0x75, 0x08, 0x95, 0x40, 0x81, 0x02, 0xC0};
 constexpr std::size_t kHidReport = 64;
 
-// The device's side of a HID gadget: its node comes and goes with the plug.
+// The device's side of a HID gadget: its node exists while it is plugged in.
 class HidSide {
  public:
   explicit HidSide(const Gadget& gadget) : gadget_(gadget) {}
@@ -82,7 +82,7 @@ class SerialSide {
   std::unique_ptr<drivers::Transport> transport_;
 };
 
-// What a lambda of LabDevice shares.
+// State shared by the lambdas of a LabDevice.
 template <typename Side>
 struct Bench {
   explicit Bench(const std::string& controller, const Ids& ids)
@@ -108,7 +108,8 @@ std::unique_ptr<LabDevice> device_of(const std::shared_ptr<Bench<Side>>& bench,
   return device;
 }
 
-// devtmpfs notes when it made a node, on the clock of files; both clocks tick alike.
+// The creation time of a device node, from devtmpfs. It is on the clock of files, which runs at the
+// same speed as ours.
 std::optional<Moment> made(const std::string& node) {
   struct statx info{};
   if (::statx(AT_FDCWD, node.c_str(), 0, STATX_BTIME, &info) != 0) return {};
@@ -160,7 +161,7 @@ std::unique_ptr<LabDevice> serial_device() {
   return device;
 }
 
-// Real feature reports of a P5 begin like these: firmware, head and LEDs.
+// These begin like a real P5's feature reports: firmware, head and LEDs.
 FunctionFsHid::Bytes feature(std::uint8_t report) {
   FunctionFsHid::Bytes bytes{std::byte{report}};
   bytes.resize(4, std::byte{0x04});

@@ -44,7 +44,7 @@ std::vector<std::uint8_t> speed_descriptors(int interfaces, unsigned interval) {
   return all;
 }
 
-// linux/usb/functionfs.h: magic, length, flags, one count a speed, then the descriptors.
+// linux/usb/functionfs.h: magic, length, flags, one count per speed, then the descriptors.
 std::vector<std::uint8_t> all_descriptors(int interfaces) {
   const auto full = speed_descriptors(interfaces, 4), high = speed_descriptors(interfaces, 6);
   const auto count = static_cast<std::size_t>(2 * interfaces + 1);
@@ -92,7 +92,7 @@ FunctionFsHid::FunctionFsHid(const std::string& name, const std::filesystem::pat
   control_ = open_file(folder / "ep0", 0);
   write_all(control_, all_descriptors(interfaces));
   write_all(control_, no_strings());
-  // Non-blocking only means not to wait for the plug; a report still waits for the host.
+  // Non-blocking only avoids waiting for the plug; a report still waits for the host.
   input_ = open_file(folder / "ep1", O_NONBLOCK);
   events_ = std::jthread([this](const std::stop_token& stop) { answer_events(stop); });
 }
@@ -131,7 +131,7 @@ void FunctionFsHid::answer(std::uint8_t request_type, std::uint8_t request, std:
     return;
   }
   if (request != kGetReport) {
-    // Reading where a write is due is how FunctionFS is told to stall.
+    // FunctionFS stalls the transfer when a read is made where a write is due.
     if (::read(control_, bytes.data(), 0) >= 0) give_up("a stall was not taken");
     return;
   }

@@ -1,5 +1,5 @@
 // A HID device that answers feature reports, on FunctionFS: the kernel's own HID gadget answers
-// GET_REPORT with zeros, and a P5 glove says in its feature reports where its LEDs are.
+// GET_REPORT with zeros, but a P5 glove gives the positions of its LEDs in feature reports.
 #pragma once
 
 #include <cstdint>
@@ -22,15 +22,16 @@ class FunctionFsHid {
     std::function<void(std::span<const std::byte>)> set;
   };
 
-  // Mounts `name` at `folder` and writes the descriptors: `interfaces` of class HID, an interrupt
-  // IN endpoint on the last. Call it between Gadget::add_functionfs and the first plug().
+  // Mounts `name` at `folder` and writes the descriptors: `interfaces` interfaces of class HID,
+  // with an interrupt IN endpoint on the last. Call it between Gadget::add_functionfs and the first
+  // plug().
   FunctionFsHid(const std::string& name, const std::filesystem::path& folder, int interfaces,
                 Reports reports);
   ~FunctionFsHid();
   FunctionFsHid(const FunctionFsHid&) = delete;
   FunctionFsHid& operator=(const FunctionFsHid&) = delete;
 
-  // One input report; waits until the host takes it. False when nobody takes it: unplugged.
+  // Sends one input report and waits until the host takes it. False when the device is unplugged.
   bool send(std::span<const std::byte> report);
 
  private:

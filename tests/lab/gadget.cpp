@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 constexpr const char* kGadgets = "/sys/kernel/config/usb_gadget";
 constexpr const char* kEnglish = "strings/0x409";
 
-// configfs takes one write() a value, so nothing may be buffered in two.
+// configfs needs each value in a single write(), so the value is not buffered.
 void put(const fs::path& file, std::string_view value) {
   std::FILE* out = std::fopen(file.c_str(), "w");
   if (out == nullptr) give_up("cannot open " + file.string() + ": " + std::strerror(errno));

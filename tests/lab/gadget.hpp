@@ -1,6 +1,6 @@
-// USB devices made of software: the kernel's gadget framework on the device's side of dummy_hcd,
-// whose host's side is a USB bus like any other. Needs root and the modules that tests/lab/init
-// loads. A step that fails ends the program with a sentence: the lab is worth nothing then.
+// USB devices in software: the kernel's gadget framework on the device side of dummy_hcd, whose
+// host side is an ordinary USB bus. Needs root and the modules that tests/lab/init loads. A step
+// that fails ends the program with a message, because the lab cannot work without it.
 #pragma once
 
 #include <cstddef>
@@ -18,13 +18,13 @@ struct Ids {
 
 class Gadget {
  public:
-  // `controller` is one of /sys/class/udc; each takes one gadget.
+  // `controller` is one of /sys/class/udc; each holds one gadget.
   Gadget(std::string controller, const Ids& ids);
   ~Gadget();
   Gadget(const Gadget&) = delete;
   Gadget& operator=(const Gadget&) = delete;
 
-  // Interfaces come in the order of these calls. Before the first plug().
+  // Interfaces are numbered in the order of these calls. Call them before the first plug().
   void add_hid(std::span<const std::uint8_t> descriptor, std::size_t report_bytes);
   void add_serial();
   void add_functionfs(const std::string& mount_name);
@@ -33,7 +33,7 @@ class Gadget {
   void unplug();
   [[nodiscard]] bool plugged() const { return plugged_; }
 
-  // The device's side: what is written there the host reads. After plug() for HID.
+  // The device's side: the host reads what is written there. For HID only after plug().
   [[nodiscard]] std::filesystem::path hid_node() const;
   [[nodiscard]] std::filesystem::path serial_node() const;
 

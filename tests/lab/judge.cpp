@@ -9,12 +9,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kMaxReturn = 1s;      // from the plug
-constexpr auto kMaxOpening = 400ms;  // from the node: the supervisor's turn without news of it
+constexpr auto kMaxReturn = 1s;  // from the plug
+constexpr auto kMaxOpening =
+    400ms;  // from the node: the supervisor's polling interval without a hotplug event
 constexpr auto kMaxSilence = 200ms;  // ten reports
-constexpr auto kUnderWay = 30ms;     // from the glove's mouth to the daemon
+constexpr auto kUnderWay = 30ms;     // from the glove to the daemon
 
-// The report of this value that was said last when it arrived.
+// The number of the last report with this value that was sent before the sample arrived.
 std::size_t number_of(const HeardSample& sample, const std::vector<Moment>& said,
                       std::uint32_t modulus) {
   const auto later = std::upper_bound(said.begin() + 1, said.end(), sample.arrived);
@@ -86,7 +87,7 @@ class Judge {
   Verdict verdict_;
   std::optional<HeardSample> last_;
   std::size_t session_ = 0;  // of the last sample
-  std::size_t report_ = 0;   // the last one known
+  std::size_t report_ = 0;   // the last known report
 };
 
 }  // namespace

@@ -12,9 +12,10 @@ namespace {
 
 constexpr int kLookAround_ms = 50;
 constexpr std::string_view kSamples = "sensor/", kEvents = "event/";
-constexpr int kFewestSensors = 4;  // of a line whose beginning was cut off by opening the port
+constexpr int kFewestSensors =
+    4;  // fewest sensors of a line whose beginning was cut off when the port was opened
 
-// The value that all valid raw sensors share; nothing when they differ or are too few.
+// The common value of all valid raw sensors; empty when they differ or are too few.
 std::optional<std::uint32_t> common_value(const v1::Sample& sample) {
   std::optional<float> common;
   int sensors = 0;
@@ -86,7 +87,7 @@ void Listener::take_sample(std::string_view bytes) {
   }
   const std::lock_guard lock(mutex_);
   auto& samples = heard_[sample.stream()].samples;
-  // One that is told once more while its stream is stale is none.
+  // A sample that is published again while its stream is stale is not a new one.
   if (!samples.empty() && samples.back().sequence == sample.sequence()) return;
   samples.push_back({.sequence = sample.sequence(),
                      .arrived = moment(sample.arrival_ns()),

@@ -1,4 +1,4 @@
-// A client of the daemon under test, which notes every Sample of every stream as it comes.
+// A client of the daemon under test that records every Sample of every stream.
 #pragma once
 
 #include <cstdint>
@@ -16,14 +16,15 @@ namespace posed::lab {
 
 struct HeardSample {
   std::uint64_t sequence = 0;
-  Moment arrived;                      // at the daemon
-  Moment heard;                        // here
-  std::optional<std::uint32_t> value;  // of all raw sensors; nothing: they differ, or are too few
+  Moment arrived;  // at the daemon
+  Moment heard;    // here
+  std::optional<std::uint32_t>
+      value;  // common value of all raw sensors; empty: they differ, or are too few
 };
 
 struct Heard {
   std::vector<HeardSample> samples;
-  std::vector<Moment> found, lost;  // when posed told so
+  std::vector<Moment> found, lost;  // times of posed's events
 };
 
 class Listener {
@@ -31,7 +32,7 @@ class Listener {
   explicit Listener(const std::string& endpoint);
 
   [[nodiscard]] Heard heard(const std::string& stream) const;
-  // Samples so far that arrived at the daemon at or after `begin`.
+  // The number of samples so far that arrived at the daemon at or after `begin`.
   [[nodiscard]] std::size_t samples_since(const std::string& stream, Moment begin) const;
   [[nodiscard]] bool lost_since(const std::string& stream, Moment begin) const;
 

@@ -2,7 +2,7 @@
 
 namespace posed::test {
 
-// Where the virtual machine keeps it (boot.sh).
+// Its path in the virtual machine (boot.sh).
 std::filesystem::path posed_binary() { return "/bin/posed"; }
 
 }  // namespace posed::test

@@ -1,4 +1,4 @@
-// What a process holds: to see that a replug leaves nothing behind.
+// The descriptors and memory of a process, to check that a replug leaks nothing.
 #pragma once
 
 #include <unistd.h>
@@ -9,7 +9,7 @@
 
 namespace posed::lab {
 
-inline constexpr long kMemorySlack_kb = 128;  // pages that a heap touches late
+inline constexpr long kMemorySlack_kb = 128;  // heap pages that are touched late
 
 struct Resources {
   long descriptors = 0;

@@ -1,4 +1,4 @@
-// The lab's gloves as posed knows them, and what makes them speak.
+// The lab's gloves and their configuration in posed, and the Speaker that makes them send.
 #pragma once
 
 #include <chrono>
@@ -13,18 +13,19 @@
 
 namespace posed::lab {
 
-// A glove whose report n has n % modulus in every sensor, so that a mixture of two shows.
+// A glove whose report n has n % modulus in every sensor, so that a mixture of two reports is
+// visible.
 struct Glove {
   std::string device;  // of lab_devices()
   std::string driver;
-  std::string config;  // what its [[stream]] says beside name and driver
+  std::string config;  // keys of its [[stream]] besides name and driver
   std::uint32_t modulus = 1;
   std::function<std::vector<std::byte>(std::uint32_t value)> report;
 };
 
 std::vector<Glove> gloves();
 
-// Makes a glove speak all the time, plugged in or not, and notes when it said what.
+// Makes a glove send all the time, plugged in or not, and records when it sent each report.
 class Speaker {
  public:
   Speaker(LabDevice& device, Glove glove);
@@ -33,7 +34,8 @@ class Speaker {
   [[nodiscard]] const Glove& glove() const { return glove_; }
   [[nodiscard]] const std::string& name() const { return glove_.device; }
 
-  // When report n, which the kernel took, was offered to it: at [n]. The first report is 1.
+  // [n] is the time at which report n, if the kernel took it, was offered to the kernel. The first
+  // report is 1.
   [[nodiscard]] std::vector<Moment> said() const;
 
  private:

@@ -28,12 +28,13 @@ constexpr int kRounds = 10;
 constexpr std::size_t kReport = 64;  // bytes: one packet of a full-speed device
 constexpr std::size_t kReportsARound = 100;
 constexpr auto kPeriod = 5ms;
-constexpr auto kPatience = 5s;  // of the lab; what is measured is printed and judged apart
+constexpr auto kPatience =
+    5s;  // timeout of the lab; measured times are printed and judged separately
 constexpr auto kMaxReturn = 1s;
 
 using Report = std::array<std::byte, kReport>;
 
-// Report n: its number and bytes that follow from it, so that a mixture of two is seen.
+// Report n: its number and bytes computed from it, so that a mixture of two reports is detected.
 Report report_of(std::uint32_t n) {
   Report report{};
   for (std::size_t i = 0; i < 4; ++i) report[i] = static_cast<std::byte>(n >> (8 * i));
@@ -51,10 +52,10 @@ std::uint32_t number_of(std::span<const std::byte> report) {
   return n;
 }
 
-// Counts what comes: whole reports in order, and everything else.
+// Counts what arrives: whole reports in order, and everything else.
 class Judge {
  public:
-  // A node or endpoint gives one report a read.
+  // A node or endpoint gives one report per read.
   void take_report(std::span<const std::byte> bytes) {
     if (bytes.size() != kReport || !std::ranges::equal(bytes, report_of(number_of(bytes)))) {
       ++wrong_;
@@ -90,11 +91,13 @@ class Judge {
 
 struct Outcome {
   std::size_t right = 0, wrong = 0;
-  Clock::duration enumerated{}, back{}, lost{};  // by the kernel; then by us; then gone
+  Clock::duration enumerated{}, back{},
+      lost{};  // time until the kernel lists it; until our first report; until its loss is noticed
   std::string trouble;
 };
 
-// Waits as the daemon's supervisor does for a device that is just coming: for news, or a moment.
+// Opens a device that is just being plugged in as the daemon's supervisor does: it waits for a
+// hotplug event or a short time.
 Result<std::unique_ptr<Transport>> open_soon(const LabDevice& device,
                                              drivers::HotplugMonitor& arrivals) {
   const auto deadline = Clock::now() + kPatience;
@@ -107,7 +110,7 @@ Result<std::unique_ptr<Transport>> open_soon(const LabDevice& device,
   }
 }
 
-// Reads until `enough` says so, the device is lost, or patience ends.
+// Reads until `enough` returns true, the device is lost, or the timeout passes.
 bool read_until(Transport& transport, Judge& judge, bool serial,
                 const std::function<bool()>& enough) {
   const auto deadline = Clock::now() + kPatience;
@@ -151,7 +154,7 @@ Outcome one_round(LabDevice& device, drivers::HotplugMonitor& arrivals) {
                      [&] { return judge.right() >= kReportsARound; });
   }
   const auto unplugged_at = Clock::now();
-  device.unplug();  // while the feeder still speaks
+  device.unplug();  // while the feeder still sends
   if (outcome.trouble.empty() &&
       read_until(**transport, judge, device.serial, [] { return false; })) {
     outcome.trouble = "it is unplugged and nobody noticed";

@@ -1,5 +1,5 @@
-// The transports against the kernel's own USB: each device is unplugged and plugged in again while
-// it streams.
+// Checks the transports with the kernel's own USB stack: each device is unplugged and plugged in
+// again while it streams.
 #pragma once
 
 #include <string_view>
@@ -8,7 +8,7 @@
 
 namespace posed::lab {
 
-// Prints a line a device (all, or the one of that name); the number of devices that failed.
+// Prints one line per device (all, or the one named `only`) and returns the number that failed.
 int check_transports(const LabDevices& devices, std::string_view only);
 
 }  // namespace posed::lab

@@ -1,7 +1,8 @@
-// The hot law, enforced: while a thread's hot marks are set (daemon/system/hot_mark.hpp), each
-// allocation, lock, log call, throw and system call is counted here. The heap, the locks and throw
-// are watched by functions that stand before the library's own; log calls by a sink; system calls
-// by the kernel (syscall user dispatch, Linux 5.11, no rights needed).
+// The real-time contract, enforced: while a thread's hot marks are set
+// (daemon/system/hot_mark.hpp), each allocation, lock, log call, throw and system call is counted
+// here. The heap, the locks and throw are watched by functions that stand before the library's own;
+// log calls by a sink; system calls by the kernel (syscall user dispatch, Linux 5.11, no rights
+// needed).
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// The hot law holds on the real reader and pipeline threads; and each way of breaking it, put into
-// those threads on purpose, is found.
+// The real-time contract holds on the real reader and pipeline threads; and each way of breaking
+// it, put into those threads on purpose, is found.
 #include <spdlog/spdlog.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -28,7 +28,7 @@ namespace {
 
 using pipeline::Command;
 
-// A record_sink that keeps the law itself; the recorder's has tests of its own.
+// A record_sink that keeps the contract itself; the recorder's has tests of its own.
 class CountingTape final : public pipeline::RecordSink {
  public:
   void chunk(std::uint32_t, std::uint8_t, pipeline::Direction, std::int64_t,
@@ -49,7 +49,7 @@ drivers::Device open_device(const char* driver, const drivers::Options& options)
   return drivers::find_driver(driver)->open(options, ports).value();
 }
 
-// Breaks the law once, at the fifth chunk.
+// Breaks the contract once, at the fifth chunk.
 class BreakingDecoder final : public drivers::Decoder {
  public:
   BreakingDecoder(std::unique_ptr<drivers::Decoder> inner, std::function<void()> breach)
@@ -75,7 +75,7 @@ void check_no_breach() {
 
 }  // namespace
 
-TEST_CASE("reader and pipeline keep the hot law", "[rt]") {
+TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   watch_log();
   const test::TempFolder folder;
   const auto path = folder.path() / "toy.bvh";
@@ -107,8 +107,9 @@ TEST_CASE("reader and pipeline keep the hot law", "[rt]") {
   check_no_breach();
 }
 
-TEST_CASE("hands keep the hot law: smoothed, constrained, performing, given another model",
-          "[rt]") {
+TEST_CASE(
+    "hands keep the real-time contract: smoothed, constrained, performing, given another model",
+    "[rt]") {
   watch_log();
   const test::TempFolder folder;
   const auto path = folder.path() / "hand.csv";
@@ -148,7 +149,7 @@ TEST_CASE("hands keep the hot law: smoothed, constrained, performing, given anot
   check_no_breach();
 }
 
-TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "[rt]") {
+TEST_CASE("a glove keeps the real-time contract: read, calibrated, felt, lost and found", "[rt]") {
   watch_log();
   CountingTape record_sink;
   const auto plug_in = [] {
@@ -205,7 +206,7 @@ TEST_CASE("a glove keeps the hot law: read, calibrated, felt, lost and found", "
   }
 }
 
-TEST_CASE("each way of breaking the hot law is found", "[rt]") {
+TEST_CASE("each way of breaking the real-time contract is found", "[rt]") {
   watch_log();
   struct Way {
     Breach breach;

@@ -1,5 +1,5 @@
-// The real reader and pipeline threads on real clips, as the daemon runs them, with the hot law
-// watched on both.
+// The real reader and pipeline threads on real clips, as the daemon runs them, with the real-time
+// contract watched on both.
 #pragma once
 
 #include <functional>

@@ -11,13 +11,13 @@ thread_local std::uint64_t count = 0;
 std::uint64_t posed::test::allocations() noexcept { return count; }
 
 #ifndef __has_feature
-#define __has_feature(name) 0  // gcc says it with a macro of its own
+#define __has_feature(name) 0  // gcc uses a different macro for this
 #endif
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || \
     __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-// A sanitizer brings a heap of its own and tells of each call. gcc 12 comes without the header that
-// declares it.
+// A sanitizer has its own heap and calls these hooks at each allocation. gcc 12 lacks the header
+// that declares them.
 extern "C" int __sanitizer_install_malloc_and_free_hooks(  // NOLINT(bugprone-reserved-identifier)
     void (*allocated)(const volatile void*, std::size_t), void (*freed)(const volatile void*));
 namespace {
@@ -25,7 +25,7 @@ const int kHooked = __sanitizer_install_malloc_and_free_hooks(
     [](const volatile void*, std::size_t) { ++count; }, [](const volatile void*) {});
 }  // namespace
 #else
-// glibc lets a program put its own malloc before the library's; operator new ends here, too.
+// glibc allows a program to replace malloc; operator new calls it, too.
 extern "C" {
 void* __libc_malloc(std::size_t size);                      // NOLINT(bugprone-reserved-identifier)
 void* __libc_calloc(std::size_t number, std::size_t size);  // NOLINT(bugprone-reserved-identifier)

@@ -1,4 +1,4 @@
-// Counts what this thread takes from the heap: operator new, malloc and their kin.
+// Counts the heap allocations of this thread: operator new, malloc, calloc, realloc and the like.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// A disk that is full as far as this process can tell: no file may grow beyond `bytes` while it
-// lives.
+// Simulates a full disk for this process: while the object lives, no file may grow beyond `bytes`.
 #pragma once
 
 #include <csignal>

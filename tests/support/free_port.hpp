@@ -1,4 +1,4 @@
-// A TCP port of this machine that was free a moment ago.
+// Returns a TCP port of this machine that was free a moment ago.
 #pragma once
 
 #include <arpa/inet.h>

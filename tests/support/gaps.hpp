@@ -1,4 +1,4 @@
-// Dropouts cut into a motion, and what an estimate makes of them beside holding the last value.
+// Cuts dropouts into a motion and measures an estimate inside them against holding the last value.
 #pragma once
 
 #include <limits>
@@ -9,11 +9,11 @@
 namespace posed::test {
 
 struct Gaps {
-  Motion measured;            // not a number inside the gaps
+  Motion measured;            // NaN inside the gaps
   std::vector<bool> missing;  // [frames]
 };
 
-// Gaps of `length` frames, 35 to 55 frames apart; the start and the end are left whole.
+// Gaps of `length` frames, 35 to 55 frames apart; none at the start and the end.
 inline Gaps with_gaps(const Motion& measured, int length, unsigned seed) {
   Gaps gaps{measured, std::vector<bool>(static_cast<std::size_t>(measured.rows()))};
   std::mt19937_64 random(seed);
@@ -27,7 +27,7 @@ inline Gaps with_gaps(const Motion& measured, int length, unsigned seed) {
   return gaps;
 }
 
-// Mean square errors inside the gaps; every motion that is added weighs the same.
+// Mean square errors inside the gaps; every added motion has the same weight.
 class GapError {
  public:
   void add(const Motion& truth, const Motion& estimate, const Gaps& gaps) {

@@ -1,4 +1,4 @@
-// Fixtures of tests/golden as JSON, and as matrices.
+// Reads the fixtures of tests/golden as JSON and as matrices.
 #pragma once
 
 #include <fstream>

@@ -1,4 +1,4 @@
-// Real grasps of GraspDB14's CyberGlove, 60 Hz, and their reference without the glove's dead band:
+// Real CyberGlove grasps of GraspDB14, 60 Hz, and their reference without the glove's dead band:
 // models/smooth/README.md, "Measured figures". Degrees; [frames x 19 channels].
 #pragma once
 
@@ -22,7 +22,8 @@ using Motion = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowM
 
 inline constexpr std::size_t kGraspAngles = 23;
 
-// One recording's angles as its file has them [rad]; date, time and switch come before them.
+// The angles of one recording as in its file [rad]; the file's columns before them are date, time
+// and switch.
 inline std::vector<std::array<double, kGraspAngles>> read_grasp_rows(
     const std::filesystem::path& path) {
   constexpr std::size_t kBefore = 7;
@@ -38,7 +39,7 @@ inline std::vector<std::array<double, kGraspAngles>> read_grasp_rows(
   return rows;
 }
 
-// The same as motion; palm arch, wrist and one sensor that hardly moves are left out.
+// The same as a Motion, without palm arch, wrist and one sensor that hardly moves.
 inline Motion read_grasps(const std::filesystem::path& path) {
   constexpr std::size_t kSensors = 20;
   constexpr std::size_t kLeftOut = 11;
@@ -52,8 +53,8 @@ inline Motion read_grasps(const std::filesystem::path& path) {
   return Eigen::Map<Motion>(values.data(), frames, kSensors - 1);
 }
 
-// Stairs of the dead band become ramps from change to change; a long hold stays and ramps in its
-// last frames.
+// Replaces the stairs of the dead band by ramps from change to change; a long hold is kept and
+// ramps in its last frames.
 inline void without_stairs(Eigen::Ref<Eigen::VectorXd> x) {
   constexpr Eigen::Index kShort = 7;
   constexpr Eigen::Index kRamp = 4;
@@ -118,7 +119,7 @@ inline Motion grasp_reference(const std::filesystem::path& path) {
   return motion;
 }
 
-// White noise of one standard deviation on everything.
+// Adds white noise of standard deviation `sd` to every value.
 inline Motion noisy(const Motion& truth, double sd, unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0.0, sd);

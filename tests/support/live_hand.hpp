@@ -1,4 +1,5 @@
-// Hand motions through the live generator with a gesture model: what the model tests share.
+// Passes hand motions through the live smoother with a gesture model; shared by the tests of the
+// model.
 #pragma once
 
 #include <filesystem>
@@ -25,11 +26,11 @@ inline gesture::Recording recording_of(const SyntheticHand& hand) {
   return recording;
 }
 
-// Grasps on the hand's joints: an unknown hand for a model of g, c, p. [frames x 45] deg; every
-// `step`-th frame.
+// Grasps mapped to the hand's joints, which are an unknown motion for a model of g, c, p. [frames x
+// 45] deg; every `step`-th frame.
 inline Motion unknown_hand(const std::filesystem::path& grasps, int step = 1) {
-  // Where the 19 sensors (thumb roll and two joints, abduction, then finger by finger) stand in
-  // hand45; this glove's flexion is negative when closing.
+  // The hand45 indices of the 19 sensors (thumb roll and two joints, abduction, then finger by
+  // finger); this glove's flexion is negative when closing.
   constexpr std::array<int, 19> kAngle{2,  3,  6,  1,  9,  12, 15, 10, 18, 21,
                                        24, 27, 30, 33, 28, 36, 39, 42, 37};
   const Motion sensors = grasp_reference(grasps);
@@ -81,7 +82,7 @@ inline Followed followed(const Motion& measured, double rate_hz, const smooth::L
 }
 
 // How often the frame's label is right, and how many frames after a segment's start (all but the
-// first) the stream has told it with more than 0.8.
+// first) the stream reports it with a probability above 0.8.
 class LabelScore {
  public:
   void add(const Followed& hand, const gesture::Recording& truth, int lag) {

@@ -1,5 +1,5 @@
-// Changes a device log behind its writer's back. After run_sql() alone the rows' checksums tell of
-// it; after reseal() they are right again, and only the content is wrong.
+// Modifies a finished device log. After run_sql() alone the rows' checksums reveal the change;
+// after reseal() they are right again, and only the content is wrong.
 #pragma once
 
 #include <filesystem>
@@ -31,7 +31,7 @@ inline void run_sql(const std::filesystem::path& path, const std::string& sql) {
   with_log(path, [&](sqlite3* handle) { run_sql(handle, sql); });
 }
 
-// Writes the right checksum into every row of a table whose last column is `crc`.
+// Recomputes the checksum of every row of a table whose last column is `crc`.
 inline void reseal(sqlite3* handle, const std::string& table) {
   sqlite3_stmt* select = nullptr;
   REQUIRE(sqlite3_prepare_v2(handle, ("SELECT * FROM " + table).c_str(), -1, &select, nullptr) ==
@@ -56,7 +56,7 @@ inline void reseal(sqlite3* handle, const std::string& table) {
   }
 }
 
-// Changes content as a writer would have written it.
+// Changes the content and recomputes the checksums, as if the writer had written it so.
 inline void forge(const std::filesystem::path& path, const std::string& sql) {
   with_log(path, [&](sqlite3* handle) {
     run_sql(handle, sql);

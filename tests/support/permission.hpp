@@ -1,4 +1,4 @@
-// Tests of what may not be opened: to be somebody who may not, and what has to be said then.
+// For tests of files without permission: runs as a user without it, and checks the error message.
 #pragma once
 
 #include <grp.h>
@@ -14,7 +14,7 @@ namespace posed::test {
 
 inline constexpr uid_t kNobody = 65534;
 
-// root may do everything, so root is somebody else for a while.
+// root may open everything, so a process of root acts as another user while this object lives.
 class AsNobody {
  public:
   AsNobody() {
@@ -41,7 +41,7 @@ class AsNobody {
   bool changed_ = false;
 };
 
-// The sentence names the node, the rule and what to do with it.
+// Checks that the message names the node, the udev rule and what to do with it.
 inline void check_sentence(const std::string& sentence, const std::string& node) {
   INFO(sentence);
   CHECK(sentence.find("no permission for " + node) != std::string::npos);

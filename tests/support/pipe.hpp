@@ -1,4 +1,4 @@
-// A pipe of a test's own, that can be full before anybody writes to it.
+// A pipe that a test can fill before anyone else writes to it.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ class Pipe {
   Pipe(const Pipe&) = delete;
   Pipe& operator=(const Pipe&) = delete;
 
-  // Until not one byte more fits; writers wait then. Returns how many bytes it holds.
+  // Fills the pipe until no byte fits, so that writers block. Returns its capacity in bytes.
   std::size_t fill() const {
     set_flags(write_, O_NONBLOCK);
     std::size_t held = 0;
@@ -39,7 +39,7 @@ class Pipe {
     return held;
   }
 
-  // What is in it, without waiting for more.
+  // Reads what is in it, without waiting for more.
   [[nodiscard]] std::string take() const {
     set_flags(read_, O_NONBLOCK);
     std::string all;

@@ -1,4 +1,4 @@
-// An emulated glove whose hand does as it is told, on a thread of its own.
+// An emulated glove whose hand takes the poses that a test sets, on its own thread.
 #pragma once
 
 #include <atomic>

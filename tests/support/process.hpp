@@ -1,4 +1,5 @@
-// The real binary as a child process: its lines, its exit code, and never a child left behind.
+// Runs the real binary as a child process and gives its output lines and exit code; the destructor
+// ends the child.
 #pragma once
 
 #include <chrono>
@@ -22,7 +23,7 @@
 
 namespace posed::test {
 
-// Where a child's stderr goes: a file that errors() reads, a descriptor of the test's, or nowhere.
+// Where a child's stderr goes: a file that errors() reads, a descriptor of the test, or nowhere.
 struct ChildStderr {
   static constexpr int kFile = -1, kClosed = -2;
   int descriptor = kFile;
@@ -30,8 +31,8 @@ struct ChildStderr {
 
 class Process {
  public:
-  // Starts `posed` with these arguments; stdin is empty. `stdout_descriptor` is the test's own
-  // instead of the pipe that line() reads. It may open `most_files` (0: as we may).
+  // Starts `posed` with these arguments; stdin is empty. `stdout_descriptor` replaces the pipe that
+  // line() reads. The child may open `most_files` files (0: the limit of this process).
   explicit Process(std::vector<std::string> arguments, ChildStderr err = {},
                    int stdout_descriptor = -1, int most_files = 0) {
     arguments.insert(arguments.begin(), posed_binary().string());
@@ -73,7 +74,7 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // The next line of stdout; nullopt at its end or when none came in time.
+  // The next line of stdout; nullopt at its end or when none comes in time.
   std::optional<std::string> line(std::chrono::milliseconds within = kPatience) {
     const auto end = std::chrono::steady_clock::now() + within;
     while (true) {
@@ -92,14 +93,14 @@ class Process {
       text_.append(buffer, static_cast<std::size_t>(size));
     }
   }
-  // All that stdout still says until its end.
+  // Reads stdout to its end.
   std::string rest() {
     std::string all;
     while (const auto next = line()) all += *next + "\n";
     return all;
   }
 
-  // Nobody reads its stdout from now on.
+  // Closes the reading end of its stdout.
   void hang_up() {
     if (out_ >= 0) close(out_);
     out_ = -1;
@@ -108,7 +109,7 @@ class Process {
   void send(int signal) const { kill(pid_, signal); }
   [[nodiscard]] pid_t pid() const { return pid_; }
 
-  // CPU time it has used so far [s].
+  // CPU time used so far [s].
   [[nodiscard]] double cpu_s() const {
     std::ifstream stat("/proc/" + std::to_string(pid_) + "/stat");
     std::string word;
@@ -119,7 +120,7 @@ class Process {
            static_cast<double>(sysconf(_SC_CLK_TCK));
   }
 
-  // The exit code (128 + signal when killed); nullopt when it still runs then.
+  // The exit code (128 + signal when killed); nullopt when it still runs after that time.
   std::optional<int> exit_code(std::chrono::milliseconds within = kPatience) {
     const auto end = std::chrono::steady_clock::now() + within;
     while (!exit_code_) {
@@ -135,7 +136,7 @@ class Process {
     return exit_code_;
   }
 
-  // What stderr has said so far.
+  // The text written to stderr so far.
   [[nodiscard]] std::string errors() const {
     std::ifstream file(folder_.path() / "stderr");
     return {std::istreambuf_iterator<char>(file), {}};

@@ -1,5 +1,5 @@
-// RawPeer: a TCP client that says whatever bytes a test wants, and the few frames of ZMTP 3.0 that
-// an attack is made of. Bounded: every call ends after `kPatience` at the latest. Loopback only.
+// RawPeer: a TCP client that sends any bytes, and the frames of ZMTP 3.0 that attacks consist of.
+// Every call ends after `kPatience` at the latest. Loopback only.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@ inline std::string greeting(std::string_view mechanism = "NULL") {
   return bytes;
 }
 
-// One short or long frame. `flags`: 1 more parts follow, 4 a command.
+// One short or long frame. `flags`: 1 = more parts follow, 4 = command.
 inline std::string frame(std::string_view body, int flags = 0) {
   std::string bytes;
   if (body.size() < 256) {
@@ -60,7 +60,7 @@ class RawPeer {
  public:
   static constexpr std::chrono::milliseconds kPatience{5000};
 
-  // `endpoint` is what the daemon says it is bound to: tcp://127.0.0.1:PORT.
+  // `endpoint` is the one that the daemon reports: tcp://127.0.0.1:PORT.
   explicit RawPeer(const std::string& endpoint)
       : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_in address{};
@@ -79,7 +79,8 @@ class RawPeer {
   RawPeer(RawPeer&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   RawPeer& operator=(RawPeer&&) = delete;
 
-  // Whether all of it went out; false when the other side hung up or takes no more in time.
+  // Returns true when all bytes were sent; false when the other side hung up or accepts no more in
+  // time.
   bool send(std::string_view bytes, std::chrono::milliseconds within = kPatience) const {
     const auto end = std::chrono::steady_clock::now() + within;
     while (!bytes.empty()) {
@@ -92,7 +93,7 @@ class RawPeer {
     }
     return true;
   }
-  // What came until `size` bytes are there, the other side hung up, or time is up.
+  // Receives until `size` bytes have arrived, the other side hangs up, or time is up.
   std::string receive(std::size_t size, std::chrono::milliseconds within = kPatience) const {
     const auto end = std::chrono::steady_clock::now() + within;
     std::string all;
@@ -106,7 +107,7 @@ class RawPeer {
     }
     return all;
   }
-  // Whether the other side hangs up in time; what it says until then is read away.
+  // Whether the other side hangs up in time; bytes that it sends before are discarded.
   bool hung_up(std::chrono::milliseconds within = kPatience) const {
     const auto end = std::chrono::steady_clock::now() + within;
     while (std::chrono::steady_clock::now() < end) {
@@ -117,7 +118,7 @@ class RawPeer {
     }
     return false;
   }
-  // Greets, and is ready as a socket of this type; false when refused.
+  // Performs the ZMTP handshake as a socket of this type; false when refused.
   bool shake_hands(std::string_view socket_type) const {
     if (!send(zmtp::greeting()) || receive(64).size() < 64) return false;
     return send(zmtp::ready(socket_type)) && !receive(20).empty();

@@ -24,7 +24,8 @@ int channel(int finger, int joint, Axis axis) {
   return finger * kFingerChannels + 3 * (joint - 1) + axis;
 }
 
-// 22 sensor angles, in the order of the glove's protocol sheet 1.4, on the joints they measure.
+// Maps 22 sensor angles, in the order of the glove's protocol sheet 1.4, to the joints that they
+// measure.
 RowVectorXd hand_of(const std::vector<double>& sensor) {
   RowVectorXd hand = RowVectorXd::Zero(kHandChannels);
   hand[channel(0, 1, kTwist)] = sensor[0];
@@ -43,7 +44,7 @@ RowVectorXd hand_of(const std::vector<double>& sensor) {
   return hand;
 }
 
-// The numbers at the start of a line; what follows them is the sign's name.
+// The numbers at the start of a line; the sign's name follows them.
 std::vector<double> numbers_of(std::string_view line) {
   std::vector<double> numbers;
   while (!line.empty()) {
@@ -72,7 +73,7 @@ FeatureMatrix libras_poses(const std::filesystem::path& folder, const std::strin
   for (std::string_view left = text; !left.empty();) {
     std::vector<double> sensors = numbers_of(clip::next_line(left));
     if (sensors.size() < kSensors) continue;
-    for (double& value : sensors) value = -value;  // flexion positive
+    for (double& value : sensors) value = -value;  // flexion is positive in hand45
     rows.push_back(hand_of(sensors));
   }
   if (rows.empty()) throw std::runtime_error("no poses of " + sign);

@@ -13,8 +13,8 @@
 
 namespace posed::test {
 
-// The letters of the sign alphabet that are the hands of Takamido et al. (models/gesture/README.md,
-// "References").
+// The letters of the sign alphabet whose hand poses are the labels of Takamido et al.
+// (models/gesture/README.md, "References").
 inline const std::map<std::string, std::string> kSignOf{{"g", "A"}, {"c", "V"}, {"p", "4"},
                                                         {"1", "G"}, {"3", "W"}, {"4", "B"}};
 
@@ -22,7 +22,7 @@ inline const std::map<std::string, std::string> kSignOf{{"g", "A"}, {"c", "V"}, 
 [[nodiscard]] gesture::FeatureMatrix libras_poses(const std::filesystem::path& folder,
                                                   const std::string& sign);
 
-// `gestures` of g, c, p at 30 Hz, never the same twice in a row.
+// A recording of `gestures` gestures of g, c, p at 30 Hz, never the same twice in a row.
 [[nodiscard]] gesture::Recording real_pose_corpus(const std::filesystem::path& folder,
                                                   std::uint32_t seed, int gestures = 100);
 

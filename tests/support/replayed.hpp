@@ -1,4 +1,5 @@
-// What a replay of a device log gives, in process, and whether it is what was published live.
+// Replays a device log in this process and compares the result with the frames that were published
+// live.
 #pragma once
 
 #include <filesystem>
@@ -16,12 +17,12 @@
 namespace posed::test {
 
 struct Replayed {
-  std::vector<std::string> frames;  // serialized, in pipeline order
+  std::vector<std::string> frames;  // serialized, in the order of the pipeline
   std::optional<Error> difference;  // the first one, or why the log cannot be replayed
   replay::Expectation::Counts counts;
 };
 
-// `expect`: compared with the published frames that the log holds.
+// `expect`: compare with the published frames that the log holds.
 inline Replayed replayed(const std::filesystem::path& path, bool expect = true) {
   Replayed result;
   auto reader = log::Reader::open(path);
@@ -41,7 +42,7 @@ inline Replayed replayed(const std::filesystem::path& path, bool expect = true) 
     }
     expectation = std::move(*live);
   }
-  std::vector<publish::FrameEncoder> encoders;  // styled and raw of each stream
+  std::vector<publish::FrameEncoder> encoders;  // for the styled and the raw topic of each stream
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     encoders.emplace_back(replay.stream(id).name);
     encoders.emplace_back(replay.stream(id).name + "-raw");

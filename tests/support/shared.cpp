@@ -2,7 +2,7 @@
 
 namespace posed::test {
 
-// The paths are compiled into this file alone, so that a compiler cache serves every checkout.
+// Only this file contains absolute paths, so that a compiler cache works across checkouts.
 std::filesystem::path source_dir() { return POSED_SOURCE_DIR; }
 std::filesystem::path posed_binary() { return POSED_BINARY; }
 

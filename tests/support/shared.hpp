@@ -1,5 +1,4 @@
-// Where tests find things: the source tree, and the real recordings that may or may not be beside
-// it.
+// Paths that tests use: the source tree, and the optional folder ../shared with real recordings.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +13,7 @@ inline std::filesystem::path golden(const std::string& name) {
   return source_dir() / "tests/golden" / name;
 }
 
-// ../shared/<relative> when it is there. Tests that need it skip by name:
+// ../shared/<relative> if it exists. Tests that need it are skipped by name:
 //   const auto clip = shared("data/cmu/07_01.amc"); if (!clip) { SKIP_WITHOUT_SHARED(); }
 inline std::optional<std::filesystem::path> shared(const std::string& relative) {
   auto path = source_dir() / "../shared" / relative;
@@ -24,7 +23,7 @@ inline std::optional<std::filesystem::path> shared(const std::string& relative) 
 
 }  // namespace posed::test
 
-// Says by name what was not run; the count of skipped tests is printed by `./run test`.
+// Prints the name of the skipped test; `./run test` prints how many there were.
 #define SKIP_WITHOUT_SHARED()                                                              \
   do {                                                                                     \
     WARN("SKIPPED without ../shared: " << Catch::getResultCapture().getCurrentTestName()); \

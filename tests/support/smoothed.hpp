@@ -1,4 +1,4 @@
-// A motion through the live generator's stage, frame by frame as it would come from a device.
+// Passes a motion through the live smoother frame by frame, as a device would send it.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@
 
 namespace posed::test {
 
-// A body with `channels` rotation channels, three a joint where they suffice.
+// A skeleton with `channels` rotation channels, three per joint; the last joint may have fewer.
 inline Skeleton body_with_channels(int channels) {
   Skeleton skeleton;
   skeleton.name = "toy";
@@ -47,7 +47,7 @@ class Frames final : public StageOut {
   std::vector<double> variance_rad2;  // of the last
 };
 
-// Row t is the estimate of frame t [deg]. Channels that are not a number make their joint missing.
+// Row t is the estimate of frame t [deg]. A joint with a NaN channel counts as missing.
 inline Motion smoothed(const Motion& measured, double rate_hz, const smooth::LiveOptions& options) {
   Skeleton skeleton = body_with_channels(static_cast<int>(measured.cols()));
   skeleton.finish().value();

@@ -16,8 +16,8 @@ namespace posed::test {
 
 struct SyntheticHand {
   Motion angles;
-  std::string labels;                      // one letter a gesture
-  std::vector<std::pair<int, int>> spans;  // its frames, the end not included
+  std::string labels;                      // one letter per gesture
+  std::vector<std::pair<int, int>> spans;  // first frame and end (excluded) of each gesture
 };
 
 namespace synthetic {
@@ -67,7 +67,7 @@ inline double minimum_jerk(double s) {
 
 }  // namespace synthetic
 
-// `gestures` of `alphabet` at random, none twice in a row.
+// `gestures` random gestures of `alphabet`, none twice in a row.
 inline SyntheticHand synthetic_hand(int gestures, unsigned seed,
                                     const std::string& alphabet = "gcp") {
   std::mt19937_64 random(seed);

@@ -1,4 +1,4 @@
-// A folder of one test's own, gone with its files when the test ends.
+// A temporary folder for one test, removed with its files at the end.
 #pragma once
 
 #include <cstdlib>

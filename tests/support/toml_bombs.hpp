@@ -1,5 +1,5 @@
-// TOML of some 62 KB that nests 15,000 to 62,000 deep, in every way that TOML can nest. toml++
-// alone overflows its stack on the dotted ones.
+// TOML texts of about 62 KB that nest 15,000 to 62,000 levels deep, one for each way in which TOML
+// can nest. toml++ alone overflows its stack on those with dots.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace posed::test {
 
-// Each is one statement or one header, ended by a newline where a text may go on behind it.
+// Each is one statement or one header, followed by a newline where more text may follow.
 inline std::vector<std::string> toml_bombs() {
   constexpr std::size_t kBytes = 62'000;
   const auto repeated = [](const std::string& piece) {
@@ -20,7 +20,7 @@ inline std::vector<std::string> toml_bombs() {
       dotted + " = 1\n",
       "[" + dotted + "]\n",
       "[[" + dotted + "]]\nb = 1\n",
-      repeated("'' .") + "\"\" = 1\n",  // quoted keys, with blanks between
+      repeated("'' .") + "\"\" = 1\n",  // quoted keys separated by blanks
       "x = {" + dotted + " = 1}\n",
       "x = [1.5, {" + dotted + " = 1}]\n",
       "x = " + repeated("[") + "\n",

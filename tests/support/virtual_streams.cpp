@@ -1,4 +1,4 @@
-// The streams of a VirtualDaemon: what their devices send.
+// The streams of a VirtualDaemon and the bytes that their devices send.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -28,7 +28,7 @@ std::string text_of(const drivers::Emulator::Bytes& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};  // NOLINT: bytes as text
 }
 
-// The chunks from `from_s` on, taken out of `link`.
+// Removes the chunks from time `from_s` on from `link` and returns them.
 std::vector<ScriptedChunk> cut_from(ScriptedLink& link, double from_s) {
   const auto at = std::ranges::lower_bound(link.chunks, from_s, {}, &ScriptedChunk::at_s);
   std::vector<ScriptedChunk> rest(at, link.chunks.end());
@@ -100,10 +100,10 @@ void disturb(VirtualStream& stream, std::uint64_t seed) {
     std::vector<ScriptedChunk> rest = cut_from(link, at_s);
     const double pause_s = draw(2.0) < 1.0 ? draw(0.3) : draw(1.2);
     const double what = draw(3.0);
-    if (what < 1.0) {  // silent: what would have come later does
+    if (what < 1.0) {  // silent for a while: later chunks come later
       for (ScriptedChunk& chunk : rest) chunk.at_s += pause_s;
       std::ranges::move(rest, std::back_inserter(link.chunks));
-    } else if (what < 2.0 || !comes_back) {  // held up: all of it comes at once
+    } else if (what < 2.0 || !comes_back) {  // delayed: all chunks of the pause come at once
       for (ScriptedChunk& chunk : rest) chunk.at_s = std::max(chunk.at_s, at_s + pause_s);
       std::ranges::move(rest, std::back_inserter(link.chunks));
     } else {  // unplugged

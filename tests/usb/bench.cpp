@@ -23,7 +23,7 @@ std::string hex(unsigned value, int digits) {
   return text.data();
 }
 
-// In hexadecimal digits, since a device may say what is no text.
+// In hexadecimal digits, because a device's strings may not be valid text.
 std::string attribute(const std::string& name, const std::string& value) {
   if (value.empty()) return {};
   std::string digits;
@@ -44,7 +44,7 @@ Bench::Bench() {
     throw std::runtime_error("run it as ctest does, with LD_PRELOAD=libumockdev-preload.so.0");
   }
   testbed_ = umockdev_testbed_new();
-  // Others than its owner look at it, too; and /dev is there before its first node.
+  // Users other than the owner must be able to read it, and /dev must exist before its first node.
   const std::filesystem::path root = file_of("");
   std::filesystem::permissions(root, std::filesystem::perms(0755));
   std::filesystem::create_directories(root / "dev");
@@ -120,7 +120,8 @@ void IoctlHandler::attach(const Bench& bench, const std::string& node) {
   if (umockdev_testbed_attach_ioctl(bench.testbed(), node.c_str(), base_, &error) == FALSE) {
     give_up("answer for " + node, error);
   }
-  // A program ends at an open() after which umockdev may not ask, even one that was refused.
+  // umockdev aborts the program at an open() whose ioctl file it may not read, even if the open()
+  // was refused.
   std::filesystem::permissions(bench.file_of("/ioctl" + node), std::filesystem::perms::all);
 }
 

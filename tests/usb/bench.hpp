@@ -1,5 +1,5 @@
-// Bench: USB devices that are not there, as umockdev shows them in /sys and /dev of this process
-// and of the programs it starts. The program has to run with libumockdev-preload in LD_PRELOAD.
+// Bench: simulated USB devices that umockdev shows in /sys and /dev to this process and to the
+// programs that it starts. The program must run with libumockdev-preload in LD_PRELOAD.
 #pragma once
 
 #include <umockdev.h>
@@ -15,7 +15,7 @@ namespace posed::test {
 
 struct UsbIds {
   std::uint16_t vendor = 0, product = 0;
-  std::string serial{};  // empty: it has none
+  std::string serial{};  // empty: no serial number
   std::string maker{}, product_name{};
   int port = 1;  // "1-PORT"
 };
@@ -28,39 +28,40 @@ class Bench {
   Bench& operator=(const Bench&) = delete;
 
   [[nodiscard]] UMockdevTestbed* testbed() const { return testbed_; }
-  // Where a node's file really is.
+  // The real path of a node's file.
   [[nodiscard]] std::filesystem::path file_of(const std::string& node) const;
 
-  // Devices in the words of umockdev-record, parents first.
+  // Adds devices in the format of umockdev-record, parents first.
   void add(const std::string& devices);
-  // Their paths below /sys, children first.
+  // Removes devices by their paths below /sys, children first.
   void remove(const std::vector<std::string>& paths);
 
  private:
   UMockdevTestbed* testbed_;
 };
 
-// What umockdev-record would say of a USB device with this number, and of its interfaces.
+// The /sys path of a USB device.
 [[nodiscard]] std::string usb_path(const UsbIds& ids);
 [[nodiscard]] std::string usb_node(int number);  // "/dev/bus/usb/001/004"
-// `content` is what reading its node gives.
+// The device and its interfaces in the format of umockdev-record; reading its node gives `content`.
 [[nodiscard]] std::string describe_usb_device(const UsbIds& ids, int number,
                                               const std::vector<std::uint8_t>& content);
 [[nodiscard]] std::string describe_interface(const UsbIds& ids, int interface);
 
-// What the pointer that an ioctl was given points to.
+// The memory that an ioctl's pointer refers to.
 struct FreeData {
   void operator()(UMockdevIoctlData* data) const { umockdev_ioctl_data_unref(data); }
 };
 using IoctlData = std::unique_ptr<UMockdevIoctlData, FreeData>;
-// `bytes` behind the pointer at `offset` of `from`; empty for a null pointer and a client that has
-// gone.
+// Resolves `bytes` bytes behind the pointer at `offset` of `from`; empty for a null pointer and for
+// a client that has ended.
 [[nodiscard]] IoctlData resolve(UMockdevIoctlData* from, std::size_t offset, std::size_t bytes);
 
-// Answers everyone who has a node open, on a thread of umockdev's.
+// Handles the ioctls, reads and writes of all clients of a node, on a thread of umockdev.
 class IoctlHandler {
  public:
-  // Completes the client's request and says true; false, or none: it goes to the node's file.
+  // Completes the client's request and returns true. False, or an empty function: the request goes
+  // to the node's file.
   using Answer = std::function<bool(UMockdevIoctlClient*)>;
   struct Answers {
     Answer ioctl{}, read{}, write{};

@@ -1,4 +1,4 @@
-// `posed devices` on gloves that umockdev plugs in.
+// `posed devices` with gloves that umockdev simulates.
 #include <catch2/catch.hpp>
 
 #include <nlohmann/json.hpp>
@@ -35,7 +35,7 @@ json only(const json& devices, const std::string& node) {
 
 }  // namespace
 
-TEST_CASE("posed devices lists a glove on hidraw and a P5, and what becomes of them") {
+TEST_CASE("posed devices lists a glove on hidraw and a P5, before and after unplugging") {
   Bench bench;
   CHECK(listed().empty());
   HidGlove ultra(bench, kUltra);
@@ -59,7 +59,7 @@ TEST_CASE("posed devices lists a glove on hidraw and a P5, and what becomes of t
 
   const json usb = only(both, p5.node());
   CHECK(usb.at("bus") == "usb");
-  CHECK(usb.at("id") == "1-3");  // it has no serial number, so the socket names it
+  CHECK(usb.at("id") == "1-3");  // it has no serial number, so its USB port path identifies it
   CHECK(usb.at("serial").is_null());
   CHECK(usb.at("port_path") == "1-3");
   CHECK(usb.at("name") == "Essential Reality P5 Virtual Reality");
@@ -72,7 +72,7 @@ TEST_CASE("posed devices lists a glove on hidraw and a P5, and what becomes of t
   CHECK(only(listed(), ultra.node()).at("id") == "ULTRA-7");
 }
 
-TEST_CASE("twins with one serial number are bound by their sockets") {
+TEST_CASE("devices with equal serial numbers are bound by their USB ports") {
   Bench bench;
   UsbIds twin = kUltra;
   twin.port = 5;
@@ -84,7 +84,7 @@ TEST_CASE("twins with one serial number are bound by their sockets") {
   CHECK(only(both, other.node()).at("id") == "1-5");
 }
 
-TEST_CASE("a device whose strings are no text and whose numbers are none is listed all the same") {
+TEST_CASE("a device with invalid strings and numbers is listed all the same") {
   Bench bench;
   UsbIds odd = kUltra;
   odd.serial = "\x1B[31m\xFF";

@@ -24,7 +24,7 @@ inline const UsbIds kP5{.vendor = 0x0D7F,
                         .maker = "Essential Reality",
                         .product_name = "P5 Virtual Reality",
                         .port = 3};
-// The glove of the description that a README teaches with.
+// The glove of the example description in a README.
 inline const UsbIds kMine{.vendor = 0x1234,
                           .product = 0xABCD,
                           .serial = "MINE-1",

@@ -18,7 +18,7 @@
 namespace posed::test {
 namespace {
 
-constexpr std::size_t kMaxUnread = 64;  // as the kernel's drivers/hid/hidraw.c keeps
+constexpr std::size_t kMaxUnread = 64;  // the queue length in the kernel's drivers/hid/hidraw.c
 
 // 64 vendor bytes without a report number.
 constexpr const char* kReportDescriptor = "0600FF0901A1010902150026FF00750895408102C0";
@@ -43,7 +43,7 @@ HidGlove::~HidGlove() {
 }
 
 void HidGlove::plug() {
-  // Two gloves on two sockets never share a number.
+  // Two gloves on different ports never share a number.
   const int number = 10 * number_++ + ids_.port;
   const std::string name = "hidraw" + std::to_string(number);
   const std::string usb = usb_path(ids_);
@@ -67,7 +67,7 @@ void HidGlove::plug() {
              std::to_string(number) + "\\n\nL: device=../../../" + hid_name + "\n");
 }
 
-// Whoever waits for a report is woken, and is told by read() that there will be none.
+// Wakes readers that wait for a report; their read() then reports the end of the device.
 void HidGlove::unplug() {
   const std::lock_guard lock(mutex_);
   bench_.remove(paths_);
@@ -96,7 +96,7 @@ bool HidGlove::has_open(UMockdevIoctlClient* client) const {
 bool HidGlove::answer(UMockdevIoctlClient* client) {
   if (umockdev_ioctl_client_get_request(client) != HIDIOCGRAWINFO) return false;
   const auto data = resolve(umockdev_ioctl_client_get_arg(client), 0, sizeof(hidraw_devinfo));
-  if (!data) return false;  // a program that was killed meanwhile
+  if (!data) return false;  // the program was killed meanwhile
   hidraw_devinfo info{};
   info.bustype = BUS_USB;
   info.vendor = static_cast<std::int16_t>(ids_.vendor);
@@ -106,7 +106,7 @@ bool HidGlove::answer(UMockdevIoctlClient* client) {
   return true;
 }
 
-// One report a read, cut off where the reader has no more room.
+// One report per read, truncated to the reader's buffer.
 bool HidGlove::answer_read(UMockdevIoctlClient* client) {
   const std::lock_guard lock(mutex_);
   const bool here = has_open(client);

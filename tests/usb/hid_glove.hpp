@@ -1,4 +1,4 @@
-// A glove on a hidraw node that is not there.
+// A simulated glove on a hidraw node.
 #pragma once
 
 #include <deque>
@@ -20,10 +20,11 @@ class HidGlove {
   HidGlove(const HidGlove&) = delete;
   HidGlove& operator=(const HidGlove&) = delete;
 
-  // Each time on a node of another number: a glove is found by what it is.
+  // Uses a node with a new number each time, because a glove must be found by its identity and not
+  // by its node.
   void plug();
   void unplug();
-  // One report; false when it is not plugged in or the host has left 64 of them unread.
+  // Sends one report; false when it is not plugged in or the host has 64 unread reports.
   bool say(std::span<const std::byte> report);
   // What the host wrote to it since the last call.
   [[nodiscard]] Bytes heard();
@@ -31,7 +32,7 @@ class HidGlove {
   [[nodiscard]] const std::string& node() const { return node_; }
 
  private:
-  // Whether this client's node is the one that the glove is plugged in at.
+  // Whether this client's node is the glove's present node.
   bool has_open(UMockdevIoctlClient* client) const;
   bool answer(UMockdevIoctlClient* client);
   bool answer_read(UMockdevIoctlClient* client);
@@ -43,7 +44,7 @@ class HidGlove {
   std::string node_;
   std::vector<std::string> paths_;  // children first
 
-  std::mutex mutex_;  // what follows; one thread plugs and others speak and answer
+  std::mutex mutex_;  // guards what follows; one thread plugs, others send and handle requests
   int bell_ = -1;     // the node is a FIFO that holds a byte for every report
   std::deque<Bytes> reports_;
   Bytes heard_;

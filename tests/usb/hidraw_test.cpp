@@ -1,4 +1,4 @@
-// Gloves on hidraw: found by hidapi, read from the node, lost and found again.
+// Gloves on hidraw: found by hidapi, read from the node, unplugged and found again.
 #include <catch2/catch.hpp>
 
 #include <poll.h>
@@ -25,7 +25,7 @@ using drivers::TransportFactory;
 
 constexpr int kPatience_ms = 5000;
 
-// What the reader thread does: waits for the descriptor, then reads.
+// Like the reader thread: waits for the descriptor, then reads.
 Chunk next(drivers::Transport& transport) {
   pollfd wanted{.fd = transport.poll_fd(), .events = POLLIN, .revents = 0};
   REQUIRE(::poll(&wanted, 1, kPatience_ms) == 1);
@@ -38,8 +38,8 @@ std::vector<std::byte> report_of(std::uint8_t n) {
   return report;
 }
 
-// Reads `count` reports, each as it was said, and none left out; what was decoded is what the same
-// bytes give without a device.
+// Reads `count` reports and checks that each is as it was sent, none is missing, and the decoded
+// values equal those of the same bytes decoded without a device.
 void check_stream(Device& device, const Driver& driver, const Speaker& speaker, std::size_t count) {
   REQUIRE(device.transport->start(0));
   CollectSink live, again;
@@ -88,7 +88,7 @@ void check_driver(const std::string& name, const Options& options, HidGlove& glo
 
 }  // namespace
 
-TEST_CASE("reports of a hidraw node come one a read, until the glove is unplugged") {
+TEST_CASE("a hidraw node gives one report per read, until the glove is unplugged") {
   Bench bench;
   HidGlove glove(bench, kUltra), other(bench, kMine);
   glove.plug();
@@ -100,7 +100,7 @@ TEST_CASE("reports of a hidraw node come one a read, until the glove is unplugge
   CHECK(link->identity() == "5d70:0001 ULTRA-7");
   const auto transport = drivers::make_link_transport(std::move(*link));
   REQUIRE(transport->start(0));
-  CHECK(transport->read(0).bytes.empty());  // nothing was said
+  CHECK(transport->read(0).bytes.empty());  // nothing was sent
   for (int n = 0; n < 256; ++n) {
     const auto report = report_of(static_cast<std::uint8_t>(n));
     REQUIRE(glove.say(report));
@@ -116,7 +116,7 @@ TEST_CASE("reports of a hidraw node come one a read, until the glove is unplugge
   CHECK(gone.error().message.find("no HID node") != std::string::npos);
 }
 
-TEST_CASE("a replugged glove is announced, and found by what it is where it is now") {
+TEST_CASE("a replugged glove is reported, and found by its identity on its new node") {
   Bench bench;
   HidGlove glove(bench, kUltra);
   drivers::HotplugMonitor arrivals;
@@ -150,7 +150,7 @@ TEST_CASE("the 5DT driver opens an Ultra USB, decodes it, loses it and opens it 
                glove, "5d70:0001 ULTRA-7");
 }
 
-TEST_CASE("a HID glove that only a description knows is opened, started and decoded") {
+TEST_CASE("a HID glove with only a description is opened, started and decoded") {
   const TempFolder folder;
   const auto description = folder.write("mine.toml", readme_description());
   Bench bench;

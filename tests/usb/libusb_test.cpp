@@ -1,4 +1,4 @@
-// A P5 through libusb: feature reports, a stream of reports, and a device that goes.
+// A P5 through libusb: feature reports, a stream of reports, and unplugging.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ std::map<std::uint8_t, P5Glove::Bytes> p5_features() {
           {kLedsReport, all(emulated_leds())}};
 }
 
-// umockdev's usbfs node is a file, which no epoll waits for: so it is asked again and again.
+// umockdev's usbfs node is a file, which epoll cannot wait for, so this polls.
 Chunk next(Transport& transport) {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   while (std::chrono::steady_clock::now() < deadline) {
@@ -57,7 +57,7 @@ bool mentions(const Error& error, const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("feature reports go to and from a USB device, and one that it has not is an error") {
+TEST_CASE("feature reports go to and from a USB device, and a missing one is an error") {
   Bench bench;
   P5Glove glove(bench, kP5, p5_features());
   glove.plug();
@@ -88,7 +88,7 @@ TEST_CASE("feature reports go to and from a USB device, and one that it has not 
   CHECK(ports.usb(p5_settings()));
 }
 
-TEST_CASE("reports of a USB device come in order, one a read, until it is unplugged") {
+TEST_CASE("reports of a USB device come in order, one per read, until it is unplugged") {
   Bench bench;
   P5Glove glove(bench, kP5, p5_features());
   TransportFactory ports;
@@ -99,7 +99,7 @@ TEST_CASE("reports of a USB device come in order, one a read, until it is unplug
     const auto transport = drivers::make_usb_transport(std::move(*link));
     REQUIRE(transport->start(0));
     for (int n = 0; n < 100; ++n) {
-      // Now and then more at once than there are transfers.
+      // Sometimes more reports at once than there are transfers.
       const int burst = n % 10 == 0 ? 40 : 1;
       for (int i = 0; i < burst; ++i) {
         glove.say(P5Glove::Bytes(24, static_cast<std::byte>(n + i)));
@@ -150,7 +150,7 @@ TEST_CASE("the P5 driver reads heads, LEDs and reports from libusb") {
   CHECK_FALSE(same_pose(live.frames.front(), live.frames[25]));
 }
 
-TEST_CASE("a P5 that gives no feature report bends its fingers all the same, with a warning") {
+TEST_CASE("a P5 without feature reports still gives finger bends, with a warning") {
   Bench bench;
   P5Glove glove(bench, kP5, {});
   glove.plug();

@@ -124,7 +124,7 @@ bool P5Glove::is_claimed() const {
 bool P5Glove::answer(UMockdevIoctlClient* client) {
   const std::lock_guard lock(mutex_);
   UMockdevIoctlData* const arg = umockdev_ioctl_client_get_arg(client);
-  int result = 0;  // negative: an error's number
+  int result = 0;  // negative: an errno value
   switch (umockdev_ioctl_client_get_request(client)) {
     case USBDEVFS_SUBMITURB:
       result = submit(arg);
@@ -147,7 +147,7 @@ bool P5Glove::answer(UMockdevIoctlClient* client) {
     case USBDEVFS_RELEASEINTERFACE:
       claimed_ = false;
       break;
-    case USBDEVFS_IOCTL:  // its driver may have it back
+    case USBDEVFS_IOCTL:  // the kernel driver may be reattached
       break;
     case USBDEVFS_GET_SPEED:
       result = kFullSpeed;
@@ -191,7 +191,7 @@ int P5Glove::submit(UMockdevIoctlData* arg) {
   return 0;
 }
 
-// Class requests for feature reports to the glove's interface; all others stall.
+// Handles class requests for feature reports of the glove's interface; all others stall.
 int P5Glove::control(usbdevfs_urb& urb, std::span<std::byte> buffer) {
   const auto at = [&](std::size_t i) { return std::to_integer<std::uint8_t>(buffer[i]); };
   const auto data = buffer.subspan(kSetup);

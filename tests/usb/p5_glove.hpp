@@ -1,5 +1,5 @@
-// A P5 that is not there: its node in usbfs answers as the kernel would for a device with two
-// interfaces, feature reports and an interrupt endpoint.
+// A simulated P5: its node in usbfs responds as the kernel does for a device with two interfaces,
+// feature reports and an interrupt endpoint.
 #pragma once
 
 #include <deque>
@@ -20,21 +20,20 @@ class P5Glove {
  public:
   using Bytes = std::vector<std::byte>;
 
-  // `features`: what it gives, by the number of the report.
+  // `features`: its feature reports, by number.
   P5Glove(Bench& bench, UsbIds ids, std::map<std::uint8_t, Bytes> features);
   ~P5Glove();
   P5Glove(const P5Glove&) = delete;
   P5Glove& operator=(const P5Glove&) = delete;
 
   void plug();
-  // Every transfer under way ends, and every further one is refused.
+  // Ends all transfers under way and refuses further ones.
   void unplug();
-  // One report, kept until a transfer fetches it.
+  // Queues one report until a transfer fetches it.
   void say(std::span<const std::byte> report);
 
   [[nodiscard]] const std::string& node() const { return node_; }
-  // The feature report that the host set last; and what went wrong in the host's calls, if
-  // anything.
+  // The feature report that the host set last, and an error in the host's calls, if any.
   [[nodiscard]] Bytes last_set() const;
   [[nodiscard]] bool is_claimed() const;
 

@@ -1,4 +1,4 @@
-// Devices that may not be opened: what is wrong, and what mends it, in a sentence.
+// Devices without permission to open them: the message states the cause and the remedy.
 #include <catch2/catch.hpp>
 
 #include <grp.h>
@@ -33,7 +33,7 @@ void forbid(const Bench& bench, const std::string& node) {
 
 }  // namespace
 
-TEST_CASE("a glove that may not be opened says which rule mends that") {
+TEST_CASE("a glove without permission names the udev rule that gives access") {
   Bench bench;
   HidGlove ultra(bench, kUltra);
   P5Glove p5(bench, kP5, {});
@@ -45,7 +45,7 @@ TEST_CASE("a glove that may not be opened says which rule mends that") {
 
   const auto nodes = drivers::list_hid_nodes();
   REQUIRE(nodes.size() == 1);
-  CHECK(nodes[0].identity() == "5d70:0001 ULTRA-7");  // seen all the same
+  CHECK(nodes[0].identity() == "5d70:0001 ULTRA-7");  // listed all the same
   check_sentence(nodes[0].open_error, ultra.node());
   std::string usb_trouble;
   for (const auto& device : drivers::list_usb_devices()) {
@@ -53,7 +53,7 @@ TEST_CASE("a glove that may not be opened says which rule mends that") {
   }
   check_sentence(usb_trouble, p5.node());
 
-  if (::access(posed_binary().c_str(), X_OK) == 0) {  // nobody may not enter every home
+  if (::access(posed_binary().c_str(), X_OK) == 0) {  // user nobody may not enter every home folder
     const Outcome listed = posed({"devices"});
     CHECK(listed.out.find(nodes[0].open_error + "\n") != std::string::npos);
     CHECK(listed.out.find(usb_trouble + "\n") != std::string::npos);
@@ -68,7 +68,7 @@ TEST_CASE("a glove that may not be opened says which rule mends that") {
   CHECK(driver.error().message == usb_trouble);
 }
 
-TEST_CASE("a node of a group is mended by joining it, too; a node for all has no trouble") {
+TEST_CASE("joining a node's group gives access, too; a node for everyone has no error") {
   Bench bench;
   HidGlove ultra(bench, kUltra);
   ultra.plug();
@@ -94,7 +94,7 @@ TEST_CASE("a node of a group is mended by joining it, too; a node for all has no
   CHECK(ports.hid({.vendor = kUltra.vendor}));
 }
 
-TEST_CASE("a daemon that may not open a glove says so, runs, and opens it once it may") {
+TEST_CASE("a daemon without permission for a glove reports it, runs, and opens it once permitted") {
   Bench bench;
   HidGlove ultra(bench, kUltra);
   const Speaker speaker(

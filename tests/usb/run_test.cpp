@@ -1,4 +1,4 @@
-// HID gloves behind the real binary: bound by serial number, lost, and found on another node.
+// HID gloves with the real binary: bound by serial number, unplugged, and found on another node.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -26,8 +26,8 @@ std::unique_ptr<drivers::Emulator> emulator(const std::string& driver,
   return std::move(*made);
 }
 
-// Every chunk of the stream is one report as its glove said it, in order, and none is left out but
-// between two connections.
+// Checks that every chunk of the stream is one report as its glove sent it, in order, and that none
+// is missing except between two connections.
 void check_chunks(const std::string& log, const std::string& stream,
                   const std::vector<Speaker::Report>& said, std::size_t connections) {
   auto reader = log::Reader::open(log);
@@ -63,7 +63,7 @@ std::string config(const std::string& description) {
 
 }  // namespace
 
-TEST_CASE("gloves on hidraw go and come back on another node; the log has what they said") {
+TEST_CASE("gloves on hidraw are unplugged and return on another node; the log has all reports") {
   const TempFolder folder;
   const std::string description = folder.write("mine.toml", readme_description());
   const std::string log = folder.path() / "take.plog";
@@ -87,7 +87,7 @@ TEST_CASE("gloves on hidraw go and come back on another node; the log has what t
   };
   mine.plug();
   ultra.plug();
-  expect_frames();  // and the other monitor listens by now
+  expect_frames();  // by then the other monitor is subscribed, too
   for (std::size_t i = 0; i < kReplugs; ++i) {
     ultra.unplug();
     wait_for(events, "KIND_LOST");

@@ -1,4 +1,4 @@
-// Speaker: a glove that somebody wears. It moves its emulator's hand and says one report after the
+// Speaker: a simulated glove in use. It moves its emulator's hand and sends one report after the
 // other, plugged in or not.
 #pragma once
 
@@ -24,7 +24,7 @@ class Speaker {
         emulator_(std::move(emulator)),
         thread_([this](const std::stop_token& stop) { speak(stop); }) {}
 
-  // All that was said so far, in order.
+  // All reports sent so far, in order.
   [[nodiscard]] std::vector<Report> said() const {
     const std::lock_guard lock(mutex_);
     return said_;

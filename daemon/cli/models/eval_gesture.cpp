@@ -153,17 +153,17 @@ Result<json> evaluate_gesture(const EvalGestureOptions& options) {
   const auto labels = perform::labels_of(*model, text);
   if (!labels) return std::unexpected(labels.error());
   const double rate_hz = model->rate_hz;
-  const trajectory::StateInformation evidence(
+  const trajectory::StateInformation information(
       std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
-  auto performance = perform::perform(evidence, *labels, {});
+  auto performance = perform::perform(information, *labels, {});
   const auto kept = perform::constrain(performance, default_hand_shape());
   const motion::Rows rows = degrees_of(performance.angles);
-  const auto curve = lag_curve(evidence, *labels);
+  const auto curve = lag_curve(information, *labels);
   json report{{"labels", text},
               {"performed", smoothness(rows, rate_hz)},
               {"min_gap_cm", 100.0 * kept.min_gap_m},
               {"min_gap_before_cm", 100.0 * kept.before_m},
-              {"leaves", leaves_of(evidence.model())},
+              {"leaves", leaves_of(information.model())},
               {"curve", curve_json(curve)}};
   if (!options.reference.empty()) {
     auto reference = against(options.reference, rows);

@@ -75,15 +75,15 @@ std::string line(const Axes& axes, std::span<const LagPoint> curve, const char* 
 
 }  // namespace
 
-std::vector<LagPoint> lag_curve(const trajectory::StateInformation& evidence,
+std::vector<LagPoint> lag_curve(const trajectory::StateInformation& information,
                                 std::span<const int> labels) {
-  const motion::Rows full = rows_of(perform::perform(evidence, labels, {}));
+  const motion::Rows full = rows_of(perform::perform(information, labels, {}));
   const double jerk = motion::jerk_rms(full);
   std::vector<LagPoint> curve;
   for (const int frames : {0, 1, 2, 3, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40}) {
     perform::PerformOptions options;
     options.look_ahead = frames;
-    const motion::Rows rows = rows_of(perform::perform(evidence, labels, options));
+    const motion::Rows rows = rows_of(perform::perform(information, labels, options));
     const motion::Rows off = rows - full;
     curve.push_back(
         {frames, kDegrees * std::sqrt(off.squaredNorm() / static_cast<double>(off.size())),

@@ -16,7 +16,7 @@ struct LagPoint {
   double jerk_ratio = 0.0;  // over the full solve's
 };
 
-[[nodiscard]] std::vector<LagPoint> lag_curve(const trajectory::StateInformation& evidence,
+[[nodiscard]] std::vector<LagPoint> lag_curve(const trajectory::StateInformation& information,
                                               std::span<const int> labels);
 
 // The curve as an SVG: look-ahead to the right, rms and largest error upwards on a log scale.

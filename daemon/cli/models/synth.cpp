@@ -93,11 +93,11 @@ Result<json> synth(const SynthOptions& options) {
   const auto labels = perform::labels_of(*model, options.labels);
   if (!labels) return std::unexpected(labels.error());
   const double rate_hz = model->rate_hz;
-  const trajectory::StateInformation evidence(
+  const trajectory::StateInformation information(
       std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
   const auto shape = find_hand_shape(options.shape);
   if (!shape) return std::unexpected(shape.error());
-  auto performance = perform::perform(evidence, *labels, *perform_as);
+  auto performance = perform::perform(information, *labels, *perform_as);
   const double gap_m = options.unconstrained ? perform::smallest_gap_m(performance, **shape)
                                              : perform::constrain(performance, **shape).min_gap_m;
   clip::HandClip hand;
@@ -110,7 +110,7 @@ Result<json> synth(const SynthOptions& options) {
   if (auto written = write(hand, options); !written) return std::unexpected(written.error());
   return json{{"frames", hand.angles.size()},
               {"rate_hz", rate_hz},
-              {"states", states_json(evidence.model(), performance)},
+              {"states", states_json(information.model(), performance)},
               {"min_gap_cm", 100.0 * gap_m},
               {"out", options.out}};
 }

@@ -1,5 +1,5 @@
-// The trajectory solver against Debian's SPTK: its recursive mlpg comes to the full solve as its
-// influence range grows (models/trajectory/README.md, measured figures).
+// The trajectory solver against Debian's SPTK: its recursive mlpg converges to the full solve as
+// its influence range grows (models/trajectory/README.md, measured figures).
 #include "tests/bench/sptk.hpp"
 
 #include <cmath>
@@ -21,7 +21,7 @@ TEST_CASE("SPTK's mlpg with an influence range of 60 frames gives the same traje
   const int channels = golden["M"];
   constexpr int kFrames = 200;
   constexpr int kStateFrames = 8;
-  trajectory::InformationForm evidence(channels, kFrames);
+  trajectory::InformationForm information(channels, kFrames);
   bench::SptkInput input{channels, {}};
   std::vector<const double*> frames;
   for (int t = 0; t < kFrames; ++t) {
@@ -33,14 +33,14 @@ TEST_CASE("SPTK's mlpg with an influence range of 60 frames gives the same traje
           const double mean = golden["state_mean"][state][w][at];
           const double spread = golden["state_var"][state][w][at];
           input.values.push_back(static_cast<float>(variance ? spread : mean));
-          evidence.row(t, static_cast<trajectory::Row>(2 * w))[c] = 1.0 / spread;
-          evidence.row(t, static_cast<trajectory::Row>(2 * w + 1))[c] = mean / spread;
+          information.row(t, static_cast<trajectory::Row>(2 * w))[c] = 1.0 / spread;
+          information.row(t, static_cast<trajectory::Row>(2 * w + 1))[c] = mean / spread;
         }
       }
     }
-    frames.push_back(evidence.frame(t));
+    frames.push_back(information.frame(t));
   }
-  trajectory::Window window(channels, kFrames);
+  trajectory::SlidingWindow window(channels, kFrames);
   window.solve(frames);
   const test::TempFolder folder;
   const auto run = bench::run_sptk(input, 60, folder.path());

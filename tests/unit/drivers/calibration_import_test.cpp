@@ -1,4 +1,4 @@
-// Calibrations of other programs, real ones where there are any, and fits from poses.
+// Imported calibrations of other programs (real ones where available), and fits from poses.
 #include <catch2/catch.hpp>
 
 #include "drivers/cyberglove/angles.hpp"
@@ -30,7 +30,7 @@ std::string virtual_hand(char side) {
   return text + "3D HAND GEOMETRY\n" + side + "\n1.0 2.0 3.0\n! E_O_F\n";
 }
 
-// What the calibrated sensor reads for this raw value.
+// The calibrated value of the sensor for this raw value.
 double value_at(const CalibrationFile& file, const std::string& sensor, double raw) {
   const auto& points = file.sensors.at(sensor);
   const double slope =
@@ -122,7 +122,7 @@ TEST_CASE("Shadow's real calibration is imported, and a cut one refused") {
   check_every_cut(load_file(path, {"file", 1 << 20}).value());
 }
 
-TEST_CASE("what is no calibration, and a sensor that hardly moved, are refused") {
+TEST_CASE("files that are not calibrations, and sensors that hardly moved, are refused") {
   CHECK_FALSE(import_text(""));
   CHECK_FALSE(import_text("hello"));
   CHECK_FALSE(import_text("<xml><nothing/></xml>"));
@@ -139,7 +139,7 @@ TEST_CASE("what is no calibration, and a sensor that hardly moved, are refused")
       import_calibration(test::scratch_file("r.cal", virtual_hand('R')), other, Side::kRight));
 }
 
-TEST_CASE("poses fit a user's glove: what moved is calibrated, what did not is said") {
+TEST_CASE("poses fit a user's glove: sensors that moved are calibrated, others are reported") {
   for (const Side hand : {Side::kRight, Side::kLeft}) {
     const Model model = cyber_model(hand);
     const auto fitted = fit_poses(model, recorded_by(model, cyberglove::kRingPip));
@@ -176,7 +176,7 @@ TEST_CASE("poses without a flat hand, or without any movement, fit nothing") {
   CHECK(nothing.error().message.contains("no sensor moved"));
 }
 
-TEST_CASE("in a pose a share of a finger's way is none or all of it, on every glove") {
+TEST_CASE("each pose sets a finger's share to zero or full, on every glove") {
   for (const Driver& driver : registry()) {
     if (driver.glove_model == nullptr || driver.name == "described") continue;
     const auto model = driver.glove_model(driver.expect({}).value()).value();

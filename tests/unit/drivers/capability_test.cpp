@@ -1,4 +1,4 @@
-// What every driver in the registry must hold, run on a fixture of each.
+// The properties that every driver in the registry must have, tested on a fixture of each.
 #include <catch2/catch.hpp>
 
 #include <random>
@@ -52,7 +52,8 @@ void check_same(const CollectSink& got, const CollectSink& expected) {
   }
 }
 
-// A repeated packet, and the first one of a device that began anew, come at the time before.
+// Checks all frames and samples. Device times never decrease: a repeated packet, and the first one
+// after a device restart, keep the previous time.
 void check_sound(const CollectSink& sink) {
   bool sound = true;
   std::int64_t before_ns = kNoTime_ns;
@@ -80,7 +81,7 @@ TEST_CASE("every driver of the registry has a fixture, a summary and help for it
   CHECK(find_driver("no such driver") == nullptr);
 }
 
-TEST_CASE("a chunk is decoded at once, whole, and every loop is like the one before") {
+TEST_CASE("a chunk is decoded at once and completely, and every loop equals the one before") {
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     INFO(fixture.name);
     Device device = test::open_device(fixture);
@@ -107,7 +108,7 @@ TEST_CASE("a chunk is decoded at once, whole, and every loop is like the one bef
   }
 }
 
-TEST_CASE("frames and samples are what the description announces") {
+TEST_CASE("frames and samples match the description") {
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     INFO(fixture.name);
     Device device = test::open_device(fixture);
@@ -129,7 +130,7 @@ TEST_CASE("frames and samples are what the description announces") {
   }
 }
 
-TEST_CASE("any cut of the bytes gives the same frames") {
+TEST_CASE("the same bytes in any chunks give the same frames") {
   std::mt19937 random(7);
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     INFO(fixture.name);
@@ -175,7 +176,7 @@ TEST_CASE("a log's text and identity build the same device again") {
   }
 }
 
-TEST_CASE("a damaged description is refused in a sentence, never a crash") {
+TEST_CASE("a damaged description is refused with an error message, never a crash") {
   std::mt19937 random(11);
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     INFO(fixture.name);
@@ -190,14 +191,14 @@ TEST_CASE("a damaged description is refused in a sentence, never a crash") {
         text[random() % text.size()] = static_cast<char>(random());
       }
       const auto description = driver.describe(text, "x");
-      if (description) continue;  // what is missing or changed may not matter
+      if (description) continue;  // the missing or changed part may be optional
       CHECK_FALSE(description.error().message.empty());
       CHECK(description.error().message.find('\n') == std::string::npos);
     }
   }
 }
 
-TEST_CASE("garbage and flipped bytes are counted, never a crash or a pose that is none") {
+TEST_CASE("garbage and flipped bytes are counted, never a crash or an invalid pose") {
   std::mt19937 random(13);
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     INFO(fixture.name);
@@ -215,7 +216,7 @@ TEST_CASE("garbage and flipped bytes are counted, never a crash or a pose that i
       for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
       feed_in_pieces(*decoder, noise, 300, random, sink);
       check_sound(sink);
-      // It finds its way back: of two more loops the second is decoded in full.
+      // The decoder resynchronises: of two more loops the second is decoded completely.
       feed_in_pieces(*decoder, good, 300, random, sink);
       sink.clear();
       feed_in_pieces(*decoder, good, 300, random, sink);
@@ -243,11 +244,11 @@ TEST_CASE("input without an end is given up, and the stream goes on after it") {
   }
 }
 
-TEST_CASE("feeding takes nothing from the heap, whatever the bytes are") {
+TEST_CASE("decoding does not allocate, whatever the bytes are") {
   const std::uint64_t start = test::allocations();
-  int* volatile seen = new int(1);  // volatile: the compiler may not leave it out
+  int* volatile seen = new int(1);  // volatile, so that the compiler does not remove it
   delete seen;
-  REQUIRE(test::allocations() > start);  // the counter counts
+  REQUIRE(test::allocations() > start);  // the counter works
   std::mt19937 random(17);
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     INFO(fixture.name);
@@ -265,7 +266,7 @@ TEST_CASE("feeding takes nothing from the heap, whatever the bytes are") {
   }
 }
 
-TEST_CASE("reading takes nothing from the heap") {
+TEST_CASE("reading does not allocate") {
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     INFO(fixture.name);
     Device device = test::open_device(fixture);
@@ -276,7 +277,7 @@ TEST_CASE("reading takes nothing from the heap") {
   }
 }
 
-TEST_CASE("wrong options are refused in a sentence that names them") {
+TEST_CASE("wrong options are refused with an error message that names them") {
   TransportFactory ports;
   for (const Driver& driver : registry()) {
     INFO(driver.name);
@@ -296,9 +297,9 @@ TEST_CASE("wrong options are refused in a sentence that names them") {
   }
 }
 
-// A stream whose device may come later is opened by its supervisor, long after the start: whatever
-// is wrong with its options has to be found without opening it.
-TEST_CASE("what open() would refuse as wrong use, expect() refuses in the same sentence") {
+// A stream whose device may be connected later is opened by its supervisor, long after the start,
+// so mistakes in its options must be found without opening it.
+TEST_CASE("what open() would refuse as wrong use, expect() refuses with the same message") {
   const std::vector<std::pair<std::string, OptionValue>> wrong_values{
       {"hand", std::string("middle")},
       {"link", std::string("bluetooth")},
@@ -316,7 +317,7 @@ TEST_CASE("what open() would refuse as wrong use, expect() refuses in the same s
   int refused = 0;
   const auto compare = [&](const Driver& driver, const Options& options) {
     TransportFactory ports;
-    ports.cancel();  // nothing is waited for
+    ports.cancel();  // open() does not wait
     const auto opened = driver.open(options, ports);
     if (opened || opened.error().exit_code != ExitCode::kWrongUse) return;
     const auto expected = driver.expect(options);

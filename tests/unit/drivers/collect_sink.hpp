@@ -1,4 +1,4 @@
-// A sink that keeps what a decoder made. Room is reserved, so that keeping does not allocate.
+// A sink that stores a decoder's output. Memory is reserved, so that storing does not allocate.
 #pragma once
 
 #include <array>
@@ -34,14 +34,14 @@ class CollectSink final : public Sink {
   std::array<int, kOutcomes> outcomes{};
 };
 
-// To the last bit, so that an angle that is missing (NaN) equals itself.
+// Bitwise equality, so that a missing angle (NaN) equals itself.
 inline bool same_bits(const std::array<float, kMaxChannels>& a,
                       const std::array<float, kMaxChannels>& b) {
   return std::bit_cast<std::array<std::uint32_t, kMaxChannels>>(a) ==
          std::bit_cast<std::array<std::uint32_t, kMaxChannels>>(b);
 }
 
-// The poses agree to the last bit, whatever their times are.
+// Bitwise equality of the poses, whatever their times are.
 inline bool same_pose(const Frame& a, const Frame& b) {
   return a.skeleton == b.skeleton && a.joint_count == b.joint_count &&
          a.angle_count == b.angle_count && a.valid == b.valid && a.quality == b.quality &&
@@ -53,7 +53,7 @@ inline bool same_values(const Sample& a, const Sample& b) {
   return a.value_count == b.value_count && a.valid == b.valid && a.value == b.value;
 }
 
-// Everything called valid is a number, and every valid rotation has unit length.
+// Every valid value is finite, and every valid rotation has unit length.
 inline bool is_sound(const Frame& frame) {
   for (std::size_t j = 0; j < frame.joint_count; ++j) {
     double squared = 0.0;

@@ -1,4 +1,5 @@
-// Links over pseudo-terminals and loopback sockets: bytes unchanged, hang-ups told, mistakes named.
+// Connections over pseudo-terminals and loopback sockets: bytes are unchanged, hang-ups are
+// reported, mistakes are named.
 #include <arpa/inet.h>
 #include <poll.h>
 #include <sys/resource.h>
@@ -45,7 +46,7 @@ bool readable(const Transport& transport) {
   return ::poll(&wanted, 1, static_cast<int>(kPatience.count())) == 1;
 }
 
-// A client on loopback, closed in the end.
+// A client on loopback; the destructor closes it.
 class Client {
  public:
   explicit Client(std::uint16_t port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -93,7 +94,7 @@ TEST_CASE("a port takes the baud rates of gloves") {
   CHECK_FALSE(ports.serial({.port = "/dev/null", .baud = 0}));
 }
 
-TEST_CASE("bytes from before the port was opened are thrown away") {
+TEST_CASE("bytes from before the port was opened are discarded") {
   const PseudoTerminal terminal;
   {
     Connection first = open_port(terminal);
@@ -105,7 +106,7 @@ TEST_CASE("bytes from before the port was opened are thrown away") {
   CHECK(bytes->empty());
 }
 
-TEST_CASE("drain leaves nothing of what came before") {
+TEST_CASE("drain discards everything received before") {
   const PseudoTerminal terminal;
   Connection link = open_port(terminal);
   terminal.say("noise");
@@ -127,7 +128,7 @@ TEST_CASE("a device that was opened early begins with what comes from its start 
   CHECK(text_of(transport->read(0).bytes) == "new");
 }
 
-TEST_CASE("an unplugged port is lost for the reader and an error for cold code") {
+TEST_CASE("an unplugged port is reported as lost to the reader and as an error to cold code") {
   PseudoTerminal terminal;
   const auto transport = make_link_transport(open_port(terminal));
   REQUIRE(transport->start(0));
@@ -148,18 +149,18 @@ TEST_CASE("an unplugged port is lost for the reader and an error for cold code")
   CHECK(bytes.error().message.find("has gone") != std::string::npos);
 }
 
-TEST_CASE("what a full port took in part is completed before anything else is sent") {
+TEST_CASE("a message that a full port took in part is completed before anything else is sent") {
   const PseudoTerminal terminal;
   const auto transport = make_link_transport(open_port(terminal));
   const std::vector<std::byte> letters(3000, std::byte{'a'});
   const std::array digit{std::byte{'1'}};
   std::string taken;
   while (transport->send(letters)) taken.append(letters.size(), 'a');
-  if (transport->send(digit)) taken += '1';  // the kernel may have made room meanwhile
+  if (transport->send(digit)) taken += '1';  // the kernel may have freed space meanwhile
   std::string heard;
   while (heard.size() < taken.size()) {
     heard += terminal.heard();
-    CHECK(transport->read(0).bytes.empty());  // also sends the rest
+    CHECK(transport->read(0).bytes.empty());  // read() also sends the rest
   }
   CHECK(heard == taken);
   REQUIRE(transport->send(digit));
@@ -172,7 +173,7 @@ TEST_CASE("a message longer than the buffer is refused whole") {
   CHECK_FALSE(transport->send(std::vector<std::byte>(kMaxChunk)));
 }
 
-TEST_CASE("a second posed is told who has the port") {
+TEST_CASE("a second posed reports which process has the port") {
   const PseudoTerminal terminal;
   const Connection link = open_port(terminal);
   TransportFactory ports;
@@ -181,7 +182,7 @@ TEST_CASE("a second posed is told who has the port") {
   CHECK(second.error().message.starts_with(terminal.port() + " is in use by "));
 }
 
-TEST_CASE("a port that is missing or no port is refused in a sentence") {
+TEST_CASE("a port that is missing or not a serial port is refused with an error message") {
   TransportFactory ports;
   const auto missing = ports.serial({.port = "/dev/ttyNotThere"});
   REQUIRE_FALSE(missing);
@@ -224,14 +225,14 @@ TEST_CASE("a glove that hangs up is lost, and may come again") {
   }
 }
 
-TEST_CASE("without a descriptor left the glove is told to be there, and waits for one") {
+TEST_CASE("without a free descriptor the glove is reported as present, and waits for one") {
   const std::uint16_t port = free_port();
   TransportFactory ports;
   CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
   const Client glove(port);
   rlimit before{};
   REQUIRE(getrlimit(RLIMIT_NOFILE, &before) == 0);
-  const int lowest = ::dup(0);  // the next descriptor that anyone would get
+  const int lowest = ::dup(0);  // the next free descriptor number
   REQUIRE(lowest >= 0);
   ::close(lowest);
   const rlimit none{static_cast<rlim_t>(lowest), before.rlim_max};
@@ -257,7 +258,7 @@ TEST_CASE("only peers may connect, and without peers only loopback listens") {
   CHECK(ports.refused() == 1);
 }
 
-TEST_CASE("whoever stops while a device is opened waits for nothing, then or later") {
+TEST_CASE("cancelling while a device is opened ends all waits, then and later") {
   using std::chrono::hours;
   const PseudoTerminal silent;
   TransportFactory ports;
@@ -283,13 +284,13 @@ TEST_CASE("ports that only prepare listen already, open nothing and still refuse
   CHECK(ports.serial({.port = terminal.port(), .baud = 0}).error().exit_code ==
         ExitCode::kWrongUse);
   CHECK(ports.accept({.endpoint = "nonsense"}).error().exit_code == ExitCode::kWrongUse);
-  const Client early(port);  // is kept until the ports are used in earnest
+  const Client early(port);  // is kept until the factory opens devices
   ports.only_prepare(false);
   CHECK(ports.accept({.endpoint = loopback(port)}));
   CHECK(ports.serial({.port = terminal.port()}));
 }
 
-TEST_CASE("an endpoint that is none or taken is refused in a sentence") {
+TEST_CASE("an endpoint that is invalid or taken is refused with an error message") {
   TransportFactory ports;
   for (const char* wrong : {"", "5200", ":5200", "127.0.0.1:", "glove:5200", "127.0.0.1:x"}) {
     const auto link = ports.accept({.endpoint = wrong});

@@ -1,4 +1,4 @@
-// The emulated CyberGlove: its answers, its motors, its faults.
+// The emulated CyberGlove: its replies, its motors, its faults.
 #include <catch2/catch.hpp>
 
 #include "tests/unit/drivers/collect_sink.hpp"
@@ -31,13 +31,13 @@ TEST_CASE("the emulated CyberGlove answers like the real one") {
   CHECK(ask("\r\n").empty());
   CHECK(ask("^c") == " e?\r\n\0"s);
   CHECK(ask("X") == " e?\r\n\0"s);
-  CHECK(ask("1S").starts_with(" e?"));  // no III
+  CHECK(ask("1S").starts_with(" e?"));  // not a CyberGlove III
   (void)ask("\x03");
   CHECK(emulator->next_due_ns() == kNoTime_ns);
   CHECK(ask("g").starts_with("g "));
   CHECK(ask("S").empty());
   CHECK(emulator->next_due_ns() == 10'000'000);
-  CHECK(ask("^c") == " e?\r\n\0"s);  // no stop
+  CHECK(ask("^c") == " e?\r\n\0"s);  // the stop command has no effect
   CHECK(emulator->next_due_ns() == 10'000'000);
   CHECK(ask("\x03") == "\x03\0"s);
   CHECK(emulator->next_due_ns() == kNoTime_ns);
@@ -46,12 +46,12 @@ TEST_CASE("the emulated CyberGlove answers like the real one") {
   emulator->settings().plugged_in = false;
   CHECK(ask("?G") == "?G\x01\0"s);
   CHECK(ask("?U") == "?U\0\0"s);
-  CHECK(ask("M\x01"s).empty());  // not whole yet
+  CHECK(ask("M\x01"s).empty());  // not complete yet
   CHECK(ask("\0\0"s) == "M\0"s);
   CHECK(ask("?M") == "?M\x01\0\0\0"s);
 }
 
-TEST_CASE("a CyberTouch shakes the fingers that a force names, and samples go on") {
+TEST_CASE("a CyberTouch vibrates the fingers with a force, and samples continue") {
   const auto bytes =
       cyberglove_driver().encode_haptics({}, {.force = {1.0F, -1.0F, 0.0F, -1.0F, 0.5F}});
   REQUIRE(bytes);

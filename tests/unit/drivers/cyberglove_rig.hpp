@@ -1,4 +1,4 @@
-// A CyberGlove's two sides for its tests: emulators, decoders, and a word between them.
+// Emulators and decoders of a CyberGlove for its tests.
 #pragma once
 
 #include <array>
@@ -16,8 +16,8 @@ namespace posed::drivers::cyberglove {
 
 using Raw = std::array<double, kSensors>;
 
-inline std::unique_ptr<Decoder> decoder_of(const Greeted& glove) {
-  const auto description = cyberglove_driver().describe(greeting_of(glove), "test");
+inline std::unique_ptr<Decoder> decoder_of(const GloveSettings& glove) {
+  const auto description = cyberglove_driver().describe(device_info_of(glove), "test");
   if (!description) FAIL(description.error().text());
   auto decoder = cyberglove_driver().make_decoder(*description);
   if (!decoder) FAIL(decoder.error().text());
@@ -46,7 +46,7 @@ inline Emulator::Bytes next(Emulator& emulator) {
   return bytes;
 }
 
-// Counts that stand in the middle of what a hand does, each another.
+// Sensor counts in the middle of a hand's range, all different.
 inline Raw some_raw() {
   Raw raw{};
   for (std::size_t i = 0; i < kSensors; ++i) raw[i] = 60.0 + 5.0 * static_cast<double>(i);

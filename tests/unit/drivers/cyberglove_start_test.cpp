@@ -1,4 +1,5 @@
-// The talk with a CyberGlove over a pseudo-terminal, and what is said of gloves that are none.
+// The start-up exchange with a CyberGlove over a pseudo-terminal, and the errors for devices that
+// are not CyberGloves.
 #include <poll.h>
 
 #include <catch2/catch.hpp>
@@ -19,11 +20,11 @@ namespace {
 using test::CollectSink;
 using test::PseudoTerminal;
 
-// A device behind a pseudo-terminal, on a thread: what it answers to what it hears.
+// A device on a pseudo-terminal, with a thread that replies to commands.
 class Box {
  public:
   explicit Box(EmulatorSettings settings) : Box(CyberGloveEmulator::make(settings).value()) {}
-  // Without an emulator it answers everything with the same text.
+  // Without an emulator it replies to everything with the same text.
   explicit Box(std::string answer) : answer_(std::move(answer)), thread_([this] { run(); }) {}
   ~Box() {
     stop_ = true;
@@ -73,7 +74,7 @@ Result<Device> open_box(const Box& box, Options options) {
   return cyberglove_driver().open(options, ports);
 }
 
-// Samples of an opened glove, polled for where it wants that.
+// Reads samples of an opened glove and polls for them if the mode needs it.
 void read_samples(Device& device, std::size_t count, CollectSink& sink) {
   REQUIRE(device.transport->start(0));
   for (int tries = 0; sink.samples.size() < count && tries < 5000; ++tries) {
@@ -86,7 +87,7 @@ void read_samples(Device& device, std::size_t count, CollectSink& sink) {
 
 }  // namespace
 
-TEST_CASE("a CyberGlove is found, told how to send, and heard, in every form and mode") {
+TEST_CASE("a CyberGlove is found, configured and read, in every form and mode") {
   struct Case {
     EmulatorSettings settings;
     Options options;
@@ -133,7 +134,7 @@ TEST_CASE("a CyberGlove that still streams from before is caught") {
   }
 }
 
-TEST_CASE("what is no CyberGlove, or not the one that was meant, is named in a sentence") {
+TEST_CASE("a device that is not the intended CyberGlove is refused with an error message") {
   const auto message = [](const Box& box, Options options) {
     const auto device = open_box(box, std::move(options));
     REQUIRE_FALSE(device);

@@ -1,4 +1,4 @@
-// CyberGlove: bytes, angles and clocks; real joint angles turned back into its bytes.
+// CyberGlove: bytes, angles and clocks; real joint angles converted back into its bytes.
 #include <poll.h>
 
 #include <catch2/catch.hpp>
@@ -30,7 +30,7 @@ class Line {
     transport_ = make_link_transport(std::move(*link));
     REQUIRE(transport_->start(0));
   }
-  // All of it, in whatever pieces it comes.
+  // Carries all bytes, in whatever pieces they arrive.
   void carry(const Emulator::Bytes& bytes, Decoder& decoder, Sink& sink) {
     terminal_.say(text_of(bytes));
     for (std::size_t came = 0; came < bytes.size();) {
@@ -48,15 +48,14 @@ class Line {
   std::unique_ptr<Transport> transport_;
 };
 
-// One GraspDB14 recording: rows of 23 angles [rad] in mask order.
-// Radians that a count is worth, with the sign.
+// Radians per count, with the sign.
 double count_rad(const glove::Model& model, std::size_t sensor) {
   const glove::Curve& line = model.sensors[sensor].curve;
   return (static_cast<double>(line.value[1]) - static_cast<double>(line.value[0])) /
          (static_cast<double>(line.raw[1]) - static_cast<double>(line.raw[0]));
 }
 
-// Counts that a glove with the default gains would have sent for these angles.
+// The counts that a glove with the default gains sends for these angles.
 Raw counts_of(Raw angles, const glove::Model& model) {
   uncompute_angles(Side::kRight, angles);
   Raw raw{};
@@ -179,7 +178,7 @@ TEST_CASE("a pose given to the CyberGlove's emulator comes out of the decoder, e
     const auto emulator = emulator_of({.hand = hand});
     const auto decoder = decoder_of({.hand = hand, .layout = kPlain22});
     (void)tell(*emulator, plain_start());
-    // The middle finger's own spread follows from its neighbours'.
+    // The middle finger's own spread is computed from its neighbours'.
     constexpr double kIndex = 0.2, kRing = 0.1, kBias = 0.248;
     constexpr double kMiddle = -kBias * (kIndex - kRing) / (1.0 - 2.0 * kBias);
     HandAngles pose{};
@@ -235,7 +234,8 @@ TEST_CASE("an 8-bit sample is framed by length and end together") {
   bad = good;
   bad.insert(bad.end() - 1, {std::byte{'e'}, std::byte{'s'}});
   CHECK(outcomes(bad) == expected(3, 0, 0, 0));
-  bad.insert(bad.end() - 1, {std::byte{'e'}, std::byte{'g'}});  // unplugged: no measurement
+  bad.insert(bad.end() - 1,
+             {std::byte{'e'}, std::byte{'g'}});  // a sensor is unplugged: no measurement
   CHECK(outcomes(bad) == expected(2, 0, 1, 0));
   bad = good;
   bad.insert(bad.end() - 1, std::byte{'x'});
@@ -261,7 +261,7 @@ TEST_CASE("a CyberGlove's time stamp crosses zero bytes and its wrap") {
   }
 }
 
-TEST_CASE("stamps with a flag that does not fit are no stamps; flags may be zero") {
+TEST_CASE("stamps with an inconsistent flag are ignored; flags may be zero") {
   std::uint32_t count = 0;
   auto stamp = encode_stamp(0x01020304);
   CHECK(decode_stamp(stamp, count));
@@ -280,23 +280,23 @@ TEST_CASE("stamps with a flag that does not fit are no stamps; flags may be zero
   CHECK(sink.count(Outcome::kOk) == 1);
 }
 
-TEST_CASE("a doubtful stamp is believed when the next confirms it, and time always ascends") {
+TEST_CASE("a doubtful stamp is accepted when the next confirms it, and time always increases") {
   StampClock clock(1 << 20, 1000);
   CHECK(clock.to(100) == 0);
   CHECK(clock.to(110) == 10);
   CHECK(clock.to(500'000) == 11);  // a flipped bit
-  CHECK(clock.to(120) == 20);      // was one
+  CHECK(clock.to(120) == 20);      // the previous one was wrong
   CHECK(clock.to(130) == 30);
   CHECK(clock.to(130) == 31);  // a repeat
   CHECK(clock.to(140) == 40);
   CHECK(clock.to(5140) == 41);    // a pause
   CHECK(clock.to(5150) == 5050);  // confirmed
   CHECK(clock.to(50) == 5051);    // a restart
-  CHECK(clock.to(60) == 5060);    // goes on from where time was
+  CHECK(clock.to(60) == 5060);    // continues from the last time
   CHECK(clock.to(70) == 5070);
 }
 
-TEST_CASE("a polled CyberGlove that has nothing new answers with what it had") {
+TEST_CASE("a polled CyberGlove without new values repeats the last ones") {
   const Layout layout{.mode = Mode::kPoll, .mask = kMask22, .time = false, .status = false};
   const auto emulator = emulator_of({});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
@@ -316,7 +316,7 @@ TEST_CASE("a polled CyberGlove that has nothing new answers with what it had") {
   CHECK(sink.samples[2].quality == Quality::kMeasured);
 }
 
-TEST_CASE("a CyberGlove out of its box is counted, not posed; its switch is in the sample") {
+TEST_CASE("a CyberGlove without its sensors is counted, not posed; its switch is in the sample") {
   const Layout layout{.mask = kMask22, .time = false, .status = true};
   const auto emulator = emulator_of({});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
@@ -361,7 +361,7 @@ TEST_CASE("16-bit records: sixteenths of a count, strays skipped, midnight cross
   }
 }
 
-TEST_CASE("a damaged 16-bit record costs itself, and one outcome") {
+TEST_CASE("a damaged 16-bit record loses only itself, and gives one outcome") {
   const Layout layout{.form = Form::k16Bit, .mask = kMask22, .multiplier = 1};
   const auto emulator = emulator_of({.level_one = true});
   (void)tell(*emulator, "1S");

@@ -1,5 +1,5 @@
-// Described devices: the shipped descriptions against what is known of the devices, a glove that
-// only its user knows, and mistakes in a description.
+// Table-driven devices: the shipped descriptions against what is known of the devices, a glove with
+// a user's own description, and mistakes in a description.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -115,7 +115,8 @@ void set_row(const std::vector<double>& row, const Table& table, DescribedEmulat
   }
 }
 
-// Two packets of different length, no checksum, a delimiter; bits across bytes in both orders.
+// Two packets of different length, no checksum, a delimiter; bit fields across bytes in both
+// orders.
 constexpr const char* kOwnGlove = R"(
 name = "own"
 rate_hz = 50
@@ -159,7 +160,7 @@ index = [{channel = "index1_x"}, {channel = "index2_x"}]
 
 }  // namespace
 
-TEST_CASE("the shipped descriptions are right and emulate what they decode") {
+TEST_CASE("the shipped descriptions are valid and emulate what they decode") {
   CHECK(described::shipped_devices() ==
         std::vector<std::string>{"bebop_forte", "opencyberglove", "vmg30"});
   for (const std::string& name : described::shipped_devices()) {
@@ -244,7 +245,7 @@ TEST_CASE("the VMG30's start is the bytes that its driver sends") {
   CHECK(table.link.stop[4] == sum(table.link.stop));
 }
 
-TEST_CASE("a glove that nobody knows works from its description alone") {
+TEST_CASE("an unknown glove works from its description alone") {
   const auto decoder = decoder_for(kOwnGlove);
   test::CollectSink sink;
   // Bits 10-15: 63, bits 28-33 (big): 21, counter 0x123, then the delimiter.
@@ -255,7 +256,7 @@ TEST_CASE("a glove that nobody knows works from its description alone") {
   CHECK(sink.samples[0].value[3] == 21.0F);  // raw_index
   CHECK(sink.samples[0].value[0] == Approx(std::numbers::pi / 2));
   CHECK(sink.samples[0].value[1] == Approx(std::numbers::pi / 6));
-  CHECK_FALSE(sink.samples[0].valid[4]);  // the battery has not been told
+  CHECK_FALSE(sink.samples[0].valid[4]);  // the battery level is not known yet
   CHECK(sink.samples[0].header.device_ns == 0);
   decoder->feed(hex("02 00 05 ff fe"), 0, sink);
   CHECK(sink.samples.size() == 1);
@@ -267,7 +268,7 @@ TEST_CASE("a glove that nobody knows works from its description alone") {
   CHECK(sink.count(Outcome::kOk) == 3);
 }
 
-TEST_CASE("what stands between two delimiters is a packet, or is counted once") {
+TEST_CASE("the bytes between two delimiters are a packet, or are counted once") {
   const auto decoder = decoder_for(kOwnGlove);
   test::CollectSink sink(16);
   decoder->feed(hex("01 3f 00 05 40 23 ff fe 01 3f 00 05 40 23 01 ff fe 03 ff fe"), 0, sink);
@@ -301,7 +302,7 @@ a = [{channel = "index1_x"}]
   test::CollectSink sink;
   decoder->feed(hex("07 01 02"), 0, sink);        // cut short
   decoder->feed(hex("07 04 05 06"), 0, sink);     // whole
-  decoder->feed(hex("08 07 01 02 03"), 0, sink);  // another report that holds a seven
+  decoder->feed(hex("08 07 01 02 03"), 0, sink);  // another report that contains a seven
   REQUIRE(sink.samples.size() == 1);
   CHECK(sink.samples[0].value[3] == 4.0F);
   CHECK(sink.samples[0].value[5] == 6.0F);
@@ -321,10 +322,11 @@ TEST_CASE("a packet without a header is found by its CRC alone, from anywhere") 
   test::CollectSink sink;
   decoder->feed(bytes, 0, sink);
   CHECK(sink.count(Outcome::kOk) == 2);
-  CHECK(sink.count(Outcome::kBadChecksum) == 1);  // one hunt from the cut to the third packet
+  CHECK(sink.count(Outcome::kBadChecksum) ==
+        1);  // one search for a packet, from the damage to the third packet
 }
 
-TEST_CASE("a mistake in a description is told with its line and what is allowed") {
+TEST_CASE("a mistake in a description is reported with its line and what is allowed") {
   const std::string own = kOwnGlove;
   const auto mistake = [&](const std::string& from, const std::string& to) {
     std::string toml = own;

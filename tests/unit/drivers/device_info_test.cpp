@@ -1,4 +1,5 @@
-// A glove's greeting comes back key by key, and a damaged one is refused in one sentence.
+// A glove's device info is read back key by key, and a damaged one gives one error
+// message.
 #include "drivers/glove/device_info.hpp"
 
 #include <catch2/catch.hpp>
@@ -10,28 +11,28 @@ namespace {
 
 constexpr std::array<std::string_view, 2> kForms{"alpha", "legacy"};
 
-// Reads what a made-up glove says; empty when all is well.
+// Reads the device info of a fictitious glove and returns the error; empty when it is accepted.
 std::string complaint(const std::string& text) {
-  Greeting greeting(text, "toy", "A9");
-  (void)greeting.side();
-  (void)greeting.whole("sensors", 18, 22);
-  (void)greeting.choice("form", kForms);
-  const auto ok = greeting.finish();
+  DeviceInfoReader reader(text, "toy", "A9");
+  (void)reader.side();
+  (void)reader.whole("sensors", 18, 22);
+  (void)reader.choice("form", kForms);
+  const auto ok = reader.finish();
   return ok ? std::string() : ok.error().text();
 }
 
 }  // namespace
 
-TEST_CASE("a greeting gives back what a driver put into it") {
-  Greeting greeting("toy form=legacy sensors=22 hand=left name=x=y", "toy", "A9");
-  CHECK(greeting.side() == Side::kLeft);
-  CHECK(greeting.whole("sensors", 18, 22) == 22);
-  CHECK(greeting.choice("form", kForms) == 1);
-  CHECK(greeting.word("name") == "x=y");
-  CHECK(greeting.finish());
+TEST_CASE("device info gives back what a driver put into it") {
+  DeviceInfoReader reader("toy form=legacy sensors=22 hand=left name=x=y", "toy", "A9");
+  CHECK(reader.side() == Side::kLeft);
+  CHECK(reader.whole("sensors", 18, 22) == 22);
+  CHECK(reader.choice("form", kForms) == 1);
+  CHECK(reader.word("name") == "x=y");
+  CHECK(reader.finish());
 }
 
-TEST_CASE("a damaged greeting is refused, and the sentence says what is wrong with it") {
+TEST_CASE("damaged device info is refused, and the message states what is wrong") {
   CHECK(complaint("toy hand=right sensors=18 form=alpha").empty());
   CHECK(complaint("other hand=right sensors=18 form=alpha").find("its name") != std::string::npos);
   CHECK(complaint("toy hand=right form=alpha").find("lacks 'sensors'") != std::string::npos);

@@ -14,7 +14,7 @@
 namespace posed::test {
 namespace {
 
-constexpr std::size_t kRounds = 4;  // that the capability tests read at most
+constexpr std::size_t kRounds = 4;  // the most rounds that the capability tests read
 
 const drivers::Driver& driver_of(const DeviceFixture& fixture) {
   const drivers::Driver* driver = drivers::find_driver(fixture.driver);
@@ -29,7 +29,7 @@ drivers::Description promised(const DeviceFixture& fixture) {
   return std::move(*description);
 }
 
-// A description may have several lines.
+// Writes a description, which may have several lines, as `text` lines.
 std::string text_lines(const std::string& text) {
   std::string lines = "text ";
   for (const char c : text) lines += c == '\n' ? std::string("\ntext ") : std::string(1, c);
@@ -113,7 +113,7 @@ std::string emulated_log(const DeviceFixture& fixture) {
       case 8:  // half of it is missing
         bytes.resize(bytes.size() / 2);
         break;
-      case 11:  // garbage before it
+      case 11:  // garbage is inserted before it
         bytes.insert(bytes.begin(), 7, std::byte{0xEE});
         break;
       default:
@@ -124,8 +124,8 @@ std::string emulated_log(const DeviceFixture& fixture) {
   return text;
 }
 
-// unit_drivers [.write-logs] makes the logs that are not there yet; UPDATE_EXPECTED=1 what they
-// decode to.
+// unit_drivers [.write-logs] writes the logs that do not exist yet; with UPDATE_EXPECTED=1
+// recorded_log_test writes their expected output.
 TEST_CASE("write the logs of emulated gloves", "[.write-logs]") {
   for (const DeviceFixture& fixture : device_fixtures()) {
     if (!fixture.emulated) continue;

@@ -1,4 +1,4 @@
-// Gloves that nobody has plugged in: what their emulators send, as a device to open and as a log.
+// The output of gloves' emulators, as a device to open and as a log.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,15 @@
 
 namespace posed::test {
 
-// A hand that closes and opens, each finger in its turn; equal after `count` poses.
+// Pose `index` of a hand that closes and opens finger by finger, with a period of `count` poses.
 [[nodiscard]] HandAngles closing_hand(std::size_t index, std::size_t count);
 
-// What the fixture's emulator sends in `rounds` rounds of loop_chunks poses, and when it was due.
+// The chunks that the fixture's emulator sends in `rounds` rounds of loop_chunks poses, each with
+// its due time.
 [[nodiscard]] std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(
     const DeviceFixture& fixture, std::size_t rounds);
 
-// The fixture as its options promise it, playing rounds enough for every test.
+// The fixture's device, which plays enough rounds for every test.
 [[nodiscard]] drivers::Device open_emulated(const DeviceFixture& fixture);
 
 // A recorded log's text (recorded_log.hpp) of one round, with damage, marked as emulated.

@@ -1,4 +1,4 @@
-// Which of the things that are plugged in an id means, and what is said when none or several fit.
+// Which plugged-in device an id selects, and the errors when no device or several match.
 #include <catch2/catch.hpp>
 
 #include "drivers/transport/enumerate.hpp"
@@ -45,7 +45,7 @@ TEST_CASE("a device is known by its serial number, its port path or both with it
   CHECK_FALSE(built_in.answers_to(""));
 }
 
-TEST_CASE("twins with one serial number are told apart by their port paths") {
+TEST_CASE("devices with equal serial numbers are distinguished by their port paths") {
   const std::vector twins{adapter("/dev/ttyUSB0", "0001", "1-1"),
                           adapter("/dev/ttyUSB1", "0001", "1-2")};
   const auto unclear = choose(twins, "0001", any, "serial port");
@@ -58,7 +58,7 @@ TEST_CASE("twins with one serial number are told apart by their port paths") {
   CHECK(clear->node == "/dev/ttyUSB1");
 }
 
-TEST_CASE("an id that nothing answers to is named") {
+TEST_CASE("an id without a device is named") {
   const std::vector one{adapter("/dev/ttyUSB0", "0001", "1-1")};
   const auto none = choose(one, "0002", any, "serial port");
   REQUIRE_FALSE(none);
@@ -68,8 +68,8 @@ TEST_CASE("an id that nothing answers to is named") {
   CHECK_FALSE(choose(one, "", [](const DeviceInfo& p) { return p.vendor == 1; }, "serial port"));
 }
 
-TEST_CASE("ports, HID nodes and USB devices that are not there are refused in a sentence") {
-  constexpr std::uint32_t kNobody = 0xFFF0;  // no vendor has it
+TEST_CASE("ports, HID nodes and USB devices that do not exist are refused with an error message") {
+  constexpr std::uint32_t kNobody = 0xFFF0;  // no vendor has this id
   TransportFactory ports;
   const auto port = ports.serial({.id = "no-such-glove"});
   REQUIRE_FALSE(port);

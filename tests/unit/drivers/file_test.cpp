@@ -1,4 +1,4 @@
-// The file driver: what it plays is what the clip says, and what it answers to bad clips and bytes.
+// The file driver: it plays exactly the clip's poses, and refuses bad clips and bytes.
 #include <catch2/catch.hpp>
 
 #include <span>
@@ -41,7 +41,7 @@ void feed(Device& device, const std::string& text, Sink& sink) {
   device.decoder->feed(std::as_bytes(std::span(text)), 0, sink);
 }
 
-// Plays the clip once and compares every frame with the clip as it is read offline.
+// Plays the clip once and compares every frame with the clip read offline.
 void check_plays_like_clip(const std::filesystem::path& path, const Options& options,
                            const clip::ReadOptions& read) {
   INFO(path);
@@ -139,7 +139,7 @@ TEST_CASE("other line ends, a byte order mark and blank lines change nothing") {
   }
 }
 
-TEST_CASE("a clip that cannot be played is refused in one sentence with its place") {
+TEST_CASE("a clip that cannot be played is refused with one error message and its place") {
   const std::string bvh = test::small_bvh();
   const std::string last = "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
   struct Case {
@@ -192,7 +192,7 @@ TEST_CASE("an AMC without its skeleton, or with another's, is refused by name") 
   CHECK(cut_device.error().text().starts_with(cut.string() + ":"));
 }
 
-TEST_CASE("a frame that no pose has is counted, and the clip's clock goes on") {
+TEST_CASE("an invalid frame is counted, and the clip's clock continues") {
   Device device = must_open(test::scratch_file("small.bvh", test::small_bvh()));
   const std::string good = "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
   CollectSink sink;
@@ -236,7 +236,7 @@ TEST_CASE("values beyond what a pose can have are counted as out of range and ne
         std::string::npos);
 }
 
-TEST_CASE("an option that says nothing about this kind of clip is refused") {
+TEST_CASE("an option without meaning for this kind of clip is refused") {
   const auto bvh = test::scratch_file("small.bvh", test::small_bvh());
   const auto said = [&](const char* option, const drivers::OptionValue& value) {
     const auto device = open_file(bvh, {{option, value}});
@@ -251,14 +251,14 @@ TEST_CASE("an option that says nothing about this kind of clip is refused") {
   CHECK(must_open(bvh, {{"hand", std::string("right")}}).description.rate_hz == Approx(120.0));
 }
 
-TEST_CASE("an AMC frame is whole with its last bone, not with the next frame's number") {
+TEST_CASE("an AMC frame is complete with its last bone, not with the next frame's number") {
   Device device = small_amc_device();
   CollectSink sink;
   feed(device, "1\nroot 1 2 3 4 5 6\nlfemur 1 2 3\n", sink);
   CHECK(sink.frames.empty());
   feed(device, "ltibia 7\n", sink);
   CHECK(sink.frames.size() == 1);
-  // Bones in another order, a bone over two lines, a comment and no bone too many.
+  // Bones in another order, a bone on two lines, a comment, and no additional bones.
   feed(device, "2\nltibia 7\n# note\nlfemur 1\n2 3\nroot 1 2 3 4 5 6\n", sink);
   REQUIRE(sink.frames.size() == 2);
   CHECK(test::same_pose(sink.frames[0], sink.frames[1]));
@@ -277,7 +277,7 @@ TEST_CASE("an AMC frame with a bone missing is short, and the next one is good")
   CHECK(sink.count(Outcome::kOutOfRange) == 1);
 }
 
-TEST_CASE("what a clip leaves in doubt is told as a warning") {
+TEST_CASE("what a clip leaves undetermined is reported as a warning") {
   const Device device = must_open(
       test::scratch_file("warn.bvh", swap(test::small_bvh(), "Frames: 5", "Frames: 500")));
   REQUIRE_FALSE(device.warnings.empty());

@@ -1,5 +1,4 @@
-// 5DT gloves: packets as the sources draw them, what is made of damaged ones, and the gloves on a
-// port.
+// 5DT gloves: packets as in the published sources, damaged packets, and gloves on a port.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -82,7 +81,8 @@ TEST_CASE("a Data Glove 5's packet is XOR checked, and its start may be data, to
   CHECK(reading.value[0] == 0x80);
   CHECK(reading.value[4] == 0xFF);
   CHECK(reading.pitch == 0x80);
-  // A byte changes: with the hand still, all of 80 look like starts, and only the place is right.
+  // One byte changes. With the hand still, every byte 80 looks like a start; only the position
+  // shows which one is.
   const auto decoder = decoder_of({});
   CollectSink sink;
   Bytes damaged = packet;
@@ -171,7 +171,7 @@ TEST_CASE("an Ultra Wireless record holds fourteen values of twelve bits, of eit
 TEST_CASE("an Ultra Wireless record after damage is found by the next one's start") {
   const auto decoder = decoder_of({{"model", std::string("ultra-wireless")}});
   Reading reading;
-  reading.value.fill(0x3C3);  // its start is among the data, too
+  reading.value.fill(0x3C3);  // its start byte also occurs in the data
   const Bytes record = fivedt::encode_packet(Form::kUltraWireless, reading, Side::kRight);
   CollectSink sink;
   decoder->feed(record, 0, sink);
@@ -197,12 +197,13 @@ TEST_CASE("a USB glove with five sensors has every third value") {
   }
 }
 
-TEST_CASE("emulated 5DT gloves' poses come back as near as their sensors can tell") {
-  // Half a count of a whole bend's 1500; what one sensor cannot tell of two joints is left out.
+TEST_CASE("emulated 5DT gloves' poses come back as exactly as their sensors allow") {
+  // Half a count of the 1500 of a full bend; joints that one sensor cannot distinguish are left
+  // out.
   CHECK(worst_error(fixture("fivedt-16"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
   CHECK(worst_error(fixture("fivedt-ultra-wireless"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
   CHECK(worst_error(fixture("fivedt-ultra-usb-14"), 1) <= 0.51 * std::numbers::pi / 2.0 / 1500.0);
-  // One sensor a finger: the mean of its joints is right, each joint is near.
+  // One sensor a finger: the mean of its joints is right, each single joint is only near.
   CHECK(worst_error(fixture("fivedt-5"), 3) < 0.25);
   CHECK(worst_error(fixture("fivedt-ultra-usb-5"), 3) < 0.25);
 }
@@ -234,11 +235,11 @@ TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
     wait(i);
   }
   CHECK(sink.samples[0].quality == Quality::kMeasured);
-  CHECK(sink.samples[1].quality == Quality::kHeld);  // the hand lies still
+  CHECK(sink.samples[1].quality == Quality::kHeld);  // the hand does not move
   CHECK(sink.samples[2].quality == Quality::kHeld);
 }
 
-TEST_CASE("a 5DT glove that only sends is told apart by its packets") {
+TEST_CASE("a 5DT glove that only sends is identified by its packets") {
   FiveDtEmulator glove(Side::kLeft, {.form = Form::kFiveWireless});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
@@ -250,7 +251,7 @@ TEST_CASE("a 5DT glove that only sends is told apart by its packets") {
   CHECK(left->warnings.empty());
 }
 
-TEST_CASE("a 5DT glove of another hand or model is told in a sentence") {
+TEST_CASE("a 5DT glove of another hand or model is refused with an error message") {
   FiveDtEmulator glove(Side::kLeft, {.form = Form::kFiveWireless});
   const test::ServedEmulator served(glove);
   TransportFactory ports;

@@ -1,4 +1,5 @@
-// What all gloves share: curves, the angle map, calibration files and the glove decoder.
+// Code shared by all gloves: calibration curves, the angle map, calibration files and the glove
+// decoder.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -78,7 +79,7 @@ TEST_CASE("a curve goes through its points and on beyond them") {
   CHECK(curve.value_at(0) == -1.0F);
 }
 
-TEST_CASE("the map adds shares, leaves others at zero, and knows what it does not know") {
+TEST_CASE("the angle map adds shares, sets other angles to zero, and marks unknown ones") {
   const auto calibration = must_make(small_model());
   HandAngles angles;
   calibration->map_to_hand(std::array{0.5F, 0.25F}, 0b11, angles);
@@ -141,7 +142,7 @@ TEST_CASE("a calibration file replaces what it names") {
   CHECK(again->user == file->user);
 }
 
-TEST_CASE("odd names come back from a calibration file as they were") {
+TEST_CASE("unusual names are read back from a calibration file unchanged") {
   auto file = parse_calibration(kSmallFile, "c.toml");
   REQUIRE(file);
   file->user = "a\"b\\c\nd";
@@ -150,7 +151,7 @@ TEST_CASE("odd names come back from a calibration file as they were") {
   CHECK(again->user == file->user);
 }
 
-TEST_CASE("a calibration file cut anywhere is refused") {
+TEST_CASE("a calibration file truncated anywhere is refused") {
   auto file = parse_calibration(kSmallFile, "c.toml");
   REQUIRE(file);
   file->sensors["spread"] = {{10, 0.0}, {200, 1.0}};
@@ -163,7 +164,7 @@ TEST_CASE("a calibration file cut anywhere is refused") {
   }
 }
 
-TEST_CASE("a wrong calibration file is refused with a sentence") {
+TEST_CASE("a wrong calibration file is refused with an error message") {
   for (const auto& [from, to] :
        std::vector<std::pair<std::string, std::string>>{{"format = 1", "format = 2"},
                                                         {"[60, 0.0]", "[100, 0.0]"},
@@ -227,7 +228,7 @@ TEST_CASE("a glove's packet becomes a sample and a frame") {
   CHECK(hand_angles(sink.frames[0])[9] == Approx(0.5));
 }
 
-TEST_CASE("what is no number never leaves a glove decoder as valid") {
+TEST_CASE("NaN never leaves a glove decoder as valid") {
   SmallDecoder decoder;
   test::CollectSink sink;
   for (const float bad : {kNaN, std::numeric_limits<float>::infinity(), 1e38F}) {
@@ -247,7 +248,7 @@ TEST_CASE("what is no number never leaves a glove decoder as valid") {
   CHECK(sink.frames.empty());
 }
 
-TEST_CASE("an angle that no finger can have costs its joint, and is counted") {
+TEST_CASE("an angle that no finger can have makes its joint invalid, and is counted") {
   SmallDecoder decoder;
   test::CollectSink sink;
   // bend = 9.95, mapped to 9.95 rad on index1_x and twice that on index2_x: beyond two turns.
@@ -264,7 +265,7 @@ TEST_CASE("an angle that no finger can have costs its joint, and is counted") {
   CHECK(sink.frames.back().valid.count() == sink.frames.back().joint_count);
 }
 
-TEST_CASE("a glove decoder uses another calibration from the next packet on, without the heap") {
+TEST_CASE("a glove decoder uses another calibration from the next packet on, without allocation") {
   const auto file = parse_calibration(kSmallFile, "c.toml");
   REQUIRE(file);
   const auto other = make_calibration(small_model(), *file, Side::kRight, "A1");
@@ -280,7 +281,7 @@ TEST_CASE("a glove decoder uses another calibration from the next packet on, wit
   CHECK(test::allocations() == before);
   CHECK(sink.samples[0].value[0] == 0.5F);
   CHECK(sink.samples[1].value[0] == 1.0F);
-  decoder.calibrate(Calibration{});  // of a glove without sensors: not used
+  decoder.calibrate(Calibration{});  // the calibration of a glove without sensors is ignored
   decoder.emit(packet, sink);
   CHECK(sink.samples[2].value[0] == 1.0F);
 }

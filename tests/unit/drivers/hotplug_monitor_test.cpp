@@ -1,4 +1,4 @@
-// The watch on device nodes, on folders that stand for /dev.
+// The monitor of device nodes, tested on folders in place of /dev.
 #include <poll.h>
 
 #include <catch2/catch.hpp>
@@ -20,7 +20,7 @@ void make_node(const std::filesystem::path& path) { std::ofstream{path} << ""; }
 
 }  // namespace
 
-TEST_CASE("a node that comes, or is opened to us, is told once") {
+TEST_CASE("a node that appears, or becomes accessible, is reported once") {
   const test::TempFolder dev;
   HotplugMonitor arrivals(dev.path());
   REQUIRE(arrivals.poll_fd() >= 0);
@@ -36,7 +36,7 @@ TEST_CASE("a node that comes, or is opened to us, is told once") {
   CHECK_FALSE(arrivals.take());
 }
 
-TEST_CASE("a USB bus that comes later is watched, too") {
+TEST_CASE("a USB bus that appears later is watched, too") {
   const test::TempFolder dev;
   HotplugMonitor arrivals(dev.path());
   std::filesystem::create_directory(dev.path() / "bus");

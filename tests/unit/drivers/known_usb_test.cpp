@@ -1,4 +1,4 @@
-// The ids gloves are known by, and the udev rules that open them.
+// The USB ids of known gloves, and the udev rules that give access to them.
 #include <catch2/catch.hpp>
 
 #include <array>
@@ -45,7 +45,7 @@ TEST_CASE("a 5DT glove's product number says which hand it is for") {
   CHECK(known(right)->hand(right) == "right");
 }
 
-TEST_CASE("an adapter and a stranger do not say what is behind them") {
+TEST_CASE("an adapter and an unknown device do not reveal what is behind them") {
   const auto adapter = plugged(Bus::kSerial, 0x0403, 0x6001);
   REQUIRE(known(adapter) != nullptr);
   CHECK(known(adapter)->adapter);

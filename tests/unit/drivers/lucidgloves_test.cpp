@@ -1,5 +1,5 @@
-// LucidGloves: lines that real gloves sent, what is made of damaged ones, forces to and fro, and
-// the glove on a port.
+// LucidGloves: lines that real gloves sent, damaged lines, forces in both directions, and the glove
+// on a port.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -55,7 +55,7 @@ std::string haptics_text(const Options& options, const Haptics& haptics) {
   return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
 }
 
-// A glove on the network: connects to us, then talks.
+// A glove on the network, which connects to us and then sends.
 class NetworkGlove {
  public:
   explicit NetworkGlove(std::uint16_t port)
@@ -93,7 +93,7 @@ class NetworkGlove {
 
 TEST_CASE("lines that real LucidGloves sent are read") {
   Line line;
-  // As quoted by their users: lucidgloves issue 36, and a glove with the old firmware.
+  // As quoted by users: lucidgloves issue 36, and a glove with the old firmware.
   REQUIRE(parse("A1662B3329C1229D4095E4095F384G0ILM", line) == Outcome::kOk);
   CHECK(line.value[lucidgloves::kCurl + 0] == 1662);
   CHECK(line.value[lucidgloves::kCurl + 4] == 4095);
@@ -121,12 +121,13 @@ TEST_CASE("joints, splay, keys in any order and keys that nobody knows") {
   CHECK_FALSE(line.has_hand());
 }
 
-TEST_CASE("what no glove sends is told apart") {
+TEST_CASE("lines that no glove sends are classified") {
   CHECK(outcome_of("rst:0x1 (POWERON_RESET),boot:0x13") == Outcome::kForeign);
   CHECK(outcome_of("ets Jun  8 2016 00:22:57") == Outcome::kForeign);
-  CHECK(outcome_of("62B3329C1229D4095E4095") == Outcome::kForeign);  // begins in its middle
-  CHECK(outcome_of("A1B2C3D4E5A1B2C3D4E5") == Outcome::kForeign);    // two lines, no end between
-  CHECK(outcome_of("A1B2C3D4EF5") == Outcome::kForeign);             // a curl without its value
+  CHECK(outcome_of("62B3329C1229D4095E4095") == Outcome::kForeign);  // the beginning is missing
+  CHECK(outcome_of("A1B2C3D4E5A1B2C3D4E5") ==
+        Outcome::kForeign);  // two lines without a line end between them
+  CHECK(outcome_of("A1B2C3D4EF5") == Outcome::kForeign);  // a curl without its value
   CHECK(outcome_of("A1B2(AAB") == Outcome::kForeign);
   CHECK(outcome_of("A1B2()5") == Outcome::kForeign);
   CHECK(outcome_of("A1B23329999999999999999999") == Outcome::kOutOfRange);
@@ -139,12 +140,12 @@ TEST_CASE("what no glove sends is told apart") {
   CHECK(outcome_of("1&2&3&4&5&6&&0&0&0&0&0&0") == Outcome::kForeign);
 }
 
-TEST_CASE("a finger's curl stands for joints and splay that the glove lacks") {
+TEST_CASE("a finger's curl replaces joints and splay that the glove lacks") {
   const auto decoder = decoder_of();
   CollectSink sink;
   feed(*decoder, "A0B4095C0D0E0(CAC)4095\r\n\r\n", sink);
   REQUIRE(sink.frames.size() == 1);
-  CHECK(sink.count(Outcome::kOk) == 1);  // an empty line is nothing at all
+  CHECK(sink.count(Outcome::kOk) == 1);  // an empty line is not counted
   const HandAngles angles = hand_angles(sink.frames[0]);
   const double right_angle = std::acos(0.0);
   CHECK(angles[1 * kFingerChannels] == Approx(right_angle));
@@ -164,7 +165,7 @@ TEST_CASE("a finger's curl stands for joints and splay that the glove lacks") {
   CHECK(sample.value[place("raw_middle_joint2")] == 4095.0F);
 }
 
-TEST_CASE("a line without a finger that the glove sends is damaged, until it stays away") {
+TEST_CASE("a line that lacks a known finger is damaged, until the finger stays absent") {
   const auto decoder = decoder_of();
   CollectSink sink;
   feed(*decoder, "A1B2C3D4E5\n", sink);
@@ -176,7 +177,7 @@ TEST_CASE("a line without a finger that the glove sends is damaged, until it sta
   CHECK_FALSE(sink.frames[1].valid[static_cast<std::size_t>(hand_joint(2, 1))]);
 }
 
-TEST_CASE("a line longer than any glove's is given up once, and its end is not read as a line") {
+TEST_CASE("a line longer than any glove's is discarded once, and its end is not read as a line") {
   const auto decoder = decoder_of();
   CollectSink sink;
   feed(*decoder, std::string(1000, 'A') + "A1B2C3D4E5\nA1B2C3D4E5\n", sink);
@@ -208,7 +209,7 @@ TEST_CASE("an emulated LucidGlove's pose comes back within half a count") {
   }
 }
 
-TEST_CASE("forces and vibrations reach the glove as told, and what is negative stays") {
+TEST_CASE("forces and vibrations reach the glove as requested, and negative ones change nothing") {
   LucidEmulator glove(Side::kRight, Encoding::kAuto, 4095);
   const auto tell = [&](const std::string& text) {
     Emulator::Bytes answer;
@@ -235,7 +236,7 @@ TEST_CASE("forces and vibrations reach the glove as told, and what is negative s
   CHECK(haptics_text({}, {.force = {NAN, 0, 0, 0, 0}}).starts_with("refused"));
 }
 
-TEST_CASE("a LucidGlove on a port is opened, read and told apart by hand and range") {
+TEST_CASE("a LucidGlove on a port is opened, read and identified by hand and range") {
   LucidEmulator glove(Side::kLeft, Encoding::kAlpha, 4095);
   const test::ServedEmulator served(glove);
   TransportFactory ports;
@@ -267,7 +268,7 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
   const Options options{{"link", std::string("tcp")},
                         {"listen", "127.0.0.1:" + std::to_string(port)}};
   TransportFactory ports;
-  CHECK_FALSE(driver().open(options, ports));  // nobody there yet; it goes on listening
+  CHECK_FALSE(driver().open(options, ports));  // no glove has connected yet; it continues to listen
   const NetworkGlove glove(port);
   glove.say("A1B2C3D4E5\n\r\nZ(ZV)5(ZG)0(ZH)1\n\r\n");
   auto device = driver().open(options, ports);

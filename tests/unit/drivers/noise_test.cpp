@@ -1,5 +1,6 @@
-// Noise on the line, for every glove that has an emulator: one byte in a hundred flipped, dropped
-// or inserted, ten minutes of packets at 150 Hz. What each framing cannot tell is printed.
+// Noise on the line, for every glove that has an emulator: one byte in a hundred is flipped,
+// dropped or inserted, in ten minutes of packets at 150 Hz. The damage that each framing cannot
+// detect is printed.
 #include <catch2/catch.hpp>
 
 #include <cstdio>
@@ -18,10 +19,10 @@ using test::DeviceFixture;
 
 constexpr std::size_t kPackets = 150 * 60 * 10;
 constexpr double kNoise = 0.01;   // of bytes
-constexpr std::size_t kLate = 8;  // packets that a decoder may still hold back
+constexpr std::size_t kLate = 8;  // most packets by which a decoder's output may be late
 
-// The share of damaged packets that come through as if they were good, at most, where the framing
-// cannot tell. A glove that is not here has a framing that can.
+// The largest share of damaged packets that are accepted as good, for gloves whose framing cannot
+// detect all damage. The framing of a glove that is not listed detects it.
 struct Blind {
   std::string_view fixture;
   double most;
@@ -46,21 +47,21 @@ double allowed_share(const DeviceFixture& fixture) {
   return at == kBlind.end() ? 0.0 : at->most;
 }
 
-// What was sent, until it came through or can come no more.
+// A sent packet, kept until it has been decoded or can no longer be.
 struct Sent {
   Sample sample;
   bool whole = false;
 };
 
 struct Tally {
-  std::size_t sent = 0, whole = 0;  // packets; those that noise left alone
+  std::size_t sent = 0, whole = 0;  // packets; those not touched by noise
   std::size_t whole_through = 0;    // of those
-  std::size_t damaged_through = 0;  // right in spite of the noise (a byte between packets)
+  std::size_t damaged_through = 0;  // correct in spite of the noise (a byte between packets)
   std::size_t wrong = 0;            // published as good, but never sent so
-  std::size_t lost_in_a_row = 0;    // untouched ones, the longest
+  std::size_t lost_in_a_row = 0;    // longest run of lost untouched packets
 };
 
-// Takes the glove's decoded samples and finds for each the packet that it was.
+// Receives the glove's decoded samples and finds the packet of each.
 class Judge {
  public:
   void sent(const Sample& sample, bool whole) {
@@ -141,7 +142,8 @@ Tally stream_through_noise(const DeviceFixture& fixture) {
 
 }  // namespace
 
-TEST_CASE("noise on the line costs what it touched, and what is published was sent") {
+TEST_CASE(
+    "noise on the line loses only the packets it touched, and only sent packets are published") {
   for (const DeviceFixture& fixture : test::device_fixtures()) {
     if (!fixture.emulated || fixture.whole_reports) continue;
     INFO(fixture.name);

@@ -1,4 +1,5 @@
-// P5: reports as libp5glove reads them, the feature reports of a real glove, and where the hand is.
+// P5: reports as libp5glove reads them, the feature reports of a real glove, and the position of
+// the hand.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -37,7 +38,7 @@ bool same(const LedObservation& a, const LedObservation& b) {
 
 CameraRig emulated_tower() { return CameraRig::of(p5::emulated_heads(), p5::emulated_leds()); }
 
-// A feature report of the real dump: the last one that begins with `start`.
+// The last feature report of the real dump that begins with `start`.
 Bytes dumped(const std::filesystem::path& path, const std::string& start, std::size_t size) {
   std::ifstream file(path);
   Bytes found;
@@ -53,7 +54,7 @@ Bytes dumped(const std::filesystem::path& path, const std::string& start, std::s
 
 }  // namespace
 
-TEST_CASE("a P5's report gives bends, buttons and spots") {
+TEST_CASE("a P5's report gives bends, buttons and LED observations") {
   const Bytes bytes =
       hex("01 29 47 a8 c8 50 24 81 93 ce 06 40 10 08 03 80 5f ff fc 00 00 00 00 00");
   Report report;
@@ -69,7 +70,7 @@ TEST_CASE("a P5's report gives bends, buttons and spots") {
   CHECK(std::ranges::equal(again, bytes));
 }
 
-TEST_CASE("a value that wrapped is led on from the one before") {
+TEST_CASE("a value that wrapped is continued from the one before") {
   CHECK(p5::unwrapped(500, 480) == 500);
   CHECK(p5::unwrapped(-450, 500) == 574);  // 574 = -450 + 1024
   CHECK(p5::unwrapped(450, -500) == -574);
@@ -77,7 +78,7 @@ TEST_CASE("a value that wrapped is led on from the one before") {
   CHECK(p5::unwrapped(-450, 574) == 574);
 }
 
-TEST_CASE("a LED comes back to where it is, up to the heads' resolution") {
+TEST_CASE("the position of a LED is recovered, up to the heads' resolution") {
   const CameraRig rig = emulated_tower();
   double worst_m = 0.0;
   for (const double x : {-0.2, 0.0, 0.2}) {
@@ -95,7 +96,7 @@ TEST_CASE("a LED comes back to where it is, up to the heads' resolution") {
   CHECK_FALSE(rig.locate({.led = 0, .v2 = 500, .v1 = -500, .h = 0}, nowhere));
 }
 
-TEST_CASE("three LEDs that agree place and turn the hand, two or false ones do not") {
+TEST_CASE("three consistent LEDs give the hand's position and rotation, two or false ones do not") {
   const CameraRig rig = emulated_tower();
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
   const Eigen::Vector3d palm(0.1, -0.05, 0.6);
@@ -112,14 +113,14 @@ TEST_CASE("three LEDs that agree place and turn the hand, two or false ones do n
   CHECK_FALSE(p5::fit_hand(rig, found, 0b01101, place));
 }
 
-TEST_CASE("an emulated P5 with its feature reports shows where its hand is") {
-  p5::Greeted glove;
+TEST_CASE("an emulated P5 with its feature reports gives the position of its hand") {
+  p5::GloveSettings glove;
   const auto keep = [](const auto& bytes) { return Bytes(bytes.begin(), bytes.end()); };
   glove.firmware = keep(p5::emulated_firmware());
   glove.heads = keep(p5::emulated_heads());
   glove.leds = keep(p5::emulated_leds());
   const Driver& driver = *find_driver("p5");
-  const auto description = driver.describe(p5::greeting_of(glove), "x");
+  const auto description = driver.describe(p5::device_info_of(glove), "x");
   if (!description) FAIL(description.error().text());
   const auto decoder = driver.make_decoder(*description);
   REQUIRE(decoder);
@@ -147,23 +148,23 @@ TEST_CASE("an emulated P5 with its feature reports shows where its hand is") {
   CHECK(description->samples.units[place("palm_qx")] == "1");
 }
 
-TEST_CASE("a P5's greeting with a damaged feature report is refused") {
-  CHECK(p5::read_greeting("p5 hand=right firmware=090403 heads=none leds=none", "x"));
-  CHECK_FALSE(p5::read_greeting("p5 hand=right firmware=080403 heads=none leds=none", "x"));
-  CHECK_FALSE(p5::read_greeting("p5 hand=right firmware=0904 heads=none leds=none", "x"));
-  CHECK_FALSE(p5::read_greeting("p5 hand=right firmware=09xx03 heads=none leds=none", "x"));
+TEST_CASE("a P5's device info with a damaged feature report is refused") {
+  CHECK(p5::read_device_info("p5 hand=right firmware=090403 heads=none leds=none", "x"));
+  CHECK_FALSE(p5::read_device_info("p5 hand=right firmware=080403 heads=none leds=none", "x"));
+  CHECK_FALSE(p5::read_device_info("p5 hand=right firmware=0904 heads=none leds=none", "x"));
+  CHECK_FALSE(p5::read_device_info("p5 hand=right firmware=09xx03 heads=none leds=none", "x"));
 }
 
-TEST_CASE("a real P5's feature reports make a rig of plausible size") {
+TEST_CASE("a real P5's feature reports give a camera rig of plausible size") {
   const auto dump = test::shared("data/gloves/p5/usb-dump.txt");
   if (!dump) {
     SKIP_WITHOUT_SHARED();
   }
-  p5::Greeted glove;
+  p5::GloveSettings glove;
   glove.firmware = dumped(*dump, "9", p5::kFirmwareBytes);
   glove.heads = dumped(*dump, "6", p5::kHeadsBytes);
   glove.leds = dumped(*dump, "c", p5::kLedsBytes);
-  const auto again = p5::read_greeting(p5::greeting_of(glove), "x");
+  const auto again = p5::read_device_info(p5::device_info_of(glove), "x");
   if (!again) FAIL(again.error().text());
   CHECK(glove.firmware == hex("09 04 03"));
   const auto rig = again->rig();

@@ -1,4 +1,4 @@
-// A serial port without permission; tests/usb has the other nodes.
+// A serial port without permission; tests/usb tests the other device nodes.
 #include <catch2/catch.hpp>
 
 #include <sys/stat.h>
@@ -9,7 +9,7 @@
 
 namespace posed::drivers {
 
-TEST_CASE("a serial port that may not be opened says which rule mends that") {
+TEST_CASE("a serial port without permission names the udev rule that gives access") {
   const test::PseudoTerminal terminal;
   REQUIRE(::chmod(terminal.port().c_str(), 0) == 0);
   const test::AsNobody nobody;

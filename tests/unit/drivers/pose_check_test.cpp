@@ -1,4 +1,4 @@
-// Whether a calibration can rest on its poses.
+// Whether recorded poses are good enough for a calibration.
 #include "drivers/glove/pose_check.hpp"
 
 #include <catch2/catch.hpp>
@@ -15,7 +15,7 @@ Model cyberglove() {
   return driver->glove_model(driver->expect({}).value()).value();
 }
 
-// The raw value that by default reads as `value`.
+// The raw value that the default calibration maps to `value`.
 double raw_of(const Sensor& sensor, double value) {
   double best = sensor.raw_min;
   for (double raw = sensor.raw_min; raw <= sensor.raw_max; ++raw) {
@@ -27,7 +27,7 @@ double raw_of(const Sensor& sensor, double value) {
   return best;
 }
 
-// All four poses held for 200 values with `unrest` counts of sway.
+// All four poses, held for 200 samples with a sway of `unrest` counts.
 Recorded held(const Model& model, double unrest = 0.5) {
   Recorded recorded{};
   for (std::size_t p = 0; p < kPoses; ++p) {

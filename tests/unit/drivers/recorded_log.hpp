@@ -1,5 +1,5 @@
-// A recorded device log as text, and what its driver makes of it: the pair of files that each
-// device brings (tests/golden/devices/NAME.log and NAME.chk).
+// A recorded device log as text, and its driver's output: each device has such a pair of files
+// (tests/golden/devices/NAME.log and NAME.chk).
 //
 //   # what was recorded, of which device, when, by whom
 //   driver template

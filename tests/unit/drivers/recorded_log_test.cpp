@@ -1,4 +1,4 @@
-// Every device's recorded log gives the output that stands beside it.
+// Every device's recorded log gives the expected output stored beside it.
 #include "tests/unit/drivers/recorded_log.hpp"
 
 #include <catch2/catch.hpp>
@@ -12,8 +12,9 @@
 
 namespace posed::test {
 
-TEST_CASE("recorded device logs decode to the output that stands beside them") {
-  // A change that is meant: UPDATE_EXPECTED=1 unit_drivers writes it; the commit says why.
+TEST_CASE("recorded device logs decode to the expected output beside them") {
+  // For an intended change, UPDATE_EXPECTED=1 unit_drivers rewrites the expected output; state the
+  // reason in the commit.
   const bool update = std::getenv("UPDATE_EXPECTED") != nullptr;
   std::set<std::string> seen;
   for (const auto& entry : std::filesystem::directory_iterator(golden("devices"))) {
@@ -35,7 +36,7 @@ TEST_CASE("recorded device logs decode to the output that stands beside them") {
   }
 }
 
-TEST_CASE("a difference in a recorded log's output is told by line") {
+TEST_CASE("a difference in a recorded log's output is reported by line") {
   CHECK(first_difference("a 1.0\nb 2", "a 1.000001\nb 2").empty());
   CHECK(first_difference("a 1\nb 2", "a 1\nb 2.1") == "line 2: got 'b 2', expected 'b 2.1'");
   CHECK(first_difference("a 1", "a 1\nb 2") == "line 2: got 'the end', expected 'b 2'");

@@ -1,4 +1,4 @@
-// An emulator that answers on a pseudo-terminal, on a thread of its own, as the real glove would.
+// Runs an emulator on a pseudo-terminal, on its own thread, in place of the real glove.
 #pragma once
 
 #include <poll.h>
@@ -16,7 +16,7 @@ namespace posed::test {
 
 class ServedEmulator {
  public:
-  // `emulator` outlives it and is the thread's own until then.
+  // `emulator` must outlive it and is used only by its thread until then.
   explicit ServedEmulator(drivers::Emulator& emulator)
       : emulator_(emulator), thread_([this] { serve(); }) {}
   ~ServedEmulator() {
@@ -46,7 +46,7 @@ class ServedEmulator {
       }
       const std::int64_t due_ns = emulator_.next_due_ns();
       if (due_ns != kNoTime_ns && due_ns <= now_ns()) emulator_.emit(now_ns(), out);
-      // What nobody reads is lost, as on a serial line.
+      // Bytes that nobody reads are lost, as on a serial line.
       if (!out.empty()) unread_ += ::write(terminal_.fd(), out.data(), out.size()) < 0 ? 1 : 0;
     }
   }

@@ -1,4 +1,4 @@
-// The template device: its packet, byte by byte, and its decoder's answers to damage.
+// The template device: its packet, byte by byte, and its decoder's handling of damage.
 #include <catch2/catch.hpp>
 
 #include <numbers>
@@ -34,7 +34,7 @@ void decode(const Bytes& bytes, test::CollectSink& sink) {
 
 }  // namespace
 
-TEST_CASE("a bend packet has the bytes that its drawing shows") {
+TEST_CASE("a bend packet has the bytes of its drawing") {
   const float bend_rad = 45.0F * std::numbers::pi_v<float> / 180.0F;
   const auto bytes = encode_packet({.count = 7, .bend_rad = bend_rad, .battery = 0.5F});
   CHECK(bytes == std::array{std::byte{0xA5}, std::byte{7}, std::byte{0x94}, std::byte{0x11},
@@ -73,7 +73,7 @@ TEST_CASE("damaged packets are counted and only they are lost") {
   CHECK(sink.frames.back().header.device_ns == 90'000'000);
 }
 
-TEST_CASE("a bend that no finger makes is out of range, and the stream goes on") {
+TEST_CASE("a bend that no finger makes is out of range, and the stream continues") {
   const auto wild = encode_packet({.count = 0, .bend_rad = 3.1F});
   Bytes bytes(wild.begin(), wild.end());
   const Bytes good = packets(1, 1);
@@ -84,7 +84,7 @@ TEST_CASE("a bend that no finger makes is out of range, and the stream goes on")
   CHECK(sink.frames.size() == 1);
 }
 
-TEST_CASE("another device's greeting is refused by name") {
+TEST_CASE("another device's device info is refused by name") {
   const Driver* driver = find_driver("template");
   for (const char* text : {"", "BEND1", "BEND1 rate=", "BEND1 rate=0", "BEND1 rate=nan",
                            "BEND1 rate=100x", "HIERARCHY"}) {

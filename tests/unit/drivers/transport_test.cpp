@@ -29,8 +29,8 @@ struct Played {
   bool ended = false;
 };
 
-// As the daemon's reader does, on a clock of its own: sleeps until a chunk is due, then reads until
-// nothing more is. Each wake-up is `late_ns` late.
+// Like the daemon's reader, on a simulated clock: sleeps until a chunk is due, then reads until no
+// more are due. Each wake-up is `late_ns` late.
 Played play(Transport& transport, std::size_t most, std::int64_t late_ns = 0) {
   Played played;
   std::int64_t now_ns = kStart_ns;
@@ -61,7 +61,7 @@ Recording recording(const std::vector<std::pair<std::int64_t, std::string>>& chu
 
 }  // namespace
 
-TEST_CASE("a file plays in order, once, and says that it ended") {
+TEST_CASE("a file plays in order, once, and reports its end") {
   for (const double pace : {0.0, 1.0, 3.0}) {
     const auto transport = must(
         FileTransport::open(letters("abcdef"), {.rate_hz = 2000, .pace = pace, .loop = false}));
@@ -82,8 +82,8 @@ TEST_CASE("a looped file begins again and never ends") {
   }
 }
 
-TEST_CASE("frames come at their times for ever: no drift, and a late one delays no other") {
-  constexpr double kRate_hz = 119.88;  // whose period is no whole number of nanoseconds
+TEST_CASE("frames come at their times without drift, and a late one delays no other") {
+  constexpr double kRate_hz = 119.88;  // whose period is not a whole number of nanoseconds
   for (const std::int64_t late_ns : {0, 3'000'000, 30'000'000}) {
     const auto transport = must(FileTransport::open(letters("abc"), {.rate_hz = kRate_hz}));
     const Played played = play(*transport, 100'000, late_ns);
@@ -101,7 +101,7 @@ TEST_CASE("frames come at their times for ever: no drift, and a late one delays 
   }
 }
 
-TEST_CASE("the pace is a factor on the recording's clock") {
+TEST_CASE("the pace (rate ratio) is a factor on the recording's clock") {
   const auto transport = must(FileTransport::open(letters("ab"), {.rate_hz = 100, .pace = 2.5}));
   CHECK(play(*transport, 251).at_ns.back() == kStart_ns + 1'000'000'000);
   CHECK_FALSE(transport->lossless());
@@ -115,8 +115,8 @@ TEST_CASE("an unpaced file is always due and waits for the pipeline") {
 }
 
 TEST_CASE("a file that cannot be played is refused with a reason") {
-  const auto reason = [](Chunks chunks, const PlaybackOptions& playback) {
-    const auto transport = FileTransport::open(std::move(chunks), playback);
+  const auto reason = [](Chunks chunks, const PlaybackOptions& options) {
+    const auto transport = FileTransport::open(std::move(chunks), options);
     return transport ? std::string() : transport.error().text();
   };
   CHECK(reason({}, {.rate_hz = 100}) == "there is nothing to play");

@@ -14,7 +14,8 @@ namespace {
 constexpr int kMaxLines = 500;
 constexpr std::size_t kMaxColumns = 100;
 
-// Blanks comments and the insides of string and character literals, keeping every column in place.
+// Replaces comments and the contents of string and character literals by blanks, keeping all
+// columns.
 class Blanker {
  public:
   std::string line(const std::string& text) {
@@ -158,7 +159,7 @@ std::vector<Finding> check_sizes(const SourceFile& file) {
   if (file.lines.size() > kMaxLines) {
     findings.push_back({file.path, kMaxLines, "has more than 500 lines: split it"});
   }
-  // Spelled in halves so that this file does not find itself.
+  // Written in two halves so that this check does not report its own source.
   const std::regex mark(std::string("\\b(TO") + "DO|FIX" + "ME|XX" + "X)\\b");
   for (std::size_t i = 0; i < file.lines.size(); ++i) {
     const int line = static_cast<int>(i) + 1;
@@ -194,18 +195,19 @@ std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies) {
   for (std::size_t i = 0; i < file.lines.size(); ++i) {
     if (file.lines[i].find("RT-safe") == std::string::npos) continue;
     if (file.lines[i].find("//") == std::string::npos) continue;
-    // The comment may go on; the function starts at the first line with code.
+    // The comment may continue; the function starts at the first line with code.
     std::size_t start = i;
     while (start < file.code.size() &&
            file.code[start].find_first_not_of(' ') == std::string::npos) {
       ++start;
     }
     if (start == file.code.size()) break;
-    if (file.code[start].starts_with('#')) continue;  // it is about the whole file
+    if (file.code[start].starts_with('#')) continue;  // the comment is about the whole file
     const std::size_t end = end_of_body(file.code, start);
     if (end == start && file.code[start].find('{') == std::string::npos) continue;
     ++bodies;
-    // Of a class that is RT-safe as a whole, what its members are is its constructor's business.
+    // In a class that is RT-safe as a whole, member declarations may allocate, because its
+    // constructor is cold.
     const bool is_class = file.code[start].starts_with("class ");
     int depth = 0;
     for (std::size_t line = start; line <= end; ++line) {

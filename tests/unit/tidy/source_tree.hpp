@@ -1,4 +1,4 @@
-// The source tree as the tidy test sees it: files as lines of text, comments and strings blanked
+// The source tree for the tidy test: files as lines of text, also with comments and strings blanked
 // out.
 #pragma once
 
@@ -20,20 +20,20 @@ struct Finding {
   std::string what;
 };
 
-// Every .hpp and .cpp of the rooms (proto, models, drivers, daemon, tests).
+// Every .hpp and .cpp of the modules (proto, models, drivers, daemon, tests).
 [[nodiscard]] std::vector<SourceFile> read_source_tree(const std::filesystem::path& root);
 [[nodiscard]] SourceFile source_from_text(std::string path, const std::string& text);
 
-// Rooms may include only what the dependency law allows.
+// Modules may include only what the dependency rules allow.
 [[nodiscard]] std::vector<Finding> check_includes(const SourceFile& file);
 // At most 500 lines a file, 100 columns a line, no left-over marks.
 [[nodiscard]] std::vector<Finding> check_sizes(const SourceFile& file);
-// TOML is parsed in proto/text/toml.cpp alone, which first looks at its depth; outside of tests a
+// TOML is parsed in proto/text/toml.cpp alone, which checks its depth first; outside of tests a
 // whole file is read by load_file alone, which bounds it.
 [[nodiscard]] std::vector<Finding> check_guarded_input(const SourceFile& file);
 // Bodies of functions marked RT-safe neither allocate, lock, log, throw nor call the system.
-// `bodies` counts the ones that were found, so that a test can tell that the check looked at
-// something.
+// `bodies` counts the functions that were found, so that a test can verify that the check is
+// effective.
 [[nodiscard]] std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies);
 
 }  // namespace posed::tidy

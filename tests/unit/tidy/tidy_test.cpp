@@ -1,4 +1,5 @@
-// The house rules as a test. Each check is first shown to fail on a bad example.
+// The project's rules for source files as a test. Each check is first shown to fail on a bad
+// example.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -38,7 +39,7 @@ std::string findings_of(const Check& check) {
 
 }  // namespace
 
-TEST_CASE("rooms include only what the dependency law allows", "[tidy]") {
+TEST_CASE("modules include only what the dependency rules allow", "[tidy]") {
   const auto bad = posed::tidy::source_from_text(
       "models/a.cpp", "#include \"proto/frame/frame.hpp\"\n#include \"drivers/driver.hpp\"\n");
   REQUIRE(listed(posed::tidy::check_includes(bad)).find("models/a.cpp:2") == 0);
@@ -83,7 +84,7 @@ TEST_CASE("functions marked RT-safe neither allocate, lock, log, throw nor call 
   CHECK(bodies >= 10);
 }
 
-TEST_CASE("every header is included by somebody", "[tidy]") {
+TEST_CASE("every header is included somewhere", "[tidy]") {
   std::set<std::string> included;
   for (const SourceFile& file : tree()) {
     for (const std::string& line : file.lines) {
@@ -100,10 +101,10 @@ TEST_CASE("every header is included by somebody", "[tidy]") {
   CHECK(orphans == "");
 }
 
-TEST_CASE("every room says what lives there", "[tidy]") {
-  for (const char* room : {"proto", "models", "drivers", "daemon", "tests", "config"}) {
-    INFO(room);
-    std::ifstream readme(posed::test::source_dir() / room / "README.md");
+TEST_CASE("every module has a README", "[tidy]") {
+  for (const char* module_name : {"proto", "models", "drivers", "daemon", "tests", "config"}) {
+    INFO(module_name);
+    std::ifstream readme(posed::test::source_dir() / module_name / "README.md");
     const std::string text{std::istreambuf_iterator<char>(readme), {}};
     CHECK(text.size() > 200);
   }

@@ -1,5 +1,5 @@
-// The seams of a performance on hands that move as people do: real grasps into a string of real
-// poses that were never recorded as labels, and a synthetic signer with a model of another.
+// The seams of a performance on realistic hands: real grasps led into a sequence of real poses that
+// were never recorded as labels, and a synthetic signer with the model of another signer.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -40,20 +40,21 @@ double acceleration(const Hands& hands, std::size_t first, std::size_t end) {
   return most;
 }
 
-// Performs the string at that frame of the live hand and holds the three seams to the larger of the
-// performance's and the live hand's own largest acceleration.
+// Performs the sequence from that frame of the live hand on and checks that the acceleration at the
+// three seams is at most the larger of the performance's and the live hand's own largest
+// acceleration.
 void check_seams(const gesture::GestureModel& trained, const Hands& live, std::size_t start) {
   const auto model = bind_model(trained, hand_skeleton(Side::kRight), kRate_hz, "test").value();
   const auto order =
       gesture::make_play_order(model->gesture(), gesture::split_labels("g 1 c 3 4 p"), 1.0, false)
           .value();
-  GesturePlayer playback(kRate_hz);
-  playback.set_model(model.get());
+  GesturePlayer player(kRate_hz);
+  player.set_model(model.get());
   Hands shown;
   std::size_t back = 0;
-  for (std::size_t t = 0; t == 0 || t <= start || playback.busy(); ++t) {
-    if (t == start) REQUIRE(playback.play(order));
-    const GesturePlayer::Pose& pose = playback.step(&live[t % live.size()]);
+  for (std::size_t t = 0; t == 0 || t <= start || player.busy(); ++t) {
+    if (t == start) REQUIRE(player.play(order));
+    const GesturePlayer::Pose& pose = player.step(&live[t % live.size()]);
     if (back == 0 && pose.what == What::kLeadingBack) back = t;
     shown.push_back(pose.angles);
     REQUIRE(t < 10'000);
@@ -95,7 +96,7 @@ TEST_CASE("real hands are led into real poses and back without a snap", "[playba
   if (!poses || !grasps) SKIP_WITHOUT_SHARED();
   const auto model = gesture::train_gesture({test::real_pose_corpus(*poses, 7)}, {});
   REQUIRE(model);
-  // The sensors stand for flexions: how they move is what matters here.
+  // The sensors are used as flexions, because only their motion matters here.
   const test::Motion motion = test::grasp_reference(*grasps);
   Hands live;
   for (Eigen::Index t = 0; t < motion.rows(); t += 2) {

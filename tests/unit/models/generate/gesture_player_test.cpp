@@ -1,5 +1,5 @@
-// A performance on a live hand: it leads in and back without a jump, keeps its time, and takes new
-// labels while it plays.
+// A performance on a live hand: it leads in and back without a jump, keeps its duration, and
+// accepts new labels while it plays.
 #include "models/generate/gesture_player.hpp"
 
 #include <algorithm>
@@ -34,8 +34,8 @@ gesture::PlayOrder order(const BoundModel& model, const std::string& labels, dou
       .value();
 }
 
-// A brisk hand that opens and closes as people do: moves of 0.3 s, each in its smoothest way, with
-// rests between, fingers one after the other.
+// A fast hand that opens and closes: minimum-jerk moves of 0.3 s with rests between, fingers one
+// after the other.
 HandAngles live_hand(double time_s) {
   constexpr double kPeriod_s = 1.2, kMove_s = 0.3;
   const auto moved = [](double since_s) {
@@ -50,18 +50,19 @@ HandAngles live_hand(double time_s) {
   return angles;
 }
 
-// Plays over the live hand (null: none) until the playback is idle again, `before` frames first.
-std::vector<Shown> perform(GesturePlayer& playback, const gesture::PlayOrder& what, double rate_hz,
+// Runs `before` frames, plays until the player is idle again, and runs `before` frames more. `live`
+// false: without a live hand.
+std::vector<Shown> perform(GesturePlayer& player, const gesture::PlayOrder& what, double rate_hz,
                            bool live = true, int before = 40) {
   std::vector<Shown> shown;
   const auto step = [&] {
     const HandAngles hand = live_hand(double(shown.size()) / rate_hz);
-    const GesturePlayer::Pose& pose = playback.step(live ? &hand : nullptr);
+    const GesturePlayer::Pose& pose = player.step(live ? &hand : nullptr);
     shown.push_back({pose.angles, pose.what, pose.label});
   };
   for (int i = 0; i < before; ++i) step();
-  REQUIRE(playback.play(what));
-  while (playback.busy()) {
+  REQUIRE(player.play(what));
+  while (player.busy()) {
     step();
     REQUIRE(shown.size() < 100'000);
   }
@@ -95,11 +96,11 @@ std::size_t count_of(const std::vector<Shown>& shown, What what) {
 
 TEST_CASE("a performance begins and ends on a live hand without a jump", "[playback]") {
   for (const double rate_hz : {30.0, 60.0, 120.0}) {
-    for (const int before : {40, 47, 55}) {  // other moments of the live hand
+    for (const int before : {40, 47, 55}) {  // different moments of the live hand
       const auto model = toy(rate_hz);
-      GesturePlayer playback(rate_hz);
-      playback.set_model(model.get());
-      const auto shown = perform(playback, order(*model, "g 1 c 3 4 p"), rate_hz, true, before);
+      GesturePlayer player(rate_hz);
+      player.set_model(model.get());
+      const auto shown = perform(player, order(*model, "g 1 c 3 4 p"), rate_hz, true, before);
       const std::size_t begin = first_of(shown, What::kPerformed);
       const std::size_t back = first_of(shown, What::kLeadingBack);
       const std::size_t idle = back + count_of(shown, What::kLeadingBack);
@@ -108,7 +109,7 @@ TEST_CASE("a performance begins and ends on a live hand without a jump", "[playb
       const double own =
           std::max(acceleration(shown, begin + lead, back - 2), acceleration(shown, 0, begin));
       INFO(rate_hz << " Hz, after " << before);
-      // The hand is at its own maximum now and then; what leads it off adds to that.
+      // The hand itself sometimes has its largest acceleration at a seam; the blend adds to that.
       for (const std::size_t seam : {begin, back, idle}) {
         CHECK(acceleration(shown, seam - 2, seam + 2) <= 1.15 * own);
       }
@@ -126,9 +127,9 @@ TEST_CASE("each label is reached, in order, and a model of 30 Hz is right at oth
   std::vector<double> seconds_of;
   for (const double rate_hz : {30.0, 60.0, 120.0}) {
     const auto model = toy(rate_hz);
-    GesturePlayer playback(rate_hz);
-    playback.set_model(model.get());
-    const auto shown = perform(playback, order(*model, "g p 1"), rate_hz);
+    GesturePlayer player(rate_hz);
+    player.set_model(model.get());
+    const auto shown = perform(player, order(*model, "g p 1"), rate_hz);
     std::vector<std::pair<int, double>> middle;  // index flexion in the middle of each label
     for (std::size_t t = first_of(shown, What::kPerformed); shown[t].what == What::kPerformed;) {
       std::size_t end = t;
@@ -151,9 +152,9 @@ TEST_CASE("the tempo divides a performance's length", "[playback]") {
   const double rate_hz = 30.0;
   const auto model = toy(rate_hz);
   const auto frames = [&](double tempo) {
-    GesturePlayer playback(rate_hz);
-    playback.set_model(model.get());
-    const auto shown = perform(playback, order(*model, "g 1 c 3 4 p", tempo), rate_hz, false, 0);
+    GesturePlayer player(rate_hz);
+    player.set_model(model.get());
+    const auto shown = perform(player, order(*model, "g 1 c 3 4 p", tempo), rate_hz, false, 0);
     // The lead-in is the same at any tempo: it goes from a flat hand to the first label.
     constexpr double kFarthest_rad = 1.3, kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
     const double lead = std::ceil(rate_hz * 1.5 * kFarthest_rad / kLeadSpeed_rad_s);
@@ -166,17 +167,17 @@ TEST_CASE("the tempo divides a performance's length", "[playback]") {
   }
 }
 
-TEST_CASE("labels that come while it plays are performed after those before them", "[playback]") {
+TEST_CASE("labels appended while it plays are performed after the earlier ones", "[playback]") {
   const auto model = toy(30.0);
-  GesturePlayer playback(30.0);
-  playback.set_model(model.get());
-  REQUIRE(playback.play(order(*model, "g")));
+  GesturePlayer player(30.0);
+  player.set_model(model.get());
+  REQUIRE(player.play(order(*model, "g")));
   std::vector<int> labels;
   HandAngles before{};
   double most_step = 0.0;
-  for (int t = 0; playback.busy(); ++t) {
-    if (t == 80) REQUIRE(playback.play(order(*model, "p c")));
-    const GesturePlayer::Pose& pose = playback.step(nullptr);
+  for (int t = 0; player.busy(); ++t) {
+    if (t == 80) REQUIRE(player.play(order(*model, "p c")));
+    const GesturePlayer::Pose& pose = player.step(nullptr);
     if (pose.what == What::kPerformed && (labels.empty() || labels.back() != pose.label)) {
       labels.push_back(pose.label);
     }
@@ -188,43 +189,43 @@ TEST_CASE("labels that come while it plays are performed after those before them
   }
   CHECK(labels == std::vector<int>{0, 2, 1});
   CHECK(most_step < 0.35);  // 600 degrees a second
-  CHECK(playback.step(nullptr).what == What::kHeld);
+  CHECK(player.step(nullptr).what == What::kHeld);
 }
 
-TEST_CASE("a loop goes on until other labels come; stop leads back at once", "[playback]") {
+TEST_CASE("a loop continues until other labels are played; stop leads back at once", "[playback]") {
   const auto model = toy(30.0);
-  GesturePlayer playback(30.0);
-  playback.set_model(model.get());
-  REQUIRE(playback.play(order(*model, "g p", 2.0, true)));
-  for (int t = 0; t < 2000; ++t) CHECK(playback.step(nullptr).what == What::kPerformed);
-  REQUIRE(playback.play(order(*model, "c")));
+  GesturePlayer player(30.0);
+  player.set_model(model.get());
+  REQUIRE(player.play(order(*model, "g p", 2.0, true)));
+  for (int t = 0; t < 2000; ++t) CHECK(player.step(nullptr).what == What::kPerformed);
+  REQUIRE(player.play(order(*model, "c")));
   int t = 0;
-  while (playback.busy() && t < 1000) {
-    static_cast<void>(playback.step(nullptr));
+  while (player.busy() && t < 1000) {
+    static_cast<void>(player.step(nullptr));
     ++t;
   }
   CHECK(t < 300);
-  REQUIRE(playback.play(order(*model, "g p g p g p")));
-  for (int i = 0; i < 60; ++i) static_cast<void>(playback.step(nullptr));
-  playback.stop();
-  for (int i = 0; i < 24; ++i) CHECK(playback.step(nullptr).what == What::kLeadingBack);
-  CHECK(playback.step(nullptr).what == What::kHeld);
+  REQUIRE(player.play(order(*model, "g p g p g p")));
+  for (int i = 0; i < 60; ++i) static_cast<void>(player.step(nullptr));
+  player.stop();
+  for (int i = 0; i < 24; ++i) CHECK(player.step(nullptr).what == What::kLeadingBack);
+  CHECK(player.step(nullptr).what == What::kHeld);
 }
 
 TEST_CASE("what cannot be performed is refused", "[playback]") {
   const auto model = toy(30.0);
-  GesturePlayer playback(30.0);
+  GesturePlayer player(30.0);
   const auto one = order(*model, "g");
-  CHECK_FALSE(playback.play(one));  // no model
-  playback.set_model(model.get());
+  CHECK_FALSE(player.play(one));  // no model
+  player.set_model(model.get());
   auto unknown = one;
   unknown.label[0] = 6;
-  CHECK_FALSE(playback.play(unknown));
-  CHECK_FALSE(playback.play(gesture::PlayOrder{}));
+  CHECK_FALSE(player.play(unknown));
+  CHECK_FALSE(player.play(gesture::PlayOrder{}));
   std::string many;
   for (int i = 0; i < gesture::kMostLabels; ++i) many += "g ";
-  for (int i = 0; i < 4; ++i) CHECK(playback.play(order(*model, many)));
-  CHECK_FALSE(playback.play(one));  // no room
+  for (int i = 0; i < 4; ++i) CHECK(player.play(order(*model, many)));
+  CHECK_FALSE(player.play(one));  // too many labels
   CHECK(gesture::make_play_order(model->gesture(), gesture::split_labels("g x"), 1.0, false)
             .error()
             .message.find("does not know the label 'x'; it knows: g c p 1 3 4") !=
@@ -234,16 +235,16 @@ TEST_CASE("what cannot be performed is refused", "[playback]") {
 TEST_CASE("a performance allocates nothing", "[playback]") {
   const auto model = toy(120.0);
   const auto other = toy(120.0);
-  GesturePlayer playback(120.0);
-  playback.set_model(model.get());
+  GesturePlayer player(120.0);
+  player.set_model(model.get());
   const auto what = order(*model, "g 1 c", 1.5, true);
   const auto before = test::allocations();
   for (int t = 0; t < 3000; ++t) {
     const HandAngles hand = live_hand(t / 120.0);
-    if (t % 700 == 100) static_cast<void>(playback.play(what));
-    if (t % 900 == 600) playback.stop();
-    if (t == 2000) playback.set_model(other.get());
-    static_cast<void>(playback.step(&hand));
+    if (t % 700 == 100) static_cast<void>(player.play(what));
+    if (t % 900 == 600) player.stop();
+    if (t == 2000) player.set_model(other.get());
+    static_cast<void>(player.step(&hand));
   }
   CHECK(test::allocations() == before);
 }

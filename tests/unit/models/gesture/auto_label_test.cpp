@@ -1,4 +1,4 @@
-// Proposed borders against the true ones, from two labelled examples a name.
+// Compares proposed borders with the true ones, from two labelled examples of each label.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -15,7 +15,7 @@ using namespace posed::gesture;
 
 namespace {
 
-// The first `each` segments of every label, less the very first: its move has no beginning.
+// The first `each` segments of every label, without the very first segment, whose move is cut off.
 Recording with_examples(Recording recording, int each) {
   std::map<std::string, int> taken;
   std::vector<Segment> examples;
@@ -54,7 +54,7 @@ void check_sound(const Recording& recording, const std::vector<Segment>& propose
 
 }  // namespace
 
-TEST_CASE("Nine borders of ten are proposed on real poses", "[auto_label][real]") {
+TEST_CASE("Nine of ten borders are proposed within 150 ms on real poses", "[auto_label][real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   for (const std::uint32_t seed : {7U, 8U, 13U}) {
@@ -77,7 +77,8 @@ TEST_CASE("Where people put the border is learnt from the examples", "[auto_labe
   const auto performance = make_performance({.gestures = 40});
   auto truth = recording_of(performance->clip, 30.0);
   REQUIRE(cut(*truth, performance->labels, "made-up.lab").has_value());
-  for (const int late : {0, 7}) {  // some mark the start of the move, some its middle
+  for (const int late :
+       {0, 7}) {  // people put the border at the start or in the middle of the move
     Recording moved = *truth;
     for (std::size_t i = 1; i < moved.segments.size(); ++i) {
       moved.segments[i].begin = moved.segments[i - 1].end = truth->segments[i].begin + late;

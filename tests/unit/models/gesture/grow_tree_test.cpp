@@ -1,5 +1,5 @@
-// The decision tree against the fixture: likelihoods, the MDL stop, the exact tree, unseen
-// contexts.
+// The decision tree against the fixture: likelihoods, the MDL stop, the exact tree, contexts that
+// were not recorded.
 #include <catch2/catch.hpp>
 
 #include <cmath>

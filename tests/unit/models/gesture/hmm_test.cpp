@@ -57,7 +57,7 @@ TEST_CASE_METHOD(Fixture, "Forward-backward gives the fixture's posteriors", "[h
         kTolerance);
   CHECK(off(posterior.gamma, matrix(golden["first_seq"]["gamma"])) < kTolerance);
   CHECK(off(posterior.stays, vector(golden["first_seq"]["self_counts"])) < kTolerance);
-  // Checked there by summing over every path.
+  // The fixture sums over every path.
   const auto brief =
       forward_backward(log_density(sequences[0].topRows(7), start), start.stay, whole_band(7, 5));
   CHECK(std::abs(brief.log_likelihood - golden["short7_loglik"].get<double>()) < kTolerance);
@@ -66,7 +66,7 @@ TEST_CASE_METHOD(Fixture, "Forward-backward gives the fixture's posteriors", "[h
 TEST_CASE_METHOD(Fixture, "A band as wide as the truth changes nothing", "[hmm]") {
   const auto density = log_density(examples[0], start);
   const auto whole = forward_backward(density, start.stay, whole_band(density.rows(), 5));
-  // Three states wide, sliding along where the posterior lives.
+  // A band of three states that follows the states with probability.
   Band band{{}, 3};
   Eigen::MatrixXd narrow(density.rows(), 3);
   for (Eigen::Index t = 0; t < density.rows(); ++t) {
@@ -107,8 +107,9 @@ TEST_CASE_METHOD(Fixture, "Viterbi finds the fixture's paths", "[hmm]") {
   }
 }
 
-TEST_CASE("Densities that no linear recursion survives stay numbers", "[hmm]") {
-  // A hundred frames a thousand deviations off: the linear form underflows at the first.
+TEST_CASE("Densities that underflow in a linear recursion stay finite", "[hmm]") {
+  // A hundred frames a thousand standard deviations off: the linear recursion underflows at the
+  // first one.
   FeatureMatrix frames = FeatureMatrix::Constant(100, 3, 1000.0);
   StateModel model{Eigen::MatrixXd::Zero(5, 3), Eigen::MatrixXd::Ones(5, 3),
                    Eigen::VectorXd::Constant(5, 0.9)};

@@ -1,4 +1,5 @@
-// The gesture model's file: there and back, and a clear refusal of everything that is not one.
+// The gesture model's file: written and read back, and a clear error for every file that is not
+// one.
 #include <catch2/catch.hpp>
 
 #include <limits>
@@ -16,7 +17,7 @@ Result<GestureModel> parse(const std::string& bytes) {
   return parse_model(std::as_bytes(std::span(bytes)), "test.gesture");
 }
 
-// What parsing says about the toy model after `spoil` changed it.
+// The result of parsing the toy model after `spoil` has changed it.
 template <typename Spoil>
 std::string verdict(Spoil spoil) {
   GestureModel model = test::toy_gesture_model();
@@ -48,7 +49,7 @@ TEST_CASE("A gesture model reads back as it was written", "[gesture_file]") {
   CHECK(parsed->high == model.high);
 }
 
-TEST_CASE("A gesture model is saved whole and loaded again", "[gesture_file]") {
+TEST_CASE("A gesture model is saved completely and loaded again", "[gesture_file]") {
   const test::TempFolder folder;
   REQUIRE(save_model(test::toy_gesture_model(), folder.path() / "a.gesture").has_value());
   CHECK(load_model(folder.path() / "a.gesture").has_value());
@@ -68,7 +69,7 @@ TEST_CASE("Truncated and corrupted gesture models are refused", "[gesture_file]"
   }
 }
 
-TEST_CASE("A tree that is no tree is refused", "[gesture_file]") {
+TEST_CASE("Nodes that do not form a tree are refused", "[gesture_file]") {
   CHECK(verdict([](GestureModel&) {}) == "sound");
   CHECK(says(verdict([](auto& m) { m.trees[1][2].nodes[2].no = 0; }), "a child"));
   CHECK(says(verdict([](auto& m) { m.trees[1][2].nodes[2].no = 5; }), "a child"));

@@ -1,5 +1,4 @@
-// Classes of fingers: the set of Takamido et al., lists that people write, proposals, a pose shown
-// once.
+// Finger classes: the set of Takamido et al., written lists, proposals, and a pose shown once.
 #include <catch2/catch.hpp>
 
 #include "models/gesture/questions.hpp"
@@ -10,7 +9,7 @@ using namespace posed::gesture;
 
 namespace {
 
-// The toy hand in a label's classes.
+// The pose of the toy hand for a label's classes.
 LabelPose toy_pose(const std::string& name, const std::array<int, kFingers>& classes) {
   LabelPose pose{name, {}};
   for (int f = 0; f < kFingers; ++f) {

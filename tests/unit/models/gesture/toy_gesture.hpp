@@ -1,6 +1,5 @@
-// A gesture model made up from rules instead of training: the six labels g c p 1 3 4, hands that
-// look like a fist, scissors and an open hand, and smooth delta statistics. Every test of the
-// second half may play with it.
+// A gesture model computed from rules instead of training: the six labels g c p 1 3 4, poses like a
+// fist, scissors and an open hand, and smooth delta statistics. Shared by many tests.
 #pragma once
 
 #include <cmath>
@@ -30,7 +29,8 @@ inline gesture::Tree<gesture::FingerGaussian> toy_tree(int state, int finger) {
                 {-1, -1, -1, 2}};
   tree.leaves.resize(3);
   tree.occupancy.assign(3, 100.0);
-  const double loose = state == 0 || state == 4 ? 9.0 : 1.0;  // a gesture's ends move
+  const double loose =
+      state == 0 || state == 4 ? 9.0 : 1.0;  // the hand moves in the first and last state
   for (int leaf = 0; leaf < 3; ++leaf) {
     FingerGaussian& gaussian = tree.leaves[leaf];
     for (int c = 0; c < kFingerChannels; ++c) {
@@ -57,7 +57,7 @@ inline gesture::GestureModel toy_gesture_model() {
       model.trees[state][finger] = toy_tree(state, finger);
     }
   }
-  // One question: scissors take a little longer.
+  // One question: scissors (c) last a little longer.
   model.durations.nodes = {{kClasses + 1, 1, 2, -1}, {-1, -1, -1, 0}, {-1, -1, -1, 1}};
   model.durations.leaves = {{{11.2, 14.0, 15.6, 12.4, 8.0}, {4.0, 9.0, 12.0, 9.0, 6.0}},
                             {{10.1, 12.3, 14.8, 11.6, 7.2}, {4.0, 8.0, 10.0, 8.0, 5.0}}};

@@ -1,5 +1,5 @@
 // Training on a recording strung together from real CyberGlove poses: gestures that were not
-// recorded come out as the best composition of recorded fingers.
+// recorded are generated as the best composition of recorded fingers.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kLibras = "data/gloves/libras_cyberglove";
 
-// Flexion angles of the fingers without the thumb.
+// Indices of the flexion angles of the fingers, without the thumb.
 std::vector<int> judged() {
   std::vector<int> channels;
   for (int finger = 1; finger < kFingers; ++finger) {
@@ -35,7 +35,7 @@ double rms_deg(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return std::sqrt(difference.squaredNorm() / 12.0) * 180.0 / std::numbers::pi;
 }
 
-// What the model holds for a label of a string: mean of states 3 and 4.
+// The held pose of a label in its context: the mean of states 3 and 4.
 Eigen::VectorXd held(const GestureModel& model, const Context& context) {
   Eigen::VectorXd pose = Eigen::VectorXd::Zero(kHandChannels);
   for (const int state : {2, 3}) {
@@ -50,7 +50,7 @@ Eigen::VectorXd held(const GestureModel& model, const Context& context) {
 
 }  // namespace
 
-TEST_CASE("Gestures that nobody recorded are composed of recorded fingers", "[train][real]") {
+TEST_CASE("Gestures that were not recorded are composed of recorded fingers", "[train][real]") {
   const auto folder = test::shared(kLibras);
   if (!folder) SKIP_WITHOUT_SHARED();
   const auto recording = test::real_pose_corpus(*folder, 7);
@@ -63,7 +63,7 @@ TEST_CASE("Gestures that nobody recorded are composed of recorded fingers", "[tr
   CHECK(report["leaves"] > 80);
   CHECK(report["leaves"] < 250);
 
-  // g 1 c 3 4 p against the real frames of the signs, by the yardsticks of the figure.
+  // g 1 c 3 4 p against the real frames of the signs, measured as in models/gesture/README.md.
   const auto at = [&](const char* label) { return model->label_index(label); };
   struct Unseen {
     const char *label, *before, *after;
@@ -82,7 +82,7 @@ TEST_CASE("Gestures that nobody recorded are composed of recorded fingers", "[tr
   CHECK(train_gesture({recording}, {})->report_json == model->report_json);
 }
 
-TEST_CASE("Embedded rounds mend borders that are off", "[train][real]") {
+TEST_CASE("Embedded rounds correct borders that are off", "[train][real]") {
   const auto folder = test::shared(kLibras);
   if (!folder) SKIP_WITHOUT_SHARED();
   auto recording = test::real_pose_corpus(*folder, 7, 40);

@@ -1,4 +1,4 @@
-// Training on made-up signers, and on recordings that nothing can be learnt from.
+// Training on synthetic signers, and on recordings from which nothing can be learnt.
 #include <catch2/catch.hpp>
 
 #include <limits>
@@ -14,7 +14,7 @@ using namespace posed::gesture;
 
 namespace {
 
-Recording performed(const PerformerOptions& options) {
+Recording performed(const SignerOptions& options) {
   const auto performance = make_performance(options);
   REQUIRE(performance.has_value());
   auto recording = recording_of(performance->clip, 30.0);
@@ -31,7 +31,7 @@ bool warned(const GestureModel& model, const std::string& what) {
   });
 }
 
-// Whether every number that a lookup can give may be loaded again.
+// Whether every number that a lookup can return would be accepted in a model file.
 bool sound(const GestureModel& model) {
   const std::string bytes = serialize_model(model);
   const auto parsed = parse_model(std::as_bytes(std::span(bytes)), "trained");
@@ -41,7 +41,7 @@ bool sound(const GestureModel& model) {
 
 }  // namespace
 
-TEST_CASE("A signer is the corpus that was asked for", "[signer]") {
+TEST_CASE("A synthetic signer performs the requested corpus", "[signer]") {
   const auto one = make_performance({});
   const auto again = make_performance({});
   const auto other = make_performance({.person = 2});
@@ -59,7 +59,7 @@ TEST_CASE("A signer is the corpus that was asked for", "[signer]") {
   CHECK_FALSE(make_performance({.script = {"g", "what"}}).has_value());
 }
 
-TEST_CASE("A made-up corpus is learnt, unseen labels included", "[train]") {
+TEST_CASE("A synthetic corpus is learnt, unseen labels included", "[train]") {
   const Recording recording = performed({});
   const auto model = train_gesture({recording}, {});
   REQUIRE(model.has_value());
@@ -96,8 +96,8 @@ TEST_CASE("Few gestures are learnt with a warning", "[train]") {
   CHECK(warned(*one, "'g' was recorded once only"));
 }
 
-TEST_CASE("Leaves of the hold that mix classes are told", "[train]") {
-  // Scissors were only ever made once, too few frames for leaves of their own.
+TEST_CASE("Leaves of the hold that mix classes are reported", "[train]") {
+  // Scissors (c) are recorded only once, which is too few frames for separate leaves.
   const auto model = train_gesture(
       {performed({.script = {"g", "p", "g", "p", "g", "c", "p", "g", "p", "g", "p", "g"}})}, {});
   REQUIRE(model.has_value());
@@ -123,7 +123,7 @@ TEST_CASE("A recording that nothing can be learnt from is refused", "[train]") {
   CHECK(refusal(bare).find("no gesture is labelled") != std::string::npos);
 }
 
-TEST_CASE("Constant channels are no harm", "[train]") {
+TEST_CASE("Constant channels do no harm", "[train]") {
   Recording recording = performed({.gestures = 30});
   recording.angles_rad.middleCols(kFingerChannels, kFingerChannels).setConstant(0.3);  // the index
   const auto model = train_gesture({recording}, {});
@@ -135,7 +135,7 @@ TEST_CASE("Constant channels are no harm", "[train]") {
   }
 }
 
-TEST_CASE("Takes that are no recording are refused", "[recording]") {
+TEST_CASE("Clips that cannot be a recording are refused", "[recording]") {
   const auto performance = make_performance({.gestures = 3});
   const auto refusal = [](const clip::HandClip& clip) {
     const auto recording = recording_of(clip, 30.0);

@@ -1,4 +1,4 @@
-// The trees as people see them: text, Graphviz source, SVG.
+// The drawings of the trees: text, Graphviz source, SVG.
 #include <catch2/catch.hpp>
 
 #include "models/gesture/tree_drawing.hpp"
@@ -17,7 +17,7 @@ std::size_t count(const std::string& text, const std::string& what) {
 
 }  // namespace
 
-TEST_CASE("A tree as text says who gets where", "[drawing]") {
+TEST_CASE("A tree as text lists the contexts that reach each node", "[drawing]") {
   const auto text = trees_text(test::toy_gesture_model(), {.state = 3, .finger = 2});
   CHECK(text ==
         "state 4, middle: 3 leaves\n"

@@ -143,7 +143,7 @@ TEST_CASE("asking for the confidence does not change the mean's bits up to 256 p
   CHECK(a == b);
 }
 
-TEST_CASE("missing dimensions are marginalised", "[gp][predictor]") {
+TEST_CASE("missing dimensions are left out of the distance", "[gp][predictor]") {
   const gp::SyntheticProcess made = gp::synthetic(300, 43);
   const auto predictor = gp::Predictor::build(made.process, true);
   REQUIRE(predictor);
@@ -158,7 +158,8 @@ TEST_CASE("missing dimensions are marginalised", "[gp][predictor]") {
     seen.col(to) = made.process.inputs.col(d);
     asked.col(to++) = made.queries.col(d);
   }
-  // The same weights; the distance over 40 of 43 dimensions, scaled by 43 / 40.
+  // The reference has the same weights; its distance runs over 40 of 43 dimensions, scaled by 43 /
+  // 40.
   gp::Trained reference = made.process;
   reference.inputs = seen;
   reference.mu *= 43.0 / 40.0;
@@ -172,7 +173,7 @@ TEST_CASE("missing dimensions are marginalised", "[gp][predictor]") {
   CHECK(none.confidence.maxCoeff() == 0.0F);
 }
 
-TEST_CASE("far from all poses only the constant is left", "[gp][predictor]") {
+TEST_CASE("far from all poses the result is the constant", "[gp][predictor]") {
   gp::SyntheticProcess made = gp::synthetic(100, 43);
   made.process.b = 0.02;
   const auto predictor = gp::Predictor::build(made.process, true);
@@ -210,7 +211,7 @@ TEST_CASE("the kernel's exponential is right to an ulp and reaches exactly zero"
   CHECK(extreme[1] == 0.0F);
 }
 
-TEST_CASE("a prediction takes nothing from the heap", "[gp][predictor]") {
+TEST_CASE("a prediction does not allocate", "[gp][predictor]") {
   const gp::SyntheticProcess made = gp::synthetic(300, 43);
   const auto predictor = gp::Predictor::build(made.process, true).value();
   const std::vector<float> q = floats(made.queries.row(0));
@@ -224,7 +225,7 @@ TEST_CASE("a prediction takes nothing from the heap", "[gp][predictor]") {
   CHECK(test::allocations() == before);
 }
 
-TEST_CASE("a broken process is refused with a sentence", "[gp][predictor]") {
+TEST_CASE("an invalid process is refused with an error message", "[gp][predictor]") {
   const gp::Trained good = gp::synthetic(28, 10).process;
   const auto refused = [&](auto&& spoil) {
     gp::Trained bad = good;

@@ -1,5 +1,5 @@
-// The predictor on real poses: five people's walks, asked about a sixth's. Needs the recordings
-// (tests/README.md).
+// The predictor on real poses: trained on five people's walks, evaluated on a sixth's. Needs the
+// recordings (tests/README.md).
 #include <cmath>
 #include <string>
 #include <vector>
@@ -50,7 +50,7 @@ TEST_CASE("on six real walks the mean is within 1e-3 degree, the confidence with
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(asked));
     const Eigen::MatrixXd X = stacked(others);
     REQUIRE(X.rows() > 800);
-    // What a style looks like: a smooth function of the pose, up to 20 degrees.
+    // A function like a style: smooth in the pose, up to 20 degrees.
     const Eigen::MatrixXd Y =
         20.0 * kDegree *
         (X * Eigen::MatrixXd::Constant(43, 43, 1.0).triangularView<Eigen::Upper>())

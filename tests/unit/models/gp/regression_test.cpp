@@ -58,7 +58,7 @@ TEST_CASE("the RBF part's variance runs from the noise to the signal's", "[gp]")
   CHECK(gp::posterior(*trained, far).variance_rbf[0] == Approx(std::exp(h.lambda)));
 }
 
-TEST_CASE("bad training data is refused with a sentence", "[gp]") {
+TEST_CASE("bad training data is refused with an error message", "[gp]") {
   const Eigen::MatrixXd X = Eigen::MatrixXd::Zero(3, 2);
   const Eigen::MatrixXd Y = Eigen::MatrixXd::Ones(3, 1);
   const Eigen::VectorXd offset = Eigen::VectorXd::Zero(1);

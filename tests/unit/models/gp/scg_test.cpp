@@ -1,4 +1,4 @@
-// SCG's path against the numpy port of NETLAB's (tests/golden/gpr.json).
+// The steps of SCG against a numpy port of NETLAB's implementation (tests/golden/gpr.json).
 #include "models/gp/scg.hpp"
 
 #include <algorithm>
@@ -25,7 +25,7 @@ Eigen::VectorXd rosenbrock_gradient(const Eigen::VectorXd& p) {
 
 }  // namespace
 
-TEST_CASE("SCG walks the fixture's path on the evidence of a Gaussian process", "[gp]") {
+TEST_CASE("SCG takes the fixture's steps on the evidence of a Gaussian process", "[gp]") {
   const auto golden = test::gpr();
   const auto& expected = golden["scg"];
   gp::ScgOptions options;
@@ -37,7 +37,8 @@ TEST_CASE("SCG walks the fixture's path on the evidence of a Gaussian process", 
   for (std::size_t i = 0; i < 20; ++i) {
     INFO("iteration " << i);
     CHECK(result.trace[i].value == Approx(expected["trace_f"][i].get<double>()).epsilon(1e-6));
-    // The curvature is a difference quotient: its rounding shows in the scale before it shows in f.
+    // The curvature is a difference quotient: its rounding becomes visible in the scale before it
+    // does in f.
     if (i < 15)
       CHECK(result.trace[i].scale ==
             Approx(expected["trace_lambda"][i].get<double>()).epsilon(1e-6));
@@ -46,7 +47,7 @@ TEST_CASE("SCG walks the fixture's path on the evidence of a Gaussian process", 
   CHECK(result.value == Approx(expected["lbfgs_f"].get<double>()).epsilon(1e-6));
 }
 
-TEST_CASE("SCG walks the fixture's path on Rosenbrock's valley", "[gp]") {
+TEST_CASE("SCG takes the fixture's steps in Rosenbrock's valley", "[gp]") {
   const auto expected = test::gpr()["scg_rosenbrock"];
   gp::ScgOptions options;
   options.max_iterations = 300;
@@ -62,7 +63,7 @@ TEST_CASE("SCG walks the fixture's path on Rosenbrock's valley", "[gp]") {
   CHECK((result.x - Eigen::Vector2d::Ones()).norm() < 1e-5);
 }
 
-TEST_CASE("SCG steps back from where the function is not defined", "[gp]") {
+TEST_CASE("SCG refuses steps to where the function is not defined", "[gp]") {
   // x - log x: a plain Newton step from 50 jumps far below zero.
   const auto value = [](const Eigen::VectorXd& x) {
     return x[0] > 0.0 ? x[0] - std::log(x[0]) : std::numeric_limits<double>::quiet_NaN();

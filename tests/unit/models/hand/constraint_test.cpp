@@ -1,4 +1,4 @@
-// The constraint stage: the fixture's optimum, and what it must hold on any input.
+// The constraint stage: the fixture's optimum, and properties that hold for any input.
 #include "models/hand/constraint_solver.hpp"
 
 #include <catch2/catch.hpp>
@@ -18,9 +18,9 @@ namespace {
 
 constexpr double kCentimetre = 0.01;
 
-// The fixture's two fingers along x, spread about z before they flex about y, as two of our five:
-// its x, y, z are our z, x, y; the spread is the z channel of the first joint in a frame whose z
-// axis is our y. The other three are far away.
+// The fixture's two fingers along x, spread about z before they flex about y, as two of our five
+// fingers: its x, y, z are our z, x, y; the spread is the z channel of the first joint in a frame
+// whose z axis is our y. The other three fingers are far away.
 HandGeometry fixture_hand(const nlohmann::json& fixture) {
   HandGeometry hand;
   for (int f = 0; f < kFingers; ++f) {
@@ -49,7 +49,7 @@ double cost(const HandAngles& a, const HandAngles& b) {
   return sum;
 }
 
-// Of this thread: other programs on a busy machine do not count.
+// Processor time of this thread, so that other programs on a busy machine do not count.
 double processor_us() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -110,7 +110,7 @@ TEST_CASE("the gap is at least zero from any finite input, and limits hold") {
   WARN("straightened in " << retreats << " of 3000 random poses");
 }
 
-TEST_CASE("a pose with gaps inside the limits is left alone to the bit") {
+TEST_CASE("a pose with gaps inside the limits is unchanged to the bit") {
   ConstraintSolver solver;
   HandAngles angles{};
   angles[test::angle(1, 1, 0)] = 0.7;
@@ -121,7 +121,7 @@ TEST_CASE("a pose with gaps inside the limits is left alone to the bit") {
   CHECK(report.changed_rad == 0.0);
 }
 
-TEST_CASE("an angle that is not finite leaves the pose as it is, and tells") {
+TEST_CASE("an angle that is not finite leaves the pose unchanged, and is reported") {
   ConstraintSolver solver;
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
@@ -142,9 +142,9 @@ TEST_CASE("an angle that is not finite leaves the pose as it is, and tells") {
   CHECK(solver.step(angles, variance).min_gap_m >= 0.0);
 }
 
-TEST_CASE("the uncertain finger gives way") {
+TEST_CASE("the finger with the larger variance moves") {
   HandAngles crossing{};
-  crossing[test::angle(1, 0, 1)] = -15 * kDegree;  // the index into the middle
+  crossing[test::angle(1, 0, 1)] = -15 * kDegree;  // the index finger into the middle finger
   const auto moved = [&](int uncertain) {
     HandAngles variance;
     variance.fill(1e-4);
@@ -184,7 +184,7 @@ TEST_CASE("a finger that slides into another moves the pose without a jump") {
   CHECK(most_rad < 1.5 * 12 * kDegree * 0.05);
 }
 
-TEST_CASE("the constraint stage takes nothing from the heap, and gives the same bits again") {
+TEST_CASE("the constraint stage does not allocate, and gives the same bits again") {
   ConstraintSolver one, other;
   std::mt19937 random(2);
   for (int i = 0; i < 50; ++i) {
@@ -199,7 +199,7 @@ TEST_CASE("the constraint stage takes nothing from the heap, and gives the same 
   }
 }
 
-TEST_CASE("what a step costs", "[.bench]") {
+TEST_CASE("the processor time of a step", "[.bench]") {
   std::mt19937 random(4);
   for (const double most_rad : {0.0, 0.25, 0.6}) {
     ConstraintSolver solver;

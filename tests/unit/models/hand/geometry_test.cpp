@@ -29,7 +29,7 @@ TEST_CASE("closest points of segments agree with the fixture, points and paralle
   }
 }
 
-TEST_CASE("bones lie where the skeleton's joints are, on either hand") {
+TEST_CASE("bones start at the skeleton's joints, on either hand") {
   std::mt19937 random(3);
   const HandGeometry geometry = hand_geometry(default_hand_shape());
   for (int i = 0; i < 20; ++i) {

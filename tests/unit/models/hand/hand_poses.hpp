@@ -1,4 +1,4 @@
-// Poses that the hand's tests share.
+// Poses shared by the tests of the hand.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ inline HandAngles same_variance() {
   return variance;
 }
 
-// Index over middle, ring over little, everything through everything.
+// All fingers through each other: index over middle, ring over little.
 inline HandAngles crossed() {
   HandAngles angles{};
   for (int finger = 0; finger < kFingers; ++finger) {

@@ -1,4 +1,4 @@
-// Real poses of a glove through the constraint stage: ordinary ones change little.
+// Real glove poses through the constraint stage: ordinary poses change little.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -26,8 +26,8 @@ struct Change {
   int retreats = 0;
 };
 
-// The corpus gives the spread of ring and little as the rotation that it is, positive towards the
-// thumb; hand45's is positive away from the middle finger. `turned` says it hand45's way.
+// The corpus gives the spread of ring and little as a plain rotation, positive towards the thumb;
+// in hand45 it is positive away from the middle finger. `turned` converts it to hand45.
 Change change_of(const gesture::FeatureMatrix& poses, bool turned) {
   Change change;
   for (Eigen::Index i = 0; i < poses.rows(); ++i) {

@@ -1,4 +1,4 @@
-// The same motion of the same person in two formats: the canonical skeleton's promise.
+// The same motion in two formats has the same rotations on the canonical skeleton.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ constexpr double kMaxShift_m = 1e-4;
 struct Pair {
   const char* bvh;
   const char* asf;
-  bool dropped_above;  // the BVH leaves out the bone that leads here
+  bool dropped_above;  // the BVH omits the bone that leads to this joint
 };
 constexpr std::array<Pair, 31> kJoints{{{"Hips", "root", false},
                                         {"LHipJoint", "lhipjoint", false},
@@ -153,7 +153,7 @@ TEST_CASE("16_15 is the same motion as AMC and as BVH with another zero pose") {
   double worst_turn_deg = 0.0;
   double worst_shift_m = 0.0;
   double worst_canonical = 0.0;
-  for (int i = 0; i < amc.frames(); i += 4) {  // between them the conversion interpolated
+  for (int i = 0; i < amc.frames(); i += 4) {  // the conversion interpolated the frames between
     const Frame a = amc.frame(i);
     const Frame b = bvh.frame(i);
     const WorldPose world_a = world_pose(asf, a);

@@ -1,4 +1,4 @@
-// Resampling, heading, leg signal: what learning sees of a clip.
+// Resampling, heading and leg signal: the preparation of a clip for training.
 #include "models/motion/motion.hpp"
 
 #include <catch2/catch.hpp>
@@ -139,7 +139,8 @@ TEST_CASE("The leg signal has the stride's period and the right leg forward at i
   CHECK(2 * kPi / stride.dtheta < 30.0 / 0.85 * 1.05);
   int peak = 0;
   signal->maxCoeff(&peak);
-  // Where the right foot is ahead of the left one by forward kinematics of the thigh alone.
+  // The frame where the right thigh is ahead of the left one, by forward kinematics of the thigh
+  // alone.
   const auto thigh = [&](const char* name) {
     const int j = walk.skeleton->joint_index(name);
     const auto& frame = walk.frames[peak];

@@ -10,7 +10,7 @@
 namespace posed::motion {
 namespace {
 
-// A channel that goes to and fro with a ripple on it.
+// A channel that oscillates, with a ripple on it.
 Rows swinging(int frames, double ripple, double phase = 0.0) {
   Rows rows(frames, 3);
   for (int i = 0; i < frames; ++i) {
@@ -55,7 +55,7 @@ TEST_CASE("a cubic has no more jerk than its third difference, a short motion no
   CHECK(speed_of(cubic, 30.0)[0] == Approx(30.0 * std::sqrt(2.0)));
 }
 
-TEST_CASE("speeds that say nothing give no figure") {
+TEST_CASE("speeds that are constant or too short give NaN") {
   const std::vector<double> still(50, 0.0);
   CHECK(std::isnan(log_dimensionless_jerk(still, 60)));
   CHECK(std::isnan(spectral_arc_length(still, 60)));
@@ -63,7 +63,7 @@ TEST_CASE("speeds that say nothing give no figure") {
   CHECK(std::isnan(log_dimensionless_jerk(std::vector<double>{1, 2}, 60)));
 }
 
-TEST_CASE("a motion is nearer to its like than to another") {
+TEST_CASE("a motion is nearer to a similar one than to another") {
   const Rows one = swinging(600, 0.0);
   const double like = motion_distance(one, swinging(600, 0.0, 0.4)).value();
   CHECK(motion_distance(one, one).value() == Approx(0.0).margin(1e-9));

@@ -1,4 +1,4 @@
-// Pose spaces: there and back, heading, missing joints, and the bits that must stay.
+// Pose spaces: conversion both ways, heading, missing joints, and bits that must not change.
 #include "models/motion/pose_space.hpp"
 
 #include <catch2/catch.hpp>
@@ -58,7 +58,7 @@ Vectors vector_of(const PoseSpace& space, const Frame& frame, double heading_rad
 
 }  // namespace
 
-TEST_CASE("Adding a change moves q by just that, in every space", "[pose_space]") {
+TEST_CASE("Adding a change moves q by exactly that change, in every space", "[pose_space]") {
   const Motion walk = walker();
   for (const Space which : {Space::kNative, Space::kHumanoid}) {
     auto spec = describe_space(which, *walk.skeleton);
@@ -78,7 +78,7 @@ TEST_CASE("Adding a change moves q by just that, in every space", "[pose_space]"
     for (int d = 0; d < space->dims(); ++d) {
       CHECK(after.q[d] == Approx(before.q[d] + delta[d]).margin(2e-6));
     }
-    // The angles say the same pose as the rotations.
+    // The channel angles give the same pose as the rotations.
     Frame again = frame;
     std::vector<double> channels;
     for (const float p : frame.root_position_m) channels.push_back(p);
@@ -91,7 +91,7 @@ TEST_CASE("Adding a change moves q by just that, in every space", "[pose_space]"
   }
 }
 
-TEST_CASE("A zero change and a missing joint leave every bit", "[pose_space]") {
+TEST_CASE("A zero change and a missing joint leave every bit unchanged", "[pose_space]") {
   const Motion walk = walker();
   const auto spec = describe_space(Space::kNative, *walk.skeleton);
   const auto space = PoseSpace::bind(*spec, *walk.skeleton);
@@ -111,7 +111,7 @@ TEST_CASE("A zero change and a missing joint leave every bit", "[pose_space]") {
   CHECK(std::memcmp(&frame, &before, sizeof(Frame)) == 0);
 }
 
-TEST_CASE("Heading is found and taken out: a turned walker has the same q", "[pose_space]") {
+TEST_CASE("The heading is removed: a turned walker has the same q", "[pose_space]") {
   const Motion walk = walker();
   for (const Space which : {Space::kNative, Space::kHumanoid}) {
     const auto spec = describe_space(which, *walk.skeleton);

@@ -1,4 +1,4 @@
-// Durations with tempo (tests/golden/durations.json) and scripts played frame by frame.
+// Durations with tempo (tests/golden/durations.json) and label sequences played frame by frame.
 #include "models/perform/label_sequence_player.hpp"
 
 #include <cmath>
@@ -26,10 +26,10 @@ StateInformation toy(double rate_hz = 30.0) {
   return {std::make_shared<const gesture::GestureModel>(test::toy_gesture_model()), rate_hz};
 }
 
-void append(LabelSequencePlayer& player, const StateInformation& evidence,
+void append(LabelSequencePlayer& player, const StateInformation& information,
             const std::string& labels) {
   for (const char label : labels) {
-    REQUIRE(player.append(evidence.model().label_index(std::string(1, label))));
+    REQUIRE(player.append(information.model().label_index(std::string(1, label))));
   }
 }
 
@@ -40,10 +40,10 @@ std::vector<PlayedFrame> play(LabelSequencePlayer& player, int most = 100'000) {
   return frames;
 }
 
-std::vector<PlayedFrame> played(const StateInformation& evidence, const std::string& labels,
+std::vector<PlayedFrame> played(const StateInformation& information, const std::string& labels,
                                 double tempo = 1.0) {
-  LabelSequencePlayer player(evidence, {});
-  append(player, evidence, labels);
+  LabelSequencePlayer player(information, {});
+  append(player, information, labels);
   player.set_tempo(tempo);
   player.start();
   return play(player);
@@ -75,37 +75,38 @@ TEST_CASE("states last as the fixture's, natural and with tempo", "[generate]") 
   }
 }
 
-TEST_CASE("a string at tempo 0.5 to 2 lasts its natural length over the tempo", "[generate]") {
-  const auto evidence = toy();
+TEST_CASE("a sequence at tempo 0.5 to 2 lasts its natural length divided by the tempo",
+          "[generate]") {
+  const auto information = toy();
   for (const std::string labels : {"g1c34p", "g", "pc"}) {
-    const auto natural = static_cast<double>(played(evidence, labels).size());
+    const auto natural = static_cast<double>(played(information, labels).size());
     for (const double tempo : {0.5, 0.7, 0.9, 1.1, 1.5, 2.0}) {
-      const auto frames = static_cast<double>(played(evidence, labels, tempo).size());
+      const auto frames = static_cast<double>(played(information, labels, tempo).size());
       INFO(labels << " at tempo " << tempo << ": " << frames << " of " << natural);
       CHECK(std::abs(frames * tempo / natural - 1.0) < 0.05);
     }
   }
 }
 
-TEST_CASE("a played string is the full solve but for the look-ahead", "[generate]") {
-  const auto evidence = toy();
-  const auto frames = played(evidence, "g1c34p");
+TEST_CASE("a played sequence equals the full solve except for the look-ahead", "[generate]") {
+  const auto information = toy();
+  const auto frames = played(information, "g1c34p");
   perform::LabelSequence script(8);
   for (const char label : std::string("g1c34p")) {
-    REQUIRE(script.append(evidence.model().label_index(std::string(1, label))));
+    REQUIRE(script.append(information.model().label_index(std::string(1, label))));
   }
   trajectory::InformationForm rows(kHandChannels, static_cast<int>(frames.size()));
   std::vector<const double*> pointers;
-  perform::Cursor cursor = enter(script, evidence, 0, 1.0);
+  perform::Cursor cursor = enter(script, information, 0, 1.0);
   for (int t = 0; cursor.frames_left > 0; ++t) {
     REQUIRE(t < rows.frames());
-    evidence.fill(script.context(cursor.position), cursor.state,
-                  rows.row(t, trajectory::kPosition));
+    information.fill(script.context(cursor.position), cursor.state,
+                     rows.row(t, trajectory::kPosition));
     pointers.push_back(rows.frame(t));
-    step(cursor, script, evidence, 1.0);
+    step(cursor, script, information, 1.0);
   }
   REQUIRE(pointers.size() == frames.size());
-  trajectory::Window full(kHandChannels, rows.frames());
+  trajectory::SlidingWindow full(kHandChannels, rows.frames());
   full.solve(pointers);
   double worst_rad = 0.0;
   for (int t = 0; t < rows.frames(); ++t) {
@@ -116,19 +117,19 @@ TEST_CASE("a played string is the full solve but for the look-ahead", "[generate
   CHECK(worst_rad * kDegrees < 0.05);
   CHECK(frames.front().label == 0);
   CHECK(frames.front().state == 0);
-  CHECK(frames.back().label == evidence.model().label_index("p"));
+  CHECK(frames.back().label == information.model().label_index("p"));
   CHECK(frames.back().state == gesture::kStates - 1);
 }
 
-TEST_CASE("labels may come while it plays, and change nothing but what lies ahead", "[generate]") {
-  const auto evidence = toy();
-  const auto whole = played(evidence, "gcp");
+TEST_CASE("labels may be appended while it plays, and change only later frames", "[generate]") {
+  const auto information = toy();
+  const auto whole = played(information, "gcp");
   for (const int when : {1, 20, 40}) {
-    LabelSequencePlayer player(evidence, {});
-    append(player, evidence, "g");
+    LabelSequencePlayer player(information, {});
+    append(player, information, "g");
     player.start();
     auto frames = play(player, when);
-    append(player, evidence, "cp");
+    append(player, information, "cp");
     const auto rest = play(player);
     frames.insert(frames.end(), rest.begin(), rest.end());
     CHECK(frames.size() == whole.size());
@@ -141,11 +142,11 @@ TEST_CASE("labels may come while it plays, and change nothing but what lies ahea
   }
 }
 
-TEST_CASE("playback takes up the live hand's pose and velocity without a snap", "[generate]") {
+TEST_CASE("the lead-in continues the live hand's pose and velocity without a snap", "[generate]") {
   for (const double rate_hz : {30.0, 60.0, 120.0}) {
-    const auto evidence = toy(rate_hz);
-    LabelSequencePlayer player(evidence, {});
-    append(player, evidence, "g1c34p");
+    const auto information = toy(rate_hz);
+    LabelSequencePlayer player(information, {});
+    append(player, information, "g1c34p");
     HandAngles last{};
     for (int f = 0; f < kFingers; ++f) last[f * kFingerChannels] = 0.2 * f;
     HandAngles before = last;
@@ -156,7 +157,7 @@ TEST_CASE("playback takes up the live hand's pose and velocity without a snap", 
     const auto frames = play(player);
     for (const auto& frame : frames) poses.push_back(frame.angle);
     std::vector<HandAngles> natural;
-    for (const auto& frame : played(evidence, "g1c34p")) natural.push_back(frame.angle);
+    for (const auto& frame : played(information, "g1c34p")) natural.push_back(frame.angle);
     INFO("at " << rate_hz << " Hz");
     // 2.6 deg/frame^2 at 30 Hz is the worst seam measured (models/generate/README.md, "Blending
     // measured").
@@ -167,49 +168,49 @@ TEST_CASE("playback takes up the live hand's pose and velocity without a snap", 
   }
 }
 
-TEST_CASE("a looped script begins anew, a resting one waits for its next label", "[generate]") {
-  const auto evidence = toy();
-  const int natural = static_cast<int>(played(evidence, "gc").size());
-  LabelSequencePlayer looped(evidence, {});
+TEST_CASE("a looped sequence starts again, a resting one waits for its next label", "[generate]") {
+  const auto information = toy();
+  const int natural = static_cast<int>(played(information, "gc").size());
+  LabelSequencePlayer looped(information, {});
   looped.set_loop(true);
-  append(looped, evidence, "gc");
+  append(looped, information, "gc");
   looped.start();
   const auto frames = play(looped, 5 * natural);
   REQUIRE(static_cast<int>(frames.size()) == 5 * natural);
-  CHECK(frames.back().label == evidence.model().label_index("c"));
+  CHECK(frames.back().label == information.model().label_index("c"));
   looped.set_loop(false);
   CHECK(static_cast<int>(play(looped).size()) <= 2 * natural);
 
-  LabelSequencePlayer resting(evidence, {.rest = true});
-  append(resting, evidence, "p");
+  LabelSequencePlayer resting(information, {.rest = true});
+  append(resting, information, "p");
   resting.start();
   const auto waiting = play(resting, 500);
   REQUIRE(waiting.size() == 500);
   CHECK(waiting.back().state == -1);
   CHECK(std::abs(waiting.back().angle[9] - waiting[450].angle[9]) < 1e-3);
-  append(resting, evidence, "g");
+  append(resting, information, "g");
   const auto after = play(resting, 60);
   std::vector<HandAngles> poses{waiting.back().angle};
   for (const auto& pose : after) poses.push_back(pose.angle);
   CHECK(fastest_deg(poses, 1) < 15.0);
-  CHECK(after.back().label == evidence.model().label_index("g"));
+  CHECK(after.back().label == information.model().label_index("g"));
   CHECK(after.back().angle[9] > 1.0);
 }
 
-TEST_CASE("a player takes nothing from the heap and says when it is full", "[generate]") {
-  const auto evidence = toy();
-  LabelSequencePlayer player(evidence, {.capacity = 4});
+TEST_CASE("a player does not allocate and reports when it is full", "[generate]") {
+  const auto information = toy();
+  LabelSequencePlayer player(information, {.capacity = 4});
   PlayedFrame frame;
   CHECK_FALSE(player.next(frame));
   player.start();
   CHECK_FALSE(player.started());
-  append(player, evidence, "gcpg");
+  append(player, information, "gcpg");
   CHECK_FALSE(player.append(0));
   const std::uint64_t before = test::allocations();
   player.start(HandAngles{}, HandAngles{});
   for (int t = 0; t < 150; ++t) static_cast<void>(player.next(frame));
   player.set_tempo(1.7);
-  CHECK(player.append(1));  // room again: labels that were performed are forgotten
+  CHECK(player.append(1));  // there is space again, because performed labels are forgotten
   while (player.next(frame)) {
   }
   player.clear();

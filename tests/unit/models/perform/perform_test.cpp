@@ -1,5 +1,5 @@
-// Whole strings: their plan, the look-ahead against the full solve, gestures that nobody recorded,
-// global variance.
+// Whole label sequences: their states, the look-ahead against the full solve, gestures that were
+// not recorded, global variance.
 #include "models/perform/perform.hpp"
 
 #include <cmath>
@@ -23,16 +23,16 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-StateInformation evidence_of(gesture::GestureModel model) {
+StateInformation information_of(gesture::GestureModel model) {
   const double rate_hz = model.rate_hz;
   return {std::make_shared<const gesture::GestureModel>(std::move(model)), rate_hz};
 }
 
-Performance performed(const StateInformation& evidence, const std::string& text,
+Performance performed(const StateInformation& information, const std::string& text,
                       const perform::PerformOptions& options = {}) {
-  const auto labels = perform::labels_of(evidence.model(), text);
+  const auto labels = perform::labels_of(information.model(), text);
   REQUIRE(labels.has_value());
-  return perform::perform(evidence, *labels, options);
+  return perform::perform(information, *labels, options);
 }
 
 double rms_apart_deg(const Performance& a, const Performance& b) {
@@ -56,8 +56,8 @@ double jerk_deg(const Performance& p) {
   return kDegrees * std::sqrt(sum / static_cast<double>((p.angles.size() - 3) * kHandChannels));
 }
 
-// Mean over states 3 and 4 of a label against real poses: rms over the flexion angles, thumb left
-// out.
+// Mean over states 3 and 4 of a label against real poses: rms over the flexion angles without the
+// thumb.
 double held_off_deg(const Performance& p, int label, const Eigen::VectorXd& real) {
   Eigen::VectorXd held = Eigen::VectorXd::Zero(kHandChannels);
   int frames = 0;
@@ -81,9 +81,9 @@ double held_off_deg(const Performance& p, int label, const Eigen::VectorXd& real
 
 }  // namespace
 
-TEST_CASE("a performance tells its states, from the first frame to the last", "[generate]") {
-  const auto evidence = evidence_of(test::toy_gesture_model());
-  const auto p = performed(evidence, "g 1 c");
+TEST_CASE("a performance lists its states, from the first frame to the last", "[generate]") {
+  const auto information = information_of(test::toy_gesture_model());
+  const auto p = performed(information, "g 1 c");
   REQUIRE(p.states.size() == 3 * gesture::kStates);
   int start = 0;
   for (std::size_t i = 0; i < p.states.size(); ++i) {
@@ -97,7 +97,7 @@ TEST_CASE("a performance tells its states, from the first frame to the last", "[
   CHECK(p.states[7].leaf[1] == 2);
 }
 
-TEST_CASE("strings of no label and of unknown labels are refused by name", "[generate]") {
+TEST_CASE("empty sequences and unknown labels are refused by name", "[generate]") {
   const auto model = test::toy_gesture_model();
   const auto unknown = perform::labels_of(model, "g 2 c five");
   REQUIRE_FALSE(unknown);
@@ -108,8 +108,8 @@ TEST_CASE("strings of no label and of unknown labels are refused by name", "[gen
 }
 
 // The table in models/trajectory/README.md, "Look-ahead", is of one corpus; corpora differ by a
-// factor of two, so ten are asked.
-TEST_CASE("a look-ahead of 15 or 20 frames is the full solve for the eye", "[generate]") {
+// factor of two, so ten are used.
+TEST_CASE("a look-ahead of 15 or 20 frames is nearly the full solve", "[generate]") {
   constexpr int kCorpora = 10;
   double at_15_deg = 0.0;
   double at_20_deg = 0.0;
@@ -117,10 +117,10 @@ TEST_CASE("a look-ahead of 15 or 20 frames is the full solve for the eye", "[gen
   for (std::uint32_t seed = 0; seed < kCorpora; ++seed) {
     auto model = gesture::train_gesture({test::study_corpus(seed)}, {});
     REQUIRE(model.has_value());
-    const auto evidence = evidence_of(std::move(*model));
-    const auto full = performed(evidence, "g 1 c 3 4 p");
-    const auto at_15 = performed(evidence, "g 1 c 3 4 p", {.look_ahead = 15});
-    const auto at_20 = performed(evidence, "g 1 c 3 4 p", {.look_ahead = 20});
+    const auto information = information_of(std::move(*model));
+    const auto full = performed(information, "g 1 c 3 4 p");
+    const auto at_15 = performed(information, "g 1 c 3 4 p", {.look_ahead = 15});
+    const auto at_20 = performed(information, "g 1 c 3 4 p", {.look_ahead = 20});
     std::cout << "look-ahead, corpus " << seed << ": " << full.angles.size()
               << " frames, rms at 15 " << rms_apart_deg(at_15, full) << ", at 20 "
               << rms_apart_deg(at_20, full) << " deg, jerk " << jerk_deg(at_20) / jerk_deg(full)
@@ -128,7 +128,7 @@ TEST_CASE("a look-ahead of 15 or 20 frames is the full solve for the eye", "[gen
     at_15_deg += rms_apart_deg(at_15, full) / kCorpora;
     at_20_deg += rms_apart_deg(at_20, full) / kCorpora;
     jerk_ratio += jerk_deg(at_20) / jerk_deg(full) / kCorpora;
-    CHECK(rms_apart_deg(performed(evidence, "g 1 c 3 4 p", {.look_ahead = 1'000}), full) < 1e-9);
+    CHECK(rms_apart_deg(performed(information, "g 1 c 3 4 p", {.look_ahead = 1'000}), full) < 1e-9);
   }
   std::cout << "look-ahead, mean: " << at_15_deg << ", " << at_20_deg << " deg, jerk " << jerk_ratio
             << '\n';
@@ -137,58 +137,58 @@ TEST_CASE("a look-ahead of 15 or 20 frames is the full solve for the eye", "[gen
   CHECK(std::abs(jerk_ratio - 1.0) <= 0.03);
 }
 
-TEST_CASE("gestures of a real hand that nobody recorded are near the real ones", "[real]") {
+TEST_CASE("gestures of a real hand that were not recorded are near the real ones", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   auto model = gesture::train_gesture({test::real_pose_corpus(*folder, 7)}, {});
   REQUIRE(model.has_value());
-  const auto evidence = evidence_of(std::move(*model));
-  const auto p = performed(evidence, "g 1 c 3 4 p");
+  const auto information = information_of(std::move(*model));
+  const auto p = performed(information, "g 1 c 3 4 p");
   std::cout << "real-pose corpus: g 1 c 3 4 p has " << p.angles.size() << " frames";
   CHECK(std::abs(static_cast<int>(p.angles.size()) - 345) <= 40);
   const std::map<std::string, double> composed_deg{{"1", 12.4}, {"3", 19.8}, {"4", 13.6}};
   for (const auto& [label, yardstick] : composed_deg) {
     const Eigen::VectorXd real =
         test::libras_poses(*folder, test::kSignOf.at(label)).colwise().mean();
-    const double off = held_off_deg(p, evidence.model().label_index(label), real);
+    const double off = held_off_deg(p, information.model().label_index(label), real);
     std::cout << "; " << label << " is " << off << " deg off, " << off / yardstick
               << " of the best composition";
     CHECK(off <= 1.25 * yardstick);
   }
   std::cout << '\n';
   for (const double tempo : {0.5, 0.75, 1.5, 2.0}) {
-    const auto fast = performed(evidence, "g 1 c 3 4 p", {.tempo = tempo});
+    const auto fast = performed(information, "g 1 c 3 4 p", {.tempo = tempo});
     const double length =
         static_cast<double>(fast.angles.size()) * tempo / static_cast<double>(p.angles.size());
     CHECK(std::abs(length - 1.0) <= 0.05);
   }
 }
 
-// All 1,296 strings of four labels are asked in `posed bench generate`.
-TEST_CASE("no finger goes through another in strings of a real hand's gestures", "[real]") {
+// `posed_bench generate` runs all 1,296 sequences of four labels.
+TEST_CASE("no finger goes through another in sequences of a real hand's gestures", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   auto model = gesture::train_gesture({test::real_pose_corpus(*folder, 7)}, {});
   REQUIRE(model.has_value());
-  const auto evidence = evidence_of(std::move(*model));
+  const auto information = information_of(std::move(*model));
   double before_m = 1.0;
   for (const char* text : {"g 1 c 3", "4 p 3 c", "c 4 g p", "p 1 4 3", "3 3 1 c", "g p g p"}) {
-    auto p = performed(evidence, text);
+    auto p = performed(information, text);
     const auto kept = perform::constrain(p, default_hand_shape());
     INFO(text);
     CHECK(kept.min_gap_m >= 0.0);
     CHECK(perform::smallest_gap_m(p, default_hand_shape()) >= 0.0);
     before_m = std::min(before_m, kept.before_m);
   }
-  CHECK(before_m < 0.0);  // else the stage had nothing to do, and nothing was shown
+  CHECK(before_m < 0.0);  // otherwise the test would prove nothing
 }
 
-TEST_CASE("global variance gives range back, within its limit", "[generate]") {
+TEST_CASE("global variance restores the range, within its limit", "[generate]") {
   auto model = gesture::train_gesture({test::study_corpus(3)}, {});
   REQUIRE(model.has_value());
-  const auto evidence = evidence_of(std::move(*model));
-  const auto plain = performed(evidence, "g p c g");
-  const auto lively = performed(evidence, "g p c g", {.global_variance = true});
+  const auto information = information_of(std::move(*model));
+  const auto plain = performed(information, "g p c g");
+  const auto lively = performed(information, "g p c g", {.global_variance = true});
   const auto range = [](const Performance& p, int c) {
     double low = 1e9;
     double high = -1e9;

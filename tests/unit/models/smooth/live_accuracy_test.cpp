@@ -1,5 +1,5 @@
-// How far the live generator's hands stay from the truth (models/smooth/README.md, "Measured
-// figures"): the fixture's made-up hand, and real grasps with known noise added.
+// The error of the live smoother (models/smooth/README.md, "Measured figures") on a synthetic hand
+// and on real grasps with known noise added.
 #include <array>
 #include <limits>
 
@@ -34,7 +34,7 @@ std::vector<bench::Trial> grasps(const std::filesystem::path& folder, double noi
   return trials;
 }
 
-// Over recordings that weigh the same [deg].
+// Rms over recordings with equal weights [deg].
 double ours(std::span<const bench::Trial> trials, const LiveOptions& options) {
   double sum = 0.0;
   for (const bench::Trial& trial : trials) {
@@ -44,7 +44,7 @@ double ours(std::span<const bench::Trial> trials, const LiveOptions& options) {
   return std::sqrt(sum / static_cast<double>(trials.size()));
 }
 
-// The same motion on another clock, straight between its frames.
+// The same motion at another rate, interpolated linearly.
 Motion at_rate(const Motion& motion, double from_hz, double to_hz) {
   const auto frames = static_cast<Eigen::Index>(
                           std::floor(static_cast<double>(motion.rows() - 1) * to_hz / from_hz)) +
@@ -61,7 +61,7 @@ Motion at_rate(const Motion& motion, double from_hz, double to_hz) {
 
 }  // namespace
 
-TEST_CASE("a made-up hand is followed closely at any noise", "[live]") {
+TEST_CASE("a synthetic hand is followed closely at any noise", "[live]") {
   const SyntheticHand hand = synthetic_hand(18, 123);
   for (const auto& [noise_deg, most_deg] : {std::pair{1.0, 0.56}, {3.0, 1.10}, {6.0, 1.85}}) {
     const Motion measured = noisy(hand.angles, noise_deg, 5);

@@ -1,6 +1,6 @@
-// A gesture model beside the live generator (models/smooth/README.md, "Model prior"): it tells the
-// gesture, bridges gaps in its own vocabulary, steadies poses it knows, and leaves an unknown hand
-// alone.
+// The live smoother with a gesture model (models/smooth/README.md, "Model prior"): it names the
+// gesture, bridges gaps within its own gestures, steadies poses that it knows, and does not disturb
+// an unknown hand.
 #include <iostream>
 
 #include <catch2/catch.hpp>
@@ -44,7 +44,7 @@ const smooth::LiveModel& real_pose_model() {
 
 }  // namespace
 
-TEST_CASE("a live hand's gestures are told", "[live][labels]") {
+TEST_CASE("a live hand's gestures are recognised", "[live][labels]") {
   for (const auto& [noise_deg, least] : {std::pair{1.0, 0.86}, {3.0, 0.82}, {6.0, 0.78}}) {
     LabelScore score;
     for (const unsigned seed : {123U, 5U, 77U}) {
@@ -59,7 +59,7 @@ TEST_CASE("a live hand's gestures are told", "[live][labels]") {
   }
 }
 
-TEST_CASE("gestures of real poses are told", "[live][labels]") {
+TEST_CASE("gestures of real poses are recognised", "[live][labels]") {
   if (!shared(kLibras)) {
     SKIP_WITHOUT_SHARED();
   }
@@ -100,7 +100,7 @@ TEST_CASE("dropouts within the model's vocabulary are bridged", "[live]") {
   CHECK(error.ours_deg() <= 0.65 * error.held_deg());
 }
 
-TEST_CASE("an unknown hand comes to no harm", "[live]") {
+TEST_CASE("an unknown hand is not disturbed", "[live]") {
   if (!shared(kGrasps) || !shared(kLibras)) {
     SKIP_WITHOUT_SHARED();
   }
@@ -130,7 +130,7 @@ TEST_CASE("an unknown hand comes to no harm", "[live]") {
   }
 }
 
-TEST_CASE("a model comes and goes while the hand moves, without the heap", "[live]") {
+TEST_CASE("a model is set and removed while the hand moves, without allocation", "[live]") {
   const Skeleton skeleton = hand_skeleton(Side::kRight);
   smooth::LiveSmoother smoother(skeleton, with(1, 1.0));
   const SyntheticHand hand = synthetic_hand(6, 3);
@@ -155,9 +155,9 @@ TEST_CASE("a model comes and goes while the hand moves, without the heap", "[liv
   }
 }
 
-// The model knows nothing of the frames that came before it: they keep the pose that the window
-// gives them, without a label.
-TEST_CASE("a model that comes while frames wait neither names nor bends them", "[live]") {
+// The model has no information about frames that came before it: they keep the pose of the plain
+// window, without a label.
+TEST_CASE("a model that is set while frames wait neither labels nor changes them", "[live]") {
   const Skeleton skeleton = hand_skeleton(Side::kRight);
   const smooth::LiveModel* const model = &synthetic_model();
   const SyntheticHand hand = synthetic_hand(6, 3);
@@ -181,7 +181,7 @@ TEST_CASE("a model that comes while frames wait neither names nor bends them", "
     step(60);
     CHECK(with_model.out.label[0] == '\0');
     CHECK(with_model.out.label_probability == 0.0F);
-    swapped.set_model(model);  // and again: nothing at all has come since
+    swapped.set_model(model);  // once more, without any frame in between
     plain.flush(without);
     swapped.flush(with_model);
     CHECK(with_model.count == without.count);

@@ -1,5 +1,5 @@
-// The live generator's stage as a stage: what comes out when, under which header, and what becomes
-// of missing joints, odd clocks and foreign frames.
+// The live smoother as a pipeline stage: which frames it emits when, their headers, and the
+// treatment of missing joints, irregular clocks and frames of other skeletons.
 #include "models/smooth/live_smoother.hpp"
 
 #include <limits>
@@ -46,7 +46,7 @@ double angle_deg(const Frame& frame, int channel) {
 
 }  // namespace
 
-TEST_CASE("each frame comes out once, as late as the lag says", "[live]") {
+TEST_CASE("each frame is emitted once, with exactly the lag", "[live]") {
   const Skeleton skeleton = finished(6);
   const int lag = GENERATE(0, 1, 3, 5);
   smooth::LiveSmoother smoother(skeleton, lagging({.frames = lag}));
@@ -108,7 +108,7 @@ TEST_CASE("the lag's bounds count frames up to 60 Hz and time above", "[live]") 
   }
 }
 
-TEST_CASE("missing joints are bridged and called predicted", "[live]") {
+TEST_CASE("missing joints are bridged and marked predicted", "[live]") {
   const Skeleton skeleton = finished(6);
   smooth::LiveSmoother smoother(skeleton, lagging({.frames = 1}, 0.3));
   Frames out;
@@ -153,7 +153,7 @@ TEST_CASE("a joint that was never measured stays unknown", "[live]") {
   CHECK(angle_deg(out.all[20], 4) == Approx(wave(6, 20 / 60.0)[4]).margin(0.01));
 }
 
-TEST_CASE("uneven and missing frames are where their times say", "[live]") {
+TEST_CASE("uneven and missing frames are handled by their times", "[live]") {
   const Skeleton skeleton = finished(3);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> uniform(0.3, 1.7);
@@ -215,7 +215,7 @@ TEST_CASE("a clock that stands still or runs backwards does no harm", "[live]") 
   }
 }
 
-TEST_CASE("arrival times that come in bursts are taken as the beat behind them", "[live]") {
+TEST_CASE("arrival times in bursts are drawn to the stream's period", "[live]") {
   const Skeleton skeleton = finished(3);
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> late(0.0, 0.012);
@@ -235,7 +235,7 @@ TEST_CASE("arrival times that come in bursts are taken as the beat behind them",
   CHECK(std::sqrt(sum / 540) < 0.3);
 }
 
-TEST_CASE("turns and the two ways to say a rotation do not jump", "[live]") {
+TEST_CASE("full turns and the two Euler forms of a rotation cause no jumps", "[live]") {
   const Skeleton skeleton = finished(3);
   smooth::LiveSmoother smoother(skeleton, lagging({.frames = 1}, 0.3));
   Frames out;
@@ -255,7 +255,7 @@ TEST_CASE("turns and the two ways to say a rotation do not jump", "[live]") {
   }
 }
 
-TEST_CASE("frames that are not its own pass through in order", "[live]") {
+TEST_CASE("frames of another skeleton pass through in order", "[live]") {
   const Skeleton skeleton = finished(6);
   smooth::LiveSmoother smoother(skeleton, lagging({.frames = 3}));
   Frames out;
@@ -271,7 +271,7 @@ TEST_CASE("frames that are not its own pass through in order", "[live]") {
   CHECK(out.all[10].lag_frames == 0);
 }
 
-TEST_CASE("the same frames give the same bits, and none is taken from the heap", "[live]") {
+TEST_CASE("the same frames give the same bits, without allocation", "[live]") {
   const Skeleton skeleton = finished(45);
   const SyntheticHand hand = synthetic_hand(4, 3);
   const Motion measured = noisy(hand.angles, 1.0, 4);
@@ -284,7 +284,7 @@ TEST_CASE("the same frames give the same bits, and none is taken from the heap",
   };
   Sum first;
   Sum again;
-  smooth::LiveSmoother smoother(skeleton, {});  // the noise is estimated, too
+  smooth::LiveSmoother smoother(skeleton, {});  // the sensor noise is estimated, too
   for (Sum* sum : {&first, &again}) {
     smoother.reset();
     for (long i = 0; i < measured.rows(); ++i) {

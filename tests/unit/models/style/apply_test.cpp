@@ -1,4 +1,4 @@
-// A clip through the style stage: settled, cold, and what must stay as it was.
+// A clip through the style stage: settled start, cold start, and values that must not change.
 #include "models/style/apply.hpp"
 
 #include <catch2/catch.hpp>
@@ -58,7 +58,7 @@ TEST_CASE("a settled start has the full style and the heading from frame one", "
   const style::Applied settled = applied(walk, 1.0);
   CHECK(furthest_rad(walk.frame(0), cold.clip.frame(0)) == 0.0);
   CHECK(furthest_rad(walk.frame(0), settled.clip.frame(0)) > 0.1);
-  // The walk repeats each second: frame 0, settled, is what both have come to at frame 180.
+  // The walk repeats each second: frame 0 with a settled start equals frame 180 of both.
   CHECK(angle_between_rad(delta_of(walk.frame(0), settled.clip.frame(0), 3),
                           delta_of(walk.frame(180), settled.clip.frame(180), 3)) < 0.01);
   CHECK(angle_between_rad(delta_of(walk.frame(180), cold.clip.frame(180), 3),
@@ -104,7 +104,7 @@ TEST_CASE("the same walk at another rate gets the same style", "[style][apply]")
   }
 }
 
-TEST_CASE("a clip that cannot be styled is refused with a sentence", "[style][apply]") {
+TEST_CASE("a clip that cannot be styled is refused with an error message", "[style][apply]") {
   const auto refusal = [](const clip::Clip& clip, const style::StyleModel& model) {
     const auto result = style::apply_to_clip(model, "fox.style", clip, {});
     return result ? std::string() : result.error().text();

@@ -1,5 +1,6 @@
 // Phases and differences between people on six real walks of six people (CMU, 120 Hz, learnt from
-// at 30): what the MGPM finds, and how a difference serves a walker that nobody learnt from.
+// at 30): the phases that the MGPM finds, and the accuracy of a difference on a walker who is not
+// in the training.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -22,12 +23,11 @@ namespace {
 
 constexpr std::array kWalks{"02_02", "08_01", "16_15", "35_01", "39_01", "07_01"};
 constexpr std::array kPeriods{29.5, 30.1, 35.0, 33.7, 31.1, 32.4};  // frames at 30 Hz
-constexpr double kPersonNoise =
-    0.1;  // of the signal variance, as where training has several people
+constexpr double kPersonNoise = 0.1;  // of the signal variance, as in training with several people
 
 bool recorded() { return test::shared("data/cmu/02_02.amc").has_value(); }
 
-// The six walks, each with the phase of its own legs only.
+// The six walks, each with the phase from its own legs only.
 style::Dataset walks() {
   std::vector<style::TrainingClip> clips;
   for (const auto* name : kWalks) {
@@ -40,7 +40,7 @@ style::Dataset walks() {
   return style::make_dataset(clips, "nobody", options).value();
 }
 
-// In common phase, from one start of the MGPM.
+// The walks in common phase, from one start of the MGPM.
 style::Dataset aligned(style::MgpmStart start, std::uint64_t seed) {
   style::Dataset dataset = walks();
   style::DatasetOptions options;
@@ -51,9 +51,9 @@ style::Dataset aligned(style::MgpmStart start, std::uint64_t seed) {
   return dataset;
 }
 
-// Everybody but these teaches `delta`, each at the poses of their own cycle.
-std::vector<style::Pairing> lessons(const std::vector<style::SubjectCycle>& cycles,
-                                    const MatrixXd& delta, const std::vector<int>& without) {
+// Training pairs from everybody except these: `delta` at the poses of each person's own cycle.
+std::vector<style::Pairing> pairs_without(const std::vector<style::SubjectCycle>& cycles,
+                                          const MatrixXd& delta, const std::vector<int>& without) {
   std::vector<style::Pairing> training_pairs;
   for (int s = 0; s < std::ssize(cycles); ++s) {
     if (std::ranges::find(without, s) != without.end()) continue;
@@ -62,7 +62,7 @@ std::vector<style::Pairing> lessons(const std::vector<style::SubjectCycle>& cycl
   return training_pairs;
 }
 
-// One person who is asked: their own frames, and the difference at their phases.
+// The held-out person: their own frames, and the true difference at their phases.
 style::Fold fold_of(const style::Dataset& dataset, std::vector<style::Pairing> train,
                     const MatrixXd& delta, int person) {
   const style::AlignedClip& clip = dataset.clips[static_cast<std::size_t>(person)];
@@ -70,7 +70,7 @@ style::Fold fold_of(const style::Dataset& dataset, std::vector<style::Pairing> t
           style::harmonic_basis(clip.phase(), style::kCycleHarmonics) * delta};
 }
 
-// Mean squares per value, summed over the folds.
+// Mean squared errors per value, summed over the folds.
 struct Errors {
   double process = 0.0, constant = 0.0, paper = 0.0, truth = 0.0;
 
@@ -79,8 +79,8 @@ struct Errors {
   [[nodiscard]] double of_paper() const { return std::sqrt(paper / truth); }
 };
 
-// The way of Sato et al. on the same fold: one lesson, at the teachers' mean cycle, values by
-// evidence.
+// The method of Sato et al. on the same fold: one training pair at the mean cycle of the training
+// people, kernel values by evidence.
 double paper_error(const style::Fold& fold) {
   MatrixXd mean = MatrixXd::Zero(fold.train.front().input.rows(), fold.q.cols());
   for (const style::Pairing& pairing : fold.train) mean += pairing.input;
@@ -92,8 +92,8 @@ double paper_error(const style::Fold& fold) {
   return (gp::posterior(*process, fold.q).mean - fold.truth).squaredNorm();
 }
 
-// Person a's cycle minus person b's, taught by the others but `asked`, who is then asked. The
-// kernel's length is chosen by leaving out each teacher in turn.
+// Person a's cycle minus person b's, trained on the others without `asked`, and evaluated on
+// `asked`. The kernel's length is chosen by leaving out each training person in turn.
 void ask(const style::Dataset& dataset, const std::vector<style::SubjectCycle>& cycles, int a,
          int b, int asked, Errors& errors) {
   const MatrixXd delta = cycles[static_cast<std::size_t>(a)].coefficients -
@@ -101,12 +101,12 @@ void ask(const style::Dataset& dataset, const std::vector<style::SubjectCycle>& 
   std::vector<style::Fold> folds;
   for (int s = 0; s < std::ssize(cycles); ++s) {
     if (s == a || s == b || s == asked) continue;
-    folds.push_back(fold_of(dataset, lessons(cycles, delta, {a, b, asked, s}), delta, s));
+    folds.push_back(fold_of(dataset, pairs_without(cycles, delta, {a, b, asked, s}), delta, s));
   }
   const auto candidates = style::candidate_lengths_rad(dataset.dims());
   const double length_rad =
       style::choose_length_rad(folds, candidates, kPersonNoise, candidates[2]).length_rad;
-  const auto fold = fold_of(dataset, lessons(cycles, delta, {a, b, asked}), delta, asked);
+  const auto fold = fold_of(dataset, pairs_without(cycles, delta, {a, b, asked}), delta, asked);
   const auto values = static_cast<double>(fold.truth.size());
   const auto found = style::fold_error(fold, length_rad, kPersonNoise);
   errors.process += found.error / values;
@@ -115,7 +115,7 @@ void ask(const style::Dataset& dataset, const std::vector<style::SubjectCycle>& 
   errors.constant += (fold.truth.rowwise() - delta.row(0)).squaredNorm() / values;
 }
 
-// Every two people, and every third who is asked.
+// For every ordered pair of people and every third person held out.
 Errors left_out_errors(const style::Dataset& dataset) {
   const auto cycles = style::subject_cycles(dataset);
   const int people = static_cast<int>(std::ssize(cycles));
@@ -150,10 +150,11 @@ TEST_CASE("on six real walks four random starts of the MGPM end at one optimum, 
   }
 }
 
-// The figure is stated for the MGPM's own phases, so those are what is asserted on. Training turns
-// each clip to its legs afterwards, which makes another difference of the same two people: that
-// figure stands beside it.
-TEST_CASE("the difference of two people serves a third whom nobody learnt from", "[style][real]") {
+// The README's figure is for the MGPM's own phases, so the test checks those. Training then shifts
+// each clip's phase to its legs, which gives a different difference of the same two people; that
+// figure is printed, too.
+TEST_CASE("the difference of two people is valid for a third who is not in the training",
+          "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
   auto dataset = aligned(style::MgpmStart::kSvd, 0);
   const Errors by_legs = left_out_errors(dataset);

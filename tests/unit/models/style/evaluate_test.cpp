@@ -1,4 +1,4 @@
-// The score of a styled walk where it is known beforehand, and where there is none.
+// The score of a styled walk in cases where it is known in advance, and where none is defined.
 #include "models/style/evaluate.hpp"
 
 #include <catch2/catch.hpp>

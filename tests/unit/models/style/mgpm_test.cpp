@@ -175,7 +175,7 @@ TEST_CASE("L-BFGS finds the minimum of Rosenbrock's valley in twenty dimensions"
   CHECK((found.x.array() - 1.0).abs().maxCoeff() < 1e-6);
 }
 
-TEST_CASE("L-BFGS steps back from values that are not finite", "[lbfgs]") {
+TEST_CASE("L-BFGS refuses steps to values that are not finite", "[lbfgs]") {
   const posed::gp::Objective barrier = [](const VectorXd& x, VectorXd& g) {
     g[0] = 1.0 - 1.0 / x[0];
     return x[0] - std::log(x[0]);  // NaN left of zero, minimum at one

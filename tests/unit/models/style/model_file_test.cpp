@@ -1,4 +1,4 @@
-// The model file: there and back, and a clear refusal of everything that is not one.
+// The style model's file: written and read back, and a clear error for every file that is not one.
 #include <catch2/catch.hpp>
 
 #include <cstring>

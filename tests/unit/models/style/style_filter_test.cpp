@@ -1,4 +1,4 @@
-// The style stage on a toy body: what it adds, what it leaves alone, and the law of the step.
+// The style stage on a toy body: what it adds, what it does not change, and the continuity bound.
 #include "models/style/style_filter.hpp"
 
 #include <cstring>
@@ -48,7 +48,7 @@ class Settled {
 
 Frame run(Settled& settled, const Frame& in) { return run(settled.filter, in); }
 
-// q of both, without their heading, and their difference.
+// q of `frame` without its heading; change() is the difference of q of two frames.
 Eigen::VectorXd pose_vector(const motion::PoseSpace& space, const Frame& frame,
                             double heading_rad) {
   std::vector<float> q(static_cast<std::size_t>(space.dims()));
@@ -78,7 +78,7 @@ bool same_pose(const Frame& a, const Frame& b) {
 
 }  // namespace
 
-TEST_CASE("the filter adds alpha times what the process says", "[style]") {
+TEST_CASE("the filter adds alpha times the model delta", "[style]") {
   const auto model = toy_model(1);
   const auto ready = bound(1);
   const clip::Clip walk = toy_walk(50);
@@ -95,7 +95,7 @@ TEST_CASE("the filter adds alpha times what the process says", "[style]") {
   CHECK(out.root_position_m == in.root_position_m);
 }
 
-TEST_CASE("alpha 0, no model, or another body leave every bit as it was", "[style]") {
+TEST_CASE("alpha 0, no model, or another skeleton leave every bit unchanged", "[style]") {
   const auto ready = bound(1);
   Frame in = toy_walk(50).frame(10);
   Settled silent(ready.get(), in, 0.0);
@@ -211,7 +211,7 @@ TEST_CASE("time that stands still, runs back or leaps does no harm", "[style]") 
   }
 }
 
-TEST_CASE("an alpha out of range is clamped, one that is no number ignored", "[style]") {
+TEST_CASE("an alpha out of range is clamped, NaN is ignored", "[style]") {
   const auto ready = bound(1);
   const Frame in = toy_walk(50).frame(10);
   Settled filter(ready.get(), in, 1.0);
@@ -223,15 +223,15 @@ TEST_CASE("an alpha out of range is clamped, one that is no number ignored", "[s
   CHECK(filter.filter.alpha() == 2.0F);
 }
 
-// angle(D(t-1), D(t)) <= |c| slew dt + the model's own change (style_filter.hpp). With the same
-// frame again and again the model's own change is what alpha's slew makes of its answer.
+// angle(D(t-1), D(t)) <= |c| slew dt + the change of the model delta (style_filter.hpp). With the
+// same frame repeated, the model delta changes only by alpha's slew.
 TEST_CASE("a thousand swaps and alpha changes never step above the slew", "[style]") {
   constexpr double kSlew = 2.0;
   constexpr double kRate = 120.0;
   constexpr double kSize = 0.4;
   std::vector<std::unique_ptr<const style::BoundModel>> models;
   for (unsigned seed = 0; seed < 8; ++seed) models.push_back(bound(seed, {}, kSize));
-  // No answer turns a joint by more than its three dimensions' limits, times alpha 2.
+  // No model delta turns a joint by more than its three dimensions' limits, times alpha 2.
   const double answer = std::sqrt(3.0) * 1.5 * kSize;
   const double c = 2 * answer + 2 * answer;  // both ends of a blend
   const double bound_rad = (c + answer) * kSlew / kRate + 1e-5;
@@ -260,7 +260,7 @@ TEST_CASE("a thousand swaps and alpha changes never step above the slew", "[styl
   CHECK(largest > 0.0);
 }
 
-TEST_CASE("the filter takes nothing from the heap", "[style]") {
+TEST_CASE("the filter does not allocate", "[style]") {
   style::FilterOptions options;
   options.gate = true;
   options.calibrate = true;
@@ -282,7 +282,7 @@ TEST_CASE("the filter takes nothing from the heap", "[style]") {
   CHECK(taken == 0);
 }
 
-TEST_CASE("a swap ends in the new model's own answer", "[style]") {
+TEST_CASE("a swap ends in the new model's own model delta", "[style]") {
   const auto a = bound(1);
   const auto b = bound(5);
   const Frame still = toy_walk(50).frame(10);
@@ -291,7 +291,7 @@ TEST_CASE("a swap ends in the new model's own answer", "[style]") {
   CHECK(same_pose(run(swapped, still), run(swapped, still)));
   CHECK(swapped.filter.set_model(b.get()) == a.get());
   Frame in = still;
-  const Frame first = run(swapped, in);  // no time has passed: the old answer still stands
+  const Frame first = run(swapped, in);  // no time has passed, so the old model delta still applies
   Settled old(a.get(), still);
   CHECK(angle_between_rad(delta_of(in, first, 3), delta_of(in, run(old, in), 3)) < 1e-5);
   for (int i = 1; i <= 60; ++i) {
@@ -301,7 +301,7 @@ TEST_CASE("a swap ends in the new model's own answer", "[style]") {
   }
 }
 
-TEST_CASE("a walker who is put elsewhere is not shaken", "[style]") {
+TEST_CASE("a source that jumps causes no jump of the style", "[style]") {
   const auto ready = bound(1);
   const clip::Clip walk = toy_walk(300);
   const clip::Clip away = toy_walk(300, 60.0, 2.5);
@@ -341,7 +341,7 @@ TEST_CASE("the gate fades to the fallback far from the training poses", "[style]
   CHECK(largest_delta_rad(in, run(constant, in)) > 0.1);
 }
 
-TEST_CASE("calibration takes the walker's own carriage off the kernel's input", "[style]") {
+TEST_CASE("calibration removes the walker's own mean offset from the kernel's input", "[style]") {
   style::FilterOptions options;
   options.calibrate = true;
   const auto ready = bound(1, options);

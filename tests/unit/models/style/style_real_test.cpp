@@ -1,5 +1,5 @@
-// The style model's figures on real recordings: acted walks and runs at 30 Hz, takes 001 taught and
-// takes 002 held out.
+// The style model's figures on real recordings: acted walks and runs at 30 Hz, trained on takes 001
+// and evaluated on takes 002.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -39,8 +39,8 @@ struct Lesson {
   std::string motion, group;
 };
 
-// A model of the lessons' takes 001, the target feminine.
-style::StyleModel taught(const std::vector<Lesson>& lessons) {
+// A model trained on takes 001 of the lessons, with the target feminine.
+style::StyleModel train_on_takes(const std::vector<Lesson>& lessons) {
   std::vector<style::TrainingClip> clips;
   for (const Lesson& lesson : lessons) {
     const std::string name = lesson.motion + "_" + lesson.group + "_001";
@@ -53,7 +53,9 @@ style::StyleModel taught(const std::vector<Lesson>& lessons) {
   return *std::move(model);
 }
 
-style::StyleModel taught_walk() { return taught({{"walk", "masculine"}, {"walk", "feminine"}}); }
+style::StyleModel trained_walk() {
+  return train_on_takes({{"walk", "masculine"}, {"walk", "feminine"}});
+}
 
 style::StyleScore score(const style::StyleModel& model, const clip::Clip& source,
                         const clip::Clip& target) {
@@ -96,10 +98,9 @@ clip::Clip upsampled(const clip::Clip& clip, double rate_hz) {
 
 }  // namespace
 
-TEST_CASE("a walk taught from one take each comes near the style's held-out take",
-          "[style][real]") {
+TEST_CASE("a walk trained on one take each comes near the style's held-out take", "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
-  const auto result = score(taught_walk(), take("walk_masculine_002"), take("walk_feminine_002"));
+  const auto result = score(trained_walk(), take("walk_masculine_002"), take("walk_feminine_002"));
   CHECK(result.cycle_ratio <= 0.15);
   CHECK(result.jerk_ratio >= 0.90);
   CHECK(result.jerk_ratio <= 1.10);
@@ -107,32 +108,34 @@ TEST_CASE("a walk taught from one take each comes near the style's held-out take
 
 TEST_CASE("walk and run in one model: the run is styled, the walk is not hurt", "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
-  const auto both = taught(
+  const auto both = train_on_takes(
       {{"walk", "masculine"}, {"walk", "feminine"}, {"run", "masculine"}, {"run", "feminine"}});
   const auto run = score(both, take("run_masculine_002"), take("run_feminine_002"));
   CHECK(run.cycle_ratio <= 0.24);
   const auto source = take("walk_masculine_002");
   const auto target = take("walk_feminine_002");
-  const auto alone = score(taught_walk(), source, target);
+  const auto alone = score(trained_walk(), source, target);
   CHECK(score(both, source, target).cycle_ratio <= alone.cycle_ratio + 0.005);
 }
 
-TEST_CASE("a normal walk among the sources is styled; a walk in the style is left as it is",
-          "[style][real]") {
+TEST_CASE(
+    "a normal walk among the sources is styled; a walk already in the style is hardly changed",
+    "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
-  const auto model = taught({{"walk", "masculine"}, {"walk", "normal"}, {"walk", "feminine"}});
+  const auto model =
+      train_on_takes({{"walk", "masculine"}, {"walk", "normal"}, {"walk", "feminine"}});
   const auto target = take("walk_feminine_002");
   const auto normal = score(model, take("walk_normal_002"), target);
   CHECK(normal.cycle_ratio <= 0.21);
   const auto already = score(model, target, take("walk_feminine_001"));
   CHECK(already.component_rms_deg <= 2.0);
-  CHECK(score(taught_walk(), target, take("walk_feminine_001")).component_rms_deg <= 2.0);
+  CHECK(score(trained_walk(), target, take("walk_feminine_001")).component_rms_deg <= 2.0);
 }
 
-TEST_CASE("a model taught at 30 Hz serves the same walk at 120 Hz, frame by frame",
+TEST_CASE("a model trained at 30 Hz works on the same walk at 120 Hz, frame by frame",
           "[style][real]") {
   if (!recorded()) SKIP_WITHOUT_SHARED();
-  const auto model = taught_walk();
+  const auto model = trained_walk();
   const auto walk = take("walk_masculine_002");
   const auto target = take("walk_feminine_002");
   REQUIRE(walk.frame_rate_hz == Approx(30.0).epsilon(1e-3));

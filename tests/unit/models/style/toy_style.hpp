@@ -1,4 +1,4 @@
-// A body of five joints, a walk of it and style models for it: small enough to reason about.
+// A skeleton of five joints, a walk and style models for it, small enough to reason about.
 #pragma once
 
 #include <cmath>
@@ -44,7 +44,7 @@ inline Skeleton toy_skeleton() {
   return skeleton;
 }
 
-// A walk with a cycle a second, sampled at `rate_hz`, towards `heading_rad`.
+// A walk with one cycle per second, sampled at `rate_hz`, in the direction `heading_rad`.
 inline clip::Clip toy_walk(int frames, double rate_hz = 60.0, double heading_rad = 0.0) {
   clip::Clip clip;
   clip.path = "toy.bvh";
@@ -64,7 +64,7 @@ inline clip::Clip toy_walk(int frames, double rate_hz = 60.0, double heading_rad
   return clip;
 }
 
-// A process over 20 poses of the walk; `seed` chooses which style. `size_rad` is how far it moves.
+// A model with 20 training poses of the walk; `seed` selects the style, `size_rad` its size.
 inline style::StyleModel toy_model(unsigned seed, double size_rad = 0.3) {
   style::StyleModel model;
   const Skeleton skeleton = toy_skeleton();

@@ -1,5 +1,5 @@
-// Training as in Sato et al. (--mode paper) on synthetic walkers: its cycles, its kernel and what
-// it does to a walk.
+// Training as in Sato et al. (--mode paper) on synthetic walkers: its cycles, its kernel and its
+// effect on a walk.
 #include <catch2/catch.hpp>
 
 #include "models/motion/synthetic_walker.hpp"

@@ -1,4 +1,4 @@
-// What training says about its own clips: made-up walkers here, real recordings where they are.
+// The checks of a training's clips, on synthetic walkers and, where present, on real recordings.
 #include "models/style/training_check.hpp"
 
 #include <catch2/catch.hpp>
@@ -58,7 +58,7 @@ json real_report(const std::string& from, const std::string& to, const std::stri
 
 }  // namespace
 
-TEST_CASE("two styles are learnt, and the verdict says how much of the way is closed",
+TEST_CASE("two styles are learnt, and the verdict states how much of the distance is closed",
           "[style][check]") {
   const json report = report_of({lesson(walker(WalkerFamily::kMarch, 1), "from"),
                                  lesson(walker(WalkerFamily::kMarch, 2), "from"),
@@ -80,14 +80,14 @@ TEST_CASE("one recording in two groups is refused by name", "[style][check]") {
   CHECK(model.error().message.contains("is the same recording as march_1"));
 }
 
-TEST_CASE("two takes of one style are no difference to learn", "[style][check]") {
+TEST_CASE("two takes of one style give no difference to learn", "[style][check]") {
   auto again = motion::make_walker({.family = WalkerFamily::kMarch, .person = 1, .seconds = 7.0});
   CHECK(has_problem(
       report_of({lesson(walker(WalkerFamily::kMarch, 1), "from"), lesson(std::move(*again), "to")}),
       "no difference to learn"));
 }
 
-TEST_CASE("a clip whose legs stand is no walk; another motion's name makes that a warning",
+TEST_CASE("a clip whose legs stand still is not a walk; for another motion name that is a warning",
           "[style][check]") {
   auto standing = walker(WalkerFamily::kSway, 2);
   for (std::size_t c = 0; c < standing.skeleton->channels.size(); ++c) {
@@ -108,7 +108,7 @@ TEST_CASE("gaits are walks and runs of all kinds", "[style][check]") {
   for (const char* other : {"wave", "jump", "crosswalk", ""}) CHECK_FALSE(style::is_gait(other));
 }
 
-TEST_CASE("a walker in another carriage is far from the training", "[style][check]") {
+TEST_CASE("a walker with another posture is far from the training", "[style][check]") {
   const auto model = trained({lesson(walker(WalkerFamily::kMarch, 1), "from"),
                               lesson(walker(WalkerFamily::kSway, 1), "to")})
                          .value();
@@ -121,7 +121,7 @@ TEST_CASE("a walker in another carriage is far from the training", "[style][chec
   CHECK(far.distance_deg > own.distance_deg);
 }
 
-TEST_CASE("styles of real walks and runs pass, nonsense does not", "[style][check][real]") {
+TEST_CASE("styles of real walks and runs pass, useless ones do not", "[style][check][real]") {
   if (!test::shared("data/styles/dataset-2_walk_masculine_001.bvh")) SKIP_WITHOUT_SHARED();
   const json good = real_report("2_walk_masculine_001", "2_walk_feminine_001", "walk");
   CHECK(good["usable"] == true);

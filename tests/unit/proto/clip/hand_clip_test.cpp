@@ -105,7 +105,7 @@ TEST_CASE("stamps that are only rounded give the clock's own rate") {
   CHECK(read(text).rate_hz == Approx(30.0).epsilon(1e-6));
 }
 
-TEST_CASE("a hand CSV that is none is refused with its line") {
+TEST_CASE("an invalid hand CSV is refused with its line") {
   CHECK(error_of("") == "h.csv: is empty, so it is no hand CSV");
   CHECK(error_of("\ntime_s,thumb1_y_rad\n") ==
         "h.csv:2: column 2 is 'thumb1_y_rad' where a hand CSV has 'thumb1_x_rad'; its header is "
@@ -185,7 +185,7 @@ TEST_CASE("a clip without the fingers of a hand says what is missing") {
         "c.bvh: has no left hand with fifteen finger joints: leftIndexProximal is missing");
 }
 
-TEST_CASE("gaps are filled by straight lines and told") {
+TEST_CASE("gaps are filled linearly and reported") {
   HandClip clip = closing_hand(Side::kRight);
   const double before = clip.angles[10][0];
   const double after = clip.angles[13][0];

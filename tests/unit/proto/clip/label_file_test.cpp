@@ -1,4 +1,4 @@
-// Label files: seconds and HTK's units, there and back, and each way a file can be wrong.
+// Label files: seconds and HTK's units, written and read back, and every kind of mistake.
 #include <catch2/catch.hpp>
 
 #include "proto/clip/label_file.hpp"
@@ -43,9 +43,9 @@ TEST_CASE("HTK's units are known by their integers", "[lab]") {
   REQUIRE(htk.has_value());
   CHECK((*htk)[1].start_s == Approx(1.5));
   CHECK((*htk)[1].end_s == Approx(3.0));
-  // Integers, but seconds: 10,000 s would be a recording of three hours.
+  // Integers, but seconds: 10,000 s is a recording of three hours.
   CHECK((*parse_labels("0 4 g\n4 10000 c\n", "a"))[1].end_s == 10'000.0);
-  // One decimal point, and all are seconds.
+  // With one decimal point in the file, all times are seconds.
   CHECK((*parse_labels("0 4.0 g\n4 20000 c\n", "a"))[1].end_s == 20'000.0);
 }
 
@@ -60,7 +60,7 @@ TEST_CASE("Labels that were written read back as the same", "[lab]") {
   CHECK_FALSE(read_labels(folder.path() / "none.lab").has_value());
 }
 
-TEST_CASE("Label files that cannot be meant are refused with their line", "[lab]") {
+TEST_CASE("Label files with mistakes are refused with the line", "[lab]") {
   CHECK(has(refusal(""), "no label in this file", 0));
   CHECK(has(refusal(" \n\n"), "no label in this file", 0));
   CHECK(has(refusal("0 1 g\n1 x c"), "is no time", 2));

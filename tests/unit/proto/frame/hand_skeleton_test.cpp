@@ -57,7 +57,7 @@ HandAngles fist() {
   return angles;
 }
 
-// Some pose with every angle different and not zero.
+// A pose in which all angles are different and not zero.
 HandAngles any_pose() {
   HandAngles angles;
   for (std::size_t i = 0; i < angles.size(); ++i) {
@@ -190,7 +190,8 @@ TEST_CASE("on the canonical humanoid a flat hand is the T-pose and a fist curls 
   }
 }
 
-TEST_CASE("angles go through a frame unchanged, without the heap, and a lacking one is told") {
+TEST_CASE(
+    "angles go through a frame unchanged, without allocation, and a missing one is reported") {
   const Skeleton skeleton = hand_skeleton(Side::kLeft);
   HandAngles angles = any_pose();
   Frame frame;
@@ -210,7 +211,7 @@ TEST_CASE("angles go through a frame unchanged, without the heap, and a lacking 
   CHECK(std::isnan(hand_angles(frame)[angle(kRing, 1, 0)]));
 }
 
-TEST_CASE("every built-in hand is good, and a bad one is refused with its line") {
+TEST_CASE("every built-in hand is valid, and an invalid one is refused with its line") {
   REQUIRE_FALSE(hand_shapes().empty());
   CHECK(default_hand_shape().name == kDefaultHandShape);
   CHECK(find_hand_shape("paw").error().text() == "there is no hand 'paw'; there are adult");

@@ -69,7 +69,7 @@ TEST_CASE("joint names of many programs are understood") {
   CHECK(odd.joint_of(Bone::kHips) == -1);
 }
 
-TEST_CASE("every built-in profile is good, and a bad one is refused with its line") {
+TEST_CASE("every built-in profile is valid, and an invalid one is refused with its line") {
   REQUIRE(profiles().size() >= 4);
   const auto error = [](const std::string& text) {
     const auto profile = parse_profile(text, "p.toml");
@@ -92,7 +92,7 @@ TEST_CASE("every built-in profile is good, and a bad one is refused with its lin
   CHECK_FALSE(name_bones(profiles()[0], other).has_value());
 }
 
-TEST_CASE("axes text goes both ways and refuses what is no rotation") {
+TEST_CASE("axes text is converted both ways, and text that is not a rotation is refused") {
   for (const char* text : {"+x+y+z", "+y-x+z", "-z+x-y", "+x-y-z"}) {
     const auto T = axes_from_text(text);
     REQUIRE(T.has_value());
@@ -139,7 +139,7 @@ TEST_CASE("the rule for folded zero poses finds the shipped frames of the Bandai
     CHECK(clip->warnings.empty());
     const Skeleton& skeleton = *clip->skeleton;
     CHECK_FALSE(zero_pose_is_t(skeleton));
-    const KnownT found = t_frames_from_standing(skeleton, clip::standing_rotations(*clip));
+    const KnownT found = t_frames_from_mean_pose(skeleton, clip::mean_rotations(*clip));
     for (std::size_t j = 1; j < skeleton.joints.size(); ++j) {
       INFO(name << " " << skeleton.joints[j].name);
       CHECK(axes_text(*found[j]) == axes_text(skeleton.joints[j].T_world_joint));

@@ -1,4 +1,4 @@
-// A file is written whole or not at all.
+// A file is written completely or not at all.
 #include "proto/frame/whole_file.hpp"
 
 #include <catch2/catch.hpp>
@@ -39,7 +39,7 @@ TEST_CASE("a file that cannot be written to its end leaves what was there, and n
   CHECK(files_in(folder.path()) == 1);
 }
 
-TEST_CASE("a symbolic link stays one: the file that it names is replaced") {
+TEST_CASE("a symbolic link is kept: the file that it names is replaced") {
   const test::TempFolder folder;
   const auto path = folder.write("take.bvh", "before");
   const auto link = folder.path() / "link.bvh";
@@ -49,7 +49,7 @@ TEST_CASE("a symbolic link stays one: the file that it names is replaced") {
   CHECK(bytes_of(path) == "after");
 }
 
-TEST_CASE("a file in a folder that is not there is an error that names it") {
+TEST_CASE("a file in a folder that does not exist is an error that names it") {
   const test::TempFolder folder;
   const auto done =
       write_whole_file(folder.path() / "no/take.bvh", [](std::ostream& out) { out << "x"; });

@@ -1,4 +1,4 @@
-// A device log that was damaged: whichever bit is flipped, it is found, or it changes nothing.
+// Damaged device logs: any flipped bit is detected, or it changes nothing.
 #include <catch2/catch.hpp>
 
 #include <fstream>
@@ -23,7 +23,7 @@ using test::run_sql;
 using test::text_of;
 using test::writer_with_two_streams;
 
-// What the reader says when it has read everything; empty when nothing is wrong.
+// The reader's error after reading everything; empty when there is none.
 std::string complaint(const std::filesystem::path& path) {
   auto reader = Reader::open(path);
   if (!reader) return reader.error().text();
@@ -44,11 +44,11 @@ std::string complaint(const std::filesystem::path& path) {
   }
 }
 
-TEST_CASE("a flipped bit in any column of any row is found, and log, table and row are named") {
+TEST_CASE("a flipped bit in any column of any row is detected, and log, table and row are named") {
   const test::TempFolder dir;
   const auto whole = dir.path() / "whole.plog", path = dir.path() / "flipped.plog";
   Writer writer = writer_with_two_streams(whole);
-  const std::vector<log::StreamPlace> places{{0, 7, 8}};
+  const std::vector<log::StreamPosition> places{{0, 7, 8}};
   for (std::uint64_t i = 1; i <= 3; ++i) {
     log::ChunkRow chunk = chunk_row(0, i, "1 2 3\n");
     chunk.places = places;
@@ -99,7 +99,7 @@ TEST_CASE("a flipped bit in any column of any row is found, and log, table and r
   }
 }
 
-// Everything that a replay computes from, as the reader gives it.
+// Everything that a replay uses, as the reader returns it.
 Result<std::string> contents(const std::filesystem::path& path) {
   auto reader = Reader::open(path);
   if (!reader) return std::unexpected(reader.error());
@@ -120,7 +120,7 @@ Result<std::string> contents(const std::filesystem::path& path) {
   return all;
 }
 
-TEST_CASE("whichever bit of a log is flipped, it is told or changes nothing") {
+TEST_CASE("any flipped bit of a log is reported or changes nothing") {
   const test::TempFolder dir;
   const auto whole = dir.path() / "whole.plog", path = dir.path() / "flipped.plog";
   Writer writer = writer_with_two_streams(whole);
@@ -149,7 +149,7 @@ TEST_CASE("whichever bit of a log is flipped, it is told or changes nothing") {
     if (!found) CHECK(found.error().file == path.string());
     told += found ? 0 : 1;
   }
-  CHECK(told > 50);  // the rest lies in pages that are partly empty
+  CHECK(told > 50);  // the other bits are in unused parts of pages
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The device log: what goes in comes out, a crash costs what was not committed, and a file that is
-// no whole log is told so in one sentence.
+// The device log: rows are read back as written, a crash loses only what was not committed, and a
+// file that is not a complete log gives one error message.
 #include <catch2/catch.hpp>
 
 #include <fstream>
@@ -29,7 +29,7 @@ using test::writer_with_two_streams;
 
 namespace {
 
-// A small log that ended as it should.
+// A small log that was closed properly.
 void write_whole_log(const std::filesystem::path& path, int chunks) {
   Writer writer = writer_with_two_streams(path);
   const std::string line(1000, '7');
@@ -68,11 +68,11 @@ TEST_CASE("sha256 names bytes as the standard does") {
 TEST_CASE("a log gives back every row it was given") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  constexpr std::uint32_t kLate = 3U << 16U | 5U;  // ids are names, not places
+  constexpr std::uint32_t kLate = 3U << 16U | 5U;  // ids are names, not indices
   constexpr std::uint64_t kMost = ~std::uint64_t{0};
   Writer writer = writer_with_two_streams(path);
   REQUIRE(writer.add(log::StreamRow{kLate, 1, "Ann", "b-ann", "{\"stages\":[]}", 40}));
-  const std::vector<log::StreamPlace> places{{1, 7, 8}, {kLate, 300, kMost}};
+  const std::vector<log::StreamPosition> places{{1, 7, 8}, {kLate, 300, kMost}};
   REQUIRE(writer.add(log::ChunkRow{.source = 1,
                                    .socket = 2,
                                    .direction = 3,
@@ -128,7 +128,7 @@ TEST_CASE("a log gives back every row it was given") {
   REQUIRE((chunk && chunk->has_value()));
   CHECK((*chunk)->bytes.empty());
   CHECK(count_chunks(*reader) == 0);
-  CHECK(count_chunks(*reader) == 0);  // the end stays the end
+  CHECK(count_chunks(*reader) == 0);  // reading on after the end gives no rows
 
   const auto decisions = reader->decisions();
   REQUIRE((decisions && decisions->size() == 1));
@@ -188,7 +188,7 @@ TEST_CASE("a log of format 1 or 2 looks like one of format 3 that counts no item
   CHECK(count_chunks(*reader) > 50);
   const auto decisions = reader->decisions();
   REQUIRE(decisions);
-  std::map<std::string, v1::DecisionValue> found;  // the last of its kind
+  std::map<std::string, v1::DecisionValue> found;  // the last decision of each kind
   for (const log::DecisionRow& row : *decisions) {
     CHECK(row.item == 0);
     CHECK(row.before_frame > 0);
@@ -228,7 +228,7 @@ TEST_CASE("after a crash the log opens with everything that was committed, as on
   for (std::uint64_t i = 1; i <= 40; ++i) REQUIRE(writer.add(chunk_row(0, i, "1 2 3\n")));
   REQUIRE(writer.commit());
   for (std::uint64_t i = 41; i <= 50; ++i) REQUIRE(writer.add(chunk_row(0, i, "1 2 3\n")));
-  // What kill -9 leaves: the file and its -wal as they are now.
+  // What kill -9 leaves: the file and its -wal in their present state.
   std::filesystem::copy_file(path, crashed);
   std::filesystem::copy_file(path.string() + "-wal", crashed.string() + "-wal");
   auto reader = Reader::open(crashed);
@@ -258,7 +258,7 @@ TEST_CASE("a log can be read while it is being recorded, and recording goes on")
   CHECK(count_chunks(*reader) == 3);
 }
 
-TEST_CASE("a file that is no whole log of ours is refused with one sentence") {
+TEST_CASE("a file that is not a complete log is refused with one error message") {
   const test::TempFolder dir;
   const auto path = dir.path() / "x.plog";
   SECTION("missing") { CHECK(refusal(path).find("No such file") != std::string::npos); }

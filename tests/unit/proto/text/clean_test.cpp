@@ -7,7 +7,7 @@
 namespace posed {
 namespace {
 
-TEST_CASE("what a terminal would obey is written out", "[clean]") {
+TEST_CASE("terminal escape characters are written out", "[clean]") {
   CHECK(clean("index_mcp") == "index_mcp");
   CHECK(clean("\x1b[2J\x07") == "\\x1b[2J\\x07");
   CHECK(clean("two\nlines\r\tof\x7f") == "two\\nlines\\r\\tof\\x7f");
@@ -16,7 +16,7 @@ TEST_CASE("what a terminal would obey is written out", "[clean]") {
   CHECK(clean("txt.\u202Egpj") == "txt.\\u{202e}gpj");
 }
 
-TEST_CASE("letters of any script stay, bytes that are no UTF-8 are written out", "[clean]") {
+TEST_CASE("letters of any script are kept, bytes that are not UTF-8 are written out", "[clean]") {
   CHECK(clean("Gänsefüßchen 手 🖐") == "Gänsefüßchen 手 🖐");
   CHECK(clean("\xff\xc3") == "\\xff\\xc3");               // no lead byte, cut off
   CHECK(clean("\xc0\xaf") == "\\xc0\\xaf");               // '/' in too many bytes
@@ -34,7 +34,7 @@ TEST_CASE("what is too long ends in dots, between two characters", "[clean]") {
   CHECK(in_quotes(megabyte) == "'" + std::string(kMaxNameBytes, 'x') + "...'");
 }
 
-TEST_CASE("an error is fit for a terminal whatever it names", "[clean]") {
+TEST_CASE("an error is safe for a terminal whatever it names", "[clean]") {
   const Error error{.message = "no joint \x1b[2J", .file = "a\nb.bvh", .line = 3};
   CHECK(error.text() == "a\\nb.bvh:3: no joint \\x1b[2J");
   const Error huge{.message = std::string(1 << 20, 'x'), .file = {}};

@@ -34,18 +34,19 @@ TEST_CASE("a whole file is read, up to its limit", "[load_file]") {
   CHECK(load_file(folder.write("large", large), {.what = "clip", .max_bytes = 300'000}) == large);
 }
 
-TEST_CASE("a file of the kernel, which promises no size, is read and bounded, too", "[load_file]") {
+TEST_CASE("a file in /proc, which states no size, is read and bounded, too", "[load_file]") {
   CHECK(load_file("/proc/self/stat", {.what = "file", .max_bytes = 100'000}).value().size() > 10);
   CHECK_FALSE(load_file("/proc/self/stat", {.what = "file", .max_bytes = 3}));
 }
 
-TEST_CASE("what is no regular file is refused at once, with a sentence", "[load_file]") {
+TEST_CASE("anything but a regular file is refused at once, with an error message", "[load_file]") {
   const test::TempFolder folder;
   CHECK(refusal(folder.path()) == "this is a folder; name a calibration in it");
   CHECK(refusal("/dev/zero").contains("device or a pipe"));
   const auto pipe = folder.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK(refusal(pipe).contains("device or a pipe"));  // nobody writes: a plain open would wait
+  CHECK(refusal(pipe).contains(
+      "device or a pipe"));  // nobody writes to it, so a plain open would block
   CHECK(refusal(folder.path() / "none").contains("cannot read the calibration: No such file"));
   CHECK(refusal({}).contains("cannot read the calibration"));
 }

@@ -44,10 +44,10 @@ TEST_CASE("dots, brackets and quotes inside strings and comments do not count", 
   CHECK(passes("\"" + dots + "\".b = ''\nc = \"\"\n"));
 }
 
-TEST_CASE("whatever nests too deep is refused before it is parsed", "[toml]") {
+TEST_CASE("TOML that nests too deep is refused before it is parsed", "[toml]") {
   for (const std::string& bomb : test::toml_bombs()) {
     CHECK_THAT(refusal(bomb), Catch::Contains("nests deeper"));
-    // Hidden behind what could fool the scan into taking the rest for a string or a comment.
+    // Preceded by text that could mislead the scan into taking the rest for a string or a comment.
     for (const char* before :
          {"a = \"\\\\\"\n", "a = '\\'\n", "a = \"\"\"x\"\"\"\"\"\n", "a = ''''x'''\n", "# \"\"\"\n",
           "# '''\n", "a = ['''\n''', \"\"] # '\n", "'#' = '#'\n", "\"#\\\"\" = {b = '#'}\n",
@@ -58,7 +58,7 @@ TEST_CASE("whatever nests too deep is refused before it is parsed", "[toml]") {
   }
 }
 
-TEST_CASE("the sentence names the line, the limit and the kind of file", "[toml]") {
+TEST_CASE("the error message names the line, the limit and the kind of file", "[toml]") {
   CHECK(refusal("a = 1\n\"\"\"\n\n\n\"\"\" = 2\nb.c.d.e.f = 1\n") ==
         "a.toml:6: nests deeper here than the 4 levels of a note (each part of a dotted key is "
         "one)");
@@ -77,9 +77,9 @@ TEST_CASE("too many keys, tables or values are refused before they are parsed", 
   CHECK(passes(repeated("[[a]]\n", 100)));
 }
 
-TEST_CASE("a mistake in TOML is one sentence with its line", "[toml]") {
+TEST_CASE("a mistake in TOML gives one error message with its line", "[toml]") {
   CHECK(refusal("a = 1\nb = \x1b[2J\n").starts_with("a.toml:2: not TOML: "));
-  CHECK(refusal(std::string(100'000, 'k')).size() < 600);  // toml++ would repeat the key
+  CHECK(refusal(std::string(100'000, 'k')).size() < 600);  // toml++ would repeat the whole key
   CHECK_FALSE(refusal("\x1b\n").contains('\x1b'));
 }
 

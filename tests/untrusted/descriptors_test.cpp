@@ -1,13 +1,13 @@
-// A process has only so many descriptors: strangers may not take them all, nor make libzmq's
-// listener try in vain over and over to accept.
+// A process has a limited number of file descriptors. Untrusted clients must not take them all, nor
+// make libzmq's listener retry accept() in a busy loop.
 #include <vector>
 
-#include "tests/strangers/target.hpp"
+#include "tests/untrusted/target.hpp"
 
 namespace posed::test {
 namespace {
 
-TEST_CASE("connections beyond what the daemon has descriptors for are cut, and cost no CPU") {
+TEST_CASE("connections beyond the daemon's descriptor limit are cut, and cost no CPU") {
   Target target;
   target.most_files = 64;
   target.start();

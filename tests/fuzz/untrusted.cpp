@@ -1,6 +1,7 @@
-// What a stranger can send to both sockets, as it reaches our code behind libzmq: subscriptions of
-// several peers, questions to the authenticator, pieces of models. With POSED_FUZZ_SOCKETS=1 the
-// bytes go through real connections on loopback instead, before and after the handshake (slow).
+// What an untrusted client can send to both sockets, as our code receives it from libzmq:
+// subscriptions of several peers, authentication requests, pieces of models. With
+// POSED_FUZZ_SOCKETS=1 the bytes go through real loopback connections instead, before and after the
+// handshake (slow).
 #include <array>
 #include <cstdint>
 #include <cstdlib>
@@ -79,7 +80,7 @@ void try_uploads(FuzzedDataProvider& data) {
       piece.offset = data.ConsumeIntegral<std::uint64_t>();
     if (data.ConsumeIntegralInRange(0, 7) == 0) piece.total = data.ConsumeIntegral<std::uint64_t>();
     const auto taken = uploads.take(std::to_string(client), piece, now_ns);
-    demand(!taken || !*taken);  // no piece has the right sum
+    demand(!taken || !*taken);  // no piece has the right checksum
     offset[client] = taken ? piece.offset + piece.bytes.size() : 0;
     demand(uploads.bytes() <= control::kLargestModel);
   }
@@ -87,7 +88,7 @@ void try_uploads(FuzzedDataProvider& data) {
   demand(uploads.bytes() == 0);
 }
 
-// Both sockets of a daemon without keys, and nothing behind them.
+// Both sockets of a daemon without keys, without a pipeline.
 class Sockets final : public control::DaemonControl {
  public:
   Sockets() {
@@ -148,7 +149,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
   FuzzedDataProvider data(bytes, size);
   static const bool through_sockets = std::getenv("POSED_FUZZ_SOCKETS") != nullptr;
   if (through_sockets) {
-    static auto* sockets = new Sockets;  // never ended: its threads outlive main
+    static auto* sockets = new Sockets;  // never destroyed, because its threads outlive main
     sockets->attack(data);
     return 0;
   }

@@ -1,4 +1,4 @@
-// What one connection without a key can pour into the daemon. Short here; POSED_FLOOD_SECONDS makes
+// How much one connection without a key can load the daemon. Short here; POSED_FLOOD_SECONDS makes
 // each attack longer.
 #include <cstdlib>
 #include <functional>
@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "posed/v1/control.pb.h"
-#include "tests/strangers/target.hpp"
+#include "tests/untrusted/target.hpp"
 
 namespace posed::test {
 namespace {
@@ -22,8 +22,8 @@ struct Damage {
   std::uint64_t lost = 0;
 };
 
-// Runs the attack on a fresh daemon. `work` does a little and may begin again as it likes: a peer
-// that is cut off connects anew.
+// Runs the attack on a new daemon. `work` is called repeatedly and sends a little each time; a peer
+// that is cut off reconnects.
 Damage attack(const std::function<void(const Target&)>& work) {
   Target target;
   target.start();
@@ -44,7 +44,7 @@ Damage attack(const std::function<void(const Target&)>& work) {
 
 void check_bounded(const char* what, const std::function<void(const Target&)>& work) {
   Damage damage = attack(work);
-  // A machine that is busy with other things may stop anybody for a moment: once more, then.
+  // A busy machine may delay any process for a moment, so the attack is repeated in that case.
   for (int i = 0; i < 2 && damage.longest_s > kLongestWait_s; ++i) damage = attack(work);
   std::printf("%s: memory +%.1f MB, longest wait %.3f s, lost %llu\n", what, damage.growth_MB,
               damage.longest_s, static_cast<unsigned long long>(damage.lost));
@@ -53,7 +53,7 @@ void check_bounded(const char* what, const std::function<void(const Target&)>& w
   CHECK(damage.longest_s <= kLongestWait_s);
 }
 
-// A peer that connects again whenever it was cut off.
+// A peer that reconnects whenever it is cut off.
 class Persistent {
  public:
   explicit Persistent(const char* socket_type) : socket_type_(socket_type) {}
@@ -70,21 +70,21 @@ class Persistent {
   std::optional<RawPeer> peer_;
 };
 
-// As often as it makes about 64 KB.
+// Repeats the bytes up to about 64 KB.
 std::string repeated(std::string_view bytes) {
   std::string all;
   while (all.size() < 65536) all += bytes;
   return all;
 }
 
-TEST_CASE("messages without end do not fill the memory of the publisher") {
+TEST_CASE("endless messages do not fill the memory of the publisher") {
   Persistent peer("SUB");
   const std::string parts = repeated(zmtp::frame("", 1));
   check_bounded("endless parts to publish",
                 [&](const Target& target) { peer.send(target.publish, parts); });
 }
 
-TEST_CASE("messages without end do not fill the memory of control") {
+TEST_CASE("endless messages do not fill the memory of control") {
   Persistent peer("DEALER");
   const std::string parts = repeated(zmtp::frame("", 1));
   check_bounded("endless parts to control",
@@ -101,7 +101,7 @@ TEST_CASE("large messages do not fill the memory of the publisher") {
   });
 }
 
-TEST_CASE("handshakes that do not end fill no memory") {
+TEST_CASE("unfinished handshakes do not fill the memory") {
   std::vector<RawPeer> peers;
   const Target* attacked = nullptr;
   check_bounded("unfinished handshakes to control", [&](const Target& target) {
@@ -115,7 +115,7 @@ TEST_CASE("handshakes that do not end fill no memory") {
   });
 }
 
-TEST_CASE("random subscriptions cost the others nothing") {
+TEST_CASE("random subscriptions do not affect other clients") {
   Persistent peer("SUB");
   std::mt19937 random(5);
   check_bounded("random subscriptions", [&](const Target& target) {
@@ -129,7 +129,7 @@ TEST_CASE("random subscriptions cost the others nothing") {
   });
 }
 
-TEST_CASE("subscriptions to streams that are not there have an end") {
+TEST_CASE("subscriptions to streams that do not exist are limited") {
   Persistent peer("SUB");
   std::mt19937 random(6);
   check_bounded("subscriptions to possible streams", [&](const Target& target) {
@@ -144,14 +144,14 @@ TEST_CASE("subscriptions to streams that are not there have an end") {
   });
 }
 
-TEST_CASE("skeletons asked for over and over cost the others nothing") {
+TEST_CASE("repeated requests for skeletons do not affect other clients") {
   Persistent peer("SUB");
   const std::string asked = repeated(zmtp::subscribe("skeleton/"));
   check_bounded("skeletons over and over",
                 [&](const Target& target) { peer.send(target.publish, asked); });
 }
 
-TEST_CASE("requests with damaged texts write no flood of lines") {
+TEST_CASE("requests with invalid texts do not flood the log") {
   Target target;
   target.start();
   v1::ControlRequest request;
@@ -163,12 +163,12 @@ TEST_CASE("requests with damaged texts write no flood of lines") {
   for (int i = 0; i < 300; ++i) {
     INFO(target.daemon->errors());
     REQUIRE(peer.send(zmtp::frame(damaged)));
-    REQUIRE_FALSE(peer.receive(1).empty());  // refused, with a sentence to the one who asked
+    REQUIRE_FALSE(peer.receive(1).empty());  // refused, with an error message to the client
   }
   CHECK(target.daemon->errors().size() < 2000);
 }
 
-TEST_CASE("requests whose answers nobody reads fill no memory") {
+TEST_CASE("requests whose replies nobody reads do not fill the memory") {
   Persistent peer("DEALER");
   v1::ControlRequest status;
   status.mutable_status();

@@ -1,6 +1,6 @@
-// A web page in the user's browser may POST any body to a port of this machine.
+// A web page in the user's browser can POST any body to a port of this machine.
 #include "posed/v1/control.pb.h"
-#include "tests/strangers/target.hpp"
+#include "tests/untrusted/target.hpp"
 
 namespace posed::test {
 namespace {
@@ -12,13 +12,13 @@ std::string old_frame(std::string_view body, bool more) {
   return bytes.append(body);
 }
 
-TEST_CASE("the body of a web page's POST is no message: nobody is stopped by it") {
+TEST_CASE("the body of a web page's POST is not a message and stops nothing") {
   Target target;
   target.start();
   v1::ControlRequest stop;
   stop.mutable_stop();
-  // "POST" reads as a frame of 80 bytes that names the peer; where it ends, the page's own frames
-  // begin. libzmq reads on for as long as they are well formed.
+  // "POST" parses as a frame of 80 bytes that names the peer, followed by the page's own frames.
+  // libzmq continues reading as long as they are well formed.
   std::string post = "POST /" + std::string(60, 'x') + " HTTP/1.1\r\n";
   post.resize(81, 'y');
   for (int i = 0; i < 4; ++i) {

@@ -1,5 +1,5 @@
-// A daemon that is attacked: one stream at 30 Hz, its memory as the kernel sees it, and an innocent
-// subscriber who counts what it lost and how long it had to wait.
+// A daemon under attack: one stream at 30 Hz, its memory use as reported by the kernel, and an
+// innocent subscriber that counts lost frames and the longest wait.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,8 @@
 
 namespace posed::test {
 
-// What an attack may cost (MB over the start, and the longest pause of an innocent's stream).
+// Limits for an attack: memory growth in MB, and the longest pause of an innocent subscriber's
+// stream.
 inline constexpr double kMostGrowth_MB = 64.0;
 inline constexpr double kLongestWait_s = 0.3;
 
@@ -45,8 +46,8 @@ class Target : public Stage {
     statm >> size >> resident;
     return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
   }
-  // Until `seconds` have passed or `work` says that it is done: the most memory seen above the
-  // start.
+  // Runs `work` until `seconds` have passed or it returns that it is done. Returns the largest
+  // memory growth seen.
   template <typename Work>
   double growth_MB(double seconds, Work&& work) const {
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
@@ -60,7 +61,7 @@ class Target : public Stage {
   double at_start_MB = 0.0;
 };
 
-// Subscribes to the target's poses with a thread of its own.
+// Subscribes to the target's poses on its own thread.
 class Innocent {
  public:
   explicit Innocent(const std::string& endpoint)
@@ -73,7 +74,7 @@ class Innocent {
     longest_ns = 0;
   }
   ~Innocent() { stop(); }
-  // Waits until that many more frames have come; false when they do not.
+  // Waits until `more` further frames arrive; returns false when they do not.
   bool hears(std::uint64_t more) const {
     const std::uint64_t wanted = frames + more;
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
