@@ -10,6 +10,7 @@ namespace posed::cli {
 namespace {
 
 constexpr int kBarCells = 30;
+constexpr double kLineEvery_s = 5.0;
 constexpr double kEnoughForGuess = 0.02;  // before that the time left is a guess at noise
 
 volatile std::sig_atomic_t g_interrupted = 0;
@@ -51,15 +52,16 @@ ProgressBar::~ProgressBar() {
 bool ProgressBar::show(std::string_view step, double fraction) {
   if (elapsed_s() < quiet_for_s_) return g_interrupted == 0;
   fraction = std::clamp(fraction, 0.0, 1.0);
-  const int quarter = static_cast<int>(fraction * 4.0);
+  const int tenth = static_cast<int>(fraction * 10.0);
   if (terminal_) {
     draw(step, fraction);
-  } else if (step != last_step_ || quarter != last_quarter_) {
+  } else if (tenth != last_tenth_ || elapsed_s() - last_line_s_ >= kLineEvery_s) {
+    last_tenth_ = tenth;
+    last_line_s_ = elapsed_s();
     std::fprintf(stderr, "%3.0f %%  %.*s\n", 100.0 * fraction, static_cast<int>(step.size()),
                  step.data());
   }
   last_step_ = step;
-  last_quarter_ = quarter;
   return g_interrupted == 0;
 }
 

@@ -1,4 +1,5 @@
-// Progress of long work on stderr: a bar with the time left on a terminal, plain lines elsewhere.
+// Progress of long work on stderr: a bar with the time left on a terminal, plain lines elsewhere,
+// one each 10 % or 5 s.
 // While one is alive, the first Ctrl-C asks the work to stop instead of ending the process.
 #pragma once
 
@@ -34,7 +35,8 @@ class ProgressBar {
   double quiet_for_s_;
   bool terminal_;
   std::string last_step_;
-  int last_quarter_ = -1;
+  int last_tenth_ = -1;       // of the last line off a terminal
+  double last_line_s_ = 0.0;  // when it was printed
   struct sigaction before_{};
 };
 

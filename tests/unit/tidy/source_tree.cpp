@@ -154,6 +154,22 @@ std::vector<Finding> check_includes(const SourceFile& file) {
   return findings;
 }
 
+std::vector<Finding> check_references(const std::string& path, const std::string& text) {
+  // Spelled in halves so that this file does not find itself.
+  static const std::regex outside(std::string("\\.\\./sha") + "red|algorithms\\.md|hand-sci" +
+                                  "ence|style-sci" + "ence|house-rev" + "iew|first-use\\.md");
+  std::vector<Finding> findings;
+  std::istringstream stream(text);
+  int number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    ++number;
+    if (std::regex_search(line, outside)) {
+      findings.push_back({path, number, "names a page outside the repository"});
+    }
+  }
+  return findings;
+}
+
 std::vector<Finding> check_sizes(const SourceFile& file) {
   std::vector<Finding> findings;
   if (file.lines.size() > kMaxLines) {

@@ -26,6 +26,22 @@ struct Finding {
 
 // Modules may include only what the dependency rules allow.
 [[nodiscard]] std::vector<Finding> check_includes(const SourceFile& file);
+// A target of the modules' CMakeLists.txt: posed_module(name FOLDERS folder... LINK target...).
+struct Target {
+  std::string name;
+  std::vector<std::string> folders, links;
+};
+[[nodiscard]] std::vector<Target> read_targets(const std::filesystem::path& root);
+[[nodiscard]] std::vector<Target> targets_from_text(const std::string& text);
+// The targets form no cycle, and a file of a target's folder includes only folders of that target
+// and of those that it links, directly or through others: linking is the permission.
+[[nodiscard]] std::vector<Finding> check_cycles(const std::vector<Target>& targets);
+[[nodiscard]] std::vector<Finding> check_links(const SourceFile& file,
+                                               const std::vector<Target>& targets);
+// A reader of the repository has only the repository: no file names a page outside of it. `text` is
+// any file's.
+[[nodiscard]] std::vector<Finding> check_references(const std::string& path,
+                                                    const std::string& text);
 // At most 500 lines a file, 100 columns a line, no left-over marks.
 [[nodiscard]] std::vector<Finding> check_sizes(const SourceFile& file);
 // TOML is parsed in proto/text/toml.cpp alone, which checks its depth first; outside of tests a

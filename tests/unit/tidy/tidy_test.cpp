@@ -47,6 +47,53 @@ TEST_CASE("modules include only what the dependency rules allow", "[tidy]") {
   CHECK(findings_of(posed::tidy::check_includes) == "");
 }
 
+TEST_CASE("a folder includes only what its target links, and no targets form a cycle", "[tidy]") {
+  const auto bad = posed::tidy::targets_from_text(
+      "posed_module(posed_a COLD FOLDERS daemon/a LINK posed_b X::Y)\n"
+      "posed_module(posed_b\n  FOLDERS daemon/b LINK posed_c)\n"
+      "posed_module(posed_c FOLDERS daemon/c daemon/d LINK)\n");
+  REQUIRE(bad.size() == 3);
+  CHECK(posed::tidy::check_cycles(bad).empty());
+  const auto upward = posed::tidy::source_from_text(
+      "daemon/d/x.cpp", "#include \"daemon/c/y.hpp\"\n#include \"daemon/a/z.hpp\"\n");
+  REQUIRE(listed(posed::tidy::check_links(upward, bad)).find("daemon/d/x.cpp:2") == 0);
+  const auto through =
+      posed::tidy::source_from_text("daemon/a/x.cpp", "#include \"daemon/d/y.hpp\"");
+  CHECK(posed::tidy::check_links(through, bad).empty());
+  auto circle = bad;
+  circle[2].links.push_back("posed_a");
+  REQUIRE(posed::tidy::check_cycles(circle).size() == 3);
+
+  const auto targets = posed::tidy::read_targets(posed::test::source_dir());
+  REQUIRE(targets.size() > 20);
+  CHECK(listed(posed::tidy::check_cycles(targets)) == "");
+  CHECK(findings_of(
+            [&](const SourceFile& file) { return posed::tidy::check_links(file, targets); }) == "");
+}
+
+TEST_CASE("no file names a page outside the repository", "[tidy]") {
+  REQUIRE(posed::tidy::check_references("a.md", std::string("x\nsee ../sha") + "red/a\n").size() ==
+          1);
+  std::vector<Finding> all;
+  int files = 0;
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(posed::test::source_dir())) {
+    const std::string path =
+        std::filesystem::relative(entry.path(), posed::test::source_dir()).generic_string();
+    const std::set<std::string> kinds{".hpp", ".cpp", ".md", ".txt", ".toml", ".proto", ".py", ""};
+    if (!entry.is_regular_file() || !kinds.contains(entry.path().extension())) continue;
+    if (path.starts_with("build/") || path.starts_with(".git/")) continue;
+    // The one place where tests find recordings, and the page that says so.
+    if (path == "tests/support/shared.hpp" || path == "tests/README.md") continue;
+    std::ifstream stream(entry.path());
+    const std::string text{std::istreambuf_iterator<char>(stream), {}};
+    for (const Finding& found : posed::tidy::check_references(path, text)) all.push_back(found);
+    ++files;
+  }
+  CHECK(files > 300);
+  CHECK(listed(all) == "");
+}
+
 TEST_CASE("files and lines are short and finished", "[tidy]") {
   const auto bad = posed::tidy::source_from_text(
       "a.cpp", std::string(101, 'x') + "\n// TO" + "DO later\n" + std::string(600, '\n'));
