@@ -96,7 +96,7 @@ TEST_CASE(
   Process emulate({"emulate", "cyberglove", "--tcp", endpoint, "--set", "form=16bit"});
   CHECK(frames_come());
   const auto status = nlohmann::json::parse(stage.ctl({"--json", "status"}).out).at("status");
-  CHECK(status.at("stream").at(0).at("device_info").get<std::string>().contains("form=16bit"));
+  CHECK(status.at("stream").at(0).at("deviceInfo").get<std::string>().contains("form=16bit"));
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
   CHECK(emulate.exit_code() == 0);  // its host has hung up
