@@ -123,10 +123,10 @@ Result<> Daemon::Parts::open() {
   }
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(into_pipeline);
   finished = std::make_unique<pipeline::Ring<pipeline::Item>>(out_of_pipeline);
-  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(control::kMostUnderWay);
+  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(control::kMaxUnderWay);
   device_commands =
-      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(control::kMostUnderWay);
-  acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(control::kMostUnderWay);
+      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(control::kMaxUnderWay);
+  acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(control::kMaxUnderWay);
   for (auto* wake : {&pipeline_wake, &publisher_wake, &control_wake}) {
     auto opened = system::EventFd::open();
     if (!opened) return std::unexpected(opened.error());
@@ -283,8 +283,8 @@ Result<> Daemon::Parts::start_threads() {
   for (std::uint32_t i = 0; i < streams.size(); ++i) {
     if (!streams[i]->slot) continue;
     devices::SupervisorPorts ports{
-        .reader = reader.get(), .clock = system::monotonic_ns, .tell = {}};
-    ports.tell = [this, i](v1::Event::Kind kind, const std::string& text) {
+        .reader = reader.get(), .clock = system::monotonic_ns, .report = {}};
+    ports.report = [this, i](v1::Event::Kind kind, const std::string& text) {
       publisher->post_event(i, kind, text);
     };
     supervisors.push_back(

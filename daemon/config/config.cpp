@@ -33,7 +33,7 @@ constexpr Range kAnyNumber{std::numeric_limits<double>::lowest(),
                            std::numeric_limits<double>::max()};
 constexpr double kDegrees = 180.0 / std::numbers::pi;  // in a radian
 // The bound above 60 Hz is a time; no rate brings more frames into it than this.
-constexpr std::int64_t kMostLagFrames = 170;
+constexpr std::int64_t kMaxLagFrames = 170;
 constexpr std::array<std::string_view, 3> kIdentityKeys{"port", "id", "hand"};
 constexpr std::string_view kRawSuffix = "-raw";
 constexpr TomlLimits kLimits{
@@ -256,10 +256,10 @@ void Reader::read_generate(TableReader table, config::GenerateConfig& generate) 
   double noise_deg = generate.live.noise_rad * kDegrees;
   std::string model, labels;
   table.read("lag_frames", lag_frames);
-  if (lag_frames < 0 || lag_frames > kMostLagFrames) {
+  if (lag_frames < 0 || lag_frames > kMaxLagFrames) {
     table.add_error("lag_frames", fmt::format("stream.generate.lag_frames = {} is out of range: it"
                                               " takes 0 to {} frames",
-                                              lag_frames, kMostLagFrames));
+                                              lag_frames, kMaxLagFrames));
     lag_frames = generate.live.lag.frames;
   }
   table.read("lag_ms", lag_ms, kLag_ms);

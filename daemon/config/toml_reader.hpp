@@ -65,7 +65,7 @@ class TableReader {
  private:
   // The node of a key, noted as known; null when absent.
   const toml::node* find(std::string_view key);
-  void blame_type(const toml::node& node, std::string_view key, const std::string& wanted);
+  void add_type_error(const toml::node& node, std::string_view key, const std::string& wanted);
   [[nodiscard]] std::string full(std::string_view key) const;
   [[nodiscard]] std::string advice(const std::string& unknown_key) const;
 

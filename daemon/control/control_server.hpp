@@ -46,7 +46,7 @@ class ControlServer {
   void sleep(long longest_ms);  // negative: until something comes
   [[nodiscard]] bool take_request();
   [[nodiscard]] bool take_ack();
-  void send(const Answer& answer);
+  void send(const Reply& answer);
 
   net::Socket router_;
   std::unique_ptr<net::PeerGuard> guard_;

@@ -30,8 +30,8 @@ class Stats;
 
 namespace posed::control {
 
-inline constexpr std::size_t kLargestRequest = 64 * 1024;  // bytes
-using pipeline::kMostUnderWay;
+inline constexpr std::size_t kMaxRequest = 64 * 1024;  // bytes
+using pipeline::kMaxUnderWay;
 
 // A stream as control sees it.
 struct ControlledStream {
@@ -72,9 +72,9 @@ class DaemonControl {
 };
 
 // Who asked: opaque to the handler, handed back with the reply.
-using Asker = std::vector<std::string>;
-struct Answer {
-  Asker to;
+using Requester = std::vector<std::string>;
+struct Reply {
+  Requester to;
   std::string bytes;  // a serialized posed.v1.ControlReply
 };
 
@@ -90,36 +90,38 @@ class RequestHandler {
 
   // One request. The answer comes at once, or with acknowledge() when the pipeline has to act
   // first. Whatever the bytes are: an answer with a sentence, never a crash.
-  [[nodiscard]] std::optional<Answer> handle(Asker asker, std::span<const std::byte> bytes);
+  [[nodiscard]] std::optional<Reply> handle(Requester requester, std::span<const std::byte> bytes);
 
   // Forgets uploads that go on no more. Returns when to call it next at the latest.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns) { return uploads_.forget_old(now_ns); }
 
   // The pipeline has applied a command. Frees the model that it replaced.
-  [[nodiscard]] std::optional<Answer> acknowledge(const pipeline::Ack& ack);
+  [[nodiscard]] std::optional<Reply> acknowledge(const pipeline::Ack& ack);
 
  private:
   struct UnderWay {
-    Asker asker;
+    Requester requester;
     std::uint32_t stream = 0;
     std::unique_ptr<const style::BoundModel> model{};       // of a new style
     std::unique_ptr<const generate::BoundModel> gesture{};  // of a new gesture model
     std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
   };
   // Nothing when the command is under way.
-  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Requester& requester);
   // True when the piece was not the last one: it is answered at once.
-  [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request,
+                                             const Requester& requester);
   [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
-                                   const std::string& name, const Asker& asker);
+                                   const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> set_style_model(std::uint32_t stream, std::span<const std::byte> bytes,
-                                         const std::string& name, const Asker& asker);
+                                         const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> set_gesture_model(std::uint32_t stream, std::span<const std::byte> bytes,
-                                           const std::string& name, const Asker& asker);
+                                           const std::string& name, const Requester& requester);
   void keep_model(std::span<const std::byte> bytes, pipeline::Command& command);
-  [[nodiscard]] Result<> play(const v1::ControlRequest& request, const Asker& asker);
-  [[nodiscard]] Result<> stop_playing(const v1::ControlRequest& request, const Asker& asker);
-  [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> play(const v1::ControlRequest& request, const Requester& requester);
+  [[nodiscard]] Result<> stop_playing(const v1::ControlRequest& request,
+                                      const Requester& requester);
+  [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
   [[nodiscard]] Result<std::uint32_t> find_stream(const std::string& name) const;
   [[nodiscard]] Result<std::uint32_t> styled_stream(const std::string& name) const;

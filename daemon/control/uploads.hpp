@@ -14,10 +14,9 @@
 
 namespace posed::control {
 
-inline constexpr std::size_t kLargestModel =
-    16 * 1024 * 1024;                                    // bytes, of all uploads together, too
-inline constexpr std::size_t kLargestPiece = 32 * 1024;  // bytes
-inline constexpr std::size_t kMostUploads = 4;           // at once
+inline constexpr std::size_t kMaxModel = 16 * 1024 * 1024;  // bytes, of all uploads together, too
+inline constexpr std::size_t kMaxPiece = 32 * 1024;         // bytes
+inline constexpr std::size_t kMaxUploads = 4;               // at once
 inline constexpr double kUploadPause_s = 10.0;  // a client that sends no piece for so long has left
 
 // One piece as a client sent it (posed.v1.ControlRequest.ModelPart).

@@ -90,8 +90,8 @@ void DeviceSupervisor::take_back() {
   const std::string why = std::exchange(asked_back_, false)
                               ? "nothing usable came from the device for a while"
                               : "the link to the device is lost";
-  ports_.tell(v1::Event::KIND_LOST, why + "; posed looks for it until it is back");
-  told_.clear();
+  ports_.report(v1::Event::KIND_LOST, why + "; posed looks for it until it is back");
+  reported_.clear();
 }
 
 void DeviceSupervisor::watch_silence() {
@@ -110,10 +110,10 @@ void DeviceSupervisor::write_to_device() {
   if (writer_ == nullptr) return;
   writer_->write_waiting();
   const std::uint64_t dropped = writer_->dropped();
-  if (dropped == drops_told_) return;
-  ports_.tell(v1::Event::KIND_WARNING,
-              std::to_string(dropped - std::exchange(drops_told_, dropped)) +
-                  " messages to the device were given up: it takes them too slowly; send fewer");
+  if (dropped == drops_reported_) return;
+  ports_.report(v1::Event::KIND_WARNING,
+                std::to_string(dropped - std::exchange(drops_reported_, dropped)) +
+                    " messages to the device were given up: it takes them too slowly; send fewer");
 }
 
 void DeviceSupervisor::look_for_device() {
@@ -121,26 +121,27 @@ void DeviceSupervisor::look_for_device() {
   if (stop_.load()) return;
   if (!found) {
     const std::string text = found.error().text();
-    if (text == told_ || settling()) return;  // said once, and not of a device that is just coming
-    told_ = text;
-    ports_.tell(v1::Event::KIND_WARNING,
-                found_once_ ? text : text + "; posed looks for it until it is there");
+    if (text == reported_ || settling())
+      return;  // said once, and not of a device that is just coming
+    reported_ = text;
+    ports_.report(v1::Event::KIND_WARNING,
+                  found_once_ ? text : text + "; posed looks for it until it is there");
     return;
   }
   found_once_ = true;
   device_ = std::move(*found);
   writer_ = dynamic_cast<drivers::ColdWriter*>(device_->transport.get());
-  drops_told_ = 0;
+  drops_reported_ = 0;
   away_ = false;
-  told_.clear();
+  reported_.clear();
   for (const std::string& warning : device_->warnings) {
-    ports_.tell(v1::Event::KIND_WARNING, warning);
+    ports_.report(v1::Event::KIND_WARNING, warning);
   }
   stream_.present->connected(device_->description);
   stream_.slot->give_back.store(false);  // that was about the one before
   static_cast<void>(stream_.slot->in.push(device_.get()));
   ports_.reader->call();
-  ports_.tell(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
+  ports_.report(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
 }
 
 // A device that is not what the stream was set up for would silently mean other joints.

@@ -23,7 +23,7 @@ struct SupervisorPorts {
   pipeline::Reader* reader = nullptr;  // called when the slot has something
   Clock clock = nullptr;
   // Tells on event/<stream>; any thread.
-  std::function<void(v1::Event::Kind kind, const std::string& text)> tell;
+  std::function<void(v1::Event::Kind kind, const std::string& text)> report;
 };
 
 class DeviceSupervisor {
@@ -57,12 +57,12 @@ class DeviceSupervisor {
   drivers::HotplugMonitor hotplug_;
   std::unique_ptr<drivers::Device> device_;  // the one opened here; null while it is away
   drivers::ColdWriter* writer_ = nullptr;    // its other side, where writing to it blocks
-  std::uint64_t drops_told_ = 0;             // of the writer
+  std::uint64_t drops_reported_ = 0;         // of the writer
   bool away_ = true;
   bool found_once_ = false;
   bool asked_back_ = false;
   std::int64_t settled_ns_ = 0;  // when what came last should open
-  std::string told_;             // why it could not be opened, as last told
+  std::string reported_;         // why it could not be opened, as last told
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

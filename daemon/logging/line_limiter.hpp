@@ -37,19 +37,19 @@ class LineLimiter {
 
  private:
   struct Cause {
-    std::int64_t told_ns = 0;  // when a line of it was last written
-    std::uint64_t held = 0;    // lines since then
+    std::int64_t written_ns = 0;  // when a line of it was last written
+    std::uint64_t held = 0;       // lines since then
     Line last;
   };
   [[nodiscard]] bool may_begin_another(std::int64_t now_ns);
 
   std::map<std::string, Cause, std::less<>> causes_;
-  Cause others_{.told_ns = kNoTime_ns, .held = 0, .last = {}};  // lines of too many causes
+  Cause others_{.written_ns = kNoTime_ns, .held = 0, .last = {}};  // lines of too many causes
   // Lines of new causes that may still be written; it fills up again slowly.
-  double credit_ = kMostAtOnce;
+  double credit_ = kMaxAtOnce;
   std::int64_t credit_ns_ = kNoTime_ns;
 
-  static constexpr double kMostAtOnce = 256.0;  // what 64 streams say when they start
+  static constexpr double kMaxAtOnce = 256.0;  // what 64 streams say when they start
   static constexpr double kNewPerSecond = 8.0;
 };
 

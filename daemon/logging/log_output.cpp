@@ -26,7 +26,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr std::size_t kMostWaiting = 1024;  // lines
+constexpr std::size_t kMaxWaiting = 1024;  // lines
 constexpr std::chrono::milliseconds kLastLinesWithin{200};
 constexpr std::chrono::milliseconds kForEver = std::chrono::milliseconds::max();
 
@@ -120,7 +120,7 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
  private:
   // All below: with the lock held.
   void push(std::string line) {
-    if (lines_.size() >= kMostWaiting) {
+    if (lines_.size() >= kMaxWaiting) {
       lines_.pop_front();
       ++lost_;
     }

@@ -14,7 +14,7 @@
 namespace posed::net {
 namespace {
 
-constexpr std::size_t kLongestKeyFile = 256;  // bytes; more than a key and a newline is no key
+constexpr std::size_t kMaxKeyFile = 256;  // bytes; more than a key and a newline is no key
 
 class File {
  public:
@@ -35,7 +35,7 @@ std::string reason() { return std::strerror(errno); }
 
 Result<std::string> read_key(const File& file, const std::filesystem::path& path) {
   if (!file.ok()) return fail("cannot read the key: " + reason(), path);
-  std::array<char, kLongestKeyFile> buffer{};
+  std::array<char, kMaxKeyFile> buffer{};
   const ssize_t size = read(file.get(), buffer.data(), buffer.size());
   if (size < 0) return fail("cannot read the key: " + reason(), path);
   std::string text(buffer.data(), static_cast<std::size_t>(size));

@@ -26,10 +26,10 @@ constexpr std::int64_t kGuardTick_ns = kNanosPerSecond / 100;
 constexpr std::int64_t kPeersATick = 64;
 constexpr std::uint64_t kNoticeableGrowth = 4 * 1024 * 1024;  // bytes
 
-constexpr std::size_t kMostSubscribers = 1024;
-constexpr std::size_t kMostControllers = 64;
+constexpr std::size_t kMaxSubscribers = 1024;
+constexpr std::size_t kMaxControllers = 64;
 constexpr std::size_t kReservedFiles = 16;  // for devices, logs and models that come later
-constexpr std::size_t kFewestPeers = 4;
+constexpr std::size_t kMinPeers = 4;
 
 std::uint64_t cookie_of(int fd) {
   std::uint64_t cookie = 0;
@@ -96,7 +96,7 @@ PeerGuard::PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::Event
       wake_(std::move(wake)),
       poller_(std::move(poller)),
       limits_(limits),
-      told_ns_(std::numeric_limits<std::int64_t>::min() / 2),
+      reported_ns_(std::numeric_limits<std::int64_t>::min() / 2),
       thread_([this] { serve(); }) {}
 
 PeerGuard::~PeerGuard() {
@@ -175,7 +175,7 @@ void PeerGuard::inspect_all() {
       most_fd = fd;
     }
   }
-  if (most <= limits_.most_unheard && unheard <= limits_.most_unheard_of_all) return;
+  if (most <= limits_.max_unheard && unheard <= limits_.max_unheard_of_all) return;
   cut_offender(most_fd, "sent much and ended no message");
   malloc_trim(0);
   resident_before_ = 0;  // it may not have been the only one: look again at the next tick
@@ -231,7 +231,7 @@ void PeerGuard::cut_now(int fd, const char* why) {
   // libzmq's thread may have closed the connection and the number may name another thing by now.
   if (found->second.cookie == 0 || cookie_of(fd) != found->second.cookie) return;
   shutdown(fd, SHUT_RDWR);
-  tell(why);
+  log_cut(why);
 }
 
 void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& allowed) {
@@ -244,19 +244,19 @@ void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& all
   }
 }
 
-void PeerGuard::tell(const char* why) {
+void PeerGuard::log_cut(const char* why) {
   ++cuts_;
-  ++untold_;
+  ++unreported_;
   const std::int64_t now_ns = system::monotonic_ns();
-  if (now_ns < told_ns_ + kNanosPerSecond) return;  // a flood is one line a second
-  told_ns_ = now_ns;
-  if (untold_ == 1) {
+  if (now_ns < reported_ns_ + kNanosPerSecond) return;  // a flood is one line a second
+  reported_ns_ = now_ns;
+  if (unreported_ == 1) {
     spdlog::warn("a connection to the {} socket was cut: it {}", limits_.name, why);
   } else {
-    spdlog::warn("{} connections to the {} socket were cut; the last {}", untold_, limits_.name,
+    spdlog::warn("{} connections to the {} socket were cut; the last {}", unreported_, limits_.name,
                  why);
   }
-  untold_ = 0;
+  unreported_ = 0;
 }
 
 PeerShares peer_shares() {
@@ -268,8 +268,8 @@ PeerShares peer_shares() {
   const std::size_t used = open + kReservedFiles;
   const auto files = static_cast<std::size_t>(limit.rlim_cur);
   const std::size_t free = files > used ? files - used : 0;
-  return {.publish = std::clamp(free * 3 / 4, kFewestPeers, kMostSubscribers),
-          .control = std::clamp(free / 4, kFewestPeers, kMostControllers)};
+  return {.publish = std::clamp(free * 3 / 4, kMinPeers, kMaxSubscribers),
+          .control = std::clamp(free / 4, kMinPeers, kMaxControllers)};
 }
 
 void raise_file_limit() noexcept {

@@ -45,8 +45,8 @@ struct PeerLimits {
   const char* name = "";       // of the socket, for the log
   std::size_t most_peers = 0;  // a connection beyond them is cut at once
   // Bytes that came to no whole message yet: of one peer, and of all together.
-  std::uint64_t most_unheard = 0;
-  std::uint64_t most_unheard_of_all = 0;
+  std::uint64_t max_unheard = 0;
+  std::uint64_t max_unheard_of_all = 0;
   ZapAuthenticator* authenticator = nullptr;  // slowed down when a peer is cut for what it sent
 };
 
@@ -92,7 +92,7 @@ class PeerGuard {
   void inspect_all();
   void cut_now(int fd, const char* why);
   void cut_offender(int fd, const char* why);  // and slows down whoever comes next
-  void tell(const char* why);
+  void log_cut(const char* why);
 
   void* socket_;
   Socket monitor_;
@@ -103,8 +103,8 @@ class PeerGuard {
   std::map<int, Peer> peers_;  // by descriptor
   std::vector<int> gone_;
   std::uint64_t cuts_ = 0;
-  std::uint64_t untold_ = 0;  // cuts since the last line of the log
-  std::int64_t told_ns_;
+  std::uint64_t unreported_ = 0;  // cuts since the last line of the log
+  std::int64_t reported_ns_;
   std::int64_t inspected_ns_ = 0;
   std::uint64_t resident_before_ = 0;  // bytes
   std::atomic<bool> stop_{false};

@@ -36,7 +36,7 @@ const AllowedClient* AccessList::find(std::string_view public_z85, Domain domain
   return found == clients_.end() ? nullptr : &*found;
 }
 
-bool AccessList::loses_someone(const AccessList& newer, Domain domain) const {
+bool AccessList::revokes_any(const AccessList& newer, Domain domain) const {
   return std::ranges::any_of(clients_, [&](const AllowedClient& client) {
     return has_right(client, domain) && newer.find(client.public_z85, domain) == nullptr;
   });

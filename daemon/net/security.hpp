@@ -32,7 +32,7 @@ class AccessList {
   // The client with this public key when it has the right; null for strangers.
   [[nodiscard]] const AllowedClient* find(std::string_view public_z85, Domain domain) const;
   // Whether `newer` takes the right from a key that has it now: such clients must be cut off.
-  [[nodiscard]] bool loses_someone(const AccessList& newer, Domain domain) const;
+  [[nodiscard]] bool revokes_any(const AccessList& newer, Domain domain) const;
 
  private:
   std::vector<AllowedClient> clients_;

@@ -12,13 +12,13 @@ namespace {
 
 constexpr const char* kZapEndpoint = "inproc://zeromq.zap.01";
 constexpr long kPause_ms = 50;
-constexpr std::size_t kLongestRequest = 16;  // parts; RFC 27 needs 7 for CURVE
+constexpr std::size_t kMaxRequestParts = 16;  // parts; RFC 27 needs 7 for CURVE
 
 // All parts of one message; those beyond the longest request are left out.
 std::vector<std::string> read_parts(void* door, Message& part) {
   std::vector<std::string> parts;
   do {
-    if (parts.size() < kLongestRequest) parts.emplace_back(part.text());
+    if (parts.size() < kMaxRequestParts) parts.emplace_back(part.text());
   } while (part.more() && part.receive(door, 0));
   return parts;
 }
@@ -61,7 +61,7 @@ ZapAuthenticator::~ZapAuthenticator() {
 ZapAuthenticator::Change ZapAuthenticator::replace(AccessList list) {
   const std::scoped_lock lock(mutex_);
   if (!list_) return {};
-  const Change change{list_->loses_someone(list, Domain::kPublish)};
+  const Change change{list_->revokes_any(list, Domain::kPublish)};
   list_ = std::move(list);
   return change;
 }

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::int64_t kBucket_ns = kNanosPerSecond / 2;
 constexpr std::size_t kPointsForDrift = 8;  // before that a crystal's drift is less than the noise
-constexpr double kMostDrift = 1e-3;         // ten times what a cheap crystal is off
+constexpr double kMaxDrift = 1e-3;          // ten times what a cheap crystal is off
 // Earlier than the line says by this much: the device's time jumped forward.
 constexpr std::int64_t kEarly_ns = 50'000'000;
 // Later by this much for so long: no delay, the device's time jumped back.
@@ -100,7 +100,7 @@ void DeviceClock::fit() noexcept {
   while (edge + 1 < size && hull[edge].x < mean_x) ++edge;
   const XY& a = hull[edge - 1];
   const XY& b = hull[edge];
-  const double slope = std::clamp((b.y - a.y) / (b.x - a.x), -kMostDrift, kMostDrift);
+  const double slope = std::clamp((b.y - a.y) / (b.x - a.x), -kMaxDrift, kMaxDrift);
   const double offset = a.y - slope * a.x;
   mapping_ = {.offset_ns = origin.delay_ns + static_cast<std::int64_t>(offset),
               .origin_ns = origin.device_ns,

@@ -53,8 +53,8 @@ class Intake final : public Sink {
 
   // A event of the reader, between two chunks. It takes a number only when there was room, so it
   // may be tried again until there is. `name`: of the calibration that the event is about.
-  [[nodiscard]] bool tell(std::uint8_t event, std::uint64_t ticket,
-                          std::string_view name = {}) noexcept;
+  [[nodiscard]] bool report(std::uint8_t event, std::uint64_t ticket,
+                            std::string_view name = {}) noexcept;
 
   // Sink, for the decoder.
   void frame(Frame& frame) noexcept override;

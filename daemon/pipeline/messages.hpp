@@ -79,7 +79,7 @@ static_assert(std::is_trivially_copyable_v<Item>);
 }
 
 // Commands of both kinds that may be under way: sent, and their Ack not yet taken by control.
-inline constexpr std::size_t kMostUnderWay = 64;
+inline constexpr std::size_t kMaxUnderWay = 64;
 
 // Where the numbering stands: what comes next of a stream, and of its reader, gets these numbers.
 struct Position {

@@ -72,7 +72,7 @@ class Reader {
          std::unique_ptr<system::Poller> poller);
   // Reads what is due by the clock; returns when that is the case next.
   std::int64_t serve_timed(std::int64_t now_ns) noexcept;
-  bool hear() noexcept;  // slots and commands; false: some must wait for room in the ring
+  bool take_requests() noexcept;  // slots and commands; false: some must wait for room in the ring
   [[nodiscard]] bool called() const noexcept { return called_.load(std::memory_order_acquire); }
 
   ReaderPorts ports_;

@@ -22,7 +22,7 @@ class Reader::Source final : private IntakeOut {
   static constexpr int kChunksATurn = 64;
   static constexpr std::size_t kBytesATurn = 4096;
   // Frames of a lossless source on their way through the pipeline; below what the pipeline sheds.
-  static constexpr std::uint64_t kPatientFrames = 2;
+  static constexpr std::uint64_t kFramesUnderWay = 2;
 
  public:
   Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports,
@@ -47,7 +47,7 @@ class Reader::Source final : private IntakeOut {
     return !device_->transport->lossless() ||
            counters_.reader.frames.load(std::memory_order_relaxed) -
                    counters_.pipeline.consumed.load(std::memory_order_acquire) <
-               kPatientFrames;
+               kFramesUnderWay;
   }
 
   // When it has to be looked at without its descriptor saying so; kNoTime_ns: never.
@@ -55,21 +55,21 @@ class Reader::Source final : private IntakeOut {
     if (device_ == nullptr || ended_) return kNoTime_ns;
     return poll_due_ns_ != kNoTime_ns ? poll_due_ns_ : device_->transport->next_due_ns();
   }
-  [[nodiscard]] bool patient_now() const noexcept { return device_ != nullptr && !may_read(); }
+  [[nodiscard]] bool must_wait() const noexcept { return device_ != nullptr && !may_read(); }
 
   // Before the first read: what the first device is and how it is calibrated.
   void begin() noexcept {
     arrived(ports_.clock());
-    if (calibration_ != nullptr) tell_calibration();
+    if (calibration_ != nullptr) record_calibration();
     counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
     if (device_ != nullptr) use(*device_);
   }
 
   void calibrate(const DeviceCommand& command) noexcept {
     calibration_ = command.calibration;
-    tell_calibration();
+    record_calibration();
     if (device_ != nullptr) device_->decoder->calibrate(*calibration_->calibration);
-    static_cast<void>(tell(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
+    static_cast<void>(report(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
   }
 
   void send(std::span<const std::byte> bytes) noexcept {
@@ -114,7 +114,7 @@ class Reader::Source final : private IntakeOut {
         counters_.reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
         break;
       case Item::Kind::kEvent:
-        return push_notice(item);
+        return push_event(item);
       default:
         item.frame.stamps.decoded_ns = ports_.clock();
         counters_.reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
@@ -194,10 +194,10 @@ class Reader::Source final : private IntakeOut {
   }
 
   // The end must be heard: without room it is tried again at the next read.
-  void end() noexcept { ended_ = tell(v1::Event::KIND_ENDED, 0); }
+  void end() noexcept { ended_ = report(v1::Event::KIND_ENDED, 0); }
 
-  bool tell(v1::Event::Kind event, std::uint64_t ticket, std::string_view name = {}) noexcept {
-    return intake_.tell(static_cast<std::uint8_t>(event), ticket, name);
+  bool report(v1::Event::Kind event, std::uint64_t ticket, std::string_view name = {}) noexcept {
+    return intake_.report(static_cast<std::uint8_t>(event), ticket, name);
   }
 
   // Once full, the stream's share takes nothing until half of it is free. A device that floods then
@@ -229,7 +229,7 @@ class Reader::Source final : private IntakeOut {
   }
 
   // What a device can cause at any rate has to fit into its stream's share, too.
-  bool push_notice(const Item& item) noexcept {
+  bool push_event(const Item& item) noexcept {
     const bool shared = item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
     return (!shared || share_is_open()) && put(item);
   }
@@ -239,7 +239,7 @@ class Reader::Source final : private IntakeOut {
     intake_.arrived(arrival_ns);
   }
 
-  void tell_calibration() noexcept {
+  void record_calibration() noexcept {
     record_sink(pipeline::Direction::kCalibration, std::as_bytes(std::span(calibration_->text)));
   }
   void record_sink(pipeline::Direction direction, std::span<const std::byte> bytes) noexcept {

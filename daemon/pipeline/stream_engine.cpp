@@ -97,7 +97,7 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   }
   stage_us_.fill(0.0F);
   run(0, {.frame = frame, .input = &frame}, out);
-  tell_played(header.arrival_ns, out);
+  report_played(header.arrival_ns, out);
 }
 
 // The frames before this one that have not come never will.
@@ -216,7 +216,7 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
       stages_[i]->tick(now_ns, rest);
       time_stage(before);
     }
-    tell_played(now_ns, out);
+    report_played(now_ns, out);
   }
   if (!stale) return;
   if (state_ == StreamState::kLive) {
@@ -234,8 +234,8 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
 Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   Ack ack{.ticket = command.ticket, .stream = options_.stream, .sequence = last_sequence_ + 1};
   Decision decision{.stream = options_.stream, .sequence = ack.sequence};
-  StreamEvent told{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
-  describe(command, told);
+  StreamEvent change{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
+  describe(command, change);
   switch (command.kind) {
     case Command::Kind::kAlpha:
       decision.kind = Decision::Kind::kAlpha;
@@ -268,9 +268,9 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   }
   out.decision(decision);
   if (ack.refused) return ack;
-  told.sequence = ack.sequence;
+  change.sequence = ack.sequence;
   other_.kind = Item::Kind::kEvent;
-  other_.stream_event = told;
+  other_.stream_event = change;
   out.item(other_);
   return ack;
 }
@@ -311,7 +311,7 @@ void StreamEngine::flush(EngineOut& out) noexcept {
   }
 }
 
-void StreamEngine::tell_played(std::int64_t time_ns, EngineOut& out) noexcept {
+void StreamEngine::report_played(std::int64_t time_ns, EngineOut& out) noexcept {
   const bool performed = performs_;
   performs_ = any_performs();
   if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);

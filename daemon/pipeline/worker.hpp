@@ -56,24 +56,24 @@ class Worker {
   [[nodiscard]] const StreamEngine& engine(std::uint32_t stream) const;
 
  private:
-  struct Lane;
+  struct StreamContext;
   Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller);
-  void obey() noexcept;
+  void apply_commands() noexcept;
   void take_items(int most) noexcept;
   void take(const Item& item) noexcept;
   void acknowledge(const Ack& ack) noexcept;
   void send_acks() noexcept;
   [[nodiscard]] std::int64_t next_due_ns(std::int64_t now_ns) const noexcept;
-  void pass_on(const StreamEvent& event, Lane& lane) noexcept;
+  void pass_on(const StreamEvent& event, StreamContext& context) noexcept;
   void tick(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool idle() const noexcept;
 
   WorkerPorts ports_;
   std::unique_ptr<system::Poller> poller_;
-  std::vector<std::unique_ptr<Lane>> lanes_;
-  std::uint64_t place_ = 1;  // number of the item before which a decision made now takes effect
+  std::vector<std::unique_ptr<StreamContext>> contexts_;
+  std::uint64_t position_ = 1;  // number of the item before which a decision made now takes effect
   // Acks that found no room; at most as many as there are commands under way.
-  std::array<Ack, kMostUnderWay> unsent_{};
+  std::array<Ack, kMaxUnderWay> unsent_{};
   std::size_t unsent_count_ = 0;
   std::atomic<bool> stop_{false};
 };

@@ -20,13 +20,13 @@ constexpr double kQueueDepth_s = 0.25;
 constexpr int kMinQueue = 16;
 // What a subscriber may say: a handshake with CURVE and a long name, and then topics, one at a
 // time, so that a flood of them reaches us as fast as we hear them and no faster.
-constexpr std::int64_t kLongestPart = 512;  // bytes
+constexpr std::int64_t kMaxPart = 512;  // bytes
 // Two at least: through a queue of one, libzmq 4.3.4 hands on nothing of a peer that uses CURVE.
 constexpr int kSubscriptionsWaiting = 2;
 constexpr int kReceiveBuffer_bytes = 8 * 1024;
 // Bytes of one peer that came to no message: the kernel and libzmq hold up to 16 KB before we hear.
-constexpr std::uint64_t kMostUnheard = 24 * 1024;
-constexpr std::uint64_t kMostUnheardOfAll = 512 * 1024;
+constexpr std::uint64_t kMaxUnheard = 24 * 1024;
+constexpr std::uint64_t kMaxUnheardOfAll = 512 * 1024;
 constexpr int kSubscriptionsATurn = 64;
 // A skeleton is sent to all who want it when one asks; not more often than this.
 constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
@@ -101,7 +101,7 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
     auto secured = net::secure_server(socket->get(), net::Domain::kPublish, options.secret_z85);
     if (!secured) return std::unexpected(secured.error());
   }
-  if (auto set = net::set_receive_limits(socket->get(), kLongestPart, kSubscriptionsWaiting,
+  if (auto set = net::set_receive_limits(socket->get(), kMaxPart, kSubscriptionsWaiting,
                                          kReceiveBuffer_bytes);
       !set) {
     return std::unexpected(set.error());
@@ -109,8 +109,8 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
   auto guard = net::PeerGuard::open(options.context, socket->get(),
                                     {.name = "publish",
                                      .most_peers = net::peer_shares().publish,
-                                     .most_unheard = kMostUnheard,
-                                     .most_unheard_of_all = kMostUnheardOfAll,
+                                     .max_unheard = kMaxUnheard,
+                                     .max_unheard_of_all = kMaxUnheardOfAll,
                                      .authenticator = options.authenticator});
   if (!guard) return std::unexpected(guard.error());
   auto endpoint = net::bind_socket(socket->get(), options.endpoint);
@@ -165,7 +165,7 @@ std::int64_t Publisher::turn(std::int64_t now_ns) {
 
 void Publisher::finish(std::int64_t now_ns) {
   take_all();
-  for (std::uint32_t i = 0; i < published_.size(); ++i) tell_shed(i, true);
+  for (std::uint32_t i = 0; i < published_.size(); ++i) report_shed(i, true);
   every_second(now_ns);
 }
 
@@ -221,13 +221,13 @@ void Publisher::take_notice(const pipeline::StreamEvent& event) {
   const auto kind = static_cast<v1::Event::Kind>(event.kind);
   if (kind == v1::Event::KIND_SHED) {
     published_[event.stream]->shed.add(event.sequence, static_cast<std::uint64_t>(event.value));
-    return tell_shed(event.stream, false);
+    return report_shed(event.stream, false);
   }
-  if (kind == v1::Event::KIND_ENDED) tell_shed(event.stream, true);
+  if (kind == v1::Event::KIND_ENDED) report_shed(event.stream, true);
   send_event(event.stream, kind, event.time_ns, event.sequence, sentence(event));
 }
 
-void Publisher::tell_shed(std::uint32_t stream, bool at_end) {
+void Publisher::report_shed(std::uint32_t stream, bool at_end) {
   const std::int64_t now_ns = options_.clock();
   const auto sum = published_[stream]->shed.take(now_ns, at_end);
   if (!sum) return;
@@ -345,7 +345,7 @@ void Publisher::every_second(std::int64_t now_ns) {
       static_cast<float>(100.0 * seconds(cpu_ns - shared_->cpu_ns) / std::max(since_s, 1e-3)));
   for (std::uint32_t i = 0; i < published_.size(); ++i) {
     published_[i]->report(*stats.add_stream(), since_s);
-    tell_shed(i, false);
+    report_shed(i, false);
   }
   if (options_.more_stats) options_.more_stats(stats);
   shared_->reported_ns = now_ns;
@@ -388,11 +388,11 @@ void Publisher::set_model_name(std::uint32_t stream, std::string name) {
 }
 
 void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {
-  ask([&](SharedState& told) { told.events.push_back({stream, kind, std::move(text)}); });
+  ask([&](SharedState& state) { state.events.push_back({stream, kind, std::move(text)}); });
 }
 
 void Publisher::check_subscribers() {
-  ask([](SharedState& told) { told.check = true; });
+  ask([](SharedState& state) { state.check = true; });
 }
 
 v1::Stats Publisher::stats() const {

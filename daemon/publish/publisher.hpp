@@ -104,7 +104,7 @@ class Publisher {
   void take(const pipeline::Item& item);
   void take_frame(const Frame& frame, bool raw);
   void take_notice(const pipeline::StreamEvent& event);
-  void tell_shed(std::uint32_t stream, bool at_end);
+  void report_shed(std::uint32_t stream, bool at_end);
   void send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
                   std::uint64_t sequence, const std::string& text);
   // Sends the skeletons that are due; returns when the next is.

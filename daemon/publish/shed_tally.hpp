@@ -20,24 +20,25 @@ class ShedTally {
   // `frames` from `first` on were skipped.
   void add(std::uint64_t first, std::uint64_t frames) noexcept {
     if (frames == 0) return;
-    if (untold_.frames == 0) untold_.first = first;
-    untold_.frames += frames;
-    untold_.last = first + frames - 1;
+    if (unreported_.frames == 0) unreported_.first = first;
+    unreported_.frames += frames;
+    unreported_.last = first + frames - 1;
   }
 
   // What is to be told now. At the end of a stream everything is.
   [[nodiscard]] std::optional<Sum> take(std::int64_t now_ns, bool at_end = false) noexcept {
-    const bool told_lately = told_ns_ != kNoTime_ns && now_ns - told_ns_ < kNanosPerSecond;
-    if (untold_.frames == 0 || (told_lately && !at_end)) return std::nullopt;
-    told_ns_ = now_ns;
-    const Sum sum = untold_;
-    untold_ = {};
+    const bool reported_lately =
+        reported_ns_ != kNoTime_ns && now_ns - reported_ns_ < kNanosPerSecond;
+    if (unreported_.frames == 0 || (reported_lately && !at_end)) return std::nullopt;
+    reported_ns_ = now_ns;
+    const Sum sum = unreported_;
+    unreported_ = {};
     return sum;
   }
 
  private:
-  Sum untold_;
-  std::int64_t told_ns_ = kNoTime_ns;
+  Sum unreported_;
+  std::int64_t reported_ns_ = kNoTime_ns;
 };
 
 }  // namespace posed::publish

@@ -19,10 +19,10 @@
 
 namespace posed::publish {
 
-inline constexpr std::size_t kMostWanted = 4096;   // distinct ones that could become a topic
-inline constexpr std::size_t kMostImpossible = 8;  // of one peer, that could never
-inline constexpr double kMostAtOnce = 8192.0;      // messages of one peer at once
-inline constexpr double kMostPerSecond = 256.0;    // and over time
+inline constexpr std::size_t kMaxWanted = 4096;   // distinct ones that could become a topic
+inline constexpr std::size_t kMaxImpossible = 8;  // of one peer, that could never
+inline constexpr double kMaxAtOnce = 8192.0;      // messages of one peer at once
+inline constexpr double kMaxPerSecond = 256.0;    // and over time
 
 // Whether topics of a posed may begin so: "", "po", "pose/", "pose/left-han", "stats".
 [[nodiscard]] bool could_become_topic(std::string_view prefix);
@@ -42,7 +42,7 @@ class Subscriptions {
 
  private:
   struct Peer {
-    double budget = kMostAtOnce;  // messages that it may still send
+    double budget = kMaxAtOnce;  // messages that it may still send
     std::int64_t asked_ns = 0;
     std::set<std::string, std::less<>> waits;  // what it asked for that is no topic yet
     std::size_t impossible = 0;                // of those

@@ -62,12 +62,12 @@ bool read_hash(const std::string& sha256, pipeline::Decision& decision) {
 }
 
 bool read_play(const Value::PlayOrder& play, pipeline::Decision& decision) {
-  constexpr std::uint32_t kMostLabel = std::numeric_limits<std::uint16_t>::max();
+  constexpr std::uint32_t kMaxLabelIndex = std::numeric_limits<std::uint16_t>::max();
   gesture::PlayOrder& order = decision.play;
   const auto count = static_cast<std::size_t>(play.label_size());
   if (count == 0 || count > order.label.size()) return false;
   for (const std::uint32_t label : play.label()) {
-    if (label > kMostLabel) return false;
+    if (label > kMaxLabelIndex) return false;
     order.label[order.size++] = static_cast<std::uint16_t>(label);
   }
   order.tempo = play.tempo();

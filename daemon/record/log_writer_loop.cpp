@@ -19,17 +19,17 @@ constexpr std::array<const char*, 3> kKindNames{"chunks", "decisions", "publishe
 }  // namespace
 
 LogWriterLoop::LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesystem::path path,
-                             std::function<void(const RecorderEvent&)> tell)
+                             std::function<void(const RecorderEvent&)> report)
     : rings_(rings),
       writer_(std::move(writer)),
       path_(std::move(path)),
-      tell_(std::move(tell)),
+      report_(std::move(report)),
       streams_(rings.streams()) {}
 
 void LogWriterLoop::turn(std::int64_t now_ns) {
   if (!writer_ && now_ns >= retry_ns_) resume(now_ns);
   drain(now_ns);
-  tell_overflows(now_ns);
+  report_overflows(now_ns);
   if (writer_ && now_ns - last_commit_ns_ >= kCommitEvery_ns) {
     if (auto done = commit(now_ns); !done) fail(done.error(), now_ns);
   }
@@ -73,7 +73,7 @@ bool LogWriterLoop::put(std::uint32_t stream, GapKind kind, const Row& row, std:
     }
     fail(done.error(), now_ns);
   }
-  lose(stream, kind, 1);
+  count_lost(stream, kind, 1);
   return false;
 }
 
@@ -132,7 +132,7 @@ Result<> LogWriterLoop::commit(std::int64_t now_ns) {
   return {};
 }
 
-void LogWriterLoop::lose(std::uint32_t stream, GapKind kind, std::uint64_t count) {
+void LogWriterLoop::count_lost(std::uint32_t stream, GapKind kind, std::uint64_t count) {
   streams_[stream].lost[index(kind)] += count;
   if (kind == GapKind::kChunks) lost_to_errors_ += count;
 }
@@ -150,7 +150,7 @@ void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     StreamState& stream = streams_[id];
     for (const GapKind kind : kKinds) {
-      lose(id, kind, std::exchange(stream.uncommitted[index(kind)], 0));
+      count_lost(id, kind, std::exchange(stream.uncommitted[index(kind)], 0));
       stream.lost[index(kind)] += std::exchange(stream.in_gaps[index(kind)], 0);
     }
     stream.lost_from_frame =
@@ -159,7 +159,7 @@ void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
   }
   const std::string text = "recording stopped, streaming goes on: " + error.text();
   spdlog::error("{}", text);
-  tell_({.kind = RecorderEvent::Kind::kError, .stream = 0, .time_ns = now_ns, .text = text});
+  report_({.kind = RecorderEvent::Kind::kError, .stream = 0, .time_ns = now_ns, .text = text});
 }
 
 // Tries to write what is missing; only when that has worked does recording go on.
@@ -185,11 +185,11 @@ void LogWriterLoop::resume(std::int64_t now_ns) {
     streams_[id].lost_from_frame = kNoFrame;
     for (const GapKind kind : kKinds) {
       if (lost[index(kind)] == 0) continue;
-      tell_({.kind = RecorderEvent::Kind::kGap,
-             .stream = id,
-             .time_ns = now_ns,
-             .text = "the log lacks " + std::to_string(lost[index(kind)]) + " " +
-                     kKindNames[index(kind)] + " from while it could not be written"});
+      report_({.kind = RecorderEvent::Kind::kGap,
+               .stream = id,
+               .time_ns = now_ns,
+               .text = "the log lacks " + std::to_string(lost[index(kind)]) + " " +
+                       kKindNames[index(kind)] + " from while it could not be written"});
     }
   }
 }
@@ -207,16 +207,16 @@ Result<> LogWriterLoop::write_lost(std::int64_t now_ns) {
   return {};
 }
 
-void LogWriterLoop::tell_overflows(std::int64_t now_ns) {
+void LogWriterLoop::report_overflows(std::int64_t now_ns) {
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     for (const GapKind kind : kKinds) {
       const std::uint64_t total = rings_.overflowed(id, kind);
-      const std::uint64_t news = total - std::exchange(streams_[id].told[index(kind)], total);
+      const std::uint64_t news = total - std::exchange(streams_[id].reported[index(kind)], total);
       if (news == 0) continue;
       const std::string text = "the recorder's ring was full: the log lacks " +
                                std::to_string(news) + " " + kKindNames[index(kind)];
       spdlog::warn("{}", text);
-      tell_({.kind = RecorderEvent::Kind::kGap, .stream = id, .time_ns = now_ns, .text = text});
+      report_({.kind = RecorderEvent::Kind::kGap, .stream = id, .time_ns = now_ns, .text = text});
     }
   }
 }
@@ -224,7 +224,7 @@ void LogWriterLoop::tell_overflows(std::int64_t now_ns) {
 Result<> LogWriterLoop::finish(std::int64_t now_ns) {
   if (!writer_) resume(now_ns);
   drain(now_ns);
-  tell_overflows(now_ns);
+  report_overflows(now_ns);
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     for (const GapKind kind : kKinds) {
       put_gap(id, kind, rings_.uncarried(id, kind), now_ns, rings_.uncarried_from_frame(id));

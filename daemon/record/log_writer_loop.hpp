@@ -30,7 +30,7 @@ class LogWriterLoop {
  public:
   // `tell` is called from within turn() and finish(). The rings must outlive the log_writer.
   LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesystem::path path,
-                std::function<void(const RecorderEvent&)> tell);
+                std::function<void(const RecorderEvent&)> report);
 
   // Call every 50 to 100 ms; commits when 250 ms have passed since the last commit.
   void turn(std::int64_t now_ns);
@@ -50,7 +50,7 @@ class LogWriterLoop {
     Counts uncommitted{};  // rows added since the last commit
     Counts in_gaps{};      // what gap rows since then speak of
     Counts lost{};         // in no gap row yet
-    Counts told{};         // overflows already told
+    Counts reported{};     // overflows already told
     // The first frame that a decision concerns which was added, or told of in a gap row, since the
     // last commit; which is lost and in no gap row yet.
     std::uint64_t uncommitted_from_frame = kNoFrame;
@@ -72,15 +72,15 @@ class LogWriterLoop {
                                             std::int64_t now_ns, std::uint64_t from_frame) const;
   [[nodiscard]] Result<> write_lost(std::int64_t now_ns);
   [[nodiscard]] Result<> commit(std::int64_t now_ns);
-  void lose(std::uint32_t stream, GapKind kind, std::uint64_t count);
+  void count_lost(std::uint32_t stream, GapKind kind, std::uint64_t count);
   void fail(const Error& error, std::int64_t now_ns);
   void resume(std::int64_t now_ns);
-  void tell_overflows(std::int64_t now_ns);
+  void report_overflows(std::int64_t now_ns);
 
   RecordRings& rings_;
   std::optional<log::Writer> writer_;  // nothing while writing fails
   std::filesystem::path path_;
-  std::function<void(const RecorderEvent&)> tell_;
+  std::function<void(const RecorderEvent&)> report_;
   std::vector<StreamState> streams_;
   std::vector<std::vector<std::byte>> models_;  // not yet committed
   std::int64_t last_commit_ns_ = 0;

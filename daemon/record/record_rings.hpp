@@ -111,41 +111,42 @@ class RecordRings final : public pipeline::RecordSink {
   [[nodiscard]] std::uint64_t uncarried(std::uint32_t stream, GapKind kind) const noexcept;
   // The first frame that a decision which no later one carries may concern.
   [[nodiscard]] std::uint64_t uncarried_from_frame(std::uint32_t stream) const noexcept;
-  [[nodiscard]] std::size_t streams() const noexcept { return lanes_.size(); }
+  [[nodiscard]] std::size_t streams() const noexcept { return shares_.size(); }
 
  private:
   // One stream's end of one ring. The share, carried and lost_from_frame belong to the one
   // producer of its kind; total is written by any; taken by the recorder; all but the share are
   // read by any.
-  struct Lane {
-    explicit Lane(std::size_t size) noexcept : share(size, taken) {}
+  struct StreamShare {
+    explicit StreamShare(std::size_t size) noexcept : share(size, taken) {}
     std::atomic<std::uint64_t> taken{0};
     pipeline::RingShare share;
     std::atomic<std::uint64_t> total{0};            // records that did not fit
     std::atomic<std::uint64_t> carried{0};          // of them, those that a later record tells of
     std::atomic<std::uint64_t> lost_from_frame{0};  // of decisions, see DecisionRecord
   };
-  struct Lanes {
-    explicit Lanes(const RingSizes& sizes) noexcept
-        : by_kind{Lane(sizes.chunk_bytes), Lane(sizes.decisions), Lane(sizes.frame_bytes)} {}
-    std::array<Lane, 3> by_kind;  // by GapKind
+  struct StreamShares {
+    explicit StreamShares(const RingSizes& sizes) noexcept
+        : by_kind{StreamShare(sizes.chunk_bytes), StreamShare(sizes.decisions),
+                  StreamShare(sizes.frame_bytes)} {}
+    std::array<StreamShare, 3> by_kind;  // by GapKind
   };
 
-  [[nodiscard]] Lane& lane(std::uint32_t stream, GapKind kind) noexcept {
-    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  [[nodiscard]] StreamShare& share_of(std::uint32_t stream, GapKind kind) noexcept {
+    return shares_[stream].by_kind[static_cast<std::size_t>(kind)];
   }
-  [[nodiscard]] const Lane& lane(std::uint32_t stream, GapKind kind) const noexcept {
-    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  [[nodiscard]] const StreamShare& share_of(std::uint32_t stream, GapKind kind) const noexcept {
+    return shares_[stream].by_kind[static_cast<std::size_t>(kind)];
   }
   void give_back(std::uint32_t stream, GapKind kind, std::size_t amount) noexcept {
-    lane(stream, kind).taken.fetch_add(amount, std::memory_order_release);
+    share_of(stream, kind).taken.fetch_add(amount, std::memory_order_release);
   }
 
   RecordRing<ChunkHeader> chunks_;
   RecordRing<FrameHeader> frames_;
   boost::lockfree::spsc_queue<DecisionRecord> decisions_;
   bool wants_published_ = false;
-  std::deque<Lanes> lanes_;  // by stream
+  std::deque<StreamShares> shares_;  // by stream
   std::mutex models_mutex_;
   std::vector<std::vector<std::byte>> models_;
 };

@@ -17,7 +17,7 @@ namespace {
 
 constexpr auto kWakeEvery = std::chrono::milliseconds(50);
 constexpr double kRing_s = 5.0;                       // what the rings hold at the nominal rates
-constexpr std::size_t kLeast = 8 * 1024 * 1024;       // bytes of all; for sources faster than told
+constexpr std::size_t kMinRings = 8 * 1024 * 1024;    // bytes of all; for sources faster than told
 constexpr double kBytesPerFrame = 4096.0;             // a text clip's line of 96 joints is shorter
 constexpr double kUnknownBytesPerSecond = 1'000'000;  // more than any glove sends
 constexpr double kUnknownFramesPerSecond = 1000.0;
@@ -25,7 +25,7 @@ constexpr double kDecisionsPerSecond = 200.0;  // a stream's ticks, sheds and co
 
 // What each stream may have in the recorder's rings.
 std::vector<RingSizes> ring_shares(const std::vector<RecordedStream>& streams, bool frames) {
-  const std::size_t least = kLeast / std::max<std::size_t>(streams.size(), 1);
+  const std::size_t least = kMinRings / std::max<std::size_t>(streams.size(), 1);
   const auto held = [&](double bytes_per_s) {
     return std::max(static_cast<std::size_t>(kRing_s * bytes_per_s), least);
   };
@@ -128,7 +128,7 @@ Recorder::Recorder(RecorderOptions options, const std::vector<RecordedStream>& s
                    log::Writer writer)
     : options_(std::move(options)),
       rings_(ring_shares(streams, options_.frames)),
-      log_writer_(rings_, std::move(writer), options_.file, options_.tell),
+      log_writer_(rings_, std::move(writer), options_.file, options_.report),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 Recorder::~Recorder() = default;

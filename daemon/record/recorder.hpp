@@ -41,7 +41,7 @@ struct RecorderOptions {
   std::string publish_endpoint;  // where it published; replay does, too
   Clock clock = nullptr;         // CLOCK_MONOTONIC
   // Called from the recorder thread.
-  std::function<void(const RecorderEvent&)> tell = [](const RecorderEvent&) {};
+  std::function<void(const RecorderEvent&)> report = [](const RecorderEvent&) {};
 };
 
 // Makes the log and writes what stands in it before the first chunk, committed.

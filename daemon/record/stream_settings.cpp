@@ -15,8 +15,9 @@ using Json = nlohmann::ordered_json;
 namespace words = log::words;
 
 bool sound(const StreamSettings& settings) {
-  constexpr double kMost = 1e6;  // seconds, Hz, per second: far beyond sense, far below overflow
-  const auto within = [](double value) { return value >= -kMost && value <= kMost; };
+  constexpr double kMaxSetting =
+      1e6;  // seconds, Hz, per second: far beyond sense, far below overflow
+  const auto within = [](double value) { return value >= -kMaxSetting && value <= kMaxSetting; };
   const style::FilterOptions style = settings.style.value_or(style::FilterOptions{});
   const smooth::LiveOptions live = settings.generate.value_or(smooth::LiveOptions{});
   return settings.stale_after_s > 0.0 && within(settings.stale_after_s) &&

@@ -29,7 +29,7 @@ void TakeClock::reached(std::int64_t arrival_ns) {
   const std::int64_t host_ns = host_();
   const std::scoped_lock lock(mutex_);
   const std::int64_t now_ns = at(host_ns);
-  const bool back = arrival_ns < now_ns - Pace::kLongestSilence_ns;  // a wrong time is over
+  const bool back = arrival_ns < now_ns - Pace::kMaxSilence_ns;  // a wrong time is over
   take_ns_ = back ? arrival_ns : std::max(arrival_ns, now_ns);
   host_ns_ = host_ns;
 }

@@ -14,7 +14,7 @@ namespace posed::replay {
 
 class Pace {
  public:
-  static constexpr std::int64_t kLongestSilence_ns = 60 * kNanosPerSecond;
+  static constexpr std::int64_t kMaxSilence_ns = 60 * kNanosPerSecond;
 
   // `speed` is above zero: 2 takes half the recorded time.
   explicit Pace(double speed) : speed_(speed) {}
@@ -28,8 +28,8 @@ class Pace {
     if (static_cast<pipeline::Direction>(chunk.direction) == pipeline::Direction::kCalibration)
       return {due_ns_, 0};
     const std::int64_t since_ns = chunk.arrival_ns - last_ns_.value_or(chunk.arrival_ns);
-    const bool too_long = since_ns > kLongestSilence_ns;
-    const bool back = since_ns < -kLongestSilence_ns;  // a wrong time is over
+    const bool too_long = since_ns > kMaxSilence_ns;
+    const bool back = since_ns < -kMaxSilence_ns;  // a wrong time is over
     if (!last_ns_ || too_long || back) {
       last_ns_ = chunk.arrival_ns;
       return {due_ns_, too_long ? since_ns : 0};

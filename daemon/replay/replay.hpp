@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
-#include "daemon/replay/replay_lane.hpp"
 #include "daemon/replay/replay_models.hpp"
+#include "daemon/replay/replay_stream_context.hpp"
 #include "daemon/replay/schedule.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/reader.hpp"
@@ -19,13 +19,15 @@
 namespace posed::replay {
 
 // Streams are numbered by their place in Reader::streams(), whatever their ids in the log are.
-class Replay final : private LaneHost {
+class Replay final : private ReplayHost {
  public:
   // Builds decoders, models and engines of all streams. The reader outlives the replay.
   [[nodiscard]] static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
   ~Replay() override = default;
 
-  [[nodiscard]] std::uint32_t streams() const { return static_cast<std::uint32_t>(lanes_.size()); }
+  [[nodiscard]] std::uint32_t streams() const {
+    return static_cast<std::uint32_t>(contexts_.size());
+  }
   [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
   // Where the slew of the stream's style is, while run() lasts and afterwards; 0 without a style.
@@ -43,18 +45,18 @@ class Replay final : private LaneHost {
 
  private:
   explicit Replay(log::Reader& reader);
-  [[nodiscard]] Result<> open_lanes();
+  [[nodiscard]] Result<> open_contexts();
   [[nodiscard]] Result<> load_decisions();
   [[nodiscard]] Result<> load_gaps();
   void apply(const Schedule::Entry& entry) noexcept;
 
-  // LaneHost
-  void before(const pipeline::Item& item, std::uint32_t lane) noexcept override;
+  // ReplayHost
+  void before(const pipeline::Item& item, std::uint32_t index) noexcept override;
   void publish(const pipeline::Item& item) noexcept override { (*out_)(item); }
 
   log::Reader& reader_;
   ReplayModels models_;
-  std::vector<std::unique_ptr<ReplayLane>> lanes_;
+  std::vector<std::unique_ptr<ReplayStreamContext>> contexts_;
   Schedule schedule_;
   const Out* out_ = nullptr;  // of the run in progress
 };

@@ -184,7 +184,7 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
       "\nreceived %llu styled frames over ZeroMQ, %llu missing; %.1f deg rms from the raw poses\n",
       static_cast<unsigned long long>(watcher.styled()),
       static_cast<unsigned long long>(watcher.gaps()), watcher.change_deg());
-  if (const std::string told = hand->summary(); !told.empty()) std::puts(told.c_str());
+  if (const std::string summary = hand->summary(); !summary.empty()) std::puts(summary.c_str());
   for (const v1::StreamStats& s : stats.stream()) {
     std::printf(
         "%s: %.1f frames/s, arrival to ZeroMQ p50 %.0f us, p99 %.0f us, dropped %llu, shed %llu\n",

@@ -25,7 +25,7 @@ namespace {
 using drivers::glove::CalibrationFile;
 using drivers::glove::kPoseNames;
 
-constexpr double kMostSeconds = 60.0;
+constexpr double kMaxSeconds = 60.0;
 
 struct CalibrateOptions {
   std::string driver, port, id, stream, user;
@@ -77,7 +77,7 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
       const auto [stop, error] = std::from_chars(word.data() + equals + 1, end, seconds);
       if (error != std::errc() || stop != end) seconds = -1.0;
     }
-    if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMostSeconds)) {
+    if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMaxSeconds)) {
       return misuse("'" + word + "': --pose is flat, fist, thumb or spread =SECONDS, 0 to 60");
     }
     plan.seconds[static_cast<std::size_t>(name - kPoseNames.begin())] = seconds;
@@ -236,11 +236,11 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command
       ->add_option("--seconds", options->seconds, "Hold each pose this long; it begins by itself")
-      ->check(CLI::Range(0.1, kMostSeconds));
+      ->check(CLI::Range(0.1, kMaxSeconds));
   auto* ready =
       command->add_option("--ready", options->ready_s, "With --seconds: the time from pose to pose")
           ->capture_default_str()
-          ->check(CLI::Range(0.0, kMostSeconds));
+          ->check(CLI::Range(0.0, kMaxSeconds));
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--force", options->force, "Write the calibration even if poses failed");
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")

@@ -240,18 +240,18 @@ Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& c
     const auto heard = subscription->next();
     if (!heard) return std::unexpected(heard.error());
     if (!heard->stats) continue;
-    const v1::StreamStats* told = subscription->part_of(*heard->stats);
-    if (told == nullptr) return no_such_stream(stream, *heard->stats);
-    const drivers::Driver* driver = drivers::find_driver(told->driver());
-    if (driver == nullptr || told->device_info().empty()) {
-      return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(told->driver()) +
+    const v1::StreamStats* stats = subscription->part_of(*heard->stats);
+    if (stats == nullptr) return no_such_stream(stream, *heard->stats);
+    const drivers::Driver* driver = drivers::find_driver(stats->driver());
+    if (driver == nullptr || stats->device_info().empty()) {
+      return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(stats->driver()) +
                     ", which has no sensors that can be calibrated");
     }
-    if (told->away()) {
+    if (stats->away()) {
       return fail("the glove of stream " + in_quotes(stream) +
                   " is away: plug it in and begin again");
     }
-    const auto description = driver->describe(told->device_info(), told->identity());
+    const auto description = driver->describe(stats->device_info(), stats->identity());
     if (!description) return std::unexpected(description.error());
     auto glove = known(*driver, *description);
     if (!glove) return std::unexpected(glove.error());

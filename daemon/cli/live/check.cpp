@@ -37,31 +37,31 @@ Result<ordered_json> try_stream(const config::StreamConfig& config) {
   const auto constrains = devices::bind_constrain(**stream);
   if (!constrains) return std::unexpected(constrains.error());
   const drivers::Description& device = (*stream)->device.description;
-  ordered_json told{{"name", config.name},
-                    {"driver", config.driver},
-                    {"device", device.identity},
-                    {"rate_hz", device.rate_hz},
-                    {"joints", device.skeleton ? device.skeleton->joints.size() : 0},
-                    {"sample_values", device.samples.names.size()},
-                    {"publish_raw", config.publish_raw},
-                    {"stale_after_s", config.stale_after_s}};
+  ordered_json summary{{"name", config.name},
+                       {"driver", config.driver},
+                       {"device", device.identity},
+                       {"rate_hz", device.rate_hz},
+                       {"joints", device.skeleton ? device.skeleton->joints.size() : 0},
+                       {"sample_values", device.samples.names.size()},
+                       {"publish_raw", config.publish_raw},
+                       {"stale_after_s", config.stale_after_s}};
   if (*bound) {
-    told["model"] = (*bound)->name;
-    told["alpha"] = config.style->filter.alpha;
+    summary["model"] = (*bound)->name;
+    summary["alpha"] = config.style->filter.alpha;
   }
   if (config.generate) {
-    told["lag_frames"] = smooth::lag_frames(config.generate->live.lag,
-                                            1.0 / generate::stream_rate_hz(device.rate_hz));
-    if (gesture->model) told["gesture_model"] = gesture->model->name;
+    summary["lag_frames"] = smooth::lag_frames(config.generate->live.lag,
+                                               1.0 / generate::stream_rate_hz(device.rate_hz));
+    if (gesture->model) summary["gesture_model"] = gesture->model->name;
   }
-  told["constrain"] = *constrains;
-  told["present"] = missing->empty();
-  told["warnings"] = (*stream)->device.warnings;
+  summary["constrain"] = *constrains;
+  summary["present"] = missing->empty();
+  summary["warnings"] = (*stream)->device.warnings;
   if (!missing->empty()) {
-    told["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
-                               *missing + ")");
+    summary["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
+                                  *missing + ")");
   }
-  return told;
+  return summary;
 }
 
 std::string security_of(const config::DaemonConfig& config) {
@@ -103,9 +103,9 @@ int check(const CheckOptions& options) {
   ordered_json streams = ordered_json::array();
   if (reading.errors.empty()) {
     for (const config::StreamConfig& stream : reading.config.streams) {
-      auto told = try_stream(stream);
-      if (told) streams.push_back(std::move(*told));
-      if (!told) reading.errors.push_back(told.error());
+      auto summary = try_stream(stream);
+      if (summary) streams.push_back(std::move(*summary));
+      if (!summary) reading.errors.push_back(summary.error());
     }
   }
   int exit_code = 0;

@@ -183,19 +183,19 @@ std::optional<std::string> SilenceWatch::silence() const {
   return heart_.ever_heard() ? connection_.silence(*silence_s) : connection_.no_answer().message;
 }
 
-std::optional<Error> SilenceWatch::tell() {
+std::optional<Error> SilenceWatch::report() {
   const std::int64_t now_ns = system::monotonic_ns();
   const auto silence_s = heart_.silent_s(now_ns);
   if (timeout_s_ > 0.0 && silence_s && *silence_s >= timeout_s_) {
     return fail(fmt::format("{}; gave up after {} s (--timeout)", sentence(*silence_s), timeout_s_))
         .error();
   }
-  const auto news_s = heart_.silence_to_tell(now_ns);
+  const auto news_s = heart_.silence_to_report(now_ns);
   if (news_s && prints_) {
     std::fprintf(stderr, "posed: %s%s\n",
                  heart_.ever_heard() ? "" : "waiting: ", sentence(*news_s).c_str());
   }
-  if (const auto back_s = heart_.return_to_tell(); back_s && prints_) {
+  if (const auto back_s = heart_.return_to_report(); back_s && prints_) {
     std::fprintf(stderr, "posed: %s answers again, after %.0f s\n", connection_.endpoint().c_str(),
                  *back_s);
   }

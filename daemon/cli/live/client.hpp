@@ -70,10 +70,10 @@ class SilenceWatch {
 
   void heard();  // any message
   // Call now and then: says what is new. The error when it is time to give up.
-  [[nodiscard]] std::optional<Error> tell();
+  [[nodiscard]] std::optional<Error> report();
   // The sentence to show while the daemon is silent; nothing while it answers.
   [[nodiscard]] std::optional<std::string> silence() const;
-  // Whether tell() prints; a drawn screen shows silence() instead.
+  // Whether report() prints; a drawn screen shows silence() instead.
   void print(bool yes) { prints_ = yes; }
 
  private:

@@ -85,36 +85,36 @@ Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& mo
   part.set_sha256(log::sha256_hex(std::as_bytes(std::span(model))));
   part.set_total(model.size());
   Result<v1::ControlReply> reply = fail("the model is empty", options.model);
-  for (std::size_t offset = 0; offset < model.size(); offset += control::kLargestPiece) {
+  for (std::size_t offset = 0; offset < model.size(); offset += control::kMaxPiece) {
     part.set_offset(offset);
-    part.set_bytes(model.substr(offset, control::kLargestPiece));
+    part.set_bytes(model.substr(offset, control::kMaxPiece));
     reply = ask(*connection, options, request);
     if (!reply || !reply->ok()) return reply;
   }
   return reply;
 }
 
-// Prints an answer: JSON, or what `tell` makes of it.
-template <typename Tell>
-int show(const CtlOptions& options, const Result<v1::ControlReply>& reply, Tell&& tell) {
+// Prints an answer: JSON, or what `print` makes of it.
+template <typename Print>
+int show(const CtlOptions& options, const Result<v1::ControlReply>& reply, Print&& print) {
   if (!reply) return report(reply.error());
   if (options.json) (void)print_json(*reply);
   if (!reply->ok()) return report(Error{reply->error(), {}, 0, ExitCode::kFailed});
-  if (!options.json) tell(*reply);
+  if (!options.json) print(*reply);
   return 0;
 }
 
-template <typename Tell>
-int ask_and_tell(const CtlOptions& options, const v1::ControlRequest& request, Tell&& tell) {
-  return show(options, ask(options, request), tell);
+template <typename Print>
+int ask_and_print(const CtlOptions& options, const v1::ControlRequest& request, Print&& print) {
+  return show(options, ask(options, request), print);
 }
 
 // Says of which stream what is in effect from when on.
 int show_change(const CtlOptions& options, const Result<v1::ControlReply>& reply,
                 const std::string& what) {
-  return show(options, reply, [&](const v1::ControlReply& told) {
-    std::printf("%s: in effect from frame %llu: %s\n", told.stream().c_str(),
-                static_cast<unsigned long long>(told.sequence()), what.c_str());
+  return show(options, reply, [&](const v1::ControlReply& accepted) {
+    std::printf("%s: in effect from frame %llu: %s\n", accepted.stream().c_str(),
+                static_cast<unsigned long long>(accepted.sequence()), what.c_str());
   });
 }
 
@@ -132,8 +132,7 @@ int set_parameter(const CtlOptions& options) {
 int send_model(const CtlOptions& options) {
   const auto fits = expect_kind(options.model, FileKind::kModel, options.stream);
   if (!fits) return report(fits.error());
-  const auto bytes =
-      load_file(options.model, {.what = "model", .max_bytes = control::kLargestModel});
+  const auto bytes = load_file(options.model, {.what = "model", .max_bytes = control::kMaxModel});
   if (!bytes) return report(bytes.error());
   return show_change(options, upload(options, *bytes),
                      "model " + options.model.filename().string());
@@ -193,7 +192,7 @@ int haptics(const CtlOptions& options) {
     wanted.set_vibration_s(options.vibration[1]);
     wanted.set_vibration_amplitude(options.vibration[2]);
   }
-  return ask_and_tell(options, request, [&](const v1::ControlReply&) {
+  return ask_and_print(options, request, [&](const v1::ControlReply&) {
     std::printf("%s: sent to the device\n", options.stream.c_str());
   });
 }
@@ -201,7 +200,7 @@ int haptics(const CtlOptions& options) {
 int show_status(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_status();
-  return ask_and_tell(options, request, [&](const v1::ControlReply& reply) {
+  return ask_and_print(options, request, [&](const v1::ControlReply& reply) {
     LiveViewOptions view{.title = "posed " + options.client.endpoint, .height = 0};
     if (isatty(STDOUT_FILENO) == 0) view.width = 0;  // a script wants whole names
     for (const std::string& line : live_view(reply.status(), view)) std::puts(line.c_str());
@@ -211,8 +210,8 @@ int show_status(const CtlOptions& options) {
 int stop_daemon(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_stop();
-  return ask_and_tell(options, request,
-                      [](const v1::ControlReply&) { std::puts("the daemon is ending"); });
+  return ask_and_print(options, request,
+                       [](const v1::ControlReply&) { std::puts("the daemon is ending"); });
 }
 
 constexpr const char* kExamples = R"(Examples:

@@ -19,14 +19,14 @@ class Heartbeat {
 
   // For those who print lines: the silence, each time that a line about it is due (at once, then
   // after twice, four times, ... as long).
-  [[nodiscard]] std::optional<double> silence_to_tell(std::int64_t now_ns);
+  [[nodiscard]] std::optional<double> silence_to_report(std::int64_t now_ns);
   // How long it was silent [s], once after a silence that was told.
-  [[nodiscard]] std::optional<double> return_to_tell();
+  [[nodiscard]] std::optional<double> return_to_report();
 
  private:
   std::int64_t last_ns_;
   bool ever_heard_ = false;
-  double told_s_ = 0.0;             // the silence that was told last; 0: none
+  double reported_s_ = 0.0;         // the silence that was told last; 0: none
   std::optional<double> returned_;  // not told yet
 };
 

@@ -15,7 +15,7 @@
 namespace posed::cli {
 namespace {
 
-constexpr int kLeastWidth = 80;
+constexpr int kMinWidth = 80;
 constexpr int kNameWidth = 11;
 
 // Cut or padded to exactly `width` columns (names are ASCII); 0: to its last word.
@@ -26,7 +26,7 @@ std::string fit(const std::string& text, int width) {
 
 // Columns of a line, of streams' names and of models' names; 0: no limit.
 struct Widths {
-  int line = kLeastWidth;
+  int line = kMinWidth;
   int name = kNameWidth;
   int model = 1;
 };
@@ -139,7 +139,7 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths
 }
 
 Widths widths_for(const v1::Stats& stats, int wanted) {
-  if (wanted > 0) return {.line = std::max(wanted, kLeastWidth)};
+  if (wanted > 0) return {.line = std::max(wanted, kMinWidth)};
   Widths widths{.line = 0, .model = 0};
   for (const v1::StreamStats& stream : stats.stream()) {
     widths.name = std::max(widths.name, static_cast<int>(stream.stream().size()) + 2);

@@ -78,11 +78,11 @@ class Monitor {
     }
     while (!Interrupt::came() && !finished_) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
-      if (auto given_up = watch_.tell()) return std::unexpected(*given_up);
+      if (auto given_up = watch_.report()) return std::unexpected(*given_up);
       if (connection_.wait(kLookAround)) {
         if (auto taken = take(); !taken) return taken;
       } else {
-        tell_quiet_topic();
+        report_quiet_topic();
       }
     }
     if (options_.count > 0 && shown_ < options_.count) {
@@ -133,10 +133,10 @@ class Monitor {
                             options_.client.endpoint, options_.stream, names));
   }
 
-  void tell_quiet_topic() {
-    if (told_quiet_ || shown_ > 0 || !looked_) return;
+  void report_quiet_topic() {
+    if (quiet_topic_reported_ || shown_ > 0 || !looked_) return;
     if (std::chrono::steady_clock::now() - start_ < kPatience) return;
-    told_quiet_ = true;
+    quiet_topic_reported_ = true;
     std::fprintf(stderr, "posed: waiting: %s answers, but nothing of %s comes yet\n",
                  options_.client.endpoint.c_str(), asked_.front().c_str());
   }
@@ -148,7 +148,7 @@ class Monitor {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   int shown_ = 0;
   bool looked_ = false;
-  bool told_quiet_ = false;
+  bool quiet_topic_reported_ = false;
   bool finished_ = false;
 };
 

@@ -46,7 +46,7 @@ class Top {
     if (drawn) show(*screen);
     while (!Interrupt::came() && !(screen && screen->quit_pressed())) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
-      if (auto given_up = watch_.tell()) return std::unexpected(*given_up);
+      if (auto given_up = watch_.report()) return std::unexpected(*given_up);
       if (!connection_.wait(kLookAround)) {
         if (drawn && (watch_.silence() || was_silent_)) show(*screen);
         continue;

@@ -32,7 +32,7 @@ struct RecordOptions {
 };
 
 // Tells what the recorder noticed on event/<stream>: a gap on its own stream, an error on all.
-void tell(assembly::Daemon& daemon, const record::RecorderEvent& event) {
+void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
   if (event.kind == record::RecorderEvent::Kind::kGap) {
     daemon.post_event(event.stream, v1::Event::KIND_RECORDING_GAP, event.text);
     return;
@@ -43,8 +43,8 @@ void tell(assembly::Daemon& daemon, const record::RecorderEvent& event) {
 }
 
 // What there is now. What is missing in it has been told as it happened; here is the sum.
-void tell_result(const RecordOptions& options, const v1::Stats& stats,
-                 const record::Recorder& recorder, double took_s) {
+void print_result(const RecordOptions& options, const v1::Stats& stats,
+                  const record::Recorder& recorder, double took_s) {
   std::error_code ignored;
   const auto bytes = std::filesystem::file_size(options.out, ignored);
   std::uint64_t frames = 0, samples = 0;
@@ -109,8 +109,8 @@ Result<> record(const RecordOptions& options) {
       .config_text = config->text,
       .publish_endpoint = config->publish_endpoint,
       .clock = system::monotonic_ns,
-      .tell = [&daemon, started](const record::RecorderEvent& event) {
-        if (*started) tell(daemon, event);
+      .report = [&daemon, started](const record::RecorderEvent& event) {
+        if (*started) post(daemon, event);
       }};
   auto replaced = SetAside::move(options.out);
   if (!replaced) return std::unexpected(replaced.error());
@@ -137,7 +137,7 @@ Result<> record(const RecordOptions& options) {
   serve(daemon, options.serve);
   const double took_s = seconds(system::monotonic_ns() - start_ns);
   auto finished = (*recorder)->finish();
-  tell_result(options, daemon.stats(), **recorder, took_s);
+  print_result(options, daemon.stats(), **recorder, took_s);
   return finished;
 }
 

@@ -59,7 +59,7 @@ class Rows final : public StageOut {
 };
 
 // The gestures that were told, one entry a run of frames.
-json told(const Rows& rows, const clip::HandClip& clip) {
+json recognised(const Rows& rows, const clip::HandClip& clip) {
   json runs = json::array();
   double sum = 0.0;
   for (std::size_t t = 0; t < rows.labels.size(); ++t) {
@@ -124,8 +124,8 @@ Result<> smooth(const SmoothOptions& options) {
   Rows rows(*clip);
   ProgressBar bar(kQuietFor_s);
   for (std::size_t t = 0; t < measured.size(); ++t) {
-    const bool tell = t % kProgressEvery == 0;
-    if (tell &&
+    const bool shows = t % kProgressEvery == 0;
+    if (shows &&
         !bar.show("smoothing", static_cast<double>(t) / static_cast<double>(measured.size()))) {
       return fail("stopped; nothing was written", options.in);
     }
@@ -158,7 +158,7 @@ Result<> smooth(const SmoothOptions& options) {
               {"noise_deg", noise_deg},
               {"noise_given", options.noise_deg > 0.0},
               {"bridged_values", rows.bridged_values}};
-  if (model) report["labels"] = told(rows, *clip);
+  if (model) report["labels"] = recognised(rows, *clip);
   std::printf("%s\n", json_text(report, 2).c_str());
   return {};
 }

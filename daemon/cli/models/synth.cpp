@@ -50,8 +50,8 @@ Result<perform::PerformOptions> perform_options(const SynthOptions& options) {
   const auto& text = options.lookahead;
   const auto end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, frames);
-  constexpr int kMostFrames = 100'000;
-  if (error != std::errc{} || stop != end || frames < 0 || frames > kMostFrames) {
+  constexpr int kMaxFrames = 100'000;
+  if (error != std::errc{} || stop != end || frames < 0 || frames > kMaxFrames) {
     return misuse("--lookahead is a number of frames or full, not '" + text + "'");
   }
   perform.look_ahead = frames;

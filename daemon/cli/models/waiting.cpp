@@ -14,14 +14,14 @@ using std::chrono::seconds;
 Waiting::Waiting(std::string what)
     : what_(std::move(what)),
       terminal_(isatty(STDERR_FILENO) == 1),
-      thread_([this](const std::stop_token& stop) { tell(stop); }) {}
+      thread_([this](const std::stop_token& stop) { show(stop); }) {}
 
 Waiting::~Waiting() {
   thread_.request_stop();
   thread_.join();
 }
 
-void Waiting::tell(const std::stop_token& stop) {
+void Waiting::show(const std::stop_token& stop) {
   const auto never = [] { return false; };
   std::unique_lock lock(mutex_);
   seconds passed{0};

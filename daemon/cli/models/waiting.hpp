@@ -18,7 +18,7 @@ class Waiting {
   ~Waiting();
 
  private:
-  void tell(const std::stop_token& stop);
+  void show(const std::stop_token& stop);
 
   std::string what_;
   bool terminal_;

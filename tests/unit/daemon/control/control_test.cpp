@@ -84,10 +84,10 @@ v1::ControlRequest model_request(const std::string& stream, const std::string& b
   return request;
 }
 
-v1::ControlReply reply_of(const std::optional<Answer>& answer) {
+v1::ControlReply reply_of(const std::optional<Reply>& answer) {
   v1::ControlReply reply;
   REQUIRE(answer);
-  CHECK(answer->to == Asker{"me"});
+  CHECK(answer->to == Requester{"me"});
   REQUIRE(reply.ParseFromString(answer->bytes));
   return reply;
 }
@@ -96,10 +96,10 @@ struct Fixture {
   FakeDaemonControl daemon_control;
   RequestHandler handler{three_streams(), daemon_control};
 
-  std::optional<Answer> ask(const std::string& bytes) {
+  std::optional<Reply> ask(const std::string& bytes) {
     return handler.handle({"me"}, std::as_bytes(std::span(bytes)));
   }
-  std::optional<Answer> ask(const v1::ControlRequest& request) {
+  std::optional<Reply> ask(const v1::ControlRequest& request) {
     return ask(request.SerializeAsString());
   }
   // The sentence of a refusal.
@@ -113,9 +113,9 @@ struct Fixture {
   std::string refused_in_pieces(const std::string& stream, const std::string& model) {
     auto request = model_request(stream, model);
     auto& part = *request.mutable_model_part();
-    for (std::size_t offset = 0; offset < model.size(); offset += kLargestPiece) {
+    for (std::size_t offset = 0; offset < model.size(); offset += kMaxPiece) {
       part.set_offset(offset);
-      part.set_bytes(model.substr(offset, kLargestPiece));
+      part.set_bytes(model.substr(offset, kMaxPiece));
       const auto reply = reply_of(ask(request));
       if (!reply.ok()) return reply.error();
     }
@@ -227,11 +227,11 @@ TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
 TEST_CASE("requests are bounded in size and in number") {
   Fixture fixture;
   auto request = alpha_request("walker", 0.0F);
-  request.mutable_set_alpha()->set_stream(std::string(kLargestRequest, 'x'));
+  request.mutable_set_alpha()->set_stream(std::string(kMaxRequest, 'x'));
   CHECK(has(fixture.refused(request), "too large"));
-  CHECK(has(fixture.refused(model_request("walker", std::string(kLargestPiece + 1, 'x'))),
+  CHECK(has(fixture.refused(model_request("walker", std::string(kMaxPiece + 1, 'x'))),
             "a piece of a model has"));
-  for (std::size_t i = 0; i < kMostUnderWay; ++i) {
+  for (std::size_t i = 0; i < kMaxUnderWay; ++i) {
     CHECK_FALSE(fixture.ask(alpha_request("walker", 1.0F)));
   }
   const auto one_more = reply_of(fixture.ask(alpha_request("walker", 1.0F)));
@@ -280,8 +280,8 @@ class Booth final : public DaemonControl {
  private:
   Context context_;
   std::unique_ptr<system::EventFd> wake_ = *system::EventFd::open();
-  pipeline::Ring<Ack> acks_{kMostUnderWay};
-  pipeline::Ring<Ack> acks_feed_{kMostUnderWay};
+  pipeline::Ring<Ack> acks_{kMaxUnderWay};
+  pipeline::Ring<Ack> acks_feed_{kMaxUnderWay};
   RequestHandler handler_{three_streams(), *this};
   std::unique_ptr<ControlServer> server_;
 };

@@ -58,7 +58,7 @@ class KeptStream {
     supervisor_.emplace(*stream,
                         SupervisorPorts{.reader = reader_.get(),
                                         .clock = system::monotonic_ns,
-                                        .tell = [this](v1::Event::Kind kind, const std::string&) {
+                                        .report = [this](v1::Event::Kind kind, const std::string&) {
                                           lost += kind == v1::Event::KIND_LOST ? 1 : 0;
                                           found += kind == v1::Event::KIND_FOUND ? 1 : 0;
                                         }});

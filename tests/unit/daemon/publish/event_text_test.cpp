@@ -12,12 +12,12 @@ using pipeline::Change;
 using pipeline::ShortText;
 using pipeline::StreamEvent;
 
-StreamEvent notice_of(v1::Event::Kind kind) {
+StreamEvent event_of(v1::Event::Kind kind) {
   return {0, static_cast<std::uint8_t>(kind), 0, 61, 0.0};
 }
 
 TEST_CASE("a change is told with what was before and what is now") {
-  StreamEvent event = notice_of(v1::Event::KIND_CONTROL);
+  StreamEvent event = event_of(v1::Event::KIND_CONTROL);
   event.alpha_before = 1.0F;
   event.value = 0.5;
   CHECK(sentence(event) == "alpha 1.00 -> 0.50 from frame 61");
@@ -30,17 +30,17 @@ TEST_CASE("a change is told with what was before and what is now") {
   CHECK(sentence(event) == "gesture model x.style from frame 61");
   event.change = Change::kStopPlaying;
   CHECK(sentence(event) == "stops performing at frame 61");
-  event = notice_of(v1::Event::KIND_CALIBRATED);
+  event = event_of(v1::Event::KIND_CALIBRATED);
   event.after = ShortText("ann.toml");
   CHECK(sentence(event) == "calibration ann.toml from frame 62");
-  event = notice_of(v1::Event::KIND_PLAYING);
+  event = event_of(v1::Event::KIND_PLAYING);
   event.value = 2.0;
   event.after = ShortText("g c");
   CHECK(sentence(event) == "performs 2 labels (g c) from frame 61 on, or after those that wait");
 }
 
 TEST_CASE("foreign names in an event are cleaned and cut between two characters") {
-  StreamEvent event = notice_of(v1::Event::KIND_CALIBRATED);
+  StreamEvent event = event_of(v1::Event::KIND_CALIBRATED);
   event.after = ShortText("\x1b[2Jevil");
   CHECK(sentence(event).find('\x1b') == std::string::npos);
   std::string umlauts = "x";

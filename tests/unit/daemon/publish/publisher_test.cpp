@@ -195,16 +195,16 @@ TEST_CASE("a glove is away only once the reader has begun to look for it") {
   info.name = "right";
   info.comes_and_goes = true;
   info.counters = &counters;
-  PublishedStream outlet(std::move(info));
+  PublishedStream published(std::move(info));
   v1::StreamStats stats;
-  outlet.report(stats, 1.0);
+  published.report(stats, 1.0);
   CHECK_FALSE(stats.away());
   counters.reader.link_ns = 7;
-  outlet.report(stats, 1.0);
+  published.report(stats, 1.0);
   CHECK(stats.away());
   CHECK(stats.link_ns() == 7);
   counters.reader.connected = true;
-  outlet.report(stats, 1.0);
+  published.report(stats, 1.0);
   CHECK_FALSE(stats.away());
 }
 

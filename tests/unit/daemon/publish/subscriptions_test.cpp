@@ -42,19 +42,19 @@ TEST_CASE(
 
 TEST_CASE("there is an end to subscriptions that wait, and to those that wait in vain") {
   Subscriptions subscriptions(is_walker);
-  for (std::size_t i = 0; i < kMostWanted; ++i) {
+  for (std::size_t i = 0; i < kMaxWanted; ++i) {
     const int peer = static_cast<int>(i % 2);
     REQUIRE(subscriptions.ask(peer, "pose/" + std::to_string(i), true, 0));
   }
   CHECK_FALSE(subscriptions.ask(3, "pose/one-more", true, 0));
   CHECK(subscriptions.ask(3, "pose/walker", true, 0));
-  for (std::size_t i = 0; i < kMostImpossible; ++i) {
+  for (std::size_t i = 0; i < kMaxImpossible; ++i) {
     REQUIRE(subscriptions.ask(4, "nonsense " + std::to_string(i), true, 0));
   }
   CHECK_FALSE(subscriptions.ask(4, "nonsense", true, 0));
   subscriptions.forget(0);
   subscriptions.forget(3);
-  CHECK(subscriptions.wanted() == kMostWanted / 2);
+  CHECK(subscriptions.wanted() == kMaxWanted / 2);
 }
 
 TEST_CASE("a peer that asks over and over has soon asked too often, and may again later") {

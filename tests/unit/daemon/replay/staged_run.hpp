@@ -59,14 +59,15 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
             .style = {bytes.begin(), bytes.end()}};
   }
 
-  void set_tape(pipeline::RecordSink& record_sink) { tape_ = &record_sink; }
+  void set_record_sink(pipeline::RecordSink& record_sink) { record_sink_ = &record_sink; }
 
   // The line of a clip, or a piece of it. A dropped chunk is decoded, but never reaches the engine.
   void feed(const std::string& line, std::int64_t arrival_ns, bool shed = false) {
     shed_ = shed;
     const auto bytes = std::as_bytes(std::span(line));
     intake_.arrived(arrival_ns);
-    tape_->chunk(id_, 0, pipeline::Direction::kFromDevice, arrival_ns, intake_.next(), bytes);
+    record_sink_->chunk(id_, 0, pipeline::Direction::kFromDevice, arrival_ns, intake_.next(),
+                        bytes);
     device_.decoder->feed(bytes, arrival_ns, intake_);
   }
 
@@ -84,7 +85,7 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
     const auto view = std::as_bytes(std::span(bytes));
     const std::string hash = log::sha256_hex(view);
     hash.copy(command.model_hash.data(), hash.size());
-    tape_->keep_model(view);
+    record_sink_->keep_model(view);
     static_cast<void>(engine_->apply(command, *this));
   }
 
@@ -109,12 +110,12 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
     const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
     if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
     const std::string bytes = (raw ? raw_ : styled_).encode(item.frame).SerializeAsString();
-    tape_->published(id_, item.frame.header.sequence, raw, std::as_bytes(std::span(bytes)));
+    record_sink_->published(id_, item.frame.header.sequence, raw, std::as_bytes(std::span(bytes)));
   }
   void decision(const pipeline::Decision& decision) noexcept override {
     pipeline::Decision placed = decision;
     placed.item = place_ != 0 ? place_ : next_item_;
-    tape_->decision(placed);
+    record_sink_->decision(placed);
   }
 
   std::uint32_t id_;
@@ -129,7 +130,7 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
   Model model_;
   std::vector<Model> swapped_;
   std::optional<pipeline::StreamEngine> engine_;
-  pipeline::RecordSink* tape_ = nullptr;
+  pipeline::RecordSink* record_sink_ = nullptr;
   bool shed_ = false;
 };
 
@@ -171,7 +172,7 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
   options.clock = []() noexcept -> std::int64_t { return 1'000'000'000; };
   auto recorder = record::Recorder::open(std::move(options), std::move(rows));
   REQUIRE(recorder);
-  for (const auto& stream : streams) stream->set_tape((*recorder)->record_sink());
+  for (const auto& stream : streams) stream->set_record_sink((*recorder)->record_sink());
   std::int64_t now_ns = 5'000'000'000;
   for (std::size_t i = 0; i < frames; ++i) {
     now_ns += 16'666'667;

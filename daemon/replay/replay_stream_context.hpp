@@ -1,5 +1,5 @@
-// ReplayLane: one stream of a log, computed again by what ran live: its decoder, its intake and its
-// engine. Cold.
+// ReplayStreamContext: one stream of a log, computed again by what ran live: its decoder, its
+// intake and its engine. Cold.
 #pragma once
 
 #include <cstdint>
@@ -31,29 +31,29 @@ struct ReplayStream {
 };
 
 // What all lanes of a replay share.
-class LaneHost {
+class ReplayHost {
  public:
-  LaneHost() = default;
-  LaneHost(const LaneHost&) = delete;
-  LaneHost& operator=(const LaneHost&) = delete;
-  virtual ~LaneHost() = default;
+  ReplayHost() = default;
+  ReplayHost(const ReplayHost&) = delete;
+  ReplayHost& operator=(const ReplayHost&) = delete;
+  virtual ~ReplayHost() = default;
 
   // An item is about to enter the engine of a lane.
-  virtual void before(const pipeline::Item& item, std::uint32_t lane) noexcept = 0;
+  virtual void before(const pipeline::Item& item, std::uint32_t index) noexcept = 0;
   // What a lane publishes.
   virtual void publish(const pipeline::Item& item) noexcept = 0;
 
   std::uint64_t next_item = 1;  // Item::number of what comes next
 };
 
-class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOut {
+class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline::EngineOut {
  public:
-  // Items that it publishes have `lane` as their stream. Host and models outlive it.
-  [[nodiscard]] static Result<std::unique_ptr<ReplayLane>> open(
-      std::uint32_t lane, const log::SourceRow& source, const log::StreamRow& stream,
-      ReplayModels& models, LaneHost& host, const std::string& file);
-  ReplayLane(std::uint32_t lane, std::uint32_t stream_id, ReplayModels& models, LaneHost& host,
-             std::string file);
+  // Items that it publishes have `index` as their stream. Host and models outlive it.
+  [[nodiscard]] static Result<std::unique_ptr<ReplayStreamContext>> open(
+      std::uint32_t index, const log::SourceRow& source, const log::StreamRow& stream,
+      ReplayModels& models, ReplayHost& host, const std::string& file);
+  ReplayStreamContext(std::uint32_t index, std::uint32_t stream_id, ReplayModels& models,
+                      ReplayHost& host, std::string file);
 
   // Before the first chunk, each decision of the stream in the log's order: tries what it needs, so
   // that nothing can fail on the way, and remembers what never reached the engine.
@@ -68,7 +68,7 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
 
   // Before the chunk of this id is fed to any lane: decisions that follow a gap of this stream may
   // come with the chunks of another.
-  void notice_gap(std::int64_t chunk);
+  void apply_gap(std::int64_t chunk);
 
   [[nodiscard]] Result<> feed(const log::ChunkRow& chunk);
   void apply(const pipeline::Decision& decision) noexcept;
@@ -102,10 +102,10 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
   }
   void decision(const pipeline::Decision&) noexcept override {}
 
-  std::uint32_t lane_;
+  std::uint32_t index_;
   std::uint32_t stream_id_;  // in the log
   ReplayModels& models_;
-  LaneHost& host_;
+  ReplayHost& host_;
   std::string file_;
   ReplayStream stream_;
   drivers::Description device_;  // as it introduced itself last
