@@ -12,7 +12,7 @@
 namespace posed::config {
 namespace {
 
-// What a key's last letters say about its unit, so that a wrong value is told the right one.
+// The unit that the last letters of a key name, so that the error for a wrong value can state it.
 std::string unit_of(std::string_view key) {
   constexpr std::array<std::pair<std::string_view, const char*>, 7> kUnits{{
       {"_per_s", " per second"},
@@ -194,7 +194,7 @@ std::string TableReader::advice(const std::string& unknown_key) const {
     if (dot == std::string::npos || path.substr(dot + 1) != unknown_key) continue;
     places.push_back("[" + path.substr(0, dot) + "]");
   }
-  // Of several tables that have such a key, those that this file has are meant.
+  // If several tables can have such a key, prefer those that this file has.
   std::vector<std::string> present = places;
   std::erase_if(present, [this](const std::string& place) {
     const std::string within = place.substr(1, place.size() - 2) + ".";

@@ -32,10 +32,10 @@ std::string cause_of(std::string_view text) {
     if (is_digit(text[at]) && !in_word) {
       cause += '#';
       while (at < text.size() && (is_digit(text[at]) || text[at] == '.')) ++at;
-      in_word = true;  // the unit behind it belongs to it
+      in_word = true;  // the unit behind a number belongs to it
       continue;
     }
-    // A sign belongs to its number.
+    // A minus sign belongs to its number.
     const bool sign = text[at] == '-' && !in_word && at + 1 < text.size() && is_digit(text[at + 1]);
     if (!sign) {
       cause += text[at];

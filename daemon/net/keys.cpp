@@ -14,7 +14,7 @@
 namespace posed::net {
 namespace {
 
-constexpr std::size_t kMaxKeyFile = 256;  // bytes; more than a key and a newline is no key
+constexpr std::size_t kMaxKeyFile = 256;  // bytes; a longer file is not a key and a newline
 
 class File {
  public:
@@ -46,7 +46,7 @@ Result<std::string> read_key(const File& file, const std::filesystem::path& path
   return text;
 }
 
-// Creates the file anew (never through a link or over another file) with these rights.
+// Creates the file with this mode; never follows a link and never overwrites a file.
 Result<> write_key(const std::filesystem::path& path, const std::string& key, mode_t mode) {
   const File file(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
   if (!file.ok()) {

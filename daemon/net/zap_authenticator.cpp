@@ -14,7 +14,7 @@ constexpr const char* kZapEndpoint = "inproc://zeromq.zap.01";
 constexpr long kPause_ms = 50;
 constexpr std::size_t kMaxRequestParts = 16;  // parts; RFC 27 needs 7 for CURVE
 
-// All parts of one message; those beyond the longest request are left out.
+// All parts of one message; parts beyond kMaxRequestParts are dropped.
 std::vector<std::string> read_parts(void* door, Message& part) {
   std::vector<std::string> parts;
   do {
@@ -77,7 +77,7 @@ void ZapAuthenticator::serve() {
   for (;;) {
     if (zmq_poll(wait.data(), 2, -1) < 0) {
       if (zmq_errno() == EINTR) continue;
-      return;  // the context is going
+      return;  // the context is being terminated
     }
     if ((wait[1].revents & ZMQ_POLLIN) != 0) return;
     Message part;
@@ -92,7 +92,7 @@ void ZapAuthenticator::slow_down() noexcept {
   slow_until_ns_.store(system::monotonic_ns() + kNanosPerSecond);
 }
 
-// What comes meanwhile waits in the socket; only the bell that ends the thread is heard.
+// Requests that come meanwhile wait in the socket; only the stop message is read.
 void ZapAuthenticator::pause() {
   if (system::monotonic_ns() >= slow_until_ns_.load()) return;
   zmq_pollitem_t bell{stop_in_.get(), 0, ZMQ_POLLIN, 0};

@@ -9,9 +9,9 @@ void Intake::frame(Frame& frame) noexcept {
   frame.header.sequence = ++frames_;
   frame.header.arrival_ns = arrival_ns_;
   clock_.stamp(frame);
-  if (clock_.jumps() != jumps_told_) {
-    jumps_told_ = clock_.jumps();
-    // Lost when there is no room, like a frame: its number is used up.
+  if (clock_.jumps() != jumps_reported_) {
+    jumps_reported_ = clock_.jumps();
+    // If the ring is full the event is lost like a frame would be, and its number is skipped.
     if (!report(v1::Event::KIND_CLOCK_JUMPED, 0)) ++next_item_;
   }
   item_.kind = Item::Kind::kFrame;

@@ -9,7 +9,7 @@
 namespace posed::pipeline {
 namespace {
 
-// Until a lossless source, or a command that waits for room, is looked at again.
+// Pause before another look at a lossless source, or at a command that waits for space in the ring.
 constexpr std::int64_t kLookAgain_ns = 250'000;
 
 }  // namespace
@@ -67,7 +67,8 @@ void Reader::call() noexcept {
   wake_->notify();
 }
 
-// A calibration is answered by a event, which must find room: without any, the commands wait.
+// A calibration is acknowledged by an event, which needs a free slot in the ring: while there is
+// none, the commands wait.
 bool Reader::take_requests() noexcept {
   if (!called_.exchange(false, std::memory_order_acq_rel) && !commands_wait_) return true;
   for (const auto& source : sources_) source->exchange();

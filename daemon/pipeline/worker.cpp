@@ -10,9 +10,11 @@ namespace posed::pipeline {
 
 namespace {
 
-// Commands, ticks and the end get their turn however fast items come.
+// Items handled in one turn, so that commands, ticks and the end are served however fast items
+// come.
 constexpr int kItemsATurn = 256;
-constexpr std::int64_t kAcksAgain_ns = 1'000'000;  // for room for an Ack
+// pause before an Ack that did not fit is sent again
+constexpr std::int64_t kAcksAgain_ns = 1'000'000;
 
 }  // namespace
 
@@ -26,8 +28,8 @@ bool is_pose(const Item& item) noexcept {
   return item.kind == Item::Kind::kFrame || item.kind == Item::Kind::kRawFrame;
 }
 
-// What a device can cause at any rate has to fit into its stream's share of the ring; few other
-// events ever come at once.
+// Events that a device can trigger at any rate must fit into its stream's share of the ring; of the
+// others only a few ever come at once.
 bool within_share(const Item& item) noexcept {
   return item.kind != Item::Kind::kEvent || item.stream_event.kind == v1::Event::KIND_SHED ||
          item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
@@ -35,7 +37,7 @@ bool within_share(const Item& item) noexcept {
 
 }  // namespace
 
-// One stream: its engine, and where that engine's output goes.
+// One stream: its engine, and the place where that engine's output goes.
 struct Worker::StreamContext final : EngineOut {
   StreamContext(const EngineOptions& options, double rate_hz, StreamCounters& stream_counters,
                 const WorkerPorts& around, const std::uint64_t& next_item, std::size_t slots)
@@ -64,14 +66,14 @@ struct Worker::StreamContext final : EngineOut {
     ports.record_sink->decision(placed);
   }
 
-  // Nothing more comes from the reader: what of the last it decoded is missing was shed.
+  // Nothing more comes from the reader: what was decoded last but never came was shed.
   void close_gaps() noexcept {
     engine.close_gaps(counters.reader.frames.load(std::memory_order_acquire),
                       counters.reader.samples.load(std::memory_order_acquire), *this);
   }
 
-  // Newest data wins: a frame with `depth` or more newer ones behind it is skipped. The engine
-  // sees the gap at the next frame.
+  // Newest data wins: a frame that has `depth` or more newer frames waiting behind it is skipped.
+  // The engine detects the gap at the next frame.
   void frame(const Frame& frame) noexcept {
     const std::uint64_t sequence = frame.header.sequence;
     counters.pipeline.consumed.store(sequence, std::memory_order_release);
@@ -88,7 +90,7 @@ struct Worker::StreamContext final : EngineOut {
     engine.on_sample(sample, *this);
   }
 
-  // An item of the stream has been dealt with.
+  // Call after an item of the stream has been handled.
   void taken() noexcept {
     count(counters.pipeline.taken);
     publish_state();
@@ -182,7 +184,7 @@ void Worker::apply_commands() noexcept {
   const auto apply = [this](const Command& command) noexcept {
     StreamContext& context = *contexts_[command.stream];
     const Ack ack = context.engine.apply(command, context);
-    context.publish_state();  // before the answer: whoever has it may ask for the status at once
+    context.publish_state();  // before the Ack, because its receiver may ask for the status at once
     acknowledge(ack);
   };
   while (ports_.commands->consume(apply)) {
@@ -195,10 +197,10 @@ void Worker::take_items(int most) noexcept {
   }
 }
 
-// No Ack is ever lost: control counts the commands that it has sent and that no Ack has answered,
-// and refuses to send more than kMaxUnderWay. So there is a place for each.
+// No Ack is ever lost: control counts the commands for which it has not received an Ack, and sends
+// at most kMaxUnderWay of them. So unsent_ has space for each.
 void Worker::acknowledge(const Ack& ack) noexcept {
-  if (ack.ticket == 0) return;  // nobody waits for it
+  if (ack.ticket == 0) return;  // no Ack is expected
   send_acks();
   if (unsent_count_ > 0 || !ports_.acks->push(ack)) {
     unsent_[unsent_count_++] = ack;
@@ -207,7 +209,7 @@ void Worker::acknowledge(const Ack& ack) noexcept {
   }
 }
 
-// In the order in which the commands took effect.
+// Sends them in the order in which the commands took effect.
 void Worker::send_acks() noexcept {
   std::size_t sent = 0;
   while (sent < unsent_count_ && ports_.acks->push(unsent_[sent])) ++sent;
@@ -249,7 +251,8 @@ void Worker::take(const Item& item) noexcept {
   position_ = item.number + 1;
 }
 
-// What the reader did between two frames: their order is right here.
+// Passes on an event of the reader. It comes from the same ring as the frames, so it keeps its
+// place between them.
 void Worker::pass_on(const StreamEvent& event, StreamContext& context) noexcept {
   acknowledge({.ticket = event.ticket, .stream = event.stream, .sequence = event.sequence + 1});
   Item item;
