@@ -202,7 +202,7 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
                                           near.empty() ? "`posed devices` lists them"
                                                        : "the nearest is '" + near +
                                                              "' (`posed devices` lists them)"));
-    // reports the single error: the key is missing
+    // Looks up every driver table, so that none is reported as unknown beside this error.
     for (const std::string& name : names) (void)table.table(name);
   }
   table.finish();

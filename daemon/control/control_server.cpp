@@ -15,10 +15,11 @@ constexpr int kRequestsWaiting = 4;  // per client; more wait at the client
 constexpr int kRepliesWaiting = 16;  // per client
 constexpr int kReceiveBuffer_bytes = 64 * 1024;
 constexpr std::int64_t kMaxPart = kMaxRequest + 1024;  // bytes
-constexpr std::uint64_t kMaxUnheard = 512 * 1024;      // bytes of all clients that ended no request
-constexpr int kLastWords_ms = 500;                     // for the answer to `stop` to leave
-constexpr int kRequestsARound = 16;                    // then acknowledgements get their turn
-constexpr std::size_t kMaxEnvelope = 4;                // parts before the request
+// bytes that have not become a request, of all clients together
+constexpr std::uint64_t kMaxUnheard = 512 * 1024;
+constexpr int kLastWords_ms = 500;       // time to send the reply to `stop`
+constexpr int kRequestsARound = 16;      // then acknowledgements are handled
+constexpr std::size_t kMaxEnvelope = 4;  // parts before the request
 
 Result<> set_limits(void* router) {
   for (const auto& [option, value] : {std::pair{ZMQ_SNDHWM, kRepliesWaiting},
@@ -108,8 +109,8 @@ bool ControlServer::take_request() {
     if (envelope.size() <= kMaxEnvelope) envelope.emplace_back(part.text());
     if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
   }
-  if (envelope.size() > kMaxEnvelope) return true;  // no client of ours; it gets no answer
-  (void)guard_->take_gone();                        // nothing is kept for a connection here
+  if (envelope.size() > kMaxEnvelope) return true;  // not a client of this protocol: no reply
+  (void)guard_->take_gone();                        // this socket keeps no state for a connection
   if (const int client = net::source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.authenticator != nullptr &&
       !ports_.authenticator->allows(part.property("User-Id"), net::Domain::kControl)) {
@@ -130,7 +131,7 @@ bool ControlServer::take_ack() {
   return taken;
 }
 
-// A ROUTER drops what a slow or departed client does not take.
+// A ROUTER socket drops a reply that a slow or disconnected client does not accept.
 void ControlServer::send(const Reply& answer) {
   for (const std::string& part : answer.to) {
     if (!net::send_part(router_.get(), part, true)) return;

@@ -1,4 +1,4 @@
-// The control messages that reach a device or its decoder: calibration and haptics.
+// The control requests for a device or its decoder: calibration and haptics.
 #include <algorithm>
 #include <cmath>
 

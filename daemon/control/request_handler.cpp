@@ -70,7 +70,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       break;
     case v1::ControlRequest::kHaptics:
       done = send_haptics(request);
-      if (done) return answer(std::move(requester), reply);  // the device does not answer
+      if (done) return answer(std::move(requester), reply);  // devices send no acknowledgement
       break;
     case v1::ControlRequest::kStatus:
       daemon_control_.fill(*reply.mutable_status());
@@ -82,7 +82,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       return refusal(std::move(requester), "the request is empty, or from a newer posed");
   }
   if (!done) return refusal(std::move(requester), done.error().text());
-  return std::nullopt;  // acknowledge() answers
+  return std::nullopt;  // acknowledge() makes the reply
 }
 
 Result<std::uint32_t> RequestHandler::find_stream(const std::string& name) const {
@@ -158,7 +158,7 @@ Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
   return false;
 }
 
-// What kind of model it is, the file itself says.
+// The file itself says which kind of model it is.
 Result<> RequestHandler::set_model(const std::string& stream, std::span<const std::byte> bytes,
                                    const std::string& name, const Requester& requester) {
   const auto index = find_stream(stream);
@@ -252,7 +252,7 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   under_way_.erase(found);
   ControlledStream& stream = streams_[ack.stream];
   if (done.model) {
-    stream.model = std::move(done.model);  // the one it replaces is free now
+    stream.model = std::move(done.model);  // frees the model that it replaces
     daemon_control_.model_in_use(ack.stream, stream.model->name);
   }
   if (done.calibration) {

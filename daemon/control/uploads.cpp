@@ -13,9 +13,9 @@
 namespace posed::control {
 namespace {
 
-constexpr std::size_t kSha256 = 64;  // hexadecimal signs
+constexpr std::size_t kSha256 = 64;  // hexadecimal digits
 
-// What does not depend on the pieces before it.
+// Checks what does not depend on earlier pieces.
 Result<> check_piece(const ModelPiece& piece) {
   if (piece.total == 0 || piece.total > kMaxModel) {
     return fail(fmt::format("a model file has 1 to {} bytes, not {}", kMaxModel, piece.total));

@@ -23,7 +23,7 @@ namespace {
 
 std::string reason() { return std::error_code(errno, std::generic_category()).message(); }
 
-// Takes the place of a link that an emulated glove left behind, and of nothing else.
+// Replaces a link that an earlier emulated glove left behind, but no other file.
 Result<> make_link(const std::filesystem::path& link, const std::string& target) {
   std::error_code failed;
   const auto before = std::filesystem::read_symlink(link, failed);
@@ -95,7 +95,7 @@ EmulatedPort::EmulatedPort(EmulatedPort&& other) noexcept
 
 EmulatedPort::~EmulatedPort() {
   std::error_code ignored;
-  // Another emulated glove may have taken over the link.
+  // Another emulated glove may have replaced the link meanwhile.
   if (!link_.empty() && std::filesystem::read_symlink(link_, ignored) == name_) {
     std::filesystem::remove(link_, ignored);
   }

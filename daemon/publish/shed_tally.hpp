@@ -1,6 +1,7 @@
-// ShedTally: when to tell that frames of a stream were skipped. A machine that cannot keep up skips
-// some with every frame it keeps; a line for each would only slow it further. The first is told at
-// once, then a sum at most once a second; nothing skipped is ever left out of the sums.
+// ShedTally decides when to report that frames of a stream were skipped. A machine that cannot keep
+// up skips frames all the time, and a line for each would slow it down further. The first skip is
+// reported at once, the following ones as a sum at most once a second; the sums include every
+// skipped frame.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +15,11 @@ class ShedTally {
  public:
   struct Sum {
     std::uint64_t frames = 0;
-    std::uint64_t first = 0, last = 0;  // sequences; between them other frames may have gone out
+    // sequences; some frames between them may have been published
+    std::uint64_t first = 0, last = 0;
   };
 
-  // `frames` from `first` on were skipped.
+  // The `frames` frames from sequence `first` on were skipped.
   void add(std::uint64_t first, std::uint64_t frames) noexcept {
     if (frames == 0) return;
     if (unreported_.frames == 0) unreported_.first = first;
@@ -25,7 +27,7 @@ class ShedTally {
     unreported_.last = first + frames - 1;
   }
 
-  // What is to be told now. At the end of a stream everything is.
+  // The sum to report now, if one is due. At the end of a stream the rest is always due.
   [[nodiscard]] std::optional<Sum> take(std::int64_t now_ns, bool at_end = false) noexcept {
     const bool reported_lately =
         reported_ns_ != kNoTime_ns && now_ns - reported_ns_ < kNanosPerSecond;

@@ -8,7 +8,7 @@
 namespace posed::publish {
 namespace {
 
-constexpr std::size_t kMaxName = 32 + 4;  // of a stream, and "-raw"
+constexpr std::size_t kMaxName = 32 + 4;  // a stream's name and "-raw"
 constexpr std::array<std::string_view, 4> kTopicKinds{"pose/", "skeleton/", "sensor/", "event/"};
 
 bool is_name_sign(char sign) {

@@ -17,7 +17,7 @@ using Kind = pipeline::Decision::Kind;
 using Value = v1::DecisionValue;
 namespace words = log::words;
 
-// How each decision is spelled, and what its value holds.
+// The stage and name under which a decision is stored, and the type of its value.
 struct Spelling {
   Kind kind;
   std::string_view stage, name;
@@ -42,7 +42,7 @@ const Spelling* find(std::string_view stage, std::string_view name) {
   return found == kSpellings.end() ? nullptr : &*found;
 }
 
-// Each reads its part of a value; false when no pipeline could have said it.
+// Each reads one kind of value; false if no pipeline can have written it.
 bool read_alpha(double alpha, pipeline::Decision& decision) {
   decision.alpha = static_cast<float>(alpha);
   return std::abs(alpha) <= style::kMaxAlpha;  // false for NaN

@@ -35,8 +35,9 @@ void LogWriterLoop::turn(std::int64_t now_ns) {
   }
 }
 
-// Against the stream of the data: a frame is in the log only together with the decisions and the
-// chunks that made it, whenever the process is killed.
+// Empties the rings against the direction of the data: frames first, chunks last. So whenever the
+// process is killed, a frame is in the log only together with the decisions and the chunks that
+// made it.
 void LogWriterLoop::drain(std::int64_t now_ns) {
   rings_.drain_frames([&](const FrameHeader& header, std::span<const std::byte> bytes) {
     put_gap(header.stream, GapKind::kFrames, header.lost_before, now_ns);
@@ -104,7 +105,7 @@ void LogWriterLoop::put_gap(std::uint32_t id, GapKind kind, std::uint64_t lost, 
   stream.lost_from_frame = std::min(stream.lost_from_frame, from_frame);
 }
 
-// Decisions come later than the chunks that they concern: where some are lost, the log is sound
+// Decisions arrive later than the chunks that they concern: if some are lost, the log is reliable
 // only up to the chunk before.
 Result<log::GapRow> LogWriterLoop::gap_row(std::uint32_t id, GapKind kind, std::uint64_t lost,
                                            std::int64_t now_ns, std::uint64_t from_frame) const {
@@ -137,13 +138,13 @@ void LogWriterLoop::count_lost(std::uint32_t stream, GapKind kind, std::uint64_t
   if (kind == GapKind::kChunks) lost_to_errors_ += count;
 }
 
-// What was written since the last commit is gone with it. The writer goes too: after an I/O error
-// only a fresh connection is known to be sound.
+// Everything written since the last commit is lost. The writer is closed, too, because after an I/O
+// error only a new connection is known to be in a valid state.
 void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
   writer_->rollback();
   writer_.reset();
   ++errors_;
-  // A disk that is all but full lets a little through now and then: ask it less and less often.
+  // An almost full disk accepts a little now and then, so try again less and less often.
   const bool held_long = now_ns - resumed_ns_ > kLastRetry_ns;
   retry_after_ns_ = held_long ? kFirstRetry_ns : std::min(2 * retry_after_ns_, kLastRetry_ns);
   retry_ns_ = now_ns + retry_after_ns_;
@@ -162,7 +163,7 @@ void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
   report_({.kind = RecorderEvent::Kind::kError, .stream = 0, .time_ns = now_ns, .text = text});
 }
 
-// Tries to write what is missing; only when that has worked does recording go on.
+// Tries to write the gap rows for what is missing; recording continues only after that has worked.
 void LogWriterLoop::resume(std::int64_t now_ns) {
   retry_ns_ = now_ns + retry_after_ns_;
   auto writer = log::Writer::reopen(path_);

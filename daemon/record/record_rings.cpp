@@ -11,8 +11,8 @@ std::uint64_t pending(const auto& to) noexcept {
   return to.total.load(kRelaxed) - to.carried.load(kRelaxed);
 }
 
-// Puts a record into its stream's share by `push`. It takes `lost_before` with it, or is itself
-// lost; false then.
+// Adds a record to its stream's share with `push`. A record that fits carries `lost_before`;
+// otherwise it is itself counted as lost, and the result is false.
 bool put(auto& to, std::size_t amount, std::uint64_t lost_before, auto&& push) noexcept {
   if (to.share.has_room(amount) && push()) {
     to.share.add(amount);

@@ -52,7 +52,7 @@ smooth::LiveOptions generate_of(const Json& parameters) {
           .noise_rad = parameters.at("noise_rad").get<double>()};
 }
 
-// False: this posed does not have the stage, or runs it at another place.
+// False if this version of posed does not have the stage, or runs it in another order.
 bool add_stage(const Json& stage, StreamSettings& settings) {
   const auto name = stage.at("stage").get<std::string>();
   if (name == words::kStyle && !settings.style && !settings.generate && !settings.constrain) {

@@ -10,7 +10,7 @@
 namespace posed::replay {
 namespace {
 
-// More than any posed records; each costs a decoder and an engine.
+// More than any posed records; a limit, because each stream costs a decoder and an engine.
 constexpr std::size_t kMaxStreams = 256;
 
 }  // namespace
@@ -89,7 +89,8 @@ void Replay::before(const pipeline::Item& item, std::uint32_t index) noexcept {
 }
 
 void Replay::apply(const Schedule::Entry& entry) noexcept {
-  // It has been read before; keeping what it says would take several times the memory.
+  // The row was already checked; decoding it again here saves several times the memory of keeping
+  // all decoded decisions.
   if (const auto decision = record::decision_of(entry.row, {}))
     contexts_[entry.stream]->apply(*decision);
 }

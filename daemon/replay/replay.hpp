@@ -1,5 +1,6 @@
-// Replay: recomputes what a device log's run published, from its chunks and decisions alone, with
-// the decoders and engines of the live run. No thread, no clock: whoever drives it paces it. Cold.
+// Replay computes again what a device log's run published, from the log's chunks and decisions
+// alone, with the decoders and engines of the live run. It has no thread and no clock; the caller
+// decides its speed. Cold.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@
 
 namespace posed::replay {
 
-// Streams are numbered by their place in Reader::streams(), whatever their ids in the log are.
+// Streams are numbered by their index in Reader::streams(), whatever their ids in the log are.
 class Replay final : private ReplayHost {
  public:
   // Builds decoders, models and engines of all streams. The reader outlives the replay.
@@ -30,7 +31,7 @@ class Replay final : private ReplayHost {
   }
   [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
-  // Where the slew of the stream's style is, while run() lasts and afterwards; 0 without a style.
+  // The stream's current alpha, during run() and afterwards; 0 without a style stage.
   [[nodiscard]] float alpha(std::uint32_t stream) const;
 
   // Items in pipeline order.
@@ -39,8 +40,8 @@ class Replay final : private ReplayHost {
   using Pace = std::function<bool(const log::ChunkRow&)>;
   [[nodiscard]] Result<> run(const Out& out, const Pace& pace);
 
-  // While run() lasts and afterwards: the first frame number of a stream from which on the log is
-  // known to lack chunks or decisions; what comes later cannot be compared.
+  // During run() and afterwards: the first frame of a stream from which the log is known to lack
+  // chunks or decisions; frames from there on cannot be compared.
   [[nodiscard]] std::optional<std::uint64_t> broken_at(std::uint32_t stream) const;
 
  private:
@@ -58,7 +59,7 @@ class Replay final : private ReplayHost {
   ReplayModels models_;
   std::vector<std::unique_ptr<ReplayStreamContext>> contexts_;
   Schedule schedule_;
-  const Out* out_ = nullptr;  // of the run in progress
+  const Out* out_ = nullptr;  // of the current run()
 };
 
 }  // namespace posed::replay

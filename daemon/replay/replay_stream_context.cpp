@@ -12,7 +12,8 @@ namespace {
 
 using Kind = pipeline::Decision::Kind;
 
-// No clock that counts from a machine's start gets there; sums of two stay within 64 bits.
+// No clock that counts from the start of a machine reaches this; sums of two such times fit 64
+// bits.
 constexpr std::int64_t kLastTime_ns = std::int64_t{1} << 61;
 
 bool possible(std::int64_t time_ns) { return time_ns >= 0 && time_ns <= kLastTime_ns; }
@@ -79,7 +80,7 @@ Result<> ReplayStreamContext::open_engine() {
     gesture_ = std::move(*bound);
   }
   pipeline::EngineOptions options = pipeline::engine_options(index_, settings, device.skeleton);
-  options.rate_hz = device.rate_hz;  // what the models are bound at
+  options.rate_hz = device.rate_hz;  // the models are bound to this rate
   options.model = style_.get();
   options.gesture = gesture_.get();
   stream_.stages = pipeline::stage_names(options);
@@ -121,13 +122,13 @@ void ReplayStreamContext::set_gap(std::int64_t after_chunk) {
   gap_after_ = std::min(gap_after_.value_or(after_chunk), after_chunk);
 }
 
-// Frames that a stage still holds back depend on what comes next, and the last one may be repeated:
-// they are not to be trusted either.
+// Frames that a stage still holds back depend on data after the gap, and the last published frame
+// may be repeated, so they are not reliable either.
 void ReplayStreamContext::apply_gap(std::int64_t chunk) {
   if (gap_after_ && !broken_at_ && chunk > *gap_after_) broken_at_ = last_out_;
 }
 
-// Formats 1 and 2 count frames only; the rest goes on by itself.
+// Formats 1 and 2 number only frames; the other numbers continue by counting.
 Result<> ReplayStreamContext::find_place(const log::ChunkRow& chunk) {
   const auto place = std::ranges::find(chunk.places, stream_id_, &log::StreamPosition::stream);
   if (place == chunk.places.end() || place->next_frame == 0 || !possible(chunk.arrival_ns)) {
@@ -161,7 +162,7 @@ Result<> ReplayStreamContext::feed(const log::ChunkRow& chunk) {
   }
 }
 
-// The device came back, perhaps as another make of it; what the pipeline was bound to stays.
+// The device came back, perhaps with other properties; what the pipeline was bound to stays.
 Result<> ReplayStreamContext::use_device(const std::string& info) {
   const drivers::Driver* driver = drivers::find_driver(stream_.description.driver);
   auto description = driver->describe(info, stream_.description.identity);
@@ -177,7 +178,7 @@ Result<> ReplayStreamContext::use_device(const std::string& info) {
 
 Result<> ReplayStreamContext::calibrate(const std::string& toml) {
   drivers::Description device = device_;
-  device.identity.clear();  // whose it was, the live run has checked
+  device.identity.clear();  // the live run has checked to which device it belongs
   auto compiled = devices::compile_calibration(device, toml, "the log's calibration");
   if (!compiled) return std::unexpected(compiled.error());
   decoder_->calibrate(*(*compiled)->calibration);
@@ -206,7 +207,7 @@ void ReplayStreamContext::apply(const pipeline::Decision& decision) noexcept {
   switch (decision.kind) {
     case Kind::kShed:
     case Kind::kShedSamples:
-      return;  // the engine decides it again when it meets the gap
+      return;  // the engine decides this again when it meets the gap
     case Kind::kTick:
       return engine_->tick_now(decision.now_ns, *this);
     case Kind::kEnd:
@@ -225,7 +226,7 @@ void ReplayStreamContext::apply(const pipeline::Decision& decision) noexcept {
   }
 }
 
-// Where the stage of a swap is missing, it was ignored live, too. What was used before is freed
+// If the stream has no such stage, the live run ignored the swap, too. The previous model is freed
 // once it is no longer read.
 void ReplayStreamContext::swap_style(const pipeline::Decision& decision) noexcept {
   if (!stream_.settings.style) return;
@@ -258,7 +259,7 @@ void ReplayStreamContext::command(const pipeline::Command& command) noexcept {
   static_cast<void>(engine_->apply(command, *this));
 }
 
-// Nothing more comes: what is missing of what was decoded last was shed.
+// Nothing more comes: what was decoded last but never came was shed.
 void ReplayStreamContext::close_gaps() noexcept {
   const pipeline::Position next = intake_.next();
   engine_->close_gaps(next.frame - 1, next.sample - 1, *this);
