@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Extensions that promise a format which posed, or any other program, knows files by.
+// Extensions of formats that posed or other programs recognise.
 constexpr std::array<std::string_view, 17> kFormats{
     ".bvh", ".amc", ".asf", ".csv", ".style", ".gesture", ".toml", ".lab", ".plog",
     ".svg", ".dot", ".gv",  ".txt", ".json",  ".bin",     ".key",  ".pub"};
@@ -28,7 +28,7 @@ std::string listed(const std::vector<std::string_view>& extensions) {
   return text;
 }
 
-// Whether both names lead to one file, be it there already or not.
+// Whether both names are the same file, whether or not it exists already.
 bool same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::equivalent(a, b, error)) return true;

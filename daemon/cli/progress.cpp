@@ -10,7 +10,8 @@ namespace posed::cli {
 namespace {
 
 constexpr int kBarCells = 30;
-constexpr double kEnoughForGuess = 0.02;  // before that the time left is a guess at noise
+// before that, an estimate of the remaining time would be too noisy
+constexpr double kEnoughForGuess = 0.02;
 
 volatile std::sig_atomic_t g_interrupted = 0;
 
@@ -34,7 +35,7 @@ ProgressBar::ProgressBar(double quiet_for_s)
   struct sigaction action{};
   action.sa_handler = interrupt;
   sigemptyset(&action.sa_mask);
-  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second Ctrl-C ends at once
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second Ctrl-C ends the process at once
   sigaction(SIGINT, &action, &before_);
 }
 

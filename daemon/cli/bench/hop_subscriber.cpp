@@ -16,7 +16,7 @@ namespace posed::cli {
 namespace {
 
 constexpr int kPoll_ms = 50;
-constexpr std::size_t kReserved = 1 << 20;  // messages for which room is made beforehand
+constexpr std::size_t kReserved = 1 << 20;  // number of messages for which memory is reserved
 
 std::string read_line(int fd) {
   std::string line;
@@ -46,12 +46,12 @@ bool read_all(int fd, void* data, std::size_t size) {
   return true;
 }
 
-// The life of the child.
+// Runs in the child process.
 class Noter {
  public:
   Noter() { noted_.messages.reserve(kReserved); }
 
-  // Takes one message if there is one.
+  // Receives one message if there is one.
   bool take(void* socket) {
     net::Message topic;
     if (!topic.receive(socket)) return false;

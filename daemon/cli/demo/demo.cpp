@@ -1,6 +1,6 @@
-// The demo: makes two families of walkers and a signer's glove recording, learns the style
-// between the families and the gestures of the glove, streams a walker it has not seen through the
-// daemon and watches it as any client would, over ZeroMQ.
+// The demo: makes two families of synthetic walkers and a signer's glove recording, trains a style
+// model from the families and a gesture model from the glove, streams a walker that is not in the
+// training data through the daemon and watches it over ZeroMQ, as any client would.
 #include <cerrno>  // program_invocation_name
 #include <chrono>
 #include <cstdio>
@@ -41,18 +41,18 @@ constexpr double kHandRate_hz = 30.0;
 struct DemoOptions {
   std::filesystem::path config;   // empty: the demo's own
   std::filesystem::path folder;   // of clips and models; empty: the user's cache
-  std::filesystem::path prepare;  // only make clips and models there
+  std::filesystem::path prepare;  // only make clips and models in this folder
   std::optional<double> seconds;
   bool overwrite = false;
 };
 
-// How this program was called, for the commands that people may copy.
+// How this program was called, for the commands that it suggests.
 std::string own_name() {
   const std::string name = program_invocation_name;
   return name.contains('/') ? name : "posed";
 }
 
-// Makes what the demo needs, unless this program made it before.
+// Makes the demo's files, unless this program has made them before.
 Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   const DemoFolder kept(folder);
   if (auto own = kept.check_is_own(demo_file_names(), overwrite); !own) return own;
@@ -87,7 +87,7 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   return kept.finish();
 }
 
-// Takes every message that waits.
+// Receives every message that waits.
 void drain(Connection& connection, Watcher& watcher) {
   net::Message topic, body;
   while (topic.receive(connection.socket()) && topic.more() &&
@@ -100,7 +100,7 @@ double seconds_since(SteadyClock::time_point then) {
   return std::chrono::duration<double>(SteadyClock::now() - then).count();
 }
 
-// Shows the running daemon until Ctrl-C or `seconds` after the first frame.
+// Shows the running daemon until Ctrl-C or until `seconds` after the first frame.
 Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watcher& watcher,
                DemoHand& hand) {
   ClientOptions client;
@@ -144,7 +144,7 @@ Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watch
   return {};
 }
 
-// Somebody wears the glove of every stream that names no device of its own.
+// Starts a synthetic signer for every stream whose device is not set in the config.
 using Signers = std::vector<std::unique_ptr<emulate::SyntheticSigner>>;
 Result<Signers> put_on_gloves(config::DaemonConfig& config, const std::filesystem::path& clip) {
   Signers signers;
@@ -195,7 +195,7 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   return {};
 }
 
-// Clips and models lie where the config looks for them.
+// The folder for clips and models, in which the config looks for them.
 Result<std::filesystem::path> folder_of(const DemoOptions& options) {
   if (!options.folder.empty()) return std::filesystem::absolute(options.folder);
   if (options.config.empty()) return demo_cache_folder();

@@ -26,7 +26,7 @@ Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
   return path;
 }
 
-// The glove that is learnt from, with labels, and a new person who performs g, c, p.
+// Writes the glove recording for training, with labels, and a new person who performs g, c, p.
 Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
   clips.glove = folder / kGlove;
   clips.labels = folder / kGloveLabels;
@@ -58,7 +58,7 @@ Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
   if (made) return fail("cannot make the folder: " + made.message(), folder.string());
   DemoClips clips;
   for (std::uint32_t person = 1; person <= kPeople; ++person) {
-    // Different people in the two families, as with real actors.
+    // The two families have different people, as with real actors.
     auto march = write_walker(folder / fmt::format("march_{}.bvh", person),
                               {.family = motion::WalkerFamily::kMarch, .person = person});
     if (!march) return std::unexpected(march.error());

@@ -1,4 +1,4 @@
-// `posed calibrate`: a user's glove from a few poses, or from another program's file.
+// `posed calibrate`: calibrates a user's glove from a few poses, or from another program's file.
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -33,13 +33,13 @@ struct CalibrateOptions {
   std::filesystem::path import, out;
   std::vector<std::string> set;    // KEY=VALUE
   std::vector<std::string> poses;  // POSE=SECONDS
-  double seconds = 0.0;            // 0: Enter begins each pose
-  double ready_s = 3.0;            // to go from pose to pose without a key
+  double seconds = 0.0;            // 0: the user starts each pose with Enter
+  double ready_s = 3.0;            // time to change from pose to pose without a key
   ClientOptions client;
   bool live = false;
   bool ready_given = false;
   bool overwrite = false;
-  bool force = false;  // write what the check calls unusable
+  bool force = false;  // write the file although the check calls it unusable
 };
 
 Result<const drivers::Driver*> named_driver(const std::string& name) {
@@ -86,7 +86,7 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
   return plan;
 }
 
-// The glove of a stream is what it is; options that say otherwise are a mistake.
+// The glove of a running stream is already set up; options that would change it are an error.
 Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
   if (options.stream.empty()) return misuse("--connect also needs --stream");
   auto source = GloveSource::connect(options.client, options.stream);
@@ -104,7 +104,8 @@ Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
   return source;
 }
 
-// A glove that a daemon has can be calibrated through that daemon; nothing has to be ended.
+// A glove that a daemon uses can be calibrated through that daemon, without ending it; the error
+// says so.
 Error with_way_through(Error error) {
   if (error.message.contains(" is in use")) {
     error.message +=
@@ -125,8 +126,8 @@ Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options)
   return source;
 }
 
-// What a calibration is for. A port's path is no glove's identity: the same glove may be plugged in
-// elsewhere tomorrow.
+// The glove that a calibration is for. A port's path does not identify it, because the same glove
+// may be plugged in elsewhere tomorrow.
 CalibrationFile blank_file(const GloveSource& source) {
   const std::string& identity = source.identity();
   return {.driver = source.model().driver,
@@ -154,7 +155,8 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   return file;
 }
 
-// Without a device only the driver and the hand are known; through a daemon the glove is, too.
+// Without a device only the driver and the hand are known; through a daemon the glove is known,
+// too.
 Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   if (options.live) {
     const auto source = connect(options);
@@ -176,7 +178,7 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   return drivers::glove::import_calibration(options.import, *model, hand);
 }
 
-// Before anybody has gone through the poses. An option that would mean nothing is refused.
+// Checked before the user goes through the poses. An option that would have no effect is refused.
 Result<> check_options(const CalibrateOptions& options) {
   if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
   const bool timed = options.seconds > 0.0;

@@ -15,13 +15,15 @@ using drivers::glove::kPoseNames;
 using drivers::glove::Pose;
 
 constexpr int kMinColumns = 40;
-constexpr int kCellWidth = 26;  // least of a sensor's: below it nobody sees a bar move
+// smallest width of a sensor's cell; in a smaller one the bar's movement is not visible
+constexpr int kCellWidth = 26;
 constexpr int kMaxCell = 60;
 constexpr int kValueWidth = 6;
 constexpr int kBesideBar = kValueWidth + 5;  // blank, frame, value, mark
 constexpr int kMinBar = 5;
 
-// Sensors differ in how their names begin and end: "thumb_jo~t1".
+// Shortens a name in its middle, because sensor names differ at their beginning and end:
+// "thumb_jo~t1".
 std::string squeezed(const std::string& name, int width) {
   const auto columns = static_cast<std::size_t>(width);
   if (name.size() <= columns) return name;
@@ -30,7 +32,7 @@ std::string squeezed(const std::string& name, int width) {
 
 std::size_t place(Pose pose) { return static_cast<std::size_t>(pose); }
 
-// Words in lines of at most `width`.
+// Splits the text at blanks into lines of at most `width`.
 std::vector<std::string> wrapped(std::string_view text, int width) {
   std::vector<std::string> lines(1);
   while (!text.empty()) {
@@ -82,7 +84,7 @@ std::string cell(const CalibrateView& view, const SensorView& sensor, int width,
   return still ? paint(view.colour, kYellow, text) : text;
 }
 
-// The sensors in `rows` lines, column by column.
+// The sensors as a table of `rows` lines, filled column by column.
 std::vector<std::string> table(const CalibrateView& view, int width, int rows) {
   std::vector<const SensorView*> there;
   for (const SensorView& sensor : view.sensors) {

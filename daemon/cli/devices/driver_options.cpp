@@ -15,7 +15,7 @@ bool parse(const std::string& text, Number& number) {
   return error == std::errc() && stop == end;
 }
 
-// As the type of the option's default; false when the text is none.
+// Converts the text to the type of the option's default; returns false if it does not fit.
 bool read_value(const std::string& text, drivers::OptionValue& value) {
   if (auto* flag = std::get_if<bool>(&value)) {
     *flag = text == "true";

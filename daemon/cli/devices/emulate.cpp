@@ -1,4 +1,4 @@
-// `posed emulate`: a glove that is not there, for any program that expects one.
+// `posed emulate`: emulates a glove for any program that expects one.
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -35,7 +35,7 @@ struct EmulateOptions {
   std::optional<double> seconds;
 };
 
-// What the emulated hand does: a clip, or a made-up person's gestures.
+// The motion of the emulated hand: a clip, or gestures of a synthetic person.
 Result<std::function<HandAngles(double)>> motion(const EmulateOptions& options) {
   auto clip = std::make_shared<clip::HandClip>();
   if (!options.clip.empty()) {

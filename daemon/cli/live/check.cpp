@@ -1,4 +1,4 @@
-// `posed check`: does everything that `run` does before it binds a socket, and says what it found.
+// `posed check`: does everything that `run` does before it binds a socket, and prints the results.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -24,7 +24,7 @@ struct CheckOptions {
   bool json = false;
 };
 
-// What one stream would run, after its device was opened and its model bound.
+// A description of what one stream would run, made with its device opened and its model bound.
 Result<ordered_json> try_stream(const config::StreamConfig& config) {
   const auto stream = devices::open_stream(config);
   if (!stream) return std::unexpected(stream.error());
@@ -96,8 +96,8 @@ void print(const config::DaemonConfig& config, const ordered_json& streams) {
   }
 }
 
-// 0 when everything would run; 2 when the config is wrong; 1 when it is right, but a file or a
-// device it names cannot be used.
+// Returns 0 if everything would run; 2 if the config is wrong; 1 if it is right, but a file or a
+// device that it names cannot be used.
 int check(const CheckOptions& options) {
   config::Reading reading = config::read_config_file(options.config, drivers::registry());
   ordered_json streams = ordered_json::array();

@@ -15,12 +15,14 @@ namespace {
 
 using net::Domain;
 
-// A client never shows old poses: what it does not take in time waits nowhere for long.
+// A client must never show old poses, so only few messages may wait anywhere.
 constexpr int kMessagesWaiting = 16;
 constexpr int kReceiveBuffer = 8 * 1024;  // bytes
 
-// A secured daemon may hang up on a client without a key before its greeting was read (libzmq then
-// tells no reason), again and again. One that only ended is not there for a second try.
+// A secured daemon may close the connection to a client without a key before the client has read
+// the ZMTP greeting; libzmq then reports no reason. So the client concludes that it was refused
+// only after it was closed on this many times in a row; a daemon that is merely ending is not there
+// for a second try.
 constexpr int kHangUps = 3;
 
 constexpr const char* kMonitorEndpoint = "inproc://posed.connection";
@@ -30,7 +32,7 @@ constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAIL
 
 volatile std::sig_atomic_t interrupt_came = 0;
 
-// The first part of a monitor's message: event and value (zmq_socket_monitor).
+// Reads the first part of a monitor message: event number and value (zmq_socket_monitor).
 std::uint16_t read_event(void* monitor) {
   net::Message part;
   if (!part.receive(monitor)) return 0;
@@ -213,7 +215,8 @@ void add_timeout_option(CLI::App& command, double& timeout_s) {
 
 Interrupt::Interrupt() {
   struct sigaction action{};
-  action.sa_handler = [](int) { interrupt_came = 1; };  // no SA_RESTART: it ends a wait
+  // no SA_RESTART, so that the signal ends a wait
+  action.sa_handler = [](int) { interrupt_came = 1; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }

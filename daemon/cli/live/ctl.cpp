@@ -73,7 +73,7 @@ Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest
   return ask(*connection, options, request);
 }
 
-// Sends the model piece by piece. The answer to the last piece, or the first one that is a refusal.
+// Sends the model piece by piece. Returns the reply to the last piece, or the first refusal.
 Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& model) {
   const Interrupt interrupt;
   auto connection = Connection::open(options.client, ZMQ_DEALER);
@@ -94,7 +94,7 @@ Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& mo
   return reply;
 }
 
-// Prints an answer: JSON, or what `print` makes of it.
+// Prints a reply as JSON, or with `print`.
 template <typename Print>
 int show(const CtlOptions& options, const Result<v1::ControlReply>& reply, Print&& print) {
   if (!reply) return report(reply.error());
@@ -109,7 +109,7 @@ int ask_and_print(const CtlOptions& options, const v1::ControlRequest& request, 
   return show(options, ask(options, request), print);
 }
 
-// Says of which stream what is in effect from when on.
+// Prints which stream was changed, how, and from which frame on.
 int show_change(const CtlOptions& options, const Result<v1::ControlReply>& reply,
                 const std::string& what) {
   return show(options, reply, [&](const v1::ControlReply& accepted) {
@@ -156,7 +156,7 @@ int stop_playing(const CtlOptions& options) {
   return change(options, request, "performs no more");
 }
 
-// Everything about the file itself is found here; whether it fits the glove, the daemon knows.
+// Checks everything about the file itself; only the daemon knows whether it fits the glove.
 Result<std::string> read_calibration(const CtlOptions& options) {
   const auto& path = options.calibration;
   const auto fits = expect_kind(path, FileKind::kCalibration, options.stream);
@@ -202,7 +202,7 @@ int show_status(const CtlOptions& options) {
   request.mutable_status();
   return ask_and_print(options, request, [&](const v1::ControlReply& reply) {
     LiveViewOptions view{.title = "posed " + options.client.endpoint, .height = 0};
-    if (isatty(STDOUT_FILENO) == 0) view.width = 0;  // a script wants whole names
+    if (isatty(STDOUT_FILENO) == 0) view.width = 0;  // not a terminal: print whole names
     for (const std::string& line : live_view(reply.status(), view)) std::puts(line.c_str());
   });
 }
@@ -221,7 +221,7 @@ constexpr const char* kExamples = R"(Examples:
 `posed ctl COMMAND --help` has examples of each. Exit code 0: it is in effect; 1: the daemon refused
 or did not answer; 2: wrong use.)";
 
-// One thing that a daemon can be asked for; the options of `ctl` itself go with each.
+// The subcommands of `ctl`; each takes the options of `ctl` itself, too.
 class Actions {
  public:
   Actions(CLI::App& command, std::shared_ptr<CtlOptions> options, int& exit_code)

@@ -7,8 +7,8 @@
 namespace posed::cli {
 namespace {
 
-constexpr double kSilence_s = 3.0;       // three messages that did not come
-constexpr double kFirstSilence_s = 1.5;  // a daemon that is there says something within a second
+constexpr double kSilence_s = 3.0;       // three stats messages are missing
+constexpr double kFirstSilence_s = 1.5;  // a running daemon sends something within a second
 
 }  // namespace
 

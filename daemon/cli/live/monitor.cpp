@@ -1,4 +1,4 @@
-// `posed monitor`: what a running daemon publishes, line by line.
+// `posed monitor`: prints what a running daemon publishes, line by line.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -19,7 +19,8 @@
 namespace posed::cli {
 namespace {
 
-constexpr std::chrono::seconds kPatience{3};  // for a message of a topic of a daemon that is there
+// to wait for the first message of a topic of a running daemon
+constexpr std::chrono::seconds kPatience{3};
 
 struct MonitorOptions {
   ClientOptions client;
@@ -30,7 +31,7 @@ struct MonitorOptions {
   bool json = false;
 };
 
-// False when stdout is gone or the bytes are none of ours.
+// Returns false if stdout is closed or the bytes are not a valid message.
 template <typename Message>
 bool show(std::span<const std::byte> bytes, bool as_json) {
   Message message;
@@ -48,7 +49,7 @@ bool show_topic(std::string_view topic, std::span<const std::byte> bytes, bool a
   return topic == "stats" && show<v1::Stats>(bytes, as_json);
 }
 
-// What to print. Beside poses, people also want to see what happens to the stream.
+// The topics to subscribe to. Beside poses, users also want to see the stream's events.
 std::vector<std::string> topics(const MonitorOptions& options) {
   if (options.topic == "stats") return {"stats"};
   std::vector<std::string> asked{options.topic + "/" + options.stream};
@@ -56,8 +57,8 @@ std::vector<std::string> topics(const MonitorOptions& options) {
   return asked;
 }
 
-// Runs until someone wants to go; an error is why it must end. It listens to `stats`, too: they
-// come every second from a daemon that lives, whatever the topic.
+// Runs until the user ends it; returns an error if it must end. Also subscribes to `stats`, which a
+// running daemon sends every second, whatever the topic.
 class Monitor {
  public:
   Monitor(const MonitorOptions& options, Connection connection)
@@ -100,11 +101,11 @@ class Monitor {
     if (topic.text() == "stats") {
       if (auto known = look_at(body.bytes()); !known) return known;
     }
-    // A subscription is a prefix: walker also brings walker-raw.
+    // A subscription is a prefix: walker also matches walker-raw.
     const bool all = options_.stream.empty() && topic.text() != "stats";
     if (!all && std::ranges::find(asked_, topic.text()) == asked_.end()) return {};
     if (!show_topic(topic.text(), body.bytes(), options_.json)) {
-      finished_ = std::ferror(stdout) != 0;  // whoever read us has gone
+      finished_ = std::ferror(stdout) != 0;  // the reader of stdout has gone
       if (finished_) shown_ = options_.count;
       return {};
     }
@@ -112,7 +113,7 @@ class Monitor {
     return {};
   }
 
-  // The first stats say which streams there are, and whether this is a replay.
+  // The first stats show which streams there are, and whether this is a replay.
   Result<> look_at(std::span<const std::byte> bytes) {
     v1::Stats stats;
     const auto size = static_cast<int>(bytes.size());

@@ -1,4 +1,4 @@
-// posed convert: a clip in one format to a clip in another, or a device log's stream to a clip.
+// `posed convert`: converts a clip to another format, or a stream of a device log to a clip.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -40,7 +40,7 @@ bool ends_in(const std::string& path, const std::string& extension) {
 bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
 bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
 
-// An option that would mean nothing for this input or output is a mistake.
+// An option that would have no effect for this input or output is an error.
 Result<> check_options(const Convert& convert) {
   const auto useless = [&](bool given, bool means_something, const char* what) -> Result<> {
     if (!given || means_something) return {};
@@ -72,7 +72,7 @@ Result<> check_options(const Convert& convert) {
       .check();
 }
 
-// A BVH has no room for a gap or an uneven clock.
+// A BVH file cannot store gaps or an uneven clock.
 Result<clip::Clip> read_log(const Convert& convert) {
   auto clip = replay::clip_of_log(convert.in, convert.stream);
   if (!clip || is_hand_csv(convert.out)) return clip;
@@ -82,7 +82,7 @@ Result<clip::Clip> read_log(const Convert& convert) {
   return clip;
 }
 
-// Nor has a hand CSV room for a body.
+// A hand CSV cannot store a body.
 Result<clip::Clip> read(const Convert& convert) {
   if (is_log(convert.in)) return read_log(convert);
   auto clip = clip::read_clip(convert.in, convert.read);
@@ -128,7 +128,7 @@ int run(Convert& convert) {
                                {"joints", clip->skeleton->joints.size()},
                                {"metres_per_unit", clip->metres_per_unit},
                                {"warnings", clip->warnings}};
-  // Names may hold any bytes; what is no UTF-8 is replaced rather than thrown at.
+  // Names may hold any bytes; invalid UTF-8 is replaced, because otherwise the JSON library throws.
   std::printf("%s\n", json_text(summary).c_str());
   return static_cast<int>(ExitCode::kDone);
 }

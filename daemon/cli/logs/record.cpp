@@ -1,4 +1,4 @@
-// `posed record`: `run` with the recorder on the record_sink.
+// `posed record`: `run` with a recorder as the record sink.
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -31,7 +31,7 @@ struct RecordOptions {
   ServeOptions serve;
 };
 
-// Tells what the recorder noticed on event/<stream>: a gap on its own stream, an error on all.
+// Publishes what the recorder reports on event/<stream>: a gap on its own stream, an error on all.
 void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
   if (event.kind == record::RecorderEvent::Kind::kGap) {
     daemon.post_event(event.stream, v1::Event::KIND_RECORDING_GAP, event.text);
@@ -42,7 +42,7 @@ void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
   }
 }
 
-// What there is now. What is missing in it has been told as it happened; here is the sum.
+// Prints a summary. Gaps were already reported when they happened.
 void print_result(const RecordOptions& options, const v1::Stats& stats,
                   const record::Recorder& recorder, double took_s) {
   std::error_code ignored;
@@ -75,7 +75,7 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
                                 lost, errors));
 }
 
-// The log must be none of the files that the daemon reads.
+// The log must not be one of the files that the daemon reads.
 Result<> check_out(const RecordOptions& options, const config::DaemonConfig& config) {
   OutputFiles files(options.overwrite);
   files.reads(options.serve.config).writes_any_but_other(options.out, {".plog"});

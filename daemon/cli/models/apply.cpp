@@ -1,4 +1,4 @@
-// posed apply: a clip through the style stage, into a BVH.
+// `posed apply`: sends a clip through the style stage and writes a BVH file.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -39,7 +39,7 @@ Result<> check_files(const ApplyArguments& options) {
       .check();
 }
 
-// How far training moved its own walkers [deg rms]; 0 where the model does not say.
+// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say.
 double training_difference_deg(const style::StyleModel& model) {
   const auto report = nlohmann::json::parse(model.report_json, nullptr, false);
   return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;

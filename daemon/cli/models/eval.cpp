@@ -35,7 +35,7 @@ as `apply` reports it; component_rms_deg: the same change per component of the r
 source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure.
 The last line is the verdict; the exit code is 1 when the model is worse than nothing.)";
 
-constexpr double kRough = 1.5;  // jerk_ratio from which on people see it
+constexpr double kRough = 1.5;  // a jerk_ratio above this is visible
 
 struct EvalOptions {
   std::string model, source, target, skeleton;

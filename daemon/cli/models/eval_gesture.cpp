@@ -1,4 +1,4 @@
-// posed eval gesture: what a gesture model performs, in figures.
+// `posed eval gesture`: measures what a gesture model performs.
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -64,7 +64,8 @@ json smoothness(const motion::Rows& rows, double rate_hz) {
           {"sparc", number(motion::spectral_arc_length(values, rate_hz))}};
 }
 
-// Rms over frames and the channels that move of the distance to the nearest frame of `reference`.
+// The distance of each frame to the nearest frame of `reference`: rms over all frames and the
+// channels that move.
 double nearest_deg(const motion::Rows& rows, const motion::Rows& reference) {
   const Eigen::RowVectorXd low = reference.colwise().minCoeff();
   const auto moving = ((reference.colwise().maxCoeff() - low).array() > 1.0).count();
@@ -117,7 +118,7 @@ json curve_json(const std::vector<LagPoint>& curve) {
   return points;
 }
 
-// The last line: whether the performance can be shown to anybody.
+// The last line: whether the performance is good enough to be shown.
 std::string verdict(const json& report) {
   const double gap_cm = report["min_gap_cm"].get<double>();
   std::string text = gap_cm >= 0.0 ? "fingers never overlap" : "fingers overlap";

@@ -1,4 +1,4 @@
-// posed smooth: a recorded hand through the live generator, as a stream would have been.
+// `posed smooth`: runs a recorded hand through the live smoother, as a stream would have been.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -32,7 +32,7 @@ struct SmoothOptions {
   bool overwrite = false, json = false;
 };
 
-// Puts what comes out into the clip's rows, and counts.
+// Writes the smoother's output to the clip's rows, and counts.
 class Rows final : public StageOut {
  public:
   explicit Rows(clip::HandClip& clip) : clip_(clip) {}
@@ -58,7 +58,7 @@ class Rows final : public StageOut {
   std::size_t next_ = 0;
 };
 
-// The gestures that were told, one entry a run of frames.
+// The recognised gestures, one entry for each run of frames.
 json recognised(const Rows& rows, const clip::HandClip& clip) {
   json runs = json::array();
   double sum = 0.0;

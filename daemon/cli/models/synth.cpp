@@ -1,4 +1,4 @@
-// posed synth: a hand performs a string of labels, into a file.
+// `posed synth`: performs a sequence of labels with a hand and writes a file.
 #include <charconv>
 #include <cmath>
 #include <cstdio>

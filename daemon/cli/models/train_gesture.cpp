@@ -36,7 +36,7 @@ A label file has a line a gesture, `start end name`, in seconds from the first f
 struct TrainGestureOptions {
   std::vector<std::string> clips, labels, shows;
   std::string questions, propose, out;
-  std::string hand;  // which one of a body
+  std::string hand;  // which hand of a body
   double rate_hz = 30.0;
   int embedded_rounds = 0;
   bool auto_label = false;
@@ -44,7 +44,7 @@ struct TrainGestureOptions {
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
-// It trains nothing, so whatever is about the training means nothing.
+// --auto-label trains nothing, so options about the training are refused.
 Result<> check_auto_label(const TrainGestureOptions& options) {
   if (options.clips.size() != 1) {
     return misuse("--auto-label proposes labels for one clip at a time");
@@ -103,7 +103,7 @@ Result<gesture::LabelPose> shown_pose(const std::string& show, const TrainGestur
   return pose;
 }
 
-// The classes of every label: from the file, proposed, or built in; then the shown poses.
+// The classes of all labels: from the file, proposed, or built in; then the poses given by clips.
 Result<std::vector<gesture::Label>> classes(const TrainGestureOptions& options,
                                             const std::vector<gesture::Recording>& recordings) {
   std::vector<gesture::Label> labels = gesture::built_in_labels();

@@ -27,7 +27,7 @@ void Waiting::show(const std::stop_token& stop) {
   seconds passed{0};
   bool drawn = false;
   while (true) {
-    // A log file needs no line a second: 1, 2, 4, ... seconds after the start are enough.
+    // In a log file a line a second is too much: print after 1, 2, 4, ... seconds.
     const seconds step = terminal_ ? seconds(1) : std::max(seconds(1), passed);
     ended_.wait_for(lock, stop, step, never);
     if (stop.stop_requested()) break;
