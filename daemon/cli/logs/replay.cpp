@@ -174,7 +174,7 @@ Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
 void warn_of_gaps(const log::Reader& reader) {
   constexpr std::array<const char*, 3> kNames{"chunks", "decisions", "published frames"};
   const auto gaps = reader.gaps();
-  if (!gaps) return;  // open() has reported that error already
+  if (!gaps) return;  // cannot happen: open() has read the gaps already
   for (const log::GapRow& gap : *gaps) {
     const bool chunks = gap.kind == log::GapRow::Kind::kChunks;
     const auto owner =
