@@ -46,7 +46,7 @@ void DeviceSupervisor::stop() noexcept {
 }
 
 void DeviceSupervisor::run() {
-  system::name_thread("keep-" + stream_.config.name);
+  system::name_thread("dev-" + stream_.config.name);
   while (!stop_.load()) {
     while (stream_.slot->out.consume([this](drivers::Device* /*device_*/) { take_back(); })) {
     }
