@@ -97,7 +97,7 @@ struct VirtualStreamContext {
     return calibrations.back().get();
   }
 
-  // The device of the next link that is there by now; null: none.
+  // The device of the next link, if it is connected by now; otherwise null.
   drivers::Device* next_device() {
     if (device || next_link == stream.links.size()) return nullptr;
     const ScriptedLink& link = stream.links[next_link];
@@ -119,7 +119,7 @@ struct VirtualStreamContext {
   std::uint32_t id;
   pipeline::StreamCounters counters;
   pipeline::DeviceSlot slot;
-  std::unique_ptr<drivers::Device> device;  // the link in use
+  std::unique_ptr<drivers::Device> device;  // of the link in use
   std::size_t next_link = 0;
   std::vector<std::unique_ptr<const style::BoundModel>> styles;
   std::vector<std::unique_ptr<const generate::BoundModel>> gestures;
@@ -175,8 +175,8 @@ class VirtualDaemon::Parts {
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
   std::size_t next_command = 0;
-  std::array<std::int64_t, kParts> due{};            // as the part's last turn said
-  std::array<std::int64_t, kParts> held_until_ns{};  // no turn before
+  std::array<std::int64_t, kParts> due{};            // as returned by the part's last turn
+  std::array<std::int64_t, kParts> held_until_ns{};  // no turn before this time
 };
 
 void VirtualDaemon::Parts::open_log() {
@@ -267,7 +267,8 @@ void VirtualDaemon::Parts::open() {
   held_until_ns.fill(kBegin_ns);
 }
 
-// One turn of a part that is due, then another, chosen at random; when none is due, time passes.
+// Runs one turn of a part that is due, then of another, chosen at random; if none is due, time
+// advances.
 void VirtualDaemon::Parts::run(double until_s) {
   open();
   const std::int64_t until_ns = at_ns(until_s);
@@ -295,7 +296,7 @@ void VirtualDaemon::Parts::run(double until_s) {
   stop();
 }
 
-// When a part would wake: by its own word, or because something came into one of its rings.
+// When a part would wake: at the time it asked for, or because one of its rings has something.
 std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
   std::int64_t at = due[part];
   switch (part) {
@@ -342,7 +343,7 @@ void VirtualDaemon::Parts::take_turn(Part part) {
       due[part] = virtual_now_ns + kLogWriterEvery_ns;
       break;
     case kPerson:
-      // Control sends no more than may be under way.
+      // Control sends at most kMaxUnderWay commands.
       if (next_command - acks_taken.size() < pipeline::kMaxUnderWay) {
         speak(script[next_command], next_command + 1);
         ++next_command;
@@ -435,7 +436,7 @@ void VirtualDaemon::Parts::publish_frame(VirtualStreamContext& context,
   record_sink->published(context.id, item.frame.header.sequence, raw, bytes_of(bytes));
 }
 
-// From the devices to the log, as the daemon ends.
+// In the order in which the daemon ends: from the devices to the log.
 void VirtualDaemon::Parts::stop() {
   worker->finish();
   while (!finished->empty() || !acks->empty()) publish(kItemsPublishedATurn);

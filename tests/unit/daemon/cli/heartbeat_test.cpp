@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::int64_t kSecond = kNanosPerSecond;
 
-TEST_CASE("a daemon that was never heard is missed within two seconds") {
+TEST_CASE("a daemon that never sent a message counts as silent within two seconds") {
   Heartbeat heart(100 * kSecond);
   CHECK_FALSE(heart.silent_s(101 * kSecond));
   CHECK_FALSE(heart.ever_heard());
@@ -17,7 +17,7 @@ TEST_CASE("a daemon that was never heard is missed within two seconds") {
   CHECK(*heart.silent_s(120 * kSecond) == Approx(20.0));
 }
 
-TEST_CASE("a daemon that falls silent is told once for each doubling, and that it is back once") {
+TEST_CASE("a silence is reported each time it has doubled, and its end is reported once") {
   Heartbeat heart(0);
   heart.heard(kSecond / 2);
   CHECK_FALSE(heart.silence_to_report(3 * kSecond));

@@ -1,4 +1,4 @@
-// Models that arrive in pieces, as nobody should send them.
+// Models that arrive in pieces, with every mistake that a client can make.
 #include <catch2/catch.hpp>
 
 #include "daemon/control/uploads.hpp"
@@ -21,7 +21,7 @@ struct Sender {
   }
 };
 
-TEST_CASE("a model in pieces comes out whole, two clients beside each other") {
+TEST_CASE("a model in pieces is put together, for two clients at the same time") {
   Uploads uploads;
   const Sender sender{.model = std::string(100, 'm')};
   for (std::size_t offset = 0; offset < 80; offset += 20) {
@@ -45,7 +45,7 @@ TEST_CASE("pieces out of order, overlapping, beyond the end or of another model 
     REQUIRE(uploads.take("a", sender.piece(0, 20), 1));
     CHECK_FALSE(uploads.take("a", wrong, 1));
     CHECK(uploads.bytes() == 0);
-    CHECK_FALSE(uploads.take("a", sender.piece(20, 20), 1));  // nothing is left to continue
+    CHECK_FALSE(uploads.take("a", sender.piece(20, 20), 1));  // the error has ended the upload
   }
   Uploads uploads;
   ModelPiece beyond = sender.piece(0, 20);
@@ -63,7 +63,7 @@ TEST_CASE("pieces out of order, overlapping, beyond the end or of another model 
   CHECK(uploads.bytes() == 0);
 }
 
-TEST_CASE("a damaged model is refused before anybody parses it") {
+TEST_CASE("a damaged model is refused before it is parsed") {
   Uploads uploads;
   const Sender sender{.model = std::string(30, 'm'), .sha256 = std::string(64, '0')};
   const auto taken = uploads.take("a", sender.piece(0, 30), 1);
@@ -78,7 +78,7 @@ TEST_CASE("uploads are bounded in number, bytes and time") {
     REQUIRE(uploads.take(std::to_string(i), sender.piece(0, kMaxPiece), 1));
   }
   CHECK_FALSE(uploads.take("one more", sender.piece(0, kMaxPiece), 1));
-  // All of them together may not hold more than one largest model.
+  // All of them together may not hold more bytes than one model of the largest size.
   std::size_t offset = kMaxPiece;
   bool refused = false;
   for (; offset < kMaxModel && !refused; offset += kMaxPiece) {
