@@ -1,16 +1,16 @@
-// VirtualDaemon: the daemon's reader, pipeline and recorder in one thread on a clock that nobody
-// waits for. Devices follow a script; the order in which the parts get their turns, how long a turn
-// takes and when one of them is held up for a while are drawn from a seed, so a run that fails can
-// be run again. It records a real device log with the frames that it published: what `replay
-// --expect` is tested with.
+// VirtualDaemon: the daemon's reader, pipeline and recorder in one thread on a virtual clock, which
+// advances without waiting. Devices follow a script. The order of the parts' turns, the duration of
+// a turn and the times at which a part is held up are drawn from a seed, so a failed run can be
+// repeated. It records a real device log with the published frames, to test `replay --expect`.
 //
 //   VirtualDaemon daemon({.seed = 7, .log = folder.path() / "take.plog"});
 //   daemon.add(walking_stream("walker", 3.0));
 //   daemon.add(glove_stream("hand", 3.0));
-//   daemon.command({.at_s = 1.0, .stream = 0, .kind = VirtualCommand::Kind::kAlpha, .alpha =
-//   0.5F}); daemon.run(3.5);  // the log is closed now
+//   daemon.command({.at_s = 1.0, .kind = VirtualCommand::Kind::kAlpha, .alpha = 0.5F});
+//   daemon.run(3.5);  // the log is closed now
 //
-// Times are seconds since the run's begin. One at a time in a thread: they share a clock.
+// Times are seconds since the start of the run. Only one at a time in a thread, because all use the
+// same clock.
 #pragma once
 
 #include <cstdint>

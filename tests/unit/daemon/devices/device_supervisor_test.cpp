@@ -37,9 +37,9 @@ class PluggedGlove {
 
 // A stream whose glove is unplugged, with its reader running and its supervisor looking for the
 // glove.
-class KeptStream {
+class SupervisedStream {
  public:
-  explicit KeptStream(const std::filesystem::path& port) {
+  explicit SupervisedStream(const std::filesystem::path& port) {
     config::StreamConfig config;
     config.name = "right";
     config.driver = "lucidgloves";
@@ -64,7 +64,7 @@ class KeptStream {
                                           found += kind == v1::Event::KIND_FOUND ? 1 : 0;
                                         }});
   }
-  ~KeptStream() {
+  ~SupervisedStream() {
     reader_->stop();
     reader_thread_.join();
   }
@@ -117,7 +117,7 @@ TEST_CASE("a supervised glove is read each time it is plugged in, and calibrated
   const drivers::glove::OwnedCalibration calibration{
       drivers::glove::default_calibration(lucidgloves().glove_model(description).value()).value(),
       "calibration"};
-  KeptStream kept(port);
+  SupervisedStream kept(port);
   CHECK(kept.take_frames(0) == 0);
   for (int time = 1; time <= 3; ++time) {
     {

@@ -17,9 +17,9 @@ namespace {
 constexpr std::int64_t kMs = 1'000'000;
 
 // spdlog's default logger is global; restores that of other tests.
-class DefaultLoggerKept {
+class RestoreDefaultLogger {
  public:
-  ~DefaultLoggerKept() { spdlog::set_default_logger(before_); }
+  ~RestoreDefaultLogger() { spdlog::set_default_logger(before_); }
 
  private:
   std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
@@ -74,7 +74,7 @@ TEST_CASE(
 TEST_CASE("lines of ever new causes are limited to a few a second, too") {
   LineLimiter limiter;
   int written = 0;
-  std::uint64_t told = 0;
+  std::uint64_t reported = 0;
   for (int i = 0; i < 10'000; ++i) {
     std::string word;
     for (int left = i; left >= 0; left = left / 26 - 1) word += static_cast<char>('a' + left % 26);
@@ -82,16 +82,17 @@ TEST_CASE("lines of ever new causes are limited to a few a second, too") {
     written += limiter.admit(now_ns, 2, "no stream " + word) ? 1 : 0;
     while (const auto line = limiter.take_due(now_ns)) {
       CHECK(line->text.ends_with(" more lines of many kinds are left out"));
-      told += std::stoull(line->text);
+      reported += std::stoull(line->text);
     }
   }
-  while (const auto line = limiter.take_due(10'000 * kMs, true)) told += std::stoull(line->text);
+  while (const auto line = limiter.take_due(10'000 * kMs, true))
+    reported += std::stoull(line->text);
   CHECK(written <= 256 + 8 * 10);
-  CHECK(static_cast<std::uint64_t>(written) + told == 10'000);  // every line is counted
+  CHECK(static_cast<std::uint64_t>(written) + reported == 10'000);  // every line is counted
 }
 
 TEST_CASE("logging never waits for a full pipe, and lost lines are counted in the log") {
-  const DefaultLoggerKept kept;
+  const RestoreDefaultLogger kept;
   test::Pipe pipe;
   pipe.fill();
   const LogOutput output(pipe.write_end());
@@ -104,7 +105,7 @@ TEST_CASE("logging never waits for a full pipe, and lost lines are counted in th
 }
 
 TEST_CASE("the log output ends even if nobody reads it") {
-  const DefaultLoggerKept kept;
+  const RestoreDefaultLogger kept;
   static test::Pipe pipe;  // static, because the thread that is left running may outlive the test
   pipe.fill();
   {
@@ -117,7 +118,7 @@ TEST_CASE("the log output ends even if nobody reads it") {
 }
 
 TEST_CASE("a pipe without a reader discards lines, and later lines are not lost") {
-  const DefaultLoggerKept kept;
+  const RestoreDefaultLogger kept;
   std::signal(SIGPIPE, SIG_IGN);
   test::Pipe pipe;
   pipe.close_reader();
@@ -129,7 +130,7 @@ TEST_CASE("a pipe without a reader discards lines, and later lines are not lost"
 }
 
 TEST_CASE("repeated lines are summed up when a command asks for it") {
-  const DefaultLoggerKept kept;
+  const RestoreDefaultLogger kept;
   test::Pipe pipe;
   {
     const LogOutput output(pipe.write_end());
@@ -146,7 +147,7 @@ TEST_CASE("repeated lines are summed up when a command asks for it") {
 }
 
 TEST_CASE("names in a line can neither control the terminal nor fill it") {
-  const DefaultLoggerKept kept;
+  const RestoreDefaultLogger kept;
   test::Pipe pipe;
   {
     const LogOutput output(pipe.write_end());

@@ -89,18 +89,18 @@ TEST_CASE("the event of a change names the old and the new value") {
   Collected out;
   static_cast<void>(engine.apply({.kind = Command::Kind::kAlpha, .alpha = 0.5F}, out));
   REQUIRE(out.items.size() == 1);
-  StreamEvent told = out.items[0].stream_event;
-  CHECK(told.kind == v1::Event::KIND_CONTROL);
-  CHECK(told.change == Change::kAlpha);
-  CHECK(told.alpha_before == 1.0F);
-  CHECK(told.value == 0.5);
+  StreamEvent change = out.items[0].stream_event;
+  CHECK(change.kind == v1::Event::KIND_CONTROL);
+  CHECK(change.change == Change::kAlpha);
+  CHECK(change.alpha_before == 1.0F);
+  CHECK(change.value == 0.5);
   CHECK(engine.alpha_target() == 0.5F);
   CHECK(engine.alpha() == 0.0F);  // alpha moves towards its target with the frames
   static_cast<void>(engine.apply({.kind = Command::Kind::kModel, .model = two.get()}, out));
-  told = out.items[1].stream_event;
-  CHECK(told.change == Change::kStyleModel);
-  CHECK(told.before.text() == "one.style");
-  CHECK(told.after.text() == "two.style");
+  change = out.items[1].stream_event;
+  CHECK(change.change == Change::kStyleModel);
+  CHECK(change.before.text() == "one.style");
+  CHECK(change.after.text() == "two.style");
 }
 
 TEST_CASE("a gap in the sequence is recorded as shed, before the frame after it") {

@@ -145,20 +145,20 @@ TEST_CASE(
     "skipped frames are reported at once, then as a sum once a second, and every one is counted") {
   constexpr std::int64_t kStep_ns = kNanosPerSecond / 100;
   ShedTally tally;
-  std::uint64_t told = 0, lines = 0;
+  std::uint64_t reported = 0, lines = 0;
   for (std::uint64_t i = 0; i < 1000; ++i) {  // ten seconds; one frame of four is published
     tally.add(4 * i + 1, 3);
     const auto sum = tally.take(static_cast<std::int64_t>(i) * kStep_ns);
     if (!sum) continue;
-    CHECK(sum->first == told / 3 * 4 + 1);
+    CHECK(sum->first == reported / 3 * 4 + 1);
     CHECK(sum->last == 4 * i + 3);
-    told += sum->frames;
+    reported += sum->frames;
     ++lines;
   }
   CHECK(lines == 10);
   const auto rest = tally.take(999 * kStep_ns, true);
   REQUIRE(rest);
-  CHECK(told + rest->frames == 3000);
+  CHECK(reported + rest->frames == 3000);
   CHECK_FALSE(tally.take(2000 * kStep_ns, true));
 }
 
@@ -182,11 +182,11 @@ TEST_CASE("a flood of skipped frames is one event, and its sum when the stream e
   }
   CHECK(texts[0] == "9 frames, 1 to 9, were skipped: newer ones waited");
   CHECK(texts[texts.size() - 2].contains("to 499, were skipped"));
-  std::uint64_t told = 0;
+  std::uint64_t reported = 0;
   for (const std::string& text : texts) {
-    if (text.contains("skipped")) told += std::stoull(text);
+    if (text.contains("skipped")) reported += std::stoull(text);
   }
-  CHECK(told == 450);
+  CHECK(reported == 450);
   CHECK(texts.size() < 50);  // three, unless the machine was very slow
 }
 
