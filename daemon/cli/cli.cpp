@@ -39,7 +39,8 @@ int with_stdout_written(int exit_code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
   const std::string why = errno == 0 ? "" : std::string(" (") + std::strerror(errno) + ")";
   if (exit_code != 0 || reader_of_stdout_has_gone()) return exit_code;
-  return report(fail("stdout does not take the output" + why + "; it is not complete").error());
+  return report(
+      fail("the output cannot be written to stdout" + why + "; it is not complete").error());
 }
 
 int parse_and_run(int argc, char** argv) {

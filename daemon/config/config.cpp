@@ -107,7 +107,7 @@ void Reader::read_endpoint(TableReader& root, const char* name, std::string& end
   table->finish();
   if (!endpoint.starts_with("tcp://") && !endpoint.starts_with("ipc://")) {
     table->add_error("endpoint",
-                     fmt::format("{} is no endpoint; it reads like tcp://127.0.0.1:5570,"
+                     fmt::format("{} is not an endpoint; it looks like tcp://127.0.0.1:5570,"
                                  " or ipc:///run/posed.sock",
                                  in_quotes(endpoint)));
   } else if (!net::is_loopback(endpoint) && !secured && !insecure) {

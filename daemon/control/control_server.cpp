@@ -51,7 +51,7 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
   }
   auto guard = net::PeerGuard::open(context, router->get(),
                                     {.name = "control",
-                                     .most_peers = net::peer_shares().control,
+                                     .max_peers = net::peer_shares().control,
                                      .max_unheard = kMaxUnheard,
                                      .max_unheard_of_all = kMaxUnheard,
                                      .authenticator = ports.authenticator});

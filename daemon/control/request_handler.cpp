@@ -44,7 +44,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
     return refusal(std::move(requester), "the request is too large: it has at most 64 KB");
   }
   if (!request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
-    return refusal(std::move(requester), "this is no posed.v1.ControlRequest");
+    return refusal(std::move(requester), "this is not a valid posed.v1.ControlRequest");
   }
   Result<> done;
   v1::ControlReply reply;

@@ -25,7 +25,7 @@ Result<> check_piece(const ModelPiece& piece) {
         fmt::format("a piece of a model has 1 to {} bytes, not {}", kMaxPiece, piece.bytes.size()));
   }
   if (piece.sha256.size() != kSha256) {
-    return fail("the model's sha256 is missing: give it as 64 hexadecimal signs in every piece");
+    return fail("the model's sha256 is missing: give it as 64 hexadecimal digits in every piece");
   }
   return {};
 }
@@ -76,7 +76,7 @@ Result<std::optional<std::string>> Uploads::take(const std::string& client, cons
   const Upload whole = std::move(upload);
   uploads_.erase(*found);
   if (log::sha256_hex(std::as_bytes(std::span(whole.bytes))) != whole.sha256) {
-    return fail("the model arrived damaged: its sha256 is another; send it again");
+    return fail("the model arrived damaged: its sha256 is different; send it again");
   }
   return std::optional(std::move(whole.bytes));
 }

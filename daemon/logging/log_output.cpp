@@ -139,8 +139,9 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
     const std::uint64_t lost = std::exchange(lost_, 0);
     std::string text;
     if (lost > 0) {
-      text = format_text(spdlog::level::warn,
-                         std::to_string(lost) + " lines of the log were lost here: nobody read it");
+      text = format_text(
+          spdlog::level::warn,
+          std::to_string(lost) + " lines of the log were discarded here: nobody read it");
     }
     text += lines_.front();
     lines_.pop_front();

@@ -41,7 +41,7 @@ Result<std::string> read_key(const File& file, const std::filesystem::path& path
   std::string text(buffer.data(), static_cast<std::size_t>(size));
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
   if (!is_key(text)) {
-    return fail("this is no key: expected the 40 characters that `posed keygen` writes", path);
+    return fail("this is not a key: expected the 40 characters that `posed keygen` writes", path);
   }
   return text;
 }
@@ -80,7 +80,7 @@ bool is_key(const std::string& text) {
 Result<KeyPair> write_new_keys(const std::string& name, const std::filesystem::path& folder) {
   if (!is_plain_name(name)) {
     return misuse("'" + name +
-                  "' is no name for a key: use letters, digits, '-' and '_'"
+                  "' is not a name for a key: use letters, digits, '-' and '_'"
                   " (--out names the folder)");
   }
   std::array<char, kKeyLength + 1> public_z85{};

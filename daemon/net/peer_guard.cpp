@@ -163,7 +163,7 @@ void PeerGuard::hear_monitor() {
 
 void PeerGuard::admit(int fd) {
   peers_[fd].cookie = cookie_of(fd);
-  if (peers_.size() > limits_.most_peers) cut_now(fd, "came when there were too many");
+  if (peers_.size() > limits_.max_peers) cut_now(fd, "came when there were too many");
 }
 
 void PeerGuard::inspect_all() {
@@ -245,7 +245,7 @@ void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& all
   hear_monitor();
   for (const auto& [fd, peer] : peers_) {
     if (!peer.spoke || !allowed(peer.user)) {
-      cut_now(fd, "has lost its right, or did not say its name");
+      cut_now(fd, "has lost its right, or has not identified itself");
     }
   }
 }

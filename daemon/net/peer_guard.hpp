@@ -43,8 +43,8 @@ namespace posed::net {
 class ZapAuthenticator;
 
 struct PeerLimits {
-  const char* name = "";       // of the socket, for the log
-  std::size_t most_peers = 0;  // further connections are cut at once
+  const char* name = "";      // of the socket, for the log
+  std::size_t max_peers = 0;  // further connections are cut at once
   // Bytes that have not yet become a whole message: of one peer, and of all peers together.
   std::uint64_t max_unheard = 0;
   std::uint64_t max_unheard_of_all = 0;

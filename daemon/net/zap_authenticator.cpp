@@ -35,7 +35,7 @@ Result<std::unique_ptr<ZapAuthenticator>> ZapAuthenticator::start(void* context,
   }
   const std::string bell = "inproc://posed.authenticator";
   if (auto done = bind_socket(door->get(), kZapEndpoint); !done) {
-    return fail("this ZeroMQ context has a authenticator already");
+    return fail("this ZeroMQ context has an authenticator already");
   }
   if (auto done = bind_socket(stop_in->get(), bell); !done) return std::unexpected(done.error());
   if (auto done = connect_socket(stop_out->get(), bell); !done) {

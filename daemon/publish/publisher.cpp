@@ -111,7 +111,7 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
   }
   auto guard = net::PeerGuard::open(options.context, socket->get(),
                                     {.name = "publish",
-                                     .most_peers = net::peer_shares().publish,
+                                     .max_peers = net::peer_shares().publish,
                                      .max_unheard = kMaxUnheard,
                                      .max_unheard_of_all = kMaxUnheardOfAll,
                                      .authenticator = options.authenticator});
@@ -283,7 +283,7 @@ bool Publisher::hear_subscriptions(std::int64_t now_ns) {
     if (!guard_->knows(peer)) continue;
     guard_->heard(peer, message.property("User-Id"));
     if (text.empty() || static_cast<unsigned char>(text.front()) > 1) {
-      guard_->cut(peer, "sent what is no subscription");
+      guard_->cut(peer, "sent an invalid subscription");
     } else if (!subscriptions_.ask(peer, text.substr(1), text.front() == 1, now_ns)) {
       guard_->cut(peer, "subscribed to too much");
     } else if (text.front() == 1) {

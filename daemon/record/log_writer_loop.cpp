@@ -158,7 +158,7 @@ void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
         std::min(stream.lost_from_frame, std::exchange(stream.uncommitted_from_frame, kNoFrame));
     stream.last_chunk = stream.committed_chunk;
   }
-  const std::string text = "recording stopped, streaming goes on: " + error.text();
+  const std::string text = "recording stopped, streaming continues: " + error.text();
   spdlog::error("{}", text);
   report_({.kind = RecorderEvent::Kind::kError, .stream = 0, .time_ns = now_ns, .text = text});
 }
@@ -180,7 +180,7 @@ void LogWriterLoop::resume(std::int64_t now_ns) {
     return;
   }
   resumed_ns_ = now_ns;
-  spdlog::warn("recording goes on: {}", path_.string());
+  spdlog::warn("recording continues: {}", path_.string());
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     const Counts lost = std::exchange(streams_[id].lost, {});
     streams_[id].lost_from_frame = kNoFrame;

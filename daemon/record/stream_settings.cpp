@@ -105,12 +105,11 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
     settings.rate_hz = root.at("rate_hz").get<double>();
     for (const Json& stage : root.at("stages")) {
       if (add_stage(stage, settings)) continue;
-      return fail("this posed cannot run the stages of a stream as they stand in the log (" +
+      return fail("this posed cannot run the stages of a stream as recorded in the log (" +
                       json_text(stage.at("stage")) + "); update posed",
                   file);
     }
-    if (!sound(settings))
-      return fail("the log is damaged (a stream's settings make no sense)", file);
+    if (!sound(settings)) return fail("the log is damaged (a stream's settings are invalid)", file);
     return settings;
   } catch (const nlohmann::json::exception& error) {
     return fail("the log is damaged (a stream's settings: " + std::string(error.what()) + ")",

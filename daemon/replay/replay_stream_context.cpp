@@ -158,7 +158,7 @@ Result<> ReplayStreamContext::feed(const log::ChunkRow& chunk) {
       return calibrate(text_of(chunk));
     default:
       return log::damaged_row(file_, "chunk", chunk.id,
-                              "holds what this posed does not know, or is of a newer one");
+                              "has an unknown kind, or comes from a newer posed");
   }
 }
 

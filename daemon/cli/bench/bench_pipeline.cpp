@@ -34,9 +34,9 @@ namespace {
 constexpr double kRate_hz = 120.0;
 constexpr const char* kBenchPipelineFooter =
     R"(Synthetic walkers at 120 Hz through the real daemon: file driver, rings, a style model of
---points poses, publisher; no recording, no real-time rights. Every other second the reader sends
+--points poses, publisher; no recording, no real-time priority. Every other second the reader sends
 a message of the same size straight to ZeroMQ instead: the bare hop. The subscriber is another
-process. Believe it only when the CPU pressure (PSI some) stays below 5 %.
+process. The result is valid only if the CPU pressure (PSI some) stays below 5 %.
 
   posed bench pipeline
   posed bench pipeline --streams 32 --points 200 --json)";

@@ -36,11 +36,11 @@ using Floats = hwy::AlignedFreeUniquePtr<float[]>;
 // one hot sample is the mean of this many calls, so that reading the clock costs only 1 %
 constexpr int kHotCalls = 8;
 constexpr const char* kBenchPredictFooter =
-    R"(Made-up walkers, queries from one who is not in the training set.
+    R"(Synthetic walkers; queries from one who is not in the training set.
 hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
-frames of a 120 Hz stream. The yardstick sums as many floats as the process logically reads
+frames of a 120 Hz stream. The reference sums as many floats as the process logically reads
 (N x 2D; gate rows are also held against the confidence's triangle added), with eight vector
-accumulators; variants take turns, so that they meet the same machine.
+accumulators; variants take turns, so that they run under the same conditions.
 
   posed bench predict
   posed bench predict --samples 500 --json)";

@@ -251,7 +251,7 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("C.toml")
       ->required();
   command->footer(
-      R"(Poses: flat, fist, thumb, spread. On a terminal a screen leads through them; elsewhere
+      R"(Poses: flat, fist, thumb, spread. On a terminal a screen shows what to do; elsewhere
 a line on stdout names each pose and a line on stdin begins it, or --seconds does. A pose in which
 the hand moved, or whose sensors hardly moved from the flat hand, fails: the screen asks for it
 again, a script gets exit code 1 and no file. Examples:

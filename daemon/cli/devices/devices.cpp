@@ -24,10 +24,10 @@ using drivers::DeviceInfo;
 using nlohmann::ordered_json;
 
 constexpr const char* kFooter = R"(examples:
-  posed devices              what is plugged in, and the id that a [[stream]] binds it by
+  posed devices              connected devices, and the id for a [[stream]] in the config
   posed devices --json       the same for a script
 
-Bind a stream to a glove, not to a port that moves: id = "SERIAL" or, for gloves without a serial
+Bind a stream to a glove, not to a port that may change: id = "SERIAL" or, for gloves without a serial
 number, the port path ("1-2.3": always that socket).)";
 
 std::string bus_name(Bus bus) {

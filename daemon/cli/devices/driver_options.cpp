@@ -42,7 +42,7 @@ Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
       for (const auto& option : driver.options) {
         known += (known.empty() ? "" : ", ") + std::string(option.name);
       }
-      return misuse("'" + word + "' is no option of " + std::string(driver.name) +
+      return misuse("'" + word + "' is not an option of " + std::string(driver.name) +
                     "; KEY=VALUE with one of: " + known);
     }
     drivers::OptionValue value = spec->default_value;

@@ -59,7 +59,8 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
     for (const drivers::Driver& other : drivers::registry()) {
       if (other.emulate != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
     }
-    return misuse("'" + name + "' is no log and no glove that can be emulated; there is: " + known);
+    return misuse("'" + name +
+                  "' is neither a log nor a glove that can be emulated; there is: " + known);
   }
   auto options = parse_driver_options(*driver, set);
   if (!options) return std::unexpected(options.error());
@@ -69,11 +70,11 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
 Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& options) {
   if (!std::filesystem::is_regular_file(options.what)) {
     if (!options.stream.empty()) {
-      return misuse("--stream chooses from a log's streams; '" + options.what + "' is no log here");
+      return misuse("--stream chooses from a log's streams; '" + options.what + "' is not a log");
     }
     return make_emulator(options.what, options.set);
   }
-  if (!options.clip.empty()) return misuse("a log brings its own motion: leave out --clip");
+  if (!options.clip.empty()) return misuse("a log has its own motion: leave out --clip");
   auto device = emulate::read_logged_device(options.what, options.stream);
   if (!device) return std::unexpected(device.error());
   std::unique_ptr<drivers::Emulator> speaker;
@@ -146,7 +147,8 @@ void add_emulate(CLI::App& app, int& exit_code) {
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
   command
-      ->add_option("--clip", options->clip, "The hand's motion, a hand CSV; else made-up gestures")
+      ->add_option("--clip", options->clip,
+                   "The hand's motion, a hand CSV; default: synthetic gestures")
       ->type_name("FILE");
   command->add_option("--set", options->set, "An option of the driver, like hand=left")
       ->type_name("KEY=VALUE");

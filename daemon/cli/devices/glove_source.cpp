@@ -214,7 +214,7 @@ Result<GloveSource::Glove> GloveSource::known(const drivers::Driver& driver,
                                               const drivers::Description& description) {
   const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
   if (driver.glove_model == nullptr || !hand) {
-    return misuse("driver " + in_quotes(driver.name) + " is no glove");
+    return misuse("driver " + in_quotes(driver.name) + " is not for gloves");
   }
   auto model = driver.glove_model(description);
   if (!model) return std::unexpected(model.error());

@@ -130,7 +130,7 @@ int check(const CheckOptions& options) {
 }  // namespace
 
 void add_check(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("check", "Read a config, open what it names, say what it is");
+  auto* command = app.add_subcommand("check", "Check a config and everything that it names");
   auto options = std::make_shared<CheckOptions>();
   command->add_option("--config", options->config, "The daemon's config, TOML")
       ->required()
@@ -139,8 +139,8 @@ void add_check(CLI::App& app, int& exit_code) {
   command->footer(R"(Examples:
   posed check --config config/posed.toml
   posed check --config mine.toml --json | jq .errors
-Every mistake is told, each with file and line. Exit code 0: it would run, though a glove that is
-away is only waited for (a note says so, "present" in JSON is false). 2: the config is wrong.
+Every error is reported with file and line. Exit code 0: it would run, though a glove that is
+unplugged is only waited for (a note says so, "present" in JSON is false). 2: the config is wrong.
 1: the config is right, but a clip, model or device that it names cannot be used.)");
   command->callback([options, &exit_code] { exit_code = check(*options); });
 }

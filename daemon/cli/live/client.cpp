@@ -126,7 +126,7 @@ std::optional<Error> Connection::refusal() {
       case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
         return keyless ? wants_key()
                        : fail("the daemon at " + where +
-                              " does not use keys, or is no posed; leave out --key")
+                              " does not use keys, or is not posed; leave out --key")
                              .error();
       case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
         if (!keyless) {
@@ -158,7 +158,7 @@ Error Connection::no_answer() const {
   const char* const hint = domain_ == Domain::kControl
                                ? " (a replay publishes, but takes no control)"
                                : " (by default 5570 publishes, 5571 takes control)";
-  return fail("nobody answers at " + options_.endpoint +
+  return fail("nothing answers at " + options_.endpoint +
               "; is `posed run` going, and is this its endpoint?" + hint)
       .error();
 }

@@ -181,7 +181,7 @@ int calibrate(const CtlOptions& options) {
 
 int haptics(const CtlOptions& options) {
   if (options.force.empty() && options.vibration.empty()) {
-    return report(misuse("say what is to be felt: --force, --vibrate or both").error());
+    return report(misuse("give --force, --vibrate or both").error());
   }
   v1::ControlRequest request;
   auto& wanted = *request.mutable_haptics();
@@ -253,8 +253,8 @@ class Actions {
 void add_style_actions(Actions& actions, CtlOptions& options) {
   CLI::App* set = actions.add_for_stream("set", "Change a stream's parameter", set_parameter,
                                          R"(Example:
-  posed ctl set walker alpha 0.5     # half the style; alpha slides there
-alpha: 0 none of the style, 1 as it was learnt, 2 twice as much, -1 the other way.)");
+  posed ctl set walker alpha 0.5     # half the style; alpha moves there slowly
+alpha: 0 no style, 1 the style as trained, 2 twice as much, -1 the opposite.)");
   set->add_option("parameter", options.parameter, "alpha: how much style")
       ->required()
       ->check(CLI::IsMember({"alpha"}));

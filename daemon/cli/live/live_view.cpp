@@ -164,14 +164,14 @@ std::string short_duration(double microseconds) {
 }
 
 const char* const kColumnsHelp = R"(Columns, one row a stream:
-  STATE    waiting (nothing came yet), live, stale (fell silent), away (its device), ended
+  STATE    waiting (nothing came yet), live, stale (fell silent), away (its device is unplugged), ended
   HZ       frames published in the last second
-  DROP     frames lost so far because a queue was full: the machine could not keep up
-  SHED     frames skipped so far because newer ones waited already: the newest pose wins
+  DROP     frames lost so far because a queue was full (machine too slow)
+  SHED     frames skipped so far because newer ones were waiting
   DECODE   from arrival to decoded, STAGES in all stages together, PUBLISH from arrival to handed
-           out: half of the frames of the last second took at most the first figure, 99 % the
+           out: 50 % of the frames of the last second took at most the first figure, 99 % the
            second; microseconds, with m milliseconds, with s seconds; - where no frame passed
-  ALPHA    how much style, -2 to 2; below the row where it slides to
+  ALPHA    how much style, -2 to 2; below the row its target, while it moves
   MODEL    the style model in use, or the gesture model)";
 
 std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {

@@ -186,7 +186,7 @@ void add_monitor(CLI::App& app, int& exit_code) {
 The quality is measured, predicted (computed for a moment without a measurement), held (the same
 measurement again), stale (the source is silent) or performed (made from labels). The latency runs
 from arrival in the daemon to its publishing; a replay as fast as possible has none. A reader too
-slow for the stream misses frames; it never sees old ones. A daemon that falls silent is told on
+slow for the stream misses frames; it never sees old ones. A daemon that falls silent is reported on
 stderr. With --count the exit code is 1 unless so many came.)");
   command->callback([options, &exit_code] {
     if (auto done = watch(*options); !done) exit_code = report(done.error());

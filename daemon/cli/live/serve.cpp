@@ -59,7 +59,7 @@ void add_serve_options(CLI::App& command, ServeOptions& options) {
       ->check([](const std::string& text) {
         return std::strtod(text.c_str(), nullptr) > 0.0
                    ? std::string()
-                   : "'" + text + "' is no time to run: give seconds above 0";
+                   : "'" + text + "' is not a time to run: give seconds above 0";
       });
   command.add_flag("--until-end", options.until_end,
                    "End when every source that can end has ended: not gloves or looped clips");
@@ -90,7 +90,7 @@ void print_ready(const assembly::Daemon& daemon) {
   // Not through stdio, because a pipe that is full or that nobody reads must not delay the signals
   // that stop the daemon.
   if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kReadyLineWithin)) {
-    spdlog::warn("stdout does not take the line that says where posed is to be found: {}",
+    spdlog::warn("the line with the daemon's endpoints cannot be written to stdout: {}",
                  json_text(line));
   }
 }

@@ -130,9 +130,9 @@ void add_top(CLI::App& app, int& exit_code) {
   command->footer(std::string(R"(Examples:
   posed top
   posed top --connect tcp://127.0.0.1:5570 --count 1 | cat
-  posed top --count 1 --timeout 5 --json      # a health check: exit code 1 when nobody answers
+  posed top --count 1 --timeout 5 --json      # a health check: exit code 1 when nothing answers
 q or Ctrl-C quits. When stdout is no terminal it prints plain lines. A daemon that falls silent is
-shown in red for how long; what was known of its present is not shown any more.
+shown in red with the time since then, and values that may be outdated are hidden.
 )") + kColumnsHelp);
   command->callback([options, &exit_code] {
     if (auto done = top(*options); !done) exit_code = report(done.error());

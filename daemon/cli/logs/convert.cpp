@@ -51,18 +51,18 @@ Result<> check_options(const Convert& convert) {
   const bool to_csv = is_hand_csv(convert.out);
   for (const auto& checked :
        {useless(!convert.stream.empty(), is_log(convert.in),
-                "is no device log (.plog), so --stream means nothing"),
+                "is not a device log (.plog), so --stream has no effect"),
         useless(!convert.read.asf.empty(), is_amc(convert.in),
-                "is no AMC, so --skeleton means nothing"),
-        useless(convert.rate_given, is_amc(convert.in), "is no AMC, so --rate means nothing"),
+                "is not an AMC, so --skeleton has no effect"),
+        useless(convert.rate_given, is_amc(convert.in), "is not an AMC, so --rate has no effect"),
         useless(convert.metres_per_unit != 0.0, bvh_in,
-                "is no BVH, so --metres-per-unit means nothing"),
+                "is not a BVH, so --metres-per-unit has no effect"),
         useless(!convert.read.profile.empty(), bvh_in || is_amc(convert.in),
-                "is no BVH or AMC, so --profile means nothing"),
+                "is neither a BVH nor an AMC, so --profile has no effect"),
         useless(!convert.hand.empty(), csv_in || to_csv,
-                "neither IN nor OUT is a hand CSV, so --hand means nothing"),
+                "neither IN nor OUT is a hand CSV, so --hand has no effect"),
         useless(convert.shape_given, csv_in && !to_csv,
-                "--hand-shape is for a hand CSV that becomes a BVH, and means nothing here")}) {
+                "--hand-shape is for a hand CSV that becomes a BVH, and has no effect here")}) {
     if (!checked) return checked;
   }
   return OutputFiles(convert.overwrite)

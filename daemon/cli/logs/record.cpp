@@ -157,7 +157,7 @@ void add_record(CLI::App& app, int& exit_code) {
   command->footer(
       "The log is one SQLite file: what each device sent, and every decision that decoding cannot\n"
       "repeat. kill -9 or a power cut costs at most the last 0.5 s. A full disk stops recording,\n"
-      "not streaming; recording goes on when there is room. Examples:\n"
+      "not streaming; recording continues when there is space. Examples:\n"
       "  posed record --config mine.toml --out take1.plog --frames\n"
       "  posed replay take1.plog --speed max --out FRAMES.bin --expect\n"
       "  sqlite3 take1.plog 'SELECT name, driver FROM stream'");

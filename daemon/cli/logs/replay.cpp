@@ -315,7 +315,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "Print the counts as JSON");
   command->footer(
       R"(Nothing but the log is needed: it holds what the devices sent, the models, the settings
-and every decision. The same log gives the same bits on one instruction set. --expect ends
+and every decision. On one instruction set the same log gives the same bits. --expect ends
 with 1 and names stream, sequence and field of the first difference. A published replay says
 in its stats that it is one; its times are the recording's, on the recording's clock. Nobody
 can control it. Examples:

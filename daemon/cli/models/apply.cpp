@@ -29,7 +29,7 @@ struct ApplyArguments {
 
 Result<> check_files(const ApplyArguments& options) {
   if (!options.read.asf.empty() && !is_amc(options.in)) {
-    return misuse("--skeleton is for an AMC, and this is none; leave it out", options.in.string());
+    return misuse("--skeleton is only for an AMC; leave it out", options.in.string());
   }
   return OutputFiles(options.overwrite)
       .reads(options.model)
@@ -135,8 +135,8 @@ void add_apply(CLI::App& app, int& exit_code) {
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
-rotations. Without --cold the style is there in full from the first frame. The last line says how
-far the walker is from those that the model learnt from. "deg rms" is the angle between the
+rotations. Without --cold the style has its full strength from the first frame. The last line says how
+far the walker is from those in the model's training data. "deg rms" is the angle between the
 rotations before and after, over frames and changed joints.)");
   command->callback([options, &exit_code] {
     if (auto done = run(*options); !done) exit_code = report(done.error());

@@ -101,7 +101,7 @@ json report_of(const Evaluation& e, double alpha) {
 
 Result<Evaluation> evaluate(const EvalOptions& options) {
   if (!options.skeleton.empty() && !is_amc(options.source) && !is_amc(options.target)) {
-    return misuse("--skeleton is for AMC clips, and there is none; leave it out");
+    return misuse("--skeleton is only for AMC clips; leave it out");
   }
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());

@@ -36,7 +36,7 @@ jerk: rms third difference, deg/frame^3; ldlj and sparc: smoothness of the speed
 smoother; nearest_reference_deg: distance to the nearest recorded frame, rms over the performed
 frames and the angles that move; frechet: distance of the Gaussians of windows of 30 frames
 [deg^2]; min_gap_cm: between any two bones, before and after the constraint stage. The curve says
-what a performance loses that knows its script only so many frames ahead.)";
+how much worse a performance is that knows its labels only so many frames ahead.)";
 
 struct EvalGestureOptions {
   std::string model, reference, labels, svg;
@@ -130,7 +130,7 @@ std::string verdict(const json& report) {
         reference["nearest_reference_deg"].get<double>(),
         report["performed"]["jerk"].get<double>() / reference["jerk"].get<double>());
   } else {
-    text += "; --reference RECORDING tells how near it is to a real hand";
+    text += "; --reference RECORDING shows how close it is to a real hand";
   }
   return text;
 }

@@ -180,7 +180,9 @@ void add_smooth(CLI::App& app, int& exit_code) {
       ->add_option("--noise-deg", options->noise_deg,
                    "Sensor noise, standard deviation (default: estimated from IN)")
       ->check(CLI::Range(0.01, 30.0));
-  command->add_option("--model", options->model, "Gestures to tell and to bridge gaps with")
+  command
+      ->add_option("--model", options->model,
+                   "Gesture model, to recognise gestures and bridge gaps")
       ->type_name("H.gesture");
   command->add_option("--hand", options->hand, "Whose a hand CSV is, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
@@ -189,7 +191,7 @@ void add_smooth(CLI::App& app, int& exit_code) {
   command->footer(R"(Examples:
   posed smooth glove.csv --out smooth.csv                     # lag 1 frame, noise estimated
   posed smooth --lag 33ms --noise-deg 1 glove.csv --out smooth.csv
-  posed smooth --model H.gesture glove.csv --out smooth.csv --json   # tells the gestures, too
+  posed smooth --model H.gesture glove.csv --out smooth.csv --json   # recognises gestures, too
 The code is the live stream's: a row is estimated from what came up to the lag after it. An empty
 field is a missing value and is bridged; rows keep their times, even or not.)");
   command->callback([options, &exit_code] {

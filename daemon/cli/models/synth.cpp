@@ -30,7 +30,7 @@ constexpr const char* kSynthFooter = R"(Examples:
   posed synth --model hand.gesture --labels "g c p" --tempo 1.5 --hand left --out hand.bvh --json
 
 Labels that were never recorded are performed too, finger by finger, when the model's classes name
-them. --lookahead N performs as a stream would that knows the script N frames ahead (20 is enough
+them. --lookahead N performs as a stream that knows the labels N frames ahead (20 is enough
 for the eye). The same motion plays in a running daemon with `posed ctl play`.)";
 
 struct SynthOptions {
@@ -144,7 +144,8 @@ void add_synth(CLI::App& app, int& exit_code) {
   command->add_option("--tempo", options->tempo, "2 is twice as fast")
       ->check(CLI::Range(perform::kMinTempo, perform::kMaxTempo))
       ->capture_default_str();
-  command->add_option("--lookahead", options->lookahead, "Frames of script that are known, or full")
+  command
+      ->add_option("--lookahead", options->lookahead, "Frames that are known in advance, or full")
       ->capture_default_str();
   command->add_option("--hand", options->hand, "left or right")
       ->check(CLI::IsMember({"left", "right"}))

@@ -29,8 +29,8 @@ constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture \
       --tree-svg tree.svg --trees middle:4
 
-A label file has a line a gesture, `start end name`, in seconds from the first frame (or HTK's
-100 ns). Label two gestures of each name by hand and let the rest be proposed:
+A label file has a line for each gesture, `start end name`, in seconds from the first frame (or HTK's
+100 ns). Label two gestures of each name by hand and let posed propose the rest:
   posed train gesture --auto-label --clip take1.csv --labels few.lab --out take1.lab)";
 
 struct TrainGestureOptions {
@@ -170,7 +170,7 @@ Result<json> train_gesture(const TrainGestureOptions& options) {
   report["seconds"] = training->seconds;
   report["out"] = options.out;
   const std::size_t warnings = report["warnings"].size();
-  report["verdict"] = warnings == 0 ? "good: nothing in these recordings speaks against the model"
+  report["verdict"] = warnings == 0 ? "good: these recordings show no problem with the model"
                                     : "usable with care: " + std::to_string(warnings) +
                                           " warnings above say what to record more of";
   return report;

@@ -40,8 +40,8 @@ make one model:
   motion = "walk"
 
 The last line says how much of the way to the target the model closes on clips that were held out,
-and what a constant offset would. A model that is unusable (the groups do not differ, a clip is no
-walk, a walker left out is led away) is not written, and the exit code is 1.)";
+and how much a constant offset would. An unusable model (the groups do not differ, a clip is not a
+walk, a held-out walker becomes worse) is not written, and the exit code is 1.)";
 
 // Options that are not given keep the value of the experiment file, or the default.
 struct TrainStyleOptions {
@@ -100,7 +100,7 @@ Result<Experiment> experiment_of(const TrainStyleOptions& options) {
   experiment->rate_hz = options.rate_hz.value_or(experiment->rate_hz);
   if (options.skeleton.empty()) return experiment;
   if (std::ranges::none_of(experiment->clips, is_amc, &ExperimentClip::file)) {
-    return misuse("--skeleton is for AMC clips, and there is none; leave it out");
+    return misuse("--skeleton is only for AMC clips; leave it out");
   }
   experiment->asf = options.skeleton;
   return experiment;
@@ -117,7 +117,7 @@ void print_style_summary(const json& report, const std::string& out) {
   std::printf("%-12s %-10s %-28s %8s %8s\n", "group", "motion", "clip", "period", "theta0");
   for (const json& clip : report["clips"]) {
     if (clip["dropped_first_frame"].get<bool>()) {
-      std::fprintf(stderr, "%s: left out the first frame, a rest pose that is no motion\n",
+      std::fprintf(stderr, "%s: left out the first frame, a rest pose without motion\n",
                    clip["file"].get<std::string>().c_str());
     }
     const auto stem = std::filesystem::path(clip["file"].get<std::string>()).stem().string();

@@ -53,7 +53,7 @@ TEST_CASE("folders, devices and unwritable places are refused as outputs") {
   std::filesystem::create_directory(here / "a.style");
   CHECK(refused(OutputFiles(true).writes(here / "a.style", {".style"}).check(), "is a folder"));
   CHECK(refused(OutputFiles(true).writes_any_but_other("/dev/null", {".style"}).check(),
-                "no regular file"));
+                "not a regular file"));
   CHECK(refused(OutputFiles(true).writes(here / "no" / "b.style", {".style"}).check(),
                 "folder is not there"));
 }

@@ -67,7 +67,7 @@ TEST_CASE("an invalid key file is refused in one sentence") {
         std::string(4000, '0'), std::string(40, '\0'), std::string(40, '\xff')}) {
     const auto bad = read_public_key(folder.write("bad.pub", text));
     REQUIRE_FALSE(bad);
-    CHECK(bad.error().message.find("this is no key") != std::string::npos);
+    CHECK(bad.error().message.find("this is not a key") != std::string::npos);
   }
 }
 

@@ -31,7 +31,7 @@ struct Stage {
   Socket publisher = *open_socket(here.get(), ZMQ_XPUB);
   std::unique_ptr<PeerGuard> guard = *PeerGuard::open(
       here.get(), publisher.get(),
-      {.name = "test", .most_peers = 10, .max_unheard = 100'000, .max_unheard_of_all = 100'000});
+      {.name = "test", .max_peers = 10, .max_unheard = 100'000, .max_unheard_of_all = 100'000});
   Socket router = *open_socket(here.get(), ZMQ_ROUTER);
   std::string pose_endpoint, control_endpoint;
 
