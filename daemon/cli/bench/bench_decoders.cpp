@@ -207,10 +207,10 @@ void add_bench_decoders(CLI::App& bench, int& exit_code) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* command = bench.add_subcommand("decoders", "Every glove's decoder, from its bytes");
+  CLI::App* command = bench.add_subcommand("decoders", "The decoders of all gloves");
   command->footer(kDecodersFooter);
-  command->add_option("--glove", options->glove, "Only gloves whose name begins so");
-  command->add_option("--samples", options->samples, "Timed packets a glove and way")
+  command->add_option("--glove", options->glove, "Only gloves whose name begins with this");
+  command->add_option("--samples", options->samples, "Timed packets for each glove and way")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON array on stdout");

@@ -224,7 +224,7 @@ void add_bench_predict(CLI::App& bench, int& exit_code) {
   const auto options = std::make_shared<Options>();
   CLI::App* command = bench.add_subcommand("predict", "One call of the style filter's process");
   command->footer(kBenchPredictFooter);
-  command->add_option("--samples", options->samples, "Timed samples a variant")
+  command->add_option("--samples", options->samples, "Timed samples for each variant")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON object on stdout");

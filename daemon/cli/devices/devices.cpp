@@ -27,7 +27,7 @@ constexpr const char* kFooter = R"(examples:
   posed devices              connected devices, and the id for a [[stream]] in the config
   posed devices --json       the same for a script
 
-Bind a stream to a glove, not to a port that may change: id = "SERIAL" or, for gloves without a serial
+Bind a stream to a glove, not to a port: id = "SERIAL" or, for gloves without a serial
 number, the port path ("1-2.3": always that socket).)";
 
 std::string bus_name(Bus bus) {

@@ -134,7 +134,7 @@ Result<> emulate(const EmulateOptions& options) {
 
 void add_emulate(CLI::App& app, int& exit_code) {
   auto* command =
-      app.add_subcommand("emulate", "Be a glove: on a pseudo-terminal or a TCP connection");
+      app.add_subcommand("emulate", "Emulate a glove on a pseudo-terminal or a TCP connection");
   auto options = std::make_shared<EmulateOptions>();
   command->add_option("WHAT", options->what, "A device log (.plog) or a driver's name")->required();
   auto* pty = command->add_flag("--pty", options->pty, "Behind a pseudo-terminal (the default)");
@@ -152,11 +152,11 @@ void add_emulate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command->add_option("--set", options->set, "An option of the driver, like hand=left")
       ->type_name("KEY=VALUE");
-  auto* fault =
-      command
-          ->add_option("--fault", options->faults, "A fault of the line, so many a byte or packet")
-          ->type_name("KIND:RATE");
-  command->add_option("--seed", options->seed, "Of the faults: the same seed, the same faults")
+  auto* fault = command
+                    ->add_option("--fault", options->faults,
+                                 "A fault of the line, with its rate per byte or packet")
+                    ->type_name("KIND:RATE");
+  command->add_option("--seed", options->seed, "Of the faults: the same seed gives the same faults")
       ->needs(fault)
       ->capture_default_str();
   command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");

@@ -135,7 +135,7 @@ void add_check(CLI::App& app, int& exit_code) {
   command->add_option("--config", options->config, "The daemon's config, TOML")
       ->required()
       ->type_name("FILE");
-  command->add_flag("--json", options->json, "What would run, or all mistakes, as one JSON object");
+  command->add_flag("--json", options->json, "What would run, or all errors, as one JSON object");
   command->footer(R"(Examples:
   posed check --config config/posed.toml
   posed check --config mine.toml --json | jq .errors

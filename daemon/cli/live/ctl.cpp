@@ -274,7 +274,7 @@ void add_hand_actions(Actions& actions, CtlOptions& options) {
       ->required();
   perform->add_option("--tempo", options.tempo, "0.5 to 2 times the learnt one; 2 is twice as fast")
       ->capture_default_str();
-  perform->add_flag("--loop", options.loop, "Begin again after the last, until others come");
+  perform->add_flag("--loop", options.loop, "Repeat the labels until others come");
   static_cast<void>(actions.add_for_stream("stop-playing", "Back to the live hand", stop_playing,
                                            "Example:\n  posed ctl stop-playing hand"));
 }
@@ -284,8 +284,9 @@ void add_glove_actions(Actions& actions, CtlOptions& options) {
                                          R"(Example:
   posed ctl calibrate right ann.toml   # from the next packet on)");
   fit->add_option("calibration", options.calibration, "What `posed calibrate` wrote")->required();
-  CLI::App* feel = actions.add_for_stream("haptics", "Let a glove with motors be felt", haptics,
-                                          R"(Examples:
+  CLI::App* feel =
+      actions.add_for_stream("haptics", "Send force or vibration to a glove with motors", haptics,
+                             R"(Examples:
   posed ctl haptics right --force 0 0.5 0.5 0 0
   posed ctl haptics right --vibrate 80 0.2 0.5    # 80 Hz for 0.2 s at half the strength)");
   feel->add_option("--force", options.force,

@@ -164,7 +164,7 @@ std::string short_duration(double microseconds) {
 }
 
 const char* const kColumnsHelp = R"(Columns, one row a stream:
-  STATE    waiting (nothing came yet), live, stale (fell silent), away (its device is unplugged), ended
+  STATE    waiting (nothing came yet), live, stale (fell silent), away (device unplugged), ended
   HZ       frames published in the last second
   DROP     frames lost so far because a queue was full (machine too slow)
   SHED     frames skipped so far because newer ones were waiting

@@ -145,7 +145,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   auto* rate =
-      command->add_option("--rate", convert->read.amc_rate_hz, "Frames a second of an AMC");
+      command->add_option("--rate", convert->read.amc_rate_hz, "Frames per second of an AMC");
   rate->capture_default_str();
   command
       ->add_option("--metres-per-unit", convert->metres_per_unit,
@@ -155,7 +155,7 @@ void add_convert(CLI::App& app, int& exit_code) {
                       "Skeleton profile (default: found by the joints' names)");
   command->add_option("--stream", convert->stream,
                       "Which of a log's streams (default: the only one)");
-  command->add_option("--hand", convert->hand, "Whose a hand CSV is, or which hand to take")
+  command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape =
       command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH");

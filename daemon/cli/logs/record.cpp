@@ -147,7 +147,7 @@ void add_record(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("record", "Stream like `run` and keep a device log");
   auto options = std::make_shared<RecordOptions>();
   add_serve_options(*command, options->serve);
-  command->add_option("--out", options->out, "The log to write, by habit NAME.plog")
+  command->add_option("--out", options->out, "The log to write, usually NAME.plog")
       ->type_name("FILE")
       ->required();
   command->add_flag("--frames", options->frames, "Keep the published frames, too (for --expect)");

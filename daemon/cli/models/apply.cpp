@@ -127,7 +127,8 @@ void add_apply(CLI::App& app, int& exit_code) {
       ->type_name("NN.asf");
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
   command->add_flag("--gate", filter.gate, "Fade to the mean change where the model knows nothing");
-  command->add_flag("--calibrate", filter.calibrate, "Learn the walker's own carriage first");
+  command->add_flag("--calibrate", filter.calibrate,
+                    "First learn how the walker usually holds itself");
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
@@ -135,8 +136,8 @@ void add_apply(CLI::App& app, int& exit_code) {
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
-rotations. Without --cold the style has its full strength from the first frame. The last line says how
-far the walker is from those in the model's training data. "deg rms" is the angle between the
+rotations. Without --cold the style has its full strength from the first frame. The last line says
+how far the walker is from those in the training data. "deg rms" is the angle between the
 rotations before and after, over frames and changed joints.)");
   command->callback([options, &exit_code] {
     if (auto done = run(*options); !done) exit_code = report(done.error());

@@ -156,7 +156,7 @@ void add_eval(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<EvalOptions>();
   style->add_option("--model", options->model, "Model from `posed train style`")->required();
   style->add_option("--source", options->source, "Clip to be styled")->required();
-  style->add_option("--target", options->target, "Clip of the style wanted")->required();
+  style->add_option("--target", options->target, "Clip in the target style")->required();
   style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
   style->add_option("--alpha", options->alpha, "How much style")
       ->check(CLI::Range(-2.0, 2.0))

@@ -224,7 +224,7 @@ void add_eval_gesture(CLI::App& eval, int& exit_code) {
   const auto options = std::make_shared<EvalGestureOptions>();
   command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
   command->add_option("--labels", options->labels, "What to perform (default: every label once)");
-  command->add_option("--reference", options->reference, "A recording to be held against");
+  command->add_option("--reference", options->reference, "A recording to compare with");
   command->add_option("--svg", options->svg, "Where to draw look-ahead against error");
   add_tree_options(*command, options->trees);
   add_overwrite_option(*command, options->overwrite);

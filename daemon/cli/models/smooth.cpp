@@ -174,7 +174,7 @@ void add_smooth(CLI::App& app, int& exit_code) {
   command->add_option("--out", options->out, "The hand CSV to write")
       ->required()
       ->type_name("OUT.csv");
-  command->add_option("--lag", options->lag, "How far the output may run behind: 1 or 33ms")
+  command->add_option("--lag", options->lag, "Delay of the output, in frames or time: 1 or 33ms")
       ->capture_default_str();
   command
       ->add_option("--noise-deg", options->noise_deg,
@@ -184,7 +184,7 @@ void add_smooth(CLI::App& app, int& exit_code) {
       ->add_option("--model", options->model,
                    "Gesture model, to recognise gestures and bridge gaps")
       ->type_name("H.gesture");
-  command->add_option("--hand", options->hand, "Whose a hand CSV is, or which hand to take")
+  command->add_option("--hand", options->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");

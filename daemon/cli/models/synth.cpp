@@ -150,10 +150,12 @@ void add_synth(CLI::App& app, int& exit_code) {
   command->add_option("--hand", options->hand, "left or right")
       ->check(CLI::IsMember({"left", "right"}))
       ->capture_default_str();
-  command->add_option("--hand-shape", options->shape, "Whose bones keep apart and make the BVH")
+  command
+      ->add_option("--hand-shape", options->shape,
+                   "Hand whose bone lengths are used for collisions and the BVH")
       ->capture_default_str();
   command->add_flag("--global-variance", options->global_variance,
-                    "Give back the range that averaging took");
+                    "Restore the range of motion that averaging reduces");
   command->add_flag("--unconstrained", options->unconstrained,
                     "Leave out joint limits and collisions: the model's bare trajectory");
   command->add_option("--out", options->out, "Where to write: .csv or .bvh")->required();

@@ -29,7 +29,7 @@ constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture \
       --tree-svg tree.svg --trees middle:4
 
-A label file has a line for each gesture, `start end name`, in seconds from the first frame (or HTK's
+A label file has a line per gesture, `start end name`, in seconds from the first frame (or HTK's
 100 ns). Label two gestures of each name by hand and let posed propose the rest:
   posed train gesture --auto-label --clip take1.csv --labels few.lab --out take1.lab)";
 
@@ -253,7 +253,7 @@ void add_train_gesture(CLI::App& train_command, int& exit_code) {
       ->capture_default_str();
   command
       ->add_option("--embedded-rounds", options->embedded_rounds,
-                   "Rounds in which borders may move, where labels are coarse")
+                   "Rounds in which borders may move, for coarse labels")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();
   command->add_flag("--auto-label", options->auto_label,
