@@ -21,7 +21,7 @@
 namespace posed::assembly {
 namespace {
 
-constexpr double kUnknownRate_hz = 1000.0;  // what rings must hold when a device does not say
+constexpr double kUnknownRate_hz = 1000.0;  // assumed for the rings if a device states no rate
 
 double rate_of(const devices::OpenStream& stream) {
   const drivers::Device& device = stream.device;
@@ -34,13 +34,13 @@ std::vector<std::string> stages_of(const devices::OpenStream& stream) {
                                                         stream.device.description.skeleton));
 }
 
-// What a stream may fill of the ring to the pipeline: half a second of its frames and samples.
+// How much of the ring to the pipeline a stream may fill: half a second of its frames and samples.
 std::size_t decoded_slots(const devices::OpenStream& stream) {
   const drivers::Description& description = stream.device.description;
   const int kinds = (description.skeleton ? 1 : 0) + (description.samples.names.empty() ? 0 : 1);
   return pipeline::ring_slots(rate_of(stream) * std::max(kinds, 1));
 }
-// The same of the ring to the publisher, which has the unstyled frames, too.
+// The same for the ring to the publisher, which also carries the unstyled frames.
 std::size_t finished_slots(const devices::OpenStream& stream) {
   return decoded_slots(stream) +
          (stream.config.publish_raw ? pipeline::ring_slots(rate_of(stream)) : 0);
@@ -48,7 +48,7 @@ std::size_t finished_slots(const devices::OpenStream& stream) {
 
 }  // namespace
 
-// Members stand in the order in which they are made; what uses another comes after it.
+// Members are declared in the order of their construction; each uses only those before it.
 class Daemon::Parts final : public control::DaemonControl {
  public:
   explicit Parts(const config::DaemonConfig& daemon_config) : config(daemon_config) {}
@@ -114,7 +114,8 @@ Result<> Daemon::Parts::open() {
     }
     streams.push_back(std::move(*stream));
   }
-  // Each stream has slots of its own, so that none can take another's, and every event finds one.
+  // Each stream has its own slots, so that no stream can use up another's, and every event finds
+  // one.
   std::size_t into_pipeline = pipeline::kEventSlots + streams.size();
   std::size_t out_of_pipeline = into_pipeline;
   for (const auto& stream : streams) {
@@ -123,10 +124,10 @@ Result<> Daemon::Parts::open() {
   }
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(into_pipeline);
   finished = std::make_unique<pipeline::Ring<pipeline::Item>>(out_of_pipeline);
-  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(control::kMostUnderWay);
+  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(control::kMaxUnderWay);
   device_commands =
-      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(control::kMostUnderWay);
-  acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(control::kMostUnderWay);
+      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(control::kMaxUnderWay);
+  acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(control::kMaxUnderWay);
   for (auto* wake : {&pipeline_wake, &publisher_wake, &control_wake}) {
     auto opened = system::EventFd::open();
     if (!opened) return std::unexpected(opened.error());
@@ -147,7 +148,7 @@ Result<> Daemon::Parts::open_sockets() {
   auto opened = net::open_context();
   if (!opened) return std::unexpected(opened.error());
   context = std::move(*opened);
-  std::optional<net::AccessList> allowed;  // none without keys
+  std::optional<net::AccessList> allowed;  // empty without keys
   if (!config.security.server_key.empty()) {
     auto keys = net::read_secret_key(config.security.server_key);
     if (!keys) return std::unexpected(keys.error());
@@ -238,7 +239,8 @@ Result<> Daemon::Parts::open_engines() {
                           .device = stream.present,
                           .options = stream.config.options,
                           .calibration = nullptr});
-    // Nobody asked for it, so nobody is told: no ticket is 0. The ring has room for every stream.
+    // No client sent this command, so it has ticket 0 and no Ack follows. The ring has space for
+    // one from every stream.
     if (gesture->play.size > 0 &&
         !commands->push(
             {.kind = pipeline::Command::Kind::kPlay, .stream = i, .play = gesture->play})) {
@@ -283,8 +285,8 @@ Result<> Daemon::Parts::start_threads() {
   for (std::uint32_t i = 0; i < streams.size(); ++i) {
     if (!streams[i]->slot) continue;
     devices::SupervisorPorts ports{
-        .reader = reader.get(), .clock = system::monotonic_ns, .tell = {}};
-    ports.tell = [this, i](v1::Event::Kind kind, const std::string& text) {
+        .reader = reader.get(), .clock = system::monotonic_ns, .report = {}};
+    ports.report = [this, i](v1::Event::Kind kind, const std::string& text) {
       publisher->post_event(i, kind, text);
     };
     supervisors.push_back(
@@ -293,10 +295,11 @@ Result<> Daemon::Parts::start_threads() {
   return {};
 }
 
-// From the devices to the clients, so that each thread still finds what the one before it made.
+// Stops the threads in the order of the data, from the devices to the clients, so that each still
+// handles what the one before it made.
 void Daemon::Parts::halt() noexcept {
   for (const auto& supervisor : supervisors)
-    supervisor->stop();  // all at once, whatever they wait for
+    supervisor->stop();  // all at once, whatever they are waiting for
   if (reader) reader->stop();
   if (reader_thread.joinable()) reader_thread.join();
   supervisors.clear();

@@ -1,6 +1,6 @@
-// Daemon: the composition of everything that `run`, `record`, `demo` and the tests start: devices,
-// threads, rings, sockets. Open it (devices and models are loaded, sockets bound), start it, stop
-// it. Cold, one owner thread.
+// Daemon: builds and owns everything that `run`, `record`, `demo` and the tests start: devices,
+// threads, rings, sockets. Open it (loads devices and models, binds sockets), start it, stop it.
+// Cold, one owner thread.
 #pragma once
 
 #include <functional>
@@ -18,18 +18,19 @@
 
 namespace posed::assembly {
 
-// What the daemon may be given when it starts; all of it outlives the daemon's stop().
+// Optional extras for start(); all of them outlive the daemon's stop().
 struct DaemonHooks {
-  pipeline::RecordSink* record_sink = nullptr;       // null: nothing is recorded
-  std::function<void(v1::Stats&)> more_stats;        // what the recorder knows; may be empty
-  std::function<void(const char* name)> hot_thread;  // first thing on a hot thread; may be empty
+  pipeline::RecordSink* record_sink = nullptr;  // null: no recording
+  std::function<void(v1::Stats&)> more_stats;   // adds the recorder's counters; may be empty
+  // called first on each hot thread; may be empty
+  std::function<void(const char* name)> hot_thread;
 };
 
 class Daemon {
  public:
   // Opens devices and models and binds the sockets. Errors name the stream.
   [[nodiscard]] static Result<std::unique_ptr<Daemon>> open(const config::DaemonConfig& config);
-  ~Daemon();  // stops first
+  ~Daemon();  // stops the daemon first
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
 
@@ -38,18 +39,21 @@ class Daemon {
 
   // Starts the threads and the devices. Call once.
   [[nodiscard]] Result<> start(DaemonHooks hooks = {});
-  // Ends the threads: what was read is still decoded and published. May be called again.
+  // Ends the threads; everything that was read is still decoded and published. May be called again.
   void stop() noexcept;
 
   // Valid after start(), from any thread.
-  [[nodiscard]] const std::string& publish_endpoint() const noexcept;  // really bound
-  [[nodiscard]] const std::string& control_endpoint() const noexcept;  // really bound
-  [[nodiscard]] bool asked_to_stop() const noexcept;                   // by a control message
-  // Every source that can end is finished and published; false when there is none.
+  // the one that is really bound
+  [[nodiscard]] const std::string& publish_endpoint() const noexcept;
+  // the one that is really bound
+  [[nodiscard]] const std::string& control_endpoint() const noexcept;
+  [[nodiscard]] bool asked_to_stop() const noexcept;  // by a control message
+  // Whether every source that can end has ended and been published; false if there is none.
   [[nodiscard]] bool all_ended() const noexcept;
-  [[nodiscard]] v1::Stats stats() const;           // of the last second
+  [[nodiscard]] v1::Stats stats() const;           // as of the last second
   [[nodiscard]] bool wants_keys() const noexcept;  // CURVE on both sockets
-  // Who may connect from now on; those who lost a right are cut off. Nothing without CURVE.
+  // Replaces the list of clients that may connect; clients that lost a right are disconnected. Has
+  // no effect without CURVE.
   void allow(const std::vector<net::AllowedClient>& clients);
   void post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text);
 

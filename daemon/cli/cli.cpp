@@ -26,24 +26,25 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_monitor, add_top,   add_emulate, add_keygen,  add_completion, add_bench,
 });
 
-// Whether whoever read our stdout has gone (`posed monitor | head`).
+// Whether the reader of stdout has gone (`posed monitor | head`).
 bool reader_of_stdout_has_gone() {
   pollfd out{.fd = STDOUT_FILENO, .events = 0, .revents = 0};
   return ::poll(&out, 1, 0) == 1 && (out.revents & (POLLERR | POLLHUP)) != 0;
 }
 
-// The exit code, or 1 when what was to be printed could not be written (a full disk). A reader that
-// has gone has what it wanted: that is no failure, and nothing is said.
+// The exit code, or 1 if the output could not be written (a full disk). A reader that has gone has
+// read what it wanted; that is not a failure, and nothing is printed.
 int with_stdout_written(int exit_code) {
   errno = 0;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
   const std::string why = errno == 0 ? "" : std::string(" (") + std::strerror(errno) + ")";
   if (exit_code != 0 || reader_of_stdout_has_gone()) return exit_code;
-  return report(fail("stdout does not take the output" + why + "; it is not complete").error());
+  return report(
+      fail("the output cannot be written to stdout" + why + "; it is not complete").error());
 }
 
 int parse_and_run(int argc, char** argv) {
-  // Bytes of strangers are refused in our own words; protobuf would write a line for each.
+  // Untrusted bytes are refused with posed's own messages; protobuf would print a line for each.
   google::protobuf::SetLogHandler(nullptr);
   CLI::App app{"posed: live poses in, another style out", "posed"};
   app.set_version_flag("--version", "posed " POSED_VERSION);

@@ -1,6 +1,6 @@
-// The command line: one file a command. A command adds a CLI11 subcommand to `app`; its callback
-// does the work and stores the exit code. To add one: write daemon/cli/<name>.cpp, declare it here,
-// list it in cli.cpp.
+// The command line: one file for each command. A command adds a CLI11 subcommand to `app`; its
+// callback does the work and stores the exit code. To add a command: write
+// daemon/cli/<folder>/<name>.cpp, declare it here, list it in cli.cpp.
 #pragma once
 
 #include <string>
@@ -13,7 +13,8 @@ class App;
 
 namespace posed::cli {
 
-// Parses and runs; returns the process's exit code (0 done, 1 failed, 2 wrong use).
+// Parses the arguments and runs the command; returns the process's exit code (0 done, 1 failed, 2
+// wrong use).
 [[nodiscard]] int main_of(int argc, char** argv);
 
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.

@@ -1,4 +1,5 @@
-// Shell completion, made from the very tree of commands that parses: it cannot go stale.
+// Shell completion, generated from the same tree of commands that parses the arguments, so that it
+// is always up to date.
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -49,7 +50,7 @@ std::string joined(const std::vector<Word>& words) {
   return out;
 }
 
-// Walks the words before the cursor down the tree, then offers that command's words.
+// Follows the words before the cursor down the command tree, then offers the words of that command.
 std::string bash(const std::vector<Node>& nodes) {
   std::string known, offers;
   for (const Node& node : nodes) {

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kEnough = 64 * 1024;  // bytes
 constexpr std::size_t kKeyLength = 40;      // characters of Z85
 
-// Whether one of the text's lines begins with `start`, blanks aside.
+// Whether a line of the text begins with `start`, after blanks.
 bool has_line(std::string_view text, std::string_view start) {
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
@@ -49,7 +49,7 @@ const char* kind_name(FileKind kind) {
   return "something else";
 }
 
-// What the file is good for.
+// What the file can be used for.
 std::string advice(FileKind kind, std::string_view stream, const std::string& file) {
   switch (kind) {
     case FileKind::kModel:

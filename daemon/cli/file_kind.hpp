@@ -1,5 +1,5 @@
-// What a file is, by its first bytes, so that a command that is given the wrong one can say which
-// command wants it.
+// Recognises what a file is by its first bytes, so that a command that gets the wrong file can name
+// the command that reads it.
 #pragma once
 
 #include <cstdint>
@@ -16,16 +16,16 @@ enum class FileKind : std::uint8_t {
   kConfig,       // TOML with [[stream]] tables
   kClip,         // BVH, ASF, AMC or a hand's CSV
   kDeviceLog,
-  kKey,    // of CURVE, secret or public
+  kKey,    // CURVE key, secret or public
   kOther,  // none of these
 };
 
-// Of a file that begins with `bytes` (a few KB are enough).
+// The kind of a file that begins with `bytes` (a few KB are enough).
 [[nodiscard]] FileKind kind_of(std::string_view bytes);
 
-// An Error that says what the file is and which command wants it for `stream`, when it is of
-// another kind. Silent when its kind is not known or it cannot be read: whoever reads it whole says
-// why.
+// An error if the file is of another kind than `wanted`; it says what the file is and which command
+// reads it, for `stream`. No error if its kind is unknown or it cannot be read: then the code that
+// reads the whole file reports it.
 [[nodiscard]] Result<> expect_kind(const std::filesystem::path& path, FileKind wanted,
                                    std::string_view stream);
 

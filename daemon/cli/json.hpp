@@ -1,5 +1,5 @@
-// Messages as canonical proto3 JSON (lowerCamelCase names, 64-bit integers as text), every plain
-// field written even where it has its default, so that a script always finds it.
+// Messages as canonical proto3 JSON (lowerCamelCase names, 64-bit integers as text). Every plain
+// field is written even if it has its default, so that a script always finds it.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace posed::cli {
 
 [[nodiscard]] std::string to_json(const google::protobuf::Message& message);
 
-// One line on stdout, at once. False when nobody reads it any more.
+// Prints one line on stdout and flushes it. Returns false if the reader of stdout has gone.
 bool print_json(const google::protobuf::Message& message);
 
 }  // namespace posed::cli

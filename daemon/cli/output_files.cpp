@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Extensions that promise a format which posed, or any other program, knows files by.
+// Extensions of formats that posed or other programs recognise.
 constexpr std::array<std::string_view, 17> kFormats{
     ".bvh", ".amc", ".asf", ".csv", ".style", ".gesture", ".toml", ".lab", ".plog",
     ".svg", ".dot", ".gv",  ".txt", ".json",  ".bin",     ".key",  ".pub"};
@@ -28,7 +28,7 @@ std::string listed(const std::vector<std::string_view>& extensions) {
   return text;
 }
 
-// Whether both names lead to one file, be it there already or not.
+// Whether both names are the same file, whether or not it exists already.
 bool same_file(const fs::path& a, const fs::path& b) {
   std::error_code error;
   if (fs::equivalent(a, b, error)) return true;
@@ -41,7 +41,7 @@ Result<> check_place(const fs::path& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) return misuse("is a folder; name a file in it", path.string());
   if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
-    return misuse("is no regular file; name another one to write to", path.string());
+    return misuse("is not a regular file; name another one to write to", path.string());
   }
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   if (!fs::is_directory(folder, error)) {
@@ -93,7 +93,7 @@ Result<> OutputFiles::check(const Output& output) const {
   const bool right = std::ranges::find(output.extensions, extension) != output.extensions.end();
   const bool other = std::ranges::find(kFormats, extension) != kFormats.end();
   if (!right && (output.strict || other)) {
-    return misuse("what is written here is " + listed(output.extensions) + "; name it so",
+    return misuse("does not end in " + listed(output.extensions) + "; choose such a name",
                   output.path.string());
   }
   for (const fs::path& input : inputs_) {

@@ -1,6 +1,6 @@
-// The one rule for every file that a command writes: its extension must not promise another format,
-// it is never a file that the command reads, and a file that exists is replaced only by
-// --overwrite. Asked before any work is done.
+// The rules for every file that a command writes: its extension must not be that of another format,
+// it must not be a file that the command reads, and an existing file is replaced only with
+// --overwrite. Checked before any work is done.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,7 @@ class Option;
 
 namespace posed::cli {
 
-// Whether the file's name says that it is an AMC, which needs a skeleton (.asf).
+// Whether the file's name says that it is AMC, which needs a skeleton (.asf).
 [[nodiscard]] bool is_amc(const std::filesystem::path& path);
 
 // Adds `--overwrite`.
@@ -27,7 +27,7 @@ class OutputFiles {
  public:
   explicit OutputFiles(bool overwrite) : overwrite_(overwrite) {}
 
-  // A file that the command reads; an empty path is none.
+  // Adds a file that the command reads; an empty path is ignored.
   OutputFiles& reads(const std::filesystem::path& path);
   template <typename Paths>
   OutputFiles& reads_all(const Paths& paths) {
@@ -35,15 +35,15 @@ class OutputFiles {
     return *this;
   }
 
-  // A file that the command writes; an empty path is none. `extensions`: the formats it can be,
-  // such as {".bvh", ".csv"}; it must end in one of them.
+  // Adds a file that the command writes; an empty path is ignored. `extensions`: the possible
+  // formats, such as {".bvh", ".csv"}; the name must end in one of them.
   OutputFiles& writes(const std::filesystem::path& path, std::vector<std::string_view> extensions);
-  // The same for a format that is known by its contents: any extension but another format's.
+  // The same for a format that is recognised by its contents: any extension except those of other
+  // formats.
   OutputFiles& writes_any_but_other(const std::filesystem::path& path,
                                     std::vector<std::string_view> extensions);
 
-  // Wrong use (exit code 2) that names the file and what to do, when one of them must not be
-  // written.
+  // Wrong use (exit code 2) if one of the files must not be written; names the file and what to do.
   [[nodiscard]] Result<> check() const;
 
  private:

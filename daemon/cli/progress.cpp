@@ -35,7 +35,7 @@ ProgressBar::ProgressBar(double quiet_for_s)
   struct sigaction action{};
   action.sa_handler = interrupt;
   sigemptyset(&action.sa_mask);
-  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second Ctrl-C ends at once
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second Ctrl-C ends the process at once
   sigaction(SIGINT, &action, &before_);
 }
 

@@ -10,20 +10,20 @@
 
 namespace posed::cli {
 
-inline constexpr double kQuietFor_s = 1.0;  // from which on waiting is felt
+inline constexpr double kQuietFor_s = 1.0;  // a longer wait needs a sign of progress
 
 class ProgressBar {
  public:
-  // Draws nothing before the work has taken `quiet_for_s`: short work needs no bar.
+  // Draws nothing until the work has taken `quiet_for_s`, because short work needs no bar.
   explicit ProgressBar(double quiet_for_s = 0.0);
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
   ~ProgressBar();
 
-  // How far the whole work is, 0..1, and what is being done. False once Ctrl-C was pressed.
+  // Shows the progress of the whole work, 0..1, and the current step. Returns false after Ctrl-C.
   bool show(std::string_view step, double fraction);
 
-  // Takes the bar off the terminal, before anything else is printed.
+  // Removes the bar from the terminal; call before anything else is printed.
   void finish();
 
   [[nodiscard]] double elapsed_s() const;

@@ -31,9 +31,10 @@ constexpr Range kNoise_deg{0.0, 90.0};
 constexpr Range kStaleAfter{0.01, 3600.0};
 constexpr Range kAnyNumber{std::numeric_limits<double>::lowest(),
                            std::numeric_limits<double>::max()};
-constexpr double kDegrees = 180.0 / std::numbers::pi;  // in a radian
-// The bound above 60 Hz is a time; no rate brings more frames into it than this.
-constexpr std::int64_t kMostLagFrames = 170;
+constexpr double kDegrees = 180.0 / std::numbers::pi;  // degrees in a radian
+// Above 60 Hz the lag is limited as a time; at no frame rate is that time longer than this many
+// frames.
+constexpr std::int64_t kMaxLagFrames = 170;
 constexpr std::array<std::string_view, 3> kIdentityKeys{"port", "id", "hand"};
 constexpr std::string_view kRawSuffix = "-raw";
 constexpr TomlLimits kLimits{
@@ -41,7 +42,8 @@ constexpr TomlLimits kLimits{
 constexpr std::size_t kMaxStreams = 64;
 constexpr std::size_t kMaxClients = 1024;
 
-// Everything that reads the file's tables needs to know where the file is.
+// Reads the tables of the file. A class, because all of its functions need the file's folder and
+// name.
 class Reader {
  public:
   Reader(std::filesystem::path folder, Drivers drivers, Findings& findings)
@@ -105,7 +107,7 @@ void Reader::read_endpoint(TableReader& root, const char* name, std::string& end
   table->finish();
   if (!endpoint.starts_with("tcp://") && !endpoint.starts_with("ipc://")) {
     table->add_error("endpoint",
-                     fmt::format("{} is no endpoint; it reads like tcp://127.0.0.1:5570,"
+                     fmt::format("{} is not an endpoint; it looks like tcp://127.0.0.1:5570,"
                                  " or ipc:///run/posed.sock",
                                  in_quotes(endpoint)));
   } else if (!net::is_loopback(endpoint) && !secured && !insecure) {
@@ -200,7 +202,8 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
                                           near.empty() ? "`posed devices` lists them"
                                                        : "the nearest is '" + near +
                                                              "' (`posed devices` lists them)"));
-    for (const std::string& name : names) (void)table.table(name);  // the one mistake is told
+    // Looks up every driver table, so that none is reported as unknown beside this error.
+    for (const std::string& name : names) (void)table.table(name);
   }
   table.finish();
 }
@@ -212,7 +215,8 @@ void Reader::read_options(TableReader& stream_table, const drivers::Driver& driv
   for (const drivers::OptionSpec& spec : driver.options) {
     const std::string key(spec.name);
     drivers::OptionValue value = spec.default_value;
-    // Which device it is stands beside the driver's name; how it is used, in the driver's table.
+    // Keys that say which device it is stand beside the driver's name; keys that say how it is used
+    // stand in the driver's own table.
     const bool beside = driver.expect != nullptr &&
                         std::ranges::find(kIdentityKeys, spec.name) != kIdentityKeys.end();
     if (beside) read_option(stream_table, spec, value);
@@ -256,10 +260,10 @@ void Reader::read_generate(TableReader table, config::GenerateConfig& generate) 
   double noise_deg = generate.live.noise_rad * kDegrees;
   std::string model, labels;
   table.read("lag_frames", lag_frames);
-  if (lag_frames < 0 || lag_frames > kMostLagFrames) {
+  if (lag_frames < 0 || lag_frames > kMaxLagFrames) {
     table.add_error("lag_frames", fmt::format("stream.generate.lag_frames = {} is out of range: it"
                                               " takes 0 to {} frames",
-                                              lag_frames, kMostLagFrames));
+                                              lag_frames, kMaxLagFrames));
     lag_frames = generate.live.lag.frames;
   }
   table.read("lag_ms", lag_ms, kLag_ms);
@@ -306,7 +310,7 @@ void Reader::check_names(const std::vector<StreamConfig>& streams, const std::ve
   }
 }
 
-// Every key that a config may have, found by reading one that has every table.
+// Every key that a config may have, found by reading a config that has every table.
 std::set<std::string> all_keys(Drivers drivers) {
   std::string text = "[publish]\n[control]\n[security]\n[[security.client]]\n";
   for (const drivers::Driver& driver : drivers) {

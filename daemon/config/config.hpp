@@ -1,6 +1,6 @@
-// Reads the daemon's TOML file into a DaemonConfig. Cold. The file is described, key by key, in
-// config/posed.toml; every default is a member's initialiser in daemon/config/daemon_config.hpp
-// or, for a driver's own table, in the driver's OptionSpec list.
+// Reads the daemon's TOML file into a DaemonConfig. Cold. config/posed.toml documents the file key
+// by key. Every default is a member's initialiser in daemon/config/daemon_config.hpp or, for a
+// driver's own table, in the driver's OptionSpec list.
 #pragma once
 
 #include <filesystem>
@@ -18,23 +18,22 @@
 namespace posed::config {
 
 struct Reading {
-  config::DaemonConfig config;  // to be used only when there are no errors
+  config::DaemonConfig config;  // valid only if there are no errors
   std::vector<Error> errors;    // all of them, each one sentence with file and line, exit code 2
-  std::set<std::string> known;  // every key that was looked for: "stream.style.alpha"
+  std::set<std::string> known;  // every key that was looked up: "stream.style.alpha"
 };
 
 using Drivers = std::span<const drivers::Driver>;
 
-// `path` gives its name to the messages and its folder to relative paths; `drivers` are those that
-// streams may name. Reads the key files that the text names, nothing else; whatever the text is, it
-// returns.
+// `path` is used in messages, and its folder for relative paths; `drivers` are those that streams
+// may use. Reads the key files that the text names, and no other file; returns for any text.
 [[nodiscard]] Reading read_config(const std::string& text, const std::filesystem::path& path,
                                   Drivers drivers);
 
-// The file, all errors (a missing file is one).
+// Reads the file; returns all errors (a missing file is one).
 [[nodiscard]] Reading read_config_file(const std::filesystem::path& path, Drivers drivers);
 
-// The file, or its first error.
+// Reads the file; returns the first error, if any.
 [[nodiscard]] Result<config::DaemonConfig> load_config(const std::filesystem::path& path,
                                                        Drivers drivers);
 

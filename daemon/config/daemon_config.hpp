@@ -1,5 +1,5 @@
-// What the daemon is to do, checked and complete: filled from TOML by the config reader, by hand in
-// tests and benchmarks, from the log in replay. Every default of the product stands here and
+// The settings of the daemon, checked and complete. They are filled from TOML by the config reader,
+// by hand in tests and benchmarks, and from the log in replay. Every default is defined here and
 // nowhere else.
 #pragma once
 
@@ -21,8 +21,8 @@ struct StyleConfig {
 };
 
 struct GenerateConfig {
-  smooth::LiveOptions live;         // the defaults of lag and noise
-  std::filesystem::path model;      // the gesture model's file; empty: smooths only
+  smooth::LiveOptions live;         // lag and noise, with their defaults
+  std::filesystem::path model;      // the gesture model's file; empty: only smooth
   std::vector<std::string> labels;  // performed from the start
   double tempo = 1.0;
   bool loop = false;
@@ -30,17 +30,18 @@ struct GenerateConfig {
 
 struct StreamConfig {
   std::string name;                   // [a-z0-9_-]{1,32}, unique
-  std::string driver;                 // registry name
+  std::string driver;                 // as in the registry
   drivers::Options options;           // of the driver, complete with its defaults
-  std::filesystem::path calibration;  // of a glove; empty: the device's default
-  bool publish_raw = false;           // the unstyled input too, as <name>-raw
-  double stale_after_s = 0.5;         // silence after which the stream is called stale
+  std::filesystem::path calibration;  // of a glove; empty: use the device's default
+  bool publish_raw = false;           // publish the unstyled input too, as <name>-raw
+  double stale_after_s = 0.5;         // after this long without data the stream is stale
   std::optional<StyleConfig> style;
   std::optional<GenerateConfig> generate;
-  std::optional<bool> constrain;  // fingers held apart and within their limits; default: on hands
+  // keep fingers apart and joints within their limits; default: on for hands
+  std::optional<bool> constrain;
 };
 
-// Who may connect; CURVE is off when there is no server key.
+// Who may connect; without a server key CURVE is off.
 struct SecurityConfig {
   std::filesystem::path server_key;  // NAME.key; empty: no CURVE
   std::vector<net::AllowedClient> clients;
@@ -48,13 +49,13 @@ struct SecurityConfig {
 
 struct DaemonConfig {
   std::string publish_endpoint = "tcp://127.0.0.1:5570";
-  bool publish_insecure = false;  // bind beyond loopback without CURVE
+  bool publish_insecure = false;  // allow binding beyond loopback without CURVE
   std::string control_endpoint = "tcp://127.0.0.1:5571";
   bool control_insecure = false;
-  bool realtime = true;  // ask for SCHED_FIFO and mlockall; refusal is a warning
+  bool realtime = true;  // ask for SCHED_FIFO and mlockall; a refusal is only a warning
   SecurityConfig security;
   std::vector<StreamConfig> streams;
-  std::string text;  // the TOML it came from, kept in the device log
+  std::string text;  // the TOML text of the config, kept in the device log
 };
 
 }  // namespace posed::config

@@ -12,7 +12,7 @@
 namespace posed::config {
 namespace {
 
-// What a key's last letters say about its unit, so that a wrong value is told the right one.
+// The unit that the last letters of a key name, so that the error for a wrong value can state it.
 std::string unit_of(std::string_view key) {
   constexpr std::array<std::pair<std::string_view, const char*>, 7> kUnits{{
       {"_per_s", " per second"},
@@ -83,8 +83,8 @@ void TableReader::add_error(std::string_view key, const std::string& message) {
   findings_.add_error(line_of(key), message);
 }
 
-void TableReader::blame_type(const toml::node& node, std::string_view key,
-                             const std::string& wanted) {
+void TableReader::add_type_error(const toml::node& node, std::string_view key,
+                                 const std::string& wanted) {
   findings_.add_error(line_of_node(node),
                       fmt::format("{} must be {}, not {}", full(key), wanted, kind_of(node)));
 }
@@ -95,7 +95,7 @@ void TableReader::read(const char* key, bool& value) {
   if (const auto* flag = node->as_boolean()) {
     value = flag->get();
   } else {
-    blame_type(*node, key, "true or false");
+    add_type_error(*node, key, "true or false");
   }
 }
 
@@ -105,14 +105,14 @@ void TableReader::read(const char* key, std::int64_t& value) {
   if (const auto* integer = node->as_integer()) {
     value = integer->get();
   } else {
-    blame_type(*node, key, "an integer");
+    add_type_error(*node, key, "an integer");
   }
 }
 
 void TableReader::read(const char* key, double& value, Range range) {
   const toml::node* node = find(key);
   if (node == nullptr) return;
-  if (!node->is_number()) return blame_type(*node, key, "a number" + unit_of(key));
+  if (!node->is_number()) return add_type_error(*node, key, "a number" + unit_of(key));
   const double number = *node->value<double>();
   if (number >= range.min && number <= range.max) {
     value = number;
@@ -131,7 +131,7 @@ void TableReader::read(const char* key, std::string& value) {
   if (const auto* text = node->as_string()) {
     value = text->get();
   } else {
-    blame_type(*node, key, "text in quotes");
+    add_type_error(*node, key, "text in quotes");
   }
 }
 
@@ -139,13 +139,13 @@ void TableReader::read(const char* key, std::vector<std::string>& value) {
   const toml::node* node = find(key);
   if (node == nullptr) return;
   const toml::array* list = node->as_array();
-  if (list == nullptr) return blame_type(*node, key, "a list of texts");
+  if (list == nullptr) return add_type_error(*node, key, "a list of texts");
   value.clear();
   for (const toml::node& element : *list) {
     if (const auto* text = element.as_string()) {
       value.push_back(text->get());
     } else {
-      blame_type(element, key, "a list of texts");
+      add_type_error(element, key, "a list of texts");
     }
   }
 }
@@ -162,7 +162,7 @@ std::optional<TableReader> TableReader::table(const std::string& key) {
   const toml::node* node = find(key);
   if (node == nullptr) return std::nullopt;
   if (const toml::table* table = node->as_table()) return TableReader(*table, full(key), findings_);
-  blame_type(*node, key, "a table ([" + full(key) + "])");
+  add_type_error(*node, key, "a table ([" + full(key) + "])");
   return std::nullopt;
 }
 
@@ -172,7 +172,7 @@ std::vector<TableReader> TableReader::tables(const std::string& key, std::size_t
   if (node == nullptr) return readers;
   const toml::array* list = node->as_array();
   if (list == nullptr || !list->is_homogeneous<toml::table>()) {
-    blame_type(*node, key, "a list of tables ([[" + full(key) + "]])");
+    add_type_error(*node, key, "a list of tables ([[" + full(key) + "]])");
     return readers;
   }
   if (list->size() > most) {
@@ -194,7 +194,7 @@ std::string TableReader::advice(const std::string& unknown_key) const {
     if (dot == std::string::npos || path.substr(dot + 1) != unknown_key) continue;
     places.push_back("[" + path.substr(0, dot) + "]");
   }
-  // Of several tables that have such a key, those that this file has are meant.
+  // If several tables can have such a key, prefer those that this file has.
   std::vector<std::string> present = places;
   std::erase_if(present, [this](const std::string& place) {
     const std::string within = place.substr(1, place.size() - 2) + ".";

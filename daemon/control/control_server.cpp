@@ -14,11 +14,12 @@ namespace {
 constexpr int kRequestsWaiting = 4;  // per client; more wait at the client
 constexpr int kRepliesWaiting = 16;  // per client
 constexpr int kReceiveBuffer_bytes = 64 * 1024;
-constexpr std::int64_t kLongestPart = kLargestRequest + 1024;  // bytes
-constexpr std::uint64_t kMostUnheard = 512 * 1024;  // bytes of all clients that ended no request
-constexpr int kLastWords_ms = 500;                  // for the answer to `stop` to leave
-constexpr int kRequestsARound = 16;                 // then acknowledgements get their turn
-constexpr std::size_t kLongestEnvelope = 4;         // parts before the request
+constexpr std::int64_t kMaxPart = kMaxRequest + 1024;  // bytes
+// bytes that have not become a request, of all clients together
+constexpr std::uint64_t kMaxUnheard = 512 * 1024;
+constexpr int kLastWords_ms = 500;       // time to send the reply to `stop`
+constexpr int kRequestsARound = 16;      // then acknowledgements are handled
+constexpr std::size_t kMaxEnvelope = 4;  // parts before the request
 
 Result<> set_limits(void* router) {
   for (const auto& [option, value] : {std::pair{ZMQ_SNDHWM, kRepliesWaiting},
@@ -26,7 +27,7 @@ Result<> set_limits(void* router) {
                                       {ZMQ_ROUTER_HANDOVER, 1}}) {
     if (auto set = net::set_option(router, option, value); !set) return set;
   }
-  return net::set_receive_limits(router, kLongestPart, kRequestsWaiting, kReceiveBuffer_bytes);
+  return net::set_receive_limits(router, kMaxPart, kRequestsWaiting, kReceiveBuffer_bytes);
 }
 
 long milliseconds_until(std::int64_t due_ns, std::int64_t now_ns) {
@@ -50,9 +51,9 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
   }
   auto guard = net::PeerGuard::open(context, router->get(),
                                     {.name = "control",
-                                     .most_peers = net::peer_shares().control,
-                                     .most_unheard = kMostUnheard,
-                                     .most_unheard_of_all = kMostUnheard,
+                                     .max_peers = net::peer_shares().control,
+                                     .max_unheard = kMaxUnheard,
+                                     .max_unheard_of_all = kMaxUnheard,
                                      .authenticator = ports.authenticator});
   if (!guard) return std::unexpected(guard.error());
   auto bound = net::bind_socket(router->get(), endpoint);
@@ -103,13 +104,13 @@ void ControlServer::sleep(long longest_ms) {
 bool ControlServer::take_request() {
   net::Message part;
   if (!part.receive(router_.get())) return false;
-  Asker envelope;
+  Requester envelope;
   while (part.more()) {
-    if (envelope.size() <= kLongestEnvelope) envelope.emplace_back(part.text());
+    if (envelope.size() <= kMaxEnvelope) envelope.emplace_back(part.text());
     if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
   }
-  if (envelope.size() > kLongestEnvelope) return true;  // no client of ours; it gets no answer
-  (void)guard_->take_gone();                            // nothing is kept for a connection here
+  if (envelope.size() > kMaxEnvelope) return true;  // not a client of this protocol: no reply
+  (void)guard_->take_gone();                        // this socket keeps no state for a connection
   if (const int client = net::source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.authenticator != nullptr &&
       !ports_.authenticator->allows(part.property("User-Id"), net::Domain::kControl)) {
@@ -123,15 +124,15 @@ bool ControlServer::take_request() {
 }
 
 bool ControlServer::take_ack() {
-  std::optional<Answer> answer;
+  std::optional<Reply> answer;
   const bool taken =
       ports_.acks->consume([&](const pipeline::Ack& ack) { answer = handler_.acknowledge(ack); });
   if (answer) send(*answer);
   return taken;
 }
 
-// A ROUTER drops what a slow or departed client does not take.
-void ControlServer::send(const Answer& answer) {
+// A ROUTER socket drops a reply that a slow or disconnected client does not accept.
+void ControlServer::send(const Reply& answer) {
   for (const std::string& part : answer.to) {
     if (!net::send_part(router_.get(), part, true)) return;
   }

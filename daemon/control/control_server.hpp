@@ -1,6 +1,6 @@
-// ControlServer: the ROUTER socket and the cold thread behind it. One request a message; whatever
-// parts stand before the last one come back before the reply, so that a client may number its
-// requests. Nothing a client does, or leaves undone, makes anyone wait.
+// ControlServer: the ROUTER socket and its cold thread. Each message is one request. Parts before
+// the last one are returned before the reply, so that a client may number its requests. Nothing
+// that a client does or fails to do makes another client wait.
 #pragma once
 
 #include <atomic>
@@ -17,18 +17,19 @@
 
 namespace posed::control {
 
-// All of it outlives the server.
+// What the server is connected to; all of it outlives the server.
 struct ControlPorts {
-  pipeline::Ring<pipeline::Ack>* acks = nullptr;  // this thread consumes
-  system::EventFd* wake = nullptr;                // rung when there is something in `acks`
-  // Asked about every client; null (in tests): nobody is asked, and old ZMTP is spoken, too.
+  pipeline::Ring<pipeline::Ack>* acks = nullptr;  // consumed by the server's thread
+  system::EventFd* wake = nullptr;                // notified when `acks` has something
+  // Checks every client; null (in tests): all are admitted, even with ZMTP before 3.0.
   net::ZapAuthenticator* authenticator = nullptr;
   std::string secret_z85;  // the server's key; empty: no CURVE
 };
 
 class ControlServer {
  public:
-  // Binds and starts the thread. Only the thread touches `handler` until the destructor returns.
+  // Binds and starts the thread. Until the destructor has returned, only that thread uses
+  // `handler`.
   [[nodiscard]] static Result<std::unique_ptr<ControlServer>> start(void* context,
                                                                     const std::string& endpoint,
                                                                     const ControlPorts& ports,
@@ -37,7 +38,8 @@ class ControlServer {
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;
 
-  [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  // really bound
+  // the endpoint that is really bound
+  [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
 
  private:
   ControlServer(net::Socket router, std::unique_ptr<net::PeerGuard> guard, std::string endpoint,
@@ -46,7 +48,7 @@ class ControlServer {
   void sleep(long longest_ms);  // negative: until something comes
   [[nodiscard]] bool take_request();
   [[nodiscard]] bool take_ack();
-  void send(const Answer& answer);
+  void send(const Reply& answer);
 
   net::Socket router_;
   std::unique_ptr<net::PeerGuard> guard_;

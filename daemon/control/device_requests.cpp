@@ -1,4 +1,4 @@
-// The control messages that reach a device or its decoder: calibration and haptics.
+// The control requests for a device or its decoder: calibration and haptics.
 #include <algorithm>
 #include <cmath>
 
@@ -13,8 +13,8 @@ namespace {
 
 using pipeline::DeviceCommand;
 
-constexpr float kMostVibration_hz = 1000.0F;
-constexpr float kMostVibration_s = 60.0F;
+constexpr float kMaxVibration_hz = 1000.0F;
+constexpr float kMaxVibration_s = 60.0F;
 
 bool within(float value, float least, float most) {
   return std::isfinite(value) && value >= least && value <= most;
@@ -31,8 +31,8 @@ Result<drivers::Haptics> read_haptics(const v1::ControlRequest::Haptics& wanted)
   std::ranges::copy(wanted.force(), haptics.force.begin());
   const bool sound =
       std::ranges::all_of(haptics.force, [](float force) { return within(force, -1.0F, 1.0F); }) &&
-      within(haptics.vibration_hz, 0.0F, kMostVibration_hz) &&
-      within(haptics.vibration_s, 0.0F, kMostVibration_s) && within(haptics.vibration, 0.0F, 1.0F);
+      within(haptics.vibration_hz, 0.0F, kMaxVibration_hz) &&
+      within(haptics.vibration_s, 0.0F, kMaxVibration_s) && within(haptics.vibration, 0.0F, 1.0F);
   if (sound) return haptics;
   return fail(
       "a force is 0 (free) to 1 (blocked), negative to leave it; a vibration has up to 1000 Hz,"
@@ -41,7 +41,7 @@ Result<drivers::Haptics> read_haptics(const v1::ControlRequest::Haptics& wanted)
 
 }  // namespace
 
-Result<> RequestHandler::calibrate(const v1::ControlRequest& request, const Asker& asker) {
+Result<> RequestHandler::calibrate(const v1::ControlRequest& request, const Requester& requester) {
   const auto& wanted = request.calibrate();
   const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
@@ -54,12 +54,12 @@ Result<> RequestHandler::calibrate(const v1::ControlRequest& request, const Aske
                               .calibration = compiled->get(),
                               .size = 0,
                               .bytes = {}};
-  if (under_way_.size() >= kMostUnderWay || !daemon_control_.send(command)) {
+  if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
   under_way_.emplace(
       ++last_ticket_,
-      UnderWay{.asker = asker, .stream = *stream, .calibration = std::move(*compiled)});
+      UnderWay{.requester = requester, .stream = *stream, .calibration = std::move(*compiled)});
   return {};
 }
 

@@ -18,13 +18,13 @@ namespace {
 
 using pipeline::Command;
 
-constexpr float kMostAlpha = 2.0F;
+constexpr float kMaxAlpha = 2.0F;
 
-Answer answer(Asker to, const v1::ControlReply& reply) {
+Reply answer(Requester to, const v1::ControlReply& reply) {
   return {std::move(to), reply.SerializeAsString()};
 }
 
-Answer refusal(Asker to, const std::string& sentence) {
+Reply refusal(Requester to, const std::string& sentence) {
   v1::ControlReply reply;
   reply.set_error(sentence);
   return answer(std::move(to), reply);
@@ -38,51 +38,51 @@ RequestHandler::RequestHandler(std::vector<ControlledStream> streams, DaemonCont
 
 RequestHandler::~RequestHandler() = default;
 
-std::optional<Answer> RequestHandler::handle(Asker asker, std::span<const std::byte> bytes) {
+std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const std::byte> bytes) {
   v1::ControlRequest request;
-  if (bytes.size() > kLargestRequest) {
-    return refusal(std::move(asker), "the request is too large: it has at most 64 KB");
+  if (bytes.size() > kMaxRequest) {
+    return refusal(std::move(requester), "the request is too large: it has at most 64 KB");
   }
   if (!request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
-    return refusal(std::move(asker), "this is no posed.v1.ControlRequest");
+    return refusal(std::move(requester), "this is not a valid posed.v1.ControlRequest");
   }
   Result<> done;
   v1::ControlReply reply;
   reply.set_ok(true);
   switch (request.request_case()) {
     case v1::ControlRequest::kSetAlpha:
-      done = set_alpha(request, asker);
+      done = set_alpha(request, requester);
       break;
     case v1::ControlRequest::kModelPart: {
-      const auto taken = take_model_part(request, asker);
-      if (!taken) return refusal(std::move(asker), taken.error().text());
-      if (*taken) return answer(std::move(asker), reply);
+      const auto taken = take_model_part(request, requester);
+      if (!taken) return refusal(std::move(requester), taken.error().text());
+      if (*taken) return answer(std::move(requester), reply);
       break;
     }
     case v1::ControlRequest::kPlay:
-      done = play(request, asker);
+      done = play(request, requester);
       break;
     case v1::ControlRequest::kStopPlaying:
-      done = stop_playing(request, asker);
+      done = stop_playing(request, requester);
       break;
     case v1::ControlRequest::kCalibrate:
-      done = calibrate(request, asker);
+      done = calibrate(request, requester);
       break;
     case v1::ControlRequest::kHaptics:
       done = send_haptics(request);
-      if (done) return answer(std::move(asker), reply);  // the device does not answer
+      if (done) return answer(std::move(requester), reply);  // devices send no acknowledgement
       break;
     case v1::ControlRequest::kStatus:
       daemon_control_.fill(*reply.mutable_status());
-      return answer(std::move(asker), reply);
+      return answer(std::move(requester), reply);
     case v1::ControlRequest::kStop:
       daemon_control_.stop();
-      return answer(std::move(asker), reply);
+      return answer(std::move(requester), reply);
     case v1::ControlRequest::REQUEST_NOT_SET:
-      return refusal(std::move(asker), "the request is empty, or from a newer posed");
+      return refusal(std::move(requester), "the request is empty, or from a newer posed");
   }
-  if (!done) return refusal(std::move(asker), done.error().text());
-  return std::nullopt;  // acknowledge() answers
+  if (!done) return refusal(std::move(requester), done.error().text());
+  return std::nullopt;  // acknowledge() makes the reply
 }
 
 Result<std::uint32_t> RequestHandler::find_stream(const std::string& name) const {
@@ -126,22 +126,22 @@ Result<std::uint32_t> RequestHandler::playing_stream(const std::string& name) co
   return stream;
 }
 
-Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, const Asker& asker) {
+Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, const Requester& requester) {
   const auto& wanted = request.set_alpha();
   const auto stream = styled_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
-  if (!(std::abs(wanted.alpha()) <= kMostAlpha)) {
+  if (!(std::abs(wanted.alpha()) <= kMaxAlpha)) {
     return fail(fmt::format("alpha {} is out of range; it goes from -2 to 2", wanted.alpha()));
   }
   Command command{.kind = Command::Kind::kAlpha, .stream = *stream, .alpha = wanted.alpha()};
-  return send(command, {.asker = asker});
+  return send(command, {.requester = requester});
 }
 
 Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
-                                             const Asker& asker) {
+                                             const Requester& requester) {
   const auto& part = request.model_part();
   if (auto stream = find_stream(part.stream()); !stream) return std::unexpected(stream.error());
-  auto whole = uploads_.take(asker.empty() ? std::string() : asker.front(),
+  auto whole = uploads_.take(requester.empty() ? std::string() : requester.front(),
                              {.stream = part.stream(),
                               .sha256 = part.sha256(),
                               .total = part.total(),
@@ -152,25 +152,25 @@ Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
   if (!*whole) return true;
   const std::string name = part.name().empty() ? "unnamed model" : clean_name(part.name());
   const auto bytes = std::as_bytes(std::span(std::as_const(**whole)));
-  if (auto done = set_model(part.stream(), bytes, name, asker); !done) {
+  if (auto done = set_model(part.stream(), bytes, name, requester); !done) {
     return std::unexpected(done.error());
   }
   return false;
 }
 
-// What kind of model it is, the file itself says.
+// The file itself says which kind of model it is.
 Result<> RequestHandler::set_model(const std::string& stream, std::span<const std::byte> bytes,
-                                   const std::string& name, const Asker& asker) {
+                                   const std::string& name, const Requester& requester) {
   const auto index = find_stream(stream);
   if (!index) return std::unexpected(index.error());
   const auto file = model_file::open(bytes, name);
   if (!file) return std::unexpected(file.error());
-  return file->has_gesture() ? set_gesture_model(*index, bytes, name, asker)
-                             : set_style_model(*index, bytes, name, asker);
+  return file->has_gesture() ? set_gesture_model(*index, bytes, name, requester)
+                             : set_style_model(*index, bytes, name, requester);
 }
 
 Result<> RequestHandler::set_style_model(std::uint32_t index, std::span<const std::byte> bytes,
-                                         const std::string& name, const Asker& asker) {
+                                         const std::string& name, const Requester& requester) {
   const ControlledStream& stream = streams_[index];
   if (auto styled = styled_stream(stream.name); !styled) return std::unexpected(styled.error());
   const auto model = style::parse_model(bytes, name);
@@ -180,11 +180,11 @@ Result<> RequestHandler::set_style_model(std::uint32_t index, std::span<const st
   if (!bound) return std::unexpected(bound.error());
   Command command{.kind = Command::Kind::kModel, .stream = index, .model = bound->get()};
   keep_model(bytes, command);
-  return send(command, {.asker = asker, .model = std::move(*bound)});
+  return send(command, {.requester = requester, .model = std::move(*bound)});
 }
 
 Result<> RequestHandler::set_gesture_model(std::uint32_t index, std::span<const std::byte> bytes,
-                                           const std::string& name, const Asker& asker) {
+                                           const std::string& name, const Requester& requester) {
   const ControlledStream& stream = streams_[index];
   if (!stream.generates) {
     return fail(fmt::format(
@@ -198,7 +198,7 @@ Result<> RequestHandler::set_gesture_model(std::uint32_t index, std::span<const 
   if (!bound) return std::unexpected(bound.error());
   Command command{.kind = Command::Kind::kGesture, .stream = index, .gesture = bound->get()};
   keep_model(bytes, command);
-  return send(command, {.asker = asker, .gesture = std::move(*bound)});
+  return send(command, {.requester = requester, .gesture = std::move(*bound)});
 }
 
 void RequestHandler::keep_model(std::span<const std::byte> bytes, Command& command) {
@@ -208,7 +208,7 @@ void RequestHandler::keep_model(std::span<const std::byte> bytes, Command& comma
   daemon_control_.keep_model(bytes);
 }
 
-Result<> RequestHandler::play(const v1::ControlRequest& request, const Asker& asker) {
+Result<> RequestHandler::play(const v1::ControlRequest& request, const Requester& requester) {
   const auto& wanted = request.play();
   const auto stream = playing_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
@@ -217,13 +217,15 @@ Result<> RequestHandler::play(const v1::ControlRequest& request, const Asker& as
       gesture::make_play_order(coming_gesture(*stream)->gesture(), names,
                                wanted.tempo() == 0.0F ? 1.0 : wanted.tempo(), wanted.loop());
   if (!order) return std::unexpected(order.error());
-  return send({.kind = Command::Kind::kPlay, .stream = *stream, .play = *order}, {.asker = asker});
+  return send({.kind = Command::Kind::kPlay, .stream = *stream, .play = *order},
+              {.requester = requester});
 }
 
-Result<> RequestHandler::stop_playing(const v1::ControlRequest& request, const Asker& asker) {
+Result<> RequestHandler::stop_playing(const v1::ControlRequest& request,
+                                      const Requester& requester) {
   const auto stream = playing_stream(request.stop_playing().stream());
   if (!stream) return std::unexpected(stream.error());
-  return send({.kind = Command::Kind::kStopPlaying, .stream = *stream}, {.asker = asker});
+  return send({.kind = Command::Kind::kStopPlaying, .stream = *stream}, {.requester = requester});
 }
 
 const generate::BoundModel* RequestHandler::coming_gesture(std::uint32_t stream) const {
@@ -235,7 +237,7 @@ const generate::BoundModel* RequestHandler::coming_gesture(std::uint32_t stream)
 
 Result<> RequestHandler::send(Command command, UnderWay under_way) {
   command.ticket = last_ticket_ + 1;
-  if (under_way_.size() >= kMostUnderWay || !daemon_control_.send(command)) {
+  if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
   under_way.stream = command.stream;
@@ -243,14 +245,14 @@ Result<> RequestHandler::send(Command command, UnderWay under_way) {
   return {};
 }
 
-std::optional<Answer> RequestHandler::acknowledge(const pipeline::Ack& ack) {
+std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   const auto found = under_way_.find(ack.ticket);
   if (found == under_way_.end()) return std::nullopt;
   UnderWay done = std::move(found->second);
   under_way_.erase(found);
   ControlledStream& stream = streams_[ack.stream];
   if (done.model) {
-    stream.model = std::move(done.model);  // the one it replaces is free now
+    stream.model = std::move(done.model);  // frees the model that it replaces
     daemon_control_.model_in_use(ack.stream, stream.model->name);
   }
   if (done.calibration) {
@@ -263,16 +265,16 @@ std::optional<Answer> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     if (!stream.style) daemon_control_.model_in_use(ack.stream, stream.gesture->name);
   }
   if (ack.refused) {
-    return refusal(std::move(done.asker), "too many labels wait already on " + stream.name +
-                                              "; try again later, or stop them with"
-                                              " `posed ctl stop-playing " +
-                                              stream.name + "`");
+    return refusal(std::move(done.requester), "too many labels wait already on " + stream.name +
+                                                  "; try again later, or stop them with"
+                                                  " `posed ctl stop-playing " +
+                                                  stream.name + "`");
   }
   v1::ControlReply reply;
   reply.set_ok(true);
   reply.set_stream(stream.name);
   reply.set_sequence(ack.sequence);
-  return answer(std::move(done.asker), reply);
+  return answer(std::move(done.requester), reply);
 }
 
 }  // namespace posed::control

@@ -1,5 +1,5 @@
-// RequestHandler: what a control message means. No socket, no thread: bytes of strangers in,
-// replies out; the control thread and the fuzz target drive the same object.
+// RequestHandler gives control messages their effect. No socket, no thread: untrusted bytes in,
+// replies out. The control thread and the fuzz target drive the same object.
 #pragma once
 
 #include <cstddef>
@@ -30,28 +30,28 @@ class Stats;
 
 namespace posed::control {
 
-inline constexpr std::size_t kLargestRequest = 64 * 1024;  // bytes
-using pipeline::kMostUnderWay;
+inline constexpr std::size_t kMaxRequest = 64 * 1024;  // bytes
+using pipeline::kMaxUnderWay;
 
-// A stream as control sees it.
+// A stream as the control thread sees it.
 struct ControlledStream {
   std::string name;
   bool publishes_raw = false;
   std::shared_ptr<const Skeleton> skeleton;   // models are bound to it; null: samples only
-  double rate_hz = 0.0;                       // nominal; 0 unknown
-  std::optional<style::FilterOptions> style;  // the style stage is there when this is
-  // What the stage runs with. The cold side owns every model; the pipeline only borrows.
+  double rate_hz = 0.0;                       // nominal; 0: unknown
+  std::optional<style::FilterOptions> style;  // set: the stream has a style stage
+  // The model in use. The cold side owns every model; the pipeline only borrows it.
   std::unique_ptr<const style::BoundModel> model;
-  bool generates = false;                               // the generate stage is there
-  std::unique_ptr<const generate::BoundModel> gesture;  // null until it has one
-  // What calibrations must fit.
+  bool generates = false;                               // true: the stream has a generate stage
+  std::unique_ptr<const generate::BoundModel> gesture;  // null while there is none
+  // The device that calibrations must fit.
   std::shared_ptr<devices::PresentDevice> device = std::make_shared<devices::PresentDevice>();
   drivers::Options options;  // of its driver
-  // In use by the reader since it was sent; null: what the stream began with.
+  // The calibration that was sent last and is in use by the reader; null: the one from the start.
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
 };
 
-// What the handler asks of the rest of the daemon; every call comes from the control thread.
+// What the handler needs from the rest of the daemon. All calls come from the control thread.
 class DaemonControl {
  public:
   DaemonControl() = default;
@@ -59,72 +59,75 @@ class DaemonControl {
   DaemonControl& operator=(const DaemonControl&) = delete;
   virtual ~DaemonControl() = default;
 
-  // Puts the command into the pipeline's ring; false when it is full.
+  // Puts the command into the pipeline's ring; returns false if it is full.
   [[nodiscard]] virtual bool send(const pipeline::Command& command) = 0;
   // The same for the reader and its devices.
   [[nodiscard]] virtual bool send(const pipeline::DeviceCommand& command) = 0;
-  // Keeps a model's file for the log, before the command that names its hash.
+  // Keeps a model's file for the log; call before the command that names its hash.
   virtual void keep_model(std::span<const std::byte> bytes) = 0;
-  // A model has taken effect: `stats` should name it.
+  // A model has taken effect; `stats` should report its name.
   virtual void model_in_use(std::uint32_t stream, const std::string& name) = 0;
   virtual void fill(v1::Stats& stats) = 0;
-  virtual void stop() = 0;  // begin to end the daemon; returns at once
+  virtual void stop() = 0;  // starts the daemon's shutdown; returns at once
 };
 
-// Who asked: opaque to the handler, handed back with the reply.
-using Asker = std::vector<std::string>;
-struct Answer {
-  Asker to;
+// The address of the client that sent a request: opaque to the handler, returned with the reply.
+using Requester = std::vector<std::string>;
+struct Reply {
+  Requester to;
   std::string bytes;  // a serialized posed.v1.ControlReply
 };
 
 class RequestHandler {
  public:
-  // `daemon_control` outlives the handler. Destroy it after the pipeline thread has ended: it owns
-  // the models in use.
+  // `daemon_control` outlives the handler. Destroy the handler after the pipeline thread has ended,
+  // because it owns the models in use.
   RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
                  Clock clock = system::monotonic_ns);
   ~RequestHandler();
   RequestHandler(const RequestHandler&) = delete;
   RequestHandler& operator=(const RequestHandler&) = delete;
 
-  // One request. The answer comes at once, or with acknowledge() when the pipeline has to act
-  // first. Whatever the bytes are: an answer with a sentence, never a crash.
-  [[nodiscard]] std::optional<Answer> handle(Asker asker, std::span<const std::byte> bytes);
+  // Handles one request. The reply is returned at once, or later by acknowledge() if the pipeline
+  // has to act first. Bytes that are not a valid request get a reply with an error sentence, never
+  // a crash.
+  [[nodiscard]] std::optional<Reply> handle(Requester requester, std::span<const std::byte> bytes);
 
-  // Forgets uploads that go on no more. Returns when to call it next at the latest.
+  // Forgets uploads that have stalled. Returns when to call it next at the latest.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns) { return uploads_.forget_old(now_ns); }
 
-  // The pipeline has applied a command. Frees the model that it replaced.
-  [[nodiscard]] std::optional<Answer> acknowledge(const pipeline::Ack& ack);
+  // The pipeline has applied a command: returns its reply, and frees the model that it replaced.
+  [[nodiscard]] std::optional<Reply> acknowledge(const pipeline::Ack& ack);
 
  private:
   struct UnderWay {
-    Asker asker;
+    Requester requester;
     std::uint32_t stream = 0;
-    std::unique_ptr<const style::BoundModel> model{};       // of a new style
-    std::unique_ptr<const generate::BoundModel> gesture{};  // of a new gesture model
+    std::unique_ptr<const style::BoundModel> model{};       // the new style model
+    std::unique_ptr<const generate::BoundModel> gesture{};  // the new gesture model
     std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
   };
-  // Nothing when the command is under way.
-  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Asker& asker);
-  // True when the piece was not the last one: it is answered at once.
-  [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request, const Asker& asker);
+  // Success means that the command is under way; acknowledge() then makes the reply.
+  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Requester& requester);
+  // Returns true if this was not the last piece, which is acknowledged at once.
+  [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request,
+                                             const Requester& requester);
   [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
-                                   const std::string& name, const Asker& asker);
+                                   const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> set_style_model(std::uint32_t stream, std::span<const std::byte> bytes,
-                                         const std::string& name, const Asker& asker);
+                                         const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> set_gesture_model(std::uint32_t stream, std::span<const std::byte> bytes,
-                                           const std::string& name, const Asker& asker);
+                                           const std::string& name, const Requester& requester);
   void keep_model(std::span<const std::byte> bytes, pipeline::Command& command);
-  [[nodiscard]] Result<> play(const v1::ControlRequest& request, const Asker& asker);
-  [[nodiscard]] Result<> stop_playing(const v1::ControlRequest& request, const Asker& asker);
-  [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Asker& asker);
+  [[nodiscard]] Result<> play(const v1::ControlRequest& request, const Requester& requester);
+  [[nodiscard]] Result<> stop_playing(const v1::ControlRequest& request,
+                                      const Requester& requester);
+  [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
   [[nodiscard]] Result<std::uint32_t> find_stream(const std::string& name) const;
   [[nodiscard]] Result<std::uint32_t> styled_stream(const std::string& name) const;
   [[nodiscard]] Result<std::uint32_t> playing_stream(const std::string& name) const;
-  // The model that the pipeline will have when a command sent now takes effect.
+  // The model that the pipeline will have when a command that is sent now takes effect.
   [[nodiscard]] const generate::BoundModel* coming_gesture(std::uint32_t stream) const;
   [[nodiscard]] Result<> send(pipeline::Command command, UnderWay under_way);
 

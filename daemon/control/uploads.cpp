@@ -13,19 +13,19 @@
 namespace posed::control {
 namespace {
 
-constexpr std::size_t kSha256 = 64;  // hexadecimal signs
+constexpr std::size_t kSha256 = 64;  // hexadecimal digits
 
-// What does not depend on the pieces before it.
+// Checks what does not depend on earlier pieces.
 Result<> check_piece(const ModelPiece& piece) {
-  if (piece.total == 0 || piece.total > kLargestModel) {
-    return fail(fmt::format("a model file has 1 to {} bytes, not {}", kLargestModel, piece.total));
+  if (piece.total == 0 || piece.total > kMaxModel) {
+    return fail(fmt::format("a model file has 1 to {} bytes, not {}", kMaxModel, piece.total));
   }
-  if (piece.bytes.empty() || piece.bytes.size() > kLargestPiece) {
-    return fail(fmt::format("a piece of a model has 1 to {} bytes, not {}", kLargestPiece,
-                            piece.bytes.size()));
+  if (piece.bytes.empty() || piece.bytes.size() > kMaxPiece) {
+    return fail(
+        fmt::format("a piece of a model has 1 to {} bytes, not {}", kMaxPiece, piece.bytes.size()));
   }
   if (piece.sha256.size() != kSha256) {
-    return fail("the model's sha256 is missing: give it as 64 hexadecimal signs in every piece");
+    return fail("the model's sha256 is missing: give it as 64 hexadecimal digits in every piece");
   }
   return {};
 }
@@ -40,7 +40,7 @@ Result<Uploads::Iterator> Uploads::find_or_begin(const std::string& client,
     return fail("no upload is under way here: it took too long, or did not begin at offset 0");
   }
   if (found != uploads_.end()) erase(found);
-  if (uploads_.size() >= kMostUploads) {
+  if (uploads_.size() >= kMaxUploads) {
     return fail("others are sending models; try again in some seconds");
   }
   return uploads_
@@ -64,7 +64,7 @@ Result<std::optional<std::string>> Uploads::take(const std::string& client, cons
     erase(*found);
     return fail("this piece does not continue the one before; send the model again from offset 0");
   }
-  if (bytes_ + piece.bytes.size() > kLargestModel) {
+  if (bytes_ + piece.bytes.size() > kMaxModel) {
     erase(*found);
     return fail("others are sending models; try again in some seconds");
   }
@@ -76,7 +76,7 @@ Result<std::optional<std::string>> Uploads::take(const std::string& client, cons
   const Upload whole = std::move(upload);
   uploads_.erase(*found);
   if (log::sha256_hex(std::as_bytes(std::span(whole.bytes))) != whole.sha256) {
-    return fail("the model arrived damaged: its sha256 is another; send it again");
+    return fail("the model arrived damaged: its sha256 is different; send it again");
   }
   return std::optional(std::move(whole.bytes));
 }

@@ -1,6 +1,6 @@
-// Uploads: models that arrive in pieces. One at a time per client, few at once, bounded in bytes
-// and in time; a model comes out only when it is whole and its SHA-256 is what the client said. No
-// socket, no clock of its own, one thread.
+// Uploads: models that arrive in pieces. Each client may have one upload at a time; their number,
+// bytes and duration are limited. A model is returned only when it is complete and its SHA-256 is
+// the one that the client stated. No socket, no clock of its own, one thread.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +14,14 @@
 
 namespace posed::control {
 
-inline constexpr std::size_t kLargestModel =
-    16 * 1024 * 1024;                                    // bytes, of all uploads together, too
-inline constexpr std::size_t kLargestPiece = 32 * 1024;  // bytes
-inline constexpr std::size_t kMostUploads = 4;           // at once
-inline constexpr double kUploadPause_s = 10.0;  // a client that sends no piece for so long has left
+// bytes; also the limit of all uploads together
+inline constexpr std::size_t kMaxModel = 16 * 1024 * 1024;
+inline constexpr std::size_t kMaxPiece = 32 * 1024;  // bytes
+inline constexpr std::size_t kMaxUploads = 4;        // at once
+// a client that sends no piece for this long is gone
+inline constexpr double kUploadPause_s = 10.0;
 
-// One piece as a client sent it (posed.v1.ControlRequest.ModelPart).
+// One piece as the client sent it (posed.v1.ControlRequest.ModelPart).
 struct ModelPiece {
   std::string_view stream, sha256;
   std::uint64_t total = 0;
@@ -30,12 +31,13 @@ struct ModelPiece {
 
 class Uploads {
  public:
-  // Takes a piece of `client`'s. The model's bytes when this was the last one; nullopt when more
-  // are to come. An error ends the client's upload. Offset 0 begins one anew.
+  // Adds a piece from `client`. Returns the model's bytes after the last piece, nullopt if more are
+  // to come. An error ends the client's upload. A piece at offset 0 starts a new one.
   [[nodiscard]] Result<std::optional<std::string>> take(const std::string& client,
                                                         const ModelPiece& piece,
                                                         std::int64_t now_ns);
-  // Forgets those that go on no more. Returns when to look again; forever when none is under way.
+  // Forgets uploads that have stalled. Returns when to call it next at the latest; for ever if none
+  // is under way.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns);
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
 

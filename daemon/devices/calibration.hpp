@@ -1,5 +1,5 @@
-// A calibration file against the glove that a stream has: shared by start, control, supervisor and
-// replay, so that the same file means the same everywhere. Cold.
+// Compiles a calibration file for the glove of a stream. Start, control, supervisor and replay
+// share this code, so that a file means the same everywhere. Cold.
 #pragma once
 
 #include <memory>
@@ -13,8 +13,9 @@ namespace posed::devices {
 
 using OwnedCalibration = drivers::glove::OwnedCalibration;
 
-// `toml` is the file's text, `file` its name for errors. Refused where it does not fit: what is no
-// glove, another driver, hand or glove, unknown sensors.
+// `toml` is the file's text, `file` its name for errors. Refuses a calibration that does not fit:
+// the device is not a glove, the file is for another driver, hand or glove, or it names unknown
+// sensors.
 [[nodiscard]] Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
     const drivers::Description& description, const std::string& toml, const std::string& file);
 

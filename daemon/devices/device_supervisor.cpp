@@ -13,10 +13,12 @@
 namespace posed::devices {
 namespace {
 
-constexpr std::chrono::milliseconds kTryEvery{400};   // at most 0.5 s apart, the try included
-constexpr std::chrono::milliseconds kLookEvery{200};  // for silence, while a device is there
-// A node that has just come may not open yet: the kernel still finds the device's interfaces, or
-// udev has not given its permissions.
+// at most 0.5 s between tries, including the try itself
+constexpr std::chrono::milliseconds kTryEvery{400};
+// how often silence is checked while a device is connected
+constexpr std::chrono::milliseconds kLookEvery{200};
+// A device node that has just appeared may not open yet, because the kernel is still finding the
+// device's interfaces or udev has not set the node's permissions.
 constexpr std::chrono::milliseconds kTrySoon{50};
 constexpr std::chrono::nanoseconds kSettles = std::chrono::seconds(1);
 
@@ -44,7 +46,7 @@ void DeviceSupervisor::stop() noexcept {
 }
 
 void DeviceSupervisor::run() {
-  system::name_thread("keep-" + stream_.config.name);
+  system::name_thread("dev-" + stream_.config.name);
   while (!stop_.load()) {
     while (stream_.slot->out.consume([this](drivers::Device* /*device_*/) { take_back(); })) {
     }
@@ -62,7 +64,8 @@ void DeviceSupervisor::sleep() {
   system::EventFd& wake = *stream_.slot->supervisor;
   wake.going_to_sleep();
   if (stream_.slot->out.empty() && !stop_.load()) {
-    // A node that comes is tried at once; where nothing tells of it, at the next turn.
+    // When a device node appears it is tried at once. Where node events are not available, it is
+    // tried at the next turn.
     const auto turn = !away_ ? kLookEvery : settling() ? kTrySoon : kTryEvery;
     std::array<pollfd, 3> wait{{{wake.fd(), POLLIN, 0},
                                 {away_ ? hotplug_.poll_fd() : -1, POLLIN, 0},
@@ -81,7 +84,7 @@ void DeviceSupervisor::sleep() {
 
 bool DeviceSupervisor::settling() const { return ports_.clock() < settled_ns_; }
 
-// Closes the link: only then can the port be opened again.
+// Closes the link; only then can the port be opened again.
 void DeviceSupervisor::take_back() {
   writer_ = nullptr;
   device_.reset();
@@ -90,8 +93,8 @@ void DeviceSupervisor::take_back() {
   const std::string why = std::exchange(asked_back_, false)
                               ? "nothing usable came from the device for a while"
                               : "the link to the device is lost";
-  ports_.tell(v1::Event::KIND_LOST, why + "; posed looks for it until it is back");
-  told_.clear();
+  ports_.report(v1::Event::KIND_LOST, why + "; posed looks for it until it is back");
+  reported_.clear();
 }
 
 void DeviceSupervisor::watch_silence() {
@@ -105,15 +108,15 @@ void DeviceSupervisor::watch_silence() {
   ports_.reader->call();
 }
 
-// While a write takes its time the queue behind it gives old messages up, which is told.
+// While a write is slow, the queue behind it drops old messages; this is reported.
 void DeviceSupervisor::write_to_device() {
   if (writer_ == nullptr) return;
   writer_->write_waiting();
   const std::uint64_t dropped = writer_->dropped();
-  if (dropped == drops_told_) return;
-  ports_.tell(v1::Event::KIND_WARNING,
-              std::to_string(dropped - std::exchange(drops_told_, dropped)) +
-                  " messages to the device were given up: it takes them too slowly; send fewer");
+  if (dropped == drops_reported_) return;
+  ports_.report(v1::Event::KIND_WARNING,
+                std::to_string(dropped - std::exchange(drops_reported_, dropped)) +
+                    " messages to the device were given up: it takes them too slowly; send fewer");
 }
 
 void DeviceSupervisor::look_for_device() {
@@ -121,29 +124,31 @@ void DeviceSupervisor::look_for_device() {
   if (stop_.load()) return;
   if (!found) {
     const std::string text = found.error().text();
-    if (text == told_ || settling()) return;  // said once, and not of a device that is just coming
-    told_ = text;
-    ports_.tell(v1::Event::KIND_WARNING,
-                found_once_ ? text : text + "; posed looks for it until it is there");
+    if (text == reported_ || settling())
+      return;  // reported before, or the device is only just starting
+    reported_ = text;
+    ports_.report(v1::Event::KIND_WARNING,
+                  found_once_ ? text : text + "; posed looks for it until it is there");
     return;
   }
   found_once_ = true;
   device_ = std::move(*found);
   writer_ = dynamic_cast<drivers::ColdWriter*>(device_->transport.get());
-  drops_told_ = 0;
+  drops_reported_ = 0;
   away_ = false;
-  told_.clear();
+  reported_.clear();
   for (const std::string& warning : device_->warnings) {
-    ports_.tell(v1::Event::KIND_WARNING, warning);
+    ports_.report(v1::Event::KIND_WARNING, warning);
   }
   stream_.present->connected(device_->description);
-  stream_.slot->give_back.store(false);  // that was about the one before
+  stream_.slot->give_back.store(false);  // that request was for the previous device
   static_cast<void>(stream_.slot->in.push(device_.get()));
   ports_.reader->call();
-  ports_.tell(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
+  ports_.report(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
 }
 
-// A device that is not what the stream was set up for would silently mean other joints.
+// Refuses a device that differs from what the stream was set up for: its data would silently be
+// taken for other joints.
 Result<std::unique_ptr<drivers::Device>> DeviceSupervisor::try_open() {
   auto opened = driver_.open(stream_.config.options, *stream_.ports);
   if (!opened) return std::unexpected(opened.error());

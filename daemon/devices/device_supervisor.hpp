@@ -1,7 +1,7 @@
-// DeviceSupervisor: holds on to one device. Its thread opens the device when it is away, again and
-// again until it is there, hands it to the reader, and takes it back when its link is lost or it
-// falls silent. Cold: everything slow about a device (finding, start-up talk, closing) happens
-// here, so that no other stream events.
+// DeviceSupervisor manages one device that may be unplugged. While the device is absent, its thread
+// tries to open it again and again; then it hands the device to the reader, and takes it back when
+// the link is lost or the device falls silent. Cold: everything slow about a device (finding,
+// start-up exchange, closing) happens here, so that no other stream is delayed.
 #pragma once
 
 #include <atomic>
@@ -20,25 +20,25 @@
 namespace posed::devices {
 
 struct SupervisorPorts {
-  pipeline::Reader* reader = nullptr;  // called when the slot has something
+  pipeline::Reader* reader = nullptr;  // notified by call() when the slot has something
   Clock clock = nullptr;
-  // Tells on event/<stream>; any thread.
-  std::function<void(v1::Event::Kind kind, const std::string& text)> tell;
+  // Publishes an event on event/<stream>; must be callable from any thread.
+  std::function<void(v1::Event::Kind kind, const std::string& text)> report;
 };
 
 class DeviceSupervisor {
  public:
-  // Whether a stream's device can go and come; only such streams have a supervisor.
+  // Whether a stream's device may be unplugged and return; only such streams have a supervisor.
   [[nodiscard]] static bool wanted(const devices::OpenStream& stream);
 
   // Starts the thread, which opens the device as soon as it is there. `stream` outlives the
   // supervisor.
   DeviceSupervisor(devices::OpenStream& stream, SupervisorPorts ports);
-  ~DeviceSupervisor();  // after the reader's thread has ended; stops first
+  ~DeviceSupervisor();  // call after the reader's thread has ended; stops the thread first
   DeviceSupervisor(const DeviceSupervisor&) = delete;
   DeviceSupervisor& operator=(const DeviceSupervisor&) = delete;
 
-  // Tells the thread to end, a device's start-up talk included. Returns at once; any thread.
+  // Asks the thread to end, even during a device's start-up exchange. Returns at once; any thread.
   void stop() noexcept;
 
  private:
@@ -49,20 +49,20 @@ class DeviceSupervisor {
   void look_for_device();
   [[nodiscard]] Result<std::unique_ptr<drivers::Device>> try_open();
   void sleep();
-  [[nodiscard]] bool settling() const;  // a node has come a moment ago
+  [[nodiscard]] bool settling() const;  // a device node appeared a moment ago
 
   devices::OpenStream& stream_;
   SupervisorPorts ports_;
   const drivers::Driver& driver_;
   drivers::HotplugMonitor hotplug_;
-  std::unique_ptr<drivers::Device> device_;  // the one opened here; null while it is away
-  drivers::ColdWriter* writer_ = nullptr;    // its other side, where writing to it blocks
-  std::uint64_t drops_told_ = 0;             // of the writer
+  std::unique_ptr<drivers::Device> device_;  // the open device; null while it is unplugged
+  drivers::ColdWriter* writer_ = nullptr;    // the same device's writer, if writing to it blocks
+  std::uint64_t drops_reported_ = 0;         // of the writer
   bool away_ = true;
   bool found_once_ = false;
   bool asked_back_ = false;
-  std::int64_t settled_ns_ = 0;  // when what came last should open
-  std::string told_;             // why it could not be opened, as last told
+  std::int64_t settled_ns_ = 0;  // when a device that just appeared should be ready to open
+  std::string reported_;         // the last reported reason why it could not be opened
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

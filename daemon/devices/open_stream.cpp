@@ -10,8 +10,8 @@
 namespace posed::devices {
 namespace {
 
-// A device that comes and goes is left to its supervisor, so that a slow or silent one holds up
-// neither the start nor the other streams; only its options must make sense.
+// A device that may be unplugged is opened later by its supervisor, so that a slow or silent one
+// delays neither the start nor the other streams. Here only its options are checked.
 Result<> open_device(const drivers::Driver& driver, OpenStream& stream) {
   if (driver.expect == nullptr) {
     auto device = driver.open(stream.config.options, *stream.ports);

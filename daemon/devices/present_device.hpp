@@ -1,6 +1,5 @@
-// PresentDevice: which device a stream has now and what calibration it is read by, for the threads
-// that come and ask: control checks calibrations against it, stats tell it, the supervisor changes
-// it. Cold; any thread.
+// PresentDevice: which device a stream has now, and which calibration is in use. Control checks
+// calibrations against it, stats report it, the supervisor changes it. Cold; any thread.
 #pragma once
 
 #include <memory>
@@ -16,26 +15,28 @@ class PresentDevice {
  public:
   void connected(drivers::Description description) { set(std::move(description), false); }
 
-  // No device answers: what the stream was opened for stays, but nobody knows who comes next.
+  // The device is unplugged. The description of what the stream was opened for stays, but the
+  // identity is cleared, because another device may come.
   void gone() {
     drivers::Description description = *this->description();
     description.identity.clear();
     set(std::move(description), true);
   }
 
-  // Whether the device is known to be away: what is sent to it reaches nobody.
+  // Whether the device is known to be absent, so that nothing can be sent to it.
   [[nodiscard]] bool away() const {
     const std::scoped_lock lock(mutex_);
     return away_;
   }
 
-  // Never null. The identity is empty while there is no device.
+  // Never null. The identity is empty while no device is connected.
   [[nodiscard]] std::shared_ptr<const drivers::Description> description() const {
     const std::scoped_lock lock(mutex_);
     return description_;
   }
 
-  // The text of the calibration in use, empty for the device's default, and its name for errors.
+  // The text of the calibration in use, and its name for errors. The text is empty for the device's
+  // default.
   struct CalibrationText {
     std::string toml, file;
   };

@@ -10,9 +10,9 @@
 namespace posed::emulate {
 namespace {
 
-// How long a stop may take to be seen.
+// How long it may take until a stop is noticed.
 constexpr std::int64_t kLookEvery_ns = 50'000'000;
-// After a stop of the process a device does not send all that it would have sent.
+// After the process was suspended, the device does not send everything that it missed.
 constexpr int kPacketsInARow = 16;
 
 }  // namespace

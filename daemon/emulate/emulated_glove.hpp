@@ -1,5 +1,5 @@
-// EmulatedGlove: an emulator brought to life: a hand's motion, a port, and the host's clock between
-// them. `posed emulate` runs one to its end, the demo one on a thread.
+// EmulatedGlove runs an emulator: it connects a hand's motion, a port and the host's clock. `posed
+// emulate` runs one until it ends, the demo runs one on a thread.
 #pragma once
 
 #include <atomic>
@@ -17,24 +17,26 @@
 
 namespace posed::emulate {
 
-// The pose of a recorded hand, between its frames and round and round; missing values are zero.
+// The pose of a recorded hand, interpolated between frames and repeated in a loop; missing values
+// are zero.
 [[nodiscard]] HandAngles pose_at(const clip::HandClip& clip, double time_s);
 
 class EmulatedGlove {
  public:
   using Bytes = drivers::Emulator::Bytes;
   struct Settings {
-    double speed = 1.0;                                     // times the device's own pace
-    std::vector<drivers::emulate::FaultInjector> faults{};  // of the line, one after the other
+    double speed = 1.0;  // relative to the device's own rate
+    // of the line, applied one after the other
+    std::vector<drivers::emulate::FaultInjector> faults{};
   };
 
-  // `motion` gives the hand's pose at a time since the start; empty leaves the pose alone.
+  // `motion` returns the hand's pose at a time since the start; if empty the pose does not change.
   EmulatedGlove(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
                 std::function<HandAngles(double time_s)> motion, Settings settings);
 
   [[nodiscard]] const std::string& port() const noexcept { return port_.name(); }
 
-  // Until a stop is asked for, or the host has hung up for good. Blocks.
+  // Runs until a stop is requested or the host has closed the connection for good. Blocks.
   void run(const std::stop_token& stop);
 
   [[nodiscard]] std::uint64_t packets() const noexcept { return packets_.load(); }

@@ -23,7 +23,7 @@ namespace {
 
 std::string reason() { return std::error_code(errno, std::generic_category()).message(); }
 
-// Takes the place of a link that an emulated glove left behind, and of nothing else.
+// Replaces a link that an earlier emulated glove left behind, but no other file.
 Result<> make_link(const std::filesystem::path& link, const std::string& target) {
   std::error_code failed;
   const auto before = std::filesystem::read_symlink(link, failed);
@@ -31,8 +31,9 @@ Result<> make_link(const std::filesystem::path& link, const std::string& target)
   std::filesystem::create_symlink(target, link, failed);
   if (!failed) return {};
   if (failed == std::errc::file_exists) {
-    return misuse("exists already and is no emulated glove's link; choose another name for --link",
-                  link.string());
+    return misuse(
+        "exists already and is not an emulated glove's link; choose another name for --link",
+        link.string());
   }
   return misuse("cannot link to the port: " + failed.message(), link.string());
 }
@@ -71,14 +72,14 @@ Result<EmulatedPort> EmulatedPort::connect_tcp(const std::string& endpoint) {
   if (colon == std::string::npos ||
       std::from_chars(endpoint.data() + colon + 1, end, number).ptr != end || number == 0 ||
       inet_pton(AF_INET, endpoint.substr(0, colon).c_str(), &address.sin_addr) != 1) {
-    return misuse("'" + endpoint + "' is no address; it reads like 127.0.0.1:5200");
+    return misuse("'" + endpoint + "' is not an address; it looks like 127.0.0.1:5200");
   }
   address.sin_port = htons(number);
   const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (fd < 0 || ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     const std::string why = reason();
     if (fd >= 0) ::close(fd);
-    return fail("nobody listens at " + endpoint + " (" + why +
+    return fail("nothing listens at " + endpoint + " (" + why +
                 "); start posed first, its stream with link = \"tcp\"");
   }
   const int on = 1;
@@ -95,7 +96,7 @@ EmulatedPort::EmulatedPort(EmulatedPort&& other) noexcept
 
 EmulatedPort::~EmulatedPort() {
   std::error_code ignored;
-  // Another emulated glove may have taken over the link.
+  // Another emulated glove may have replaced the link meanwhile.
   if (!link_.empty() && std::filesystem::read_symlink(link_, ignored) == name_) {
     std::filesystem::remove(link_, ignored);
   }

@@ -1,6 +1,5 @@
-// EmulatedPort: what stands between an emulator and a program that expects a glove: a
-// pseudo-terminal for serial gloves, or a TCP connection to the host for gloves that connect to it.
-// Cold.
+// EmulatedPort connects an emulator with a program that expects a glove: through a pseudo-terminal
+// for serial gloves, or through a TCP connection to the host for gloves that connect to it. Cold.
 #pragma once
 
 #include <chrono>
@@ -17,10 +16,10 @@ namespace posed::emulate {
 
 class EmulatedPort {
  public:
-  // A pseudo-terminal in raw mode. With `link` that path leads to it as long as it is open (a link
-  // that is there already is replaced; anything else is not).
+  // A pseudo-terminal in raw mode. With `link`, a symbolic link at that path points to it while it
+  // is open. An existing link is replaced; any other file is an error.
   [[nodiscard]] static Result<EmulatedPort> open_pty(const std::filesystem::path& link = {});
-  // Connects to HOST:PORT, numbers only; fails when nobody listens.
+  // Connects to HOST:PORT, numbers only; fails if nothing listens there.
   [[nodiscard]] static Result<EmulatedPort> connect_tcp(const std::string& endpoint);
 
   ~EmulatedPort();
@@ -29,11 +28,11 @@ class EmulatedPort {
   EmulatedPort(const EmulatedPort&) = delete;
   EmulatedPort& operator=(const EmulatedPort&) = delete;
 
-  // What the other side opens: "/dev/pts/3", "127.0.0.1:5200".
+  // What the host opens: "/dev/pts/3", "127.0.0.1:5200".
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
 
-  // What the host sent, waiting until `patience` has passed; empty when nothing came, nothing at
-  // all (nullopt) when the host has hung up for good.
+  // What the host sent. Waits for at most `patience`; empty if nothing came, nullopt if the host
+  // has closed the connection for good.
   [[nodiscard]] std::optional<std::vector<std::byte>> receive(std::chrono::nanoseconds patience);
   // Sends what fits: a host that does not read loses bytes, as with a real device.
   void send(std::span<const std::byte> bytes) noexcept;
@@ -43,7 +42,9 @@ class EmulatedPort {
       : fd_(fd), other_side_(other_side), name_(std::move(name)), link_(std::move(link)) {}
 
   int fd_;
-  int other_side_;  // of a pseudo-terminal, kept open so that its master survives a host that goes
+  // the host's end of a pseudo-terminal, kept open so that the terminal survives a host that closes
+  // its own
+  int other_side_;
   std::string name_;
   std::filesystem::path link_;
 };

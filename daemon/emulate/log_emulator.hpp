@@ -1,6 +1,6 @@
-// LogEmulator: a recorded device that answers again. The driver's emulator speaks with the host as
-// the device did; once the host has started the stream, it is the log's bytes that come, at the
-// times they came.
+// LogEmulator: a recorded device that can be opened again. The driver's emulator answers the host
+// as the device did; once the host has started the stream, the log's bytes are sent, at the
+// recorded times.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@ namespace posed::emulate {
 
 class LogEmulator final : public drivers::Emulator {
  public:
-  // `speaker` may be null: a device that streams by itself and hears nothing.
+  // `speaker` may be null: a device that streams by itself and ignores what the host sends.
   LogEmulator(drivers::Recording recording, std::unique_ptr<drivers::Emulator> speaker);
 
   void pose(const HandAngles&) override {}
@@ -34,7 +34,7 @@ class LogEmulator final : public drivers::Emulator {
   std::int64_t start_ns_ = 0;  // device time of the first chunk
 };
 
-// The chunks that a stream of the log received; without a name the log has to have one stream only.
+// The chunks that a stream of the log received. Without a name the log must have only one stream.
 struct LoggedDevice {
   std::string stream, driver, text;
   drivers::Recording recording;

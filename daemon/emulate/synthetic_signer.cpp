@@ -9,7 +9,7 @@ Result<std::unique_ptr<SyntheticSigner>> SyntheticSigner::start(const std::strin
                                                                 const std::filesystem::path& clip) {
   const drivers::Driver* driver = drivers::find_driver(name);
   if (driver == nullptr || driver->emulate == nullptr) {
-    return misuse("driver '" + name + "' has no emulator, so nobody can wear it here");
+    return misuse("driver '" + name + "' has no emulator, so it cannot be used here");
   }
   auto motion = clip::read_hand_clip(clip);
   if (!motion) return std::unexpected(motion.error());

@@ -1,6 +1,6 @@
-// SyntheticSigner: an emulated glove, worn by somebody whose motion is a clip, on a thread of its
-// own: the demo's live hand. From labels over angles and the glove's bytes to a pseudo-terminal,
-// everything behind it is what a real glove goes through.
+// SyntheticSigner: an emulated glove with a clip as its hand motion, on its own thread; the live
+// hand of the demo. It goes from labels through angles to the glove's bytes on a pseudo-terminal;
+// everything behind that is the same as for a real glove.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@ namespace posed::emulate {
 
 class SyntheticSigner {
  public:
-  // Wears a glove of this driver, with its default options.
+  // Starts a glove of this driver, with its default options.
   [[nodiscard]] static Result<std::unique_ptr<SyntheticSigner>> start(
       const std::string& driver, const std::filesystem::path& clip);
   SyntheticSigner(const SyntheticSigner&) = delete;

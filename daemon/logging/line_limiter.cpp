@@ -15,7 +15,7 @@ bool is_of_word(char c) {
 }
 
 // "the text (the last of 12 like it)"
-std::string told(const LineLimiter::Line& last, std::uint64_t held) {
+std::string with_count(const LineLimiter::Line& last, std::uint64_t held) {
   if (held == 1) return last.text;
   return last.text + " (the last of " + std::to_string(held) + " like it)";
 }
@@ -32,10 +32,10 @@ std::string cause_of(std::string_view text) {
     if (is_digit(text[at]) && !in_word) {
       cause += '#';
       while (at < text.size() && (is_digit(text[at]) || text[at] == '.')) ++at;
-      in_word = true;  // the unit behind it belongs to it
+      in_word = true;  // the unit behind a number belongs to it
       continue;
     }
-    // A sign belongs to its number.
+    // A minus sign belongs to its number.
     const bool sign = text[at] == '-' && !in_word && at + 1 < text.size() && is_digit(text[at + 1]);
     if (!sign) {
       cause += text[at];
@@ -48,7 +48,7 @@ std::string cause_of(std::string_view text) {
 
 bool LineLimiter::may_begin_another(std::int64_t now_ns) {
   if (credit_ns_ != kNoTime_ns) {
-    credit_ = std::min(kMostAtOnce, credit_ + kNewPerSecond * seconds(now_ns - credit_ns_));
+    credit_ = std::min(kMaxAtOnce, credit_ + kNewPerSecond * seconds(now_ns - credit_ns_));
   }
   credit_ns_ = now_ns;
   if (credit_ < 1.0) return false;
@@ -61,8 +61,8 @@ bool LineLimiter::admit(std::int64_t now_ns, int level, std::string_view text) {
   const auto found = causes_.find(key);
   if (found != causes_.end()) {
     Cause& cause = found->second;
-    if (cause.held == 0 && now_ns - cause.told_ns >= kPeriod_ns) {
-      cause.told_ns = now_ns;
+    if (cause.held == 0 && now_ns - cause.written_ns >= kPeriod_ns) {
+      cause.written_ns = now_ns;
       return true;
     }
     ++cause.held;
@@ -70,31 +70,31 @@ bool LineLimiter::admit(std::int64_t now_ns, int level, std::string_view text) {
     return false;
   }
   std::erase_if(causes_, [&](const auto& entry) {
-    return entry.second.held == 0 && now_ns - entry.second.told_ns >= kPeriod_ns;
+    return entry.second.held == 0 && now_ns - entry.second.written_ns >= kPeriod_ns;
   });
   if (!may_begin_another(now_ns)) {
-    if (others_.held++ == 0 && others_.told_ns == kNoTime_ns) others_.told_ns = now_ns;
+    if (others_.held++ == 0 && others_.written_ns == kNoTime_ns) others_.written_ns = now_ns;
     others_.last.level = std::max(others_.last.level, level);
     return false;
   }
-  causes_.emplace(std::move(key), Cause{.told_ns = now_ns, .held = 0, .last = {}});
+  causes_.emplace(std::move(key), Cause{.written_ns = now_ns, .held = 0, .last = {}});
   return true;
 }
 
 std::optional<LineLimiter::Line> LineLimiter::take_due(std::int64_t now_ns, bool at_end) {
   const auto due = [&](const Cause& cause) {
-    return cause.held > 0 && (at_end || now_ns - cause.told_ns >= kPeriod_ns);
+    return cause.held > 0 && (at_end || now_ns - cause.written_ns >= kPeriod_ns);
   };
   for (auto& [key, cause] : causes_) {
     if (!due(cause)) continue;
-    Line line{cause.last.level, told(cause.last, std::exchange(cause.held, 0))};
-    cause.told_ns = now_ns;
+    Line line{cause.last.level, with_count(cause.last, std::exchange(cause.held, 0))};
+    cause.written_ns = now_ns;
     return line;
   }
   if (!due(others_)) return std::nullopt;
   Line line{others_.last.level,
             std::to_string(others_.held) + " more lines of many kinds are left out"};
-  others_ = {.told_ns = now_ns, .held = 0, .last = {}};
+  others_ = {.written_ns = now_ns, .held = 0, .last = {}};
   return line;
 }
 
@@ -102,7 +102,7 @@ std::int64_t LineLimiter::next_due_ns() const {
   std::int64_t next_ns = kNoTime_ns;
   const auto look = [&](const Cause& cause) {
     if (cause.held == 0) return;
-    const std::int64_t due_ns = cause.told_ns + kPeriod_ns;
+    const std::int64_t due_ns = cause.written_ns + kPeriod_ns;
     next_ns = next_ns == kNoTime_ns ? due_ns : std::min(next_ns, due_ns);
   };
   for (const auto& [key, cause] : causes_) look(cause);

@@ -1,7 +1,7 @@
-// LineLimiter: at most one line a second of each cause, so that nobody who can make the daemon say
-// something can fill its log. Two lines have the same cause when they have the same level and
-// differ only in numbers. The first is written at once; what follows within a second is counted,
-// and the last of it is written with the count. Pure: no clock, no lock, no output.
+// LineLimiter writes at most one line a second for each cause, so that nobody who can make the
+// daemon log something can fill its log. Two lines have the same cause if they have the same level
+// and differ only in numbers. The first line is written at once. Lines that follow within a second
+// are counted, and the last of them is written with the count. Pure: no clock, no lock, no output.
 #pragma once
 
 #include <cstdint>
@@ -25,31 +25,32 @@ class LineLimiter {
     std::string text;
   };
 
-  // Whether to write the line now. One that is held back comes out of take_due(), counted.
+  // Whether to write the line now. A line that is held back is counted, and take_due() returns it.
   [[nodiscard]] bool admit(std::int64_t now_ns, int level, std::string_view text);
 
-  // A line that tells what was held back, once its second is over; at the end at once. Call it
-  // until it has no more.
+  // The next summary of lines that were held back, if its second is over; with `at_end`, without
+  // waiting. Call it until it returns nothing.
   [[nodiscard]] std::optional<Line> take_due(std::int64_t now_ns, bool at_end = false);
 
-  // When take_due() has something next; kNoTime_ns when nothing is held back.
+  // When take_due() next has something; kNoTime_ns if no line is held back.
   [[nodiscard]] std::int64_t next_due_ns() const;
 
  private:
   struct Cause {
-    std::int64_t told_ns = 0;  // when a line of it was last written
-    std::uint64_t held = 0;    // lines since then
+    std::int64_t written_ns = 0;  // when a line of this cause was last written
+    std::uint64_t held = 0;       // lines held back since then
     Line last;
   };
   [[nodiscard]] bool may_begin_another(std::int64_t now_ns);
 
   std::map<std::string, Cause, std::less<>> causes_;
-  Cause others_{.told_ns = kNoTime_ns, .held = 0, .last = {}};  // lines of too many causes
-  // Lines of new causes that may still be written; it fills up again slowly.
-  double credit_ = kMostAtOnce;
+  // lines held back because there were too many causes
+  Cause others_{.written_ns = kNoTime_ns, .held = 0, .last = {}};
+  // How many lines of new causes may still be written; grows again slowly.
+  double credit_ = kMaxAtOnce;
   std::int64_t credit_ns_ = kNoTime_ns;
 
-  static constexpr double kMostAtOnce = 256.0;  // what 64 streams say when they start
+  static constexpr double kMaxAtOnce = 256.0;  // enough for the lines of 64 streams at their start
   static constexpr double kNewPerSecond = 8.0;
 };
 

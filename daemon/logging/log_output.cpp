@@ -26,7 +26,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr std::size_t kMostWaiting = 1024;  // lines
+constexpr std::size_t kMaxWaiting = 1024;  // lines
 constexpr std::chrono::milliseconds kLastLinesWithin{200};
 constexpr std::chrono::milliseconds kForEver = std::chrono::milliseconds::max();
 
@@ -35,7 +35,7 @@ std::int64_t now_ns() {
       .count();
 }
 
-// What a terminal shows the level in; the same colours as spdlog's own sinks.
+// The colour of the level on a terminal; the same colours as spdlog's own sinks.
 std::string_view colour_of(spdlog::level::level_enum level) {
   switch (level) {
     case spdlog::level::info:
@@ -53,19 +53,21 @@ std::string_view colour_of(spdlog::level::level_enum level) {
 
 }  // namespace
 
-// The sink and all that the thread uses: it outlives the LogOutput when the thread is left behind.
+// The sink, and everything that the thread uses. It outlives the LogOutput if the thread has to be
+// left running.
 class LogOutput::Queue final : public spdlog::sinks::sink {
  public:
   explicit Queue(int descriptor) : descriptor_(descriptor), coloured_(::isatty(descriptor) == 1) {}
 
   void log(const spdlog::details::log_msg& message) override {
-    // Names that files, devices and clients chose come by here; none may act on a terminal.
+    // The text may contain names chosen by files, devices and clients; clean() removes control
+    // characters, so that none of them can act on a terminal.
     const std::string text = clean({message.payload.data(), message.payload.size()});
     spdlog::details::log_msg shown = message;
     shown.payload = text;
     const std::scoped_lock lock(mutex_);
     if (!limits_ || limiter_.admit(now_ns(), message.level, text)) push(format(shown));
-    changed_.notify_all();  // a line waits, or one was held back whose time will come
+    changed_.notify_all();  // a line waits, or one that was held back will be due
   }
   void flush() override {}
   void set_pattern(const std::string& /*pattern*/) override {}
@@ -85,7 +87,7 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
     limits_ = true;
   }
 
-  // The thread.
+  // The thread's function.
   void run() {
     std::unique_lock lock(mutex_);
     while (true) {
@@ -104,7 +106,7 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
     changed_.notify_all();
   }
 
-  // Whether the thread has written all and ended within `patience`.
+  // Returns whether the thread has written everything and ended within `patience`.
   bool end(std::chrono::milliseconds patience) {
     {
       std::unique_lock lock(mutex_);
@@ -112,15 +114,15 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
       changed_.notify_all();
       changed_.wait_for(lock, patience, [this] { return ended_; });
     }
-    // Once more: the thread sanitizer does not see that the wait has locked it.
+    // Locks again because the thread sanitizer does not see that the wait has locked the mutex.
     const std::scoped_lock lock(mutex_);
     return ended_;
   }
 
  private:
-  // All below: with the lock held.
+  // All functions below: call with the lock held.
   void push(std::string line) {
-    if (lines_.size() >= kMostWaiting) {
+    if (lines_.size() >= kMaxWaiting) {
       lines_.pop_front();
       ++lost_;
     }
@@ -137,8 +139,9 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
     const std::uint64_t lost = std::exchange(lost_, 0);
     std::string text;
     if (lost > 0) {
-      text = format_text(spdlog::level::warn,
-                         std::to_string(lost) + " lines of the log were lost here: nobody read it");
+      text = format_text(
+          spdlog::level::warn,
+          std::to_string(lost) + " lines of the log were discarded here: nobody read it");
     }
     text += lines_.front();
     lines_.pop_front();
@@ -171,7 +174,7 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
   LineLimiter limiter_;
   bool limits_ = false;
   std::deque<std::string> lines_;
-  std::uint64_t lost_ = 0;  // lines that nobody will read, not told yet
+  std::uint64_t lost_ = 0;  // lines that were discarded and not reported yet
   bool ending_ = false, ended_ = false;
 };
 
@@ -186,7 +189,8 @@ std::shared_ptr<LogOutput::Queue> queue_in_use() {
 }  // namespace
 
 LogOutput::LogOutput(int descriptor) : queue_(std::make_shared<Queue>(descriptor)) {
-  // Signals are for the thread that waits for them, and this one is started before any is blocked.
+  // Blocks all signals while the thread is started, because signals are for the thread that waits
+  // for them, and this one is started before any signal is blocked.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -217,7 +221,7 @@ bool write_within(int descriptor, std::string_view text, std::chrono::millisecon
     pollfd wait{.fd = descriptor, .events = POLLOUT, .revents = 0};
     const int timeout_ms = for_ever ? -1 : static_cast<int>(std::max<long>(left.count(), 0));
     if (::poll(&wait, 1, timeout_ms) == 0) return false;
-    // A pipe that is ready takes so much without blocking.
+    // A pipe that is ready takes this much without blocking.
     const ssize_t wrote =
         ::write(descriptor, text.data(), std::min<std::size_t>(text.size(), PIPE_BUF));
     if (wrote > 0) {
@@ -232,7 +236,8 @@ bool write_within(int descriptor, std::string_view text, std::chrono::millisecon
 void protect_standard_descriptors() {
   for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
-    // The lowest free number is this one. Opened the wrong way round, its use fails as before.
+    // The new descriptor gets the lowest free number, which is this one. It is opened in the wrong
+    // direction, so that using it still fails.
     [[maybe_unused]] const int opened =
         ::open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
   }

@@ -1,6 +1,6 @@
-// LogOutput: where the log goes. Lines are put into a bounded queue, and a thread of its own writes
-// them to stderr, so that whoever logs never waits for whoever reads: a pipe that nobody empties
-// costs old lines, which are counted, and nothing else. Cold; any thread may log.
+// LogOutput writes the log. Lines go into a bounded queue, and a separate thread writes them to
+// stderr. So a thread that logs never waits for the reader of stderr: if nobody reads the pipe, the
+// oldest lines are discarded and counted. Cold; any thread may log.
 #pragma once
 
 #include <chrono>
@@ -15,9 +15,10 @@ namespace posed::logging {
 class LogOutput {
  public:
   // Starts the thread, with all signals blocked, and becomes spdlog's default logger. `descriptor`
-  // stays open as long as it writes there.
+  // must stay open while this object exists.
   explicit LogOutput(int descriptor = STDERR_FILENO);
-  // Writes what waits, for at most 0.2 s; a thread that still cannot write then is left to itself.
+  // Writes the lines that wait, for at most 0.2 s. If the thread still cannot write then, it is
+  // left running.
   ~LogOutput();
   LogOutput(const LogOutput&) = delete;
   LogOutput& operator=(const LogOutput&) = delete;
@@ -28,22 +29,22 @@ class LogOutput {
   std::shared_ptr<Queue> queue_;
 };
 
-// From now on at most one line a second of each cause (line_limiter.hpp): for commands that
-// strangers can make say something. Nothing without a LogOutput.
+// From now on, writes at most one line a second for each cause (line_limiter.hpp). For commands
+// that untrusted clients can cause to log. Has no effect without a LogOutput.
 void sum_up_repeats();
 
-// Puts a whole line, without a time, behind what was logged before; without a LogOutput it goes
-// straight to stderr. Never sum up nor left out by the limiter.
+// Adds a whole line, without a time, after what was logged before; without a LogOutput it goes
+// straight to stderr. The limiter never holds it back.
 void say(std::string_view line);
 
-// Writes all of `text`; false when the descriptor is broken or did not take it in time. Waits by
-// poll, so a descriptor that others have set non-blocking is served, too.
+// Writes all of `text`; returns false if the descriptor is broken or did not accept it in time.
+// Waits with poll, so it also works for a descriptor that another program has set non-blocking.
 bool write_within(int descriptor, std::string_view text, std::chrono::milliseconds patience);
 
-// For the beginning of main(). A closed standard descriptor would be given to the next file that is
-// opened, and lines for people would go into it: each one that is closed is opened so that its use
-// still fails. SIGPIPE is ignored, so that a reader that goes is an error of the write and does not
-// end the process.
+// Call at the beginning of main(). The number of a closed standard descriptor would be given to the
+// next file that is opened, and messages would be written into that file; so each closed one is
+// opened in a way that its use still fails. Also ignores SIGPIPE: writing to a reader that has gone
+// is then an error and does not end the process.
 void protect_standard_descriptors();
 
 }  // namespace posed::logging

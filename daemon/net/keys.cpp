@@ -14,7 +14,7 @@
 namespace posed::net {
 namespace {
 
-constexpr std::size_t kLongestKeyFile = 256;  // bytes; more than a key and a newline is no key
+constexpr std::size_t kMaxKeyFile = 256;  // bytes; a longer file is not a key and a newline
 
 class File {
  public:
@@ -35,18 +35,18 @@ std::string reason() { return std::strerror(errno); }
 
 Result<std::string> read_key(const File& file, const std::filesystem::path& path) {
   if (!file.ok()) return fail("cannot read the key: " + reason(), path);
-  std::array<char, kLongestKeyFile> buffer{};
+  std::array<char, kMaxKeyFile> buffer{};
   const ssize_t size = read(file.get(), buffer.data(), buffer.size());
   if (size < 0) return fail("cannot read the key: " + reason(), path);
   std::string text(buffer.data(), static_cast<std::size_t>(size));
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
   if (!is_key(text)) {
-    return fail("this is no key: expected the 40 characters that `posed keygen` writes", path);
+    return fail("this is not a key: expected the 40 characters that `posed keygen` writes", path);
   }
   return text;
 }
 
-// Creates the file anew (never through a link or over another file) with these rights.
+// Creates the file with this mode; never follows a link and never overwrites a file.
 Result<> write_key(const std::filesystem::path& path, const std::string& key, mode_t mode) {
   const File file(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
   if (!file.ok()) {
@@ -80,7 +80,7 @@ bool is_key(const std::string& text) {
 Result<KeyPair> write_new_keys(const std::string& name, const std::filesystem::path& folder) {
   if (!is_plain_name(name)) {
     return misuse("'" + name +
-                  "' is no name for a key: use letters, digits, '-' and '_'"
+                  "' is not a name for a key: use letters, digits, '-' and '_'"
                   " (--out names the folder)");
   }
   std::array<char, kKeyLength + 1> public_z85{};

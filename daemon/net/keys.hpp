@@ -1,5 +1,5 @@
-// CURVE keys as posed keeps them: NAME.key holds the secret half, NAME.pub the public one, each as
-// 40 characters of Z85 (ZeroMQ RFC 32) and a newline. The public half follows from the secret one.
+// CURVE key files: NAME.key holds the secret key, NAME.pub the public key, each as 40 characters of
+// Z85 (ZeroMQ RFC 32) and a newline. The public key can be computed from the secret one.
 #pragma once
 
 #include <filesystem>
@@ -16,18 +16,18 @@ struct KeyPair {
   std::string secret_z85;
 };
 
-// Makes a pair and writes DIR/NAME.pub and DIR/NAME.key (mode 0600). Refuses to overwrite either,
-// and leaves no half pair behind.
+// Makes a key pair and writes DIR/NAME.pub and DIR/NAME.key (mode 0600). Refuses to overwrite
+// either file, and leaves neither behind when one cannot be written.
 [[nodiscard]] Result<KeyPair> write_new_keys(const std::string& name,
                                              const std::filesystem::path& folder);
 
-// A NAME.key. Refuses one that others can read: it is a secret no longer.
+// Reads NAME.key. Refuses a file that other users can read, because its key is no longer secret.
 [[nodiscard]] Result<KeyPair> read_secret_key(const std::filesystem::path& path);
 
-// A NAME.pub, in Z85.
+// Reads NAME.pub; returns the key in Z85.
 [[nodiscard]] Result<std::string> read_public_key(const std::filesystem::path& path);
 
-// Whether `text` could be a key at all: 40 characters of Z85.
+// Whether `text` has the form of a key: 40 characters of Z85.
 [[nodiscard]] bool is_key(const std::string& text);
 
 }  // namespace posed::net

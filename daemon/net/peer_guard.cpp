@@ -20,16 +20,17 @@
 namespace posed::net {
 namespace {
 
-// A flood of empty parts fills about 0.7 GB a second, so peers are looked at often: 64 a tick, all
-// of them when the process' memory has grown.
+// A flood of empty parts fills about 0.7 GB a second, so peers are checked often: 64 of them a
+// tick, and all of them when the process's memory has grown.
 constexpr std::int64_t kGuardTick_ns = kNanosPerSecond / 100;
 constexpr std::int64_t kPeersATick = 64;
 constexpr std::uint64_t kNoticeableGrowth = 4 * 1024 * 1024;  // bytes
 
-constexpr std::size_t kMostSubscribers = 1024;
-constexpr std::size_t kMostControllers = 64;
-constexpr std::size_t kReservedFiles = 16;  // for devices, logs and models that come later
-constexpr std::size_t kFewestPeers = 4;
+constexpr std::size_t kMaxSubscribers = 1024;
+constexpr std::size_t kMaxControllers = 64;
+// kept free for devices, logs and models that are opened later
+constexpr std::size_t kReservedFiles = 16;
+constexpr std::size_t kMinPeers = 4;
 
 std::uint64_t cookie_of(int fd) {
   std::uint64_t cookie = 0;
@@ -50,7 +51,8 @@ Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages,
 }
 
 int source_of(const Message& message) {
-  const std::string_view text = message.property("__fd");  // libzmq's name for ZMQ_SRCFD
+  // libzmq's name for the property ZMQ_SRCFD
+  const std::string_view text = message.property("__fd");
   int fd = -1;
   std::from_chars(text.data(), text.data() + text.size(), fd);
   return fd;
@@ -58,7 +60,8 @@ int source_of(const Message& message) {
 
 Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
                                                    const PeerLimits& limits) {
-  static std::atomic<unsigned> number{0};  // a context may have several guards
+  // unique names, because a context may have several guards
+  static std::atomic<unsigned> number{0};
   const std::string endpoint = fmt::format("inproc://posed.peers.{}", ++number);
   if (zmq_socket_monitor(socket, endpoint.c_str(), ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED) !=
       0) {
@@ -66,7 +69,7 @@ Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
   }
   auto monitor = open_socket(context, ZMQ_PAIR);
   if (!monitor) return std::unexpected(monitor.error());
-  // Without a limit: libzmq's own thread would wait here for us to read.
+  // No limit: otherwise libzmq's own thread would wait here until this guard reads.
   if (auto set = set_option(monitor->get(), ZMQ_RCVHWM, 0); !set) {
     return std::unexpected(set.error());
   }
@@ -96,7 +99,7 @@ PeerGuard::PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::Event
       wake_(std::move(wake)),
       poller_(std::move(poller)),
       limits_(limits),
-      told_ns_(std::numeric_limits<std::int64_t>::min() / 2),
+      reported_ns_(std::numeric_limits<std::int64_t>::min() / 2),
       thread_([this] { serve(); }) {}
 
 PeerGuard::~PeerGuard() {
@@ -125,7 +128,8 @@ void PeerGuard::serve() {
 std::int64_t PeerGuard::turn(std::int64_t now_ns) {
   hear_monitor();
   if (peers_.empty()) return system::kForever_ns;
-  // Memory that was freed stays resident for a while, so its growth alone does not tell.
+  // Freed memory stays resident for a while, so growth alone does not show whether a peer is
+  // flooding now.
   const std::int64_t pause_ns =
       kGuardTick_ns * (1 + static_cast<std::int64_t>(peers_.size()) / kPeersATick);
   if (const std::uint64_t resident = system::resident_bytes();
@@ -137,7 +141,8 @@ std::int64_t PeerGuard::turn(std::int64_t now_ns) {
   return now_ns + kGuardTick_ns;
 }
 
-// An event is two parts: number (16 bits) and descriptor (32), then the endpoint.
+// A monitor event has two parts: the event number (16 bits) with the descriptor (32 bits), then the
+// endpoint.
 void PeerGuard::hear_monitor() {
   Message part;
   while (part.receive(monitor_.get())) {
@@ -158,7 +163,7 @@ void PeerGuard::hear_monitor() {
 
 void PeerGuard::admit(int fd) {
   peers_[fd].cookie = cookie_of(fd);
-  if (peers_.size() > limits_.most_peers) cut_now(fd, "came when there were too many");
+  if (peers_.size() > limits_.max_peers) cut_now(fd, "came when there were too many");
 }
 
 void PeerGuard::inspect_all() {
@@ -175,16 +180,16 @@ void PeerGuard::inspect_all() {
       most_fd = fd;
     }
   }
-  if (most <= limits_.most_unheard && unheard <= limits_.most_unheard_of_all) return;
+  if (most <= limits_.max_unheard && unheard <= limits_.max_unheard_of_all) return;
   cut_offender(most_fd, "sent much and ended no message");
   malloc_trim(0);
-  resident_before_ = 0;  // it may not have been the only one: look again at the next tick
+  resident_before_ = 0;  // others may be flooding, too: check all again at the next tick
 }
 
 bool PeerGuard::knows(int fd) {
   const std::scoped_lock lock(mutex_);
   if (fd < 0 || peers_.contains(fd)) return fd >= 0;
-  hear_monitor();  // it may have come just now
+  hear_monitor();  // its connection event may still be waiting
   wake_->notify();
   return peers_.contains(fd);
 }
@@ -228,10 +233,11 @@ void PeerGuard::cut_now(int fd, const char* why) {
   const auto found = peers_.find(fd);
   if (found == peers_.end() || found->second.is_cut) return;
   found->second.is_cut = true;
-  // libzmq's thread may have closed the connection and the number may name another thing by now.
+  // libzmq's thread may have closed the connection since then, and its descriptor may have been
+  // reused.
   if (found->second.cookie == 0 || cookie_of(fd) != found->second.cookie) return;
   shutdown(fd, SHUT_RDWR);
-  tell(why);
+  log_cut(why);
 }
 
 void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& allowed) {
@@ -239,24 +245,25 @@ void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& all
   hear_monitor();
   for (const auto& [fd, peer] : peers_) {
     if (!peer.spoke || !allowed(peer.user)) {
-      cut_now(fd, "has lost its right, or did not say its name");
+      cut_now(fd, "has lost its right, or has not identified itself");
     }
   }
 }
 
-void PeerGuard::tell(const char* why) {
+void PeerGuard::log_cut(const char* why) {
   ++cuts_;
-  ++untold_;
+  ++unreported_;
   const std::int64_t now_ns = system::monotonic_ns();
-  if (now_ns < told_ns_ + kNanosPerSecond) return;  // a flood is one line a second
-  told_ns_ = now_ns;
-  if (untold_ == 1) {
+  // a flood of cuts gives one log line a second
+  if (now_ns < reported_ns_ + kNanosPerSecond) return;
+  reported_ns_ = now_ns;
+  if (unreported_ == 1) {
     spdlog::warn("a connection to the {} socket was cut: it {}", limits_.name, why);
   } else {
-    spdlog::warn("{} connections to the {} socket were cut; the last {}", untold_, limits_.name,
+    spdlog::warn("{} connections to the {} socket were cut; the last {}", unreported_, limits_.name,
                  why);
   }
-  untold_ = 0;
+  unreported_ = 0;
 }
 
 PeerShares peer_shares() {
@@ -268,8 +275,8 @@ PeerShares peer_shares() {
   const std::size_t used = open + kReservedFiles;
   const auto files = static_cast<std::size_t>(limit.rlim_cur);
   const std::size_t free = files > used ? files - used : 0;
-  return {.publish = std::clamp(free * 3 / 4, kFewestPeers, kMostSubscribers),
-          .control = std::clamp(free / 4, kFewestPeers, kMostControllers)};
+  return {.publish = std::clamp(free * 3 / 4, kMinPeers, kMaxSubscribers),
+          .control = std::clamp(free / 4, kMinPeers, kMaxControllers)};
 }
 
 void raise_file_limit() noexcept {

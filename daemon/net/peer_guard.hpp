@@ -1,18 +1,18 @@
-// PeerGuard: who is connected to one of our listening sockets, and the means to cut one of them
-// off.
+// PeerGuard knows who is connected to one of the daemon's listening sockets, and can disconnect a
+// single peer.
 //
-// libzmq 4.3.4 bounds neither how many parts a message has (a part of two bytes on the wire takes
-// 64 in memory, and HWM counts whole messages only) nor how many peers there are, and it cannot
-// disconnect one of them. But it says which descriptor each connection has (socket monitor,
-// ZMQ_SRCFD). The guard asks the kernel how much came in there since the last whole message, and
-// shuts the connection down when that is too much; libzmq then closes it like one that was lost.
-// An honest client reconnects by itself within about 0.1 s. (ZMTP heartbeats come to no message
-// either: a client that sends one a second is cut about every
-// 45 minutes.)
+// libzmq 4.3.4 limits neither how many parts a message has (a part of two bytes on the wire takes
+// 64 in memory, and the high-water mark counts whole messages only) nor how many peers there are,
+// and it cannot disconnect a peer. But it reports the descriptor of each connection (socket
+// monitor, ZMQ_SRCFD). The guard asks the kernel how many bytes have arrived there since the last
+// whole message, and shuts the connection down when there are too many; libzmq then closes it like
+// a lost connection. An honest client reconnects by itself within about 0.1 s. (ZMTP heartbeats
+// never become a message either: a client that sends one a second is disconnected about every 45
+// minutes.)
 //
-// Connections by ipc:// have no such count in the kernel; the file's permission guards them.
-// A thread of its own looks: libzmq takes subscriptions in for as long as they come, and may hold
-// the publisher's thread meanwhile. Cold; every call from any thread.
+// The kernel has no such byte count for ipc:// connections; they are protected by the file's
+// permissions. The guard has its own thread, because libzmq processes subscriptions for as long as
+// they come and may block the publisher's thread meanwhile. Cold; every call from any thread.
 #pragma once
 
 #include <atomic>
@@ -32,52 +32,54 @@
 
 namespace posed::net {
 
-// How much a peer may make libzmq keep: bytes of one part (handshakes included), whole messages
-// that wait for us, and the kernel's buffer behind them. Before bind.
+// How much memory a peer may make libzmq use: the size of one part in bytes (handshakes included),
+// the number of whole messages that wait to be read, and the kernel's buffer behind them. Call
+// before bind.
 [[nodiscard]] Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages,
                                           int buffer_bytes);
-// The descriptor of the connection that a message came through; -1 when it came through none.
+// The descriptor of the connection through which a message came; -1 if there is none.
 [[nodiscard]] int source_of(const Message& message);
 
 class ZapAuthenticator;
 
 struct PeerLimits {
-  const char* name = "";       // of the socket, for the log
-  std::size_t most_peers = 0;  // a connection beyond them is cut at once
-  // Bytes that came to no whole message yet: of one peer, and of all together.
-  std::uint64_t most_unheard = 0;
-  std::uint64_t most_unheard_of_all = 0;
+  const char* name = "";      // of the socket, for the log
+  std::size_t max_peers = 0;  // further connections are cut at once
+  // Bytes that have not yet become a whole message: of one peer, and of all peers together.
+  std::uint64_t max_unheard = 0;
+  std::uint64_t max_unheard_of_all = 0;
   ZapAuthenticator* authenticator = nullptr;  // slowed down when a peer is cut for what it sent
 };
 
 class PeerGuard {
  public:
-  // Call before `socket` is bound, so that no connection is missed; closed before the socket.
+  // Call before `socket` is bound, so that no connection is missed. Destroy the guard before the
+  // socket.
   [[nodiscard]] static Result<std::unique_ptr<PeerGuard>> open(void* context, void* socket,
                                                                const PeerLimits& limits);
   ~PeerGuard();
   PeerGuard(const PeerGuard&) = delete;
   PeerGuard& operator=(const PeerGuard&) = delete;
 
-  // A whole message came through the connection `fd`, of the peer with this User-Id.
+  // A whole message came through the connection `fd`, from the peer with this User-Id.
   void heard(int fd, std::string_view user);
-  // Ends the connection; `why` completes "a connection was cut: it ...".
+  // Closes the connection; `why` completes the sentence "a connection was cut: it ...".
   void cut(int fd, const char* why);
-  // Ends every connection whose User-Id is not allowed any more, and those that said nothing yet:
-  // nobody knows who they are, and who is still allowed comes back.
+  // Closes every connection whose User-Id is no longer allowed, and those that have not sent a
+  // message yet: their user is unknown, and one that is still allowed reconnects.
   void cut_unless(const std::function<bool(std::string_view user)>& allowed);
 
-  // Whether `fd` is one of our connections now.
+  // Whether `fd` is a connection of this socket at the moment.
   [[nodiscard]] bool knows(int fd);
-  // The descriptors of the connections that ended since the last call.
+  // The descriptors of the connections that have ended since the last call.
   [[nodiscard]] std::vector<int> take_gone();
   [[nodiscard]] std::size_t peers() const;
   [[nodiscard]] std::uint64_t cuts() const;
 
  private:
   struct Peer {
-    std::uint64_t cookie = 0;  // the kernel's name of this connection: descriptors are used again
-    std::uint64_t heard = 0;   // bytes received when its last whole message was taken
+    std::uint64_t cookie = 0;  // the kernel's id of this connection, because descriptors are reused
+    std::uint64_t heard = 0;   // bytes received when its last whole message was read
     std::string user;
     bool spoke = false;
     bool is_cut = false;
@@ -85,14 +87,14 @@ class PeerGuard {
   PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::EventFd> wake,
             std::unique_ptr<system::Poller> poller, const PeerLimits& limits);
   void serve();
-  // The rest under mutex_.
-  [[nodiscard]] std::int64_t turn(std::int64_t now_ns);  // returns when the next is due
+  // All below: call with mutex_ held.
+  [[nodiscard]] std::int64_t turn(std::int64_t now_ns);  // returns when the next turn is due
   void hear_monitor();
   void admit(int fd);
   void inspect_all();
   void cut_now(int fd, const char* why);
-  void cut_offender(int fd, const char* why);  // and slows down whoever comes next
-  void tell(const char* why);
+  void cut_offender(int fd, const char* why);  // and slows down the next handshakes
+  void log_cut(const char* why);
 
   void* socket_;
   Socket monitor_;
@@ -103,22 +105,22 @@ class PeerGuard {
   std::map<int, Peer> peers_;  // by descriptor
   std::vector<int> gone_;
   std::uint64_t cuts_ = 0;
-  std::uint64_t untold_ = 0;  // cuts since the last line of the log
-  std::int64_t told_ns_;
+  std::uint64_t unreported_ = 0;  // cuts since the last log line
+  std::int64_t reported_ns_;
   std::int64_t inspected_ns_ = 0;
   std::uint64_t resident_before_ = 0;  // bytes
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
 
-// How many connections each socket may have, of the process' limit of open files: a reserve stays
-// for devices, logs and models.
+// How many connections each socket may have within the process's limit of open files; some files
+// stay reserved for devices, logs and models.
 struct PeerShares {
   std::size_t publish = 0, control = 0;
 };
 [[nodiscard]] PeerShares peer_shares();
 
-// Raises the process' soft limit of open files to the hard one. Once, at the start.
+// Raises the process's soft limit of open files to the hard limit. Call once, at the start.
 void raise_file_limit() noexcept;
 
 }  // namespace posed::net

@@ -8,16 +8,18 @@
 namespace posed::net {
 namespace {
 
-// zmq.h hides the name behind its draft API, but stable 4.3.4 honours the number.
+// zmq.h declares the name only in its draft API, but stable 4.3.4 accepts the number.
 constexpr int kZapEnforceDomain = 93;
 
-constexpr int kHandshake_ms = 3000;  // a peer that is not through by then is dropped
+// a peer that has not finished its handshake by then is dropped
+constexpr int kHandshake_ms = 3000;
 
 bool has_right(const AllowedClient& client, Domain domain) {
   return domain == Domain::kPublish ? client.may_subscribe : client.may_control;
 }
 
-// "127.0.0.1" and its network, written as four numbers; "127.evil.example" is a name like any.
+// "127.0.0.1" or another address of that network, written as four numbers; "127.evil.example" is
+// not a loopback address but an ordinary host name.
 bool is_loopback_address(std::string_view host) {
   return host.starts_with("127.") &&
          host.find_first_not_of("0123456789.") == std::string_view::npos;
@@ -36,15 +38,15 @@ const AllowedClient* AccessList::find(std::string_view public_z85, Domain domain
   return found == clients_.end() ? nullptr : &*found;
 }
 
-bool AccessList::loses_someone(const AccessList& newer, Domain domain) const {
+bool AccessList::revokes_any(const AccessList& newer, Domain domain) const {
   return std::ranges::any_of(clients_, [&](const AllowedClient& client) {
     return has_right(client, domain) && newer.find(client.public_z85, domain) == nullptr;
   });
 }
 
-// Without a key the domain alone is set: the ZapAuthenticator is asked all the same, and a socket
-// with a domain refuses ZMTP before 3.0. (libzmq 4.3.4 would else frame the body of a web page's
-// HTTP POST as messages of the unversioned ZMTP 1.0.)
+// Without a key only the domain is set. The ZapAuthenticator is asked all the same, and a socket
+// with a domain refuses ZMTP before 3.0. (Otherwise libzmq 4.3.4 would read the body of a web
+// page's HTTP POST as messages of the unversioned ZMTP 1.0.)
 Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85) {
   for (const Result<>& set : {set_option(socket, ZMQ_ZAP_DOMAIN, domain_name(domain)),
                               set_option(socket, kZapEnforceDomain, 1),

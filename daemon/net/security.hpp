@@ -1,6 +1,6 @@
-// Who may speak to a daemon: CURVE keys on the sockets, and an allow-list with rights behind them.
-// Every secured socket names a ZAP domain and enforces it (without ZMQ_ZAP_ENFORCE_DOMAIN libzmq
-// lets strangers in when no handler runs).
+// Access control: CURVE keys on the sockets, and an allow-list that gives rights to keys. Every
+// secured socket names a ZAP domain and enforces it (without ZMQ_ZAP_ENFORCE_DOMAIN libzmq admits
+// unknown clients while no handler runs).
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@
 
 namespace posed::net {
 
-// What a socket is for; also the right that a client needs for it.
+// The purpose of a socket, and the right that a client needs to use it.
 enum class Domain : std::uint8_t { kPublish, kControl };
-[[nodiscard]] std::string_view domain_name(Domain domain);  // as it stands in ZAP requests
+[[nodiscard]] std::string_view domain_name(Domain domain);  // as it appears in ZAP requests
 
 struct AllowedClient {
-  std::string name;        // for people
-  std::string public_z85;  // its NAME.pub; also the connection's User-Id
+  std::string name;        // human-readable
+  std::string public_z85;  // the content of its NAME.pub; also the connection's User-Id
   bool may_subscribe = true;
   bool may_control = false;
 };
@@ -29,17 +29,18 @@ class AccessList {
   AccessList() = default;
   explicit AccessList(std::vector<AllowedClient> clients) : clients_(std::move(clients)) {}
 
-  // The client with this public key when it has the right; null for strangers.
+  // The client with this public key if it has the right; null if it does not, or if the key is
+  // unknown.
   [[nodiscard]] const AllowedClient* find(std::string_view public_z85, Domain domain) const;
-  // Whether `newer` takes the right from a key that has it now: such clients must be cut off.
-  [[nodiscard]] bool loses_someone(const AccessList& newer, Domain domain) const;
+  // Whether `newer` revokes a right that some key has now; such clients must be disconnected.
+  [[nodiscard]] bool revokes_any(const AccessList& newer, Domain domain) const;
 
  private:
   std::vector<AllowedClient> clients_;
 };
 
-// Makes `socket` a CURVE server of this domain. Call before bind; a ZapAuthenticator must be
-// running in the same context, or nobody gets in.
+// Makes `socket` a CURVE server of this domain. Call before bind. A ZapAuthenticator must be
+// running in the same context, or every client is refused.
 [[nodiscard]] Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85);
 
 // Makes `socket` a CURVE client with its own NAME.key and the server's NAME.pub. Call before
@@ -47,8 +48,8 @@ class AccessList {
 [[nodiscard]] Result<> secure_client(void* socket, const std::filesystem::path& key_file,
                                      const std::filesystem::path& server_key_file);
 
-// Whether what binds there can be reached from this machine only: tcp to 127.*, ::1 or localhost,
-// ipc and inproc.
+// Whether an endpoint that binds there can be reached from this machine only: tcp to 127.*, ::1 or
+// localhost, ipc and inproc.
 [[nodiscard]] bool is_loopback(std::string_view endpoint);
 
 }  // namespace posed::net

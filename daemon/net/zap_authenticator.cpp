@@ -12,13 +12,13 @@ namespace {
 
 constexpr const char* kZapEndpoint = "inproc://zeromq.zap.01";
 constexpr long kPause_ms = 50;
-constexpr std::size_t kLongestRequest = 16;  // parts; RFC 27 needs 7 for CURVE
+constexpr std::size_t kMaxRequestParts = 16;  // parts; RFC 27 needs 7 for CURVE
 
-// All parts of one message; those beyond the longest request are left out.
+// All parts of one message; parts beyond kMaxRequestParts are dropped.
 std::vector<std::string> read_parts(void* door, Message& part) {
   std::vector<std::string> parts;
   do {
-    if (parts.size() < kLongestRequest) parts.emplace_back(part.text());
+    if (parts.size() < kMaxRequestParts) parts.emplace_back(part.text());
   } while (part.more() && part.receive(door, 0));
   return parts;
 }
@@ -35,7 +35,7 @@ Result<std::unique_ptr<ZapAuthenticator>> ZapAuthenticator::start(void* context,
   }
   const std::string bell = "inproc://posed.authenticator";
   if (auto done = bind_socket(door->get(), kZapEndpoint); !done) {
-    return fail("this ZeroMQ context has a authenticator already");
+    return fail("this ZeroMQ context has an authenticator already");
   }
   if (auto done = bind_socket(stop_in->get(), bell); !done) return std::unexpected(done.error());
   if (auto done = connect_socket(stop_out->get(), bell); !done) {
@@ -61,7 +61,7 @@ ZapAuthenticator::~ZapAuthenticator() {
 ZapAuthenticator::Change ZapAuthenticator::replace(AccessList list) {
   const std::scoped_lock lock(mutex_);
   if (!list_) return {};
-  const Change change{list_->loses_someone(list, Domain::kPublish)};
+  const Change change{list_->revokes_any(list, Domain::kPublish)};
   list_ = std::move(list);
   return change;
 }
@@ -77,7 +77,7 @@ void ZapAuthenticator::serve() {
   for (;;) {
     if (zmq_poll(wait.data(), 2, -1) < 0) {
       if (zmq_errno() == EINTR) continue;
-      return;  // the context is going
+      return;  // the context is being terminated
     }
     if ((wait[1].revents & ZMQ_POLLIN) != 0) return;
     Message part;
@@ -92,7 +92,7 @@ void ZapAuthenticator::slow_down() noexcept {
   slow_until_ns_.store(system::monotonic_ns() + kNanosPerSecond);
 }
 
-// What comes meanwhile waits in the socket; only the bell that ends the thread is heard.
+// Requests that come meanwhile wait in the socket; only the stop message is read.
 void ZapAuthenticator::pause() {
   if (system::monotonic_ns() >= slow_until_ns_.load()) return;
   zmq_pollitem_t bell{stop_in_.get(), 0, ZMQ_POLLIN, 0};

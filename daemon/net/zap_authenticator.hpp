@@ -1,6 +1,7 @@
-// ZapAuthenticator: the ZAP handler (ZeroMQ RFC 27) of a context. Every handshake asks it. With an
-// allow-list it lets in the keys that have the right for the socket's domain, and nobody else.
-// Without one (a daemon without keys) whoever speaks ZMTP 3 without a key is welcome.
+// ZapAuthenticator: the ZAP handler (ZeroMQ RFC 27) of a context. libzmq asks it at every
+// handshake. With an allow-list it admits the keys that have the right for the socket's domain, and
+// refuses all others. Without one (a daemon without keys) it admits every client that speaks ZMTP 3
+// without a key.
 #pragma once
 
 #include <atomic>
@@ -19,29 +20,31 @@ namespace posed::net {
 
 class ZapAuthenticator {
  public:
-  // Bound before it returns. Start it before the first socket of the context is made and destroy it
-  // after the last is closed, else a handshake finds nobody to ask (and is refused).
+  // The handler's socket is bound before this returns. Start the authenticator before the first
+  // socket of the context is made and destroy it after the last one is closed; otherwise a
+  // handshake finds no handler and is refused.
   [[nodiscard]] static Result<std::unique_ptr<ZapAuthenticator>> start(
       void* context, std::optional<AccessList> list);
   ~ZapAuthenticator();
   ZapAuthenticator(const ZapAuthenticator&) = delete;
   ZapAuthenticator& operator=(const ZapAuthenticator&) = delete;
 
-  // What a new list means for those already connected. ROUTER messages are checked one by one
-  // (allows), so the control socket needs nothing; the publisher must cut the subscribers off that
-  // are not allowed any more.
+  // What a new list means for clients that are already connected. The control socket checks every
+  // message (allows()), so it needs nothing; the publisher must disconnect the subscribers that are
+  // no longer allowed.
   struct Change {
     bool publisher_must_check = false;
   };
-  [[nodiscard]] Change replace(AccessList list);  // a authenticator without a list stays as it is
+  [[nodiscard]] Change replace(AccessList list);  // an authenticator without a list stays as it is
 
-  // Whether the peer whose message carries this User-Id still has the right; always without a list.
+  // Whether the peer whose message carries this User-Id still has the right; always true without a
+  // list.
   [[nodiscard]] bool allows(std::string_view user_id, Domain domain) const;
 
-  // A peer was cut off for what it sent. It will be back at once, and each time it costs a socket's
-  // thread some milliseconds: for the next second handshakes are answered one by one with a pause
-  // between them, in the order of their coming, so that whoever is connected is not kept waiting.
-  // Any thread.
+  // Call when a peer was disconnected for what it sent. It will reconnect at once, and each
+  // handshake costs a socket's thread some milliseconds: for the next second, handshakes are
+  // answered one by one with a pause between them, in the order in which they come, so that
+  // connected clients are not kept waiting. Any thread.
   void slow_down() noexcept;
 
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_.load(); }
@@ -53,9 +56,9 @@ class ZapAuthenticator {
   void answer(Message& version);
   [[nodiscard]] bool welcomes(const ZapRequest& request) const;
 
-  Socket door_;      // REP on inproc://zeromq.zap.01, the thread's
-  Socket stop_in_;   // the thread's end of the bell that ends it
-  Socket stop_out_;  // ours
+  Socket door_;      // REP on inproc://zeromq.zap.01, used by the thread
+  Socket stop_in_;   // receives the stop message, used by the thread
+  Socket stop_out_;  // sends the stop message
   mutable std::mutex mutex_;
   std::optional<AccessList> list_;  // under mutex_
   std::atomic<std::uint64_t> refused_{0};

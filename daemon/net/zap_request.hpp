@@ -1,4 +1,4 @@
-// What libzmq asks a ZAP handler (ZeroMQ RFC 27), read from the parts of its message.
+// A request of libzmq to its ZAP handler (ZeroMQ RFC 27), read from the parts of its message.
 #pragma once
 
 #include <optional>
@@ -10,13 +10,13 @@
 namespace posed::net {
 
 struct ZapRequest {
-  std::string id;                // goes back with the answer
+  std::string id;                // returned in the reply
   std::string mechanism;         // "NULL", "CURVE", ...
   std::string key_z85;           // the client's public key; empty without CURVE
-  std::optional<Domain> domain;  // which socket of ours; none of them when empty
+  std::optional<Domain> domain;  // of which socket; empty: none of the daemon's
 };
 
-// Nothing when the parts are no request of version 1.0.
+// Empty if the parts are not a request of version 1.0.
 [[nodiscard]] std::optional<ZapRequest> read_zap_request(std::span<const std::string> parts);
 
 }  // namespace posed::net

@@ -1,5 +1,5 @@
-// Owners of libzmq's handles. The C API is used on purpose: it reports by return value, so no
-// exception needs to be caught, and EINTR reaches the caller, which is how Ctrl-C ends a client.
+// Owners of libzmq's handles. The C API is used on purpose: it reports errors by return value, so
+// there is no exception to catch, and EINTR reaches the caller; that is how Ctrl-C ends a client.
 #pragma once
 
 #include <chrono>
@@ -21,7 +21,7 @@ struct CloseSocket {
 };
 using Socket = std::unique_ptr<void, CloseSocket>;
 
-// Waits for every socket of the context to be closed: declare it before them.
+// Waits until every socket of the context is closed, so declare the context before them.
 struct EndContext {
   void operator()(void* context) const noexcept {
     while (zmq_ctx_term(context) != 0 && zmq_errno() == EINTR) {
@@ -30,7 +30,7 @@ struct EndContext {
 };
 using Context = std::unique_ptr<void, EndContext>;
 
-// One received part; its bytes are valid until the next receive() or the end of its life.
+// One received part; its bytes are valid until the next receive() or the destructor.
 class Message {
  public:
   Message() noexcept { zmq_msg_init(&message_); }
@@ -38,19 +38,20 @@ class Message {
   Message(const Message&) = delete;
   Message& operator=(const Message&) = delete;
 
-  // False when nothing was there, or a signal came (errno is EAGAIN, EINTR, ...).
+  // Returns false if nothing was waiting or a signal came (errno is EAGAIN, EINTR, ...).
   [[nodiscard]] bool receive(void* socket, int flags = ZMQ_DONTWAIT) noexcept {
     return zmq_msg_recv(&message_, socket, flags) >= 0;
   }
   [[nodiscard]] bool more() const noexcept { return zmq_msg_more(&message_) != 0; }
   [[nodiscard]] std::string_view text() const noexcept {
-    auto* raw = const_cast<zmq_msg_t*>(&message_);  // libzmq reads without const
+    // libzmq's function only reads, but takes no const pointer
+    auto* raw = const_cast<zmq_msg_t*>(&message_);
     return {static_cast<const char*>(zmq_msg_data(raw)), zmq_msg_size(raw)};
   }
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
     return std::as_bytes(std::span(text()));
   }
-  // A property of the connection, such as "User-Id"; empty when it has none.
+  // A property of the connection, such as "User-Id"; empty if it has none.
   [[nodiscard]] std::string_view property(const char* name) const noexcept {
     const char* value = zmq_msg_gets(&message_, name);
     return value == nullptr ? std::string_view{} : std::string_view{value};
@@ -62,18 +63,18 @@ class Message {
 
 [[nodiscard]] Result<Context> open_context();
 
-// A socket that drops what it could not send when it is closed (linger 0).
+// A socket that drops unsent messages when it is closed (linger 0).
 [[nodiscard]] Result<Socket> open_socket(void* context, int type);
 
 [[nodiscard]] Result<> set_option(void* socket, int option, int value);
 [[nodiscard]] Result<> set_option(void* socket, int option, std::string_view value);
 
-// Binds and returns the endpoint really bound ("tcp://127.0.0.1:*" picks a free port). A busy port
-// is one sentence.
+// Binds and returns the endpoint that is really bound ("tcp://127.0.0.1:*" picks a free port). If
+// the port is busy, the error says so in one sentence.
 [[nodiscard]] Result<std::string> bind_socket(void* socket, const std::string& endpoint);
 [[nodiscard]] Result<> connect_socket(void* socket, const std::string& endpoint);
 
-// Whether the part was taken; never blocks.
+// Returns whether libzmq accepted the part; never blocks.
 [[nodiscard]] bool send_part(void* socket, std::string_view bytes, bool more) noexcept;
 
 }  // namespace posed::net

@@ -1,5 +1,5 @@
-// What the hot threads count about one stream, for `stats`. Relaxed atomics: each is written by one
-// thread and read by any.
+// What the hot threads count about one stream, for `stats`. Relaxed atomics: each one is written by
+// one thread only and may be read by any thread.
 #pragma once
 
 #include <array>
@@ -15,25 +15,26 @@ enum class StreamState : std::uint8_t { kWaiting, kLive, kStale, kEnded };
 
 struct alignas(64) ReaderCounters {
   std::atomic<std::uint64_t> newest{0};   // sequence of the last frame that went into the ring
-  std::atomic<std::uint64_t> frames{0};   // sequence of the last frame decoded
-  std::atomic<std::uint64_t> samples{0};  // sequence of the last sample decoded
-  std::atomic<std::uint64_t> newest_sample{0};  // sequence of the last sample that went in
-  std::atomic<std::uint64_t> dropped{0};        // frames and samples that found no room in it
+  std::atomic<std::uint64_t> frames{0};   // sequence of the last decoded frame
+  std::atomic<std::uint64_t> samples{0};  // sequence of the last decoded sample
+  // sequence of the last sample that went into the ring
+  std::atomic<std::uint64_t> newest_sample{0};
+  std::atomic<std::uint64_t> dropped{0};  // frames and samples for which the ring was full
   std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
   std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
   std::atomic<bool> connected{false};              // a link to the device is open
-  std::atomic<std::uint64_t> connections{0};       // links opened so far
-  std::atomic<std::int64_t> link_ns{kNoTime_ns};   // when `connected` changed last
+  std::atomic<std::uint64_t> connections{0};       // links opened since the start
+  std::atomic<std::int64_t> link_ns{kNoTime_ns};   // when `connected` last changed
 };
 
 struct alignas(64) PipelineCounters {
   std::atomic<std::uint64_t> consumed{0};  // sequence of the last frame taken from the ring
   std::atomic<std::uint64_t> taken{0};     // items taken from the ring
   std::atomic<std::uint64_t> shed{0};      // frames and samples skipped because newer ones waited
-  std::atomic<std::uint64_t> dropped{0};   // items that found no room in the publisher's ring
+  std::atomic<std::uint64_t> dropped{0};   // items for which the publisher's ring was full
   std::atomic<StreamState> state{StreamState::kWaiting};
-  std::atomic<float> alpha{0.0F};         // where the slew is
-  std::atomic<float> alpha_target{0.0F};  // where it goes
+  std::atomic<float> alpha{0.0F};         // the value in use now
+  std::atomic<float> alpha_target{0.0F};  // the value towards which alpha moves
 };
 
 struct alignas(64) PublisherCounters {
@@ -46,9 +47,9 @@ struct StreamCounters {
   PublisherCounters publisher;
 };
 
-// How much of a ring that all streams share one of them may fill, so that the others always find
-// room, in items or in bytes. Belongs to the producer; `taken` is the consumer's count of what the
-// stream had in it.
+// The part of a shared ring that one stream may fill, in items or in bytes. Because of it no stream
+// can take the space of another. It belongs to the producer; `taken` is the consumer's count of
+// what it has removed for this stream.
 class RingShare {
  public:
   RingShare(std::size_t size, const std::atomic<std::uint64_t>& taken) noexcept
@@ -57,7 +58,7 @@ class RingShare {
   [[nodiscard]] bool has_room(std::size_t amount = 1) const noexcept {
     return put_ - taken_.load(std::memory_order_acquire) + amount <= size_;
   }
-  // Something of the stream went in. RT-safe.
+  // Counts what was just put into the ring for this stream. RT-safe.
   void add(std::size_t amount = 1) noexcept { put_ += amount; }
 
  private:
@@ -66,7 +67,7 @@ class RingShare {
   const std::atomic<std::uint64_t>& taken_;
 };
 
-// Adds one; the counter has only this writer. RT-safe.
+// Adds `n`. Only one thread may write the counter. RT-safe.
 inline void count(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
   counter.store(counter.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
 }

@@ -7,11 +7,11 @@ namespace posed::pipeline {
 namespace {
 
 constexpr std::int64_t kBucket_ns = kNanosPerSecond / 2;
-constexpr std::size_t kPointsForDrift = 8;  // before that a crystal's drift is less than the noise
-constexpr double kMostDrift = 1e-3;         // ten times what a cheap crystal is off
-// Earlier than the line says by this much: the device's time jumped forward.
+constexpr std::size_t kPointsForDrift = 8;  // with fewer points the noise exceeds a crystal's drift
+constexpr double kMaxDrift = 1e-3;          // ten times the error of a cheap crystal
+// A packet that arrives this much earlier than the line predicts: the device's time jumped forward.
 constexpr std::int64_t kEarly_ns = 50'000'000;
-// Later by this much for so long: no delay, the device's time jumped back.
+// Packets that arrive this much later, for kLateFor_ns: not a delay; the device's time jumped back.
 constexpr std::int64_t kLate_ns = 250'000'000;
 constexpr std::int64_t kLateFor_ns = kNanosPerSecond;
 constexpr std::int64_t kFarthest_ns = std::numeric_limits<std::int64_t>::max() / 4;
@@ -43,7 +43,7 @@ ClockMapping DeviceClock::take(std::int64_t device_ns, std::int64_t arrival_ns) 
     open_ = {device_ns, delay_ns};
   }
   if (count_ < kPointsForDrift) {
-    // Only the offset: the least delay so far.
+    // Too few points for a drift: use only the offset, which is the smallest delay so far.
     std::int64_t least_ns = open_.delay_ns;
     for (std::size_t i = 0; i < count_; ++i) least_ns = std::min(least_ns, points_[i].delay_ns);
     mapping_ = {.offset_ns = least_ns, .origin_ns = device_ns, .drift_ppm = 0.0F, .valid = true};
@@ -75,7 +75,7 @@ void DeviceClock::close_point() noexcept {
 }
 
 void DeviceClock::fit() noexcept {
-  // Relative to the first point, so that doubles hold it to the nanosecond.
+  // Coordinates relative to the first point, so that doubles resolve single nanoseconds.
   const Point origin = points_[first_];
   struct XY {
     double x, y;
@@ -100,7 +100,7 @@ void DeviceClock::fit() noexcept {
   while (edge + 1 < size && hull[edge].x < mean_x) ++edge;
   const XY& a = hull[edge - 1];
   const XY& b = hull[edge];
-  const double slope = std::clamp((b.y - a.y) / (b.x - a.x), -kMostDrift, kMostDrift);
+  const double slope = std::clamp((b.y - a.y) / (b.x - a.x), -kMaxDrift, kMaxDrift);
   const double offset = a.y - slope * a.x;
   mapping_ = {.offset_ns = origin.delay_ns + static_cast<std::int64_t>(offset),
               .origin_ns = origin.device_ns,

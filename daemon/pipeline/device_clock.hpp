@@ -1,9 +1,9 @@
-// DeviceClock: where a device's own time stands on the host's clock. A packet is never early: what
-// lies between its device time and its arrival is the clocks' offset, their drift, and a delay that
-// is sometimes small (USB hands over in batches) and never negative. So the mapping is the line
-// under all points (device time, arrival - device time) that lies closest to them: the edge of
-// their lower convex hull below their mean (Moon, Skelly, Towsley 1999, "Estimation and removal of
-// clock skew from network delay measurements").
+// DeviceClock maps a device's own time to the host's clock. A packet never arrives before it was
+// sent: the difference between its arrival and its device time is the offset of the two clocks,
+// plus their drift, plus a delay that is sometimes small (USB delivers in batches) but never
+// negative. The mapping is therefore the closest line below all points (device time, arrival -
+// device time): the edge of their lower convex hull that lies below their mean (Moon, Skelly,
+// Towsley 1999, "Estimation and removal of clock skew from network delay measurements").
 //
 // Pure: the same packets give the same mapping, live and in replay. RT-safe throughout.
 #pragma once
@@ -19,46 +19,48 @@ namespace posed::pipeline {
 
 class DeviceClock {
  public:
-  // The mapping with this packet taken in. Device times without one (kNoTime_ns) change nothing.
-  // One that jumps (the device restarted) begins anew.
+  // Adds one packet and returns the new mapping. A packet without device time (kNoTime_ns) changes
+  // nothing. If the device's time jumps (the device restarted), the estimate starts again.
   ClockMapping take(std::int64_t device_ns, std::int64_t arrival_ns) noexcept;
 
-  // The same for a frame, whose header gets the mapping; one that no device stamped is left alone.
+  // Adds the frame as a packet and writes the mapping to its header. Does nothing for a frame that
+  // has no device time stamp.
   void stamp(Frame& frame) noexcept {
     if (frame.source != Source::kDevice) return;
     frame.header.clock = take(frame.header.device_ns, frame.header.arrival_ns);
   }
 
-  // The link is new: what is known of the old one no longer holds.
+  // A new link to the device was opened: forgets what the old link showed.
   void restart() noexcept;
 
-  // Times that the device's time jumped, over all links.
+  // How often the device's time has jumped, over all links.
   [[nodiscard]] std::uint64_t jumps() const noexcept { return jumps_; }
   [[nodiscard]] const ClockMapping& mapping() const noexcept { return mapping_; }
 
  private:
-  // The least delay of half a second.
+  // The smallest delay within half a second.
   struct Point {
     std::int64_t device_ns;
     std::int64_t delay_ns;  // arrival - device
   };
-  static constexpr std::size_t kPoints = 64;  // half a minute: longer, and a crystal warms up
+  // half a minute; over a longer time a crystal warms up and drifts differently
+  static constexpr std::size_t kPoints = 64;
 
   [[nodiscard]] bool jumped(std::int64_t device_ns, std::int64_t delay_ns) noexcept;
   void close_point() noexcept;
   void fit() noexcept;
 
-  std::array<Point, kPoints> points_{};  // oldest first from `first_`
+  std::array<Point, kPoints> points_{};  // a ring; the oldest is at `first_`
   std::size_t first_ = 0;
   std::size_t count_ = 0;
-  Point open_{};  // of the half second under way
+  Point open_{};  // of the current half second
   std::int64_t open_until_ns_ = kNoTime_ns;
   std::int64_t late_since_ns_ = kNoTime_ns;
   ClockMapping mapping_;
   std::uint64_t jumps_ = 0;
 };
 
-// Host time of a device time.
+// The host time that corresponds to a device time.
 [[nodiscard]] constexpr std::int64_t to_host_ns(const ClockMapping& clock,
                                                 std::int64_t device_ns) noexcept {
   const double since_ns = static_cast<double>(device_ns - clock.origin_ns);

@@ -9,10 +9,10 @@ void Intake::frame(Frame& frame) noexcept {
   frame.header.sequence = ++frames_;
   frame.header.arrival_ns = arrival_ns_;
   clock_.stamp(frame);
-  if (clock_.jumps() != jumps_told_) {
-    jumps_told_ = clock_.jumps();
-    // Lost when there is no room, like a frame: its number is used up.
-    if (!tell(v1::Event::KIND_CLOCK_JUMPED, 0)) ++next_item_;
+  if (clock_.jumps() != jumps_reported_) {
+    jumps_reported_ = clock_.jumps();
+    // If the ring is full the event is lost like a frame would be, and its number is skipped.
+    if (!report(v1::Event::KIND_CLOCK_JUMPED, 0)) ++next_item_;
   }
   item_.kind = Item::Kind::kFrame;
   item_.frame = frame;
@@ -28,7 +28,7 @@ void Intake::sample(Sample& sample) noexcept {
   put();
 }
 
-bool Intake::tell(std::uint8_t event, std::uint64_t ticket, std::string_view name) noexcept {
+bool Intake::report(std::uint8_t event, std::uint64_t ticket, std::string_view name) noexcept {
   item_.kind = Item::Kind::kEvent;
   item_.number = next_item_;
   item_.stream_event = {stream_, event, arrival_ns_, frames_, 0.0, ticket};

@@ -1,7 +1,7 @@
-// Intake: what one stream's decoder emits, turned into items. It stamps frames and samples with
-// stream, sequence and arrival, maps the device's clock to the host's, events when that clock
-// jumps, and gives every item its number. The live reader and `replay` use the same class, so that
-// the same chunks give the same items.
+// Intake turns the output of one stream's decoder into items. It stamps frames and samples with
+// stream, sequence and arrival, maps the device's clock to the host's, emits an event when that
+// clock jumps, and numbers every item. The live reader and `replay` use the same class, so the same
+// chunks give the same items.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@
 
 namespace posed::pipeline {
 
-// Where an intake puts its items: live the ring to the pipeline, in replay the stream's engine.
+// Receives the items of an intake. Live this is the ring to the pipeline, in replay the stream's
+// engine.
 class IntakeOut {
  public:
   IntakeOut() = default;
@@ -21,7 +22,8 @@ class IntakeOut {
   IntakeOut& operator=(const IntakeOut&) = delete;
   virtual ~IntakeOut() = default;
 
-  // An item with its number, in order. False: there was no room, and the item is lost.
+  // Takes an item, which already has its number; items come in order. Returns false if the ring was
+  // full and the item is lost.
   virtual bool item(Item& item) noexcept = 0;
   virtual void outcome(Outcome outcome) noexcept = 0;
 };
@@ -33,17 +35,17 @@ class Intake final : public Sink {
   Intake(std::uint32_t stream, std::uint64_t& next_item, IntakeOut& out) noexcept
       : stream_(stream), next_item_(next_item), out_(out) {}
 
-  // Before bytes are fed to the decoder: when they came. Notices get that time, too.
+  // Call before bytes are given to the decoder, with their arrival time. Events get that time, too.
   void arrived(std::int64_t arrival_ns) noexcept { arrival_ns_ = arrival_ns; }
 
-  // Another link to the device: nothing is known of its clock.
+  // A new link to the device was opened: nothing is known of its clock yet.
   void new_link() noexcept { clock_.restart(); }
 
-  // The numbers of what comes next.
+  // The numbers that the next frame, sample and item will get.
   [[nodiscard]] Position next() const noexcept {
     return {.frame = frames_ + 1, .sample = samples_ + 1, .item = next_item_};
   }
-  // For replay, which takes the numbers from the log, so that it is right again after a gap. The
+  // For replay, which sets the numbers from the log so that they are right again after a gap. The
   // item number is the one that all intakes share.
   void go_to(const Position& next) noexcept {
     frames_ = next.frame - 1;
@@ -51,25 +53,25 @@ class Intake final : public Sink {
     next_item_ = next.item;
   }
 
-  // A event of the reader, between two chunks. It takes a number only when there was room, so it
-  // may be tried again until there is. `name`: of the calibration that the event is about.
-  [[nodiscard]] bool tell(std::uint8_t event, std::uint64_t ticket,
-                          std::string_view name = {}) noexcept;
+  // Emits an event of the reader between two chunks. Returns false, without using up a number, if
+  // the ring is full; the caller may try again. `name` is the calibration that the event is about.
+  [[nodiscard]] bool report(std::uint8_t event, std::uint64_t ticket,
+                            std::string_view name = {}) noexcept;
 
-  // Sink, for the decoder.
+  // Sink: called by the decoder.
   void frame(Frame& frame) noexcept override;
   void sample(Sample& sample) noexcept override;
   void outcome(Outcome outcome) noexcept override { out_.outcome(outcome); }
 
  private:
-  // The item takes its number, whether there is room for it or not.
+  // Hands item_ over. It uses up a number even if the ring is full.
   void put() noexcept;
 
   std::uint32_t stream_;
   std::uint64_t& next_item_;
   IntakeOut& out_;
   DeviceClock clock_;
-  std::uint64_t jumps_told_ = 0;  // of the device's clock
+  std::uint64_t jumps_reported_ = 0;  // jumps of the device's clock that were already reported
   std::int64_t arrival_ns_ = 0;
   std::uint64_t frames_ = 0;   // sequence of the last frame
   std::uint64_t samples_ = 0;  // sequence of the last sample

@@ -9,7 +9,7 @@
 namespace posed::pipeline {
 namespace {
 
-// Until a lossless source, or a command that waits for room, is looked at again.
+// Pause before another look at a lossless source, or at a command that waits for space in the ring.
 constexpr std::int64_t kLookAgain_ns = 250'000;
 
 }  // namespace
@@ -39,10 +39,10 @@ void Reader::begin() noexcept {
 }
 
 std::int64_t Reader::turn(std::int64_t now_ns) noexcept {
-  const bool heard = hear();
+  const bool all_taken = take_requests();
   for (const std::uint32_t stream : std::exchange(ready_, {})) sources_[stream]->serve();
   const std::int64_t due_ns = serve_timed(now_ns);
-  return heard ? due_ns : std::min(due_ns, now_ns + kLookAgain_ns);
+  return all_taken ? due_ns : std::min(due_ns, now_ns + kLookAgain_ns);
 }
 
 void Reader::run() noexcept {
@@ -67,11 +67,12 @@ void Reader::call() noexcept {
   wake_->notify();
 }
 
-// A calibration is answered by a event, which must find room: without any, the commands wait.
-bool Reader::hear() noexcept {
+// A calibration is acknowledged by an event, which needs a free slot in the ring: while there is
+// none, the commands wait.
+bool Reader::take_requests() noexcept {
   if (!called_.exchange(false, std::memory_order_acq_rel) && !commands_wait_) return true;
   for (const auto& source : sources_) source->exchange();
-  const auto obey = [this](const DeviceCommand& command) noexcept {
+  const auto apply = [this](const DeviceCommand& command) noexcept {
     Source& source = *sources_[command.stream];
     if (command.kind == DeviceCommand::Kind::kCalibrate) {
       source.calibrate(command);
@@ -80,7 +81,7 @@ bool Reader::hear() noexcept {
     }
   };
   if (ports_.commands == nullptr) return true;
-  while (ports_.out->has_room() && ports_.commands->consume(obey)) {
+  while (ports_.out->has_room() && ports_.commands->consume(apply)) {
   }
   commands_wait_ = !ports_.commands->empty();
   return !commands_wait_;
@@ -95,7 +96,7 @@ std::int64_t Reader::serve_timed(std::int64_t now_ns) noexcept {
       source->serve();
       due_ns = source->due_ns();
       if (due_ns == kNoTime_ns) continue;
-      if (source->patient_now()) due_ns = std::max(due_ns, now_ns + kLookAgain_ns);
+      if (source->must_wait()) due_ns = std::max(due_ns, now_ns + kLookAgain_ns);
     }
     next_ns = std::min(next_ns, due_ns);
   }

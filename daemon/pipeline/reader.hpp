@@ -1,4 +1,4 @@
-// Reader: the one thread that reads all devices, decodes what they sent and hands the frames to the
+// Reader: the one thread that reads all devices, decodes their bytes and hands the frames to the
 // pipeline thread.
 #pragma once
 
@@ -18,31 +18,33 @@
 
 namespace posed::pipeline {
 
-// A device that may go and come: how its supervisor (daemon/devices) and the reader hand it over.
-// Every device that went in comes back once, when its link is lost or it is asked for.
+// Passes a device that may be unplugged between its supervisor (daemon/devices) and the reader.
+// Every device that went in comes back once: when its link is lost, or when the supervisor asks for
+// it.
 struct DeviceSlot {
   Ring<drivers::Device*> in{kSlots}, out{kSlots};  // to and from the reader
-  std::atomic<bool> give_back{false};              // the supervisor wants the device that is in use
-  std::unique_ptr<system::EventFd> supervisor;     // rung when there is something in `out`
+  std::atomic<bool> give_back{false};              // the supervisor asks for the device in use
+  std::unique_ptr<system::EventFd> supervisor;     // notified when `out` has something
   static constexpr std::size_t kSlots = 4;
 };
 
-// What the reader needs of its surroundings; all of it outlives the reader.
+// What the reader is connected to; all of it outlives the reader.
 struct ReaderPorts {
   Ring<Item>* out = nullptr;
-  system::EventFd* pipeline = nullptr;          // rung when there is something in `out`
-  pipeline::RecordSink* record_sink = nullptr;  // null: nothing is recorded
+  system::EventFd* pipeline = nullptr;          // notified when `out` has something
+  pipeline::RecordSink* record_sink = nullptr;  // null: no recording
   Clock clock = nullptr;
   Ring<DeviceCommand>* commands = nullptr;  // from control; may be null
 };
 
-// One stream as the reader takes it over; what it points to outlives the reader.
+// One stream that the reader is to serve; what it points to outlives the reader.
 struct ReadStream {
-  drivers::Device* device = nullptr;  // null while it is away
+  drivers::Device* device = nullptr;  // null while it is unplugged
   StreamCounters* counters = nullptr;
-  DeviceSlot* slot = nullptr;  // null: a device that never comes back
-  const drivers::glove::OwnedCalibration* calibration = nullptr;  // null: the device's default
-  std::size_t slots = std::numeric_limits<std::size_t>::max();    // of `out` that it may fill
+  DeviceSlot* slot = nullptr;  // null: a device that cannot come back
+  const drivers::glove::OwnedCalibration* calibration = nullptr;  // null: use the device's default
+  // how many slots of `out` it may fill
+  std::size_t slots = std::numeric_limits<std::size_t>::max();
 };
 
 class Reader {
@@ -50,38 +52,41 @@ class Reader {
   [[nodiscard]] static Result<std::unique_ptr<Reader>> open(const ReaderPorts& ports);
   ~Reader();
 
-  // Streams are numbered in the order of adding. Cold, before run().
+  // Streams are numbered in the order in which they are added. Cold, before run().
   void add(const ReadStream& stream);
 
-  // Takes the first devices over; before the first turn. RT-safe but for one epoll_ctl a device.
+  // Takes over the first devices; call before the first turn. RT-safe, except for one epoll_ctl for
+  // each device.
   void begin() noexcept;
-  // One round: obeys commands, and reads a share of what each device has sent, so that none of them
-  // keeps the others waiting. Returns when the next turn is due at the latest [ns]; kForever_ns:
-  // when called or when a device is ready. RT-safe.
+  // One round: applies commands, then reads a limited amount from each device, so that none delays
+  // the others. Returns the latest time at which the next turn is due [ns]; kForever_ns: only when
+  // call() was used or a device is ready. RT-safe.
   std::int64_t turn(std::int64_t now_ns) noexcept;
 
-  // begin(), then turn after turn until stop(). The calling thread becomes the reader thread.
+  // begin(), then one turn after another until stop(). The calling thread becomes the reader
+  // thread.
   void run() noexcept;
   void stop() noexcept;  // any thread
-  // There is something in a slot or in the commands. Any thread.
+  // Wakes the reader because a slot or the command ring has something. Any thread.
   void call() noexcept;
 
  private:
   class Source;
   Reader(const ReaderPorts& ports, std::unique_ptr<system::EventFd> wake,
          std::unique_ptr<system::Poller> poller);
-  // Reads what is due by the clock; returns when that is the case next.
+  // Reads the sources that are due by the clock; returns when the next one is.
   std::int64_t serve_timed(std::int64_t now_ns) noexcept;
-  bool hear() noexcept;  // slots and commands; false: some must wait for room in the ring
+  bool take_requests() noexcept;  // from slots and commands; false: some wait for space in the ring
   [[nodiscard]] bool called() const noexcept { return called_.load(std::memory_order_acquire); }
 
   ReaderPorts ports_;
   std::unique_ptr<system::EventFd> wake_;
   std::unique_ptr<system::Poller> poller_;
-  std::span<const std::uint32_t> ready_;  // sources whose descriptors have something; the poller's
+  // sources whose descriptors are readable; memory of the poller
+  std::span<const std::uint32_t> ready_;
   std::vector<std::unique_ptr<Source>> sources_;
-  std::uint64_t next_item_ = 1;  // Item::number
-  bool commands_wait_ = false;   // for room in `out`
+  std::uint64_t next_item_ = 1;  // the next Item::number
+  bool commands_wait_ = false;   // for space in `out`
   std::atomic<bool> called_{false};
   std::atomic<bool> stop_{false};
 };

@@ -1,5 +1,5 @@
-// Reader::Source: one stream of the reader. Private to reader.cpp. RT-safe throughout, but for the
-// reads, writes and wake-ups that it marks as allowed.
+// Reader::Source: one stream of the reader. Private to reader.cpp. RT-safe throughout, except for
+// the reads, writes and wake-ups that are marked as allowed.
 #pragma once
 
 #include <algorithm>
@@ -14,15 +14,16 @@
 
 namespace posed::pipeline {
 
-// One stream: its device while there is one, and what becomes of what the device sends.
+// One stream: its device, if one is connected, and the handling of what the device sends.
 class Reader::Source final : private IntakeOut {
-  // What one source may give in one turn; the rest waits for the next one. A source that never runs
-  // dry so costs each of the others a fraction of a millisecond. No real device comes near it:
-  // USB's full speed is 64 bytes a millisecond, a serial line's 11.5 KB a second.
+  // The most that one source may deliver in one turn; the rest waits for the next turn. A source
+  // that always has data then costs each of the others only a fraction of a millisecond. No real
+  // device comes near the limit: USB full speed is 64 bytes a millisecond, a serial line 11.5 KB a
+  // second.
   static constexpr int kChunksATurn = 64;
   static constexpr std::size_t kBytesATurn = 4096;
   // Frames of a lossless source on their way through the pipeline; below what the pipeline sheds.
-  static constexpr std::uint64_t kPatientFrames = 2;
+  static constexpr std::uint64_t kFramesUnderWay = 2;
 
  public:
   Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports,
@@ -40,36 +41,36 @@ class Reader::Source final : private IntakeOut {
 
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
-  // Whether a chunk may be read now: whenever there is a device, but for a lossless one with frames
-  // under way.
+  // Whether a chunk may be read now: always while a device is connected, except that a lossless
+  // source waits while its earlier frames are still in the pipeline.
   [[nodiscard]] bool may_read() const noexcept {
     if (device_ == nullptr || ended_) return false;
     return !device_->transport->lossless() ||
            counters_.reader.frames.load(std::memory_order_relaxed) -
                    counters_.pipeline.consumed.load(std::memory_order_acquire) <
-               kPatientFrames;
+               kFramesUnderWay;
   }
 
-  // When it has to be looked at without its descriptor saying so; kNoTime_ns: never.
+  // When the source must be read although its descriptor is not ready; kNoTime_ns: never.
   [[nodiscard]] std::int64_t due_ns() const noexcept {
     if (device_ == nullptr || ended_) return kNoTime_ns;
     return poll_due_ns_ != kNoTime_ns ? poll_due_ns_ : device_->transport->next_due_ns();
   }
-  [[nodiscard]] bool patient_now() const noexcept { return device_ != nullptr && !may_read(); }
+  [[nodiscard]] bool must_wait() const noexcept { return device_ != nullptr && !may_read(); }
 
-  // Before the first read: what the first device is and how it is calibrated.
+  // Before the first read: records the first device's info and calibration.
   void begin() noexcept {
     arrived(ports_.clock());
-    if (calibration_ != nullptr) tell_calibration();
+    if (calibration_ != nullptr) record_calibration();
     counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
     if (device_ != nullptr) use(*device_);
   }
 
   void calibrate(const DeviceCommand& command) noexcept {
     calibration_ = command.calibration;
-    tell_calibration();
+    record_calibration();
     if (device_ != nullptr) device_->decoder->calibrate(*calibration_->calibration);
-    static_cast<void>(tell(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
+    static_cast<void>(report(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
   }
 
   void send(std::span<const std::byte> bytes) noexcept {
@@ -79,7 +80,7 @@ class Reader::Source final : private IntakeOut {
     record_sink(pipeline::Direction::kToDevice, bytes);
   }
 
-  // Takes a device from the slot, and gives back the one that is asked for.
+  // Takes a new device from the slot, and returns the current one if the supervisor asks for it.
   void exchange() noexcept {
     if (read_.slot == nullptr) return;
     if (device_ != nullptr && read_.slot->give_back.exchange(false)) give_back();
@@ -107,14 +108,14 @@ class Reader::Source final : private IntakeOut {
     }
   }
 
-  // IntakeOut: into the ring, and counted.
+  // IntakeOut: counts the item and puts it into the ring.
   bool item(Item& item) noexcept override {
     switch (item.kind) {
       case Item::Kind::kSample:
         counters_.reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
         break;
       case Item::Kind::kEvent:
-        return push_notice(item);
+        return push_event(item);
       default:
         item.frame.stamps.decoded_ns = ports_.clock();
         counters_.reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
@@ -132,7 +133,7 @@ class Reader::Source final : private IntakeOut {
   }
 
  private:
-  // Reads and decodes one chunk; returns its bytes, 0 when none was due.
+  // Reads and decodes one chunk; returns its length in bytes, 0 when none was due.
   std::size_t read_one() noexcept {
     const drivers::Chunk chunk = read();
     arrived(ports_.clock());
@@ -145,7 +146,7 @@ class Reader::Source final : private IntakeOut {
     return chunk.bytes.size();
   }
 
-  // A source that goes by time alone has nothing to ask the system.
+  // A source without a descriptor is driven by time alone, so it needs no system call.
   drivers::Chunk read() noexcept {
     drivers::Transport& transport = *device_->transport;
     if (transport.poll_fd() < 0) return transport.read(ports_.clock());
@@ -153,8 +154,8 @@ class Reader::Source final : private IntakeOut {
     return transport.read(ports_.clock());
   }
 
-  // A device that answers instead of streaming is asked at its own pace; what was late once does
-  // not stay late.
+  // A device that is polled gets its requests at its own rate. A late request does not delay the
+  // ones after it.
   void poll() noexcept {
     if (poll_due_ns_ == kNoTime_ns) return;
     const std::int64_t now_ns = ports_.clock();
@@ -173,11 +174,11 @@ class Reader::Source final : private IntakeOut {
     counters_.reader.connected.store(true, std::memory_order_release);
     count(counters_.reader.connections);
     if (device.transport->poll_fd() < 0) return;
-    const system::AllowedCall the_call;  // once a connection, and nothing flows yet
+    const system::AllowedCall the_call;  // once for each connection, before any data flows
     static_cast<void>(poller_.add(device.transport->poll_fd(), stream_));
   }
 
-  // A device without a supervisor that is lost has ended.
+  // If a device without a supervisor is lost, its stream has ended.
   void give_back() noexcept {
     if (read_.slot == nullptr) return end();
     if (device_->transport->poll_fd() >= 0) {
@@ -187,28 +188,30 @@ class Reader::Source final : private IntakeOut {
     poll_due_ns_ = kNoTime_ns;
     counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
     counters_.reader.connected.store(false, std::memory_order_release);
-    static_cast<void>(read_.slot->out.push(device_));  // holds more than there are devices
+    // never full: the slot has more entries than there are devices
+    static_cast<void>(read_.slot->out.push(device_));
     device_ = nullptr;
     const system::AllowedCall the_wake;
     read_.slot->supervisor->notify();
   }
 
-  // The end must be heard: without room it is tried again at the next read.
-  void end() noexcept { ended_ = tell(v1::Event::KIND_ENDED, 0); }
+  // The end event must not be lost: if the ring is full it is tried again at the next read.
+  void end() noexcept { ended_ = report(v1::Event::KIND_ENDED, 0); }
 
-  bool tell(v1::Event::Kind event, std::uint64_t ticket, std::string_view name = {}) noexcept {
-    return intake_.tell(static_cast<std::uint8_t>(event), ticket, name);
+  bool report(v1::Event::Kind event, std::uint64_t ticket, std::string_view name = {}) noexcept {
+    return intake_.report(static_cast<std::uint8_t>(event), ticket, name);
   }
 
-  // Once full, the stream's share takes nothing until half of it is free. A device that floods then
-  // loses long runs and not every other item: each run is a decision in the log.
+  // Once its share of the ring is full, a stream may add nothing until half of the share is free. A
+  // device that floods then loses long runs of frames instead of every other one, and each run is a
+  // single decision in the log.
   bool share_is_open() noexcept {
     if (!share_.has_room()) open_ = false;
     if (!open_) open_ = half_.has_room();
     return open_;
   }
 
-  // Into the ring, whose slot the stream's share pays for.
+  // Puts the item into the ring and counts it against the stream's share.
   bool put(const Item& item) noexcept {
     if (!ports_.out->push(item)) return false;
     share_.add();
@@ -217,7 +220,7 @@ class Reader::Source final : private IntakeOut {
     return true;
   }
 
-  // A frame or sample: within the stream's share of the ring.
+  // Puts a frame or sample into the stream's share of the ring.
   bool push(const Item& item) noexcept {
     if (!share_is_open() || !put(item)) return false;
     if (item.kind == Item::Kind::kSample) {
@@ -228,8 +231,8 @@ class Reader::Source final : private IntakeOut {
     return true;
   }
 
-  // What a device can cause at any rate has to fit into its stream's share, too.
-  bool push_notice(const Item& item) noexcept {
+  // Events that a device can trigger at any rate count against its stream's share, too.
+  bool push_event(const Item& item) noexcept {
     const bool shared = item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
     return (!shared || share_is_open()) && put(item);
   }
@@ -239,7 +242,7 @@ class Reader::Source final : private IntakeOut {
     intake_.arrived(arrival_ns);
   }
 
-  void tell_calibration() noexcept {
+  void record_calibration() noexcept {
     record_sink(pipeline::Direction::kCalibration, std::as_bytes(std::span(calibration_->text)));
   }
   void record_sink(pipeline::Direction direction, std::span<const std::byte> bytes) noexcept {
@@ -252,12 +255,12 @@ class Reader::Source final : private IntakeOut {
   const ReaderPorts& ports_;
   system::Poller& poller_;
   std::uint32_t stream_;
-  drivers::Device* device_;  // null while it is away
+  drivers::Device* device_;  // null while it is unplugged
   const drivers::glove::OwnedCalibration* calibration_;
   std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
   bool ended_ = false;
-  RingShare share_, half_;  // of the ring to the pipeline
+  RingShare share_, half_;  // this stream's share of the ring to the pipeline
   bool open_ = true;
   Intake intake_;
 };

@@ -1,6 +1,6 @@
-// RecordSink: the recorder as the daemon's other threads see it. The calls of the hot threads copy
-// into a ring and return; the recorder thread drains on its own timer, so recording costs the hot
-// path no system call.
+// RecordSink: the recorder as the other threads of the daemon see it. Calls from the hot threads
+// copy into a ring and return. The recorder thread empties the rings on its own timer, so recording
+// adds no system call to the hot path.
 #pragma once
 
 #include <cstddef>
@@ -11,9 +11,9 @@
 
 namespace posed::pipeline {
 
-// What a row of the log's chunks is. A device's info (Description::text) says that a link is new
-// and how what follows is decoded; a calibration is its file's text, in use from the next chunk on;
-// a description says which bodies a source has from there on.
+// The kind of a row in the log's chunk table. A device info (Description::text) marks a new link
+// and says how the following chunks are decoded. A calibration is the text of its file and applies
+// from the next chunk on. A description lists the bodies that a source has from there on.
 enum class Direction : std::uint8_t {
   kFromDevice = 0,
   kToDevice = 1,
@@ -29,10 +29,10 @@ class RecordSink {
   RecordSink& operator=(const RecordSink&) = delete;
   virtual ~RecordSink() = default;
 
-  // Reader thread, before decoding. `next` are the numbers that the first frame, sample and item
-  // made from this chunk will get: replay finds its place again after a gap. A source may have
-  // several sockets; the first is 0. A full ring is counted and becomes a gap row and an event.
-  // RT-safe.
+  // Reader thread, before decoding. `next` holds the numbers that the first frame, sample and item
+  // made from this chunk will get; with them replay can continue after a gap. A source may have
+  // several sockets; the first is 0. If the ring is full the chunk is counted as lost, and the log
+  // gets a gap row and an event. RT-safe.
   virtual void chunk(std::uint32_t stream, std::uint8_t socket, Direction direction,
                      std::int64_t arrival_ns, const pipeline::Position& next,
                      std::span<const std::byte> bytes) noexcept = 0;
@@ -40,16 +40,16 @@ class RecordSink {
   // Pipeline thread. RT-safe.
   virtual void decision(const pipeline::Decision& decision) noexcept = 0;
 
-  // Publisher thread, in pipeline order: `bytes` is a serialized posed.v1.Frame without stage
-  // stamps. Only called when wants_published(), which never changes. RT-safe.
+  // Publisher thread, in pipeline order. `bytes` is a serialized posed.v1.Frame without stage
+  // stamps. Called only if wants_published(), whose value never changes. RT-safe.
   [[nodiscard]] virtual bool wants_published() const noexcept = 0;
   virtual void published(std::uint32_t stream, std::uint64_t sequence, bool raw,
                          std::span<const std::byte> bytes) noexcept = 0;
-  // Pipeline thread: a frame found the publisher's ring full and was not published. RT-safe.
+  // Pipeline thread: a frame was not published because the publisher's ring was full. RT-safe.
   virtual void unpublished(std::uint32_t stream) noexcept = 0;
 
-  // Control thread, before the command that names it: a model file's bytes, kept under their
-  // SHA-256. Cold: allocates and locks.
+  // Control thread, before the command that names the model: keeps the bytes of a model file under
+  // their SHA-256. Cold: allocates and locks.
   virtual void keep_model(std::span<const std::byte> bytes) = 0;
 };
 

@@ -1,5 +1,5 @@
-// Ring: a bounded queue between one producer and one consumer thread, sized at start. Nothing
-// blocks; a full ring refuses. The consumer looks at an element in place.
+// Ring: a bounded queue between one producer and one consumer thread; its size is fixed at the
+// start. No call blocks; push() on a full ring fails. The consumer reads elements in place.
 #pragma once
 
 #include <algorithm>
@@ -11,20 +11,20 @@
 
 namespace posed::pipeline {
 
-// How deep a ring must be: half a second of everything that may come, and room for bursts.
+// The size of a ring in time: it holds half a second of everything that may come, and bursts.
 inline constexpr double kRingDepth_s = 0.5;
 [[nodiscard]] inline std::size_t ring_slots(double items_per_s) {
   return static_cast<std::size_t>(std::ceil(std::max(items_per_s * kRingDepth_s, 64.0)));
 }
 
-// What events need beside a stream's frames and samples: they have no share of their own, and one
-// that answers a command must never be lost.
+// Extra slots for events. They have no share of their own, and one that acknowledges a command must
+// never be lost.
 inline constexpr std::size_t kEventSlots = 128;
 
 template <typename T>
 class Ring {
  public:
-  // Touches all of its memory, so that no page is missing when it matters.
+  // Touches all of its memory, so that later no access causes a page fault.
   explicit Ring(std::size_t slots) : queue_(slots) {
     const T blank{};
     while (queue_.push(blank)) {

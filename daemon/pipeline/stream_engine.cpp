@@ -61,7 +61,7 @@ class StreamEngine::Chain final : public StageOut {
   EngineOut& out_;
 };
 
-// From stage `next` on, and out behind the last.
+// Runs the frame through the stages from `next` on, then emits it.
 void StreamEngine::run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept {
   if (next == stages_.size()) return emit(frame.frame, out);
   Chain rest(*this, next + 1, out);
@@ -70,7 +70,8 @@ void StreamEngine::run(std::size_t next, const StageFrame& frame, EngineOut& out
   time_stage(before);
 }
 
-// From now on the time is that of this stage, kMaxStages: of none. Returns whose it was.
+// From now on, time is charged to this stage; kMaxStages: to none. Returns the stage that was
+// charged before.
 std::size_t StreamEngine::time_stage(std::size_t stage) noexcept {
   if (options_.clock == nullptr) return stage;
   const std::int64_t now_ns = options_.clock();
@@ -97,10 +98,10 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   }
   stage_us_.fill(0.0F);
   run(0, {.frame = frame, .input = &frame}, out);
-  tell_played(header.arrival_ns, out);
+  report_played(header.arrival_ns, out);
 }
 
-// The frames before this one that have not come never will.
+// Frames before this sequence that have not come by now are counted as skipped.
 void StreamEngine::shed_until(std::uint64_t sequence, std::int64_t time_ns,
                               EngineOut& out) noexcept {
   const std::uint64_t expected = last_sequence_ + 1;
@@ -130,7 +131,7 @@ void StreamEngine::close_gaps(std::uint64_t last_frame, std::uint64_t last_sampl
   shed_samples_until(last_sample + 1, out);
 }
 
-// A frame leaves the last stage.
+// Publishes a frame that leaves the last stage.
 void StreamEngine::emit(const Frame& frame, EngineOut& out) noexcept {
   pose_.kind = Item::Kind::kFrame;
   pose_.frame = frame;
@@ -151,7 +152,7 @@ void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
   out.item(other_);
 }
 
-// Something came: a silent stream has recovered.
+// Data arrived: a stream that was silent has recovered.
 void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
   last_arrival_ns_ = arrival_ns;
   for (const auto& stage : stages_) stage->heard(arrival_ns);
@@ -170,7 +171,7 @@ std::int64_t StreamEngine::stale_due_ns() const noexcept {
   return kNoTime_ns;
 }
 
-// When the first stage wants a tick; kNoTime_ns: none does.
+// The earliest tick that a stage asks for; kNoTime_ns if none does.
 std::int64_t StreamEngine::stages_due_ns() const noexcept {
   if (state_ != StreamState::kLive && state_ != StreamState::kStale) return kNoTime_ns;
   std::int64_t first_ns = kNoTime_ns;
@@ -216,7 +217,7 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
       stages_[i]->tick(now_ns, rest);
       time_stage(before);
     }
-    tell_played(now_ns, out);
+    report_played(now_ns, out);
   }
   if (!stale) return;
   if (state_ == StreamState::kLive) {
@@ -234,8 +235,8 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
 Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   Ack ack{.ticket = command.ticket, .stream = options_.stream, .sequence = last_sequence_ + 1};
   Decision decision{.stream = options_.stream, .sequence = ack.sequence};
-  StreamEvent told{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
-  describe(command, told);
+  StreamEvent change{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
+  describe(command, change);
   switch (command.kind) {
     case Command::Kind::kAlpha:
       decision.kind = Decision::Kind::kAlpha;
@@ -268,14 +269,14 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   }
   out.decision(decision);
   if (ack.refused) return ack;
-  told.sequence = ack.sequence;
+  change.sequence = ack.sequence;
   other_.kind = Item::Kind::kEvent;
-  other_.stream_event = told;
+  other_.stream_event = change;
   out.item(other_);
   return ack;
 }
 
-// What the command is about to change, for people.
+// Describes in the event what the command is about to change.
 void StreamEngine::describe(const Command& command, StreamEvent& event) const noexcept {
   switch (command.kind) {
     case Command::Kind::kAlpha:
@@ -311,7 +312,7 @@ void StreamEngine::flush(EngineOut& out) noexcept {
   }
 }
 
-void StreamEngine::tell_played(std::int64_t time_ns, EngineOut& out) noexcept {
+void StreamEngine::report_played(std::int64_t time_ns, EngineOut& out) noexcept {
   const bool performed = performs_;
   performs_ = any_performs();
   if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);

@@ -1,6 +1,6 @@
-// StreamEngine: everything between decoding and publishing for one stream, and nothing else: no
-// thread, no clock, no ring. The live pipeline thread and `replay` drive the same object, so the
-// same frames and decisions give the same bits.
+// StreamEngine does everything between decoding and publishing for one stream, and nothing else: it
+// has no thread, no clock and no ring. The live pipeline thread and `replay` drive the same object,
+// so the same frames and decisions give the same bits.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@
 
 namespace posed::pipeline {
 
-// Where an engine puts what it made. Items come in the order in which they are published; decisions
-// are what replay must be told (see pipeline::RecordSink).
+// Receives the output of an engine. Items come in the order in which they are published. Decisions
+// are what replay must read from the log (see pipeline::RecordSink).
 class EngineOut {
  public:
   EngineOut() = default;
@@ -34,69 +34,70 @@ struct EngineOptions {
   std::uint32_t stream = 0;
   std::int64_t stale_after_ns = kNanosPerSecond / 2;
   bool publish_raw = false;
-  std::optional<style::FilterOptions> style;      // the stage is there when this is
-  const style::BoundModel* model = nullptr;       // not owned; null passes frames through
-  std::optional<smooth::LiveOptions> generate{};  // the stage is there when this is; hands only
+  std::optional<style::FilterOptions> style;      // set: the engine has this stage
+  const style::BoundModel* model = nullptr;       // not owned; null: frames pass through unchanged
+  std::optional<smooth::LiveOptions> generate{};  // set: the engine has this stage; hands only
   const generate::BoundModel* gesture = nullptr;  // not owned; null: nothing can be performed
-  bool constrain = false;                         // the stage is there; hands only
-  double rate_hz = 0.0;                           // of the stream; only `generate` needs it
-  std::shared_ptr<const Skeleton> skeleton{};  // of the stream; `generate` and `constrain` need it
-  Clock clock = nullptr;                       // times the stages; null: not timed
+  bool constrain = false;                         // true: the engine has this stage; hands only
+  double rate_hz = 0.0;                           // of the stream; used by `generate` only
+  std::shared_ptr<const Skeleton> skeleton{};  // of the stream; used by `generate` and `constrain`
+  Clock clock = nullptr;                       // to time the stages; null: they are not timed
 };
 
-// The stages that the options ask for, in the order in which the engine runs them.
+// The names of the stages that the options ask for, in the order in which the engine runs them.
 [[nodiscard]] std::vector<std::string> stage_names(const EngineOptions& options);
 
-// Runs the stages of one stream as a list. All calls come from one thread and are RT-safe, but for
-// construction.
+// Runs the stages of one stream as a list. All calls come from one thread and are RT-safe, except
+// for construction.
 class StreamEngine final {
  public:
   explicit StreamEngine(const EngineOptions& options);
 
-  // A decoded frame, stamped with stream, sequence and arrival. A gap since the last sequence is a
-  // shed: decided and told before the frame itself.
+  // A decoded frame, stamped with stream, sequence and arrival. If sequences are missing before it,
+  // they are recorded as shed and reported before the frame itself.
   void on_frame(const Frame& frame, EngineOut& out) noexcept;
-  // The same for a sample; its gaps are decided, but not told.
+  // The same for a sample; missing samples are recorded as a decision, but no event reports them.
   void on_sample(const Sample& sample, EngineOut& out) noexcept;
-  // What was decoded last, before flush() or end(): what is missing behind the last frame and
-  // sample that came was shed, too.
+  // Call before flush() or end(), with the sequences that were decoded last: frames and samples
+  // that are missing after the last ones seen are recorded as shed, too.
   void close_gaps(std::uint64_t last_frame, std::uint64_t last_sample, EngineOut& out) noexcept;
 
-  // Says that the time is `now_ns` when nothing came. Stages whose tick is due get it. Frames are
-  // missing for stale_after: the stream turns stale, and the last pose goes out once a second with
-  // quality stale, under its own old sequence and times. Returns whether anything happened; only
-  // then is a decision emitted.
+  // Call when nothing has arrived until `now_ns`. Calls the stages whose tick is due. If frames
+  // have been missing for stale_after, the stream becomes stale, and the last pose is published
+  // once a second with quality stale and with its old sequence and times. Returns whether anything
+  // happened; only then a decision is emitted.
   bool tick(std::int64_t now_ns, EngineOut& out) noexcept;
-  // The tick itself, for replay: the live run has decided that it was due.
+  // Does the tick without asking whether it is due; for replay, where the live run decided that.
   void tick_now(std::int64_t now_ns, EngineOut& out) noexcept;
   // When the next tick is due; kNoTime_ns while none is.
   [[nodiscard]] std::int64_t next_tick_ns() const noexcept;
 
-  // Alpha and model take effect at the next frame that enters, a play at the next that leaves; its
-  // sequence is in the Ack.
+  // Alpha and models take effect at the next frame that enters, a play order at the next frame that
+  // leaves; the Ack holds its sequence.
   [[nodiscard]] Ack apply(const Command& command, EngineOut& out) noexcept;
 
-  // No more frames come: those that wait go out.
+  // No more frames come: the stages emit the frames that they hold back.
   void flush(EngineOut& out) noexcept;
-  // The source will give no more: flushed; no longer stale, only ended. A decision.
+  // The source has ended for good: flushes the stages and sets the state to ended. Emits a
+  // decision.
   void end(std::int64_t now_ns, EngineOut& out) noexcept;
 
   [[nodiscard]] StreamState state() const noexcept { return state_; }
-  [[nodiscard]] float alpha() const noexcept;         // where the slew is
-  [[nodiscard]] float alpha_target() const noexcept;  // where it goes
+  [[nodiscard]] float alpha() const noexcept;         // the value in use now
+  [[nodiscard]] float alpha_target() const noexcept;  // the value towards which alpha moves
   [[nodiscard]] const style::BoundModel* model() const noexcept { return model_; }
   [[nodiscard]] const generate::BoundModel* gesture() const noexcept {
     return generate_ ? generate_->model() : nullptr;
   }
 
  private:
-  // Where the stage before `next` puts its frames.
+  // Hands the output of one stage to the next, `next`.
   class Chain;
 
   void run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept;
   void emit(const Frame& frame, EngineOut& out) noexcept;
   std::size_t time_stage(std::size_t stage) noexcept;
-  void tell_played(std::int64_t time_ns, EngineOut& out) noexcept;
+  void report_played(std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_until(std::uint64_t sequence, std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_samples_until(std::uint64_t sequence, EngineOut& out) noexcept;
   [[nodiscard]] std::int64_t stale_due_ns() const noexcept;
@@ -109,23 +110,23 @@ class StreamEngine final {
 
   EngineOptions options_;
   std::vector<std::unique_ptr<Stage>> stages_;
-  style::StyleFilter* style_ = nullptr;          // of them; null where it is not there
+  style::StyleFilter* style_ = nullptr;          // points into stages_; null without this stage
   generate::GenerateStage* generate_ = nullptr;  // the same
   const style::BoundModel* model_ = nullptr;
   StreamState state_ = StreamState::kWaiting;
-  std::uint64_t last_sequence_ = 0;  // that entered
-  std::uint64_t last_out_ = 0;       // that left
-  std::uint64_t last_sample_ = 0;    // that entered
+  std::uint64_t last_sequence_ = 0;  // of the last frame that entered
+  std::uint64_t last_out_ = 0;       // of the last frame that left
+  std::uint64_t last_sample_ = 0;    // of the last sample that entered
   std::int64_t last_arrival_ns_ = kNoTime_ns;
   std::int64_t next_held_ns_ = kNoTime_ns;
-  // The stopwatch: which stage runs, since when, and what each has taken in this call.
+  // Timing: which stage is running, since when, and how long each has taken in this call.
   std::size_t timed_stage_ = kMaxStages;  // kMaxStages: none
   std::int64_t timed_since_ns_ = 0;
   std::array<float, kMaxStages> stage_us_{};
-  bool performs_ = false;  // as last told
-  bool has_pose_ = false;  // pose_ holds a pose that went out
-  Item pose_;              // frames on their way out, and the last pose
-  Item other_;             // samples and events on their way out
+  bool performs_ = false;  // as last reported
+  bool has_pose_ = false;  // pose_ holds a pose that was published
+  Item pose_;              // the frame on its way out; afterwards the last pose
+  Item other_;             // the sample or event on its way out
 };
 
 }  // namespace posed::pipeline

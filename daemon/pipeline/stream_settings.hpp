@@ -1,5 +1,5 @@
-// What of a stream's config its engine runs by. The live daemon fills it from the config, replay
-// from the device log; engine_options() then makes the same engine of it for both.
+// The settings by which a stream's engine runs. The live daemon fills them from the config, replay
+// from the device log; engine_options() makes the same engine from them for both.
 #pragma once
 
 #include <memory>
@@ -13,25 +13,25 @@
 
 namespace posed::pipeline {
 
-// The model that a stage began with.
+// The model with which a stage started.
 struct StageModel {
-  std::string sha256{};  // of its file, which the log keeps; empty: it had none
-  std::string name{};    // for people
+  std::string sha256{};  // of its file, which the log keeps; empty: no model
+  std::string name{};    // human-readable
 };
 
 struct StreamSettings {
   bool publish_raw = false;
   double stale_after_s = 0.5;
-  double rate_hz = 0.0;                         // the device's nominal rate; 0 unknown
-  std::optional<style::FilterOptions> style{};  // the style stage is there when this is
+  double rate_hz = 0.0;                         // the device's nominal rate; 0: unknown
+  std::optional<style::FilterOptions> style{};  // set: the stream has a style stage
   StageModel style_model{};
-  std::optional<smooth::LiveOptions> generate{};  // the generate stage is there when this is
+  std::optional<smooth::LiveOptions> generate{};  // set: the stream has a generate stage
   StageModel gesture_model{};
-  bool constrain = false;  // the constrain stage is there
+  bool constrain = false;  // true: the stream has a constrain stage
 };
 
-// The engine of stream number `stream` with this skeleton (null: samples only), still without
-// models. Cold.
+// The options of the engine of stream number `stream`, without models, which the caller adds.
+// `skeleton` is null for a stream that has samples only. Cold.
 [[nodiscard]] EngineOptions engine_options(std::uint32_t stream, const StreamSettings& settings,
                                            std::shared_ptr<const Skeleton> skeleton);
 

@@ -10,9 +10,11 @@ namespace posed::pipeline {
 
 namespace {
 
-// Commands, ticks and the end get their turn however fast items come.
+// Items handled in one turn, so that commands, ticks and the end are served however fast items
+// come.
 constexpr int kItemsATurn = 256;
-constexpr std::int64_t kAcksAgain_ns = 1'000'000;  // for room for an Ack
+// pause before an Ack that did not fit is sent again
+constexpr std::int64_t kAcksAgain_ns = 1'000'000;
 
 }  // namespace
 
@@ -26,8 +28,8 @@ bool is_pose(const Item& item) noexcept {
   return item.kind == Item::Kind::kFrame || item.kind == Item::Kind::kRawFrame;
 }
 
-// What a device can cause at any rate has to fit into its stream's share of the ring; few other
-// events ever come at once.
+// Events that a device can trigger at any rate must fit into its stream's share of the ring; of the
+// others only a few ever come at once.
 bool within_share(const Item& item) noexcept {
   return item.kind != Item::Kind::kEvent || item.stream_event.kind == v1::Event::KIND_SHED ||
          item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
@@ -35,15 +37,15 @@ bool within_share(const Item& item) noexcept {
 
 }  // namespace
 
-// One stream: its engine, and where that engine's output goes.
-struct Worker::Lane final : EngineOut {
-  Lane(const EngineOptions& options, double rate_hz, StreamCounters& stream_counters,
-       const WorkerPorts& around, const std::uint64_t& next_item, std::size_t slots)
+// One stream: its engine, and the place where that engine's output goes.
+struct Worker::StreamContext final : EngineOut {
+  StreamContext(const EngineOptions& options, double rate_hz, StreamCounters& stream_counters,
+                const WorkerPorts& around, const std::uint64_t& next_item, std::size_t slots)
       : engine(options),
         depth(shed_depth(rate_hz)),
         counters(stream_counters),
         ports(around),
-        place(next_item),
+        position(next_item),
         share(slots, counters.publisher.taken) {}
 
   void item(const Item& item) noexcept override {
@@ -60,18 +62,18 @@ struct Worker::Lane final : EngineOut {
   void decision(const Decision& decision) noexcept override {
     if (ports.record_sink == nullptr) return;
     placed = decision;
-    placed.item = place;
+    placed.item = position;
     ports.record_sink->decision(placed);
   }
 
-  // Nothing more comes from the reader: what of the last it decoded is missing was shed.
+  // Nothing more comes from the reader: what was decoded last but never came was shed.
   void close_gaps() noexcept {
     engine.close_gaps(counters.reader.frames.load(std::memory_order_acquire),
                       counters.reader.samples.load(std::memory_order_acquire), *this);
   }
 
-  // Newest data wins: a frame with `depth` or more newer ones behind it is skipped. The engine
-  // sees the gap at the next frame.
+  // Newest data wins: a frame that has `depth` or more newer frames waiting behind it is skipped.
+  // The engine detects the gap at the next frame.
   void frame(const Frame& frame) noexcept {
     const std::uint64_t sequence = frame.header.sequence;
     counters.pipeline.consumed.store(sequence, std::memory_order_release);
@@ -88,13 +90,13 @@ struct Worker::Lane final : EngineOut {
     engine.on_sample(sample, *this);
   }
 
-  // An item of the stream has been dealt with.
+  // Call after an item of the stream has been handled.
   void taken() noexcept {
     count(counters.pipeline.taken);
-    tell();
+    publish_state();
   }
 
-  void tell() noexcept {
+  void publish_state() noexcept {
     counters.pipeline.state.store(engine.state(), std::memory_order_relaxed);
     counters.pipeline.alpha.store(engine.alpha(), std::memory_order_relaxed);
     counters.pipeline.alpha_target.store(engine.alpha_target(), std::memory_order_relaxed);
@@ -104,7 +106,7 @@ struct Worker::Lane final : EngineOut {
   std::uint64_t depth;
   StreamCounters& counters;
   const WorkerPorts& ports;
-  const std::uint64_t& place;
+  const std::uint64_t& position;
   RingShare share;  // of ports.out
   Item outgoing;    // kept here because it is large
   Decision placed;  // the same
@@ -124,14 +126,15 @@ Worker::~Worker() = default;
 
 void Worker::add(const EngineOptions& options, double rate_hz, StreamCounters& counters,
                  std::size_t slots) {
-  lanes_.push_back(std::make_unique<Lane>(options, rate_hz, counters, ports_, place_, slots));
+  contexts_.push_back(
+      std::make_unique<StreamContext>(options, rate_hz, counters, ports_, position_, slots));
 }
 
-const StreamEngine& Worker::engine(std::uint32_t stream) const { return lanes_[stream]->engine; }
+const StreamEngine& Worker::engine(std::uint32_t stream) const { return contexts_[stream]->engine; }
 
 std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
   send_acks();
-  obey();
+  apply_commands();
   take_items(kItemsATurn);
   tick(now_ns);
   return next_due_ns(now_ns);
@@ -140,20 +143,20 @@ std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
 std::int64_t Worker::next_due_ns(std::int64_t now_ns) const noexcept {
   if (!ports_.in->empty()) return now_ns;
   std::int64_t due_ns = unsent_count_ > 0 ? now_ns + kAcksAgain_ns : system::kForever_ns;
-  for (const auto& lane : lanes_) {
-    const std::int64_t lane_due_ns = lane->engine.next_tick_ns();
-    if (lane_due_ns != kNoTime_ns) due_ns = std::min(due_ns, lane_due_ns);
+  for (const auto& context : contexts_) {
+    const std::int64_t tick_ns = context->engine.next_tick_ns();
+    if (tick_ns != kNoTime_ns) due_ns = std::min(due_ns, tick_ns);
   }
   return due_ns;
 }
 
 void Worker::finish() noexcept {
   send_acks();
-  obey();
+  apply_commands();
   while (!ports_.in->empty()) take_items(kItemsATurn);
-  for (const auto& lane : lanes_) {
-    lane->close_gaps();
-    lane->engine.flush(*lane);
+  for (const auto& context : contexts_) {
+    context->close_gaps();
+    context->engine.flush(*context);
   }
 }
 
@@ -177,11 +180,11 @@ bool Worker::idle() const noexcept {
   return ports_.in->empty() && ports_.commands->empty() && !stop_.load(std::memory_order_acquire);
 }
 
-void Worker::obey() noexcept {
+void Worker::apply_commands() noexcept {
   const auto apply = [this](const Command& command) noexcept {
-    Lane& lane = *lanes_[command.stream];
-    const Ack ack = lane.engine.apply(command, lane);
-    lane.tell();  // before the answer: whoever has it may ask for the status at once
+    StreamContext& context = *contexts_[command.stream];
+    const Ack ack = context.engine.apply(command, context);
+    context.publish_state();  // before the Ack, because its receiver may ask for the status at once
     acknowledge(ack);
   };
   while (ports_.commands->consume(apply)) {
@@ -194,10 +197,10 @@ void Worker::take_items(int most) noexcept {
   }
 }
 
-// No Ack is ever lost: control counts the commands that it has sent and that no Ack has answered,
-// and refuses to send more than kMostUnderWay. So there is a place for each.
+// No Ack is ever lost: control counts the commands for which it has not received an Ack, and sends
+// at most kMaxUnderWay of them. So unsent_ has space for each.
 void Worker::acknowledge(const Ack& ack) noexcept {
-  if (ack.ticket == 0) return;  // nobody waits for it
+  if (ack.ticket == 0) return;  // no Ack is expected
   send_acks();
   if (unsent_count_ > 0 || !ports_.acks->push(ack)) {
     unsent_[unsent_count_++] = ack;
@@ -206,7 +209,7 @@ void Worker::acknowledge(const Ack& ack) noexcept {
   }
 }
 
-// In the order in which the commands took effect.
+// Sends them in the order in which the commands took effect.
 void Worker::send_acks() noexcept {
   std::size_t sent = 0;
   while (sent < unsent_count_ && ports_.acks->push(unsent_[sent])) ++sent;
@@ -218,48 +221,49 @@ void Worker::send_acks() noexcept {
 }
 
 void Worker::take(const Item& item) noexcept {
-  place_ = item.number;
+  position_ = item.number;
   switch (item.kind) {
     case Item::Kind::kFrame:
     case Item::Kind::kRawFrame: {
-      Lane& lane = *lanes_[item.frame.header.stream];
-      lane.frame(item.frame);
-      lane.taken();
+      StreamContext& context = *contexts_[item.frame.header.stream];
+      context.frame(item.frame);
+      context.taken();
       break;
     }
     case Item::Kind::kSample: {
-      Lane& lane = *lanes_[item.sample.header.stream];
-      lane.sample(item.sample);
-      lane.taken();
+      StreamContext& context = *contexts_[item.sample.header.stream];
+      context.sample(item.sample);
+      context.taken();
       break;
     }
     case Item::Kind::kEvent: {
-      Lane& lane = *lanes_[item.stream_event.stream];
+      StreamContext& context = *contexts_[item.stream_event.stream];
       if (item.stream_event.kind == v1::Event::KIND_ENDED) {
-        lane.close_gaps();
-        lane.engine.end(item.stream_event.time_ns, lane);
+        context.close_gaps();
+        context.engine.end(item.stream_event.time_ns, context);
       } else {
-        pass_on(item.stream_event, lane);
+        pass_on(item.stream_event, context);
       }
-      lane.taken();
+      context.taken();
       break;
     }
   }
-  place_ = item.number + 1;
+  position_ = item.number + 1;
 }
 
-// What the reader did between two frames: their order is right here.
-void Worker::pass_on(const StreamEvent& event, Lane& lane) noexcept {
+// Passes on an event of the reader. It comes from the same ring as the frames, so it keeps its
+// place between them.
+void Worker::pass_on(const StreamEvent& event, StreamContext& context) noexcept {
   acknowledge({.ticket = event.ticket, .stream = event.stream, .sequence = event.sequence + 1});
   Item item;
   item.kind = Item::Kind::kEvent;
   item.stream_event = event;
-  lane.item(item);
+  context.item(item);
 }
 
 void Worker::tick(std::int64_t now_ns) noexcept {
-  for (const auto& lane : lanes_) {
-    if (lane->engine.tick(now_ns, *lane)) lane->tell();
+  for (const auto& context : contexts_) {
+    if (context->engine.tick(now_ns, *context)) context->publish_state();
   }
 }
 

@@ -1,6 +1,6 @@
 // Worker: the pipeline thread. It takes what the reader decoded, runs each stream's engine, applies
-// commands at frame boundaries, ticks silent streams, sheds what came too late, and hands the rest
-// to the publisher.
+// commands at frame boundaries, ticks silent streams, skips frames that are too late, and hands the
+// rest to the publisher.
 #pragma once
 
 #include <array>
@@ -19,15 +19,15 @@
 
 namespace posed::pipeline {
 
-// The rings and wakes around the worker; all of them outlive it.
+// The rings and event descriptors around the worker; all of them outlive it.
 struct WorkerPorts {
   Ring<Item>* in = nullptr;
   Ring<Item>* out = nullptr;
   Ring<Command>* commands = nullptr;
   Ring<Ack>* acks = nullptr;
-  system::EventFd* wake = nullptr;       // its own
-  system::EventFd* publisher = nullptr;  // rung when there is something in `out`
-  system::EventFd* control = nullptr;    // rung when there is something in `acks`; may be null
+  system::EventFd* wake = nullptr;       // wakes this thread
+  system::EventFd* publisher = nullptr;  // notified when `out` has something
+  system::EventFd* control = nullptr;    // notified when `acks` has something; may be null
   pipeline::RecordSink* record_sink = nullptr;
   Clock clock = nullptr;
 };
@@ -37,43 +37,46 @@ class Worker {
   [[nodiscard]] static Result<std::unique_ptr<Worker>> open(const WorkerPorts& ports);
   ~Worker();
 
-  // Streams are numbered in the order of adding. `rate_hz` is nominal, 0 when unknown; `slots` is
-  // how much of `out` the stream may fill. Cold, before the first turn.
+  // Streams are numbered in the order in which they are added. `rate_hz` is the nominal rate, 0
+  // when unknown; `slots` is how many slots of `out` the stream may fill. Cold, before the first
+  // turn.
   void add(const EngineOptions& options, double rate_hz, StreamCounters& counters,
            std::size_t slots = std::numeric_limits<std::size_t>::max());
 
-  // One round: commands, a bounded number of items, and the ticks that are due. Returns when the
-  // next turn is due at the latest [ns]; kForever_ns: when there is something in a ring. RT-safe.
+  // One round: commands, a bounded number of items, and the ticks that are due. Returns the latest
+  // time at which the next turn is due [ns]; kForever_ns: only when a ring has something. RT-safe.
   std::int64_t turn(std::int64_t now_ns) noexcept;
-  // After the reader's last turn: takes all that waits and lets out what the stages hold. RT-safe.
+  // After the reader's last turn: handles all items that wait, then makes the stages emit what they
+  // hold back. RT-safe.
   void finish() noexcept;
 
-  // Turn after turn until stop(), then finish(). The calling thread becomes the pipeline thread.
+  // One turn after another until stop(), then finish(). The calling thread becomes the pipeline
+  // thread.
   void run() noexcept;
   void stop() noexcept;  // any thread
 
-  // After run() has returned.
+  // Call after run() has returned.
   [[nodiscard]] const StreamEngine& engine(std::uint32_t stream) const;
 
  private:
-  struct Lane;
+  struct StreamContext;
   Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller);
-  void obey() noexcept;
+  void apply_commands() noexcept;
   void take_items(int most) noexcept;
   void take(const Item& item) noexcept;
   void acknowledge(const Ack& ack) noexcept;
   void send_acks() noexcept;
   [[nodiscard]] std::int64_t next_due_ns(std::int64_t now_ns) const noexcept;
-  void pass_on(const StreamEvent& event, Lane& lane) noexcept;
+  void pass_on(const StreamEvent& event, StreamContext& context) noexcept;
   void tick(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool idle() const noexcept;
 
   WorkerPorts ports_;
   std::unique_ptr<system::Poller> poller_;
-  std::vector<std::unique_ptr<Lane>> lanes_;
-  std::uint64_t place_ = 1;  // number of the item before which a decision made now takes effect
-  // Acks that found no room; at most as many as there are commands under way.
-  std::array<Ack, kMostUnderWay> unsent_{};
+  std::vector<std::unique_ptr<StreamContext>> contexts_;
+  std::uint64_t position_ = 1;  // number of the item before which a decision made now takes effect
+  // Acks for which the ring was full; never more than there are commands under way.
+  std::array<Ack, kMaxUnderWay> unsent_{};
   std::size_t unsent_count_ = 0;
   std::atomic<bool> stop_{false};
 };

@@ -6,7 +6,7 @@
 namespace posed::publish {
 namespace {
 
-// Makes `field` hold `values`, in place.
+// Replaces the content of `field` with `values`, reusing its memory.
 void assign(google::protobuf::RepeatedField<float>& field, std::span<const float> values) {
   field.Resize(static_cast<int>(values.size()), 0.0F);
   std::ranges::copy(values, field.begin());

@@ -1,5 +1,6 @@
-// Our words to the wire's (proto/wire/posed/v1/posed.proto). The message for frames is reused:
-// packed arrays in place, never cleared, so that encoding a frame allocates nothing.
+// Converts frames and other messages to the wire format (proto/wire/posed/v1/posed.proto). The
+// message for frames is reused: its packed arrays are overwritten in place and never cleared, so
+// encoding a frame allocates nothing.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +13,14 @@
 
 namespace posed::publish {
 
-// One published stream's frame message. One thread; RT-safe after the first frame.
+// The frame message of one published stream. One thread; RT-safe after the first frame.
 class FrameEncoder {
  public:
   explicit FrameEncoder(const std::string& stream) { message_.set_stream(stream); }
 
-  // The frame without stage stamps, as logs keep it; valid until the next call.
+  // The frame without stage stamps, as logs store it; valid until the next call.
   [[nodiscard]] const v1::Frame& encode(const Frame& frame);
-  // Adds the stage stamps that are known to what encode() made.
+  // Adds the stage stamps that are known to the message that encode() made.
   [[nodiscard]] const v1::Frame& stamp(const StageStamps& stamps, std::span<const float> stage_us);
 
  private:

@@ -15,7 +15,7 @@ std::string words(const pipeline::ShortText& text) {
   return clean(text.text()) + (text.cut() ? "..." : "");
 }
 
-// "march.style -> sway.style"; only the new one where there was none.
+// "march.style -> sway.style"; only the new name if there was no old one.
 std::string from_to(const StreamEvent& event) {
   const std::string before = words(event.before);
   return (before.empty() ? "" : before + " -> ") + words(event.after);

@@ -1,4 +1,5 @@
-// What the pipeline's events say to people, on event/<stream> and in the log output. Cold.
+// The human-readable text of the pipeline's events, for event/<stream> and for the log output.
+// Cold.
 #pragma once
 
 #include <string>
@@ -8,8 +9,8 @@
 
 namespace posed::publish {
 
-// One sentence without a full stop; empty for a kind that is told otherwise. Names that came over
-// the network are cleaned.
+// One sentence without a full stop; empty for a kind that gets its text elsewhere. Control
+// characters are removed from names that came over the network.
 [[nodiscard]] std::string sentence(const pipeline::StreamEvent& event);
 [[nodiscard]] std::string sentence(const ShedTally::Sum& shed);
 

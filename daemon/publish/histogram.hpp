@@ -1,5 +1,5 @@
-// LatencyHistogram: percentiles of durations in fixed memory. Buckets grow by an eighth of an
-// octave, so a percentile is at most 9 % too high; the maximum is exact.
+// LatencyHistogram: percentiles of durations in fixed memory. Each bucket is an eighth of an octave
+// wide, so a percentile is at most 9 % too high; the maximum is exact.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +20,7 @@ class LatencyHistogram {
     max_ns_ = std::max(max_ns_, value);
   }
 
-  // The duration that the fraction `p` of all durations does not exceed [us]; 0 when there are
-  // none.
+  // The duration that the fraction `p` of all durations does not exceed [us]; 0 if there are none.
   [[nodiscard]] double percentile_us(double p) const noexcept {
     const auto wanted = static_cast<std::uint64_t>(p * static_cast<double>(count_));
     std::uint64_t seen = 0;
@@ -37,7 +36,8 @@ class LatencyHistogram {
   void clear() noexcept { *this = {}; }
 
  private:
-  // Below 8 one bucket a value; above, 8 a power of two by the three bits after the leading one.
+  // Values below 8 have a bucket each; above, each power of two has 8 buckets, chosen by the three
+  // bits after the leading one.
   static constexpr std::size_t kBuckets = 8 + 61 * 8;
   [[nodiscard]] static std::size_t bucket(std::uint64_t value) noexcept {
     if (value < 8) return static_cast<std::size_t>(value);

@@ -15,12 +15,12 @@ v1::Percentiles percentiles(LatencyHistogram& histogram) {
   return message;
 }
 
-// A stage that did not see the frame left no stamp.
+// A stage that did not process the frame has set no stamp.
 void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t to_ns) noexcept {
   if (from_ns != kNoTime_ns && to_ns != kNoTime_ns) histogram.add(to_ns - from_ns);
 }
 
-// Only of a glove: the device info of a file is its whole header.
+// Only of a glove, because the device info of a file is its whole header.
 void describe_device(const drivers::Description& device, v1::StreamStats& stats) {
   const drivers::Driver* driver = drivers::find_driver(device.driver);
   stats.set_identity(device.identity);
@@ -54,7 +54,7 @@ void PublishedStream::measure(const Frame& frame, const StageStamps& stamps) noe
   if (frame.quality == Quality::kStale) return;
   const std::int64_t arrival_ns = frame.header.arrival_ns;
   add_between(decode_, arrival_ns, stamps.decoded_ns);
-  if (stamps.decoded_ns == kNoTime_ns) return;  // computed again by a replay: not timed
+  if (stamps.decoded_ns == kNoTime_ns) return;  // computed by a replay, which is not timed
   float all_us = 0.0F;
   for (std::size_t i = 0; i < info.stages.size(); ++i) {
     stage_[i].add(nanoseconds(frame.stage_us[i] * 1e-6));
@@ -101,7 +101,8 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_alpha(pipeline.alpha.load());
   stats.set_alpha_target(pipeline.alpha_target.load());
   const std::int64_t link_ns = reader.link_ns.load();
-  const bool begun = link_ns != kNoTime_ns;  // until the reader has, nobody is missed
+  // before the reader has started, no device counts as absent
+  const bool begun = link_ns != kNoTime_ns;
   stats.set_away(info.comes_and_goes && begun && !reader.connected.load());
   stats.set_connections(reader.connections.load());
   stats.set_link_ns(begun ? link_ns : 0);

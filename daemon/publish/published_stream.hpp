@@ -1,5 +1,5 @@
-// PublishedStream: what the publisher keeps of one stream: its topics, its reused messages, its
-// counts.
+// PublishedStream: the publisher's state for one stream: its topics, its reused messages, its
+// counters.
 #pragma once
 
 #include <array>
@@ -15,35 +15,36 @@
 
 namespace posed::publish {
 
-// The topics and frame message under one published name; a stream has a second one for its raw
-// input.
+// The topics and the frame message of one published name; a stream with raw output has a second
+// one.
 struct Channel {
-  // `unstyled`: of the stream before its stages.
+  // `unstyled`: for the frames before the stages.
   Channel(const std::string& name, const StreamInfo& info, bool unstyled);
 
   std::string pose_topic, skeleton_topic, sensor_topic, event_topic;
   FrameEncoder frames;
   SampleEncoder samples;
   std::optional<v1::Skeleton> skeleton;
-  // When it is to be sent next: at once when somebody subscribes, but not over and over.
+  // When the skeleton is to be sent next: soon after a subscription, but not at every one of many.
   std::int64_t skeleton_sent_ns = 0;
   std::int64_t skeleton_due_ns = 0;
 };
 
-// Publisher thread, but for set_model() and fill(): any thread.
+// Publisher thread, except for set_model() and fill(): any thread.
 class PublishedStream {
  public:
   explicit PublishedStream(StreamInfo stream_info);
 
-  // A styled frame goes out with these stamps. Its times go into the percentiles of this second;
-  // those of stale frames are old and are left out.
+  // Counts a styled frame that goes out with these stamps. Its times go into the percentiles of the
+  // current second, except those of a stale frame, which are old.
   void count(const Frame& frame, const StageStamps& stamps);
   void count_sample();
   void set_model(std::string name);
 
-  // What is so at this moment: all of `stats` but rates and percentiles, which are a second's.
+  // The state at this moment: everything in `stats` except rates and percentiles, which cover a
+  // whole second.
   void fill(v1::StreamStats& stats) const;
-  // The same with the rates and percentiles of the second that ends here; begins the next one.
+  // The same with the rates and percentiles of the second that ends here; starts the next one.
   void report(v1::StreamStats& stats, double seconds_since);
 
   StreamInfo info;
@@ -52,7 +53,7 @@ class PublishedStream {
   ShedTally shed;
 
  private:
-  // What fill() reads while the publisher goes on.
+  // What fill() reads while the publisher continues.
   struct Now {
     std::uint64_t frames = 0;
     std::uint64_t samples = 0;

@@ -18,19 +18,22 @@ namespace {
 
 constexpr double kQueueDepth_s = 0.25;
 constexpr int kMinQueue = 16;
-// What a subscriber may say: a handshake with CURVE and a long name, and then topics, one at a
-// time, so that a flood of them reaches us as fast as we hear them and no faster.
-constexpr std::int64_t kLongestPart = 512;  // bytes
-// Two at least: through a queue of one, libzmq 4.3.4 hands on nothing of a peer that uses CURVE.
+// The longest part that a subscriber may send: it holds a CURVE handshake and a long name. After
+// that come subscriptions, one at a time, so that a flood of them is received no faster than it is
+// processed.
+constexpr std::int64_t kMaxPart = 512;  // bytes
+// At least two: through a queue of one, libzmq 4.3.4 delivers nothing from a peer that uses CURVE.
 constexpr int kSubscriptionsWaiting = 2;
 constexpr int kReceiveBuffer_bytes = 8 * 1024;
-// Bytes of one peer that came to no message: the kernel and libzmq hold up to 16 KB before we hear.
-constexpr std::uint64_t kMostUnheard = 24 * 1024;
-constexpr std::uint64_t kMostUnheardOfAll = 512 * 1024;
+// Bytes of one peer that have not become a message: the kernel and libzmq hold up to 16 KB before
+// the publisher receives anything.
+constexpr std::uint64_t kMaxUnheard = 24 * 1024;
+constexpr std::uint64_t kMaxUnheardOfAll = 512 * 1024;
 constexpr int kSubscriptionsATurn = 64;
-// A skeleton is sent to all who want it when one asks; not more often than this.
+// A skeleton is sent to all its subscribers when one of them subscribes, but at most this often.
 constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
-constexpr int kSendBuffer = 8 * 1024;  // bytes; the kernel's default alone hides seconds of poses
+// bytes; the kernel's default alone can hold seconds of old poses
+constexpr int kSendBuffer = 8 * 1024;
 
 std::int64_t clock_ns(clockid_t clock) {
   timespec now{};
@@ -38,7 +41,7 @@ std::int64_t clock_ns(clockid_t clock) {
   return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
 }
 
-// What the publisher's thread waits for: new items, and what subscribers say.
+// The publisher's thread waits for new items and for messages of subscribers.
 Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake, void* socket) {
   auto poller = system::Poller::open();
   if (!poller) return poller;
@@ -55,7 +58,7 @@ Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake,
 
 }  // namespace
 
-// What other threads asked for or want to know. Cold: never touched by the hot threads.
+// Requests of other threads, and results for them. Cold: never used by the hot threads.
 struct Publisher::SharedState {
   struct Posted {
     std::uint32_t stream;
@@ -66,9 +69,9 @@ struct Publisher::SharedState {
   std::vector<Posted> events;
   bool check = false;
   v1::Stats stats;
-  std::atomic<bool> asked{false};  // one of events, check is new
+  std::atomic<bool> asked{false};  // `events` or `check` has something new
 
-  // The publisher thread's own, of the last report.
+  // Used by the publisher thread only: when it last published stats.
   std::int64_t reported_ns = kNoTime_ns;
   std::int64_t cpu_ns = 0;
 };
@@ -101,16 +104,16 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
     auto secured = net::secure_server(socket->get(), net::Domain::kPublish, options.secret_z85);
     if (!secured) return std::unexpected(secured.error());
   }
-  if (auto set = net::set_receive_limits(socket->get(), kLongestPart, kSubscriptionsWaiting,
+  if (auto set = net::set_receive_limits(socket->get(), kMaxPart, kSubscriptionsWaiting,
                                          kReceiveBuffer_bytes);
       !set) {
     return std::unexpected(set.error());
   }
   auto guard = net::PeerGuard::open(options.context, socket->get(),
                                     {.name = "publish",
-                                     .most_peers = net::peer_shares().publish,
-                                     .most_unheard = kMostUnheard,
-                                     .most_unheard_of_all = kMostUnheardOfAll,
+                                     .max_peers = net::peer_shares().publish,
+                                     .max_unheard = kMaxUnheard,
+                                     .max_unheard_of_all = kMaxUnheardOfAll,
                                      .authenticator = options.authenticator});
   if (!guard) return std::unexpected(guard.error());
   auto endpoint = net::bind_socket(socket->get(), options.endpoint);
@@ -153,7 +156,7 @@ void Publisher::take_all() {
 std::int64_t Publisher::turn(std::int64_t now_ns) {
   take_all();
   do_what_was_asked();
-  // At the first turn, too: who asks for the status at once is told the streams.
+  // Also at the first turn, so that a status request that comes at once already finds the streams.
   if (shared_->reported_ns == kNoTime_ns || now_ns >= shared_->reported_ns + kNanosPerSecond) {
     every_second(now_ns);
   }
@@ -165,7 +168,7 @@ std::int64_t Publisher::turn(std::int64_t now_ns) {
 
 void Publisher::finish(std::int64_t now_ns) {
   take_all();
-  for (std::uint32_t i = 0; i < published_.size(); ++i) tell_shed(i, true);
+  for (std::uint32_t i = 0; i < published_.size(); ++i) report_shed(i, true);
   every_second(now_ns);
 }
 
@@ -221,13 +224,13 @@ void Publisher::take_notice(const pipeline::StreamEvent& event) {
   const auto kind = static_cast<v1::Event::Kind>(event.kind);
   if (kind == v1::Event::KIND_SHED) {
     published_[event.stream]->shed.add(event.sequence, static_cast<std::uint64_t>(event.value));
-    return tell_shed(event.stream, false);
+    return report_shed(event.stream, false);
   }
-  if (kind == v1::Event::KIND_ENDED) tell_shed(event.stream, true);
+  if (kind == v1::Event::KIND_ENDED) report_shed(event.stream, true);
   send_event(event.stream, kind, event.time_ns, event.sequence, sentence(event));
 }
 
-void Publisher::tell_shed(std::uint32_t stream, bool at_end) {
+void Publisher::report_shed(std::uint32_t stream, bool at_end) {
   const std::int64_t now_ns = options_.clock();
   const auto sum = published_[stream]->shed.take(now_ns, at_end);
   if (!sum) return;
@@ -246,7 +249,7 @@ void Publisher::take_frame(const Frame& frame, bool raw) {
   }
   StageStamps stamps = frame.stamps;
   if (options_.stamps) stamps.published_ns = options_.data_clock();
-  // What a replay computes again is not timed.
+  // Frames that a replay computes are not timed.
   const bool timed = !raw && stamps.decoded_ns != kNoTime_ns;
   const std::size_t stages = timed ? published.info.stages.size() : 0;
   send(channel.pose_topic, channel.frames.stamp(stamps, std::span(frame.stage_us).first(stages)));
@@ -268,7 +271,7 @@ void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int6
   send(published_[stream]->styled.event_topic, event);
 }
 
-// A subscription message is one byte, 1 for coming and 0 for going, then the topic's beginning.
+// A subscription message is one byte (1: subscribe, 0: unsubscribe), then the beginning of a topic.
 bool Publisher::hear_subscriptions(std::int64_t now_ns) {
   for (const int peer : guard_->take_gone()) subscriptions_.forget(peer);
   net::Message message;
@@ -276,10 +279,11 @@ bool Publisher::hear_subscriptions(std::int64_t now_ns) {
     if (!message.receive(socket_.get())) return true;
     const std::string_view text = message.text();
     const int peer = net::source_of(message);
-    if (!guard_->knows(peer)) continue;  // gone meanwhile, or libzmq says what went with it
+    // gone meanwhile, or libzmq unsubscribes for a peer that is gone
+    if (!guard_->knows(peer)) continue;
     guard_->heard(peer, message.property("User-Id"));
     if (text.empty() || static_cast<unsigned char>(text.front()) > 1) {
-      guard_->cut(peer, "sent what is no subscription");
+      guard_->cut(peer, "sent an invalid subscription");
     } else if (!subscriptions_.ask(peer, text.substr(1), text.front() == 1, now_ns)) {
       guard_->cut(peer, "subscribed to too much");
     } else if (text.front() == 1) {
@@ -300,7 +304,7 @@ bool Publisher::is_topic(std::string_view prefix) const {
   });
 }
 
-// Somebody subscribed to topics that begin with `prefix`.
+// Schedules the skeletons of all topics that begin with `prefix`, after a subscription.
 void Publisher::want_skeletons(std::string_view prefix) {
   const auto want = [&](Channel& channel) {
     if (!channel.skeleton_topic.starts_with(prefix)) return;
@@ -345,7 +349,7 @@ void Publisher::every_second(std::int64_t now_ns) {
       static_cast<float>(100.0 * seconds(cpu_ns - shared_->cpu_ns) / std::max(since_s, 1e-3)));
   for (std::uint32_t i = 0; i < published_.size(); ++i) {
     published_[i]->report(*stats.add_stream(), since_s);
-    tell_shed(i, false);
+    report_shed(i, false);
   }
   if (options_.more_stats) options_.more_stats(stats);
   shared_->reported_ns = now_ns;
@@ -388,11 +392,11 @@ void Publisher::set_model_name(std::uint32_t stream, std::string name) {
 }
 
 void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {
-  ask([&](SharedState& told) { told.events.push_back({stream, kind, std::move(text)}); });
+  ask([&](SharedState& state) { state.events.push_back({stream, kind, std::move(text)}); });
 }
 
 void Publisher::check_subscribers() {
-  ask([](SharedState& told) { told.check = true; });
+  ask([](SharedState& state) { state.check = true; });
 }
 
 v1::Stats Publisher::stats() const {
@@ -402,7 +406,7 @@ v1::Stats Publisher::stats() const {
     stats = shared_->stats;
   }
   for (int i = 0; i < static_cast<int>(published_.size()); ++i) {
-    if (i == stats.stream_size()) stats.add_stream();  // nothing has been reported yet
+    if (i == stats.stream_size()) stats.add_stream();  // before the first stats
     published_[static_cast<std::size_t>(i)]->fill(*stats.mutable_stream(i));
   }
   stats.set_time_ns(options_.data_clock());

@@ -1,8 +1,8 @@
-// Publisher: the one thread that turns what the pipeline made into messages and sends them on a
+// Publisher: the one thread that turns the pipeline's items into messages and sends them on a
 // ZeroMQ XPUB socket. Topics: pose/<stream>, skeleton/<stream> (soon after a subscription and every
-// second), sensor/<stream>, event/<stream>, stats (every second). A slow subscriber costs the
-// others nothing: its queue is a quarter of a second deep and what does not fit is dropped for it
-// alone.
+// second), sensor/<stream>, event/<stream>, stats (every second). A slow subscriber does not affect
+// the others: its queue is a quarter of a second deep, and messages that do not fit are dropped for
+// it alone.
 #pragma once
 
 #include <atomic>
@@ -34,33 +34,33 @@ namespace posed::publish {
 struct StreamInfo {
   std::string name;
   drivers::Description description;
-  double rate_hz = 0.0;             // at which frames are to be expected; 0 unknown
-  std::vector<std::string> stages;  // in the order in which a frame passes them
-  bool raw = false;                 // the unstyled input goes out as <name>-raw
+  double rate_hz = 0.0;             // expected frame rate; 0: unknown
+  std::vector<std::string> stages;  // in the order in which they run
+  bool raw = false;                 // the unstyled input is published as <name>-raw
   std::string model;                // the style model's name at the start
-  bool comes_and_goes = false;      // the device may be away
-  std::shared_ptr<const devices::PresentDevice> present{};  // null: nothing comes from a device
+  bool comes_and_goes = false;      // the device may be unplugged
+  std::shared_ptr<const devices::PresentDevice> present{};  // null: the stream has no device
   pipeline::StreamCounters* counters = nullptr;
 };
 
 struct PublisherOptions {
-  void* context = nullptr;  // ZeroMQ's; outlives the publisher
+  void* context = nullptr;  // the ZeroMQ context; outlives the publisher
   std::string endpoint;
-  // Asked about every subscriber; null (in tests): nobody is asked, and old ZMTP is spoken, too.
+  // Checks every subscriber; null (in tests): all are admitted, even with ZMTP before 3.0.
   net::ZapAuthenticator* authenticator = nullptr;
   std::string secret_z85;                       // the server's key; empty: no CURVE
-  std::function<void(v1::Stats&)> more_stats;   // adds what others know (recorder); may be empty
-  pipeline::RecordSink* record_sink = nullptr;  // null: nothing is recorded
-  Clock clock = nullptr;                        // the host's: paces what is said every second
-  // The clock of what is published: frames', events' and stats' own times. Empty: `clock`. A replay
-  // publishes on the clock of its recording.
+  std::function<void(v1::Stats&)> more_stats;   // adds the recorder's counters; may be empty
+  pipeline::RecordSink* record_sink = nullptr;  // null: no recording
+  Clock clock = nullptr;                        // the host's; times what is sent every second
+  // The clock for the times of published frames, events and stats. Empty: `clock`. A replay
+  // publishes in the time of its recording.
   std::function<std::int64_t()> data_clock{};
-  bool stamps = true;  // false: published_ns is left out, because it would mean nothing
+  bool stamps = true;  // false: leaves published_ns out, because it would have no meaning
 };
 
-// A message queue a quarter of a second deep, for all streams together.
+// The length of a message queue that holds a quarter of a second of all streams together.
 [[nodiscard]] int send_high_water_mark(double messages_per_s);
-// That depth, and a small kernel buffer behind it. Before bind.
+// Sets that queue length, and a small kernel buffer behind it. Call before bind.
 [[nodiscard]] Result<> set_queue_options(void* socket, double messages_per_s);
 
 class PublishedStream;
@@ -74,24 +74,27 @@ class Publisher {
                                                                system::EventFd& wake);
   ~Publisher();
 
-  [[nodiscard]] const std::string& endpoint() const noexcept;  // really bound
+  [[nodiscard]] const std::string& endpoint() const noexcept;  // the endpoint that is really bound
 
-  // Does all that is due at `now_ns` (of the options' clock) and never waits. Returns when it must
-  // be called next at the latest; earlier when the wake rings or the socket has something to say.
+  // Does everything that is due at `now_ns` (of the options' clock) and never waits. Returns the
+  // latest time of the next call; call earlier if the EventFd is notified or the socket is
+  // readable.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
-  // The last turn: what still waits goes out, and the last counts.
+  // The last turn: sends the items that still wait, and the final counts.
   void finish(std::int64_t now_ns);
-  // Takes turns until stop(), then finishes. The calling thread becomes the publisher thread.
+  // One turn after another until stop(), then finish(). The calling thread becomes the publisher
+  // thread.
   void run();
 
-  // The rest is for any other thread; cold.
+  // All below: for any other thread; cold.
   void stop() noexcept;
   void set_model_name(std::uint32_t stream, std::string name);
-  // Says something a person should know on event/<stream>.
+  // Publishes a message for people on event/<stream>.
   void post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text);
-  // Cuts off who is not allowed any more (a key was withdrawn); needs an authenticator.
+  // Disconnects subscribers that are no longer allowed (a key was withdrawn); needs an
+  // authenticator.
   void check_subscribers();
-  // Rates and percentiles are the last full second's; all else is so at this moment.
+  // Rates and percentiles are those of the last full second; everything else is current.
   [[nodiscard]] v1::Stats stats() const;
 
  private:
@@ -104,13 +107,13 @@ class Publisher {
   void take(const pipeline::Item& item);
   void take_frame(const Frame& frame, bool raw);
   void take_notice(const pipeline::StreamEvent& event);
-  void tell_shed(std::uint32_t stream, bool at_end);
+  void report_shed(std::uint32_t stream, bool at_end);
   void send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
                   std::uint64_t sequence, const std::string& text);
-  // Sends the skeletons that are due; returns when the next is.
+  // Sends the skeletons that are due; returns when the next one is.
   [[nodiscard]] std::int64_t send_skeletons(std::int64_t now_ns);
   void want_skeletons(std::string_view prefix);
-  // False when there may be more to hear.
+  // Returns false if more subscriptions may wait.
   [[nodiscard]] bool hear_subscriptions(std::int64_t now_ns);
   [[nodiscard]] bool is_topic(std::string_view prefix) const;
   void every_second(std::int64_t now_ns);

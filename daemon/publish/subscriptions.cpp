@@ -8,7 +8,7 @@
 namespace posed::publish {
 namespace {
 
-constexpr std::size_t kLongestName = 32 + 4;  // of a stream, and "-raw"
+constexpr std::size_t kMaxName = 32 + 4;  // a stream's name and "-raw"
 constexpr std::array<std::string_view, 4> kTopicKinds{"pose/", "skeleton/", "sensor/", "event/"};
 
 bool is_name_sign(char sign) {
@@ -23,13 +23,13 @@ bool could_become_topic(std::string_view prefix) {
     if (kind.starts_with(prefix)) return true;
     if (!prefix.starts_with(kind)) return false;
     const std::string_view name = prefix.substr(kind.size());
-    return name.size() <= kLongestName && std::ranges::all_of(name, is_name_sign);
+    return name.size() <= kMaxName && std::ranges::all_of(name, is_name_sign);
   });
 }
 
 bool Subscriptions::within_budget(Peer& peer, std::int64_t now_ns) const {
-  const double earned = seconds(std::max<std::int64_t>(now_ns - peer.asked_ns, 0)) * kMostPerSecond;
-  peer.budget = std::min(peer.budget + earned, kMostAtOnce) - 1.0;
+  const double earned = seconds(std::max<std::int64_t>(now_ns - peer.asked_ns, 0)) * kMaxPerSecond;
+  peer.budget = std::min(peer.budget + earned, kMaxAtOnce) - 1.0;
   peer.asked_ns = now_ns;
   return peer.budget >= 0.0;
 }
@@ -51,9 +51,9 @@ bool Subscriptions::ask(int peer_id, std::string_view prefix, bool on, std::int6
   }
   if (found != peer.waits.end() || is_topic_(prefix)) return true;
   peer.waits.emplace(prefix);
-  if (!possible) return ++peer.impossible <= kMostImpossible;
+  if (!possible) return ++peer.impossible <= kMaxImpossible;
   ++wanted_[std::string(prefix)];
-  return wanted_.size() <= kMostWanted;
+  return wanted_.size() <= kMaxWanted;
 }
 
 void Subscriptions::drop(const std::string& prefix) {

@@ -17,7 +17,7 @@ using Kind = pipeline::Decision::Kind;
 using Value = v1::DecisionValue;
 namespace words = log::words;
 
-// How each decision is spelled, and what its value holds.
+// The stage and name under which a decision is stored, and the type of its value.
 struct Spelling {
   Kind kind;
   std::string_view stage, name;
@@ -42,7 +42,7 @@ const Spelling* find(std::string_view stage, std::string_view name) {
   return found == kSpellings.end() ? nullptr : &*found;
 }
 
-// Each reads its part of a value; false when no pipeline could have said it.
+// Each reads one kind of value; false if no pipeline can have written it.
 bool read_alpha(double alpha, pipeline::Decision& decision) {
   decision.alpha = static_cast<float>(alpha);
   return std::abs(alpha) <= style::kMaxAlpha;  // false for NaN
@@ -62,12 +62,12 @@ bool read_hash(const std::string& sha256, pipeline::Decision& decision) {
 }
 
 bool read_play(const Value::PlayOrder& play, pipeline::Decision& decision) {
-  constexpr std::uint32_t kMostLabel = std::numeric_limits<std::uint16_t>::max();
+  constexpr std::uint32_t kMaxLabelIndex = std::numeric_limits<std::uint16_t>::max();
   gesture::PlayOrder& order = decision.play;
   const auto count = static_cast<std::size_t>(play.label_size());
   if (count == 0 || count > order.label.size()) return false;
   for (const std::uint32_t label : play.label()) {
-    if (label > kMostLabel) return false;
+    if (label > kMaxLabelIndex) return false;
     order.label[order.size++] = static_cast<std::uint16_t>(label);
   }
   order.tempo = play.tempo();

@@ -1,5 +1,4 @@
-// The one place where the pipeline's decisions become rows of a device log, and rows decisions.
-// Cold.
+// Converts the pipeline's decisions to rows of a device log and back. No other code does. Cold.
 #pragma once
 
 #include <string>
@@ -12,9 +11,9 @@ namespace posed::record {
 
 [[nodiscard]] log::DecisionRow row_of(const pipeline::Decision& decision);
 
-// What the pipeline decided. Of `sequence`, rows of format 3 keep only what kShed and kShedSamples
-// say; those of the older formats say it of every decision. A row that no pipeline could have
-// written is damage: the error names `file` and the row.
+// The decision in a row. Rows of format 3 store `sequence` only for kShed and kShedSamples; those
+// of older formats store it for every decision. A row that no pipeline can have written is damage:
+// the error names `file` and the row.
 [[nodiscard]] Result<pipeline::Decision> decision_of(const log::DecisionRow& row,
                                                      const std::string& file);
 

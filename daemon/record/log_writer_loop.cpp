@@ -19,24 +19,25 @@ constexpr std::array<const char*, 3> kKindNames{"chunks", "decisions", "publishe
 }  // namespace
 
 LogWriterLoop::LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesystem::path path,
-                             std::function<void(const RecorderEvent&)> tell)
+                             std::function<void(const RecorderEvent&)> report)
     : rings_(rings),
       writer_(std::move(writer)),
       path_(std::move(path)),
-      tell_(std::move(tell)),
+      report_(std::move(report)),
       streams_(rings.streams()) {}
 
 void LogWriterLoop::turn(std::int64_t now_ns) {
   if (!writer_ && now_ns >= retry_ns_) resume(now_ns);
   drain(now_ns);
-  tell_overflows(now_ns);
+  report_overflows(now_ns);
   if (writer_ && now_ns - last_commit_ns_ >= kCommitEvery_ns) {
     if (auto done = commit(now_ns); !done) fail(done.error(), now_ns);
   }
 }
 
-// Against the stream of the data: a frame is in the log only together with the decisions and the
-// chunks that made it, whenever the process is killed.
+// Empties the rings against the direction of the data: frames first, chunks last. So whenever the
+// process is killed, a frame is in the log only together with the decisions and the chunks that
+// made it.
 void LogWriterLoop::drain(std::int64_t now_ns) {
   rings_.drain_frames([&](const FrameHeader& header, std::span<const std::byte> bytes) {
     put_gap(header.stream, GapKind::kFrames, header.lost_before, now_ns);
@@ -73,7 +74,7 @@ bool LogWriterLoop::put(std::uint32_t stream, GapKind kind, const Row& row, std:
     }
     fail(done.error(), now_ns);
   }
-  lose(stream, kind, 1);
+  count_lost(stream, kind, 1);
   return false;
 }
 
@@ -104,7 +105,7 @@ void LogWriterLoop::put_gap(std::uint32_t id, GapKind kind, std::uint64_t lost, 
   stream.lost_from_frame = std::min(stream.lost_from_frame, from_frame);
 }
 
-// Decisions come later than the chunks that they concern: where some are lost, the log is sound
+// Decisions arrive later than the chunks that they concern: if some are lost, the log is reliable
 // only up to the chunk before.
 Result<log::GapRow> LogWriterLoop::gap_row(std::uint32_t id, GapKind kind, std::uint64_t lost,
                                            std::int64_t now_ns, std::uint64_t from_frame) const {
@@ -132,37 +133,37 @@ Result<> LogWriterLoop::commit(std::int64_t now_ns) {
   return {};
 }
 
-void LogWriterLoop::lose(std::uint32_t stream, GapKind kind, std::uint64_t count) {
+void LogWriterLoop::count_lost(std::uint32_t stream, GapKind kind, std::uint64_t count) {
   streams_[stream].lost[index(kind)] += count;
   if (kind == GapKind::kChunks) lost_to_errors_ += count;
 }
 
-// What was written since the last commit is gone with it. The writer goes too: after an I/O error
-// only a fresh connection is known to be sound.
+// Everything written since the last commit is lost. The writer is closed, too, because after an I/O
+// error only a new connection is known to be in a valid state.
 void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
   writer_->rollback();
   writer_.reset();
   ++errors_;
-  // A disk that is all but full lets a little through now and then: ask it less and less often.
+  // An almost full disk accepts a little now and then, so try again less and less often.
   const bool held_long = now_ns - resumed_ns_ > kLastRetry_ns;
   retry_after_ns_ = held_long ? kFirstRetry_ns : std::min(2 * retry_after_ns_, kLastRetry_ns);
   retry_ns_ = now_ns + retry_after_ns_;
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     StreamState& stream = streams_[id];
     for (const GapKind kind : kKinds) {
-      lose(id, kind, std::exchange(stream.uncommitted[index(kind)], 0));
+      count_lost(id, kind, std::exchange(stream.uncommitted[index(kind)], 0));
       stream.lost[index(kind)] += std::exchange(stream.in_gaps[index(kind)], 0);
     }
     stream.lost_from_frame =
         std::min(stream.lost_from_frame, std::exchange(stream.uncommitted_from_frame, kNoFrame));
     stream.last_chunk = stream.committed_chunk;
   }
-  const std::string text = "recording stopped, streaming goes on: " + error.text();
+  const std::string text = "recording stopped, streaming continues: " + error.text();
   spdlog::error("{}", text);
-  tell_({.kind = RecorderEvent::Kind::kError, .stream = 0, .time_ns = now_ns, .text = text});
+  report_({.kind = RecorderEvent::Kind::kError, .stream = 0, .time_ns = now_ns, .text = text});
 }
 
-// Tries to write what is missing; only when that has worked does recording go on.
+// Tries to write the gap rows for what is missing; recording continues only after that has worked.
 void LogWriterLoop::resume(std::int64_t now_ns) {
   retry_ns_ = now_ns + retry_after_ns_;
   auto writer = log::Writer::reopen(path_);
@@ -179,17 +180,17 @@ void LogWriterLoop::resume(std::int64_t now_ns) {
     return;
   }
   resumed_ns_ = now_ns;
-  spdlog::warn("recording goes on: {}", path_.string());
+  spdlog::warn("recording continues: {}", path_.string());
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     const Counts lost = std::exchange(streams_[id].lost, {});
     streams_[id].lost_from_frame = kNoFrame;
     for (const GapKind kind : kKinds) {
       if (lost[index(kind)] == 0) continue;
-      tell_({.kind = RecorderEvent::Kind::kGap,
-             .stream = id,
-             .time_ns = now_ns,
-             .text = "the log lacks " + std::to_string(lost[index(kind)]) + " " +
-                     kKindNames[index(kind)] + " from while it could not be written"});
+      report_({.kind = RecorderEvent::Kind::kGap,
+               .stream = id,
+               .time_ns = now_ns,
+               .text = "the log lacks " + std::to_string(lost[index(kind)]) + " " +
+                       kKindNames[index(kind)] + " from while it could not be written"});
     }
   }
 }
@@ -207,16 +208,16 @@ Result<> LogWriterLoop::write_lost(std::int64_t now_ns) {
   return {};
 }
 
-void LogWriterLoop::tell_overflows(std::int64_t now_ns) {
+void LogWriterLoop::report_overflows(std::int64_t now_ns) {
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     for (const GapKind kind : kKinds) {
       const std::uint64_t total = rings_.overflowed(id, kind);
-      const std::uint64_t news = total - std::exchange(streams_[id].told[index(kind)], total);
+      const std::uint64_t news = total - std::exchange(streams_[id].reported[index(kind)], total);
       if (news == 0) continue;
       const std::string text = "the recorder's ring was full: the log lacks " +
                                std::to_string(news) + " " + kKindNames[index(kind)];
       spdlog::warn("{}", text);
-      tell_({.kind = RecorderEvent::Kind::kGap, .stream = id, .time_ns = now_ns, .text = text});
+      report_({.kind = RecorderEvent::Kind::kGap, .stream = id, .time_ns = now_ns, .text = text});
     }
   }
 }
@@ -224,7 +225,7 @@ void LogWriterLoop::tell_overflows(std::int64_t now_ns) {
 Result<> LogWriterLoop::finish(std::int64_t now_ns) {
   if (!writer_) resume(now_ns);
   drain(now_ns);
-  tell_overflows(now_ns);
+  report_overflows(now_ns);
   for (std::uint32_t id = 0; id < streams_.size(); ++id) {
     for (const GapKind kind : kKinds) {
       put_gap(id, kind, rings_.uncarried(id, kind), now_ns, rings_.uncarried_from_frame(id));

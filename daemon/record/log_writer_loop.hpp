@@ -1,6 +1,7 @@
-// LogWriterLoop: what the recorder thread does at each turn. Empties the rings into the log,
-// commits, and on an error (a full disk) counts what is lost, tells it once, and tries again now
-// and then until writing works. No thread and no clock of its own, so tests drive it.
+// LogWriterLoop: the work of the recorder thread in each turn. It empties the rings into the log
+// and commits. On an error (such as a full disk) it counts what is lost, reports the error once,
+// and tries again from time to time until writing works. It has no thread and no clock, so tests
+// can drive it.
 #pragma once
 
 #include <array>
@@ -17,7 +18,7 @@
 
 namespace posed::record {
 
-// Something about recording that a person should know.
+// An event of the recorder that a person should know about.
 struct RecorderEvent {
   enum class Kind : std::uint8_t { kGap, kError };
   Kind kind = Kind::kGap;
@@ -28,16 +29,16 @@ struct RecorderEvent {
 
 class LogWriterLoop {
  public:
-  // `tell` is called from within turn() and finish(). The rings must outlive the log_writer.
+  // Calls `report` from within turn() and finish(). The rings must outlive this object.
   LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesystem::path path,
-                std::function<void(const RecorderEvent&)> tell);
+                std::function<void(const RecorderEvent&)> report);
 
   // Call every 50 to 100 ms; commits when 250 ms have passed since the last commit.
   void turn(std::int64_t now_ns);
-  // After the producers have stopped: writes the rest and leaves one file.
+  // Call after the producers have stopped: writes the rest and leaves a single file.
   [[nodiscard]] Result<> finish(std::int64_t now_ns);
 
-  // Any thread. Chunks missing in the log, and failed attempts to write.
+  // Any thread. The number of chunks missing in the log, and of failed attempts to write.
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept;
   [[nodiscard]] std::uint64_t errors() const noexcept { return errors_.load(); }
 
@@ -48,11 +49,11 @@ class LogWriterLoop {
 
   struct StreamState {
     Counts uncommitted{};  // rows added since the last commit
-    Counts in_gaps{};      // what gap rows since then speak of
-    Counts lost{};         // in no gap row yet
-    Counts told{};         // overflows already told
-    // The first frame that a decision concerns which was added, or told of in a gap row, since the
-    // last commit; which is lost and in no gap row yet.
+    Counts in_gaps{};      // records counted in the gap rows added since then
+    Counts lost{};         // lost and not in a gap row yet
+    Counts reported{};     // overflows already reported
+    // The first frame that is concerned by a decision or a gap row added since the last commit; and
+    // by a decision that is lost and not in a gap row yet.
     std::uint64_t uncommitted_from_frame = kNoFrame;
     std::uint64_t lost_from_frame = kNoFrame;
     std::int64_t last_chunk = 0;
@@ -65,22 +66,22 @@ class LogWriterLoop {
   template <typename Row>
   bool put(std::uint32_t stream, GapKind kind, const Row& row, std::int64_t now_ns);
   void put_decision(const DecisionRecord& record, std::int64_t now_ns);
-  // `from_frame`: the first that the lost decisions may concern.
+  // `from_frame`: the first frame that the lost decisions may concern.
   void put_gap(std::uint32_t stream, GapKind kind, std::uint64_t lost, std::int64_t now_ns,
                std::uint64_t from_frame = kNoFrame);
   [[nodiscard]] Result<log::GapRow> gap_row(std::uint32_t stream, GapKind kind, std::uint64_t lost,
                                             std::int64_t now_ns, std::uint64_t from_frame) const;
   [[nodiscard]] Result<> write_lost(std::int64_t now_ns);
   [[nodiscard]] Result<> commit(std::int64_t now_ns);
-  void lose(std::uint32_t stream, GapKind kind, std::uint64_t count);
+  void count_lost(std::uint32_t stream, GapKind kind, std::uint64_t count);
   void fail(const Error& error, std::int64_t now_ns);
   void resume(std::int64_t now_ns);
-  void tell_overflows(std::int64_t now_ns);
+  void report_overflows(std::int64_t now_ns);
 
   RecordRings& rings_;
-  std::optional<log::Writer> writer_;  // nothing while writing fails
+  std::optional<log::Writer> writer_;  // empty while writing fails
   std::filesystem::path path_;
-  std::function<void(const RecorderEvent&)> tell_;
+  std::function<void(const RecorderEvent&)> report_;
   std::vector<StreamState> streams_;
   std::vector<std::vector<std::byte>> models_;  // not yet committed
   std::int64_t last_commit_ns_ = 0;

@@ -1,6 +1,6 @@
-// A lock-free ring of records {header, bytes} of any length between one producer and one consumer.
-// A record that does not fit is refused whole. Memory is touched when it is made, so that the
-// producer never meets a page fault.
+// A lock-free ring of records {header, bytes} of any length, between one producer and one consumer.
+// A record that does not fit is refused as a whole. The memory is touched at construction, so that
+// the producer never causes a page fault.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace posed::record {
 
-// Header: trivially copyable, with a member `bytes` that holds the length of what follows it.
+// Header: trivially copyable, with a member `bytes` that holds the length of the bytes behind it.
 template <typename Header>
 class RecordRing {
   static_assert(std::is_trivially_copyable_v<Header>);
@@ -27,12 +27,12 @@ class RecordRing {
     ring_.reset();
   }
 
-  // What a record takes of the capacity.
+  // How much of the capacity a record uses.
   [[nodiscard]] static std::size_t size_of(const Header& header) noexcept {
     return sizeof(Header) + header.bytes;
   }
 
-  // Producer. False: full, nothing was written. RT-safe.
+  // Producer. Returns false if the ring is full; then nothing was written. RT-safe.
   [[nodiscard]] bool push(const Header& header, std::span<const std::byte> bytes) noexcept {
     if (ring_.write_available() < size_of(header)) return false;
     std::array<std::byte, sizeof(Header)> image;
@@ -42,7 +42,7 @@ class RecordRing {
     return true;
   }
 
-  // Consumer: calls each(header, bytes) for what is there now, not for what comes meanwhile; the
+  // Consumer: calls each(header, bytes) for the records that are there now, not for later ones. The
   // bytes are valid during the call.
   template <typename Each>
   void drain(Each&& each) {
@@ -55,7 +55,7 @@ class RecordRing {
         header_ready_ = true;
         budget -= sizeof(Header);
       }
-      // Header and bytes are two pushes: the second may still be under way.
+      // Header and bytes are two pushes: the second one may still be missing.
       if (budget < header_.bytes) return;
       scratch_.resize(header_.bytes);
       ring_.pop(scratch_.data(), scratch_.size());
@@ -67,7 +67,7 @@ class RecordRing {
 
  private:
   boost::lockfree::spsc_queue<std::byte> ring_;
-  // The consumer's.
+  // Used by the consumer.
   Header header_{};
   bool header_ready_ = false;
   std::vector<std::byte> scratch_;

@@ -7,19 +7,19 @@ namespace {
 
 constexpr auto kRelaxed = std::memory_order_relaxed;
 
-std::uint64_t pending(const auto& lane) noexcept {
-  return lane.total.load(kRelaxed) - lane.carried.load(kRelaxed);
+std::uint64_t pending(const auto& to) noexcept {
+  return to.total.load(kRelaxed) - to.carried.load(kRelaxed);
 }
 
-// Puts a record into its stream's share by `push`. It takes `lost_before` with it, or is itself
-// lost; false then.
-bool put(auto& lane, std::size_t amount, std::uint64_t lost_before, auto&& push) noexcept {
-  if (lane.share.has_room(amount) && push()) {
-    lane.share.add(amount);
-    if (lost_before != 0) lane.carried.fetch_add(lost_before, kRelaxed);
+// Adds a record to its stream's share with `push`. A record that fits carries `lost_before`;
+// otherwise it is itself counted as lost, and the result is false.
+bool put(auto& to, std::size_t amount, std::uint64_t lost_before, auto&& push) noexcept {
+  if (to.share.has_room(amount) && push()) {
+    to.share.add(amount);
+    if (lost_before != 0) to.carried.fetch_add(lost_before, kRelaxed);
     return true;
   }
-  lane.total.fetch_add(1, kRelaxed);
+  to.total.fetch_add(1, kRelaxed);
   return false;
 }
 
@@ -36,14 +36,14 @@ RecordRings::RecordRings(const std::vector<RingSizes>& shares)
       frames_(sum_of(shares, &RingSizes::frame_bytes)),
       decisions_(sum_of(shares, &RingSizes::decisions)),
       wants_published_(sum_of(shares, &RingSizes::frame_bytes) != 0) {
-  for (const RingSizes& share : shares) lanes_.emplace_back(share);
+  for (const RingSizes& share : shares) shares_.emplace_back(share);
 }
 
 // RT-safe
 void RecordRings::chunk(std::uint32_t stream, std::uint8_t socket, pipeline::Direction direction,
                         std::int64_t arrival_ns, const pipeline::Position& next,
                         std::span<const std::byte> bytes) noexcept {
-  Lane& to = lane(stream, GapKind::kChunks);
+  StreamShare& to = share_of(stream, GapKind::kChunks);
   const ChunkHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
                            .stream = stream,
                            .socket = socket,
@@ -56,7 +56,7 @@ void RecordRings::chunk(std::uint32_t stream, std::uint8_t socket, pipeline::Dir
 
 // RT-safe
 void RecordRings::decision(const pipeline::Decision& decision) noexcept {
-  Lane& to = lane(decision.stream, GapKind::kDecisions);
+  StreamShare& to = share_of(decision.stream, GapKind::kDecisions);
   const DecisionRecord record{.decision = decision,
                               .lost_before = pending(to),
                               .lost_from_frame = to.lost_from_frame.load(kRelaxed)};
@@ -68,7 +68,7 @@ void RecordRings::decision(const pipeline::Decision& decision) noexcept {
 // RT-safe
 void RecordRings::published(std::uint32_t stream, std::uint64_t sequence, bool raw,
                             std::span<const std::byte> bytes) noexcept {
-  Lane& to = lane(stream, GapKind::kFrames);
+  StreamShare& to = share_of(stream, GapKind::kFrames);
   const FrameHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
                            .stream = stream,
                            .raw = raw,
@@ -79,7 +79,7 @@ void RecordRings::published(std::uint32_t stream, std::uint64_t sequence, bool r
 
 // RT-safe
 void RecordRings::unpublished(std::uint32_t stream) noexcept {
-  if (wants_published_) lane(stream, GapKind::kFrames).total.fetch_add(1, kRelaxed);
+  if (wants_published_) share_of(stream, GapKind::kFrames).total.fetch_add(1, kRelaxed);
 }
 
 void RecordRings::keep_model(std::span<const std::byte> bytes) {
@@ -93,15 +93,15 @@ std::vector<std::vector<std::byte>> RecordRings::take_models() {
 }
 
 std::uint64_t RecordRings::overflowed(std::uint32_t stream, GapKind kind) const noexcept {
-  return lane(stream, kind).total.load(kRelaxed);
+  return share_of(stream, kind).total.load(kRelaxed);
 }
 
 std::uint64_t RecordRings::uncarried(std::uint32_t stream, GapKind kind) const noexcept {
-  return pending(lane(stream, kind));
+  return pending(share_of(stream, kind));
 }
 
 std::uint64_t RecordRings::uncarried_from_frame(std::uint32_t stream) const noexcept {
-  return lane(stream, GapKind::kDecisions).lost_from_frame.load(kRelaxed);
+  return share_of(stream, GapKind::kDecisions).lost_from_frame.load(kRelaxed);
 }
 
 }  // namespace posed::record

@@ -1,7 +1,7 @@
-// The rings behind RecordSink: the hot threads' end puts records in, the recorder thread takes them
-// out. Each stream has a share of every ring, so that none can cost another its records. What does
-// not fit is counted, and the next record of the same stream that does fit carries the count, so
-// that the gap stands in the log where it happened.
+// The rings behind RecordSink: the hot threads add records, the recorder thread removes them. Each
+// stream has a share of every ring, so that no stream can cause another to lose records. A record
+// that does not fit is counted, and the next record of the same stream that fits carries the count;
+// so the gap row stands in the log where the gap happened.
 #pragma once
 
 #include <array>
@@ -41,7 +41,7 @@ struct FrameHeader {
   std::uint64_t lost_before = 0;
 };
 
-// Stands for no frame: a later one than any.
+// Stands for "no frame"; compares as later than any frame.
 inline constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
 
 // The first frame of its stream that a decision concerns. RT-safe.
@@ -53,22 +53,22 @@ inline constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::ma
 struct DecisionRecord {
   pipeline::Decision decision;
   std::uint64_t lost_before = 0;
-  std::uint64_t lost_from_frame = 0;  // the first frame that one of them may concern
+  std::uint64_t lost_from_frame = 0;  // the first frame that one of the lost decisions may concern
 };
 
-// What one stream may have in the rings.
+// How much of the rings one stream may use.
 struct RingSizes {
   std::size_t chunk_bytes = 0;
-  std::size_t frame_bytes = 0;  // 0: published frames are not wanted
+  std::size_t frame_bytes = 0;  // 0: published frames are not recorded
   std::size_t decisions = 0;
 };
 
 class RecordRings final : public pipeline::RecordSink {
  public:
-  // A share for each stream, in their order. Frames are wanted of all streams or of none.
+  // A share for each stream, in stream order. Frames are recorded of all streams or of none.
   explicit RecordRings(const std::vector<RingSizes>& shares);
 
-  // RecordSink, for the hot threads.
+  // RecordSink, called by the hot threads.
   void chunk(std::uint32_t stream, std::uint8_t socket, pipeline::Direction direction,
              std::int64_t arrival_ns, const pipeline::Position& next,
              std::span<const std::byte> bytes) noexcept override;
@@ -79,7 +79,7 @@ class RecordRings final : public pipeline::RecordSink {
   void unpublished(std::uint32_t stream) noexcept override;
   void keep_model(std::span<const std::byte> bytes) override;
 
-  // The recorder thread's end: each(header, bytes) or each(record) for what is there now.
+  // Called by the recorder thread: each(header, bytes) or each(record) for what is there now.
   template <typename Each>
   void drain_chunks(Each&& each) {
     chunks_.drain([&](const ChunkHeader& header, std::span<const std::byte> bytes) {
@@ -107,45 +107,46 @@ class RecordRings final : public pipeline::RecordSink {
   using GapKind = log::GapRow::Kind;
   // Records of one kind that did not fit since the start. Any thread.
   [[nodiscard]] std::uint64_t overflowed(std::uint32_t stream, GapKind kind) const noexcept;
-  // Those of them that no later record carries; meaningful once the producers have stopped.
+  // How many of them no later record carries; valid once the producers have stopped.
   [[nodiscard]] std::uint64_t uncarried(std::uint32_t stream, GapKind kind) const noexcept;
-  // The first frame that a decision which no later one carries may concern.
+  // The first frame that may be concerned by a lost decision that no later one carries.
   [[nodiscard]] std::uint64_t uncarried_from_frame(std::uint32_t stream) const noexcept;
-  [[nodiscard]] std::size_t streams() const noexcept { return lanes_.size(); }
+  [[nodiscard]] std::size_t streams() const noexcept { return shares_.size(); }
 
  private:
-  // One stream's end of one ring. The share, carried and lost_from_frame belong to the one
-  // producer of its kind; total is written by any; taken by the recorder; all but the share are
-  // read by any.
-  struct Lane {
-    explicit Lane(std::size_t size) noexcept : share(size, taken) {}
+  // One stream's part of one ring. `share`, `carried` and `lost_from_frame` are written by the
+  // single producer of this kind, `total` by any thread, `taken` by the recorder. Any thread may
+  // read all of them except `share`.
+  struct StreamShare {
+    explicit StreamShare(std::size_t size) noexcept : share(size, taken) {}
     std::atomic<std::uint64_t> taken{0};
     pipeline::RingShare share;
     std::atomic<std::uint64_t> total{0};            // records that did not fit
-    std::atomic<std::uint64_t> carried{0};          // of them, those that a later record tells of
-    std::atomic<std::uint64_t> lost_from_frame{0};  // of decisions, see DecisionRecord
+    std::atomic<std::uint64_t> carried{0};          // how many of them a later record has reported
+    std::atomic<std::uint64_t> lost_from_frame{0};  // for decisions, see DecisionRecord
   };
-  struct Lanes {
-    explicit Lanes(const RingSizes& sizes) noexcept
-        : by_kind{Lane(sizes.chunk_bytes), Lane(sizes.decisions), Lane(sizes.frame_bytes)} {}
-    std::array<Lane, 3> by_kind;  // by GapKind
+  struct StreamShares {
+    explicit StreamShares(const RingSizes& sizes) noexcept
+        : by_kind{StreamShare(sizes.chunk_bytes), StreamShare(sizes.decisions),
+                  StreamShare(sizes.frame_bytes)} {}
+    std::array<StreamShare, 3> by_kind;  // by GapKind
   };
 
-  [[nodiscard]] Lane& lane(std::uint32_t stream, GapKind kind) noexcept {
-    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  [[nodiscard]] StreamShare& share_of(std::uint32_t stream, GapKind kind) noexcept {
+    return shares_[stream].by_kind[static_cast<std::size_t>(kind)];
   }
-  [[nodiscard]] const Lane& lane(std::uint32_t stream, GapKind kind) const noexcept {
-    return lanes_[stream].by_kind[static_cast<std::size_t>(kind)];
+  [[nodiscard]] const StreamShare& share_of(std::uint32_t stream, GapKind kind) const noexcept {
+    return shares_[stream].by_kind[static_cast<std::size_t>(kind)];
   }
   void give_back(std::uint32_t stream, GapKind kind, std::size_t amount) noexcept {
-    lane(stream, kind).taken.fetch_add(amount, std::memory_order_release);
+    share_of(stream, kind).taken.fetch_add(amount, std::memory_order_release);
   }
 
   RecordRing<ChunkHeader> chunks_;
   RecordRing<FrameHeader> frames_;
   boost::lockfree::spsc_queue<DecisionRecord> decisions_;
   bool wants_published_ = false;
-  std::deque<Lanes> lanes_;  // by stream
+  std::deque<StreamShares> shares_;  // by stream
   std::mutex models_mutex_;
   std::vector<std::vector<std::byte>> models_;
 };

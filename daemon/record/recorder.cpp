@@ -16,16 +16,17 @@ namespace posed::record {
 namespace {
 
 constexpr auto kWakeEvery = std::chrono::milliseconds(50);
-constexpr double kRing_s = 5.0;                       // what the rings hold at the nominal rates
-constexpr std::size_t kLeast = 8 * 1024 * 1024;       // bytes of all; for sources faster than told
-constexpr double kBytesPerFrame = 4096.0;             // a text clip's line of 96 joints is shorter
+constexpr double kRing_s = 5.0;  // the rings hold this long at the nominal rates
+// bytes of all streams; for sources that send faster than stated
+constexpr std::size_t kMinRings = 8 * 1024 * 1024;
+constexpr double kBytesPerFrame = 4096.0;             // longer than a text clip's line of 96 joints
 constexpr double kUnknownBytesPerSecond = 1'000'000;  // more than any glove sends
 constexpr double kUnknownFramesPerSecond = 1000.0;
-constexpr double kDecisionsPerSecond = 200.0;  // a stream's ticks, sheds and control together
+constexpr double kDecisionsPerSecond = 200.0;  // of a stream, for ticks, sheds and control together
 
-// What each stream may have in the recorder's rings.
+// How much of the recorder's rings each stream may use.
 std::vector<RingSizes> ring_shares(const std::vector<RecordedStream>& streams, bool frames) {
-  const std::size_t least = kLeast / std::max<std::size_t>(streams.size(), 1);
+  const std::size_t least = kMinRings / std::max<std::size_t>(streams.size(), 1);
   const auto held = [&](double bytes_per_s) {
     return std::max(static_cast<std::size_t>(kRing_s * bytes_per_s), least);
   };
@@ -67,7 +68,7 @@ std::map<std::string, std::string> meta_of(const RecorderOptions& options) {
           {"config", options.config_text}};
 }
 
-// The hash under which the log keeps a model's file; empty when there is none.
+// Stores a model's file in the log and returns its hash; empty if there is no model.
 Result<std::string> keep(log::Writer& writer, std::span<const std::byte> bytes) {
   if (bytes.empty()) return std::string();
   return writer.add_blob(bytes);
@@ -128,7 +129,7 @@ Recorder::Recorder(RecorderOptions options, const std::vector<RecordedStream>& s
                    log::Writer writer)
     : options_(std::move(options)),
       rings_(ring_shares(streams, options_.frames)),
-      log_writer_(rings_, std::move(writer), options_.file, options_.tell),
+      log_writer_(rings_, std::move(writer), options_.file, options_.report),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 Recorder::~Recorder() = default;

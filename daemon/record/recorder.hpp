@@ -1,5 +1,5 @@
-// Recorder: the thread that writes the device log. It wakes by its own timer, so the hot threads
-// only ever touch the rings behind record_sink(). Cold.
+// Recorder: the thread that writes the device log. It wakes by its own timer; the hot threads only
+// use the rings behind record_sink(). Cold.
 #pragma once
 
 #include <condition_variable>
@@ -23,34 +23,34 @@
 
 namespace posed::record {
 
-// One stream as it stands before its first chunk: a source of the log with one body.
+// One stream before its first chunk: a source of the log with one body.
 struct RecordedStream {
-  log::SourceRow source;             // its id is filled in here: its place
-  StreamSettings settings{};         // the hashes of its models are filled in here, too
-  std::vector<std::byte> style{};    // the bytes of the style model's file it begins with
-  std::vector<std::byte> gesture{};  // the same of the gesture model
+  log::SourceRow source;             // begin_log() sets its id, which is its index
+  StreamSettings settings{};         // begin_log() sets the hashes of its models
+  std::vector<std::byte> style{};    // the file of the style model at the start
+  std::vector<std::byte> gesture{};  // the file of the gesture model at the start
 };
-// An opened stream, as a recorder needs it.
+// What a recorder needs of an opened stream.
 [[nodiscard]] RecordedStream recorded_stream(const devices::OpenStream& stream);
 
 struct RecorderOptions {
   std::filesystem::path file;
   bool overwrite = false;
-  bool frames = false;           // keep what is published, too
-  std::string config_text;       // the daemon's whole config, for people
-  std::string publish_endpoint;  // where it published; replay does, too
+  bool frames = false;           // record the published frames, too
+  std::string config_text;       // the daemon's whole config, for human readers
+  std::string publish_endpoint;  // where the daemon published; replay publishes there, too
   Clock clock = nullptr;         // CLOCK_MONOTONIC
   // Called from the recorder thread.
-  std::function<void(const RecorderEvent&)> tell = [](const RecorderEvent&) {};
+  std::function<void(const RecorderEvent&)> report = [](const RecorderEvent&) {};
 };
 
-// Makes the log and writes what stands in it before the first chunk, committed.
+// Creates the log, and writes and commits its content before the first chunk.
 [[nodiscard]] Result<log::Writer> begin_log(const RecorderOptions& options,
                                             std::vector<RecordedStream>& streams);
 
 class Recorder {
  public:
-  // Makes the log and starts the thread. Stream ids are places in `streams`.
+  // Creates the log and starts the thread. Stream ids are indices in `streams`.
   [[nodiscard]] static Result<std::unique_ptr<Recorder>> open(RecorderOptions options,
                                                               std::vector<RecordedStream> streams);
   Recorder(const Recorder&) = delete;
@@ -59,8 +59,8 @@ class Recorder {
 
   [[nodiscard]] pipeline::RecordSink& record_sink() noexcept { return rings_; }
 
-  // Stops the thread, writes the rest and leaves one file. Call once, after every thread that uses
-  // record_sink() has ended.
+  // Stops the thread, writes the rest and leaves a single file. Call once, after every thread that
+  // uses record_sink() has ended.
   [[nodiscard]] Result<> finish();
 
   // Any thread.
@@ -77,7 +77,7 @@ class Recorder {
   LogWriterLoop log_writer_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
-  std::jthread thread_;  // last: uses all the others
+  std::jthread thread_;  // last, because it uses all the others
 };
 
 }  // namespace posed::record

@@ -15,8 +15,9 @@ using Json = nlohmann::ordered_json;
 namespace words = log::words;
 
 bool sound(const StreamSettings& settings) {
-  constexpr double kMost = 1e6;  // seconds, Hz, per second: far beyond sense, far below overflow
-  const auto within = [](double value) { return value >= -kMost && value <= kMost; };
+  constexpr double kMaxSetting =
+      1e6;  // seconds, Hz, per second: far beyond sense, far below overflow
+  const auto within = [](double value) { return value >= -kMaxSetting && value <= kMaxSetting; };
   const style::FilterOptions style = settings.style.value_or(style::FilterOptions{});
   const smooth::LiveOptions live = settings.generate.value_or(smooth::LiveOptions{});
   return settings.stale_after_s > 0.0 && within(settings.stale_after_s) &&
@@ -51,7 +52,7 @@ smooth::LiveOptions generate_of(const Json& parameters) {
           .noise_rad = parameters.at("noise_rad").get<double>()};
 }
 
-// False: this posed does not have the stage, or runs it at another place.
+// False if this version of posed does not have the stage, or runs it in another order.
 bool add_stage(const Json& stage, StreamSettings& settings) {
   const auto name = stage.at("stage").get<std::string>();
   if (name == words::kStyle && !settings.style && !settings.generate && !settings.constrain) {
@@ -104,12 +105,11 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
     settings.rate_hz = root.at("rate_hz").get<double>();
     for (const Json& stage : root.at("stages")) {
       if (add_stage(stage, settings)) continue;
-      return fail("this posed cannot run the stages of a stream as they stand in the log (" +
+      return fail("this posed cannot run the stages of a stream as recorded in the log (" +
                       json_text(stage.at("stage")) + "); update posed",
                   file);
     }
-    if (!sound(settings))
-      return fail("the log is damaged (a stream's settings make no sense)", file);
+    if (!sound(settings)) return fail("the log is damaged (a stream's settings are invalid)", file);
     return settings;
   } catch (const nlohmann::json::exception& error) {
     return fail("the log is damaged (a stream's settings: " + std::string(error.what()) + ")",

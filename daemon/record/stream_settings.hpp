@@ -1,5 +1,5 @@
-// A stream's settings as the device log keeps them (stream.stages_json): JSON with every default
-// filled in, so that a log means the same when defaults change. Numbers come back to the bit.
+// A stream's settings as the device log stores them (stream.stages_json): JSON that includes every
+// default, so that a log keeps its meaning when defaults change. Numbers are restored exactly.
 #pragma once
 
 #include <string>
@@ -14,11 +14,11 @@ using pipeline::StageModel;
 using pipeline::StreamSettings;
 
 [[nodiscard]] std::string to_json(const StreamSettings& settings);
-// `file` is the log's name, for the error. Stages that this posed does not have are refused.
+// `file` is the log's name, for the error. Refuses stages that this version of posed does not have.
 [[nodiscard]] Result<StreamSettings> settings_from_json(const std::string& json,
                                                         const std::string& file);
 
-// source.config: a driver's options, as it was opened with them.
+// source.config: the options with which a driver was opened.
 [[nodiscard]] std::string to_json(const drivers::Options& options);
 
 }  // namespace posed::record

@@ -19,7 +19,8 @@ constexpr auto kLookAgain = std::chrono::milliseconds(1);
 TakeClock::TakeClock(double speed, std::int64_t begin_ns, Clock host)
     : speed_(speed), host_(host), take_ns_(begin_ns), host_ns_(kNoTime_ns) {}
 
-// Until the first chunk is reached it stands: how long a log takes to open is no age of its frames.
+// The clock stands still until the first chunk: the time it takes to open a log must not count as
+// age of its frames.
 std::int64_t TakeClock::at(std::int64_t host_ns) const {
   if (host_ns_ == kNoTime_ns) return take_ns_;
   return take_ns_ + nanoseconds(seconds(host_ns - host_ns_) * speed_);
@@ -29,7 +30,8 @@ void TakeClock::reached(std::int64_t arrival_ns) {
   const std::int64_t host_ns = host_();
   const std::scoped_lock lock(mutex_);
   const std::int64_t now_ns = at(host_ns);
-  const bool back = arrival_ns < now_ns - Pace::kLongestSilence_ns;  // a wrong time is over
+  // the recording has returned from a wrong time
+  const bool back = arrival_ns < now_ns - Pace::kMaxSilence_ns;
   take_ns_ = back ? arrival_ns : std::max(arrival_ns, now_ns);
   host_ns_ = host_ns;
 }
@@ -91,7 +93,8 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
   published.endpoint = endpoint;
   published.clock = system::monotonic_ns;
   published.data_clock = [clock = &self->clock_] { return clock->now_ns(); };
-  published.stamps = options.speed != 0.0;  // as fast as possible, no frame has a right moment
+  // at full speed no frame has a meaningful time of publication
+  published.stamps = options.speed != 0.0;
   published.more_stats = [file = options.log, speed = options.speed](v1::Stats& stats) {
     stats.set_replay_file(file);
     stats.set_replay_speed(speed);
@@ -118,7 +121,7 @@ void Broadcast::add(const pipeline::Item& item) {
   wake_->notify();
 }
 
-// What the pipeline's counters and the control thread knew in the live run.
+// Updates what the pipeline's counters and the control thread knew in the live run.
 void Broadcast::note(const pipeline::StreamEvent& event) {
   using pipeline::Change;
   using pipeline::StreamState;

@@ -1,5 +1,5 @@
-// Broadcast: publishes what a replay makes as the live run did: same topics, same messages. Times
-// are the recording's, on the recording's clock, and stats say that this is a replay. Cold.
+// Broadcast publishes a replay as the live run did: same topics, same messages. All times are those
+// of the recording, and stats say that this is a replay. Cold.
 #pragma once
 
 #include <cstdint>
@@ -21,15 +21,15 @@
 
 namespace posed::replay {
 
-// What time it is in the recording that is being replayed. It steps back only where the recording's
-// own times do, by more than a minute. Any thread.
+// The current time in the recording that is being replayed. It steps back only where the
+// recording's own times step back by more than a minute. Any thread.
 class TakeClock {
  public:
-  // `speed` of the replay, times the recording's pace; 0: as fast as possible, and the clock stands
-  // still between chunks.
+  // `speed` is relative to the recording; 0: as fast as possible, and the clock stands still
+  // between chunks.
   TakeClock(double speed, std::int64_t begin_ns, Clock host);
 
-  void reached(std::int64_t arrival_ns);  // what arrived then is replayed now
+  void reached(std::int64_t arrival_ns);  // the replay has come to this arrival time
   [[nodiscard]] std::int64_t now_ns() const;
 
  private:
@@ -44,9 +44,9 @@ class TakeClock {
 
 struct BroadcastOptions {
   std::string endpoint;
-  std::string log;            // the log's file name, for people
+  std::string log;            // the log's file name, to display
   double speed = 1.0;         // 0: as fast as possible
-  std::int64_t begin_ns = 0;  // when the log's first chunk arrived
+  std::int64_t begin_ns = 0;  // arrival of the log's first chunk
 };
 
 class Broadcast {
@@ -61,7 +61,8 @@ class Broadcast {
 
   [[nodiscard]] const std::string& endpoint() const noexcept { return publisher_->endpoint(); }
   [[nodiscard]] TakeClock& clock() noexcept { return clock_; }
-  // Waits while the publisher is behind: a replay loses nothing. Replay's thread.
+  // Waits while the publisher is behind, because a replay must not lose frames. Call on the
+  // replay's thread.
   void add(const pipeline::Item& item);
 
  private:

@@ -14,7 +14,7 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Reflection;
 
-// One field alone, as bytes.
+// A single field of the frame, serialized.
 std::string bytes_of_field(const v1::Frame& frame, const FieldDescriptor* field) {
   v1::Frame alone;
   const auto* descriptor = v1::Frame::descriptor();
@@ -37,7 +37,8 @@ std::string print_field(const v1::Frame& frame, const FieldDescriptor* field, in
   return text;
 }
 
-// Where two repeated float fields part: the first element, or the shorter one's end.
+// The index at which two repeated float fields differ: the first unequal element, or the end of the
+// shorter field.
 int first_index(const v1::Frame& live, const v1::Frame& replayed, const FieldDescriptor* field) {
   const Reflection* reflection = v1::Frame::GetReflection();
   const int count =
@@ -100,8 +101,9 @@ Result<Expectation> Expectation::open(const log::Reader& reader) {
   return expectation;
 }
 
-// Of a live frame that was not met. One sequence may come twice (a pose is repeated), so a replayed
-// frame that differs from it may have been another that the log lacks, or not.
+// Describes a live frame that the replay did not produce. A sequence may come twice (a pose is
+// repeated), so a replayed frame that differs from it may correspond to another frame that the log
+// lacks.
 std::string Expectation::how_it_lacks(const Channel& channel) {
   return channel.difference.empty() ? "published live, but not replayed" : channel.difference;
 }
@@ -134,7 +136,8 @@ Result<> Expectation::compare(std::uint32_t id, bool raw, const v1::Frame& repla
     return {};
   }
   if (!channel.live) {
-    // A gap row may stand for the last frames, too; else the recording ended before they were out.
+    // A gap row may account for the last frames, too; otherwise the recording ended before they
+    // were published.
     if (stream.may_lack > 0) {
       --stream.may_lack;
       ++counts_.lost;

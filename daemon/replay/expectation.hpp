@@ -1,5 +1,5 @@
-// Expectation: does replay give, bit for bit, what the live run published? Compares frame by frame
-// with those in the log and stops at the first difference. Cold.
+// Expectation checks that a replay gives, bit for bit, what the live run published. It compares
+// each frame with the one in the log and stops at the first difference. Cold.
 #pragma once
 
 #include <array>
@@ -14,41 +14,43 @@
 
 namespace posed::replay {
 
-// "rotation_xyzw[17]: 0.5 live, 0.25 replayed" of the first field, in the schema's order, whose
-// bits differ; empty when none do.
+// "rotation_xyzw[17]: 0.5 live, 0.25 replayed", for the first field in the schema's order whose
+// bits differ; empty if none does.
 [[nodiscard]] std::string first_difference(const v1::Frame& live, const v1::Frame& replayed);
 
 class Expectation {
  public:
-  // The reader outlives it. A log without frames is an error that says how to get one.
+  // The reader outlives it. For a log without frames the error says how to record one with frames.
   [[nodiscard]] static Result<Expectation> open(const log::Reader& reader);
 
-  // The next frame of the replay, in its order; streams are numbered as in Replay; `broken_at` is
-  // what Replay says of the stream. The error of the first difference names stream, sequence and
+  // Compares the next frame of the replay. Streams are numbered as in Replay; `broken_at` is
+  // Replay::broken_at() of the stream. The error at the first difference names stream, sequence and
   // field.
   [[nodiscard]] Result<> compare(std::uint32_t stream, bool raw, const v1::Frame& replayed,
                                  std::optional<std::uint64_t> broken_at);
-  // After the replay: every frame that was published must have come.
+  // Call after the replay: an error if a published frame was not replayed.
   [[nodiscard]] Result<> finish(std::uint32_t stream, std::optional<std::uint64_t> broken_at);
 
   struct Counts {
     std::uint64_t compared = 0;
-    std::uint64_t lost = 0;       // replayed; the log says that it lacks them
-    std::uint64_t after_gap = 0;  // not comparable: the log lacks chunks or decisions before them
-    std::uint64_t past_end = 0;   // replayed, after the last that the log holds (killed)
+    std::uint64_t lost = 0;  // replayed, but according to the log it lacks them
+    // not comparable, because the log lacks chunks or decisions before them
+    std::uint64_t after_gap = 0;
+    // replayed, but after the last frame in the log (recording was killed)
+    std::uint64_t past_end = 0;
   };
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
 
  private:
   struct Channel {
     log::Reader::Frames frames;
-    std::optional<v1::Frame> live;  // the next one; nothing after the last
-    std::string difference;         // between it and a replayed frame of the same sequence
+    std::optional<v1::Frame> live;  // the next one; empty after the last
+    std::string difference;         // between `live` and a replayed frame of the same sequence
   };
   struct Stream {
     std::string name;
     std::array<std::optional<Channel>, 2> channels;  // styled, raw
-    std::uint64_t may_lack = 0;                      // frames that gap rows still explain
+    std::uint64_t may_lack = 0;  // missing frames that the log's gap rows account for
   };
   explicit Expectation(std::string file) : file_(std::move(file)) {}
   [[nodiscard]] static std::string how_it_lacks(const Channel& channel);

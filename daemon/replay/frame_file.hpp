@@ -16,7 +16,7 @@ class FrameFile {
   [[nodiscard]] static Result<FrameFile> create(const std::filesystem::path& path);
 
   void add(const v1::Frame& frame);
-  // Tells whether everything is on the disk.
+  // Returns whether everything was written.
   [[nodiscard]] Result<> close();
 
  private:

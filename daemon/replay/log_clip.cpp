@@ -16,7 +16,7 @@
 namespace posed::replay {
 namespace {
 
-// With a skeleton: others have no pose that a clip could hold.
+// Only streams with a skeleton, because others have no pose.
 std::string names_of(const Replay& replay) {
   std::string names;
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
@@ -45,14 +45,14 @@ Result<std::uint32_t> choose(const Replay& replay, const std::string& wanted,
   return *chosen;
 }
 
-// The frames of one stream as they were published, each once.
+// Collects the frames of one stream as they were published, each once.
 class Collector {
  public:
   explicit Collector(std::shared_ptr<const Skeleton> skeleton) : clip_(std::move(skeleton)) {}
 
   void take(const Frame& frame) {
     const Header& header = frame.header;
-    if (header.sequence <= last_) return;  // once more while the stream was stale
+    if (header.sequence <= last_) return;  // repeated while the stream was stale
     missing_ += last_ == 0 ? 0 : header.sequence - last_ - 1;
     last_ = header.sequence;
     arrival_ns_.push_back(header.arrival_ns);
@@ -70,7 +70,8 @@ class Collector {
   }
 
  private:
-  // A device's time restarts with its link, and some have none.
+  // Device times if all frames have them and they increase; a device's time restarts with each
+  // link.
   [[nodiscard]] std::vector<double> times_s() const {
     const bool running = std::ranges::find(device_ns_, kNoTime_ns) == device_ns_.end() &&
                          std::ranges::is_sorted(device_ns_, std::ranges::less_equal());

@@ -1,4 +1,4 @@
-// A device log's stream as a clip: the frames that the run published, replayed. Cold.
+// Turns a stream of a device log into a clip: replays the frames that the run published. Cold.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,9 @@
 
 namespace posed::replay {
 
-// The stream called `stream`; the only one when that is empty. Times are the device's where it has
-// them, else those of arrival, from 0. What the log or the run left out is told in `warnings`.
+// The stream named `stream`; the only one if that is empty. Times are those of the device if it has
+// them, otherwise those of arrival, starting from 0. `warnings` describes what the log or the run
+// left out.
 [[nodiscard]] Result<clip::Clip> clip_of_log(const std::filesystem::path& path,
                                              const std::string& stream);
 

@@ -1,5 +1,5 @@
-// Pace: when the chunks of a log are due in a replay that keeps the recorded times. A silence that
-// nobody would sit through is cut, whether the recording paused or a time in the log is wrong.
+// Pace: when the chunks of a log are due in a replay at the recorded speed. A silence of more than
+// a minute is skipped, whether the recording paused or a time in the log is wrong.
 #pragma once
 
 #include <algorithm>
@@ -14,22 +14,22 @@ namespace posed::replay {
 
 class Pace {
  public:
-  static constexpr std::int64_t kLongestSilence_ns = 60 * kNanosPerSecond;
+  static constexpr std::int64_t kMaxSilence_ns = 60 * kNanosPerSecond;
 
-  // `speed` is above zero: 2 takes half the recorded time.
+  // `speed` is above zero; 2 replays in half the recorded time.
   explicit Pace(double speed) : speed_(speed) {}
 
   struct Step {
     std::int64_t due_ns = 0;      // after the first chunk
-    std::int64_t skipped_ns = 0;  // silence before the chunk that was cut; 0: none
+    std::int64_t skipped_ns = 0;  // the silence before the chunk that was skipped; 0: none
   };
   Step step(const log::ChunkRow& chunk) {
-    // What a calibration carries is the time of whatever came before it, or none.
+    // A calibration's arrival time is only that of the chunk before it, or unset.
     if (static_cast<pipeline::Direction>(chunk.direction) == pipeline::Direction::kCalibration)
       return {due_ns_, 0};
     const std::int64_t since_ns = chunk.arrival_ns - last_ns_.value_or(chunk.arrival_ns);
-    const bool too_long = since_ns > kLongestSilence_ns;
-    const bool back = since_ns < -kLongestSilence_ns;  // a wrong time is over
+    const bool too_long = since_ns > kMaxSilence_ns;
+    const bool back = since_ns < -kMaxSilence_ns;  // the recording has returned from a wrong time
     if (!last_ns_ || too_long || back) {
       last_ns_ = chunk.arrival_ns;
       return {due_ns_, too_long ? since_ns : 0};
@@ -42,7 +42,7 @@ class Pace {
  private:
   double speed_;
   std::int64_t due_ns_ = 0;
-  std::optional<std::int64_t> last_ns_;  // the latest arrival; nothing before the first
+  std::optional<std::int64_t> last_ns_;  // the latest arrival; empty before the first chunk
 };
 
 }  // namespace posed::replay

@@ -10,8 +10,8 @@
 namespace posed::replay {
 namespace {
 
-// More than any posed records; each costs a decoder and an engine.
-constexpr std::size_t kMostStreams = 256;
+// More than any posed records; a limit, because each stream costs a decoder and an engine.
+constexpr std::size_t kMaxStreams = 256;
 
 }  // namespace
 
@@ -20,18 +20,18 @@ Replay::Replay(log::Reader& reader)
 
 Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
   std::unique_ptr<Replay> replay(new Replay(reader));
-  if (auto done = replay->open_lanes(); !done) return std::unexpected(done.error());
+  if (auto done = replay->open_contexts(); !done) return std::unexpected(done.error());
   if (auto done = replay->load_decisions(); !done) return std::unexpected(done.error());
   if (auto done = replay->load_gaps(); !done) return std::unexpected(done.error());
-  for (const auto& lane : replay->lanes_) lane->ready();
+  for (const auto& context : replay->contexts_) context->ready();
   return replay;
 }
 
-Result<> Replay::open_lanes() {
+Result<> Replay::open_contexts() {
   const auto& streams = reader_.streams();
-  if (streams.size() > kMostStreams) {
+  if (streams.size() > kMaxStreams) {
     return fail("holds " + std::to_string(streams.size()) + " streams, and this posed replays " +
-                    std::to_string(kMostStreams) + " at most",
+                    std::to_string(kMaxStreams) + " at most",
                 reader_.file());
   }
   for (const log::StreamRow& row : streams) {
@@ -41,10 +41,10 @@ Result<> Replay::open_lanes() {
                       " has several bodies, which this posed cannot replay; update posed",
                   reader_.file());
     }
-    const auto id = static_cast<std::uint32_t>(lanes_.size());
-    auto lane = ReplayLane::open(id, source, row, models_, *this, reader_.file());
-    if (!lane) return std::unexpected(lane.error());
-    lanes_.push_back(std::move(*lane));
+    const auto id = static_cast<std::uint32_t>(contexts_.size());
+    auto context = ReplayStreamContext::open(id, source, row, models_, *this, reader_.file());
+    if (!context) return std::unexpected(context.error());
+    contexts_.push_back(std::move(*context));
   }
   return {};
 }
@@ -56,7 +56,7 @@ Result<> Replay::load_decisions() {
     const auto decision = record::decision_of(row, reader_.file());
     if (!decision) return std::unexpected(decision.error());
     const std::size_t stream = *reader_.place_of_stream(row.stream);
-    if (auto done = lanes_[stream]->expect(*decision); !done) return done;
+    if (auto done = contexts_[stream]->expect(*decision); !done) return done;
     schedule_.add({stream, std::move(row)});
   }
   return {};
@@ -66,33 +66,36 @@ Result<> Replay::load_gaps() {
   const auto gaps = reader_.gaps();
   if (!gaps) return std::unexpected(gaps.error());
   for (const log::GapRow& gap : *gaps) {
-    for (std::size_t i = 0; i < lanes_.size(); ++i) {
+    for (std::size_t i = 0; i < contexts_.size(); ++i) {
       const log::StreamRow& row = reader_.streams()[i];
       const bool chunks = gap.kind == log::GapRow::Kind::kChunks && row.source == gap.owner;
       const bool decisions = gap.kind == log::GapRow::Kind::kDecisions && row.id == gap.owner;
-      if (chunks || decisions) lanes_[i]->set_gap(gap.after_chunk);
+      if (chunks || decisions) contexts_[i]->set_gap(gap.after_chunk);
     }
   }
   return {};
 }
 
-const ReplayStream& Replay::stream(std::uint32_t stream) const { return lanes_[stream]->stream(); }
-
-std::optional<std::uint64_t> Replay::broken_at(std::uint32_t stream) const {
-  return lanes_[stream]->broken_at();
+const ReplayStream& Replay::stream(std::uint32_t stream) const {
+  return contexts_[stream]->stream();
 }
 
-void Replay::before(const pipeline::Item& item, std::uint32_t lane) noexcept {
-  while (const Schedule::Entry* entry = schedule_.due(item, lane)) apply(*entry);
+std::optional<std::uint64_t> Replay::broken_at(std::uint32_t stream) const {
+  return contexts_[stream]->broken_at();
+}
+
+void Replay::before(const pipeline::Item& item, std::uint32_t index) noexcept {
+  while (const Schedule::Entry* entry = schedule_.due(item, index)) apply(*entry);
 }
 
 void Replay::apply(const Schedule::Entry& entry) noexcept {
-  // It has been read before; keeping what it says would take several times the memory.
+  // The row was already checked; decoding it again here saves several times the memory of keeping
+  // all decoded decisions.
   if (const auto decision = record::decision_of(entry.row, {}))
-    lanes_[entry.stream]->apply(*decision);
+    contexts_[entry.stream]->apply(*decision);
 }
 
-float Replay::alpha(std::uint32_t stream) const { return lanes_[stream]->alpha(); }
+float Replay::alpha(std::uint32_t stream) const { return contexts_[stream]->alpha(); }
 
 Result<> Replay::run(const Out& out, const Pace& pace) {
   out_ = &out;
@@ -102,16 +105,17 @@ Result<> Replay::run(const Out& out, const Pace& pace) {
     if (!chunk) return std::unexpected(chunk.error());
     if (!chunk->has_value()) break;
     if (!pace(**chunk)) return {};
-    for (const auto& lane : lanes_) lane->notice_gap((*chunk)->id);
+    for (const auto& context : contexts_) context->apply_gap((*chunk)->id);
     const auto stream = std::ranges::find(streams, (*chunk)->source, &log::StreamRow::source);
     if (stream == streams.end()) continue;  // a source without a body
-    ReplayLane& lane = *lanes_[static_cast<std::size_t>(stream - streams.begin())];
-    if (auto fed = lane.feed(**chunk); !fed) return fed;
+    ReplayStreamContext& context = *contexts_[static_cast<std::size_t>(stream - streams.begin())];
+    if (auto fed = context.feed(**chunk); !fed) return fed;
   }
-  for (const auto& lane : lanes_) lane->notice_gap(std::numeric_limits<std::int64_t>::max());
+  for (const auto& context : contexts_)
+    context->apply_gap(std::numeric_limits<std::int64_t>::max());
   while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry);
-  for (const auto& lane : lanes_) {
-    if (auto done = lane->finish(!reader_.counts_items()); !done) return done;
+  for (const auto& context : contexts_) {
+    if (auto done = context->finish(!reader_.counts_items()); !done) return done;
   }
   return {};
 }

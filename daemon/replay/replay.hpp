@@ -1,5 +1,6 @@
-// Replay: recomputes what a device log's run published, from its chunks and decisions alone, with
-// the decoders and engines of the live run. No thread, no clock: whoever drives it paces it. Cold.
+// Replay computes again what a device log's run published, from the log's chunks and decisions
+// alone, with the decoders and engines of the live run. It has no thread and no clock; the caller
+// decides its speed. Cold.
 #pragma once
 
 #include <cstdint>
@@ -10,25 +11,27 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
-#include "daemon/replay/replay_lane.hpp"
 #include "daemon/replay/replay_models.hpp"
+#include "daemon/replay/replay_stream_context.hpp"
 #include "daemon/replay/schedule.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/reader.hpp"
 
 namespace posed::replay {
 
-// Streams are numbered by their place in Reader::streams(), whatever their ids in the log are.
-class Replay final : private LaneHost {
+// Streams are numbered by their index in Reader::streams(), whatever their ids in the log are.
+class Replay final : private ReplayHost {
  public:
   // Builds decoders, models and engines of all streams. The reader outlives the replay.
   [[nodiscard]] static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
   ~Replay() override = default;
 
-  [[nodiscard]] std::uint32_t streams() const { return static_cast<std::uint32_t>(lanes_.size()); }
+  [[nodiscard]] std::uint32_t streams() const {
+    return static_cast<std::uint32_t>(contexts_.size());
+  }
   [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
-  // Where the slew of the stream's style is, while run() lasts and afterwards; 0 without a style.
+  // The stream's current alpha, during run() and afterwards; 0 without a style stage.
   [[nodiscard]] float alpha(std::uint32_t stream) const;
 
   // Items in pipeline order.
@@ -37,26 +40,26 @@ class Replay final : private LaneHost {
   using Pace = std::function<bool(const log::ChunkRow&)>;
   [[nodiscard]] Result<> run(const Out& out, const Pace& pace);
 
-  // While run() lasts and afterwards: the first frame number of a stream from which on the log is
-  // known to lack chunks or decisions; what comes later cannot be compared.
+  // During run() and afterwards: the first frame of a stream from which the log is known to lack
+  // chunks or decisions; frames from there on cannot be compared.
   [[nodiscard]] std::optional<std::uint64_t> broken_at(std::uint32_t stream) const;
 
  private:
   explicit Replay(log::Reader& reader);
-  [[nodiscard]] Result<> open_lanes();
+  [[nodiscard]] Result<> open_contexts();
   [[nodiscard]] Result<> load_decisions();
   [[nodiscard]] Result<> load_gaps();
   void apply(const Schedule::Entry& entry) noexcept;
 
-  // LaneHost
-  void before(const pipeline::Item& item, std::uint32_t lane) noexcept override;
+  // ReplayHost
+  void before(const pipeline::Item& item, std::uint32_t index) noexcept override;
   void publish(const pipeline::Item& item) noexcept override { (*out_)(item); }
 
   log::Reader& reader_;
   ReplayModels models_;
-  std::vector<std::unique_ptr<ReplayLane>> lanes_;
+  std::vector<std::unique_ptr<ReplayStreamContext>> contexts_;
   Schedule schedule_;
-  const Out* out_ = nullptr;  // of the run in progress
+  const Out* out_ = nullptr;  // of the current run()
 };
 
 }  // namespace posed::replay

@@ -9,7 +9,7 @@ namespace {
 
 std::string name_of(const std::string& hash) { return "the log's model " + hash.substr(0, 12); }
 
-// The model kept under a hash, read at its first use.
+// The model stored under a hash; reads it at its first use.
 template <typename Model, typename Parse>
 Result<const Model*> find_or_read(std::map<std::string, Model>& models, const std::string& hash,
                                   const log::Reader& reader, Parse&& parse) {

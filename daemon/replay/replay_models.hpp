@@ -1,5 +1,6 @@
-// ReplayModels: the models that a log's streams and decisions name, each read once, before anything
-// is replayed. A swap gets a freshly bound one, as live: a model may carry state of its use. Cold.
+// ReplayModels: the models that a log's streams and decisions name, each read once before the
+// replay starts. Each swap gets a newly bound model, as in the live run, because a model may carry
+// state from its use. Cold.
 #pragma once
 
 #include <map>
@@ -20,8 +21,8 @@ class ReplayModels {
   // The reader outlives it.
   explicit ReplayModels(const log::Reader& reader) : reader_(reader) {}
 
-  // Bound to the device's skeleton, which is there. Errors name the model. What has been bound once
-  // can be bound again.
+  // Binds the model to the device's skeleton, which must be present. Errors name the model. If
+  // binding has succeeded once it succeeds again.
   [[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> style(
       const std::string& hash, const drivers::Description& device,
       const style::FilterOptions& options);

@@ -1,6 +1,6 @@
-// Schedule: when each decision of a log takes effect. Format 3 places all decisions in one order,
-// each just before an item; the older formats place each just before a frame of its own stream.
-// Cold.
+// Schedule: when each decision of a log takes effect. In format 3 all decisions have one order,
+// each just before an item; in older formats each takes effect just before a frame of its own
+// stream. Cold.
 #pragma once
 
 #include <cstddef>
@@ -15,20 +15,20 @@ namespace posed::replay {
 class Schedule {
  public:
   struct Entry {
-    std::size_t stream = 0;  // by place in the log
+    std::size_t stream = 0;  // index of the stream in the log
     log::DecisionRow row;
   };
 
   Schedule(std::size_t streams, bool counts_items)
       : counts_items_(counts_items), queues_(counts_items ? 1 : streams) {}
 
-  // In the order of the log.
+  // Call in the order of the log.
   void add(Entry entry) {
     queues_[counts_items_ ? 0 : entry.stream].waiting.push_back(std::move(entry));
   }
 
-  // The next decision that takes effect before `item`; null when none is left that does. Stays
-  // valid.
+  // The next decision that takes effect before `item`; null if none is left that does. The pointer
+  // stays valid.
   [[nodiscard]] const Entry* due(const pipeline::Item& item, std::size_t stream) {
     Queue& queue = queues_[counts_items_ ? 0 : stream];
     if (queue.next == queue.waiting.size()) return nullptr;
@@ -38,7 +38,8 @@ class Schedule {
     return &entry;
   }
 
-  // After the last item: what was decided when none came any more.
+  // Call after the last item: the decisions that were made when no more items came; null after the
+  // last.
   [[nodiscard]] const Entry* rest() {
     for (Queue& queue : queues_) {
       if (queue.next < queue.waiting.size()) return &queue.waiting[queue.next++];

@@ -1,5 +1,5 @@
-// ShedRanges: the frames, or samples, of a stream that were decoded live but never reached its
-// engine. Cold.
+// ShedRanges: the frames (or samples) of a stream that were decoded in the live run but never
+// reached its engine. Cold.
 #pragma once
 
 #include <algorithm>
@@ -11,10 +11,11 @@ namespace posed::replay {
 
 class ShedRanges {
  public:
-  // first + count does not overflow.
+  // first + count must not overflow.
   void add(std::uint64_t first, std::uint64_t count) { ranges_.push_back({first, first + count}); }
 
-  // After the last add(): overlapping ranges become one, so that contains() may search.
+  // Call after the last add(): joins overlapping ranges, so that contains() can use a binary
+  // search.
   void finish() {
     std::ranges::sort(ranges_, {}, &Range::first);
     std::vector<Range> joined;
@@ -38,7 +39,7 @@ class ShedRanges {
     std::uint64_t first = 0;
     std::uint64_t end = 0;  // the first that is not shed
   };
-  std::vector<Range> ranges_;  // after finish() in order and apart
+  std::vector<Range> ranges_;  // after finish() sorted and without overlap
 };
 
 }  // namespace posed::replay

@@ -1,4 +1,5 @@
-// The daemon's clock: CLOCK_MONOTONIC. Handed down to whatever must know the time.
+// The daemon's clock: CLOCK_MONOTONIC. It is passed as a parameter to everything that needs the
+// time, so that tests can use another one.
 #pragma once
 
 #include <cstdint>

@@ -31,8 +31,8 @@ Result<std::unique_ptr<EventFd>> EventFd::open() {
 EventFd::~EventFd() { close(fd_); }
 
 void EventFd::notify() noexcept {
-  // Both sides exchange the flag: whichever comes second sees what the other did before, so either
-  // the consumer finds the new element or we find it asleep.
+  // Both sides exchange the flag, and the later exchange sees what the other side did before:
+  // either the consumer finds the new element, or this thread finds the consumer asleep.
   if (!asleep_.exchange(false, std::memory_order_acq_rel)) return;
   const std::uint64_t one = 1;
   const AllowedCall allowed;

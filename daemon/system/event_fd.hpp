@@ -1,5 +1,5 @@
-// How one thread waits: a EventFd (eventfd) that other threads ring, and a Poller (epoll) that
-// waits for it and for devices until a deadline. One EventFd per consuming thread.
+// How a thread waits: an EventFd (eventfd) that other threads notify, and a Poller (epoll) that
+// waits for it and for devices until a deadline. Each consuming thread has one EventFd.
 #pragma once
 
 #include <algorithm>
@@ -22,13 +22,13 @@ class EventFd {
   EventFd(const EventFd&) = delete;
   EventFd& operator=(const EventFd&) = delete;
 
-  // Any thread, after it has put something where the consumer looks. Writes to the eventfd only
-  // when the consumer sleeps. RT-safe but for that one write.
+  // Any thread, after it has put something where the consumer looks. Writes to the eventfd only if
+  // the consumer sleeps. RT-safe except for that one write.
   void notify() noexcept;
 
-  // The consumer, before its last look at its rings: from here on notify() writes.
+  // Consumer, before its last look at its rings: from now on notify() writes to the eventfd.
   void going_to_sleep() noexcept { asleep_.exchange(true, std::memory_order_acq_rel); }
-  // The consumer, back from its wait.
+  // Consumer, after its wait.
   void awake() noexcept { asleep_.exchange(false, std::memory_order_acq_rel); }
 
   [[nodiscard]] int fd() const noexcept { return fd_; }
@@ -37,19 +37,20 @@ class EventFd {
   explicit EventFd(int fd) noexcept : fd_(fd) {}
   int fd_;
   // No wake-up is missed, on any memory model. Every change of the flag is an exchange with acquire
-  // and release, so each one synchronizes with all before it in the flag's modification order (a
-  // chain of read-modify-writes keeps a release sequence whole). Say a producer puts an element in
-  // and its exchange finds false, so that it writes nothing. The consumer's next exchange, in
-  // awake() or going_to_sleep(), comes after the producer's and so sees the element at the look
-  // that follows it; it cannot have come before, or the producer would have found its true. A plain
-  // store in awake() would cut the chain: a second producer could find false between the first
-  // one's write and that store, and its element would be visible to nobody in particular.
+  // and release, so each one synchronizes with all earlier ones in the flag's modification order (a
+  // chain of read-modify-writes keeps a release sequence whole). Suppose a producer adds an element
+  // and its exchange returns false, so it does not write. The consumer's next exchange, in awake()
+  // or going_to_sleep(), must come after the producer's, because otherwise the producer would have
+  // seen the consumer's true; so the consumer sees the element at its next look. A plain store in
+  // awake() would break the chain: a second producer could read false between the first producer's
+  // write and that store, and then nothing would guarantee that the consumer sees the second
+  // producer's element.
   std::atomic<bool> asleep_{false};
 };
 
 inline constexpr std::int64_t kForever_ns = std::numeric_limits<std::int64_t>::max();
 
-// How long a thread may sleep whose next turn is due then; never negative. RT-safe.
+// How long a thread may sleep when its next turn is due at `due_ns`; never negative. RT-safe.
 [[nodiscard]] inline std::int64_t time_left_ns(std::int64_t due_ns, Clock clock) noexcept {
   return due_ns == kForever_ns ? kForever_ns : std::max<std::int64_t>(due_ns - clock(), 0);
 }
@@ -61,15 +62,16 @@ class Poller {
   Poller(const Poller&) = delete;
   Poller& operator=(const Poller&) = delete;
 
-  // A EventFd: edge-triggered, so that it never needs to be read.
+  // An EventFd: edge-triggered, so that it never needs to be read.
   [[nodiscard]] Result<> add(const EventFd& wake);
-  // A device's descriptor: level-triggered; `key` comes back from wait().
+  // A device's descriptor: level-triggered; wait() returns its `key`.
   [[nodiscard]] Result<> add(int fd, std::uint32_t key);
-  // A device that has ended: its descriptor would stay readable for ever.
+  // For a device that has ended: its descriptor would stay readable for ever.
   void remove(int fd) noexcept;
 
-  // Sleeps until something is ready or for `timeout_ns`; returns the keys of the ready devices
-  // (the EventFd has none), valid until the next wait. One system call, RT-safe but for it.
+  // Sleeps until something is ready or `timeout_ns` has passed; returns the keys of the ready
+  // devices (an EventFd has none), valid until the next wait. One system call; RT-safe except for
+  // it.
   [[nodiscard]] std::span<const std::uint32_t> wait(std::int64_t timeout_ns) noexcept;
 
  private:

@@ -1,7 +1,7 @@
-// Marks by which the hot threads declare where the real-time contract holds: no allocation, lock,
-// log or exception, and no system call but the read, the wait and the eventfd write. They cost a
-// byte store each. The rt test watches them, and hands the address of no_syscalls to the kernel,
-// which then reports every system call made while it is 1.
+// Marks with which the hot threads declare where the real-time contract holds: no allocation, lock,
+// log or exception, and no system call except the read, the wait and the eventfd write. Setting a
+// mark costs one byte store. The rt test checks the marked code, and passes the address of
+// no_syscalls to the kernel, which then reports every system call that is made while it is 1.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 namespace posed::system {
 
 struct HotMarks {
-  volatile std::uint8_t contract = 0;     // 1: no allocation, lock, log or throw
-  volatile std::uint8_t no_syscalls = 0;  // 1: no system call either
+  volatile std::uint8_t contract = 0;     // 1: no allocation, lock, log or throw allowed
+  volatile std::uint8_t no_syscalls = 0;  // 1: no system call allowed either
 };
 inline constinit thread_local HotMarks hot_marks;
 
@@ -28,7 +28,7 @@ class [[nodiscard]] HotSection {
   HotSection& operator=(const HotSection&) = delete;
 };
 
-// Around the one system call that the contract allows: the read, the wait or the eventfd write.
+// Encloses the one system call that the contract allows: the read, the wait or the eventfd write.
 class [[nodiscard]] AllowedCall {
  public:
   AllowedCall() noexcept { hot_marks.no_syscalls = 0; }

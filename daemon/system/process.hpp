@@ -1,4 +1,4 @@
-// What this process uses of the machine. Cold.
+// Resources that this process uses. Cold.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 namespace posed::system {
 
 [[nodiscard]] std::uint64_t resident_bytes();
-// CPU time of all its threads since it began.
+// CPU time of all threads since the process began.
 [[nodiscard]] std::int64_t cpu_time_ns();
 
 }  // namespace posed::system

@@ -17,7 +17,7 @@ bool become_fifo(int priority) {
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &wanted) == 0;
 }
 
-// Tried on the calling thread, which goes back to what it was.
+// Tries SCHED_FIFO on the calling thread, then restores the thread's scheduling.
 bool may_be_fifo() {
   if (!become_fifo(kReaderPriority)) return false;
   const sched_param ordinary{.sched_priority = 0};
@@ -44,7 +44,7 @@ void name_thread(const std::string& name) {
 
 void enter_hot_thread(const char* name, int priority) {
   name_thread(name);
-  prctl(PR_SET_TIMERSLACK, 1UL);  // waits end on time, not up to 50 us later
+  prctl(PR_SET_TIMERSLACK, 1UL);  // waits end on time instead of up to 50 us late
   if (priority > 0) static_cast<void>(become_fifo(priority));
 }
 

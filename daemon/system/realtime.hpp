@@ -1,23 +1,25 @@
-// What the operating system can do for threads that must wake on time. Cold; refusal is no error.
+// Asks the operating system for what threads need that must wake on time. Cold. A refusal is not an
+// error.
 #pragma once
 
 #include <string>
 
 namespace posed::system {
 
-// Priorities under SCHED_FIFO: nearer to the device is more urgent.
+// Priorities under SCHED_FIFO: a thread closer to the device has a higher one.
 inline constexpr int kReaderPriority = 12;
 inline constexpr int kPipelinePriority = 11;
 inline constexpr int kPublisherPriority = 10;
 
-// Keeps the process's memory in RAM, and asks whether threads may be SCHED_FIFO. Warns, once, when
-// either is refused; returns the answer to the second.
+// Locks the process's memory in RAM and tests whether threads may use SCHED_FIFO. Warns once if
+// either is refused. Returns whether SCHED_FIFO is allowed.
 [[nodiscard]] bool ask_for_realtime();
 
-// Names the calling thread: at most 15 letters are kept.
+// Names the calling thread; only the first 15 letters are kept.
 void name_thread(const std::string& name);
 
-// Names the calling thread and makes its timers exact; with `priority` > 0 it becomes SCHED_FIFO.
+// Names the calling thread and makes its timers exact; with `priority` > 0 the thread also becomes
+// SCHED_FIFO.
 void enter_hot_thread(const char* name, int priority);
 
 }  // namespace posed::system

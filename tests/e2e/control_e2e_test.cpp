@@ -91,7 +91,7 @@ TEST_CASE("completion is generated from the existing commands") {
 TEST_CASE("an absent daemon gives one error message") {
   const auto ctl = posed({"ctl", "--connect", "tcp://127.0.0.1:9", "--timeout", "0.3", "status"});
   CHECK(ctl.code == 1);
-  CHECK(has(ctl.err, "posed: nobody answers at tcp://127.0.0.1:9"));
+  CHECK(has(ctl.err, "posed: nothing answers at tcp://127.0.0.1:9"));
   const auto wrong = posed({"ctl", "--connect", "nonsense", "status"});
   CHECK(wrong.code == 2);
   CHECK(has(wrong.err, "an endpoint reads like"));

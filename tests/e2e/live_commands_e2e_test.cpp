@@ -98,7 +98,7 @@ TEST_CASE("a daemon that is gone is not shown as live") {
 TEST_CASE("commands that wait for a daemon report what they wait for") {
   for (const char* command : {"top", "monitor"}) {
     Process waits({command, "--connect", kNobody, "--json"});
-    CHECK(comes_to_say(waits, "posed: waiting: nobody answers at tcp://127.0.0.1:9"));
+    CHECK(comes_to_say(waits, "posed: waiting: nothing answers at tcp://127.0.0.1:9"));
     waits.send(SIGINT);
     CHECK(waits.exit_code() == 0);
     const Outcome gives_up =

@@ -149,7 +149,7 @@ TEST_CASE("a full disk stops the recording and not the stream, and is counted an
     errors = std::stoull(stats.value("recorderErrors", "0"));
   }
   CHECK(errors > 0);
-  CHECK(has(served.daemon->errors(), "recording stopped, streaming goes on"));
+  CHECK(has(served.daemon->errors(), "recording stopped, streaming continues"));
   const Outcome seen = posed({"monitor", "--connect", publish, "--json", "--count", "30"});
   INFO(seen.err);
   CHECK(seen.code == 0);

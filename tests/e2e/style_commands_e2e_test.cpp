@@ -189,19 +189,19 @@ TEST_CASE("no command destroys a file: wrong names, inputs and files that exist 
   const auto refused = [&](const Outcome& done, const std::string& why) {
     return done.code == 2 && has(done.err, why);
   };
-  CHECK(refused(apply("out.csv"), "what is written here is .bvh"));
+  CHECK(refused(apply("out.csv"), "does not end in .bvh"));
   CHECK_FALSE(studio.there("out.csv"));
   CHECK(refused(apply("march_1.bvh", {"--overwrite"}), "is read by this command"));
   CHECK(refused(apply("sway_1.bvh"), "add --overwrite"));
   CHECK(apply("sway_1.bvh", {"--overwrite"}).code == 0);
   CHECK(refused(studio.experiment({}, "m.style"), "add --overwrite"));
-  CHECK(refused(studio.experiment({"--overwrite"}, "exp.toml"), "what is written here is .style"));
+  CHECK(refused(studio.experiment({"--overwrite"}, "exp.toml"), "does not end in .style"));
   CHECK(refused(posed({"convert", studio.path("march_1.bvh"), "--out", studio.path("march_1.bvh"),
                        "--overwrite"}),
                 "is read by this command"));
   CHECK(refused(
       posed({"convert", studio.path("march_1.bvh"), "--rate", "60", "--out", studio.path("c.bvh")}),
-      "--rate means nothing"));
+      "--rate has no effect"));
   CHECK(studio.bytes("m.style") == model);
   CHECK(studio.bytes("march_1.bvh") == walk);
 }

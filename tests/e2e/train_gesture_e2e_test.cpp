@@ -147,7 +147,7 @@ TEST_CASE("What cannot be trained from is refused", "[train_gesture]") {
   CHECK(one_sentence(glove.train("x.gesture", {"--trees", "middle"}), 2, "add --tree-text"));
   CHECK(one_sentence(glove.train("x.lab", {"--auto-label", "--questions", "q.toml"}), 2,
                      "--auto-label only proposes labels"));
-  CHECK(one_sentence(glove.train("take.csv"), 2, "what is written here is .gesture"));
+  CHECK(one_sentence(glove.train("take.csv"), 2, "does not end in .gesture"));
   CHECK(one_sentence(glove.train("take.lab", {"--auto-label", "--overwrite"}), 2,
                      "is read by this command"));
   CHECK(one_sentence(glove.train("x.gesture", {"--show", "three"}), 2, "shows no pose"));

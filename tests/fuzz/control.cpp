@@ -61,7 +61,7 @@ std::vector<control::ControlledStream> two_streams() {
   return streams;
 }
 
-void check(const control::Answer& answer) {
+void check(const control::Reply& answer) {
   v1::ControlReply reply;
   if (!reply.ParseFromString(answer.bytes)) std::abort();
   if (!reply.ok() && reply.error().empty()) std::abort();

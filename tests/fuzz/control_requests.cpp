@@ -128,7 +128,7 @@ struct Fixture {
       check(answer);
     }
   }
-  static void check(const std::optional<control::Answer>& answer) {
+  static void check(const std::optional<control::Reply>& answer) {
     if (!answer) return;
     v1::ControlReply reply;
     demand(reply.ParseFromString(answer->bytes));
@@ -145,7 +145,7 @@ void send_model(FuzzedDataProvider& data, Fixture& fixture, const std::string& c
   part.set_name(data.ConsumeRandomLengthString(10));
   part.set_sha256(log::sha256_hex(std::as_bytes(std::span(model))));
   const std::size_t size =
-      data.ConsumeIntegralInRange<std::size_t>(model.size() / 8 + 1, control::kLargestPiece);
+      data.ConsumeIntegralInRange<std::size_t>(model.size() / 8 + 1, control::kMaxPiece);
   for (std::size_t offset = 0; offset < model.size(); offset += size) {
     const bool wrong = data.ConsumeIntegralInRange(0, 15) == 1;
     part.set_total(wrong ? data.ConsumeIntegral<std::uint64_t>() : model.size());

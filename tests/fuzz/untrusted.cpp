@@ -46,7 +46,7 @@ void try_subscriptions(FuzzedDataProvider& data) {
     } else if (!subscriptions.ask(peer, topic(data), data.ConsumeBool(), now_ns)) {
       subscriptions.forget(peer);  // the publisher cuts it off
     }
-    demand(subscriptions.wanted() <= publish::kMostWanted);
+    demand(subscriptions.wanted() <= publish::kMaxWanted);
   }
   for (const int peer : {0, 1, 2, 3}) subscriptions.forget(peer);
   demand(subscriptions.wanted() == 0);
@@ -64,7 +64,7 @@ void try_gatekeeper(FuzzedDataProvider& data) {
 void try_uploads(FuzzedDataProvider& data) {
   control::Uploads uploads;
   const std::string sha256(64, 'a');
-  const std::string bytes(control::kLargestPiece + 1, 'b');
+  const std::string bytes(control::kMaxPiece + 1, 'b');
   std::int64_t now_ns = 0;
   std::array<std::uint64_t, 4> offset{};
   while (data.remaining_bytes() > 0) {
@@ -73,7 +73,7 @@ void try_uploads(FuzzedDataProvider& data) {
     control::ModelPiece piece{
         .stream = "s",
         .sha256 = sha256,
-        .total = control::kLargestModel,
+        .total = control::kMaxModel,
         .offset = offset[client],
         .bytes = std::string_view(bytes).substr(0, data.ConsumeIntegral<std::uint16_t>())};
     if (data.ConsumeIntegralInRange(0, 7) == 0)
@@ -82,7 +82,7 @@ void try_uploads(FuzzedDataProvider& data) {
     const auto taken = uploads.take(std::to_string(client), piece, now_ns);
     demand(!taken || !*taken);  // no piece has the right checksum
     offset[client] = taken ? piece.offset + piece.bytes.size() : 0;
-    demand(uploads.bytes() <= control::kLargestModel);
+    demand(uploads.bytes() <= control::kMaxModel);
   }
   (void)uploads.forget_old(now_ns + 1'000'000'000'000);
   demand(uploads.bytes() == 0);

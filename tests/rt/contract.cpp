@@ -32,7 +32,8 @@ void note(Breach breach) noexcept {
   if (hot_marks.contract != 0) counts[static_cast<std::size_t>(breach)].fetch_add(1);
 }
 
-// The library's own function behind one of ours. Looked up before main(), so never in hot code.
+// The library's function behind one that is replaced here. Looked up before main(), so never in hot
+// code.
 template <typename Function>
 Function* behind(const char* name) noexcept {
   return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
@@ -47,8 +48,8 @@ class CountingSink final : public spdlog::sinks::sink {
 };
 
 #if defined(__x86_64__)
-// The kernel did not make the call but sent SIGSYS: counts it, then makes it, so that the thread
-// goes on. The mark stays off until the next allowed call.
+// The kernel did not execute the call but sent SIGSYS: counts the call, then executes it, so that
+// the thread continues. The mark stays off until the next allowed call.
 void on_forbidden_call(int /*signal*/, siginfo_t* info, void* context) {
   hot_marks.no_syscalls = 0;
   note(Breach::kSystemCall);
@@ -99,7 +100,8 @@ bool watch_system_calls() noexcept {
 
 }  // namespace posed::rt
 
-// What stands before the library's functions. The executable's symbols win over shared libraries'.
+// Replacements of library functions. The executable's symbols take precedence over those of shared
+// libraries.
 namespace {
 using posed::rt::behind;
 using posed::rt::Breach;
@@ -140,7 +142,7 @@ void free(void* block) noexcept {
 }
 int pthread_mutex_lock(pthread_mutex_t* mutex) noexcept {
   note(Breach::kLock);
-  // Before our own constructors have run, libraries' may lock: there is one thread then.
+  // Before the constructors of this file have run, libraries may lock; only one thread exists then.
   return kMutexLock != nullptr ? kMutexLock(mutex) : 0;
 }
 int pthread_rwlock_rdlock(pthread_rwlock_t* lock) noexcept {

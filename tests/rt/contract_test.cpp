@@ -1,5 +1,5 @@
-// The real-time contract holds on the real reader and pipeline threads; and each way of breaking
-// it, put into those threads on purpose, is found.
+// The real-time contract holds on the real reader and pipeline threads, and each kind of violation
+// is detected when it is put into those threads on purpose.
 #include <spdlog/spdlog.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -28,8 +28,8 @@ namespace {
 
 using pipeline::Command;
 
-// A record_sink that keeps the contract itself; the recorder's has tests of its own.
-class CountingTape final : public pipeline::RecordSink {
+// A record sink that keeps the contract itself; the recorder's own sink has its own tests.
+class CountingSink final : public pipeline::RecordSink {
  public:
   void chunk(std::uint32_t, std::uint8_t, pipeline::Direction, std::int64_t,
              const pipeline::Position&, std::span<const std::byte>) noexcept override {
@@ -49,7 +49,7 @@ drivers::Device open_device(const char* driver, const drivers::Options& options)
   return drivers::find_driver(driver)->open(options, ports).value();
 }
 
-// Breaks the contract once, at the fifth chunk.
+// Violates the contract once, at the fifth chunk.
 class BreakingDecoder final : public drivers::Decoder {
  public:
   BreakingDecoder(std::unique_ptr<drivers::Decoder> inner, std::function<void()> breach)
@@ -80,7 +80,7 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   const test::TempFolder folder;
   const auto path = folder.path() / "toy.bvh";
   REQUIRE(clip::write_bvh(test::toy_walk(120, 120.0), path));
-  CountingTape record_sink;
+  CountingSink record_sink;
   const auto device = open_device("file", {{"path", path.string()}});
   const Skeleton& skeleton = *device.description.skeleton;
   const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
@@ -89,7 +89,7 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   streams.push_back(
       {.device = open_device("file", {{"path", path.string()}}), .style = first.get()});
   streams.push_back({.device = open_device("template", {})});
-  // Once through at 20 times its speed: ends, and is silent before that is noticed.
+  // Plays once at 20 times its speed, so it ends, and is silent until the end is noticed.
   streams.push_back(
       {.device = open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}}),
        .style = first.get()});
@@ -107,19 +107,18 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   check_no_breach();
 }
 
-TEST_CASE(
-    "hands keep the real-time contract: smoothed, constrained, performing, given another model",
-    "[rt]") {
+TEST_CASE("hands keep the real-time contract: smoothed, constrained, performing, with a new model",
+          "[rt]") {
   watch_log();
   const test::TempFolder folder;
   const auto path = folder.path() / "hand.csv";
   const auto signer = gesture::make_performance({.person = 3, .gestures = 6}).value();
   REQUIRE(clip::write_hand_csv(signer.clip, path));
-  CountingTape record_sink;
+  CountingSink record_sink;
   std::vector<RigStream> streams;
   streams.push_back({.device = open_device("file", {{"path", path.string()}, {"pace", 4.0}})});
   streams.push_back({.device = open_device("labels", {{"rate_hz", 120.0}})});
-  // Falls silent with frames in the smoother, and performs on.
+  // Falls silent while frames wait in the smoother, and performs.
   streams.push_back(
       {.device = open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}})});
   std::vector<std::unique_ptr<const generate::BoundModel>> models;
@@ -149,9 +148,10 @@ TEST_CASE(
   check_no_breach();
 }
 
-TEST_CASE("a glove keeps the real-time contract: read, calibrated, felt, lost and found", "[rt]") {
+TEST_CASE("a glove keeps the real-time contract: read, calibrated, vibrated, unplugged and back",
+          "[rt]") {
   watch_log();
-  CountingTape record_sink;
+  CountingSink record_sink;
   const auto plug_in = [] {
     auto emulator =
         drivers::find_driver("lucidgloves")
@@ -206,7 +206,7 @@ TEST_CASE("a glove keeps the real-time contract: read, calibrated, felt, lost an
   }
 }
 
-TEST_CASE("each way of breaking the real-time contract is found", "[rt]") {
+TEST_CASE("each kind of violation of the real-time contract is detected", "[rt]") {
   watch_log();
   struct Way {
     Breach breach;

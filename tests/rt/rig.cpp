@@ -74,7 +74,7 @@ int Rig::take_frames(int frames) {
       if (item.kind == pipeline::Item::Kind::kFrame) ++came;
     });
     if (any) continue;
-    // Asleep, so that the pipeline thread has to ring.
+    // Marked as asleep, so that the pipeline thread has to write to the eventfd.
     publisher_wake_->going_to_sleep();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }

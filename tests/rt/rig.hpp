@@ -1,5 +1,5 @@
-// The real reader and pipeline threads on real clips, as the daemon runs them, with the real-time
-// contract watched on both.
+// The real reader and pipeline threads with real clips, as the daemon runs them, with the real-time
+// contract checked on both.
 #pragma once
 
 #include <functional>
@@ -13,12 +13,12 @@
 
 namespace posed::rt {
 
-// A stream of the rig, with the stages that its models are for.
+// A stream of the rig; it has the stages for which it has models.
 struct RigStream {
   drivers::Device device;
   const style::BoundModel* style = nullptr;
   const generate::BoundModel* gesture = nullptr;
-  pipeline::DeviceSlot* slot = nullptr;  // for a device that goes and comes
+  pipeline::DeviceSlot* slot = nullptr;  // for a device that can be unplugged
 };
 
 class Rig {
@@ -28,14 +28,14 @@ class Rig {
 
   void start();
   // Takes items from the pipeline until `frames` styled frames have come; returns how many came
-  // before ten seconds were over.
+  // within ten seconds.
   int take_frames(int frames);
-  // Puts a command where control would.
+  // Sends a command, as control would.
   void command(const pipeline::Command& command);
   void command(const pipeline::DeviceCommand& command);
-  // There is something in a stream's slot.
+  // Tells the reader that a stream's slot has something.
   void call_reader() { reader_->call(); }
-  // Acknowledgements that have come.
+  // Takes the waiting acknowledgements and returns how many there were.
   [[nodiscard]] int take_acks();
   [[nodiscard]] bool system_calls_watched() const noexcept { return watched_.load() == 2; }
 

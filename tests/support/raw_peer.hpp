@@ -70,7 +70,7 @@ class RawPeer {
     address.sin_port = htons(static_cast<std::uint16_t>(port));
     if (connect(fd_, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) {
       close(fd_);
-      throw std::runtime_error("nobody listens at " + endpoint);
+      throw std::runtime_error("nothing listens at " + endpoint);
     }
   }
   ~RawPeer() {

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::int64_t kBegin_ns = 1'000'000'000'000;
 constexpr std::int64_t kLogWriterEvery_ns = 50'000'000;
-constexpr std::int64_t kLongestHoldup_ns = 400'000'000;
+constexpr std::int64_t kMaxHoldup_ns = 400'000'000;
 constexpr int kTurnsBetweenHoldups = 400;
 constexpr int kItemsPublishedATurn = 32;
 
@@ -66,8 +66,8 @@ class ScriptedTransport final : public drivers::Transport {
 }  // namespace
 
 // One stream of the running daemon, with everything that its parts borrow.
-struct Lane {
-  Lane(VirtualStream script, std::uint32_t number)
+struct VirtualStreamContext {
+  VirtualStreamContext(VirtualStream script, std::uint32_t number)
       : stream(std::move(script)), id(number), styled(stream.name), raw(stream.name + "-raw") {
     slot.supervisor = system::EventFd::open().value();
     stream.settings.rate_hz = stream.description.rate_hz;
@@ -97,7 +97,7 @@ struct Lane {
     return calibrations.back().get();
   }
 
-  // The device of the next link that is there by now; null: none.
+  // The device of the next link, if it is connected by now; otherwise null.
   drivers::Device* next_device() {
     if (device || next_link == stream.links.size()) return nullptr;
     const ScriptedLink& link = stream.links[next_link];
@@ -119,7 +119,7 @@ struct Lane {
   std::uint32_t id;
   pipeline::StreamCounters counters;
   pipeline::DeviceSlot slot;
-  std::unique_ptr<drivers::Device> device;  // the link in use
+  std::unique_ptr<drivers::Device> device;  // of the link in use
   std::size_t next_link = 0;
   std::vector<std::unique_ptr<const style::BoundModel>> styles;
   std::vector<std::unique_ptr<const generate::BoundModel>> gestures;
@@ -135,7 +135,7 @@ class VirtualDaemon::Parts {
   void run(double until_s);
 
   VirtualOptions options;
-  std::vector<std::unique_ptr<Lane>> lanes;
+  std::vector<std::unique_ptr<VirtualStreamContext>> contexts;
   std::vector<VirtualCommand> script;
   std::vector<pipeline::Ack> acks_taken;
 
@@ -152,11 +152,11 @@ class VirtualDaemon::Parts {
 
   void open();
   void open_log();
-  [[nodiscard]] pipeline::EngineOptions engine_of(Lane& lane) const;
+  [[nodiscard]] pipeline::EngineOptions engine_of(VirtualStreamContext& context) const;
   void take_turn(Part part);
   [[nodiscard]] std::int64_t due_ns(Part part) const;
   void publish(int most);
-  void publish_frame(Lane& lane, const pipeline::Item& item);
+  void publish_frame(VirtualStreamContext& context, const pipeline::Item& item);
   void speak(const VirtualCommand& command, std::uint64_t ticket);
   void keep_devices();
   void stop();
@@ -175,15 +175,15 @@ class VirtualDaemon::Parts {
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
   std::size_t next_command = 0;
-  std::array<std::int64_t, kParts> due{};            // as the part's last turn said
-  std::array<std::int64_t, kParts> held_until_ns{};  // no turn before
+  std::array<std::int64_t, kParts> due{};            // as returned by the part's last turn
+  std::array<std::int64_t, kParts> held_until_ns{};  // no turn before this time
 };
 
 void VirtualDaemon::Parts::open_log() {
   if (options.log.empty()) return;
   std::vector<record::RecordedStream> streams;
-  for (const auto& lane : lanes) {
-    const VirtualStream& stream = lane->stream;
+  for (const auto& context : contexts) {
+    const VirtualStream& stream = context->stream;
     const auto style = bytes_of(stream.style_model), gesture = bytes_of(stream.gesture_model);
     streams.push_back({.source = {.id = 0,
                                   .name = stream.name,
@@ -201,16 +201,16 @@ void VirtualDaemon::Parts::open_log() {
   auto writer = record::begin_log(recorder, streams);
   REQUIRE(writer);
   record_sink = std::make_unique<record::RecordRings>(
-      std::vector<record::RingSizes>(lanes.size(), options.record_sink));
+      std::vector<record::RingSizes>(contexts.size(), options.record_sink));
   log_writer = std::make_unique<record::LogWriterLoop>(
       *record_sink, std::move(*writer), options.log, [](const record::RecorderEvent&) {});
 }
 
-pipeline::EngineOptions VirtualDaemon::Parts::engine_of(Lane& lane) const {
-  const VirtualStream& stream = lane.stream;
+pipeline::EngineOptions VirtualDaemon::Parts::engine_of(VirtualStreamContext& context) const {
+  const VirtualStream& stream = context.stream;
   const record::StreamSettings& settings = stream.settings;
   pipeline::EngineOptions engine;
-  engine.stream = lane.id;
+  engine.stream = context.id;
   engine.stale_after_ns = nanoseconds(settings.stale_after_s);
   engine.publish_raw = settings.publish_raw;
   engine.style = settings.style;
@@ -218,21 +218,21 @@ pipeline::EngineOptions VirtualDaemon::Parts::engine_of(Lane& lane) const {
   engine.constrain = settings.constrain;
   engine.rate_hz = stream.description.rate_hz;
   engine.skeleton = stream.description.skeleton;
-  if (!stream.style_model.empty()) engine.model = lane.bind_style(stream.style_model);
-  if (!stream.gesture_model.empty()) engine.gesture = lane.bind_gesture(stream.gesture_model);
+  if (!stream.style_model.empty()) engine.model = context.bind_style(stream.style_model);
+  if (!stream.gesture_model.empty()) engine.gesture = context.bind_gesture(stream.gesture_model);
   return engine;
 }
 
 void VirtualDaemon::Parts::open() {
   virtual_now_ns = kBegin_ns;
   open_log();
-  std::size_t slots = pipeline::kEventSlots + lanes.size();
-  for (const auto& lane : lanes) slots += lane->stream.slots;
+  std::size_t slots = pipeline::kEventSlots + contexts.size();
+  for (const auto& context : contexts) slots += context->stream.slots;
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
   finished = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
-  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(pipeline::kMostUnderWay);
+  commands = std::make_unique<pipeline::Ring<pipeline::Command>>(pipeline::kMaxUnderWay);
   device_commands =
-      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(pipeline::kMostUnderWay);
+      std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(pipeline::kMaxUnderWay);
   acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(options.ack_slots);
   pipeline_wake = system::EventFd::open().value();
   publisher_wake = system::EventFd::open().value();
@@ -251,14 +251,14 @@ void VirtualDaemon::Parts::open() {
                                    .clock = virtual_clock,
                                    .commands = device_commands.get()})
                .value();
-  for (const auto& lane : lanes) {
-    const VirtualStream& stream = lane->stream;
-    worker->add(engine_of(*lane), stream.description.rate_hz, lane->counters, stream.slots);
+  for (const auto& context : contexts) {
+    const VirtualStream& stream = context->stream;
+    worker->add(engine_of(*context), stream.description.rate_hz, context->counters, stream.slots);
     reader->add(
-        {.device = lane->next_device(),
-         .counters = &lane->counters,
-         .slot = &lane->slot,
-         .calibration = stream.calibration.empty() ? nullptr : lane->compile(stream.calibration),
+        {.device = context->next_device(),
+         .counters = &context->counters,
+         .slot = &context->slot,
+         .calibration = stream.calibration.empty() ? nullptr : context->compile(stream.calibration),
          .slots = stream.slots});
   }
   std::ranges::stable_sort(script, {}, &VirtualCommand::at_s);
@@ -267,7 +267,8 @@ void VirtualDaemon::Parts::open() {
   held_until_ns.fill(kBegin_ns);
 }
 
-// One turn of a part that is due, then another, chosen at random; when none is due, time passes.
+// Runs one turn of a part that is due, then of another, chosen at random; if none is due, time
+// advances.
 void VirtualDaemon::Parts::run(double until_s) {
   open();
   const std::int64_t until_ns = at_ns(until_s);
@@ -289,20 +290,20 @@ void VirtualDaemon::Parts::run(double until_s) {
     take_turn(part);
     virtual_now_ns += 1 + draw_ns(static_cast<std::int64_t>(options.turn_us * 1e3));
     if (options.holdups && draw_ns(kTurnsBetweenHoldups) == 0) {
-      held_until_ns[part] = virtual_now_ns + draw_ns(kLongestHoldup_ns);
+      held_until_ns[part] = virtual_now_ns + draw_ns(kMaxHoldup_ns);
     }
   }
   stop();
 }
 
-// When a part would wake: by its own word, or because something came into one of its rings.
+// When a part would wake: at the time it asked for, or because one of its rings has something.
 std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
   std::int64_t at = due[part];
   switch (part) {
     case kReader:
       if (!device_commands->empty()) at = virtual_now_ns;
-      for (const auto& lane : lanes) {
-        if (!lane->slot.in.empty()) at = virtual_now_ns;
+      for (const auto& context : contexts) {
+        if (!context->slot.in.empty()) at = virtual_now_ns;
       }
       break;
     case kWorker:
@@ -316,8 +317,8 @@ std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
       break;
     case kSupervisor:
       at = system::kForever_ns;
-      for (const auto& lane : lanes) {
-        at = std::min(at, lane->slot.out.empty() ? lane->next_device_ns() : virtual_now_ns);
+      for (const auto& context : contexts) {
+        at = std::min(at, context->slot.out.empty() ? context->next_device_ns() : virtual_now_ns);
       }
       break;
     default:
@@ -342,8 +343,8 @@ void VirtualDaemon::Parts::take_turn(Part part) {
       due[part] = virtual_now_ns + kLogWriterEvery_ns;
       break;
     case kPerson:
-      // Control sends no more than may be under way.
-      if (next_command - acks_taken.size() < pipeline::kMostUnderWay) {
+      // Control sends at most kMaxUnderWay commands.
+      if (next_command - acks_taken.size() < pipeline::kMaxUnderWay) {
         speak(script[next_command], next_command + 1);
         ++next_command;
       }
@@ -354,11 +355,11 @@ void VirtualDaemon::Parts::take_turn(Part part) {
 }
 
 void VirtualDaemon::Parts::keep_devices() {
-  for (const auto& lane : lanes) {
-    while (lane->slot.out.consume([&](drivers::Device*) { lane->device.reset(); })) {
+  for (const auto& context : contexts) {
+    while (context->slot.out.consume([&](drivers::Device*) { context->device.reset(); })) {
     }
-    if (drivers::Device* const device = lane->next_device(); device != nullptr) {
-      REQUIRE(lane->slot.in.push(device));
+    if (drivers::Device* const device = context->next_device(); device != nullptr) {
+      REQUIRE(context->slot.in.push(device));
       reader->call();
     }
   }
@@ -366,12 +367,12 @@ void VirtualDaemon::Parts::keep_devices() {
 
 void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t ticket) {
   using Kind = VirtualCommand::Kind;
-  Lane& lane = *lanes[wanted.stream];
+  VirtualStreamContext& context = *contexts[wanted.stream];
   if (wanted.kind == Kind::kCalibrate) {
     REQUIRE(device_commands->push({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
                                    .stream = wanted.stream,
                                    .ticket = ticket,
-                                   .calibration = lane.compile(wanted.bytes)}));
+                                   .calibration = context.compile(wanted.bytes)}));
     return reader->call();
   }
   pipeline::Command command{.stream = wanted.stream, .ticket = ticket, .alpha = wanted.alpha};
@@ -383,18 +384,19 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
   switch (wanted.kind) {
     case Kind::kModel:
       command.kind = pipeline::Command::Kind::kModel;
-      command.model = lane.bind_style(wanted.bytes);
+      command.model = context.bind_style(wanted.bytes);
       keep();
       break;
     case Kind::kGesture:
       command.kind = pipeline::Command::Kind::kGesture;
-      command.gesture = lane.bind_gesture(wanted.bytes);
+      command.gesture = context.bind_gesture(wanted.bytes);
       keep();
       break;
     case Kind::kPlay: {
       command.kind = pipeline::Command::Kind::kPlay;
-      const auto order = gesture::make_play_order(
-          lane.gestures.back()->gesture(), gesture::split_labels(wanted.labels), 1.0, wanted.loop);
+      const auto order =
+          gesture::make_play_order(context.gestures.back()->gesture(),
+                                   gesture::split_labels(wanted.labels), 1.0, wanted.loop);
       REQUIRE(order);
       command.play = *order;
       break;
@@ -412,10 +414,10 @@ void VirtualDaemon::Parts::publish(int most) {
   const auto take = [this](const pipeline::Item& item) {
     using Kind = pipeline::Item::Kind;
     const bool event = item.kind == Kind::kEvent;
-    Lane& lane = *lanes[pipeline::stream_of(item)];
-    pipeline::count(lane.counters.publisher.taken);
-    if (item.kind == Kind::kSample) ++lane.published.samples;
-    if (!event && item.kind != Kind::kSample) publish_frame(lane, item);
+    VirtualStreamContext& context = *contexts[pipeline::stream_of(item)];
+    pipeline::count(context.counters.publisher.taken);
+    if (item.kind == Kind::kSample) ++context.published.samples;
+    if (!event && item.kind != Kind::kSample) publish_frame(context, item);
   };
   for (int i = 0; i < most && finished->consume(take); ++i) {
   }
@@ -423,16 +425,18 @@ void VirtualDaemon::Parts::publish(int most) {
   }
 }
 
-void VirtualDaemon::Parts::publish_frame(Lane& lane, const pipeline::Item& item) {
+void VirtualDaemon::Parts::publish_frame(VirtualStreamContext& context,
+                                         const pipeline::Item& item) {
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
-  ++(raw ? lane.published.raw : lane.published.frames);
-  if (!raw) lane.published.sequences.push_back(item.frame.header.sequence);
+  ++(raw ? context.published.raw : context.published.frames);
+  if (!raw) context.published.sequences.push_back(item.frame.header.sequence);
   if (!record_sink) return;
-  const std::string bytes = (raw ? lane.raw : lane.styled).encode(item.frame).SerializeAsString();
-  record_sink->published(lane.id, item.frame.header.sequence, raw, bytes_of(bytes));
+  const std::string bytes =
+      (raw ? context.raw : context.styled).encode(item.frame).SerializeAsString();
+  record_sink->published(context.id, item.frame.header.sequence, raw, bytes_of(bytes));
 }
 
-// From the devices to the log, as the daemon ends.
+// In the order in which the daemon ends: from the devices to the log.
 void VirtualDaemon::Parts::stop() {
   worker->finish();
   while (!finished->empty() || !acks->empty()) publish(kItemsPublishedATurn);
@@ -444,8 +448,8 @@ VirtualDaemon::VirtualDaemon(VirtualOptions options)
 VirtualDaemon::~VirtualDaemon() = default;
 
 void VirtualDaemon::add(VirtualStream stream) {
-  const auto id = static_cast<std::uint32_t>(parts_->lanes.size());
-  parts_->lanes.push_back(std::make_unique<Lane>(std::move(stream), id));
+  const auto id = static_cast<std::uint32_t>(parts_->contexts.size());
+  parts_->contexts.push_back(std::make_unique<VirtualStreamContext>(std::move(stream), id));
 }
 void VirtualDaemon::command(VirtualCommand command) {
   parts_->script.push_back(std::move(command));
@@ -453,10 +457,10 @@ void VirtualDaemon::command(VirtualCommand command) {
 void VirtualDaemon::run(double until_s) { parts_->run(until_s); }
 
 const VirtualDaemon::Published& VirtualDaemon::published(std::uint32_t stream) const {
-  return parts_->lanes[stream]->published;
+  return parts_->contexts[stream]->published;
 }
 const pipeline::StreamCounters& VirtualDaemon::counters(std::uint32_t stream) const {
-  return parts_->lanes[stream]->counters;
+  return parts_->contexts[stream]->counters;
 }
 const std::vector<pipeline::Ack>& VirtualDaemon::acks() const { return parts_->acks_taken; }
 

@@ -1,16 +1,16 @@
-// VirtualDaemon: the daemon's reader, pipeline and recorder in one thread on a clock that nobody
-// waits for. Devices follow a script; the order in which the parts get their turns, how long a turn
-// takes and when one of them is held up for a while are drawn from a seed, so a run that fails can
-// be run again. It records a real device log with the frames that it published: what `replay
-// --expect` is tested with.
+// VirtualDaemon: the daemon's reader, pipeline and recorder in one thread on a virtual clock, which
+// advances without waiting. Devices follow a script. The order of the parts' turns, the duration of
+// a turn and the times at which a part is held up are drawn from a seed, so a failed run can be
+// repeated. It records a real device log with the published frames, to test `replay --expect`.
 //
 //   VirtualDaemon daemon({.seed = 7, .log = folder.path() / "take.plog"});
 //   daemon.add(walking_stream("walker", 3.0));
 //   daemon.add(glove_stream("hand", 3.0));
-//   daemon.command({.at_s = 1.0, .stream = 0, .kind = VirtualCommand::Kind::kAlpha, .alpha =
-//   0.5F}); daemon.run(3.5);  // the log is closed now
+//   daemon.command({.at_s = 1.0, .kind = VirtualCommand::Kind::kAlpha, .alpha = 0.5F});
+//   daemon.run(3.5);  // the log is closed now
 //
-// Times are seconds since the run's begin. One at a time in a thread: they share a clock.
+// Times are seconds since the start of the run. Only one at a time in a thread, because all use the
+// same clock.
 #pragma once
 
 #include <cstdint>
@@ -31,35 +31,36 @@ namespace posed::test {
 
 inline constexpr double kNever_s = std::numeric_limits<double>::infinity();
 
-// What one read of a device gives.
+// What one read of the device returns.
 struct ScriptedChunk {
   double at_s = 0.0;
   std::string bytes;
 };
 
-// One link to a device, from when it is found to when it is lost. Several in order are a device
-// that is unplugged and comes back.
+// One link to a device, from its connection to its loss. Several in order are a device that is
+// unplugged and plugged in again.
 struct ScriptedLink {
   double from_s = 0.0;
   std::vector<ScriptedChunk> chunks;  // by time
   double until_s = kNever_s;
-  bool ends = false;  // at `until_s` the source has ended, and no other link follows
-  std::string flood;  // from `from_s` to `until_s` every read gives this: a device without a pause
+  bool ends = false;  // at `until_s` the source ends, and no other link follows
+  // every read from `from_s` to `until_s` returns this: a device without a pause
+  std::string flood;
 };
 
-// A stream and all that it needs; made by the functions below or by hand.
+// A stream and everything that it needs; made by the functions below or by hand.
 struct VirtualStream {
   std::string name;
   drivers::Description description;  // of a driver in the registry
-  record::StreamSettings settings;   // rate_hz and the models are filled in
-  std::string style_model;           // a model file's bytes; empty: none
-  std::string gesture_model;         // the same
+  record::StreamSettings settings;   // rate_hz and the models are set by the VirtualDaemon
+  std::string style_model;           // bytes of a model file; empty: none
+  std::string gesture_model;         // bytes of a model file; empty: none
   std::string calibration;           // TOML; empty: the device's default
   std::vector<ScriptedLink> links;
-  std::size_t slots = 64;  // of each ring that the stream may fill
+  std::size_t slots = 64;  // how many slots of each ring the stream may fill
 };
 
-// What a person asks for while it runs.
+// A command that a client sends during the run.
 struct VirtualCommand {
   enum class Kind : std::uint8_t { kAlpha, kModel, kGesture, kPlay, kStopPlaying, kCalibrate };
   double at_s = 0.0;
@@ -73,11 +74,11 @@ struct VirtualCommand {
 
 struct VirtualOptions {
   std::uint64_t seed = 1;
-  std::filesystem::path log;   // empty: nothing is recorded
-  bool holdups = true;         // parts are held up now and then, for up to 0.4 s
-  double turn_us = 40.0;       // the longest that a turn takes
+  std::filesystem::path log;   // empty: no recording
+  bool holdups = true;         // the parts are held up from time to time, for up to 0.4 s
+  double turn_us = 40.0;       // the longest duration of a turn
   std::size_t ack_slots = 64;  // of the ring to control
-  // What each stream may have in the recorder's rings.
+  // Each stream's share of the recorder's rings.
   record::RingSizes record_sink{.chunk_bytes = 4 << 20, .frame_bytes = 16 << 20, .decisions = 2048};
 };
 
@@ -86,12 +87,12 @@ class VirtualDaemon {
   explicit VirtualDaemon(VirtualOptions options);
   ~VirtualDaemon();
 
-  // Before run(); streams are numbered in the order of adding.
+  // Call before run(); streams are numbered in the order in which they are added.
   void add(VirtualStream stream);
   void command(VirtualCommand command);
 
-  // Runs from 0 to `until_s`, stops as the daemon does and closes the log. Call once. Fails the
-  // test when something cannot be set up.
+  // Runs from time 0 to `until_s`, stops as the daemon does and closes the log. Call once. Fails
+  // the test if something cannot be set up.
   void run(double until_s);
 
   struct Published {
@@ -100,7 +101,7 @@ class VirtualDaemon {
   };
   [[nodiscard]] const Published& published(std::uint32_t stream) const;
   [[nodiscard]] const pipeline::StreamCounters& counters(std::uint32_t stream) const;
-  // The answers that control got; the tickets count the commands from 1, by time.
+  // The Acks that control received; tickets count the commands from 1, by time.
   [[nodiscard]] const std::vector<pipeline::Ack>& acks() const;
 
  private:
@@ -108,17 +109,19 @@ class VirtualDaemon {
   std::unique_ptr<Parts> parts_;
 };
 
-// A body of five joints that walks at 60 Hz: style, generate (a lag of one frame) and raw frames.
+// A body of five joints that walks at 60 Hz, with style, generate (a lag of one frame) and raw
+// frames.
 [[nodiscard]] VirtualStream walking_stream(const std::string& name, double length_s,
                                            unsigned style_seed = 1);
-// A right-handed LucidGlove at 100 Hz, whose decoder gives a sample before each frame:
-// generate (a lag of two frames) with a gesture model, constrain.
+// A right-handed LucidGlove at 100 Hz whose decoder gives a sample before each frame, with generate
+// (a lag of two frames, with a gesture model) and constrain.
 [[nodiscard]] VirtualStream glove_stream(const std::string& name, double length_s);
 
-// Silences, unplugs (on streams with a glove) and bursts, put into a stream's only link at random.
+// Inserts silences, unplugs (on streams with a glove) and bursts into the stream's only link, at
+// random.
 void disturb(VirtualStream& stream, std::uint64_t seed);
 
-// A calibration of glove_stream()'s glove; another for each `variant`.
+// A calibration for the glove of glove_stream(); each `variant` is different.
 [[nodiscard]] std::string glove_calibration(int variant);
 
 }  // namespace posed::test

@@ -1,4 +1,4 @@
-// The streams of a VirtualDaemon and the bytes that their devices send.
+// The streams of a VirtualDaemon, and the bytes that their devices send.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -100,7 +100,7 @@ void disturb(VirtualStream& stream, std::uint64_t seed) {
     std::vector<ScriptedChunk> rest = cut_from(link, at_s);
     const double pause_s = draw(2.0) < 1.0 ? draw(0.3) : draw(1.2);
     const double what = draw(3.0);
-    if (what < 1.0) {  // silent for a while: later chunks come later
+    if (what < 1.0) {  // silent for a while: the following chunks are shifted
       for (ScriptedChunk& chunk : rest) chunk.at_s += pause_s;
       std::ranges::move(rest, std::back_inserter(link.chunks));
     } else if (what < 2.0 || !comes_back) {  // delayed: all chunks of the pause come at once

@@ -1,5 +1,5 @@
-// posed bench decoders: how many packets a second each glove's decoder takes on one core, and what
-// it adds to a bare read() of the same pseudo-terminal.
+// `posed bench decoders`: how many packets a second each glove's decoder handles on one core, and
+// what it adds to a bare read() of the same pseudo-terminal.
 #include <poll.h>
 #include <unistd.h>
 
@@ -34,8 +34,8 @@ using nlohmann::json;
 using system::monotonic_ns;
 using Bytes = std::vector<std::byte>;
 
-constexpr std::size_t kLoopRecords = 512;  // of the stream that is decoded again and again
-constexpr std::size_t kReadBytes = 4096;   // bytes a read gives at most
+constexpr std::size_t kLoopRecords = 512;  // of the data that is decoded repeatedly
+constexpr std::size_t kReadBytes = 4096;   // most bytes of a read
 constexpr auto kPacketPause = std::chrono::milliseconds(1);
 constexpr const char* kDecodersFooter =
     R"(Every glove that posed can emulate, its bytes as the emulator sends them.
@@ -46,7 +46,7 @@ its frame in a ring (decoded); packets take turns between the two, one a millise
   posed bench decoders
   posed bench decoders --glove cyberglove --samples 500 --json)";
 
-// What a reader's sink does: into a ring, here its own.
+// Does what a reader's sink does: puts items into a ring.
 class RingSink final : public Sink {
  public:
   void frame(Frame& frame) noexcept override {
@@ -65,7 +65,7 @@ class RingSink final : public Sink {
   pipeline::Ring<Frame> ring_{256};
 };
 
-// Of this thread: what else runs on the machine does not count.
+// CPU time of this thread, so that other programs on the machine do not count.
 std::int64_t cpu_ns() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
@@ -92,14 +92,14 @@ json decoder_rate(BenchGlove& glove) {
           {"damaged", sink.bad}};
 }
 
-// Both sides of one pseudo-terminal, and when the packet under way was written.
+// Both ends of a pseudo-terminal, and when the current packet was written.
 struct BenchLine {
   emulate::EmulatedPort port;
   std::unique_ptr<drivers::Transport> host;
   std::atomic<std::int64_t> written_ns{0};
 };
 
-// Waits for the packet and takes it in, with the decoder or without; 0 when none came.
+// Waits for the packet and reads it, with or without the decoder; 0 if none came.
 std::int64_t take_record(BenchLine& line, std::size_t bytes, drivers::Decoder* decoder,
                          RingSink& sink) {
   std::array<std::byte, kReadBytes> buffer{};
@@ -153,7 +153,8 @@ Result<json> decoder_latency(BenchGlove& glove, int samples) {
         take_record(line, size.load(), decode ? glove.decoder.get() : nullptr, sink);
     sink.empty_ring();
     if (done_ns == 0) return fail("a packet did not come through the pseudo-terminal");
-    if (decode && sink.samples == before) continue;  // it begins in a packet that was not decoded
+    // the stream began in the middle of a packet that was skipped
+    if (decode && sink.samples == before) continue;
     (decode ? decoded_us : bare_us)
         .push_back(static_cast<double>(done_ns - line.written_ns.load()) * 1e-3);
   }
@@ -206,10 +207,10 @@ void add_bench_decoders(CLI::App& bench, int& exit_code) {
     bool json = false;
   };
   const auto options = std::make_shared<Options>();
-  CLI::App* command = bench.add_subcommand("decoders", "Every glove's decoder, from its bytes");
+  CLI::App* command = bench.add_subcommand("decoders", "The decoders of all gloves");
   command->footer(kDecodersFooter);
-  command->add_option("--glove", options->glove, "Only gloves whose name begins so");
-  command->add_option("--samples", options->samples, "Timed packets a glove and way")
+  command->add_option("--glove", options->glove, "Only gloves whose name begins with this");
+  command->add_option("--samples", options->samples, "Timed packets for each glove and way")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON array on stdout");

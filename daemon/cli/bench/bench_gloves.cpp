@@ -15,7 +15,7 @@ using drivers::Driver;
 using drivers::Emulator;
 using drivers::Options;
 
-// An emulator lent to what wants one of its own.
+// Lends an emulator to code that wants to own one.
 class LentEmulator final : public Emulator {
  public:
   explicit LentEmulator(Emulator& emulator) : emulator_(emulator) {}
@@ -30,7 +30,7 @@ class LentEmulator final : public Emulator {
   Emulator& emulator_;
 };
 
-// The driver opens the emulator as it would the glove; from then on it streams.
+// The driver opens the emulator as it would open the glove; afterwards the emulator streams.
 Result<std::unique_ptr<drivers::Decoder>> opened_decoder(const Driver& driver, Options options,
                                                          Emulator& emulator) {
   auto port = emulate::EmulatedPort::open_pty();
@@ -62,7 +62,7 @@ Result<BenchGlove> make_bench_glove(const Driver& driver, const std::string& nam
   return BenchGlove{name, std::move(*emulator), std::move(*decoder)};
 }
 
-// How a driver's gloves differ in their bytes.
+// The variants of a driver's gloves that differ in their bytes.
 std::vector<std::pair<std::string, Options>> glove_kinds(const Driver& driver) {
   const std::string name(driver.name);
   std::vector<std::pair<std::string, Options>> found;

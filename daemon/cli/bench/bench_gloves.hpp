@@ -1,4 +1,4 @@
-// BenchGlove: a glove that is not there, as a source of packets for the decoder beside it.
+// BenchGlove: an emulated glove as a source of packets, with its decoder.
 #pragma once
 
 #include <cstddef>
@@ -13,15 +13,15 @@ namespace posed::cli {
 
 struct BenchGlove {
   std::string name;                             // "described vmg30"
-  std::unique_ptr<drivers::Emulator> emulator;  // streams
+  std::unique_ptr<drivers::Emulator> emulator;  // already streaming
   std::unique_ptr<drivers::Decoder> decoder;
 };
 
-// One of every driver that can be emulated, and of every described device. A glove that streams
-// only when it is told to has been told so by its driver, over a pseudo-terminal.
+// One of every driver that can be emulated, and one of every table-driven device. If a glove
+// streams only on command, its driver has sent that command through a pseudo-terminal.
 [[nodiscard]] Result<std::vector<BenchGlove>> bench_gloves();
 
-// Adds the glove's next record to `out`, of a hand that closes and opens every 64 of them.
+// Adds the glove's next record to `out`, for a hand that closes and opens every 64 records.
 void next_record(BenchGlove& glove, std::size_t index, std::vector<std::byte>& out);
 
 }  // namespace posed::cli

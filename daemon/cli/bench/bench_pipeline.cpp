@@ -1,5 +1,5 @@
-// posed bench pipeline: what the daemon adds to a bare ZeroMQ hop, from the reader's arrival stamp
-// to another process; both take turns every second on the same frames.
+// `posed bench pipeline`: what the daemon adds to a bare ZeroMQ hop, from the reader's arrival
+// stamp to another process. The two alternate every second, on the same frames.
 #include <unistd.h>
 
 #include <cstdio>
@@ -34,9 +34,9 @@ namespace {
 constexpr double kRate_hz = 120.0;
 constexpr const char* kBenchPipelineFooter =
     R"(Synthetic walkers at 120 Hz through the real daemon: file driver, rings, a style model of
---points poses, publisher; no recording, no real-time rights. Every other second the reader sends
+--points poses, publisher; no recording, no real-time priority. Every other second the reader sends
 a message of the same size straight to ZeroMQ instead: the bare hop. The subscriber is another
-process. Believe it only when the CPU pressure (PSI some) stays below 5 %.
+process. The result is valid only if the CPU pressure (PSI some) stays below 5 %.
 
   posed bench pipeline
   posed bench pipeline --streams 32 --points 200 --json)";
@@ -50,7 +50,7 @@ struct HopOptions {
 };
 
 // A field of the line `some` of the CPU's pressure: "avg10=" [percent] or "total=" [us since boot];
-// negative where the kernel does not say.
+// negative if the kernel does not report it.
 double cpu_pressure(const std::string& field) {
   std::ifstream file("/proc/pressure/cpu");
   std::string word;
@@ -60,7 +60,7 @@ double cpu_pressure(const std::string& field) {
   return -1.0;
 }
 
-// A folder that goes when the benchmark does.
+// A folder that is deleted with this object.
 class WorkFolder {
  public:
   WorkFolder()
@@ -80,7 +80,7 @@ class WorkFolder {
   std::filesystem::path path_;
 };
 
-// A model of the wanted size for the walker's skeleton; its poses are made up.
+// Writes a model of the requested size for the walker's skeleton; its poses are synthetic.
 Result<> write_synthetic_model(const Skeleton& skeleton, int points,
                                const std::filesystem::path& path) {
   style::StyleModel model;
@@ -117,7 +117,7 @@ Result<config::DaemonConfig> make_config(const HopOptions& options, const WorkFo
     stream.name = "walker" + std::to_string(i);
     stream.driver = "file";
     stream.options = {{"path", (folder / "walker.bvh").string()}};
-    stream.stale_after_s = 3.0;  // its turn is every other second
+    stream.stale_after_s = 3.0;  // each gets its turn every other second
     stream.style.emplace();
     stream.style->model = folder / "model.style";
     stream.style->filter.gate = options.gate;
@@ -126,7 +126,7 @@ Result<config::DaemonConfig> make_config(const HopOptions& options, const WorkFo
   return config;
 }
 
-// The bare hop: what the reader thread sends on in its seconds.
+// The bare hop: the reader thread sends directly during its seconds.
 class BareHop {
  public:
   BareHop(net::Socket socket, std::string endpoint, std::string body)
@@ -156,7 +156,7 @@ class BareHop {
   std::string body_;
 };
 
-// Which second it is: even ones are the pipeline's.
+// Which second it is: the pipeline has the even ones.
 struct Turns {
   std::int64_t start_ns = 0;
   [[nodiscard]] bool bare(std::int64_t time_ns) const noexcept {
@@ -180,7 +180,7 @@ class TurnDecoder final : public drivers::Decoder {
   const Turns& turns_;
 };
 
-// Starts a little later, so that streams of one rate do not all fall due in the same instant.
+// Starts a little later, so that streams of one rate are not all due at the same instant.
 class LaterTransport final : public drivers::Transport {
  public:
   LaterTransport(std::unique_ptr<drivers::Transport> inner, std::int64_t later_ns)
@@ -200,7 +200,7 @@ class LaterTransport final : public drivers::Transport {
   std::int64_t later_ns_;
 };
 
-// What was seen of the process while it ran.
+// Measurements of the process during the run.
 struct Watched {
   double pipeline_cpu_percent = 0.0;  // of one core, in the pipeline's seconds
   std::uint64_t rss_10s = 0, rss_end = 0;
@@ -210,7 +210,7 @@ struct Watched {
   std::uint64_t gaps = 0;
 };
 
-// A serialized frame of the stream's size.
+// A serialized frame of the same size as the stream's.
 std::string sample_body(const devices::OpenStream& stream) {
   const Skeleton& skeleton = *stream.device.description.skeleton;
   Frame frame;
@@ -223,7 +223,7 @@ std::string sample_body(const devices::OpenStream& stream) {
   return encoder.stamp({some_ns, some_ns}, {}).SerializeAsString();
 }
 
-// Sleeps through all turns, looking at the process at each change.
+// Sleeps through all turns and samples the process at each change.
 void watch(const assembly::Daemon& daemon, const Turns& turns, int seconds, Watched& watched) {
   std::int64_t pipeline_cpu_ns = 0;
   std::int64_t before_ns = system::cpu_time_ns();
@@ -245,7 +245,7 @@ void watch(const assembly::Daemon& daemon, const Turns& turns, int seconds, Watc
 }
 
 Result<Watched> measure(const HopOptions& options) {
-  spdlog::set_level(spdlog::level::err);  // the figures are the message
+  spdlog::set_level(spdlog::level::err);  // only the figures are to be printed
   auto subscriber = HopSubscriber::fork();
   if (!subscriber) return std::unexpected(subscriber.error());
   const WorkFolder folder;

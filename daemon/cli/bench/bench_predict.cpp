@@ -1,5 +1,5 @@
-// posed bench predict: what one call of the style filter's process costs, against reading its
-// bytes.
+// `posed bench predict`: the cost of one call of the style filter's Gaussian process, compared with
+// just reading the same bytes.
 #include <unistd.h>
 
 #include <algorithm>
@@ -33,28 +33,29 @@ namespace {
 using nlohmann::json;
 using Floats = hwy::AlignedFreeUniquePtr<float[]>;
 
-constexpr int kHotCalls = 8;  // one hot sample is the mean of so many calls, a clock read costs 1 %
+// one hot sample is the mean of this many calls, so that reading the clock costs only 1 %
+constexpr int kHotCalls = 8;
 constexpr const char* kBenchPredictFooter =
-    R"(Made-up walkers, queries from one who is not in the training set.
+    R"(Synthetic walkers; queries from one who is not in the training set.
 hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
-frames of a 120 Hz stream. The yardstick sums as many floats as the process logically reads
+frames of a 120 Hz stream. The reference sums as many floats as the process logically reads
 (N x 2D; gate rows are also held against the confidence's triangle added), with eight vector
-accumulators; variants take turns, so that they meet the same machine.
+accumulators; variants take turns, so that they run under the same conditions.
 
   posed bench predict
   posed bench predict --samples 500 --json)";
 
-// One thing that is timed: a call for query i, answering a float so that no call is optimised away.
+// One variant to time: a call for query i. It returns a float, so that no call is optimised away.
 struct Variant {
   std::string name;
   std::function<float(int)> call;
   std::vector<double> hot_us{}, cold_us{};
 };
 
-// The optimiser may not drop what made this value.
+// Prevents the optimiser from removing the computation of this value.
 void keep(float value) { asm volatile("" : : "x"(value) : "memory"); }
 
-// What is read to push everything else out of L2.
+// Reads memory to push everything else out of the L2 cache.
 class Evictor {
  public:
   Evictor() {
@@ -101,7 +102,7 @@ Floats ones(int count) {
 
 int to_yardstick(int floats) { return (floats + 127) / 128 * 128; }
 
-// A process, both ways of asking it, and the queries as the hot path has them.
+// A Gaussian process, the two ways to call it, and the queries as the hot path has them.
 struct Subject {
   gp::SyntheticProcess made;
   gp::Predictor plain, gated;
@@ -128,7 +129,8 @@ Subject subject(int poses, int dims) {
           std::vector<float>(static_cast<std::size_t>(dims))};
 }
 
-// Largest errors against the double reference, and whether the instruction sets agree on the bits.
+// The largest errors against a reference in double precision, and whether all instruction sets give
+// the same bits.
 json accuracy(const Subject& subject) {
   const auto& made = subject.made;
   const gp::Posterior exact = gp::posterior(made.process, made.queries);
@@ -222,7 +224,7 @@ void add_bench_predict(CLI::App& bench, int& exit_code) {
   const auto options = std::make_shared<Options>();
   CLI::App* command = bench.add_subcommand("predict", "One call of the style filter's process");
   command->footer(kBenchPredictFooter);
-  command->add_option("--samples", options->samples, "Timed samples a variant")
+  command->add_option("--samples", options->samples, "Timed samples for each variant")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON object on stdout");

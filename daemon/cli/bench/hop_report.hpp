@@ -1,4 +1,4 @@
-// What `posed bench pipeline` makes of the ages that its subscriber noted.
+// Evaluates the message ages that the subscriber of `posed bench pipeline` has recorded.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +21,8 @@ struct HopReport {
   double block_p99_ratio = 0.0;
 };
 
-// Block 0 begins at `start_ns`; even blocks are the pipeline's. The first pair warms up and is left
-// out, and so is what came after `end_ns`.
+// Block 0 begins at `start_ns`; the pipeline has the even blocks. The first pair (warm-up) and
+// everything after `end_ns` are left out.
 [[nodiscard]] HopReport report_hops(std::span<const Arrival> arrivals, std::int64_t start_ns,
                                     std::int64_t end_ns);
 

@@ -16,7 +16,7 @@ namespace posed::cli {
 namespace {
 
 constexpr int kPoll_ms = 50;
-constexpr std::size_t kRoom = 1 << 20;  // messages for which room is made beforehand
+constexpr std::size_t kReserved = 1 << 20;  // number of messages for which memory is reserved
 
 std::string read_line(int fd) {
   std::string line;
@@ -46,12 +46,12 @@ bool read_all(int fd, void* data, std::size_t size) {
   return true;
 }
 
-// The life of the child.
+// Runs in the child process.
 class Noter {
  public:
-  Noter() { noted_.messages.reserve(kRoom); }
+  Noter() { noted_.messages.reserve(kReserved); }
 
-  // Takes one message if there is one.
+  // Receives one message if there is one.
   bool take(void* socket) {
     net::Message topic;
     if (!topic.receive(socket)) return false;
@@ -79,7 +79,7 @@ class Noter {
   std::map<std::string, std::uint64_t> last_;  // sequence by stream
 };
 
-int note_until_told(int from_parent, int to_parent) {
+int note_until_stopped(int from_parent, int to_parent) {
   const std::string pipeline_endpoint = read_line(from_parent);
   const std::string bare_endpoint = read_line(from_parent);
   auto context = net::open_context();
@@ -101,10 +101,10 @@ int note_until_told(int from_parent, int to_parent) {
     }
   }
   const Arrivals& noted = noter.noted();
-  const bool told =
+  const bool sent =
       write_all(to_parent, &noted.gaps, sizeof noted.gaps) &&
       write_all(to_parent, noted.messages.data(), noted.messages.size() * sizeof(Arrival));
-  return told ? 0 : 1;
+  return sent ? 0 : 1;
 }
 
 }  // namespace
@@ -120,7 +120,7 @@ Result<std::unique_ptr<HopSubscriber>> HopSubscriber::fork() {
   if (process == 0) {
     close(down[1]);
     close(up[0]);
-    _exit(note_until_told(down[0], up[1]));
+    _exit(note_until_stopped(down[0], up[1]));
   }
   close(down[0]);
   close(up[1]);

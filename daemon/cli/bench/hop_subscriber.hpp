@@ -1,5 +1,5 @@
-// The other end of `posed bench pipeline`: a subscriber in a process of its own that notes how old
-// each message is when it comes.
+// The receiver of `posed bench pipeline`: a subscriber in its own process that records how old each
+// message is when it arrives.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@
 
 namespace posed::cli {
 
-// A message that came. Its kind is known by its topic: bare/... or pose/...
+// A received message. Its topic says which kind it is: bare/... or pose/...
 struct Arrival {
   std::int64_t arrival_ns = 0;  // stamped in the reader
-  std::int64_t age_ns = 0;      // when the subscriber had it
+  std::int64_t age_ns = 0;      // age when the subscriber received it
   bool bare = false;
 };
 
 struct Arrivals {
   std::vector<Arrival> messages;
-  std::uint64_t gaps = 0;  // sequence numbers that did not come, over all pose streams
+  std::uint64_t gaps = 0;  // missing sequence numbers, over all pose streams
 };
 
 class HopSubscriber {
@@ -31,16 +31,16 @@ class HopSubscriber {
   HopSubscriber(const HopSubscriber&) = delete;
   HopSubscriber& operator=(const HopSubscriber&) = delete;
 
-  // Connects to both endpoints; returns when the process has been told.
+  // Makes the process connect to both endpoints; returns when the endpoints have been sent.
   void begin(const std::string& pipeline_endpoint, const std::string& bare_endpoint);
-  // Tells it to end and takes what it noted.
+  // Ends the process and returns what it recorded.
   [[nodiscard]] Result<Arrivals> finish();
 
  private:
   HopSubscriber(int process, int to, int from) : process_(process), to_(to), from_(from) {}
   int process_;
-  int to_;    // pipe: two lines, then its end is the end
-  int from_;  // pipe: gaps, then Arrivals
+  int to_;    // pipe to the child: two lines; closing it ends the child
+  int from_;  // pipe from the child: gaps, then Arrivals
 };
 
 }  // namespace posed::cli

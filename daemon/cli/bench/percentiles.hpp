@@ -1,4 +1,4 @@
-// How a benchmark tells a distribution: never by its mean alone.
+// The figures that a benchmark reports of a distribution; never its mean alone.
 #pragma once
 
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace posed::cli {
 
-// {"p50_us", "p99_us", "p99_9_us", "max_us"}; at least one value.
+// {"p50_us", "p99_us", "p99_9_us", "max_us"}; needs at least one value.
 [[nodiscard]] nlohmann::json percentiles(std::vector<double> values_us);
 
 }  // namespace posed::cli

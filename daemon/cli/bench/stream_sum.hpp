@@ -1,10 +1,10 @@
-// The yardstick of `posed bench predict`: reading floats as fast as this CPU can.
+// The reference of `posed bench predict`: reading floats as fast as this CPU can.
 #pragma once
 
 namespace posed::cli {
 
-// The sum of data[0 .. count), count a multiple of 128, on the best instruction set there is: eight
-// vector accumulators, so that nothing but the bytes costs time.
+// The sum of data[0 .. count), count a multiple of 128, with the best available instruction set.
+// Eight vector accumulators, so that only reading the bytes takes time.
 [[nodiscard]] float stream_sum(const float* data, int count);
 
 }  // namespace posed::cli

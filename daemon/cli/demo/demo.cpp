@@ -1,6 +1,6 @@
-// The demo: makes two families of walkers and a signer's glove recording, learns the style
-// between the families and the gestures of the glove, streams a walker it has not seen through the
-// daemon and watches it as any client would, over ZeroMQ.
+// The demo: makes two families of synthetic walkers and a signer's glove recording, trains a style
+// model from the families and a gesture model from the glove, streams a walker that is not in the
+// training data through the daemon and watches it over ZeroMQ, as any client would.
 #include <cerrno>  // program_invocation_name
 #include <chrono>
 #include <cstdio>
@@ -41,18 +41,18 @@ constexpr double kHandRate_hz = 30.0;
 struct DemoOptions {
   std::filesystem::path config;   // empty: the demo's own
   std::filesystem::path folder;   // of clips and models; empty: the user's cache
-  std::filesystem::path prepare;  // only make clips and models there
+  std::filesystem::path prepare;  // only make clips and models in this folder
   std::optional<double> seconds;
   bool overwrite = false;
 };
 
-// How this program was called, for the commands that people may copy.
+// How this program was called, for the commands that it suggests.
 std::string own_name() {
   const std::string name = program_invocation_name;
   return name.contains('/') ? name : "posed";
 }
 
-// Makes what the demo needs, unless this program made it before.
+// Makes the demo's files, unless this program has made them before.
 Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   const DemoFolder kept(folder);
   if (auto own = kept.check_is_own(demo_file_names(), overwrite); !own) return own;
@@ -87,7 +87,7 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   return kept.finish();
 }
 
-// Takes every message that waits.
+// Receives every message that waits.
 void drain(Connection& connection, Watcher& watcher) {
   net::Message topic, body;
   while (topic.receive(connection.socket()) && topic.more() &&
@@ -100,7 +100,7 @@ double seconds_since(SteadyClock::time_point then) {
   return std::chrono::duration<double>(SteadyClock::now() - then).count();
 }
 
-// Shows the running daemon until Ctrl-C or `seconds` after the first frame.
+// Shows the running daemon until Ctrl-C or until `seconds` after the first frame.
 Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watcher& watcher,
                DemoHand& hand) {
   ClientOptions client;
@@ -144,7 +144,7 @@ Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watch
   return {};
 }
 
-// Somebody wears the glove of every stream that names no device of its own.
+// Starts a synthetic signer for every stream whose device is not set in the config.
 using Signers = std::vector<std::unique_ptr<emulate::SyntheticSigner>>;
 Result<Signers> put_on_gloves(config::DaemonConfig& config, const std::filesystem::path& clip) {
   Signers signers;
@@ -184,7 +184,7 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
       "\nreceived %llu styled frames over ZeroMQ, %llu missing; %.1f deg rms from the raw poses\n",
       static_cast<unsigned long long>(watcher.styled()),
       static_cast<unsigned long long>(watcher.gaps()), watcher.change_deg());
-  if (const std::string told = hand->summary(); !told.empty()) std::puts(told.c_str());
+  if (const std::string summary = hand->summary(); !summary.empty()) std::puts(summary.c_str());
   for (const v1::StreamStats& s : stats.stream()) {
     std::printf(
         "%s: %.1f frames/s, arrival to ZeroMQ p50 %.0f us, p99 %.0f us, dropped %llu, shed %llu\n",
@@ -195,7 +195,7 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   return {};
 }
 
-// Clips and models lie where the config looks for them.
+// The folder for clips and models, in which the config looks for them.
 Result<std::filesystem::path> folder_of(const DemoOptions& options) {
   if (!options.folder.empty()) return std::filesystem::absolute(options.folder);
   if (options.config.empty()) return demo_cache_folder();
@@ -253,8 +253,8 @@ void add_demo(CLI::App& app, int& exit_code) {
   posed demo                      # from anywhere
   posed demo --seconds 10
   posed demo --prepare build/demo # what ./run build does
-What was learnt is kept in $XDG_CACHE_HOME/posed/demo (~/.cache/posed/demo), with a demo.toml that
-`posed run --config` streams, too; another build of posed learns anew.)");
+Clips and models are kept in $XDG_CACHE_HOME/posed/demo (~/.cache/posed/demo), with a demo.toml that
+`posed run --config` streams, too; another build of posed makes them again.)");
   command->callback([options, &exit_code] {
     if (auto done = demo(*options); !done) exit_code = report(done.error());
   });

@@ -26,7 +26,7 @@ Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
   return path;
 }
 
-// The glove that is learnt from, with labels, and a new person who performs g, c, p.
+// Writes the glove recording for training, with labels, and a new person who performs g, c, p.
 Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
   clips.glove = folder / kGlove;
   clips.labels = folder / kGloveLabels;
@@ -34,10 +34,10 @@ Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
   if (!learnt) return std::unexpected(learnt.error());
   if (auto done = clip::write_hand_csv(learnt->clip, clips.glove); !done) return done;
   if (auto done = clip::write_labels(learnt->labels, clips.labels); !done) return done;
-  const auto stranger = gesture::make_performance(
+  const auto signer = gesture::make_performance(
       {.person = kNewPerson, .script = {"g", "c", "p", "g", "c", "p", "c", "g", "p", "c"}});
-  if (!stranger) return std::unexpected(stranger.error());
-  return clip::write_hand_csv(stranger->clip, folder / kDemoSigner);
+  if (!signer) return std::unexpected(signer.error());
+  return clip::write_hand_csv(signer->clip, folder / kDemoSigner);
 }
 
 }  // namespace
@@ -58,7 +58,7 @@ Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
   if (made) return fail("cannot make the folder: " + made.message(), folder.string());
   DemoClips clips;
   for (std::uint32_t person = 1; person <= kPeople; ++person) {
-    // Different people in the two families, as with real actors.
+    // The two families have different people, as with real actors.
     auto march = write_walker(folder / fmt::format("march_{}.bvh", person),
                               {.family = motion::WalkerFamily::kMarch, .person = person});
     if (!march) return std::unexpected(march.error());
@@ -68,10 +68,10 @@ Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
     clips.from.push_back(*march);
     clips.to.push_back(*sway);
   }
-  auto stranger = write_walker(
+  auto walker = write_walker(
       folder / kDemoWalker,
       {.family = motion::WalkerFamily::kMarch, .person = kNewPerson, .seconds = kNewWalkSeconds});
-  if (!stranger) return std::unexpected(stranger.error());
+  if (!walker) return std::unexpected(walker.error());
   if (auto done = write_hands(folder, clips); !done) return std::unexpected(done.error());
   return clips;
 }

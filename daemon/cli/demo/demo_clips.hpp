@@ -1,5 +1,5 @@
-// What the demo learns from and streams: synthetic walkers as BVH files, a synthetic signer's
-// glove as CSV with labels, and the names of the models made of them.
+// The training data and the streams of the demo: synthetic walkers as BVH files, a synthetic
+// signer's glove as CSV with labels, and the names of the models trained from them.
 #pragma once
 
 #include <filesystem>
@@ -10,12 +10,12 @@
 
 namespace posed::cli {
 
-// The model's name inside the demo's folder; config/demo.toml names it too.
+// The style model's file name in the demo's folder; config/demo.toml names it, too.
 inline constexpr const char* kDemoModel = "march-to-sway.style";
-// The walker that is streamed and was not learnt from.
+// The walker that is streamed; it is not in the training data.
 inline constexpr const char* kDemoWalker = "new_walker.bvh";
 
-// The gesture model, learnt from g, c and p; and a signer whom it has not learnt from.
+// The gesture model, trained with g, c and p; and a signer who is not in its training data.
 inline constexpr const char* kDemoHand = "hand.gesture";
 inline constexpr const char* kDemoSigner = "new_performer.csv";
 
@@ -28,7 +28,7 @@ struct DemoClips {
 [[nodiscard]] std::vector<std::string> demo_file_names();
 
 // Writes the clips of both families and the new walker, the glove recording with its labels and the
-// new signer into `folder`, which is made.
+// new signer into `folder`, which is created.
 [[nodiscard]] Result<DemoClips> make_demo_clips(const std::filesystem::path& folder);
 
 }  // namespace posed::cli

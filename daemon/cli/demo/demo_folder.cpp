@@ -25,16 +25,16 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kStamp = "demo.json";
-constexpr std::uintmax_t kMaxStamp = 64 * 1024;      // bytes of the stamp
-constexpr std::uintmax_t kMaxBytes = 1'000'000'000;  // of the program, or of what it has learnt
+constexpr std::uintmax_t kMaxStamp = 64 * 1024;      // bytes of the stamp file
+constexpr std::uintmax_t kMaxBytes = 1'000'000'000;  // of the program, or of a file that it wrote
 
-// Empty when it cannot be read.
+// Empty if the file cannot be read.
 std::string digest_of(const fs::path& file) {
   const auto bytes = load_file(file, {.what = "file", .max_bytes = kMaxBytes});
   return bytes ? log::sha256_hex(std::as_bytes(std::span(*bytes))) : std::string();
 }
 
-// The program itself, to the last bit: another build may learn otherwise.
+// A hash of the whole program, because another build may train other models.
 std::string program_digest() { return digest_of("/proc/self/exe"); }
 
 json digests_of_files(const fs::path& folder) {
@@ -92,7 +92,8 @@ bool DemoFolder::is_up_to_date() const {
 Result<> DemoFolder::check_is_own(const std::vector<std::string>& names, bool overwrite) const {
   std::error_code error;
   if (overwrite || fs::exists(path_ / kStamp, error)) return {};
-  if (fs::exists(path_ / kDemoModel, error)) return {};  // of a demo before it left a stamp
+  // of a version of the demo that wrote no stamp
+  if (fs::exists(path_ / kDemoModel, error)) return {};
   for (const std::string& name : names) {
     if (!fs::exists(path_ / name, error)) continue;
     return misuse("exists already, and no demo wrote it; name another folder, or add --overwrite",

@@ -1,4 +1,4 @@
-// Where the demo keeps what it has made and learnt, and whether that is what this very program
+// The folder for the demo's clips and models, and the check whether they are what this program
 // would make again.
 #pragma once
 
@@ -10,8 +10,8 @@
 
 namespace posed::cli {
 
-// The demo's config inside its folder: config/demo.toml, which travels inside the binary, with the
-// paths of that folder.
+// The demo's config in its folder: config/demo.toml, which is part of the binary, with the paths of
+// that folder.
 inline constexpr const char* kDemoConfig = "demo.toml";
 
 // $XDG_CACHE_HOME/posed/demo, or ~/.cache/posed/demo.
@@ -23,14 +23,15 @@ class DemoFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  // Whether every file is there as this program wrote it. Another build of posed, or a file that
-  // was changed, makes it false.
+  // Whether every file is there as this program wrote it; false after another build of posed wrote
+  // them, or after a file was changed.
   [[nodiscard]] bool is_up_to_date() const;
 
-  // Refuses a folder that holds files of these names which no demo wrote; `overwrite` allows them.
+  // Refuses a folder with files of these names that no demo wrote; `overwrite` allows it.
   [[nodiscard]] Result<> check_is_own(const std::vector<std::string>& names, bool overwrite) const;
 
-  // Writes the config, and then what is_up_to_date() reads about all files of the folder.
+  // Writes the config, and the stamp that is_up_to_date() reads, with a hash of every file in the
+  // folder.
   [[nodiscard]] Result<> finish() const;
 
  private:

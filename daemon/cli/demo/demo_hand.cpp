@@ -13,7 +13,8 @@ namespace posed::cli {
 namespace {
 
 constexpr std::array kLabels{"g", "1", "c", "3", "4", "p"};
-constexpr double kAgainAfter_s = 25.0;  // it takes some 12 s, and then the live hand is shown
+// a performance takes about 12 s; the rest shows the live hand
+constexpr double kAgainAfter_s = 25.0;
 
 std::string joined(const auto& labels) {
   std::string text;

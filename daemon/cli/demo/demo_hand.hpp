@@ -1,5 +1,5 @@
-// The demo's hand, seen and asked as any client would: a signer's g, c and p, and now and then a
-// string of labels that was not in the training data, performed over them.
+// The hand of the demo, watched and controlled as by any client: a signer performs g, c and p, and
+// from time to time the daemon performs labels in an order that was not in the training data.
 #pragma once
 
 #include <optional>
@@ -14,16 +14,16 @@ namespace posed::cli {
 
 class DemoHand {
  public:
-  // `control` is the daemon's endpoint.
+  // `control` is the daemon's control endpoint.
   [[nodiscard]] static Result<DemoHand> open(const std::string& control);
 
-  // A frame of the stream kDemoHandStream.
+  // Call with each frame of the stream kDemoHandStream.
   void take(const v1::Frame& frame);
-  // Asks for the string when its time has come and hears the answer; `seconds` since the start.
+  // Sends the labels when it is time, and reads the reply; `seconds` since the start.
   [[nodiscard]] Result<> tend(double seconds);
 
-  [[nodiscard]] std::string note() const;     // what it does now, one line
-  [[nodiscard]] std::string summary() const;  // what it did; empty when no hand was seen
+  [[nodiscard]] std::string note() const;     // what the hand does now, one line
+  [[nodiscard]] std::string summary() const;  // what it has done; empty if no hand was seen
 
  private:
   explicit DemoHand(Connection connection) : connection_(std::move(connection)) {}
@@ -32,7 +32,7 @@ class DemoHand {
   double next_play_s_ = 3.0;
   std::uint64_t frames_ = 0;
   v1::Frame last_;
-  std::vector<std::string> performed_;  // the labels of the last string, as they came
+  std::vector<std::string> performed_;  // the labels of the last performance, as they came
   std::uint64_t performed_frames_ = 0;
 };
 

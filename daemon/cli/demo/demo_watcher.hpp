@@ -1,5 +1,5 @@
-// The demo as a client of its own daemon: styled frames counted and held against the raw ones of
-// the same instant.
+// The demo as a client of its own daemon: counts styled frames and compares each with the raw frame
+// of the same instant.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace posed::cli {
 
-// What the demo sees as a client: raw and styled frames of the same instant, compared.
+// Receives raw and styled frames, and compares those of the same instant.
 class Watcher {
  public:
   explicit Watcher(DemoHand& hand) : hand_(hand) {}
@@ -35,8 +35,8 @@ class Watcher {
 
   [[nodiscard]] std::uint64_t styled() const { return styled_; }
   [[nodiscard]] std::uint64_t gaps() const { return gaps_; }
-  // Degrees rms (motion::TurnSum) from the raw pose: of all frames, and of those since the last
-  // call.
+  // The rms difference from the raw pose in degrees (motion::TurnSum): over all frames, and over
+  // those since the last call.
   [[nodiscard]] double change_deg() const { return all_.rms_rad() * kDegrees; }
   [[nodiscard]] double change_lately_deg() {
     const double change = lately_.rms_rad() * kDegrees;

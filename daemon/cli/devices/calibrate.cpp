@@ -1,4 +1,4 @@
-// `posed calibrate`: a user's glove from a few poses, or from another program's file.
+// `posed calibrate`: calibrates a user's glove from a few poses, or from another program's file.
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -25,7 +25,7 @@ namespace {
 using drivers::glove::CalibrationFile;
 using drivers::glove::kPoseNames;
 
-constexpr double kMostSeconds = 60.0;
+constexpr double kMaxSeconds = 60.0;
 
 struct CalibrateOptions {
   std::string driver, port, id, stream, user;
@@ -33,13 +33,13 @@ struct CalibrateOptions {
   std::filesystem::path import, out;
   std::vector<std::string> set;    // KEY=VALUE
   std::vector<std::string> poses;  // POSE=SECONDS
-  double seconds = 0.0;            // 0: Enter begins each pose
-  double ready_s = 3.0;            // to go from pose to pose without a key
+  double seconds = 0.0;            // 0: the user starts each pose with Enter
+  double ready_s = 3.0;            // time to change from pose to pose without a key
   ClientOptions client;
   bool live = false;
   bool ready_given = false;
   bool overwrite = false;
-  bool force = false;  // write what the check calls unusable
+  bool force = false;  // write the file although the check calls it unusable
 };
 
 Result<const drivers::Driver*> named_driver(const std::string& name) {
@@ -77,7 +77,7 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
       const auto [stop, error] = std::from_chars(word.data() + equals + 1, end, seconds);
       if (error != std::errc() || stop != end) seconds = -1.0;
     }
-    if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMostSeconds)) {
+    if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMaxSeconds)) {
       return misuse("'" + word + "': --pose is flat, fist, thumb or spread =SECONDS, 0 to 60");
     }
     plan.seconds[static_cast<std::size_t>(name - kPoseNames.begin())] = seconds;
@@ -86,7 +86,7 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
   return plan;
 }
 
-// The glove of a stream is what it is; options that say otherwise are a mistake.
+// The glove of a running stream is already set up; options that would change it are an error.
 Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
   if (options.stream.empty()) return misuse("--connect also needs --stream");
   auto source = GloveSource::connect(options.client, options.stream);
@@ -104,7 +104,8 @@ Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
   return source;
 }
 
-// A glove that a daemon has can be calibrated through that daemon; nothing has to be ended.
+// A glove that a daemon uses can be calibrated through that daemon, without ending it; the error
+// says so.
 Error with_way_through(Error error) {
   if (error.message.contains(" is in use")) {
     error.message +=
@@ -125,8 +126,8 @@ Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options)
   return source;
 }
 
-// What a calibration is for. A port's path is no glove's identity: the same glove may be plugged in
-// elsewhere tomorrow.
+// The glove that a calibration is for. A port's path does not identify it, because the same glove
+// may be plugged in elsewhere tomorrow.
 CalibrationFile blank_file(const GloveSource& source) {
   const std::string& identity = source.identity();
   return {.driver = source.model().driver,
@@ -154,7 +155,8 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   return file;
 }
 
-// Without a device only the driver and the hand are known; through a daemon the glove is, too.
+// Without a device only the driver and the hand are known; through a daemon the glove is known,
+// too.
 Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   if (options.live) {
     const auto source = connect(options);
@@ -176,7 +178,7 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   return drivers::glove::import_calibration(options.import, *model, hand);
 }
 
-// Before anybody has gone through the poses. An option that would mean nothing is refused.
+// Checked before the user goes through the poses. An option that would have no effect is refused.
 Result<> check_options(const CalibrateOptions& options) {
   if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
   const bool timed = options.seconds > 0.0;
@@ -236,11 +238,11 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command
       ->add_option("--seconds", options->seconds, "Hold each pose this long; it begins by itself")
-      ->check(CLI::Range(0.1, kMostSeconds));
+      ->check(CLI::Range(0.1, kMaxSeconds));
   auto* ready =
       command->add_option("--ready", options->ready_s, "With --seconds: the time from pose to pose")
           ->capture_default_str()
-          ->check(CLI::Range(0.0, kMostSeconds));
+          ->check(CLI::Range(0.0, kMaxSeconds));
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--force", options->force, "Write the calibration even if poses failed");
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")
@@ -249,7 +251,7 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("C.toml")
       ->required();
   command->footer(
-      R"(Poses: flat, fist, thumb, spread. On a terminal a screen leads through them; elsewhere
+      R"(Poses: flat, fist, thumb, spread. On a terminal a screen shows what to do; elsewhere
 a line on stdout names each pose and a line on stdin begins it, or --seconds does. A pose in which
 the hand moved, or whose sensors hardly moved from the flat hand, fails: the screen asks for it
 again, a script gets exit code 1 and no file. Examples:

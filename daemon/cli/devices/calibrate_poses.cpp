@@ -10,7 +10,7 @@ using drivers::glove::Pose;
 using drivers::glove::Recorded;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr double kRestlessShare = 0.12;  // of a sensor's range; its noise is far less
+constexpr double kRestlessShare = 0.12;  // share of a sensor's range; its noise is far less
 constexpr double kPatience_s = 5.0;      // for a glove that sends nothing while the user reads
 
 class Recording {
@@ -38,7 +38,7 @@ class Recording {
   using Raw = GloveSource::Raw;
   using Valid = GloveSource::Valid;
 
-  // Shows the live hand until the user, or the time to get ready, is over.
+  // Shows the live hand until the user confirms, or the time to get ready has passed.
   Result<PoseGuide::Word> ask(Pose pose) {
     guide_.want(pose);
     const double ready_s = plan_.ready_s.value_or(0.0);
@@ -67,7 +67,8 @@ class Recording {
     held = {};
     begin();
     const double held_s = plan_.seconds[static_cast<std::size_t>(pose)];
-    const double whole_s = plan_.settle_s + held_s;  // to the user it is one time to be still
+    // shown to the user as one time in which to hold still
+    const double whole_s = plan_.settle_s + held_s;
     const auto settle = [&](const Raw& raw, const Valid& valid) {
       guide_.show(raw, valid, PosePhase::kSettling, whole_s - past_s(), whole_s);
     };
@@ -111,7 +112,7 @@ class Recording {
   const PosePlan& plan_;
   PoseGuide& guide_;
   Recorded recorded_{};
-  SteadyClock::time_point begun_{};  // of the phase
+  SteadyClock::time_point begun_{};  // start of the phase
 };
 
 }  // namespace

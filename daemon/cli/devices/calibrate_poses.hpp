@@ -1,5 +1,5 @@
-// The part of `posed calibrate` in which a hand goes from pose to pose. Who leads the user through
-// it is a PoseGuide: a screen (pose_screen.hpp), lines for scripts, or a test.
+// The part of `posed calibrate` that records pose after pose. A PoseGuide leads the user through
+// it: a screen (pose_screen.hpp), lines of text for scripts, or a test.
 #pragma once
 
 #include <array>
@@ -12,11 +12,11 @@
 namespace posed::cli {
 
 struct PosePlan {
-  // How long each pose is recorded [s]; 0 leaves it out. The flat hand is never left out.
+  // How long each pose is recorded [s]; 0: skip it. The flat hand is never skipped.
   std::array<double, drivers::glove::kPoses> seconds{2.0, 2.0, 2.0, 2.0};
-  // How long the user has to take a pose that begins by itself [s]; none: the guide says when.
+  // How long the user has to take a pose that starts by itself [s]; empty: the guide starts it.
   std::optional<double> ready_s{};
-  double settle_s = 0.5;  // not recorded: the hand comes to rest, the glove's filter, too
+  double settle_s = 0.5;  // not recorded, so that the hand and the glove's filter come to rest
 
   [[nodiscard]] std::vector<drivers::glove::Pose> poses() const;
 };
@@ -30,20 +30,21 @@ class PoseGuide {
 
   virtual void want(drivers::glove::Pose pose) = 0;
 
-  // What the user says while a pose is asked for; never waits, called ten times a second at least.
+  // The user's reply while a pose is asked for. The call must not wait; it is made at least ten
+  // times a second.
   enum class Word { kNothing, kGo, kBack, kStop };
   [[nodiscard]] virtual Word hear() = 0;
 
-  // A measurement. `left_s` of `whole_s` are still to come: of the time to get ready, or to be
-  // still, settling included; both 0 where the user ends it.
+  // One measurement. `left_s` of `whole_s` remain: of the time to get ready, or of the time to hold
+  // still, settling included. Both are 0 if the user ends the phase.
   virtual void show(const GloveSource::Raw& raw, const GloveSource::Valid& valid, PosePhase phase,
                     double left_s, double whole_s) = 0;
 
-  // The hand was not still while the pose was held; this sensor tells.
+  // The hand moved while the pose was held; `sensor` shows it.
   virtual void restless(drivers::glove::Pose pose, const std::string& sensor) = 0;
 };
 
-// An error when the user gives up, the glove goes, or nothing comes from it.
+// An error if the user gives up, the glove is unplugged, or it sends nothing.
 [[nodiscard]] Result<drivers::glove::Recorded> record_poses(GloveSource& source,
                                                             const PosePlan& plan, PoseGuide& guide);
 

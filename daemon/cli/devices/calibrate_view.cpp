@@ -14,14 +14,16 @@ using drivers::glove::kPoseHints;
 using drivers::glove::kPoseNames;
 using drivers::glove::Pose;
 
-constexpr int kLeastColumns = 40;
-constexpr int kCellWidth = 26;  // least of a sensor's: below it nobody sees a bar move
-constexpr int kMostCell = 60;
+constexpr int kMinColumns = 40;
+// smallest width of a sensor's cell; in a smaller one the bar's movement is not visible
+constexpr int kCellWidth = 26;
+constexpr int kMaxCell = 60;
 constexpr int kValueWidth = 6;
 constexpr int kBesideBar = kValueWidth + 5;  // blank, frame, value, mark
-constexpr int kLeastBar = 5;
+constexpr int kMinBar = 5;
 
-// Sensors differ in how their names begin and end: "thumb_jo~t1".
+// Shortens a name in its middle, because sensor names differ at their beginning and end:
+// "thumb_jo~t1".
 std::string squeezed(const std::string& name, int width) {
   const auto columns = static_cast<std::size_t>(width);
   if (name.size() <= columns) return name;
@@ -30,7 +32,7 @@ std::string squeezed(const std::string& name, int width) {
 
 std::size_t place(Pose pose) { return static_cast<std::size_t>(pose); }
 
-// Words in lines of at most `width`.
+// Splits the text at blanks into lines of at most `width`.
 std::vector<std::string> wrapped(std::string_view text, int width) {
   std::vector<std::string> lines(1);
   while (!text.empty()) {
@@ -82,7 +84,7 @@ std::string cell(const CalibrateView& view, const SensorView& sensor, int width,
   return still ? paint(view.colour, kYellow, text) : text;
 }
 
-// The sensors in `rows` lines, column by column.
+// The sensors as a table of `rows` lines, filled column by column.
 std::vector<std::string> table(const CalibrateView& view, int width, int rows) {
   std::vector<const SensorView*> there;
   for (const SensorView& sensor : view.sensors) {
@@ -93,12 +95,12 @@ std::vector<std::string> table(const CalibrateView& view, int width, int rows) {
   const int most_columns = std::max(1, (width + 1) / (kCellWidth + 1));
   const int columns = std::clamp((count + rows - 1) / std::max(rows, 1), 1, most_columns);
   const int lines = std::min((count + columns - 1) / columns, std::max(rows, 1));
-  const int cell_width = std::min((width - (columns - 1)) / columns, kMostCell);
+  const int cell_width = std::min((width - (columns - 1)) / columns, kMaxCell);
   int name_width = 0;
   for (const SensorView* sensor : there) {
     name_width = std::max(name_width, static_cast<int>(sensor->name.size()));
   }
-  name_width = std::min(name_width, cell_width - kBesideBar - kLeastBar);
+  name_width = std::min(name_width, cell_width - kBesideBar - kMinBar);
   std::vector<std::string> text(static_cast<std::size_t>(lines));
   for (int i = 0; i < std::min(count, lines * columns); ++i) {
     std::string& line = text[static_cast<std::size_t>(i % lines)];
@@ -129,7 +131,7 @@ std::string sensor_bar(const SensorView& sensor, int width) {
 }
 
 std::vector<std::string> calibrate_view(const CalibrateView& view) {
-  const int width = std::max(view.width, kLeastColumns);
+  const int width = std::max(view.width, kMinColumns);
   const Pose pose = view.poses[view.pose];
   std::vector<std::string> lines{paint(view.colour, kBold, cut(view.title, width)),
                                  paint(view.colour, kDim, cut(steps(view), width)), ""};

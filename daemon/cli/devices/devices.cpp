@@ -1,5 +1,5 @@
-// `posed devices`: what is plugged in, how a config names it, which driver may fit, and what keeps
-// it from being opened.
+// `posed devices`: lists connected devices, how a config names them, which driver may fit, and what
+// prevents opening them.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -24,10 +24,10 @@ using drivers::DeviceInfo;
 using nlohmann::ordered_json;
 
 constexpr const char* kFooter = R"(examples:
-  posed devices              what is plugged in, and the id that a [[stream]] binds it by
+  posed devices              connected devices, and the id for a [[stream]] in the config
   posed devices --json       the same for a script
 
-Bind a stream to a glove, not to a port that moves: id = "SERIAL" or, for gloves without a serial
+Bind a stream to a glove, not to a port: id = "SERIAL" or, for gloves without a serial
 number, the port path ("1-2.3": always that socket).)";
 
 std::string bus_name(Bus bus) {
@@ -40,7 +40,7 @@ std::string usb_numbers(std::uint16_t number) {
   return text.data();
 }
 
-// The serial number, or the port path where that is missing or shared by twins.
+// The serial number, or the port path if the serial number is missing or not unique.
 std::string id_of(const DeviceInfo& one, const std::vector<DeviceInfo>& all) {
   if (!one.is_usb) return {};
   const auto same = std::ranges::count_if(all, [&](const DeviceInfo& other) {
@@ -53,7 +53,7 @@ std::string id_of(const DeviceInfo& one, const std::vector<DeviceInfo>& all) {
   return ports == 1 ? one.port_path : one.port_path + ":1." + std::to_string(one.interface);
 }
 
-// Serial ports and HID nodes of any kind; of the other USB devices only the gloves.
+// Serial ports and HID nodes of any kind; of the other USB devices only gloves.
 std::vector<DeviceInfo> list_all() {
   std::vector<DeviceInfo> all = drivers::list_serial_ports();
   for (auto& one : drivers::list_hid_nodes()) all.push_back(std::move(one));
@@ -88,7 +88,7 @@ ordered_json describe(const DeviceInfo& one, const std::vector<DeviceInfo>& all)
           {"open_error", or_null(one.open_error)}};
 }
 
-// For people: what a device calls itself may hold anything.
+// For printing: a device's name for itself may contain any bytes.
 std::string text_of(const ordered_json& value) {
   return value.is_null() ? "-" : clean(value.get<std::string>());
 }

@@ -15,7 +15,7 @@ bool parse(const std::string& text, Number& number) {
   return error == std::errc() && stop == end;
 }
 
-// As the type of the option's default; false when the text is none.
+// Converts the text to the type of the option's default; returns false if it does not fit.
 bool read_value(const std::string& text, drivers::OptionValue& value) {
   if (auto* flag = std::get_if<bool>(&value)) {
     *flag = text == "true";
@@ -42,7 +42,7 @@ Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
       for (const auto& option : driver.options) {
         known += (known.empty() ? "" : ", ") + std::string(option.name);
       }
-      return misuse("'" + word + "' is no option of " + std::string(driver.name) +
+      return misuse("'" + word + "' is not an option of " + std::string(driver.name) +
                     "; KEY=VALUE with one of: " + known);
     }
     drivers::OptionValue value = spec->default_value;

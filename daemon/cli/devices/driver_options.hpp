@@ -1,4 +1,4 @@
-// A driver's options as people type them: KEY=VALUE.
+// Driver options from the command line: KEY=VALUE.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace posed::cli {
 
-// Completed with the driver's defaults; a key or a value that it does not take is misuse.
+// Completed with the driver's defaults; an unknown key or a wrong value is an error (wrong use).
 [[nodiscard]] Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
                                                             const std::vector<std::string>& words);
 

@@ -1,4 +1,4 @@
-// `posed emulate`: a glove that is not there, for any program that expects one.
+// `posed emulate`: emulates a glove for any program that expects one.
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -35,7 +35,7 @@ struct EmulateOptions {
   std::optional<double> seconds;
 };
 
-// What the emulated hand does: a clip, or a made-up person's gestures.
+// The motion of the emulated hand: a clip, or gestures of a synthetic person.
 Result<std::function<HandAngles(double)>> motion(const EmulateOptions& options) {
   auto clip = std::make_shared<clip::HandClip>();
   if (!options.clip.empty()) {
@@ -59,7 +59,8 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
     for (const drivers::Driver& other : drivers::registry()) {
       if (other.emulate != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
     }
-    return misuse("'" + name + "' is no log and no glove that can be emulated; there is: " + known);
+    return misuse("'" + name +
+                  "' is neither a log nor a glove that can be emulated; there is: " + known);
   }
   auto options = parse_driver_options(*driver, set);
   if (!options) return std::unexpected(options.error());
@@ -69,11 +70,11 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
 Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& options) {
   if (!std::filesystem::is_regular_file(options.what)) {
     if (!options.stream.empty()) {
-      return misuse("--stream chooses from a log's streams; '" + options.what + "' is no log here");
+      return misuse("--stream chooses from a log's streams; '" + options.what + "' is not a log");
     }
     return make_emulator(options.what, options.set);
   }
-  if (!options.clip.empty()) return misuse("a log brings its own motion: leave out --clip");
+  if (!options.clip.empty()) return misuse("a log has its own motion: leave out --clip");
   auto device = emulate::read_logged_device(options.what, options.stream);
   if (!device) return std::unexpected(device.error());
   std::unique_ptr<drivers::Emulator> speaker;
@@ -133,7 +134,7 @@ Result<> emulate(const EmulateOptions& options) {
 
 void add_emulate(CLI::App& app, int& exit_code) {
   auto* command =
-      app.add_subcommand("emulate", "Be a glove: on a pseudo-terminal or a TCP connection");
+      app.add_subcommand("emulate", "Emulate a glove on a pseudo-terminal or a TCP connection");
   auto options = std::make_shared<EmulateOptions>();
   command->add_option("WHAT", options->what, "A device log (.plog) or a driver's name")->required();
   auto* pty = command->add_flag("--pty", options->pty, "Behind a pseudo-terminal (the default)");
@@ -146,15 +147,16 @@ void add_emulate(CLI::App& app, int& exit_code) {
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
   command
-      ->add_option("--clip", options->clip, "The hand's motion, a hand CSV; else made-up gestures")
+      ->add_option("--clip", options->clip,
+                   "The hand's motion, a hand CSV; default: synthetic gestures")
       ->type_name("FILE");
   command->add_option("--set", options->set, "An option of the driver, like hand=left")
       ->type_name("KEY=VALUE");
-  auto* fault =
-      command
-          ->add_option("--fault", options->faults, "A fault of the line, so many a byte or packet")
-          ->type_name("KIND:RATE");
-  command->add_option("--seed", options->seed, "Of the faults: the same seed, the same faults")
+  auto* fault = command
+                    ->add_option("--fault", options->faults,
+                                 "A fault of the line, with its rate per byte or packet")
+                    ->type_name("KIND:RATE");
+  command->add_option("--seed", options->seed, "Of the faults: the same seed gives the same faults")
       ->needs(fault)
       ->capture_default_str();
   command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");

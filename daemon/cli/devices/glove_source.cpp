@@ -17,7 +17,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using drivers::glove::Model;
 
-constexpr double kGlovePatience_s = 5.0;  // without a value: the glove or the daemon is gone
+// without a value for this long, the glove or the daemon is gone
+constexpr double kGlovePatience_s = 5.0;
 
 std::unexpected<Error> nothing_came() {
   return fail("no values come from the glove: is it switched on and worn?");
@@ -38,7 +39,7 @@ std::int64_t now_ns() {
       .count();
 }
 
-// Raw values of a glove's samples: sensors first, then their raw values.
+// Collects raw values from a glove's samples: calibrated sensors come first, then their raw values.
 class RawSink final : public Sink {
  public:
   RawSink(std::size_t sensors, const GloveSource::Take& take) : sensors_(sensors), take_(take) {}
@@ -104,7 +105,7 @@ class OpenedGlove final : public GloveSource {
   drivers::Device device_;
 };
 
-// One message of the daemon about the stream; both empty: nothing came within a look-around.
+// One message of the daemon about the stream; both are empty if nothing came within kLookAround.
 struct Heard {
   std::optional<v1::Sample> sample;
   std::optional<v1::Stats> stats;
@@ -141,7 +142,7 @@ class Subscription {
     return heard;
   }
 
-  // The stream's own part; null when there is no such stream.
+  // The stats of the stream; null if there is no such stream.
   [[nodiscard]] const v1::StreamStats* part_of(const v1::Stats& stats) const {
     const auto at = std::ranges::find(stats.stream(), stream_, &v1::StreamStats::stream);
     return at == stats.stream().end() ? nullptr : &*at;
@@ -184,7 +185,7 @@ class PublishedGlove final : public GloveSource {
   }
 
  private:
-  // Another glove on the same port would be mixed into the one that went.
+  // Data of another glove on the same port must not be mixed with those of the one that went.
   [[nodiscard]] bool still_there(const v1::Stats& stats) const {
     const v1::StreamStats* stream = subscription_.part_of(stats);
     return stream != nullptr && !stream->away() && stream->identity() == identity();
@@ -213,7 +214,7 @@ Result<GloveSource::Glove> GloveSource::known(const drivers::Driver& driver,
                                               const drivers::Description& description) {
   const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
   if (driver.glove_model == nullptr || !hand) {
-    return misuse("driver " + in_quotes(driver.name) + " is no glove");
+    return misuse("driver " + in_quotes(driver.name) + " is not for gloves");
   }
   auto model = driver.glove_model(description);
   if (!model) return std::unexpected(model.error());
@@ -240,18 +241,18 @@ Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& c
     const auto heard = subscription->next();
     if (!heard) return std::unexpected(heard.error());
     if (!heard->stats) continue;
-    const v1::StreamStats* told = subscription->part_of(*heard->stats);
-    if (told == nullptr) return no_such_stream(stream, *heard->stats);
-    const drivers::Driver* driver = drivers::find_driver(told->driver());
-    if (driver == nullptr || told->device_info().empty()) {
-      return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(told->driver()) +
+    const v1::StreamStats* stats = subscription->part_of(*heard->stats);
+    if (stats == nullptr) return no_such_stream(stream, *heard->stats);
+    const drivers::Driver* driver = drivers::find_driver(stats->driver());
+    if (driver == nullptr || stats->device_info().empty()) {
+      return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(stats->driver()) +
                     ", which has no sensors that can be calibrated");
     }
-    if (told->away()) {
+    if (stats->away()) {
       return fail("the glove of stream " + in_quotes(stream) +
                   " is away: plug it in and begin again");
     }
-    const auto description = driver->describe(told->device_info(), told->identity());
+    const auto description = driver->describe(stats->device_info(), stats->identity());
     if (!description) return std::unexpected(description.error());
     auto glove = known(*driver, *description);
     if (!glove) return std::unexpected(glove.error());

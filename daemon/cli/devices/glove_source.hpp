@@ -1,5 +1,5 @@
-// GloveSource: the raw values of a glove's sensors for the command line, from a free device that it
-// opens itself or through a running daemon.
+// GloveSource: raw sensor values of a glove for the command line, either from a free device, which
+// it opens itself, or through a running daemon.
 #pragma once
 
 #include <bitset>
@@ -19,13 +19,13 @@ class GloveSource {
  public:
   using Raw = std::array<float, drivers::glove::kMaxSensors>;
   using Valid = std::bitset<drivers::glove::kMaxSensors>;
-  // [sensor of the model]; what is not valid is not measured.
+  // [sensor of the model]; values that are not valid were not measured.
   using Take = std::function<void(const Raw& raw, const Valid& valid)>;
 
-  // Speaks with the device and starts it.
+  // Opens the device and starts it.
   [[nodiscard]] static Result<std::unique_ptr<GloveSource>> open(const drivers::Driver& driver,
                                                                  const drivers::Options& options);
-  // Of a stream that a daemon publishes: what glove it is, the daemon tells.
+  // For a stream of a running daemon; the daemon reports which glove it is.
   [[nodiscard]] static Result<std::unique_ptr<GloveSource>> connect(const ClientOptions& client,
                                                                     const std::string& stream);
   virtual ~GloveSource() = default;
@@ -36,8 +36,9 @@ class GloveSource {
   [[nodiscard]] const std::string& identity() const { return glove_.identity; }
   [[nodiscard]] Side hand() const { return glove_.hand; }
 
-  // Hands over what comes for this long, or until it is `enough`, which is asked after each
-  // measurement and ten times a second. An error when the glove is lost, nothing comes, or Ctrl-C.
+  // Passes on what comes for this long, or until `enough` returns true, which is asked after each
+  // measurement and ten times a second. Returns an error if the glove is lost, nothing comes, or on
+  // Ctrl-C.
   [[nodiscard]] virtual Result<> listen(double seconds, const Take& take,
                                         const std::function<bool()>& enough) = 0;
   [[nodiscard]] Result<> listen(double seconds, const Take& take) {

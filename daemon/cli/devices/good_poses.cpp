@@ -14,8 +14,8 @@ namespace {
 
 bool on_terminal() { return ::isatty(STDIN_FILENO) != 0 && ::isatty(STDOUT_FILENO) != 0; }
 
-// On a terminal a screen leads the user; it is gone before anything else is printed. `note` says
-// why poses are asked for again; empty at first.
+// On a terminal a full-screen view leads the user; it is removed before anything else is printed.
+// `note` says why poses are asked for again; empty at first.
 Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
                                       const std::string& user, const std::string& note) {
   if (!on_terminal()) {
@@ -37,7 +37,7 @@ Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan&
   while (recorded) {
     const auto check = drivers::glove::check_poses(source.model(), *recorded);
     if (!check) return std::unexpected(check.error());
-    if (check->sensors == 0) return recorded;  // nothing came: the fit says so
+    if (check->sensors == 0) return recorded;  // nothing was measured; the fit reports it
     if (check->usable() || force) {
       std::fprintf(stderr, "posed: %s%s\n",
                    check->usable() ? "" : "warning: ", check->verdict().c_str());

@@ -1,4 +1,4 @@
-// `posed calibrate` from the first pose to poses that a calibration can rest on.
+// Records the poses for `posed calibrate` until they are good enough for a calibration.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace posed::cli {
 
-// Leads `user` through the poses and says on stderr how good they are. On a terminal those that
-// failed are asked for again, until the user gives up; elsewhere they are an error that names each
-// and what was wrong. `force` takes them all the same, with a warning.
+// Leads the user through the poses with `user` and reports on stderr how good they are. On a
+// terminal, poses that failed are asked for again until the user gives up; otherwise they are an
+// error that names each one and its fault. `force` accepts them all the same, with a warning.
 [[nodiscard]] Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan& plan,
                                                           const std::string& user, bool force);
 

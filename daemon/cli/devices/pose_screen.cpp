@@ -16,7 +16,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kRedraw{66};
 constexpr std::chrono::seconds kSilence{1};
-constexpr double kNoiseShare = 0.04;  // of a sensor's range
+constexpr double kNoiseShare = 0.04;  // share of a sensor's range
 
 }  // namespace
 
@@ -34,7 +34,8 @@ PoseScreen::PoseScreen(const drivers::glove::Model& model, const PosePlan& plan,
   heard_ = SteadyClock::now();
 }
 
-// Keys from before were not about this pose: an Enter too many would begin it.
+// Discards keys that were pressed before this pose was asked for: a superfluous Enter would start
+// it.
 void PoseScreen::want(Pose pose) {
   while (screen_.key_pressed() != 0) {
   }
@@ -61,7 +62,7 @@ void PoseScreen::show(const GloveSource::Raw& raw, const GloveSource::Valid& val
   view_.phase = phase;
   view_.left_s = std::max(left_s, 0.0);
   view_.share = whole_s > 0.0 ? 1.0 - view_.left_s / whole_s : 0.0;
-  if (phase != PosePhase::kAsked) view_.note.clear();  // it was about the pose before
+  if (phase != PosePhase::kAsked) view_.note.clear();  // it was about the previous pose
   const bool first_held = phase == PosePhase::kHeld && !ranging_;
   ranging_ = ranging_ || first_held;
   for (std::size_t i = 0; i < view_.sensors.size(); ++i) {

@@ -1,5 +1,5 @@
-// Who leads a user from pose to pose: a screen with a bar for each sensor, or lines of text where
-// there is no terminal.
+// Leads a user from pose to pose: with a bar for each sensor on a terminal, with lines of text
+// elsewhere.
 #pragma once
 
 #include <chrono>
@@ -10,10 +10,10 @@
 
 namespace posed::cli {
 
-// On the terminal, which is as it was once this is gone.
+// On the terminal, which is restored by the destructor.
 class PoseScreen final : public PoseGuide {
  public:
-  // `note` stands on the screen from the start; may be empty.
+  // `note` is shown from the start; may be empty.
   PoseScreen(const drivers::glove::Model& model, const PosePlan& plan, std::string title,
              std::string note);
 
@@ -28,12 +28,12 @@ class PoseScreen final : public PoseGuide {
 
   LiveScreen screen_;
   CalibrateView view_;
-  bool ranging_ = false;  // a pose is, or was, held: where sensors have been counts from then on
+  bool ranging_ = false;  // a pose is or was held; from now on the range of each sensor is tracked
   std::chrono::steady_clock::time_point drawn_{}, heard_{};
 };
 
-// A line on stdout when a pose is wanted ("pose fist"), what to do on stderr, and a line on stdin
-// for "I hold it", unless the poses begin by themselves.
+// Prints a line on stdout when a pose is wanted ("pose fist") and instructions on stderr. The user
+// confirms with a line on stdin, unless the poses start by themselves.
 class PoseLines final : public PoseGuide {
  public:
   explicit PoseLines(const PosePlan& plan) : waits_(!plan.ready_s) {}

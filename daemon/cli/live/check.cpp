@@ -1,4 +1,4 @@
-// `posed check`: does everything that `run` does before it binds a socket, and says what it found.
+// `posed check`: does everything that `run` does before it binds a socket, and prints the results.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -24,7 +24,7 @@ struct CheckOptions {
   bool json = false;
 };
 
-// What one stream would run, after its device was opened and its model bound.
+// A description of what one stream would run, made with its device opened and its model bound.
 Result<ordered_json> try_stream(const config::StreamConfig& config) {
   const auto stream = devices::open_stream(config);
   if (!stream) return std::unexpected(stream.error());
@@ -37,31 +37,31 @@ Result<ordered_json> try_stream(const config::StreamConfig& config) {
   const auto constrains = devices::bind_constrain(**stream);
   if (!constrains) return std::unexpected(constrains.error());
   const drivers::Description& device = (*stream)->device.description;
-  ordered_json told{{"name", config.name},
-                    {"driver", config.driver},
-                    {"device", device.identity},
-                    {"rate_hz", device.rate_hz},
-                    {"joints", device.skeleton ? device.skeleton->joints.size() : 0},
-                    {"sample_values", device.samples.names.size()},
-                    {"publish_raw", config.publish_raw},
-                    {"stale_after_s", config.stale_after_s}};
+  ordered_json summary{{"name", config.name},
+                       {"driver", config.driver},
+                       {"device", device.identity},
+                       {"rate_hz", device.rate_hz},
+                       {"joints", device.skeleton ? device.skeleton->joints.size() : 0},
+                       {"sample_values", device.samples.names.size()},
+                       {"publish_raw", config.publish_raw},
+                       {"stale_after_s", config.stale_after_s}};
   if (*bound) {
-    told["model"] = (*bound)->name;
-    told["alpha"] = config.style->filter.alpha;
+    summary["model"] = (*bound)->name;
+    summary["alpha"] = config.style->filter.alpha;
   }
   if (config.generate) {
-    told["lag_frames"] = smooth::lag_frames(config.generate->live.lag,
-                                            1.0 / generate::stream_rate_hz(device.rate_hz));
-    if (gesture->model) told["gesture_model"] = gesture->model->name;
+    summary["lag_frames"] = smooth::lag_frames(config.generate->live.lag,
+                                               1.0 / generate::stream_rate_hz(device.rate_hz));
+    if (gesture->model) summary["gesture_model"] = gesture->model->name;
   }
-  told["constrain"] = *constrains;
-  told["present"] = missing->empty();
-  told["warnings"] = (*stream)->device.warnings;
+  summary["constrain"] = *constrains;
+  summary["present"] = missing->empty();
+  summary["warnings"] = (*stream)->device.warnings;
   if (!missing->empty()) {
-    told["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
-                               *missing + ")");
+    summary["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
+                                  *missing + ")");
   }
-  return told;
+  return summary;
 }
 
 std::string security_of(const config::DaemonConfig& config) {
@@ -96,16 +96,16 @@ void print(const config::DaemonConfig& config, const ordered_json& streams) {
   }
 }
 
-// 0 when everything would run; 2 when the config is wrong; 1 when it is right, but a file or a
-// device it names cannot be used.
+// Returns 0 if everything would run; 2 if the config is wrong; 1 if it is right, but a file or a
+// device that it names cannot be used.
 int check(const CheckOptions& options) {
   config::Reading reading = config::read_config_file(options.config, drivers::registry());
   ordered_json streams = ordered_json::array();
   if (reading.errors.empty()) {
     for (const config::StreamConfig& stream : reading.config.streams) {
-      auto told = try_stream(stream);
-      if (told) streams.push_back(std::move(*told));
-      if (!told) reading.errors.push_back(told.error());
+      auto summary = try_stream(stream);
+      if (summary) streams.push_back(std::move(*summary));
+      if (!summary) reading.errors.push_back(summary.error());
     }
   }
   int exit_code = 0;
@@ -130,17 +130,17 @@ int check(const CheckOptions& options) {
 }  // namespace
 
 void add_check(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("check", "Read a config, open what it names, say what it is");
+  auto* command = app.add_subcommand("check", "Check a config and everything that it names");
   auto options = std::make_shared<CheckOptions>();
   command->add_option("--config", options->config, "The daemon's config, TOML")
       ->required()
       ->type_name("FILE");
-  command->add_flag("--json", options->json, "What would run, or all mistakes, as one JSON object");
+  command->add_flag("--json", options->json, "What would run, or all errors, as one JSON object");
   command->footer(R"(Examples:
   posed check --config config/posed.toml
   posed check --config mine.toml --json | jq .errors
-Every mistake is told, each with file and line. Exit code 0: it would run, though a glove that is
-away is only waited for (a note says so, "present" in JSON is false). 2: the config is wrong.
+Every error is reported with file and line. Exit code 0: it would run, though a glove that is
+unplugged is only waited for (a note says so, "present" in JSON is false). 2: the config is wrong.
 1: the config is right, but a clip, model or device that it names cannot be used.)");
   command->callback([options, &exit_code] { exit_code = check(*options); });
 }

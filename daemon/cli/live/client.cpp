@@ -15,12 +15,14 @@ namespace {
 
 using net::Domain;
 
-// A client never shows old poses: what it does not take in time waits nowhere for long.
+// A client must never show old poses, so only few messages may wait anywhere.
 constexpr int kMessagesWaiting = 16;
 constexpr int kReceiveBuffer = 8 * 1024;  // bytes
 
-// A secured daemon may hang up on a client without a key before its greeting was read (libzmq then
-// tells no reason), again and again. One that only ended is not there for a second try.
+// A secured daemon may close the connection to a client without a key before the client has read
+// the ZMTP greeting; libzmq then reports no reason. So the client concludes that it was refused
+// only after it was closed on this many times in a row; a daemon that is merely ending is not there
+// for a second try.
 constexpr int kHangUps = 3;
 
 constexpr const char* kMonitorEndpoint = "inproc://posed.connection";
@@ -30,7 +32,7 @@ constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAIL
 
 volatile std::sig_atomic_t interrupt_came = 0;
 
-// The first part of a monitor's message: event and value (zmq_socket_monitor).
+// Reads the first part of a monitor message: event number and value (zmq_socket_monitor).
 std::uint16_t read_event(void* monitor) {
   net::Message part;
   if (!part.receive(monitor)) return 0;
@@ -124,7 +126,7 @@ std::optional<Error> Connection::refusal() {
       case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
         return keyless ? wants_key()
                        : fail("the daemon at " + where +
-                              " does not use keys, or is no posed; leave out --key")
+                              " does not use keys, or is not posed; leave out --key")
                              .error();
       case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
         if (!keyless) {
@@ -156,7 +158,7 @@ Error Connection::no_answer() const {
   const char* const hint = domain_ == Domain::kControl
                                ? " (a replay publishes, but takes no control)"
                                : " (by default 5570 publishes, 5571 takes control)";
-  return fail("nobody answers at " + options_.endpoint +
+  return fail("nothing answers at " + options_.endpoint +
               "; is `posed run` going, and is this its endpoint?" + hint)
       .error();
 }
@@ -183,19 +185,19 @@ std::optional<std::string> SilenceWatch::silence() const {
   return heart_.ever_heard() ? connection_.silence(*silence_s) : connection_.no_answer().message;
 }
 
-std::optional<Error> SilenceWatch::tell() {
+std::optional<Error> SilenceWatch::report() {
   const std::int64_t now_ns = system::monotonic_ns();
   const auto silence_s = heart_.silent_s(now_ns);
   if (timeout_s_ > 0.0 && silence_s && *silence_s >= timeout_s_) {
     return fail(fmt::format("{}; gave up after {} s (--timeout)", sentence(*silence_s), timeout_s_))
         .error();
   }
-  const auto news_s = heart_.silence_to_tell(now_ns);
+  const auto news_s = heart_.silence_to_report(now_ns);
   if (news_s && prints_) {
     std::fprintf(stderr, "posed: %s%s\n",
                  heart_.ever_heard() ? "" : "waiting: ", sentence(*news_s).c_str());
   }
-  if (const auto back_s = heart_.return_to_tell(); back_s && prints_) {
+  if (const auto back_s = heart_.return_to_report(); back_s && prints_) {
     std::fprintf(stderr, "posed: %s answers again, after %.0f s\n", connection_.endpoint().c_str(),
                  *back_s);
   }
@@ -213,7 +215,8 @@ void add_timeout_option(CLI::App& command, double& timeout_s) {
 
 Interrupt::Interrupt() {
   struct sigaction action{};
-  action.sa_handler = [](int) { interrupt_came = 1; };  // no SA_RESTART: it ends a wait
+  // no SA_RESTART, so that the signal ends a wait
+  action.sa_handler = [](int) { interrupt_came = 1; };
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }

@@ -1,5 +1,5 @@
-// What all commands that talk to a running daemon share: their options, a connection that can say
-// why it does not come about, and Ctrl-C.
+// Shared by all commands that talk to a running daemon: their options, a connection that reports
+// why it cannot be established, and Ctrl-C.
 #pragma once
 
 #include <chrono>
@@ -20,31 +20,32 @@ namespace posed::cli {
 
 struct ClientOptions {
   std::string endpoint;
-  std::filesystem::path key;         // own NAME.key; empty: no CURVE
+  std::filesystem::path key;         // the client's own NAME.key; empty: no CURVE
   std::filesystem::path server_key;  // the daemon's NAME.pub
 };
 
-// --connect (default `endpoint`), --key and --server-key.
+// Adds --connect (default `endpoint`), --key and --server-key.
 void add_client_options(CLI::App& command, ClientOptions& options, const char* endpoint);
 
-// A connected socket that watches its own connection.
+// A connected socket that monitors its own connection.
 class Connection {
  public:
-  // `type` is ZMQ_SUB or ZMQ_DEALER. Returns at once; the connection comes about behind it, again
-  // and again if need be.
+  // `type` is ZMQ_SUB or ZMQ_DEALER. Returns at once; libzmq connects in the background, and
+  // reconnects when necessary.
   [[nodiscard]] static Result<Connection> open(const ClientOptions& options, int type);
 
   [[nodiscard]] const std::string& endpoint() const { return options_.endpoint; }
   [[nodiscard]] void* socket() const { return socket_.get(); }
-  // Waits for a message; false on timeout or a signal.
+  // Waits for a message; returns false on timeout or a signal.
   [[nodiscard]] bool wait(std::chrono::milliseconds timeout);
 
-  // Why the daemon does not let us in, once that is known: one sentence. Call now and then.
+  // Why the daemon refuses this client, in one sentence, once that is known. Call from time to
+  // time.
   [[nodiscard]] std::optional<Error> refusal();
-  // Whether the connection stands, as far as refusal() has seen.
+  // Whether the connection is established, as of the last call of refusal().
   [[nodiscard]] bool established() const { return established_; }
-  [[nodiscard]] Error no_answer() const;  // the sentence for nobody being there
-  // The same for a daemon that has answered before, and not for so long.
+  [[nodiscard]] Error no_answer() const;  // the error if nothing answers at the endpoint
+  // The sentence for a daemon that has answered before but has been silent for `silence_s`.
   [[nodiscard]] std::string silence(double silence_s) const;
 
  private:
@@ -61,19 +62,19 @@ class Connection {
   int hang_ups_ = 0;  // in a row, before the handshake
 };
 
-// Listens for the daemon's heartbeat, its stats, and says on stderr when it falls silent and when
-// it is back.
+// Watches the daemon's heartbeat, its stats, and prints on stderr when it falls silent and when it
+// is back.
 class SilenceWatch {
  public:
-  // `connection` outlives it. `timeout_s`: silence after which to give up; 0: never.
+  // `connection` outlives it. `timeout_s`: give up after this much silence; 0: never.
   SilenceWatch(const Connection& connection, double timeout_s);
 
-  void heard();  // any message
-  // Call now and then: says what is new. The error when it is time to give up.
-  [[nodiscard]] std::optional<Error> tell();
-  // The sentence to show while the daemon is silent; nothing while it answers.
+  void heard();  // call for every message
+  // Call from time to time: prints what is new. Returns an error when it is time to give up.
+  [[nodiscard]] std::optional<Error> report();
+  // The sentence to show while the daemon is silent; empty while it answers.
   [[nodiscard]] std::optional<std::string> silence() const;
-  // Whether tell() prints; a drawn screen shows silence() instead.
+  // Whether report() prints; a full-screen view shows silence() instead.
   void print(bool yes) { prints_ = yes; }
 
  private:
@@ -85,14 +86,14 @@ class SilenceWatch {
   Heartbeat heart_;
 };
 
-// --timeout: how long to wait for a daemon that does not answer; 0, the default, for ever.
+// Adds --timeout: how long to wait for a daemon that does not answer; 0, the default: for ever.
 void add_timeout_option(CLI::App& command, double& timeout_s);
 
-// How long a client waits before it looks for keys, signals and refusals.
+// How often a waiting client checks keys, signals and refusals.
 inline constexpr std::chrono::milliseconds kLookAround{100};
 
-// From its making on SIGINT and SIGTERM only set a flag. A stdout that nobody reads any more
-// (`posed monitor | head`) is as good a reason to end.
+// While one exists, SIGINT and SIGTERM only set a flag. A reader of stdout that has gone (`posed
+// monitor | head`) counts as an interrupt, too.
 class Interrupt {
  public:
   Interrupt();

@@ -1,4 +1,4 @@
-// The time of day as people read it beside an event.
+// The time of day, to print beside an event.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@
 
 namespace posed::cli {
 
-// "17:04:09.250", this machine's own time zone.
+// "17:04:09.250", in this machine's time zone.
 inline std::string clock_time() {
   const auto now = std::chrono::system_clock::now();
   const std::time_t whole = std::chrono::system_clock::to_time_t(now);

@@ -73,7 +73,7 @@ Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest
   return ask(*connection, options, request);
 }
 
-// Sends the model piece by piece. The answer to the last piece, or the first one that is a refusal.
+// Sends the model piece by piece. Returns the reply to the last piece, or the first refusal.
 Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& model) {
   const Interrupt interrupt;
   auto connection = Connection::open(options.client, ZMQ_DEALER);
@@ -85,36 +85,36 @@ Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& mo
   part.set_sha256(log::sha256_hex(std::as_bytes(std::span(model))));
   part.set_total(model.size());
   Result<v1::ControlReply> reply = fail("the model is empty", options.model);
-  for (std::size_t offset = 0; offset < model.size(); offset += control::kLargestPiece) {
+  for (std::size_t offset = 0; offset < model.size(); offset += control::kMaxPiece) {
     part.set_offset(offset);
-    part.set_bytes(model.substr(offset, control::kLargestPiece));
+    part.set_bytes(model.substr(offset, control::kMaxPiece));
     reply = ask(*connection, options, request);
     if (!reply || !reply->ok()) return reply;
   }
   return reply;
 }
 
-// Prints an answer: JSON, or what `tell` makes of it.
-template <typename Tell>
-int show(const CtlOptions& options, const Result<v1::ControlReply>& reply, Tell&& tell) {
+// Prints a reply as JSON, or with `print`.
+template <typename Print>
+int show(const CtlOptions& options, const Result<v1::ControlReply>& reply, Print&& print) {
   if (!reply) return report(reply.error());
   if (options.json) (void)print_json(*reply);
   if (!reply->ok()) return report(Error{reply->error(), {}, 0, ExitCode::kFailed});
-  if (!options.json) tell(*reply);
+  if (!options.json) print(*reply);
   return 0;
 }
 
-template <typename Tell>
-int ask_and_tell(const CtlOptions& options, const v1::ControlRequest& request, Tell&& tell) {
-  return show(options, ask(options, request), tell);
+template <typename Print>
+int ask_and_print(const CtlOptions& options, const v1::ControlRequest& request, Print&& print) {
+  return show(options, ask(options, request), print);
 }
 
-// Says of which stream what is in effect from when on.
+// Prints which stream was changed, how, and from which frame on.
 int show_change(const CtlOptions& options, const Result<v1::ControlReply>& reply,
                 const std::string& what) {
-  return show(options, reply, [&](const v1::ControlReply& told) {
-    std::printf("%s: in effect from frame %llu: %s\n", told.stream().c_str(),
-                static_cast<unsigned long long>(told.sequence()), what.c_str());
+  return show(options, reply, [&](const v1::ControlReply& accepted) {
+    std::printf("%s: in effect from frame %llu: %s\n", accepted.stream().c_str(),
+                static_cast<unsigned long long>(accepted.sequence()), what.c_str());
   });
 }
 
@@ -132,8 +132,7 @@ int set_parameter(const CtlOptions& options) {
 int send_model(const CtlOptions& options) {
   const auto fits = expect_kind(options.model, FileKind::kModel, options.stream);
   if (!fits) return report(fits.error());
-  const auto bytes =
-      load_file(options.model, {.what = "model", .max_bytes = control::kLargestModel});
+  const auto bytes = load_file(options.model, {.what = "model", .max_bytes = control::kMaxModel});
   if (!bytes) return report(bytes.error());
   return show_change(options, upload(options, *bytes),
                      "model " + options.model.filename().string());
@@ -157,7 +156,7 @@ int stop_playing(const CtlOptions& options) {
   return change(options, request, "performs no more");
 }
 
-// Everything about the file itself is found here; whether it fits the glove, the daemon knows.
+// Checks everything about the file itself; only the daemon knows whether it fits the glove.
 Result<std::string> read_calibration(const CtlOptions& options) {
   const auto& path = options.calibration;
   const auto fits = expect_kind(path, FileKind::kCalibration, options.stream);
@@ -182,7 +181,7 @@ int calibrate(const CtlOptions& options) {
 
 int haptics(const CtlOptions& options) {
   if (options.force.empty() && options.vibration.empty()) {
-    return report(misuse("say what is to be felt: --force, --vibrate or both").error());
+    return report(misuse("give --force, --vibrate or both").error());
   }
   v1::ControlRequest request;
   auto& wanted = *request.mutable_haptics();
@@ -193,7 +192,7 @@ int haptics(const CtlOptions& options) {
     wanted.set_vibration_s(options.vibration[1]);
     wanted.set_vibration_amplitude(options.vibration[2]);
   }
-  return ask_and_tell(options, request, [&](const v1::ControlReply&) {
+  return ask_and_print(options, request, [&](const v1::ControlReply&) {
     std::printf("%s: sent to the device\n", options.stream.c_str());
   });
 }
@@ -201,9 +200,9 @@ int haptics(const CtlOptions& options) {
 int show_status(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_status();
-  return ask_and_tell(options, request, [&](const v1::ControlReply& reply) {
+  return ask_and_print(options, request, [&](const v1::ControlReply& reply) {
     LiveViewOptions view{.title = "posed " + options.client.endpoint, .height = 0};
-    if (isatty(STDOUT_FILENO) == 0) view.width = 0;  // a script wants whole names
+    if (isatty(STDOUT_FILENO) == 0) view.width = 0;  // not a terminal: print whole names
     for (const std::string& line : live_view(reply.status(), view)) std::puts(line.c_str());
   });
 }
@@ -211,8 +210,8 @@ int show_status(const CtlOptions& options) {
 int stop_daemon(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_stop();
-  return ask_and_tell(options, request,
-                      [](const v1::ControlReply&) { std::puts("the daemon is ending"); });
+  return ask_and_print(options, request,
+                       [](const v1::ControlReply&) { std::puts("the daemon is ending"); });
 }
 
 constexpr const char* kExamples = R"(Examples:
@@ -222,7 +221,7 @@ constexpr const char* kExamples = R"(Examples:
 `posed ctl COMMAND --help` has examples of each. Exit code 0: it is in effect; 1: the daemon refused
 or did not answer; 2: wrong use.)";
 
-// One thing that a daemon can be asked for; the options of `ctl` itself go with each.
+// The subcommands of `ctl`; each takes the options of `ctl` itself, too.
 class Actions {
  public:
   Actions(CLI::App& command, std::shared_ptr<CtlOptions> options, int& exit_code)
@@ -254,8 +253,8 @@ class Actions {
 void add_style_actions(Actions& actions, CtlOptions& options) {
   CLI::App* set = actions.add_for_stream("set", "Change a stream's parameter", set_parameter,
                                          R"(Example:
-  posed ctl set walker alpha 0.5     # half the style; alpha slides there
-alpha: 0 none of the style, 1 as it was learnt, 2 twice as much, -1 the other way.)");
+  posed ctl set walker alpha 0.5     # half the style; alpha moves there slowly
+alpha: 0 no style, 1 the style as trained, 2 twice as much, -1 the opposite.)");
   set->add_option("parameter", options.parameter, "alpha: how much style")
       ->required()
       ->check(CLI::IsMember({"alpha"}));
@@ -275,7 +274,7 @@ void add_hand_actions(Actions& actions, CtlOptions& options) {
       ->required();
   perform->add_option("--tempo", options.tempo, "0.5 to 2 times the learnt one; 2 is twice as fast")
       ->capture_default_str();
-  perform->add_flag("--loop", options.loop, "Begin again after the last, until others come");
+  perform->add_flag("--loop", options.loop, "Repeat the labels until others come");
   static_cast<void>(actions.add_for_stream("stop-playing", "Back to the live hand", stop_playing,
                                            "Example:\n  posed ctl stop-playing hand"));
 }
@@ -285,8 +284,9 @@ void add_glove_actions(Actions& actions, CtlOptions& options) {
                                          R"(Example:
   posed ctl calibrate right ann.toml   # from the next packet on)");
   fit->add_option("calibration", options.calibration, "What `posed calibrate` wrote")->required();
-  CLI::App* feel = actions.add_for_stream("haptics", "Let a glove with motors be felt", haptics,
-                                          R"(Examples:
+  CLI::App* feel =
+      actions.add_for_stream("haptics", "Send force or vibration to a glove with motors", haptics,
+                             R"(Examples:
   posed ctl haptics right --force 0 0.5 0.5 0 0
   posed ctl haptics right --vibrate 80 0.2 0.5    # 80 Hz for 0.2 s at half the strength)");
   feel->add_option("--force", options.force,

@@ -7,14 +7,14 @@
 namespace posed::cli {
 namespace {
 
-constexpr double kSilence_s = 3.0;       // three messages that did not come
-constexpr double kFirstSilence_s = 1.5;  // a daemon that is there says something within a second
+constexpr double kSilence_s = 3.0;       // three stats messages are missing
+constexpr double kFirstSilence_s = 1.5;  // a running daemon sends something within a second
 
 }  // namespace
 
 void Heartbeat::heard(std::int64_t now_ns) {
-  if (told_s_ > 0.0) returned_ = seconds(now_ns - last_ns_);
-  told_s_ = 0.0;
+  if (reported_s_ > 0.0) returned_ = seconds(now_ns - last_ns_);
+  reported_s_ = 0.0;
   last_ns_ = now_ns;
   ever_heard_ = true;
 }
@@ -25,13 +25,15 @@ std::optional<double> Heartbeat::silent_s(std::int64_t now_ns) const {
   return silence_s;
 }
 
-std::optional<double> Heartbeat::silence_to_tell(std::int64_t now_ns) {
+std::optional<double> Heartbeat::silence_to_report(std::int64_t now_ns) {
   const auto silence_s = silent_s(now_ns);
-  if (!silence_s || *silence_s < 2.0 * told_s_) return std::nullopt;
-  told_s_ = *silence_s;
+  if (!silence_s || *silence_s < 2.0 * reported_s_) return std::nullopt;
+  reported_s_ = *silence_s;
   return silence_s;
 }
 
-std::optional<double> Heartbeat::return_to_tell() { return std::exchange(returned_, std::nullopt); }
+std::optional<double> Heartbeat::return_to_report() {
+  return std::exchange(returned_, std::nullopt);
+}
 
 }  // namespace posed::cli

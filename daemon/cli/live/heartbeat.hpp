@@ -1,5 +1,5 @@
-// Heartbeat: whether a daemon that says something every second still does. Time is handed in, so a
-// test can let it pass.
+// Heartbeat: whether a daemon that sends stats every second still does. The time is a parameter, so
+// a test can choose it.
 #pragma once
 
 #include <cstdint>
@@ -12,22 +12,22 @@ class Heartbeat {
   explicit Heartbeat(std::int64_t now_ns) : last_ns_(now_ns) {}
 
   void heard(std::int64_t now_ns);
-  // For how long nothing was heard [s], once that is too long to be chance; nothing while it
-  // answers. Before the first message the patience is shorter: a user waits.
+  // How long the daemon has been silent [s], if that is longer than normal; empty while it answers.
+  // Before the first message a shorter silence counts, because a user is waiting.
   [[nodiscard]] std::optional<double> silent_s(std::int64_t now_ns) const;
   [[nodiscard]] bool ever_heard() const { return ever_heard_; }
 
-  // For those who print lines: the silence, each time that a line about it is due (at once, then
-  // after twice, four times, ... as long).
-  [[nodiscard]] std::optional<double> silence_to_tell(std::int64_t now_ns);
-  // How long it was silent [s], once after a silence that was told.
-  [[nodiscard]] std::optional<double> return_to_tell();
+  // For output as lines: the silence, whenever a line about it is due (at once, then after twice,
+  // four times, ... the time).
+  [[nodiscard]] std::optional<double> silence_to_report(std::int64_t now_ns);
+  // How long the daemon was silent [s], returned once after a silence that was reported.
+  [[nodiscard]] std::optional<double> return_to_report();
 
  private:
   std::int64_t last_ns_;
   bool ever_heard_ = false;
-  double told_s_ = 0.0;             // the silence that was told last; 0: none
-  std::optional<double> returned_;  // not told yet
+  double reported_s_ = 0.0;         // the last silence that was reported; 0: none
+  std::optional<double> returned_;  // not reported yet
 };
 
 }  // namespace posed::cli

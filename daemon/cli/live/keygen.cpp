@@ -22,7 +22,7 @@ void add_keygen(CLI::App& app, int& exit_code) {
       ->type_name("DIR");
   command->footer(R"(Examples:
   posed keygen server --out keys     # name keys/server.key as server_key in the config
-  posed keygen viewer                # give viewer.pub to whoever runs the daemon
+  posed keygen viewer                # give viewer.pub to the operator of the daemon
 NAME.key never leaves its machine. An existing file is not overwritten.)");
   command->callback([options, &exit_code] {
     const auto pair = net::write_new_keys(options->name, options->folder);

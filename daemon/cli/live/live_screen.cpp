@@ -11,7 +11,7 @@
 namespace posed::cli {
 namespace {
 
-termios keyboard_before;  // one terminal a process, so its state is the process's
+termios keyboard_before;  // global, because a process has one terminal
 
 void put_on_screen(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
@@ -24,12 +24,12 @@ LiveScreen::LiveScreen()
     : terminal_(isatty(STDOUT_FILENO) == 1), keyboard_(terminal_ && isatty(STDIN_FILENO) == 1) {
   if (keyboard_ && tcgetattr(STDIN_FILENO, &keyboard_before) == 0) {
     termios raw = keyboard_before;
-    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C still is a signal
+    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C still sends a signal
     tcsetattr(STDIN_FILENO, TCSANOW, &raw);
   } else {
     keyboard_ = false;
   }
-  if (terminal_) put_on_screen("\x1b[?1049h\x1b[?25l\x1b[2J");  // own screen, no cursor
+  if (terminal_) put_on_screen("\x1b[?1049h\x1b[?25l\x1b[2J");  // alternate screen, no cursor
 }
 
 LiveScreen::~LiveScreen() {

@@ -15,18 +15,18 @@
 namespace posed::cli {
 namespace {
 
-constexpr int kLeastWidth = 80;
+constexpr int kMinWidth = 80;
 constexpr int kNameWidth = 11;
 
-// Cut or padded to exactly `width` columns (names are ASCII); 0: to its last word.
+// Cuts or pads to exactly `width` columns (names are ASCII); 0: neither.
 std::string fit(const std::string& text, int width) {
   if (width == 0) return text.substr(0, text.find_last_not_of(' ') + 1);
   return fmt::format("{:<{}}", cut(text, width), width);
 }
 
-// Columns of a line, of streams' names and of models' names; 0: no limit.
+// Columns for a whole line, for stream names and for model names; 0: no limit.
 struct Widths {
-  int line = kLeastWidth;
+  int line = kMinWidth;
   int name = kNameWidth;
   int model = 1;
 };
@@ -38,7 +38,7 @@ std::string short_count(std::uint64_t count) {
   return fmt::format("{}M", std::min<std::uint64_t>(count / 1'000'000, 9999));
 }
 
-// "-" for a stage that no frame went through in this second.
+// "-" for a stage that processed no frame in this second.
 std::string stage(const v1::Percentiles& percentiles) {
   if (percentiles.p99_us() == 0.0F && percentiles.max_us() == 0.0F) return "-";
   return short_duration(percentiles.p50_us()) + "/" + short_duration(percentiles.p99_us());
@@ -58,7 +58,7 @@ std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
   return line;
 }
 
-// A device that is not there is more than a stream in which nothing comes.
+// An unplugged device is shown as such, not only as a stream without data.
 std::string state_of(const v1::StreamStats& stream) {
   return stream.away() ? "away" : clean_name(stream.state());
 }
@@ -75,11 +75,11 @@ std::string row(const v1::StreamStats& stream, const Widths& widths, bool silent
                      fit(clean_name(stream.model()), widths.model));
 }
 
-// What a stream's stages do, below its row; empty where there is nothing to say.
+// A line below the stream's row about its stages; empty if there is nothing to report.
 std::string stages_row(const v1::StreamStats& stream) {
   std::string text = label_words(stream);
   const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
-  // Of a single stage the column says it.
+  // If there is a single stage, the column already shows its time.
   for (const v1::StageStats& one : stream.stage()) {
     if (stream.stage_size() > 1) add(clean_name(one.name()) + " " + stage(one.time()));
   }
@@ -87,7 +87,7 @@ std::string stages_row(const v1::StreamStats& stream) {
     add(fmt::format("lag {} frame{} ({:.0f} ms)", stream.lag_frames(),
                     stream.lag_frames() == 1 ? "" : "s", stream.lag_ms()));
   }
-  // To what the column shows, alpha has arrived.
+  // As far as the column shows, alpha has reached its target.
   if (std::abs(stream.alpha_target() - stream.alpha()) >= 0.005F) {
     add(fmt::format("alpha slides to {:.2f}", stream.alpha_target()));
   }
@@ -101,7 +101,7 @@ std::string for_people(double time_s) {
   return fmt::format("{:.1f} h", time_s / 3600.0);
 }
 
-// Whether a glove is there and how its clock runs; empty for a stream without either.
+// Whether a glove is connected and how its clock runs; empty for a stream without either.
 std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
   const std::string since = for_people(seconds(now_ns - stream.link_ns()));
   const std::uint64_t links = stream.connections();
@@ -117,7 +117,8 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
                     links == 2 ? "once" : fmt::format("{} times", links - 1)));
   }
   if (stream.has_clock_offset_ns()) {
-    const float drift_ppm = std::round(stream.clock_drift_ppm() * 10.0F) / 10.0F + 0.0F;  // no -0.0
+    // avoids -0.0
+    const float drift_ppm = std::round(stream.clock_drift_ppm() * 10.0F) / 10.0F + 0.0F;
     add(fmt::format("clock {:+.3f} s, drift {:+.1f} ppm", seconds(stream.clock_offset_ns()),
                     drift_ppm));
   }
@@ -125,7 +126,7 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
   return text;
 }
 
-// What stands below the streams' rows.
+// The lines below the rows of the streams.
 std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths) {
   std::vector<std::string> rows;
   if (!stats.replay_file().empty()) rows.push_back("  " + replay_words(stats));
@@ -139,7 +140,7 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths
 }
 
 Widths widths_for(const v1::Stats& stats, int wanted) {
-  if (wanted > 0) return {.line = std::max(wanted, kLeastWidth)};
+  if (wanted > 0) return {.line = std::max(wanted, kMinWidth)};
   Widths widths{.line = 0, .model = 0};
   for (const v1::StreamStats& stream : stats.stream()) {
     widths.name = std::max(widths.name, static_cast<int>(stream.stream().size()) + 2);
@@ -163,14 +164,14 @@ std::string short_duration(double microseconds) {
 }
 
 const char* const kColumnsHelp = R"(Columns, one row a stream:
-  STATE    waiting (nothing came yet), live, stale (fell silent), away (its device), ended
+  STATE    waiting (nothing came yet), live, stale (fell silent), away (device unplugged), ended
   HZ       frames published in the last second
-  DROP     frames lost so far because a queue was full: the machine could not keep up
-  SHED     frames skipped so far because newer ones waited already: the newest pose wins
+  DROP     frames lost so far because a queue was full (machine too slow)
+  SHED     frames skipped so far because newer ones were waiting
   DECODE   from arrival to decoded, STAGES in all stages together, PUBLISH from arrival to handed
-           out: half of the frames of the last second took at most the first figure, 99 % the
+           out: 50 % of the frames of the last second took at most the first figure, 99 % the
            second; microseconds, with m milliseconds, with s seconds; - where no frame passed
-  ALPHA    how much style, -2 to 2; below the row where it slides to
+  ALPHA    how much style, -2 to 2; below the row its target, while it moves
   MODEL    the style model in use, or the gesture model)";
 
 std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {
@@ -184,10 +185,10 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
       paint(options.colour, kBold, fit(head(stats, options), widths.line)),
       paint(options.colour, kDim, fit(names + fit("MODEL", widths.model), widths.line)),
   };
-  // What stands above all else: that the rest is old.
+  // If the daemon is silent, the first line says so, because everything below it is old.
   if (silent)
     lines.insert(lines.begin(), paint(options.colour, kRed, fit(options.silence, widths.line)));
-  // Streams first; what does not fit is at least counted.
+  // Streams first; those that do not fit are at least counted.
   const int above = static_cast<int>(lines.size());
   const int room = options.height == 0 ? stats.stream_size() : options.height - above - 1;
   const int shown = stats.stream_size() <= room ? stats.stream_size() : std::max(0, room - 1);

@@ -1,4 +1,4 @@
-// `posed monitor`: what a running daemon publishes, line by line.
+// `posed monitor`: prints what a running daemon publishes, line by line.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -19,7 +19,8 @@
 namespace posed::cli {
 namespace {
 
-constexpr std::chrono::seconds kPatience{3};  // for a message of a topic of a daemon that is there
+// to wait for the first message of a topic of a running daemon
+constexpr std::chrono::seconds kPatience{3};
 
 struct MonitorOptions {
   ClientOptions client;
@@ -30,7 +31,7 @@ struct MonitorOptions {
   bool json = false;
 };
 
-// False when stdout is gone or the bytes are none of ours.
+// Returns false if stdout is closed or the bytes are not a valid message.
 template <typename Message>
 bool show(std::span<const std::byte> bytes, bool as_json) {
   Message message;
@@ -48,7 +49,7 @@ bool show_topic(std::string_view topic, std::span<const std::byte> bytes, bool a
   return topic == "stats" && show<v1::Stats>(bytes, as_json);
 }
 
-// What to print. Beside poses, people also want to see what happens to the stream.
+// The topics to subscribe to. Beside poses, users also want to see the stream's events.
 std::vector<std::string> topics(const MonitorOptions& options) {
   if (options.topic == "stats") return {"stats"};
   std::vector<std::string> asked{options.topic + "/" + options.stream};
@@ -56,8 +57,8 @@ std::vector<std::string> topics(const MonitorOptions& options) {
   return asked;
 }
 
-// Runs until someone wants to go; an error is why it must end. It listens to `stats`, too: they
-// come every second from a daemon that lives, whatever the topic.
+// Runs until the user ends it; returns an error if it must end. Also subscribes to `stats`, which a
+// running daemon sends every second, whatever the topic.
 class Monitor {
  public:
   Monitor(const MonitorOptions& options, Connection connection)
@@ -78,11 +79,11 @@ class Monitor {
     }
     while (!Interrupt::came() && !finished_) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
-      if (auto given_up = watch_.tell()) return std::unexpected(*given_up);
+      if (auto given_up = watch_.report()) return std::unexpected(*given_up);
       if (connection_.wait(kLookAround)) {
         if (auto taken = take(); !taken) return taken;
       } else {
-        tell_quiet_topic();
+        report_quiet_topic();
       }
     }
     if (options_.count > 0 && shown_ < options_.count) {
@@ -100,11 +101,11 @@ class Monitor {
     if (topic.text() == "stats") {
       if (auto known = look_at(body.bytes()); !known) return known;
     }
-    // A subscription is a prefix: walker also brings walker-raw.
+    // A subscription is a prefix: walker also matches walker-raw.
     const bool all = options_.stream.empty() && topic.text() != "stats";
     if (!all && std::ranges::find(asked_, topic.text()) == asked_.end()) return {};
     if (!show_topic(topic.text(), body.bytes(), options_.json)) {
-      finished_ = std::ferror(stdout) != 0;  // whoever read us has gone
+      finished_ = std::ferror(stdout) != 0;  // the reader of stdout has gone
       if (finished_) shown_ = options_.count;
       return {};
     }
@@ -112,7 +113,7 @@ class Monitor {
     return {};
   }
 
-  // The first stats say which streams there are, and whether this is a replay.
+  // The first stats show which streams there are, and whether this is a replay.
   Result<> look_at(std::span<const std::byte> bytes) {
     v1::Stats stats;
     const auto size = static_cast<int>(bytes.size());
@@ -133,10 +134,10 @@ class Monitor {
                             options_.client.endpoint, options_.stream, names));
   }
 
-  void tell_quiet_topic() {
-    if (told_quiet_ || shown_ > 0 || !looked_) return;
+  void report_quiet_topic() {
+    if (quiet_topic_reported_ || shown_ > 0 || !looked_) return;
     if (std::chrono::steady_clock::now() - start_ < kPatience) return;
-    told_quiet_ = true;
+    quiet_topic_reported_ = true;
     std::fprintf(stderr, "posed: waiting: %s answers, but nothing of %s comes yet\n",
                  options_.client.endpoint.c_str(), asked_.front().c_str());
   }
@@ -148,7 +149,7 @@ class Monitor {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   int shown_ = 0;
   bool looked_ = false;
-  bool told_quiet_ = false;
+  bool quiet_topic_reported_ = false;
   bool finished_ = false;
 };
 
@@ -185,7 +186,7 @@ void add_monitor(CLI::App& app, int& exit_code) {
 The quality is measured, predicted (computed for a moment without a measurement), held (the same
 measurement again), stale (the source is silent) or performed (made from labels). The latency runs
 from arrival in the daemon to its publishing; a replay as fast as possible has none. A reader too
-slow for the stream misses frames; it never sees old ones. A daemon that falls silent is told on
+slow for the stream misses frames; it never sees old ones. A daemon that falls silent is reported on
 stderr. With --count the exit code is 1 unless so many came.)");
   command->callback([options, &exit_code] {
     if (auto done = watch(*options); !done) exit_code = report(done.error());

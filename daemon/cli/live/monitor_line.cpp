@@ -10,7 +10,8 @@
 namespace posed::cli {
 namespace {
 
-// "KIND_CLOCK_JUMPED" without "KIND_" -> "clock_jumped". A value of a newer posed has no name.
+// "KIND_CLOCK_JUMPED" without "KIND_" -> "clock_jumped". A value from a newer version of posed has
+// no name.
 std::string short_name(const std::string& name, std::string_view prefix) {
   if (!name.starts_with(prefix)) return "unknown";
   std::string out;
@@ -20,7 +21,7 @@ std::string short_name(const std::string& name, std::string_view prefix) {
   return out;
 }
 
-// How the pose came about: nobody measured one that is performed.
+// How the pose was made: one that is performed was not measured.
 std::string quality(const v1::Frame& frame) {
   if (frame.source() == v1::SOURCE_LABELS && frame.quality() == v1::QUALITY_MEASURED) {
     return "performed";
@@ -28,7 +29,7 @@ std::string quality(const v1::Frame& frame) {
   return short_name(v1::Quality_Name(frame.quality()), "QUALITY_");
 }
 
-// From arrival to publishing, in the unit that reads best.
+// The time from arrival to publication, in the most readable unit.
 std::string age(const v1::Frame& frame) {
   if (!frame.has_published_ns()) return fmt::format(" {:>9}", "-");
   const double age_us = static_cast<double>(frame.published_ns() - frame.arrival_ns()) * 1e-3;

@@ -1,4 +1,4 @@
-// What `posed monitor` prints of each kind of message: one line, for people.
+// One human-readable line for each kind of message, as printed by `posed monitor`.
 #pragma once
 
 #include <string>
@@ -13,7 +13,8 @@ class Stats;
 
 namespace posed::cli {
 
-// Without the time of day that stands before each line. Words of strangers are cleaned.
+// Without the time of day at the start of the line. Control characters are removed from untrusted
+// text.
 [[nodiscard]] std::string monitor_line(const v1::Frame& frame);
 [[nodiscard]] std::string monitor_line(const v1::Sample& sample);
 [[nodiscard]] std::string monitor_line(const v1::Event& event);
@@ -23,8 +24,8 @@ namespace posed::cli {
 // "a replay of take1.plog, 1 x its pace; its times are the recording's"
 [[nodiscard]] std::string replay_words(const v1::Stats& stats);
 
-// "performs g" of a pose made from labels, "recognised g 83 %" of one that a hand made; empty
-// without a label. `Labelled` is a Frame or a StreamStats.
+// "performs g" for a pose made from labels, "recognised g 83 %" for a measured one; empty without a
+// label. `Labelled` is a Frame or a StreamStats.
 template <typename Labelled>
 [[nodiscard]] std::string label_words(const Labelled& labelled);
 

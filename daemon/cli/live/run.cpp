@@ -26,7 +26,7 @@ Result<> run(const ServeOptions& options) {
 }  // namespace
 
 void add_run(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("run", "Stream as a config says, until stopped");
+  auto* command = app.add_subcommand("run", "Stream as set in a config, until stopped");
   auto options = std::make_shared<ServeOptions>();
   add_serve_options(*command, *options);
   command->footer(

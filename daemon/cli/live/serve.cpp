@@ -29,7 +29,8 @@ sigset_t end_signals() {
   return set;
 }
 
-// Whether there was a list to read again; a config that is wrong leaves the old list in force.
+// Returns whether the daemon uses keys, so that there is a list to read. If the config is wrong the
+// old list stays in use.
 bool read_clients_again(assembly::Daemon& daemon, const std::string& path) {
   if (path.empty() || !daemon.wants_keys()) return false;
   const auto config = config::load_config(path, drivers::registry());
@@ -58,7 +59,7 @@ void add_serve_options(CLI::App& command, ServeOptions& options) {
       ->check([](const std::string& text) {
         return std::strtod(text.c_str(), nullptr) > 0.0
                    ? std::string()
-                   : "'" + text + "' is no time to run: give seconds above 0";
+                   : "'" + text + "' is not a time to run: give seconds above 0";
       });
   command.add_flag("--until-end", options.until_end,
                    "End when every source that can end has ended: not gloves or looped clips");
@@ -68,7 +69,8 @@ void prepare_to_serve() {
   logging::sum_up_repeats();
   const sigset_t set = end_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file at its limit is a full disk, which the recorder tells
+  // a file at its size limit is then an ordinary error, which the recorder reports like a full disk
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) {
@@ -85,9 +87,10 @@ void print_ready(const assembly::Daemon& daemon) {
                               {"control", daemon.control_endpoint()},
                               {"streams", nlohmann::json::array()}};
   for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
-  // Not by stdio: a pipe that is full, or that nobody reads, must not hold up the stop signals.
+  // Not through stdio, because a pipe that is full or that nobody reads must not delay the signals
+  // that stop the daemon.
   if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kReadyLineWithin)) {
-    spdlog::warn("stdout does not take the line that says where posed is to be found: {}",
+    spdlog::warn("the line with the daemon's endpoints cannot be written to stdout: {}",
                  json_text(line));
   }
 }

@@ -1,4 +1,4 @@
-// What the commands that serve (`run`, `record`, `demo`) share: being ready, and ending.
+// Shared by the commands that serve (`run`, `record`, `demo`): start and end of serving.
 #pragma once
 
 #include <optional>
@@ -12,30 +12,31 @@ class App;
 
 namespace posed::cli {
 
-// For the beginning of a command that serves. Blocks SIGINT, SIGTERM and SIGHUP in this thread and
-// all that it starts from now on, so that only serve() hears them: one that comes during the start
-// waits there and ends it. What strangers make the daemon say is summed up in the log.
+// Call at the beginning of a command that serves. Blocks SIGINT, SIGTERM and SIGHUP in this thread
+// and in all threads that it starts from now on, so that only serve() receives them: a signal that
+// comes during the start stays pending and ends serve(). Also limits repeated log lines
+// (sum_up_repeats()), because untrusted clients can cause them.
 void prepare_to_serve();
 
-// Prints the one JSON line that says where the daemon is to be found; waits at most 0.3 s for
-// stdout, and warns when it does not take the line.
+// Prints one JSON line with the daemon's endpoints; waits at most 0.3 s for stdout, and warns if
+// the line could not be written.
 void print_ready(const assembly::Daemon& daemon);
 
 struct ServeOptions {
-  bool until_end = false;         // also end when every source that can has
+  bool until_end = false;         // also end when every source that can end has ended
   std::optional<double> seconds;  // also end after this long
-  std::string config;             // the TOML file; SIGHUP reads its client list again; may be empty
+  std::string config;  // the TOML file, whose client list SIGHUP reads again; may be empty
 };
 
-// --config (required), --seconds and --until-end.
+// Adds --config (required), --seconds and --until-end.
 void add_serve_options(CLI::App& command, ServeOptions& options);
 
-// Refuses --until-end where nothing ever ends.
+// Refuses --until-end if no source can end.
 [[nodiscard]] Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options);
 
-// Waits for SIGINT, SIGTERM, a control message or what the options say, then stops the daemon.
-// SIGHUP reads the client list again where keys are used; elsewhere it is a closed terminal and
-// ends.
+// Waits for SIGINT, SIGTERM, a control message or the end that the options set, then stops the
+// daemon. SIGHUP reads the client list again if keys are used; otherwise it means a closed terminal
+// and stops the daemon.
 void serve(assembly::Daemon& daemon, const ServeOptions& options);
 
 }  // namespace posed::cli

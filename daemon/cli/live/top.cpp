@@ -30,7 +30,7 @@ struct TopOptions {
   bool json = false;
 };
 
-// Runs until someone wants to go; an error is why the daemon cannot be shown.
+// Runs until the user ends it; an error says why the daemon cannot be shown.
 class Top {
  public:
   Top(const TopOptions& options, Connection connection)
@@ -46,14 +46,14 @@ class Top {
     if (drawn) show(*screen);
     while (!Interrupt::came() && !(screen && screen->quit_pressed())) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
-      if (auto given_up = watch_.tell()) return std::unexpected(*given_up);
+      if (auto given_up = watch_.report()) return std::unexpected(*given_up);
       if (!connection_.wait(kLookAround)) {
         if (drawn && (watch_.silence() || was_silent_)) show(*screen);
         continue;
       }
       if (!take()) continue;
       const bool shown = screen ? show(*screen) : print_json(stats_);
-      if (!shown) return {};  // whoever read us has gone
+      if (!shown) return {};  // the reader of stdout has gone
       if (++shown_ == options_.count) return {};
     }
     if (options_.count == 0) return {};
@@ -61,7 +61,7 @@ class Top {
   }
 
  private:
-  // One message; true when it brought new stats.
+  // Receives one message; returns true if it brought new stats.
   bool take() {
     net::Message topic, body;
     if (!topic.receive(connection_.socket()) || !topic.more()) return false;
@@ -77,14 +77,14 @@ class Top {
     return false;
   }
 
-  // False when nobody sees it any more.
+  // Returns false if the output can no longer be seen.
   bool show(LiveScreen& screen) {
     LiveViewOptions view{.title = "posed " + options_.client.endpoint};
     screen.measure(view);
     view.notes.assign(notes_.begin(), notes_.end());
     view.silence = watch_.silence().value_or("");
     was_silent_ = !view.silence.empty();
-    if (!screen.is_terminal()) notes_.clear();  // plain lines: each is told once
+    if (!screen.is_terminal()) notes_.clear();  // plain lines: print each note once
     if (stats_.stream_size() > 0 || stats_.time_ns() != 0) {
       screen.draw(live_view(stats_, view));
     } else if (screen.is_terminal()) {
@@ -101,7 +101,7 @@ class Top {
   v1::Stats stats_;
   std::deque<std::string> notes_;
   int shown_ = 0;
-  bool was_silent_ = false;  // as drawn last
+  bool was_silent_ = false;  // when last drawn
 };
 
 Result<> top(const TopOptions& options) {
@@ -130,9 +130,9 @@ void add_top(CLI::App& app, int& exit_code) {
   command->footer(std::string(R"(Examples:
   posed top
   posed top --connect tcp://127.0.0.1:5570 --count 1 | cat
-  posed top --count 1 --timeout 5 --json      # a health check: exit code 1 when nobody answers
+  posed top --count 1 --timeout 5 --json      # a health check: exit code 1 when nothing answers
 q or Ctrl-C quits. When stdout is no terminal it prints plain lines. A daemon that falls silent is
-shown in red for how long; what was known of its present is not shown any more.
+shown in red with the time since then, and values that may be outdated are hidden.
 )") + kColumnsHelp);
   command->callback([options, &exit_code] {
     if (auto done = top(*options); !done) exit_code = report(done.error());

@@ -1,4 +1,4 @@
-// posed convert: a clip in one format to a clip in another, or a device log's stream to a clip.
+// `posed convert`: converts a clip to another format, or a stream of a device log to a clip.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -40,7 +40,7 @@ bool ends_in(const std::string& path, const std::string& extension) {
 bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
 bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
 
-// An option that would mean nothing for this input or output is a mistake.
+// An option that would have no effect for this input or output is an error.
 Result<> check_options(const Convert& convert) {
   const auto useless = [&](bool given, bool means_something, const char* what) -> Result<> {
     if (!given || means_something) return {};
@@ -51,18 +51,18 @@ Result<> check_options(const Convert& convert) {
   const bool to_csv = is_hand_csv(convert.out);
   for (const auto& checked :
        {useless(!convert.stream.empty(), is_log(convert.in),
-                "is no device log (.plog), so --stream means nothing"),
+                "is not a device log (.plog), so --stream has no effect"),
         useless(!convert.read.asf.empty(), is_amc(convert.in),
-                "is no AMC, so --skeleton means nothing"),
-        useless(convert.rate_given, is_amc(convert.in), "is no AMC, so --rate means nothing"),
+                "is not an AMC, so --skeleton has no effect"),
+        useless(convert.rate_given, is_amc(convert.in), "is not an AMC, so --rate has no effect"),
         useless(convert.metres_per_unit != 0.0, bvh_in,
-                "is no BVH, so --metres-per-unit means nothing"),
+                "is not a BVH, so --metres-per-unit has no effect"),
         useless(!convert.read.profile.empty(), bvh_in || is_amc(convert.in),
-                "is no BVH or AMC, so --profile means nothing"),
+                "is neither a BVH nor an AMC, so --profile has no effect"),
         useless(!convert.hand.empty(), csv_in || to_csv,
-                "neither IN nor OUT is a hand CSV, so --hand means nothing"),
+                "neither IN nor OUT is a hand CSV, so --hand has no effect"),
         useless(convert.shape_given, csv_in && !to_csv,
-                "--hand-shape is for a hand CSV that becomes a BVH, and means nothing here")}) {
+                "--hand-shape is for a hand CSV that becomes a BVH, and has no effect here")}) {
     if (!checked) return checked;
   }
   return OutputFiles(convert.overwrite)
@@ -72,7 +72,7 @@ Result<> check_options(const Convert& convert) {
       .check();
 }
 
-// A BVH has no room for a gap or an uneven clock.
+// A BVH file cannot store gaps or an uneven clock.
 Result<clip::Clip> read_log(const Convert& convert) {
   auto clip = replay::clip_of_log(convert.in, convert.stream);
   if (!clip || is_hand_csv(convert.out)) return clip;
@@ -82,7 +82,7 @@ Result<clip::Clip> read_log(const Convert& convert) {
   return clip;
 }
 
-// Nor has a hand CSV room for a body.
+// A hand CSV cannot store a body.
 Result<clip::Clip> read(const Convert& convert) {
   if (is_log(convert.in)) return read_log(convert);
   auto clip = clip::read_clip(convert.in, convert.read);
@@ -128,7 +128,7 @@ int run(Convert& convert) {
                                {"joints", clip->skeleton->joints.size()},
                                {"metres_per_unit", clip->metres_per_unit},
                                {"warnings", clip->warnings}};
-  // Names may hold any bytes; what is no UTF-8 is replaced rather than thrown at.
+  // Names may hold any bytes; invalid UTF-8 is replaced, because otherwise the JSON library throws.
   std::printf("%s\n", json_text(summary).c_str());
   return static_cast<int>(ExitCode::kDone);
 }
@@ -145,7 +145,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   auto* rate =
-      command->add_option("--rate", convert->read.amc_rate_hz, "Frames a second of an AMC");
+      command->add_option("--rate", convert->read.amc_rate_hz, "Frames per second of an AMC");
   rate->capture_default_str();
   command
       ->add_option("--metres-per-unit", convert->metres_per_unit,
@@ -155,7 +155,7 @@ void add_convert(CLI::App& app, int& exit_code) {
                       "Skeleton profile (default: found by the joints' names)");
   command->add_option("--stream", convert->stream,
                       "Which of a log's streams (default: the only one)");
-  command->add_option("--hand", convert->hand, "Whose a hand CSV is, or which hand to take")
+  command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape =
       command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH");

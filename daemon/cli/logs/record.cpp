@@ -1,4 +1,4 @@
-// `posed record`: `run` with the recorder on the record_sink.
+// `posed record`: `run` with a recorder as the record sink.
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -31,8 +31,8 @@ struct RecordOptions {
   ServeOptions serve;
 };
 
-// Tells what the recorder noticed on event/<stream>: a gap on its own stream, an error on all.
-void tell(assembly::Daemon& daemon, const record::RecorderEvent& event) {
+// Publishes what the recorder reports on event/<stream>: a gap on its own stream, an error on all.
+void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
   if (event.kind == record::RecorderEvent::Kind::kGap) {
     daemon.post_event(event.stream, v1::Event::KIND_RECORDING_GAP, event.text);
     return;
@@ -42,9 +42,9 @@ void tell(assembly::Daemon& daemon, const record::RecorderEvent& event) {
   }
 }
 
-// What there is now. What is missing in it has been told as it happened; here is the sum.
-void tell_result(const RecordOptions& options, const v1::Stats& stats,
-                 const record::Recorder& recorder, double took_s) {
+// Prints a summary. Gaps were already reported when they happened.
+void print_result(const RecordOptions& options, const v1::Stats& stats,
+                  const record::Recorder& recorder, double took_s) {
   std::error_code ignored;
   const auto bytes = std::filesystem::file_size(options.out, ignored);
   std::uint64_t frames = 0, samples = 0;
@@ -75,7 +75,7 @@ void tell_result(const RecordOptions& options, const v1::Stats& stats,
                                 lost, errors));
 }
 
-// The log must be none of the files that the daemon reads.
+// The log must not be one of the files that the daemon reads.
 Result<> check_out(const RecordOptions& options, const config::DaemonConfig& config) {
   OutputFiles files(options.overwrite);
   files.reads(options.serve.config).writes_any_but_other(options.out, {".plog"});
@@ -109,8 +109,8 @@ Result<> record(const RecordOptions& options) {
       .config_text = config->text,
       .publish_endpoint = config->publish_endpoint,
       .clock = system::monotonic_ns,
-      .tell = [&daemon, started](const record::RecorderEvent& event) {
-        if (*started) tell(daemon, event);
+      .report = [&daemon, started](const record::RecorderEvent& event) {
+        if (*started) post(daemon, event);
       }};
   auto replaced = SetAside::move(options.out);
   if (!replaced) return std::unexpected(replaced.error());
@@ -137,7 +137,7 @@ Result<> record(const RecordOptions& options) {
   serve(daemon, options.serve);
   const double took_s = seconds(system::monotonic_ns() - start_ns);
   auto finished = (*recorder)->finish();
-  tell_result(options, daemon.stats(), **recorder, took_s);
+  print_result(options, daemon.stats(), **recorder, took_s);
   return finished;
 }
 
@@ -147,7 +147,7 @@ void add_record(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("record", "Stream like `run` and keep a device log");
   auto options = std::make_shared<RecordOptions>();
   add_serve_options(*command, options->serve);
-  command->add_option("--out", options->out, "The log to write, by habit NAME.plog")
+  command->add_option("--out", options->out, "The log to write, usually NAME.plog")
       ->type_name("FILE")
       ->required();
   command->add_flag("--frames", options->frames, "Keep the published frames, too (for --expect)");
@@ -157,7 +157,7 @@ void add_record(CLI::App& app, int& exit_code) {
   command->footer(
       "The log is one SQLite file: what each device sent, and every decision that decoding cannot\n"
       "repeat. kill -9 or a power cut costs at most the last 0.5 s. A full disk stops recording,\n"
-      "not streaming; recording goes on when there is room. Examples:\n"
+      "not streaming; recording continues when there is space. Examples:\n"
       "  posed record --config mine.toml --out take1.plog --frames\n"
       "  posed replay take1.plog --speed max --out FRAMES.bin --expect\n"
       "  sqlite3 take1.plog 'SELECT name, driver FROM stream'");

@@ -1,4 +1,4 @@
-// `posed replay`: a log's run again, from the log alone.
+// `posed replay`: repeats the run in a log, from the log alone.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -44,7 +44,7 @@ struct ReplayOptions {
   bool json = false;
 };
 
-// Waits until a chunk is due; false when the user has had enough.
+// Waits until a chunk is due; returns false if the user wants to stop.
 class Pacer {
  public:
   Pacer(std::string log, double speed)  // 0: as fast as possible
@@ -73,7 +73,7 @@ class Pacer {
   Clock::time_point start_ = Clock::now();
 };
 
-// Says how far the replay is, once it takes long enough for someone to wonder.
+// Shows the progress of the replay once it takes long.
 class ReplayProgress {
  public:
   explicit ReplayProgress(const std::optional<log::Reader::Extent>& extent) : extent_(extent) {}
@@ -99,7 +99,7 @@ class ReplayProgress {
   ProgressBar bar_;
 };
 
-// Where the frames of a replay go: the file, the comparison, the network.
+// The outputs for the frames of a replay: the file, the comparison, the network.
 class Outputs {
  public:
   explicit Outputs(const replay::Replay& replay) : replay_(replay) {
@@ -122,7 +122,7 @@ class Outputs {
     if (!same) difference = same.error();
   }
 
-  // After the last frame.
+  // Call after the last frame.
   Result<> finish() {
     if (file) {
       if (auto closed = file->close(); !closed) return closed;
@@ -155,7 +155,7 @@ Result<double> speed_of(const std::string& text) {
                 text + "'");
 }
 
-// Bits are promised on one instruction set: by default the log's own.
+// Equal bits are guaranteed for one instruction set only: by default that of the log.
 Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
   const auto meta = reader.meta().find("isa");
   const std::string recorded = meta == reader.meta().end() ? "auto" : meta->second;
@@ -174,7 +174,7 @@ Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
 void warn_of_gaps(const log::Reader& reader) {
   constexpr std::array<const char*, 3> kNames{"chunks", "decisions", "published frames"};
   const auto gaps = reader.gaps();
-  if (!gaps) return;  // open() has read them already
+  if (!gaps) return;  // cannot happen: open() has read the gaps already
   for (const log::GapRow& gap : *gaps) {
     const bool chunks = gap.kind == log::GapRow::Kind::kChunks;
     const auto owner =
@@ -244,7 +244,7 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
   return {};
 }
 
-// Just watching may end at any time; a file or a comparison that is not whole is a failure.
+// A replay that only publishes may end at any time; an incomplete file or comparison is a failure.
 Result<> ended_early(const ReplayOptions& options, const Outputs& outputs) {
   const std::string what = fmt::format("interrupted after {} frames", outputs.frames);
   if (options.expect) return fail(what + ": those after them were not compared");
@@ -273,12 +273,12 @@ Result<> replay(const ReplayOptions& options) {
   const auto extent = reader->extent();
   if (!extent) return std::unexpected(extent.error());
   ReplayProgress progress(*extent);
-  const Interrupt interrupt;  // after the progress, whose Ctrl-C it takes over
+  const Interrupt interrupt;  // after the progress bar, because it takes over Ctrl-C
   Pacer pacer(options.log, *speed);
   const auto pace = [&](const log::ChunkRow& chunk) {
     if (!pacer(chunk)) return false;
     if (static_cast<pipeline::Direction>(chunk.direction) != pipeline::Direction::kFromDevice) {
-      return true;  // only what a device sent has a time of its own
+      return true;  // only chunks from a device have a time of their own
     }
     progress.show(chunk.arrival_ns);
     if (outputs.broadcast) outputs.broadcast->clock().reached(chunk.arrival_ns);
@@ -315,7 +315,7 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "Print the counts as JSON");
   command->footer(
       R"(Nothing but the log is needed: it holds what the devices sent, the models, the settings
-and every decision. The same log gives the same bits on one instruction set. --expect ends
+and every decision. On one instruction set the same log gives the same bits. --expect ends
 with 1 and names stream, sequence and field of the first difference. A published replay says
 in its stats that it is one; its times are the recording's, on the recording's clock. Nobody
 can control it. Examples:

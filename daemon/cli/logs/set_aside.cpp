@@ -22,7 +22,8 @@ Result<SetAside> SetAside::move(const std::filesystem::path& file) {
 
 SetAside::SetAside(SetAside&& other) noexcept : file_(std::exchange(other.file_, {})) {}
 
-// What the failed replacement left beside its log must not be taken for the old one's.
+// Files that the failed replacement left beside its log must not be mistaken for files of the old
+// log.
 SetAside::~SetAside() {
   if (file_.empty()) return;
   for (const char* suffix : log::kFileSuffixes) {
@@ -39,7 +40,7 @@ void SetAside::let_go() noexcept {
 
 void SetAside::rename(const std::filesystem::path& from, const std::filesystem::path& to,
                       const char* suffix) {
-  std::error_code ignored;  // most suffixes have no file
+  std::error_code ignored;  // for most suffixes there is no file
   std::filesystem::rename(from.string() + suffix, to.string() + suffix, ignored);
 }
 

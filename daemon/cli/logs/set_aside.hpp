@@ -1,5 +1,5 @@
-// SetAside: a device log that is about to be replaced, kept under another name until its
-// replacement is sure to come. Cold.
+// SetAside keeps a device log that is about to be replaced under another name until the new log has
+// been started successfully. Cold.
 #pragma once
 
 #include <filesystem>
@@ -10,13 +10,13 @@ namespace posed::cli {
 
 class SetAside {
  public:
-  // Renames `file`, if it is there, to <file>.replaced. The error says why that cannot be done.
+  // Renames `file`, if it exists, to <file>.replaced. The error says why that is impossible.
   [[nodiscard]] static Result<SetAside> move(const std::filesystem::path& file);
   SetAside(SetAside&& other) noexcept;
   SetAside& operator=(SetAside&&) = delete;
-  ~SetAside();  // puts the file back, in place of what there is now, unless it was let go
+  ~SetAside();  // restores the file over the new one, unless let_go() was called
 
-  // The replacement stands: deletes what was set aside.
+  // The replacement has succeeded: deletes the old file.
   void let_go() noexcept;
 
  private:
@@ -26,7 +26,7 @@ class SetAside {
   static void remove(const std::filesystem::path& file, const char* suffix);
   [[nodiscard]] std::filesystem::path aside() const { return file_.string() + ".replaced"; }
 
-  std::filesystem::path file_;  // empty: there is nothing to put back
+  std::filesystem::path file_;  // empty: nothing to restore
 };
 
 }  // namespace posed::cli

@@ -1,4 +1,4 @@
-// posed apply: a clip through the style stage, into a BVH.
+// `posed apply`: sends a clip through the style stage and writes a BVH file.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -29,7 +29,7 @@ struct ApplyArguments {
 
 Result<> check_files(const ApplyArguments& options) {
   if (!options.read.asf.empty() && !is_amc(options.in)) {
-    return misuse("--skeleton is for an AMC, and this is none; leave it out", options.in.string());
+    return misuse("--skeleton is only for an AMC; leave it out", options.in.string());
   }
   return OutputFiles(options.overwrite)
       .reads(options.model)
@@ -39,7 +39,7 @@ Result<> check_files(const ApplyArguments& options) {
       .check();
 }
 
-// How far training moved its own walkers [deg rms]; 0 where the model does not say.
+// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say.
 double training_difference_deg(const style::StyleModel& model) {
   const auto report = nlohmann::json::parse(model.report_json, nullptr, false);
   return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;
@@ -127,7 +127,8 @@ void add_apply(CLI::App& app, int& exit_code) {
       ->type_name("NN.asf");
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
   command->add_flag("--gate", filter.gate, "Fade to the mean change where the model knows nothing");
-  command->add_flag("--calibrate", filter.calibrate, "Learn the walker's own carriage first");
+  command->add_flag("--calibrate", filter.calibrate,
+                    "First learn how the walker usually holds itself");
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
@@ -135,8 +136,8 @@ void add_apply(CLI::App& app, int& exit_code) {
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
-rotations. Without --cold the style is there in full from the first frame. The last line says how
-far the walker is from those that the model learnt from. "deg rms" is the angle between the
+rotations. Without --cold the style has its full strength from the first frame. The last line says
+how far the walker is from those in the training data. "deg rms" is the angle between the
 rotations before and after, over frames and changed joints.)");
   command->callback([options, &exit_code] {
     if (auto done = run(*options); !done) exit_code = report(done.error());

@@ -32,9 +32,9 @@ int auto_label(const AutoLabelOptions& options) {
   }
   const std::size_t examples = recording->segments.size();
   if (options.json) {
-    const nlohmann::json told{
+    const nlohmann::json counts{
         {"examples", examples}, {"segments", labels.size()}, {"out", options.out.string()}};
-    std::printf("%s\n", json_text(told, 2).c_str());
+    std::printf("%s\n", json_text(counts, 2).c_str());
   } else {
     std::printf(
         "%zu segments proposed from %zu examples, written to %s; look through them, two "

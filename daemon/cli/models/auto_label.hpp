@@ -1,4 +1,5 @@
-// `posed train gesture --auto-label`: few labels in, proposed labels out.
+// `posed train gesture --auto-label`: proposes labels for a recording of which few parts are
+// labelled.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +15,7 @@ struct AutoLabelOptions {
   bool json;
 };
 
-// The exit code; reports on stdout and stderr.
+// Returns the exit code; prints results on stdout and errors on stderr.
 [[nodiscard]] int auto_label(const AutoLabelOptions& options);
 
 }  // namespace posed::cli

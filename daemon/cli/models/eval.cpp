@@ -35,7 +35,7 @@ as `apply` reports it; component_rms_deg: the same change per component of the r
 source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure.
 The last line is the verdict; the exit code is 1 when the model is worse than nothing.)";
 
-constexpr double kRough = 1.5;  // jerk_ratio from which on people see it
+constexpr double kRough = 1.5;  // a jerk_ratio above this is visible
 
 struct EvalOptions {
   std::string model, source, target, skeleton;
@@ -101,7 +101,7 @@ json report_of(const Evaluation& e, double alpha) {
 
 Result<Evaluation> evaluate(const EvalOptions& options) {
   if (!options.skeleton.empty() && !is_amc(options.source) && !is_amc(options.target)) {
-    return misuse("--skeleton is for AMC clips, and there is none; leave it out");
+    return misuse("--skeleton is only for AMC clips; leave it out");
   }
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
@@ -156,7 +156,7 @@ void add_eval(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<EvalOptions>();
   style->add_option("--model", options->model, "Model from `posed train style`")->required();
   style->add_option("--source", options->source, "Clip to be styled")->required();
-  style->add_option("--target", options->target, "Clip of the style wanted")->required();
+  style->add_option("--target", options->target, "Clip in the target style")->required();
   style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
   style->add_option("--alpha", options->alpha, "How much style")
       ->check(CLI::Range(-2.0, 2.0))

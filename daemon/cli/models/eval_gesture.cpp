@@ -1,4 +1,4 @@
-// posed eval gesture: what a gesture model performs, in figures.
+// `posed eval gesture`: measures what a gesture model performs.
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -36,7 +36,7 @@ jerk: rms third difference, deg/frame^3; ldlj and sparc: smoothness of the speed
 smoother; nearest_reference_deg: distance to the nearest recorded frame, rms over the performed
 frames and the angles that move; frechet: distance of the Gaussians of windows of 30 frames
 [deg^2]; min_gap_cm: between any two bones, before and after the constraint stage. The curve says
-what a performance loses that knows its script only so many frames ahead.)";
+how much worse a performance is that knows its labels only so many frames ahead.)";
 
 struct EvalGestureOptions {
   std::string model, reference, labels, svg;
@@ -64,7 +64,8 @@ json smoothness(const motion::Rows& rows, double rate_hz) {
           {"sparc", number(motion::spectral_arc_length(values, rate_hz))}};
 }
 
-// Rms over frames and the channels that move of the distance to the nearest frame of `reference`.
+// The distance of each frame to the nearest frame of `reference`: rms over all frames and the
+// channels that move.
 double nearest_deg(const motion::Rows& rows, const motion::Rows& reference) {
   const Eigen::RowVectorXd low = reference.colwise().minCoeff();
   const auto moving = ((reference.colwise().maxCoeff() - low).array() > 1.0).count();
@@ -117,7 +118,7 @@ json curve_json(const std::vector<LagPoint>& curve) {
   return points;
 }
 
-// The last line: whether the performance can be shown to anybody.
+// The last line: whether the performance is good enough to be shown.
 std::string verdict(const json& report) {
   const double gap_cm = report["min_gap_cm"].get<double>();
   std::string text = gap_cm >= 0.0 ? "fingers never overlap" : "fingers overlap";
@@ -129,7 +130,7 @@ std::string verdict(const json& report) {
         reference["nearest_reference_deg"].get<double>(),
         report["performed"]["jerk"].get<double>() / reference["jerk"].get<double>());
   } else {
-    text += "; --reference RECORDING tells how near it is to a real hand";
+    text += "; --reference RECORDING shows how close it is to a real hand";
   }
   return text;
 }
@@ -223,7 +224,7 @@ void add_eval_gesture(CLI::App& eval, int& exit_code) {
   const auto options = std::make_shared<EvalGestureOptions>();
   command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
   command->add_option("--labels", options->labels, "What to perform (default: every label once)");
-  command->add_option("--reference", options->reference, "A recording to be held against");
+  command->add_option("--reference", options->reference, "A recording to compare with");
   command->add_option("--svg", options->svg, "Where to draw look-ahead against error");
   add_tree_options(*command, options->trees);
   add_overwrite_option(*command, options->overwrite);

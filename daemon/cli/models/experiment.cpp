@@ -14,7 +14,7 @@ constexpr TomlLimits kExperimentLimits{
     .what = "experiment file", .bytes = std::size_t{1024} * 1024, .depth = 4, .items = 20'000};
 constexpr std::size_t kMaxClips = 4000;
 
-// A word that must be one of a few.
+// A value that must be one of a few words.
 template <typename T>
 void read_choice(config::TableReader& reader, const char* key, T& value,
                  Result<T> (*parse)(std::string_view)) {

@@ -1,4 +1,4 @@
-// The experiment file of `posed train style`: which clips show which group, person and motion.
+// The experiment file of `posed train style`: the group, person and motion of each clip.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 namespace posed::cli {
 
 struct ExperimentClip {
-  std::filesystem::path file;  // made absolute by the experiment file's folder
+  std::filesystem::path file;  // absolute; relative paths start at the experiment file's folder
   std::string group, subject, motion;
   int line = 0;  // of its [[clip]] header
 };
@@ -21,11 +21,11 @@ struct Experiment {
   double rate_hz = 30.0;
   motion::Space space = motion::Space::kNative;
   style::TrainMode mode = style::TrainMode::kDefault;
-  std::filesystem::path asf;  // skeleton of all AMC clips; empty: beside each
+  std::filesystem::path asf;  // skeleton of all AMC clips; empty: each has one beside it
   std::vector<ExperimentClip> clips;
 };
 
-// Errors name file and line; an unknown key names the nearest known one.
+// Errors name file and line; the error for an unknown key names the nearest known one.
 [[nodiscard]] Result<Experiment> read_experiment(const std::filesystem::path& path);
 
 // Reads the clips themselves.

@@ -23,7 +23,7 @@ motion::Rows rows_of(const perform::Performance& performance) {
   return rows;
 }
 
-// Where things stand on the page; the vertical axis has whole powers of ten at its ends.
+// Positions on the page; the vertical axis begins and ends at a power of ten.
 struct Axes {
   double most_frames;
   int low, high;  // powers of ten

@@ -1,5 +1,5 @@
-// How far a performance that knows its script some frames ahead is from one that knows all of it:
-// as numbers and as a drawing.
+// How far a performance that knows its label sequence only some frames ahead is from one that knows
+// all of it: as numbers and as a drawing.
 #pragma once
 
 #include <span>
@@ -13,7 +13,7 @@ namespace posed::cli {
 struct LagPoint {
   int frames = 0;  // of look-ahead
   double rms_deg = 0.0, max_deg = 0.0;
-  double jerk_ratio = 0.0;  // over the full solve's
+  double jerk_ratio = 0.0;  // relative to the full solve
 };
 
 [[nodiscard]] std::vector<LagPoint> lag_curve(const trajectory::StateInformation& information,

@@ -32,7 +32,7 @@ void read_fingers(const toml::table& root, config::Findings& findings, gesture::
   reader.finish();
 }
 
-// A name as it stands between quotes in TOML; names have no control characters.
+// A name in quotes for TOML; names have no control characters.
 std::string quoted(const std::string& name) {
   std::string out = "\"";
   for (const char c : name) {

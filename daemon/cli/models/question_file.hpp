@@ -1,4 +1,4 @@
-// The questions file: which class each finger of each gesture is of (config/gestures/gcp134.toml).
+// The questions file: the class of each finger in each gesture (config/gestures/gcp134.toml).
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 namespace posed::cli {
 
-// Errors name file and line, or the label that a finger has in no class or in two.
+// Errors name file and line, or the label in which a finger is in no class or in two.
 [[nodiscard]] Result<std::vector<gesture::Label>> read_questions(const std::filesystem::path& path);
 
 [[nodiscard]] Result<> write_questions(const std::vector<gesture::Label>& labels,

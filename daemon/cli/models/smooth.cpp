@@ -1,4 +1,4 @@
-// posed smooth: a recorded hand through the live generator, as a stream would have been.
+// `posed smooth`: runs a recorded hand through the live smoother, as a stream would have been.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -32,7 +32,7 @@ struct SmoothOptions {
   bool overwrite = false, json = false;
 };
 
-// Puts what comes out into the clip's rows, and counts.
+// Writes the smoother's output to the clip's rows, and counts.
 class Rows final : public StageOut {
  public:
   explicit Rows(clip::HandClip& clip) : clip_(clip) {}
@@ -58,8 +58,8 @@ class Rows final : public StageOut {
   std::size_t next_ = 0;
 };
 
-// The gestures that were told, one entry a run of frames.
-json told(const Rows& rows, const clip::HandClip& clip) {
+// The recognised gestures, one entry for each run of frames.
+json recognised(const Rows& rows, const clip::HandClip& clip) {
   json runs = json::array();
   double sum = 0.0;
   for (std::size_t t = 0; t < rows.labels.size(); ++t) {
@@ -124,8 +124,8 @@ Result<> smooth(const SmoothOptions& options) {
   Rows rows(*clip);
   ProgressBar bar(kQuietFor_s);
   for (std::size_t t = 0; t < measured.size(); ++t) {
-    const bool tell = t % kProgressEvery == 0;
-    if (tell &&
+    const bool shows = t % kProgressEvery == 0;
+    if (shows &&
         !bar.show("smoothing", static_cast<double>(t) / static_cast<double>(measured.size()))) {
       return fail("stopped; nothing was written", options.in);
     }
@@ -158,7 +158,7 @@ Result<> smooth(const SmoothOptions& options) {
               {"noise_deg", noise_deg},
               {"noise_given", options.noise_deg > 0.0},
               {"bridged_values", rows.bridged_values}};
-  if (model) report["labels"] = told(rows, *clip);
+  if (model) report["labels"] = recognised(rows, *clip);
   std::printf("%s\n", json_text(report, 2).c_str());
   return {};
 }
@@ -174,22 +174,24 @@ void add_smooth(CLI::App& app, int& exit_code) {
   command->add_option("--out", options->out, "The hand CSV to write")
       ->required()
       ->type_name("OUT.csv");
-  command->add_option("--lag", options->lag, "How far the output may run behind: 1 or 33ms")
+  command->add_option("--lag", options->lag, "Delay of the output, in frames or time: 1 or 33ms")
       ->capture_default_str();
   command
       ->add_option("--noise-deg", options->noise_deg,
                    "Sensor noise, standard deviation (default: estimated from IN)")
       ->check(CLI::Range(0.01, 30.0));
-  command->add_option("--model", options->model, "Gestures to tell and to bridge gaps with")
+  command
+      ->add_option("--model", options->model,
+                   "Gesture model, to recognise gestures and bridge gaps")
       ->type_name("H.gesture");
-  command->add_option("--hand", options->hand, "Whose a hand CSV is, or which hand to take")
+  command->add_option("--hand", options->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
   posed smooth glove.csv --out smooth.csv                     # lag 1 frame, noise estimated
   posed smooth --lag 33ms --noise-deg 1 glove.csv --out smooth.csv
-  posed smooth --model H.gesture glove.csv --out smooth.csv --json   # tells the gestures, too
+  posed smooth --model H.gesture glove.csv --out smooth.csv --json   # recognises gestures, too
 The code is the live stream's: a row is estimated from what came up to the lag after it. An empty
 field is a missing value and is bridged; rows keep their times, even or not.)");
   command->callback([options, &exit_code] {

@@ -1,4 +1,4 @@
-// posed synth: a hand performs a string of labels, into a file.
+// `posed synth`: performs a sequence of labels with a hand and writes a file.
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -30,7 +30,7 @@ constexpr const char* kSynthFooter = R"(Examples:
   posed synth --model hand.gesture --labels "g c p" --tempo 1.5 --hand left --out hand.bvh --json
 
 Labels that were never recorded are performed too, finger by finger, when the model's classes name
-them. --lookahead N performs as a stream would that knows the script N frames ahead (20 is enough
+them. --lookahead N performs as a stream that knows the labels N frames ahead (20 is enough
 for the eye). The same motion plays in a running daemon with `posed ctl play`.)";
 
 struct SynthOptions {
@@ -50,8 +50,8 @@ Result<perform::PerformOptions> perform_options(const SynthOptions& options) {
   const auto& text = options.lookahead;
   const auto end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, frames);
-  constexpr int kMostFrames = 100'000;
-  if (error != std::errc{} || stop != end || frames < 0 || frames > kMostFrames) {
+  constexpr int kMaxFrames = 100'000;
+  if (error != std::errc{} || stop != end || frames < 0 || frames > kMaxFrames) {
     return misuse("--lookahead is a number of frames or full, not '" + text + "'");
   }
   perform.look_ahead = frames;
@@ -144,15 +144,18 @@ void add_synth(CLI::App& app, int& exit_code) {
   command->add_option("--tempo", options->tempo, "2 is twice as fast")
       ->check(CLI::Range(perform::kMinTempo, perform::kMaxTempo))
       ->capture_default_str();
-  command->add_option("--lookahead", options->lookahead, "Frames of script that are known, or full")
+  command
+      ->add_option("--lookahead", options->lookahead, "Frames that are known in advance, or full")
       ->capture_default_str();
   command->add_option("--hand", options->hand, "left or right")
       ->check(CLI::IsMember({"left", "right"}))
       ->capture_default_str();
-  command->add_option("--hand-shape", options->shape, "Whose bones keep apart and make the BVH")
+  command
+      ->add_option("--hand-shape", options->shape,
+                   "Hand whose bone lengths are used for collisions and the BVH")
       ->capture_default_str();
   command->add_flag("--global-variance", options->global_variance,
-                    "Give back the range that averaging took");
+                    "Restore the range of motion that averaging reduces");
   command->add_flag("--unconstrained", options->unconstrained,
                     "Leave out joint limits and collisions: the model's bare trajectory");
   command->add_option("--out", options->out, "Where to write: .csv or .bvh")->required();

@@ -29,14 +29,14 @@ constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture \
       --tree-svg tree.svg --trees middle:4
 
-A label file has a line a gesture, `start end name`, in seconds from the first frame (or HTK's
-100 ns). Label two gestures of each name by hand and let the rest be proposed:
+A label file has a line per gesture, `start end name`, in seconds from the first frame (or HTK's
+100 ns). Label two gestures of each name by hand and let posed propose the rest:
   posed train gesture --auto-label --clip take1.csv --labels few.lab --out take1.lab)";
 
 struct TrainGestureOptions {
   std::vector<std::string> clips, labels, shows;
   std::string questions, propose, out;
-  std::string hand;  // which one of a body
+  std::string hand;  // which hand of a body
   double rate_hz = 30.0;
   int embedded_rounds = 0;
   bool auto_label = false;
@@ -44,7 +44,7 @@ struct TrainGestureOptions {
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
-// It trains nothing, so whatever is about the training means nothing.
+// --auto-label trains nothing, so options about the training are refused.
 Result<> check_auto_label(const TrainGestureOptions& options) {
   if (options.clips.size() != 1) {
     return misuse("--auto-label proposes labels for one clip at a time");
@@ -103,7 +103,7 @@ Result<gesture::LabelPose> shown_pose(const std::string& show, const TrainGestur
   return pose;
 }
 
-// The classes of every label: from the file, proposed, or built in; then the shown poses.
+// The classes of all labels: from the file, proposed, or built in; then the poses given by clips.
 Result<std::vector<gesture::Label>> classes(const TrainGestureOptions& options,
                                             const std::vector<gesture::Recording>& recordings) {
   std::vector<gesture::Label> labels = gesture::built_in_labels();
@@ -170,7 +170,7 @@ Result<json> train_gesture(const TrainGestureOptions& options) {
   report["seconds"] = training->seconds;
   report["out"] = options.out;
   const std::size_t warnings = report["warnings"].size();
-  report["verdict"] = warnings == 0 ? "good: nothing in these recordings speaks against the model"
+  report["verdict"] = warnings == 0 ? "good: these recordings show no problem with the model"
                                     : "usable with care: " + std::to_string(warnings) +
                                           " warnings above say what to record more of";
   return report;
@@ -253,7 +253,7 @@ void add_train_gesture(CLI::App& train_command, int& exit_code) {
       ->capture_default_str();
   command
       ->add_option("--embedded-rounds", options->embedded_rounds,
-                   "Rounds in which borders may move, where labels are coarse")
+                   "Rounds in which borders may move, for coarse labels")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();
   command->add_flag("--auto-label", options->auto_label,

@@ -1,4 +1,4 @@
-// Training a gesture model with a progress bar: what `train gesture` and the demo share.
+// Training a gesture model with a progress bar; shared by `train gesture` and the demo.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 
 namespace posed::cli {
 
-// A clip with its labels, at the rate to learn at.
+// A clip with its labels, resampled to the training rate.
 [[nodiscard]] Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
                                                         const std::filesystem::path& labels,
                                                         double rate_hz,
@@ -25,8 +25,8 @@ struct GestureTraining {
   double seconds = 0.0;  // of the training itself
 };
 
-// Learns and writes the model to `out`. Draws progress on stderr; Ctrl-C ends it with an error and
-// no file.
+// Trains the model and writes it to `out`. Draws progress on stderr; Ctrl-C ends it with an error
+// and without a file.
 [[nodiscard]] Result<GestureTraining> train_gesture_and_save(
     const std::vector<gesture::Recording>& recordings, gesture::TrainOptions options,
     const std::filesystem::path& out);

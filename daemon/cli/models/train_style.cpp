@@ -40,10 +40,10 @@ make one model:
   motion = "walk"
 
 The last line says how much of the way to the target the model closes on clips that were held out,
-and what a constant offset would. A model that is unusable (the groups do not differ, a clip is no
-walk, a walker left out is led away) is not written, and the exit code is 1.)";
+and how much a constant offset would. An unusable model (the groups do not differ, a clip is not a
+walk, a held-out walker becomes worse) is not written, and the exit code is 1.)";
 
-// What was not given stays as the experiment file, or the default, has it.
+// Options that are not given keep the value of the experiment file, or the default.
 struct TrainStyleOptions {
   std::vector<std::string> from, to;
   std::string experiment, skeleton, out;
@@ -53,7 +53,7 @@ struct TrainStyleOptions {
   bool overwrite = false, force = false, json = false;
 };
 
-// The clips: of the experiment file, or of --from and --to, where each is one subject.
+// The clips: from the experiment file, or from --from and --to, where each clip is one subject.
 Result<Experiment> clips_of(const TrainStyleOptions& options) {
   if (!options.experiment.empty()) {
     if (!options.from.empty() || !options.to.empty()) {
@@ -79,7 +79,7 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
   return experiment;
 }
 
-// What the command line says goes over what the file says; a wrong word is refused either way.
+// The command line overrides the file; a wrong value is refused in either.
 Result<Experiment> experiment_of(const TrainStyleOptions& options) {
   std::optional<motion::Space> space;
   if (options.pose_space) {
@@ -100,7 +100,7 @@ Result<Experiment> experiment_of(const TrainStyleOptions& options) {
   experiment->rate_hz = options.rate_hz.value_or(experiment->rate_hz);
   if (options.skeleton.empty()) return experiment;
   if (std::ranges::none_of(experiment->clips, is_amc, &ExperimentClip::file)) {
-    return misuse("--skeleton is for AMC clips, and there is none; leave it out");
+    return misuse("--skeleton is only for AMC clips; leave it out");
   }
   experiment->asf = options.skeleton;
   return experiment;
@@ -117,7 +117,7 @@ void print_style_summary(const json& report, const std::string& out) {
   std::printf("%-12s %-10s %-28s %8s %8s\n", "group", "motion", "clip", "period", "theta0");
   for (const json& clip : report["clips"]) {
     if (clip["dropped_first_frame"].get<bool>()) {
-      std::fprintf(stderr, "%s: left out the first frame, a rest pose that is no motion\n",
+      std::fprintf(stderr, "%s: left out the first frame, a rest pose without motion\n",
                    clip["file"].get<std::string>().c_str());
     }
     const auto stem = std::filesystem::path(clip["file"].get<std::string>()).stem().string();
@@ -133,7 +133,7 @@ void print_style_summary(const json& report, const std::string& out) {
               out.c_str(), report["seconds"].get<double>(), out.c_str());
 }
 
-// Shares of the whole that the steps of a training take, for one bar over all of them.
+// Maps the progress of one training step to that of the whole training, for a single bar.
 double overall(std::string_view step, double fraction) {
   if (step == "reading poses") return 0.05 * fraction;
   if (step == "aligning phases") return 0.05 + 0.85 * fraction;
@@ -147,7 +147,7 @@ Result<json> train_style(const TrainStyleOptions& options) {
   return train_and_save(*experiment, options.seed, options.out, options.force);
 }
 
-// Sentences go to stderr: what to beware of, and the verdict last.
+// Prints warnings and, last, the verdict on stderr.
 int finish(const json& report, const TrainStyleOptions& options) {
   if (options.json) {
     std::printf("%s\n", json_text(report, 2).c_str());

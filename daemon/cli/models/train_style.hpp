@@ -1,4 +1,4 @@
-// Training with a progress bar: what `train style` and the demo share.
+// Training a style model with a progress bar; shared by `train style` and the demo.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 
 namespace posed::cli {
 
-// Reads the experiment's clips, learns, writes the model to `out` and returns the report that
-// `train --json` prints. A model that is unusable is written only when `force` says so: the
-// report's `written` and `verdict` tell. Draws progress on stderr; Ctrl-C ends it with an error and
-// no file.
+// Reads the experiment's clips, trains, writes the model to `out` and returns the report that
+// `train --json` prints. A model that is unusable is written only with `force`; see `written` and
+// `verdict` in the report. Draws progress on stderr; Ctrl-C ends it with an error and without a
+// file.
 [[nodiscard]] Result<nlohmann::json> train_and_save(const Experiment& experiment,
                                                     std::uint64_t seed,
                                                     const std::filesystem::path& out, bool force);

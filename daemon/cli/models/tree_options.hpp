@@ -1,5 +1,4 @@
-// Drawing a gesture model's trees from the command line: what `train gesture` and `eval gesture`
-// share.
+// Options to draw the trees of a gesture model; shared by `train gesture` and `eval gesture`.
 #pragma once
 
 #include <memory>
@@ -23,8 +22,8 @@ struct TreeOptions {
 
 void add_tree_options(CLI::App& command, const std::shared_ptr<TreeOptions>& options);
 
-// Whether `which` names trees, and of what is drawn somewhere; adds the drawings to `files`. To be
-// asked before long work.
+// Checks that `which` names trees, and that they are drawn somewhere if it is given; adds the
+// drawings to `files`. Call before long work.
 [[nodiscard]] Result<> check_tree_options(const TreeOptions& options, OutputFiles& files);
 [[nodiscard]] Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options);
 

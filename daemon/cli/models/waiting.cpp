@@ -14,20 +14,20 @@ using std::chrono::seconds;
 Waiting::Waiting(std::string what)
     : what_(std::move(what)),
       terminal_(isatty(STDERR_FILENO) == 1),
-      thread_([this](const std::stop_token& stop) { tell(stop); }) {}
+      thread_([this](const std::stop_token& stop) { show(stop); }) {}
 
 Waiting::~Waiting() {
   thread_.request_stop();
   thread_.join();
 }
 
-void Waiting::tell(const std::stop_token& stop) {
+void Waiting::show(const std::stop_token& stop) {
   const auto never = [] { return false; };
   std::unique_lock lock(mutex_);
   seconds passed{0};
   bool drawn = false;
   while (true) {
-    // A log file needs no line a second: 1, 2, 4, ... seconds after the start are enough.
+    // In a log file a line a second is too much: print after 1, 2, 4, ... seconds.
     const seconds step = terminal_ ? seconds(1) : std::max(seconds(1), passed);
     ended_.wait_for(lock, stop, step, never);
     if (stop.stop_requested()) break;

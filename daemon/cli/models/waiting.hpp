@@ -1,5 +1,6 @@
-// Work whose end nobody knows: after a second stderr says what is going on and for how long, once
-// on a line of a terminal, now and then elsewhere. Ctrl-C ends the process as ever.
+// Shows work of unknown duration: after a second stderr says what is being done and for how long;
+// on a terminal in one line that is rewritten, elsewhere a line from time to time. Ctrl-C ends the
+// process as usual.
 #pragma once
 
 #include <condition_variable>
@@ -18,13 +19,13 @@ class Waiting {
   ~Waiting();
 
  private:
-  void tell(const std::stop_token& stop);
+  void show(const std::stop_token& stop);
 
   std::string what_;
   bool terminal_;
   std::mutex mutex_;
   std::condition_variable_any ended_;
-  std::jthread thread_;  // last: it uses all of the above
+  std::jthread thread_;  // last, because it uses all of the above
 };
 
 }  // namespace posed::cli

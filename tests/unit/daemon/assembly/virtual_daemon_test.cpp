@@ -1,5 +1,5 @@
-// What the daemon promises whatever the order in which its parts get their turns: on a virtual
-// clock, so that a device may flood it for as long as we like.
+// What the daemon guarantees in whatever order its parts get their turns. On a virtual clock, so
+// that a device can flood it for any length of time.
 #include <catch2/catch.hpp>
 
 #include <set>
@@ -28,7 +28,7 @@ std::uint64_t lost(const pipeline::StreamCounters& counters) {
 
 }  // namespace
 
-TEST_CASE("on the virtual clock every frame and sample comes through, in order") {
+TEST_CASE("on the virtual clock every frame and sample arrives, in order") {
   VirtualDaemon daemon({.seed = 1, .log = {}, .holdups = false});
   daemon.add(walking_stream("walker", 3.0));
   daemon.add(glove_stream("hand", 3.0));
@@ -45,7 +45,7 @@ TEST_CASE("on the virtual clock every frame and sample comes through, in order")
   }
 }
 
-TEST_CASE("a device that sends without a pause costs its neighbour nothing") {
+TEST_CASE("a device that sends without a pause does not affect another stream") {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     INFO("seed " << seed);
     VirtualDaemon daemon({.seed = seed, .log = {}, .holdups = false, .turn_us = 1000.0});

@@ -13,7 +13,7 @@ namespace {
 using drivers::glove::Pose;
 using test::PosingGlove;
 
-// Says these words, one a pose; poses that the script does not know begin at once.
+// Gives these replies, one for each pose; poses beyond the script begin at once.
 class ScriptedUser final : public PoseGuide {
  public:
   explicit ScriptedUser(PosingGlove& glove, std::deque<Word> script = {})
@@ -73,8 +73,8 @@ TEST_CASE("a glove calibrated by poses reads the angles of those poses") {
   const auto fitted = drivers::glove::fit_poses(model, *recorded);
   if (!fitted) FAIL(fitted.error().text());
   CHECK(fitted->warnings.empty());
-  // The emulator's gains are the driver's defaults: the fit finds them again, to a count's
-  // rounding.
+  // The emulator's gains are the driver's defaults; the fit must recover them, up to the rounding
+  // to counts.
   for (const auto& [name, points] : fitted->sensors) {
     INFO(name);
     const auto sensor = std::ranges::find(model.sensors, name, &drivers::glove::Sensor::name);
@@ -88,7 +88,7 @@ TEST_CASE("a glove calibrated by poses reads the angles of those poses") {
   CHECK(fitted->sensors.size() >= 18);
 }
 
-TEST_CASE("a pose can be held again, and a hand that moved in it is told") {
+TEST_CASE("a pose can be repeated, and a hand that moved during it is reported") {
   PosingGlove glove;
   const auto source = worn(glove);
   using Word = PoseGuide::Word;
@@ -102,7 +102,7 @@ TEST_CASE("a pose can be held again, and a hand that moved in it is told") {
   CHECK(user.moved[0] == Pose::kFlat);
 }
 
-TEST_CASE("poses that begin by themselves need no word") {
+TEST_CASE("poses that begin by themselves need no reply of the user") {
   PosingGlove glove;
   const auto source = worn(glove);
   ScriptedUser user(glove, std::deque<PoseGuide::Word>(100'000, PoseGuide::Word::kNothing));
@@ -112,7 +112,7 @@ TEST_CASE("poses that begin by themselves need no word") {
   CHECK(user.asked == std::vector{Pose::kFlat, Pose::kFist});
 }
 
-TEST_CASE("a calibration that the user gives up writes nothing, and says so") {
+TEST_CASE("a calibration that the user cancels writes no file and reports that") {
   PosingGlove glove;
   const auto source = worn(glove);
   ScriptedUser user(glove, {PoseGuide::Word::kNothing, PoseGuide::Word::kStop});

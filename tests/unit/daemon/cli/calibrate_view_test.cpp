@@ -1,4 +1,4 @@
-// The screen of `posed calibrate`, looked at as text.
+// The screen of `posed calibrate`, tested as text.
 #include "daemon/cli/devices/calibrate_view.hpp"
 
 #include <catch2/catch.hpp>
@@ -66,7 +66,7 @@ TEST_CASE("all sensors of a glove have a bar on 80 x 24 and 60 x 24") {
   }
 }
 
-TEST_CASE("sensors stay apart where their names are cut") {
+TEST_CASE("sensors remain distinguishable when their names are cut") {
   CalibrateView view = view_of(3);
   view.width = 40;
   view.height = 12;
@@ -76,7 +76,7 @@ TEST_CASE("sensors stay apart where their names are cut") {
   for (const char* end : {"~t0 |#", "~t1 |#", "~t2 |#"}) CHECK(text.contains(end));
 }
 
-TEST_CASE("what does not fit is counted") {
+TEST_CASE("sensors that do not fit on the screen are counted") {
   CalibrateView view = view_of(32);
   view.width = 40;
   view.height = 16;
@@ -86,7 +86,7 @@ TEST_CASE("what does not fit is counted") {
   CHECK(text.contains("... and " + std::to_string(32 - bars) + " more: make the window larger"));
 }
 
-TEST_CASE("the screen says which pose is wanted and what to do") {
+TEST_CASE("the screen shows which pose to take and what to do") {
   CalibrateView view = view_of(2);
   std::string text = all(calibrate_view(view));
   CHECK(text.contains("[flat]   fist   thumb   spread\n"));
@@ -105,7 +105,7 @@ TEST_CASE("the screen says which pose is wanted and what to do") {
   CHECK(all(calibrate_view(view)).contains("Nothing comes from the glove"));
 }
 
-TEST_CASE("a bar shows the value and where it has been") {
+TEST_CASE("a bar shows the current value and the range seen so far") {
   SensorView sensor{.name = "index", .least = 0, .most = 100, .there = true, .value = 30};
   sensor.low = 10;
   sensor.high = 60;
@@ -116,13 +116,12 @@ TEST_CASE("a bar shows the value and where it has been") {
   CHECK(sensor_bar(sensor, 10) == "##########");
   sensor.value = -5;
   CHECK(sensor_bar(sensor, 10) == " -----    ");
-  sensor.most = sensor.least;  // a driver's mistake
+  sensor.most = sensor.least;  // as if a driver had a mistake
   CHECK(sensor_bar(sensor, 10).size() == 10);
   CHECK(sensor_bar(sensor, 0).empty());
 }
 
-TEST_CASE(
-    "a sensor that has not moved is marked once a pose was held; one never measured is not there") {
+TEST_CASE("a sensor that has not moved is marked after a pose; one never measured is left out") {
   CalibrateView view = view_of(3);
   view.sensors[1].low = view.sensors[1].high = 128;
   view.sensors[2].there = false;

@@ -14,7 +14,7 @@ constexpr const char* kCalibration =
     "format = 1\ndriver = \"lucidgloves\"\nhand = \"right\"\n[sensors]\nindex = [[0, 0.0], [9, "
     "1.0]]\n";
 
-TEST_CASE("files are known by how they begin") {
+TEST_CASE("files are recognised by their first bytes") {
   CHECK(kind_of("POSEDMDL\x01") == FileKind::kModel);
   CHECK(kind_of(std::string("SQLite format 3\0", 16)) == FileKind::kDeviceLog);
   CHECK(kind_of(kCalibration) == FileKind::kCalibration);
@@ -27,7 +27,7 @@ TEST_CASE("files are known by how they begin") {
   CHECK(kind_of("") == FileKind::kOther);
 }
 
-TEST_CASE("the wrong file is told what it is and which command wants it") {
+TEST_CASE("the error for a wrong file says what it is and which command reads it") {
   const test::TempFolder folder;
   const auto style = folder.write("mine.style", "POSEDMDL and more");
   const auto fit = folder.write("ann.toml", kCalibration);
@@ -43,7 +43,7 @@ TEST_CASE("the wrong file is told what it is and which command wants it") {
   const auto other = expect_kind(fit, FileKind::kModel, "right");
   REQUIRE_FALSE(other);
   CHECK(other.error().message.contains("posed ctl calibrate right"));
-  // What is not known is left to the one who reads it whole.
+  // A file of unknown kind is no error here; the code that reads the whole file reports it.
   CHECK(expect_kind(folder.write("notes.txt", "hello"), FileKind::kModel, "walker"));
   CHECK(expect_kind(folder.write("empty", ""), FileKind::kModel, "walker"));
   CHECK(expect_kind(folder.path() / "none", FileKind::kModel, "walker"));

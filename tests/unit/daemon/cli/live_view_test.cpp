@@ -26,7 +26,7 @@ v1::Stats stats_of(int streams) {
   return stats;
 }
 
-TEST_CASE("the live view fits 80 x 24 whatever the daemon says") {
+TEST_CASE("the live view fits 80 x 24 whatever the daemon sends") {
   v1::Stats stats = stats_of(32);
   auto& wild = *stats.mutable_stream(0);
   wild.set_stream(std::string(32, 'x'));
@@ -49,7 +49,7 @@ TEST_CASE("the live view fits 80 x 24 whatever the daemon says") {
   }
 }
 
-TEST_CASE("the live view shows what matters of each stream") {
+TEST_CASE("the live view has a row for each stream") {
   const auto lines = live_view(stats_of(2), {.title = "posed", .width = 100});
   REQUIRE(lines.size() == 5);
   CHECK(lines[0].find("2 streams   cpu 12.3 %   rss 45.6 MB") != std::string::npos);
@@ -59,7 +59,7 @@ TEST_CASE("the live view shows what matters of each stream") {
   CHECK(lines[3].find("-0.50 march-to-sway.style") != std::string::npos);
 }
 
-TEST_CASE("the live view tells which gloves are away, since when, and how a glove's clock runs") {
+TEST_CASE("the live view shows unplugged gloves, since when, and how a glove's clock runs") {
   v1::Stats stats = stats_of(4);
   stats.set_time_ns(1'000'000'000'000);
   for (auto& stream : *stats.mutable_stream()) {
@@ -117,7 +117,7 @@ TEST_CASE("a daemon that does not answer is not shown as live") {
   CHECK(all.contains("walker1"));
 }
 
-TEST_CASE("on no terminal names are whole and lines end with their words") {
+TEST_CASE("without a terminal names are not cut and lines are not padded") {
   v1::Stats stats = stats_of(2);
   const std::string name = "a-model-with-quite-a-long-name-indeed-yes.style";
   stats.mutable_stream(0)->set_model(name);
@@ -131,7 +131,7 @@ TEST_CASE("on no terminal names are whole and lines end with their words") {
   for (const std::string& line : lines) CHECK_FALSE(line.ends_with(' '));
 }
 
-TEST_CASE("what a stream does is told: performed, recognised, sliding, replayed") {
+TEST_CASE("the live view shows performed and recognised gestures, a moving alpha and a replay") {
   v1::Stats stats = stats_of(1);
   auto& stream = *stats.mutable_stream(0);
   stream.set_alpha_target(-0.5F);
@@ -148,11 +148,11 @@ TEST_CASE("what a stream does is told: performed, recognised, sliding, replayed"
   stats.set_replay_file("take1.plog");
   stats.set_replay_speed(1.0);
   CHECK(below() == "  a replay of take1.plog, 1 x its pace; all times are the recording's");
-  // A stage that no frame passed has no times.
+  // A stage that processed no frame has no times.
   CHECK(live_view(stats, {.width = 0, .height = 0})[2].contains(" -   31/1.2m         - "));
 }
 
-TEST_CASE("streams that do not fit are counted, notes fill what is left") {
+TEST_CASE("streams that do not fit are counted, notes fill the remaining lines") {
   LiveViewOptions options{.title = "posed", .height = 10};
   const auto many = live_view(stats_of(32), options);
   CHECK(many.size() == 10);

@@ -12,7 +12,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST_CASE("every kind of event is a line that names it, one of a newer posed too") {
+TEST_CASE("every kind of event has a line with its name, also one from a newer posed") {
   v1::Event event;
   event.set_stream("right");
   event.set_sequence(61);
@@ -32,7 +32,7 @@ TEST_CASE("every kind of event is a line that names it, one of a newer posed too
   CHECK(has(monitor_line(event), "61 unknown   the"));
 }
 
-TEST_CASE("a performed pose is told from a recognised one") {
+TEST_CASE("a performed pose is distinguished from a recognised one") {
   v1::Frame frame;
   frame.set_stream("hand");
   frame.set_label("g");
@@ -49,7 +49,7 @@ TEST_CASE("a performed pose is told from a recognised one") {
   CHECK(has(monitor_line(frame), "held"));
 }
 
-TEST_CASE("a latency has a unit that reads well, and a dash where it is not known") {
+TEST_CASE("a latency has a readable unit, and a dash if it is unknown") {
   v1::Frame frame;
   frame.set_arrival_ns(1'000'000'000);
   frame.set_published_ns(frame.arrival_ns() + 57'000);
@@ -62,7 +62,7 @@ TEST_CASE("a latency has a unit that reads well, and a dash where it is not know
   CHECK(has(monitor_line(frame), "         -"));
 }
 
-TEST_CASE("values of a sample carry their units, and a replay says that it is one") {
+TEST_CASE("values of a sample have units, and a replay is marked as one") {
   v1::Sample sample;
   sample.add_name("index");
   sample.add_value(0.5F);

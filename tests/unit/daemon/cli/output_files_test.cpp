@@ -1,4 +1,4 @@
-// The one rule for files that commands write.
+// The rules for files that commands write.
 #include "daemon/cli/output_files.hpp"
 
 #include <catch2/catch.hpp>
@@ -16,20 +16,21 @@ bool refused(const Result<>& done, const std::string& why) {
 
 }  // namespace
 
-TEST_CASE("an output must not be named as another format") {
+TEST_CASE("an output must not have the extension of another format") {
   const test::TempFolder folder;
   const auto path = [&](const char* name) { return folder.path() / name; };
   CHECK(OutputFiles(false).writes(path("a.bvh"), {".bvh"}).check());
   CHECK(OutputFiles(false).writes(path("a.BVH"), {".bvh"}).check());
   CHECK(refused(OutputFiles(false).writes(path("a.csv"), {".bvh"}).check(), "is .bvh"));
   CHECK(refused(OutputFiles(false).writes(path("a"), {".bvh", ".csv"}).check(), ".bvh or .csv"));
-  // A format that is known by its contents may have any name but another format's.
+  // A format that is recognised by its contents may have any extension except those of other
+  // formats.
   CHECK(OutputFiles(false).writes_any_but_other(path("a.model"), {".style"}).check());
   CHECK(refused(OutputFiles(false).writes_any_but_other(path("a.bvh"), {".style"}).check(),
                 "is .style"));
 }
 
-TEST_CASE("an input is never overwritten, whatever its name here") {
+TEST_CASE("an input is never overwritten, by whatever path it is named") {
   const test::TempFolder folder;
   const auto in = folder.write("in.csv", "x");
   const auto link = folder.path() / "link.csv";
@@ -39,25 +40,25 @@ TEST_CASE("an input is never overwritten, whatever its name here") {
   }
 }
 
-TEST_CASE("a file that exists is replaced only when that is said") {
+TEST_CASE("an existing file is replaced only with --overwrite") {
   const test::TempFolder folder;
   const auto out = folder.write("out.csv", "x");
   CHECK(refused(OutputFiles(false).writes(out, {".csv"}).check(), "--overwrite"));
   CHECK(OutputFiles(true).writes(out, {".csv"}).check());
 }
 
-TEST_CASE("folders, devices and places that cannot be written to are no outputs") {
+TEST_CASE("folders, devices and unwritable places are refused as outputs") {
   const test::TempFolder folder;
   const auto& here = folder.path();
   std::filesystem::create_directory(here / "a.style");
   CHECK(refused(OutputFiles(true).writes(here / "a.style", {".style"}).check(), "is a folder"));
   CHECK(refused(OutputFiles(true).writes_any_but_other("/dev/null", {".style"}).check(),
-                "no regular file"));
+                "not a regular file"));
   CHECK(refused(OutputFiles(true).writes(here / "no" / "b.style", {".style"}).check(),
                 "folder is not there"));
 }
 
-TEST_CASE("two outputs are two files") {
+TEST_CASE("two outputs must be different files") {
   const test::TempFolder folder;
   const auto a = folder.path() / "a.svg";
   CHECK(refused(OutputFiles(true).writes(a, {".svg"}).writes(a, {".svg"}).check(), "twice"));

@@ -1,4 +1,5 @@
-// The questions file: the documented sample, there and back, and each way it can be wrong.
+// The questions file: the documented sample, written and read back, and each way in which it can be
+// wrong.
 #include <catch2/catch.hpp>
 
 #include <fstream>
@@ -20,7 +21,7 @@ std::string sample_text() {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-// What the reader says about the sample with `from` replaced by `to`.
+// The error for the sample with `from` replaced by `to`.
 Error refusal(const char* from, const char* to) {
   const test::TempFolder folder;
   const auto text = std::regex_replace(sample_text(), std::regex(from), to);
@@ -55,7 +56,7 @@ TEST_CASE("Written questions read back", "[questions]") {
   CHECK(gesture::lists_of(*read) == gesture::lists_of(sorted.value()));
 }
 
-TEST_CASE("Questions that cannot be asked are refused", "[questions]") {
+TEST_CASE("Invalid questions are refused", "[questions]") {
   CHECK(refusal("\\[ring\\]", "[rink]").message.find("[ring]") != std::string::npos);
   CHECK(refusal("B = ", "D = ").message.find("unknown key") != std::string::npos);
   CHECK(refusal("\"1\", \"3\", \"4\"\\]", "\"1\", \"3\"]").message.find("'4' is in no class") !=

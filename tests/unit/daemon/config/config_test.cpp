@@ -14,7 +14,7 @@
 namespace posed::config {
 namespace {
 
-// Drivers of the tests' own: one option of each type.
+// Drivers for these tests: one option of each type.
 std::vector<drivers::Driver> two_drivers() {
   using drivers::OptionSpec;
   return {{"file",
@@ -41,7 +41,7 @@ driver = "file"
 path = "walk.bvh"
 )";
 
-// The one complaint about kWalker with these lines behind it.
+// The only error for kWalker followed by these lines.
 std::string complaint(const std::string& more, const std::string& start = kWalker) {
   const Reading reading = read(start + more);
   INFO(more);
@@ -68,7 +68,7 @@ TEST_CASE("a small config gets every default") {
   CHECK(reading.config.text == kWalker);
 }
 
-TEST_CASE("every value reaches its field") {
+TEST_CASE("every value is stored in its field") {
   const Reading reading = read(R"(
 realtime = false
 publish.endpoint = "tcp://0.0.0.0:1"
@@ -164,7 +164,7 @@ TEST_CASE("each mistake is one sentence with file and line") {
         std::string::npos);
 }
 
-TEST_CASE("an unknown key is told where it belongs, or what is known") {
+TEST_CASE("the error for an unknown key names its table, or the known keys") {
   CHECK(complaint("", "[[stream]]\nname = \"a\"\ndriver = \"glove\"\nalpha = 0.5\n") ==
         "stage/posed.toml:4: unknown key 'stream.alpha'; it belongs into [stream.style]");
   CHECK(complaint("[stream.style]\nmodel = \"m\"\npublish_raw = true\n")
@@ -172,7 +172,7 @@ TEST_CASE("an unknown key is told where it belongs, or what is known") {
   CHECK(complaint("[control]\nmodel = 1\n")
             .ends_with("it belongs into [stream.generate] or [stream.style]"));
   CHECK(complaint("xyzzy = 1\n").ends_with("known here: first, loop, pace, path"));
-  // Nothing of a stranger's key reaches the terminal as it is.
+  // An untrusted key reaches the terminal without its control characters.
   CHECK(complaint("\"\\u001b[2J\" = 1\n").find("'stream.file.\\x1b[2J'") != std::string::npos);
 }
 
@@ -188,7 +188,7 @@ TEST_CASE("generate: lags, tempo and labels are checked") {
   CHECK(complaint("[stream.constrain]\nenable = true\n").find("'enabled'") != std::string::npos);
 }
 
-TEST_CASE("a wrong unit is told the right one") {
+TEST_CASE("the error for a wrong unit names the right one") {
   const std::string stream = "[[stream]]\nname = \"w\"\ndriver = \"glove\"\n";
   CHECK(complaint("stale_after_s = \"500 ms\"\n", stream) ==
         "stage/posed.toml:4: stream.stale_after_s must be a number of seconds, not text");
@@ -222,7 +222,7 @@ TEST_CASE("streams: names, drivers and their tables") {
             .find(":1: stream.file.path is missing: the clip to play") != std::string::npos);
 }
 
-TEST_CASE("all mistakes are told at once, in the file's order") {
+TEST_CASE("all errors are reported at once, in the file's order") {
   const Reading reading = read(R"(realtime = "yes"
 [[stream]]
 name = "A"
@@ -236,7 +236,7 @@ alpha = 9
   CHECK(lines == std::vector<int>{1, 3, 5, 6, 7});
 }
 
-TEST_CASE("nothing listens beyond this machine without keys unless the config insists") {
+TEST_CASE("without keys nothing listens beyond this machine, unless the config says insecure") {
   CHECK(complaint("[publish]\nendpoint = \"tcp://0.0.0.0:5570\"\n")
             .find("insecure = true in"
                   " [publish]") != std::string::npos);
@@ -293,7 +293,7 @@ TEST_CASE("security: keys are read and clients checked") {
         std::string::npos);
 }
 
-TEST_CASE("a config that is not there or no text is one sentence") {
+TEST_CASE("a config that is missing or not text gives one sentence") {
   const auto drivers = two_drivers();
   const test::TempFolder folder;
   const auto missing = load_config(folder.path() / "none.toml", drivers);
@@ -310,7 +310,7 @@ TEST_CASE("a config that is not there or no text is one sentence") {
   }
 }
 
-// The shipped file with every "#key = value" and "#[table]" line switched on.
+// The shipped file with every "#key = value" and "#[table]" line uncommented.
 std::string shipped(bool with_commented_defaults) {
   std::ifstream file(test::source_dir() / "config/posed.toml");
   const std::regex commented(R"(^#([a-z_]+ = |\[))");
@@ -322,7 +322,7 @@ std::string shipped(bool with_commented_defaults) {
   return text;
 }
 
-TEST_CASE("the shipped config lists every key there is, with its default") {
+TEST_CASE("the shipped config contains every key with its default") {
   const auto read_real = [](const std::string& text) {
     return read_config(text, test::source_dir() / "config/posed.toml", drivers::registry());
   };
@@ -330,18 +330,19 @@ TEST_CASE("the shipped config lists every key there is, with its default") {
   REQUIRE(bare.errors.empty());
 
   const Reading full = read_real(shipped(true));
-  for (const Error& error : full.errors) {  // its example keys are not there; nothing else is wrong
+  // the key files of the example do not exist; there must be no other error
+  for (const Error& error : full.errors) {
     INFO(error.text());
     CHECK(error.message.find("cannot read the key") != std::string::npos);
   }
-  // Every key that the reader asks for stands in the file.
+  // The file contains every key that the reader looks up.
   const std::string text = shipped(true);
   for (const std::string& key : full.known) {
     const std::string last = key.substr(key.rfind('.') + 1);
     INFO(key);
     CHECK(std::regex_search(text, std::regex("(^|\n)" + last + " = |\n\\[+" + key + "\\]")));
   }
-  // And what it says is the default: switching all of it on changes nothing.
+  // The values in the file are the defaults: uncommenting all of them changes nothing.
   const auto& a = bare.config;
   const auto& b = full.config;
   CHECK(a.realtime == b.realtime);

@@ -1,4 +1,4 @@
-// What control messages do: the handler with a pipeline of the test's own, then the socket.
+// What control messages do: the handler with a pipeline made by the test, then the socket.
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -72,7 +72,7 @@ v1::ControlRequest alpha_request(const std::string& stream, float alpha) {
   return request;
 }
 
-// A model that goes into one piece.
+// A model that fits into one piece.
 v1::ControlRequest model_request(const std::string& stream, const std::string& bytes) {
   v1::ControlRequest request;
   auto& part = *request.mutable_model_part();
@@ -84,10 +84,10 @@ v1::ControlRequest model_request(const std::string& stream, const std::string& b
   return request;
 }
 
-v1::ControlReply reply_of(const std::optional<Answer>& answer) {
+v1::ControlReply reply_of(const std::optional<Reply>& answer) {
   v1::ControlReply reply;
   REQUIRE(answer);
-  CHECK(answer->to == Asker{"me"});
+  CHECK(answer->to == Requester{"me"});
   REQUIRE(reply.ParseFromString(answer->bytes));
   return reply;
 }
@@ -96,26 +96,26 @@ struct Fixture {
   FakeDaemonControl daemon_control;
   RequestHandler handler{three_streams(), daemon_control};
 
-  std::optional<Answer> ask(const std::string& bytes) {
+  std::optional<Reply> ask(const std::string& bytes) {
     return handler.handle({"me"}, std::as_bytes(std::span(bytes)));
   }
-  std::optional<Answer> ask(const v1::ControlRequest& request) {
+  std::optional<Reply> ask(const v1::ControlRequest& request) {
     return ask(request.SerializeAsString());
   }
-  // The sentence of a refusal.
+  // The error sentence of a refusal.
   std::string refused(const v1::ControlRequest& request) {
     const auto reply = reply_of(ask(request));
     CHECK_FALSE(reply.ok());
     CHECK(daemon_control.sent.empty());
     return reply.error();
   }
-  // The sentence of the refusal of a model that takes several pieces.
+  // The error sentence for a model that takes several pieces.
   std::string refused_in_pieces(const std::string& stream, const std::string& model) {
     auto request = model_request(stream, model);
     auto& part = *request.mutable_model_part();
-    for (std::size_t offset = 0; offset < model.size(); offset += kLargestPiece) {
+    for (std::size_t offset = 0; offset < model.size(); offset += kMaxPiece) {
       part.set_offset(offset);
-      part.set_bytes(model.substr(offset, kLargestPiece));
+      part.set_bytes(model.substr(offset, kMaxPiece));
       const auto reply = reply_of(ask(request));
       if (!reply.ok()) return reply.error();
     }
@@ -134,7 +134,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST_CASE("an alpha goes to its stream and is answered when it took effect") {
+TEST_CASE("an alpha goes to its stream, and the reply comes when it took effect") {
   Fixture fixture;
   CHECK_FALSE(fixture.ask(alpha_request("runner", -2.0F)));
   REQUIRE(fixture.daemon_control.sent.size() == 1);
@@ -160,7 +160,7 @@ TEST_CASE("a model is parsed, bound, kept and owned until the next one took effe
   CHECK(fixture.daemon_control.in_use.empty());
   CHECK(fixture.acknowledge(5).sequence() == 5);
   CHECK(fixture.daemon_control.in_use == "0 sway.style");
-  for (int i = 0; i < 10; ++i) {  // under ASan: none leaks, none is freed too early
+  for (int i = 0; i < 10; ++i) {  // under ASan: no leak, and no model freed too early
     CHECK_FALSE(fixture.ask(model_request("walker", bytes)));
     const auto* bound = fixture.daemon_control.sent.front().model;
     CHECK(fixture.acknowledge(6).ok());
@@ -169,7 +169,7 @@ TEST_CASE("a model is parsed, bound, kept and owned until the next one took effe
   CHECK_FALSE(fixture.ask(model_request("walker", bytes)));  // never acknowledged
 }
 
-TEST_CASE("status and stop are answered at once") {
+TEST_CASE("status and stop get a reply at once") {
   Fixture fixture;
   v1::ControlRequest request;
   request.mutable_status();
@@ -179,7 +179,7 @@ TEST_CASE("status and stop are answered at once") {
   CHECK(fixture.daemon_control.stopped);
 }
 
-TEST_CASE("each refusal is one sentence") {
+TEST_CASE("each refusal is a single sentence") {
   Fixture fixture;
   CHECK(has(fixture.refused(alpha_request("nobody", 0.0F)),
             "there is no stream 'nobody'; there is: walker, plain, runner"));
@@ -205,7 +205,7 @@ TEST_CASE("each refusal is one sentence") {
   CHECK(has(fixture.refused(alpha_request("walker", 0.0F)), "too many changes"));
 }
 
-TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
+TEST_CASE("a refusal repeats an untrusted name cleaned and cut") {
   Fixture fixture;
   const std::string wild = "\x1b[2J" + std::string(60'000, 'x');
   const std::string stream = fixture.refused(alpha_request(wild, 0.0F));
@@ -216,7 +216,7 @@ TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
   const std::string name = fixture.refused(named);
   CHECK(name.find('\x1b') == std::string::npos);
   CHECK(name.size() < 300);
-  // A model's joints are named in the sentence that says which of them the stream lacks.
+  // The sentence names the joints of the model that the stream lacks.
   auto model = test::toy_model(1, 0.3);
   model.space.joints.back() = "\x1b[2J" + std::string(1 << 20, 'x');
   const std::string joints = fixture.refused_in_pieces("walker", style::serialize_model(model));
@@ -227,11 +227,11 @@ TEST_CASE("a refusal repeats a foreign name cleaned and cut") {
 TEST_CASE("requests are bounded in size and in number") {
   Fixture fixture;
   auto request = alpha_request("walker", 0.0F);
-  request.mutable_set_alpha()->set_stream(std::string(kLargestRequest, 'x'));
+  request.mutable_set_alpha()->set_stream(std::string(kMaxRequest, 'x'));
   CHECK(has(fixture.refused(request), "too large"));
-  CHECK(has(fixture.refused(model_request("walker", std::string(kLargestPiece + 1, 'x'))),
+  CHECK(has(fixture.refused(model_request("walker", std::string(kMaxPiece + 1, 'x'))),
             "a piece of a model has"));
-  for (std::size_t i = 0; i < kMostUnderWay; ++i) {
+  for (std::size_t i = 0; i < kMaxUnderWay; ++i) {
     CHECK_FALSE(fixture.ask(alpha_request("walker", 1.0F)));
   }
   const auto one_more = reply_of(fixture.ask(alpha_request("walker", 1.0F)));
@@ -240,12 +240,12 @@ TEST_CASE("requests are bounded in size and in number") {
   CHECK_FALSE(fixture.ask(alpha_request("walker", 1.0F)));
 }
 
-TEST_CASE("an acknowledgement of nothing is nothing") {
+TEST_CASE("an acknowledgement of an unknown command gives no reply") {
   Fixture fixture;
   CHECK_FALSE(fixture.handler.acknowledge({.ticket = 99, .stream = 0}));
 }
 
-// A daemon reduced to its control side: a socket, and a pipeline that acknowledges.
+// The control side of a daemon only: a socket, and a pipeline that acknowledges.
 class Booth final : public DaemonControl {
  public:
   explicit Booth(ZapAuthenticator* authenticator = nullptr, std::string secret = {},
@@ -262,7 +262,7 @@ class Booth final : public DaemonControl {
         acks_feed_.push({.ticket = command.ticket, .stream = command.stream, .sequence = commands});
     return pushed;
   }
-  // The pipeline's part, on the test's thread.
+  // What the pipeline does, on the test's thread.
   void serve() {
     while (acks_feed_.consume([this](const Ack& ack) noexcept { (void)acks_.push(ack); })) {
     }
@@ -280,8 +280,8 @@ class Booth final : public DaemonControl {
  private:
   Context context_;
   std::unique_ptr<system::EventFd> wake_ = *system::EventFd::open();
-  pipeline::Ring<Ack> acks_{kMostUnderWay};
-  pipeline::Ring<Ack> acks_feed_{kMostUnderWay};
+  pipeline::Ring<Ack> acks_{kMaxUnderWay};
+  pipeline::Ring<Ack> acks_feed_{kMaxUnderWay};
   RequestHandler handler_{three_streams(), *this};
   std::unique_ptr<ControlServer> server_;
 };
@@ -295,7 +295,7 @@ class Client {
   void send(const v1::ControlRequest& request) const {
     REQUIRE(send_part(socket_.get(), request.SerializeAsString(), false));
   }
-  // The next reply; nullopt when none came in time.
+  // The next reply; nullopt if none came in time.
   [[nodiscard]] std::optional<v1::ControlReply> receive(std::chrono::milliseconds within) const {
     zmq_pollitem_t wait{socket_.get(), 0, ZMQ_POLLIN, 0};
     if (zmq_poll(&wait, 1, within.count()) <= 0) return std::nullopt;
@@ -336,10 +336,10 @@ TEST_CASE("the control socket answers REQ and DEALER clients") {
   CHECK(done->sequence() == 1);
 }
 
-TEST_CASE("neither silent, deaf, wild nor busy clients keep others waiting") {
+TEST_CASE("clients that are silent, never read, send garbage or flood do not delay others") {
   Booth booth;
-  // One sends rubbish and never reads; one sends an endless envelope; one floods with requests
-  // whose answers never come because the pipeline stands.
+  // One client sends invalid bytes and never reads; one sends an endless envelope; one floods with
+  // requests that get no reply because the pipeline does not run.
   const Client wild(booth.endpoint(), ZMQ_DEALER);
   const Client endless(booth.endpoint(), ZMQ_DEALER);
   const Client flood(booth.endpoint(), ZMQ_DEALER);
@@ -357,7 +357,7 @@ TEST_CASE("neither silent, deaf, wild nor busy clients keep others waiting") {
   }
 }
 
-TEST_CASE("a controller's key counts for every message it sends") {
+TEST_CASE("a controller's key is checked at every message") {
   const test::TempFolder folder;
   const auto server = *write_new_keys("server", folder.path());
   const auto director = *write_new_keys("director", folder.path());

@@ -1,4 +1,4 @@
-// What `play` and `stop-playing` do at the control fixture: an order of label indices for the hot
+// What `play` and `stop-playing` do at the request handler: an order of label indices for the hot
 // side, or one sentence that says what is wrong.
 #include <catch2/catch.hpp>
 
@@ -29,7 +29,7 @@ class QuietDaemonControl final : public DaemonControl {
   std::deque<Command> sent;
 };
 
-// A hand with a gesture model, one that only smooths, and a stream without the stage.
+// A hand with a gesture model, one that is only smoothed, and a stream without the generate stage.
 std::vector<ControlledStream> hands() {
   const auto skeleton = std::make_shared<const Skeleton>(hand_skeleton(Side::kRight));
   std::vector<ControlledStream> streams(3);
@@ -50,7 +50,7 @@ struct PlayDesk {
   QuietDaemonControl daemon_control;
   RequestHandler handler{hands(), daemon_control};
 
-  // The sentence of the refusal; empty when the request went on to the pipeline.
+  // The error sentence; empty if the request went on to the pipeline.
   std::string refusal(const v1::ControlRequest& request) {
     const std::string bytes = request.SerializeAsString();
     const auto answer = handler.handle({"me"}, std::as_bytes(std::span(bytes)));
@@ -102,7 +102,7 @@ TEST_CASE("a play becomes label indices, tempo and loop for its stream") {
   CHECK(fixture.daemon_control.sent.back().kind == Command::Kind::kStopPlaying);
 }
 
-TEST_CASE("a play that cannot be is refused with one sentence and reaches nobody") {
+TEST_CASE("an invalid play is refused with one sentence and reaches no stream") {
   PlayDesk fixture;
   CHECK(says(fixture.refusal(play("nobody", {"g"})), "nobody"));
   CHECK(says(fixture.refusal(play("plain", {"g"})), "generate"));

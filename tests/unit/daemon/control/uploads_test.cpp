@@ -1,4 +1,4 @@
-// Models that arrive in pieces, as nobody should send them.
+// Models that arrive in pieces, with every mistake that a client can make.
 #include <catch2/catch.hpp>
 
 #include "daemon/control/uploads.hpp"
@@ -21,7 +21,7 @@ struct Sender {
   }
 };
 
-TEST_CASE("a model in pieces comes out whole, two clients beside each other") {
+TEST_CASE("a model in pieces is put together, for two clients at the same time") {
   Uploads uploads;
   const Sender sender{.model = std::string(100, 'm')};
   for (std::size_t offset = 0; offset < 80; offset += 20) {
@@ -45,13 +45,13 @@ TEST_CASE("pieces out of order, overlapping, beyond the end or of another model 
     REQUIRE(uploads.take("a", sender.piece(0, 20), 1));
     CHECK_FALSE(uploads.take("a", wrong, 1));
     CHECK(uploads.bytes() == 0);
-    CHECK_FALSE(uploads.take("a", sender.piece(20, 20), 1));  // nothing is left to continue
+    CHECK_FALSE(uploads.take("a", sender.piece(20, 20), 1));  // the error has ended the upload
   }
   Uploads uploads;
   ModelPiece beyond = sender.piece(0, 20);
   beyond.total = 10;
   CHECK_FALSE(uploads.take("a", beyond, 1));
-  for (const std::uint64_t total : {std::uint64_t{0}, kLargestModel + 1, ~std::uint64_t{0}}) {
+  for (const std::uint64_t total : {std::uint64_t{0}, kMaxModel + 1, ~std::uint64_t{0}}) {
     ModelPiece absurd = sender.piece(0, 20);
     absurd.total = total;
     CHECK_FALSE(uploads.take("a", absurd, 1));
@@ -63,7 +63,7 @@ TEST_CASE("pieces out of order, overlapping, beyond the end or of another model 
   CHECK(uploads.bytes() == 0);
 }
 
-TEST_CASE("a damaged model is refused before anybody parses it") {
+TEST_CASE("a damaged model is refused before it is parsed") {
   Uploads uploads;
   const Sender sender{.model = std::string(30, 'm'), .sha256 = std::string(64, '0')};
   const auto taken = uploads.take("a", sender.piece(0, 30), 1);
@@ -73,26 +73,26 @@ TEST_CASE("a damaged model is refused before anybody parses it") {
 
 TEST_CASE("uploads are bounded in number, bytes and time") {
   Uploads uploads;
-  const Sender sender{.model = std::string(kLargestModel, 'm')};
-  for (std::size_t i = 0; i < kMostUploads; ++i) {
-    REQUIRE(uploads.take(std::to_string(i), sender.piece(0, kLargestPiece), 1));
+  const Sender sender{.model = std::string(kMaxModel, 'm')};
+  for (std::size_t i = 0; i < kMaxUploads; ++i) {
+    REQUIRE(uploads.take(std::to_string(i), sender.piece(0, kMaxPiece), 1));
   }
-  CHECK_FALSE(uploads.take("one more", sender.piece(0, kLargestPiece), 1));
-  // All of them together may not hold more than one largest model.
-  std::size_t offset = kLargestPiece;
+  CHECK_FALSE(uploads.take("one more", sender.piece(0, kMaxPiece), 1));
+  // All of them together may not hold more bytes than one model of the largest size.
+  std::size_t offset = kMaxPiece;
   bool refused = false;
-  for (; offset < kLargestModel && !refused; offset += kLargestPiece) {
-    for (std::size_t i = 0; i < kMostUploads; ++i) {
-      refused |= !uploads.take(std::to_string(i), sender.piece(offset, kLargestPiece), 1);
+  for (; offset < kMaxModel && !refused; offset += kMaxPiece) {
+    for (std::size_t i = 0; i < kMaxUploads; ++i) {
+      refused |= !uploads.take(std::to_string(i), sender.piece(offset, kMaxPiece), 1);
     }
-    CHECK(uploads.bytes() <= kLargestModel);
+    CHECK(uploads.bytes() <= kMaxModel);
   }
   CHECK(refused);
   CHECK(uploads.forget_old(2) > 2);
   CHECK(uploads.forget_old(1 + nanoseconds(kUploadPause_s)) ==
         std::numeric_limits<std::int64_t>::max());
   CHECK(uploads.bytes() == 0);
-  CHECK(uploads.take("one more", sender.piece(0, kLargestPiece), 1));
+  CHECK(uploads.take("one more", sender.piece(0, kMaxPiece), 1));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// A supervisor, a reader and an emulated glove on threads of their own: whoever hands what to whom,
-// a glove that comes, goes and comes again is read each time. For the thread sanitizer, too.
+// A supervisor, a reader and an emulated glove on threads of their own: a glove that is plugged in,
+// unplugged and plugged in again is read each time. Also runs under the thread sanitizer.
 #include <memory>
 #include <string>
 #include <thread>
@@ -23,7 +23,7 @@ using namespace std::chrono_literals;
 
 const drivers::Driver& lucidgloves() { return *drivers::find_driver("lucidgloves"); }
 
-// DeviceInfo in as long as it lives.
+// Plugged in while this object exists.
 class PluggedGlove {
  public:
   explicit PluggedGlove(const std::filesystem::path& port)
@@ -35,10 +35,11 @@ class PluggedGlove {
   std::jthread thread_;
 };
 
-// A stream whose glove is away, its reader at work and its supervisor looking out.
-class KeptStream {
+// A stream whose glove is unplugged, with its reader running and its supervisor looking for the
+// glove.
+class SupervisedStream {
  public:
-  explicit KeptStream(const std::filesystem::path& port) {
+  explicit SupervisedStream(const std::filesystem::path& port) {
     config::StreamConfig config;
     config.name = "right";
     config.driver = "lucidgloves";
@@ -58,17 +59,17 @@ class KeptStream {
     supervisor_.emplace(*stream,
                         SupervisorPorts{.reader = reader_.get(),
                                         .clock = system::monotonic_ns,
-                                        .tell = [this](v1::Event::Kind kind, const std::string&) {
+                                        .report = [this](v1::Event::Kind kind, const std::string&) {
                                           lost += kind == v1::Event::KIND_LOST ? 1 : 0;
                                           found += kind == v1::Event::KIND_FOUND ? 1 : 0;
                                         }});
   }
-  ~KeptStream() {
+  ~SupervisedStream() {
     reader_->stop();
     reader_thread_.join();
   }
 
-  // Frames that came within ten seconds, up to `count`.
+  // Number of frames that came within ten seconds, up to `count`.
   int take_frames(int count) {
     int came = 0;
     const auto take = [&](const pipeline::Item& item) {
@@ -80,7 +81,7 @@ class KeptStream {
     }
     return came;
   }
-  // Until the reader has let the glove go, and what it had sent is gone, too.
+  // Waits until the reader has returned the glove, and discards what the glove had sent.
   void wait_for_loss(int times) {
     while (lost.load() < times) std::this_thread::sleep_for(1ms);
     while (decoded_.consume([](const pipeline::Item&) {})) {
@@ -102,20 +103,21 @@ class KeptStream {
   pipeline::Ring<pipeline::DeviceCommand> commands_{16};
   std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
   std::unique_ptr<pipeline::Reader> reader_;
-  std::optional<DeviceSupervisor> supervisor_;  // ends after the reader's thread, before the reader
+  // destroyed after the reader's thread, before the reader
+  std::optional<DeviceSupervisor> supervisor_;
   std::thread reader_thread_;
 };
 
 }  // namespace
 
-TEST_CASE("a kept glove is read each time that it comes, and calibrated anew") {
+TEST_CASE("a supervised glove is read each time it is plugged in, and calibrated again") {
   const test::TempFolder folder;
   const auto port = folder.path() / "glove";
   const auto description = lucidgloves().expect({{"port", port.string()}}).value();
   const drivers::glove::OwnedCalibration calibration{
       drivers::glove::default_calibration(lucidgloves().glove_model(description).value()).value(),
       "calibration"};
-  KeptStream kept(port);
+  SupervisedStream kept(port);
   CHECK(kept.take_frames(0) == 0);
   for (int time = 1; time <= 3; ++time) {
     {

@@ -1,5 +1,5 @@
-// Files that are none, and TOML that would overflow the parser's stack, at every place where the
-// daemon takes them: one sentence each, and nothing is waited for.
+// Paths that are not regular files, and TOML that would overflow the parser's stack, at every place
+// where the daemon reads files: each gives one error sentence, and nothing blocks.
 #include <sys/stat.h>
 
 #include <catch2/catch.hpp>
@@ -35,7 +35,7 @@ drivers::Description a_glove() {
       .value();
 }
 
-TEST_CASE("a model or calibration that is no regular file is refused at once", "[hostile]") {
+TEST_CASE("a model or calibration that is not a regular file is refused at once", "[hostile]") {
   const test::TempFolder folder;
   const auto pipe = folder.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
@@ -56,14 +56,14 @@ TEST_CASE("a model or calibration that is no regular file is refused at once", "
   }
 }
 
-TEST_CASE("a calibration that is not there is told how to make one", "[hostile]") {
+TEST_CASE("the error for a missing calibration says how to make one", "[hostile]") {
   auto config = stream_of("lucidgloves", {{"port", std::string("/dev/none")}});
   config.calibration = "/nowhere/ann.toml";
   CHECK_THAT(refusal(config), Catch::Contains("there is no such calibration; make one with `posed "
                                               "calibrate --driver lucidgloves --out ann.toml`"));
 }
 
-TEST_CASE("a calibration that is nested too deep is refused as control, config and log give it",
+TEST_CASE("a calibration that is nested too deep is refused from control, config and log",
           "[hostile]") {
   for (const std::string& bomb : test::toml_bombs()) {
     const auto refused = devices::compile_calibration(a_glove(), bomb, "ann.toml");
@@ -76,7 +76,7 @@ TEST_CASE("a calibration that is nested too deep is refused as control, config a
   }
 }
 
-TEST_CASE("a config that is nested too deep is one mistake with its line", "[hostile]") {
+TEST_CASE("a config that is nested too deep gives one error with its line", "[hostile]") {
   for (const std::string& bomb : test::toml_bombs()) {
     const auto reading =
         config::read_config("realtime = false\n" + bomb, "/nowhere/a.toml", drivers::registry());
@@ -86,8 +86,7 @@ TEST_CASE("a config that is nested too deep is one mistake with its line", "[hos
   }
 }
 
-TEST_CASE("a config with more tables than a daemon runs is one sentence, whatever their number",
-          "[hostile]") {
+TEST_CASE("a config with too many tables gives one sentence, whatever their number", "[hostile]") {
   const auto config_of = [](int streams) {
     std::string text;
     for (int i = 0; i < streams; ++i) {
@@ -106,7 +105,7 @@ TEST_CASE("a config with more tables than a daemon runs is one sentence, whateve
   CHECK_THAT(flood.errors[0].message, Catch::Contains("more than 16384 keys and values"));
 }
 
-TEST_CASE("clients, labels and mistakes are bounded in number, too", "[hostile]") {
+TEST_CASE("clients, labels and errors are limited in number, too", "[hostile]") {
   std::string clients = "[security]\nserver_key = \"\"\n";
   for (int i = 0; i < 1025; ++i) clients += "[[security.client]]\nname = \"c\"\n";
   const auto many = config::read_config(clients, "a.toml", drivers::registry());

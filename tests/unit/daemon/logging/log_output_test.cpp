@@ -1,5 +1,4 @@
-// The log's limiter by its own clock, and its output against pipes that are full, left and read
-// again.
+// The log's limiter on a test clock, and its output to pipes that are full, closed, and read again.
 #include <algorithm>
 #include <csignal>
 #include <string>
@@ -17,16 +16,16 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 
-// spdlog's default logger is the process's; another test's is put back.
-class DefaultLoggerKept {
+// spdlog's default logger is global; restores that of other tests.
+class RestoreDefaultLogger {
  public:
-  ~DefaultLoggerKept() { spdlog::set_default_logger(before_); }
+  ~RestoreDefaultLogger() { spdlog::set_default_logger(before_); }
 
  private:
   std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
 };
 
-// Until `part` has come out of the pipe; all that came.
+// Reads until `part` has come out of the pipe; returns everything that came.
 std::string read_until(const test::Pipe& pipe, const std::string& part) {
   std::string all;
   while (all.find(part) == std::string::npos) {
@@ -72,10 +71,10 @@ TEST_CASE(
   CHECK(limiter.admit(5000 * kMs, 2, "a: frame 1002"));                // quiet for a while
 }
 
-TEST_CASE("lines of ever new causes are a few a second, too") {
+TEST_CASE("lines of ever new causes are limited to a few a second, too") {
   LineLimiter limiter;
   int written = 0;
-  std::uint64_t told = 0;
+  std::uint64_t reported = 0;
   for (int i = 0; i < 10'000; ++i) {
     std::string word;
     for (int left = i; left >= 0; left = left / 26 - 1) word += static_cast<char>('a' + left % 26);
@@ -83,42 +82,43 @@ TEST_CASE("lines of ever new causes are a few a second, too") {
     written += limiter.admit(now_ns, 2, "no stream " + word) ? 1 : 0;
     while (const auto line = limiter.take_due(now_ns)) {
       CHECK(line->text.ends_with(" more lines of many kinds are left out"));
-      told += std::stoull(line->text);
+      reported += std::stoull(line->text);
     }
   }
-  while (const auto line = limiter.take_due(10'000 * kMs, true)) told += std::stoull(line->text);
+  while (const auto line = limiter.take_due(10'000 * kMs, true))
+    reported += std::stoull(line->text);
   CHECK(written <= 256 + 8 * 10);
-  CHECK(static_cast<std::uint64_t>(written) + told == 10'000);  // nothing is left out uncounted
+  CHECK(static_cast<std::uint64_t>(written) + reported == 10'000);  // every line is counted
 }
 
-TEST_CASE("who logs never waits for a pipe that is full; its reader is told what is missing") {
-  const DefaultLoggerKept kept;
+TEST_CASE("logging never waits for a full pipe, and lost lines are counted in the log") {
+  const RestoreDefaultLogger kept;
   test::Pipe pipe;
   pipe.fill();
   const LogOutput output(pipe.write_end());
   for (int i = 0; i < 5000; ++i) spdlog::info("line {}", i);
   say("posed: the end");
   const std::string log = read_until(pipe, "posed: the end\n");
-  CHECK(log.find(" lines of the log were lost here: nobody read it\n") != std::string::npos);
-  CHECK(log.find("line 4999\n") != std::string::npos);  // the newest are kept
+  CHECK(log.find(" lines of the log were discarded here: nobody read it\n") != std::string::npos);
+  CHECK(log.find("line 4999\n") != std::string::npos);  // the newest lines are kept
   CHECK(log.find("line 3000\n") == std::string::npos);
 }
 
-TEST_CASE("the output ends though nobody reads") {
-  const DefaultLoggerKept kept;
-  static test::Pipe pipe;  // the thread that is left behind may outlive the test
+TEST_CASE("the log output ends even if nobody reads it") {
+  const RestoreDefaultLogger kept;
+  static test::Pipe pipe;  // static, because the thread that is left running may outlive the test
   pipe.fill();
   {
     const LogOutput output(pipe.write_end());
     spdlog::warn("for nobody");
   }
   std::signal(SIGPIPE, SIG_IGN);
-  pipe.close_reader();  // which ends the thread that was left behind
+  pipe.close_reader();  // ends the thread that was left running
   spdlog::warn("after the end");
 }
 
-TEST_CASE("a pipe that its reader has left takes no line, and costs none that comes later") {
-  const DefaultLoggerKept kept;
+TEST_CASE("a pipe without a reader discards lines, and later lines are not lost") {
+  const RestoreDefaultLogger kept;
   std::signal(SIGPIPE, SIG_IGN);
   test::Pipe pipe;
   pipe.close_reader();
@@ -130,7 +130,7 @@ TEST_CASE("a pipe that its reader has left takes no line, and costs none that co
 }
 
 TEST_CASE("repeated lines are summed up when a command asks for it") {
-  const DefaultLoggerKept kept;
+  const RestoreDefaultLogger kept;
   test::Pipe pipe;
   {
     const LogOutput output(pipe.write_end());
@@ -146,8 +146,8 @@ TEST_CASE("repeated lines are summed up when a command asks for it") {
   CHECK(log.find("posed: first\nposed: first\n") != std::string::npos);
 }
 
-TEST_CASE("what a line names cannot act on the terminal, nor fill it") {
-  const DefaultLoggerKept kept;
+TEST_CASE("names in a line can neither control the terminal nor fill it") {
+  const RestoreDefaultLogger kept;
   test::Pipe pipe;
   {
     const LogOutput output(pipe.write_end());

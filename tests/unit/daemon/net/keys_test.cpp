@@ -28,7 +28,7 @@ TEST_CASE("keygen writes a pair that reads back, the secret half for its owner o
   CHECK(*pub == pair->public_z85);
 }
 
-TEST_CASE("keygen overwrites nothing and leaves no half pair") {
+TEST_CASE("keygen overwrites no file and never leaves only one of the two files") {
   const test::TempFolder folder;
   REQUIRE(write_new_keys("a", folder.path()));
   const auto again = write_new_keys("a", folder.path());
@@ -48,7 +48,7 @@ TEST_CASE("keygen overwrites nothing and leaves no half pair") {
   }
 }
 
-TEST_CASE("a key file is refused in one sentence when it is not what it should be") {
+TEST_CASE("an invalid key file is refused in one sentence") {
   const test::TempFolder folder;
   REQUIRE(write_new_keys("a", folder.path()));
   const auto key = folder.path() / "a.key";
@@ -67,11 +67,11 @@ TEST_CASE("a key file is refused in one sentence when it is not what it should b
         std::string(4000, '0'), std::string(40, '\0'), std::string(40, '\xff')}) {
     const auto bad = read_public_key(folder.write("bad.pub", text));
     REQUIRE_FALSE(bad);
-    CHECK(bad.error().message.find("this is no key") != std::string::npos);
+    CHECK(bad.error().message.find("this is not a key") != std::string::npos);
   }
 }
 
-TEST_CASE("loopback is what only this machine can reach") {
+TEST_CASE("loopback addresses are those that only this machine can reach") {
   for (const auto* near : {"tcp://127.0.0.1:5570", "tcp://127.0.0.1:*", "tcp://127.8.1.1:1",
                            "tcp://localhost:5", "tcp://[::1]:5", "ipc:///tmp/x", "inproc://a"}) {
     CHECK(is_loopback(near));

@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// One context as a daemon has it, with a authenticator, and another for the clients.
+// One context as a daemon has it, with an authenticator, and another for the clients.
 struct Stage {
   test::TempFolder folder;
   KeyPair server = *write_new_keys("server", folder.path());
@@ -31,12 +31,13 @@ struct Stage {
   Socket publisher = *open_socket(here.get(), ZMQ_XPUB);
   std::unique_ptr<PeerGuard> guard = *PeerGuard::open(
       here.get(), publisher.get(),
-      {.name = "test", .most_peers = 10, .most_unheard = 100'000, .most_unheard_of_all = 100'000});
+      {.name = "test", .max_peers = 10, .max_unheard = 100'000, .max_unheard_of_all = 100'000});
   Socket router = *open_socket(here.get(), ZMQ_ROUTER);
   std::string pose_endpoint, control_endpoint;
 
   Stage() {
-    REQUIRE(set_option(publisher.get(), ZMQ_XPUB_VERBOSER, 1));  // as the publisher hears them
+    // so that the publisher receives every subscription
+    REQUIRE(set_option(publisher.get(), ZMQ_XPUB_VERBOSER, 1));
     REQUIRE(secure_server(publisher.get(), Domain::kPublish, server.secret_z85));
     REQUIRE(secure_server(router.get(), Domain::kControl, server.secret_z85));
     pose_endpoint = *bind_socket(publisher.get(), "tcp://127.0.0.1:*");
@@ -64,7 +65,7 @@ struct Stage {
     return socket;
   }
 
-  // As the publisher does it: so the guard learns whose connection is whose.
+  // As the publisher does: so the guard learns which User-Id each connection has.
   void hear_subscriptions() const {
     Message message;
     while (message.receive(publisher.get())) {
@@ -74,8 +75,7 @@ struct Stage {
     }
   }
 
-  // Whether a published message reaches the subscriber within the time. Old ones are read away
-  // first.
+  // Whether a published message reaches the subscriber in time. Reads old messages first.
   [[nodiscard]] bool hears(void* subscriber, std::chrono::milliseconds within) const {
     Message message;
     while (message.receive(subscriber)) {
@@ -88,7 +88,7 @@ struct Stage {
     return false;
   }
 
-  // Whether a request reaches the control socket within the time, and under whose key.
+  // Waits for a request at the control socket; returns its User-Id.
   [[nodiscard]] std::string sender_of_request(void* dealer,
                                               std::chrono::milliseconds within) const {
     (void)send_part(dealer, "hello", false);
@@ -101,10 +101,10 @@ struct Stage {
   }
 };
 
-constexpr auto kSoon = 5000ms;  // arrives at once on any machine that is not hung
-constexpr auto kNever = 400ms;  // long enough for a handshake that should not happen
+constexpr auto kSoon = 5000ms;  // enough on any machine
+constexpr auto kNever = 400ms;  // long enough for a handshake that must not happen
 
-TEST_CASE("a key on the list gets what its rights say") {
+TEST_CASE("a listed key has the rights that the list gives it") {
   const Stage stage;
   const auto viewer = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer");
   CHECK(stage.hears(viewer.get(), kSoon));
@@ -115,7 +115,7 @@ TEST_CASE("a key on the list gets what its rights say") {
   CHECK(stage.authenticator->refused() > 0);
 }
 
-TEST_CASE("a stranger hears nothing: no key, a key not listed, a wrong server key") {
+TEST_CASE("an unknown client receives nothing: no key, a key not listed, a wrong server key") {
   const Stage stage;
   const auto keyless = stage.client(ZMQ_SUB, stage.pose_endpoint, "");
   CHECK_FALSE(stage.hears(keyless.get(), kNever));
@@ -127,7 +127,7 @@ TEST_CASE("a stranger hears nothing: no key, a key not listed, a wrong server ke
   CHECK(stage.hears(good.get(), kSoon));
 }
 
-TEST_CASE("a subscriber whose key is withdrawn is cut off, the others hear on") {
+TEST_CASE("a subscriber whose key is withdrawn is disconnected, the others are not") {
   Stage stage;
   const auto viewer = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer");
   const auto director = stage.client(ZMQ_SUB, stage.pose_endpoint, "director");
@@ -156,7 +156,7 @@ TEST_CASE("a controller whose key is withdrawn is known by the User-Id of its ne
   CHECK_FALSE(stage.authenticator->allows(user, Domain::kControl));
 }
 
-TEST_CASE("without a authenticator a secured socket lets nobody in") {
+TEST_CASE("without an authenticator a secured socket refuses every client") {
   Stage stage;
   stage.authenticator.reset();
   const auto viewer = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer");

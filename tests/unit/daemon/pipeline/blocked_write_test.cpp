@@ -1,4 +1,4 @@
-// A device whose write blocks, as hidraw's does for up to 5 s: a pipe that is full stands for it.
+// A device to which a write blocks, as with hidraw for up to 5 s; here a full pipe.
 #include <array>
 #include <string>
 #include <thread>
@@ -29,7 +29,7 @@ drivers::Connection link_to(const test::Pipe& pipe) {
   return {::dup(pipe.write_end()), "pipe", ""};
 }
 
-// A glove that takes messages, at the end of a pipe.
+// A glove that receives messages at the other end of a pipe.
 drivers::Device glove_on(const test::Pipe& pipe) {
   const drivers::Driver& driver = *drivers::find_driver("lucidgloves");
   drivers::Device device;
@@ -41,7 +41,7 @@ drivers::Device glove_on(const test::Pipe& pipe) {
 
 }  // namespace
 
-TEST_CASE("a device whose write blocks holds up no other stream") {
+TEST_CASE("a device whose write blocks delays no other stream") {
   const test::TempFolder folder;
   const auto walk = folder.path() / "walk.bvh";
   REQUIRE(clip::write_bvh(test::toy_walk(240, 120.0), walk));
@@ -71,7 +71,7 @@ TEST_CASE("a device whose write blocks holds up no other stream") {
   felt.size = 8;
   REQUIRE(commands.push(felt));
   reader->call();
-  // As the device's supervisor does it: waits for the message, then for the pipe.
+  // As the device's supervisor does: waits for the message, then for the pipe.
   std::thread supervisor([&] {
     pollfd waiting{.fd = writer.waiting_fd(), .events = POLLIN, .revents = 0};
     ::poll(&waiting, 1, -1);
@@ -87,13 +87,13 @@ TEST_CASE("a device whose write blocks holds up no other stream") {
     if (!decoded.consume(count)) std::this_thread::sleep_for(1ms);
   }
   CHECK(frames == 60);
-  CHECK(pipe.take().size() >= held);  // which ends the write
+  CHECK(pipe.take().size() >= held);  // ends the blocked write
   supervisor.join();
   reader->stop();
   reads.join();
 }
 
-TEST_CASE("of what piled up for a slow device the newest is sent, and the rest is counted") {
+TEST_CASE("of the messages that wait for a slow device the newest are sent, the rest is counted") {
   const test::Pipe pipe;
   const drivers::Device glove = glove_on(pipe);
   auto& writer = dynamic_cast<drivers::ColdWriter&>(*glove.transport);

@@ -1,5 +1,5 @@
-// A device's clock on the host's: drift, batches, wraps and restarts, against a device whose true
-// time the test knows.
+// Mapping a device's clock to the host's: drift, batches, wraps and restarts, with a device whose
+// true time the test knows.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace {
 constexpr double kRate_hz = 150.0;
 constexpr std::int64_t kBatch_ns = 8'000'000;
 
-// A glove that counts milliseconds in 16 bits on a crystal that is off, behind a USB bridge that
-// hands over every 8 ms.
+// A glove that counts milliseconds in 16 bits with an inaccurate crystal, behind a USB bridge that
+// delivers every 8 ms.
 struct Device {
   double drift_ppm = 100.0;
   std::int64_t started_ns = 123'456'789'012;  // on the host's clock
@@ -59,7 +59,7 @@ TEST_CASE("100 ppm, batches of 8 ms, a wrap of 16 bits: mapped within 1 ms after
     const std::int64_t host_ns = to_host_ns(mapping, device_ns);
     if (packet.true_ns - device.started_ns > 30 * kNanosPerSecond) {
       errors_ns.push_back(std::abs(host_ns - packet.true_ns));
-      // Between two packets host time goes on by their period, one tick of a millisecond off.
+      // From packet to packet host time advances by the period, within one tick of a millisecond.
       const auto step_ns = host_ns - last_host_ns - std::llround(1e9 / kRate_hz);
       largest_step_ns = std::max<std::int64_t>(largest_step_ns, std::abs(step_ns));
     }
@@ -73,7 +73,7 @@ TEST_CASE("100 ppm, batches of 8 ms, a wrap of 16 bits: mapped within 1 ms after
   CHECK(clock.mapping().drift_ppm == Approx(-device.drift_ppm).margin(20.0));
 }
 
-TEST_CASE("a device that restarts is mapped anew, and nonsense moves nothing") {
+TEST_CASE("a device that restarts is mapped again, and impossible times change nothing") {
   DeviceClock clock;
   std::int64_t arrival_ns = 5 * kNanosPerSecond;
   std::int64_t device_ns = 0;
@@ -87,11 +87,11 @@ TEST_CASE("a device that restarts is mapped anew, and nonsense moves nothing") {
   for (int i = 0; i < 10; ++i) clock.take(device_ns += 10'000'000, arrival_ns += 10'000'000);
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);
   CHECK(clock.jumps() == 1);
-  // Away for a minute while its time stood still.
+  // Unplugged for a minute during which its time stood still.
   arrival_ns += 60 * kNanosPerSecond;
   for (int i = 0; i < 300; ++i) clock.take(device_ns += 10'000'000, arrival_ns += 10'000'000);
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);
-  // Times at the ends of what can be said.
+  // Times at the ends of the number range.
   clock.take(std::numeric_limits<std::int64_t>::max(), arrival_ns);
   clock.take(device_ns, std::numeric_limits<std::int64_t>::min() + 1);
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);

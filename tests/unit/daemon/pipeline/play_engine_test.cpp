@@ -1,5 +1,5 @@
-// The engine with a generate stage: what its lag holds back, what silence and the end let out, and
-// what a play command does to a hand.
+// The engine with a generate stage: which frames its lag holds back, when silence and the end
+// release them, and what a play command does.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -65,7 +65,7 @@ class Hand {
     return engine->apply(command, out);
   }
 
-  // Ticks as the worker does, for so long.
+  // Calls the ticks that are due during this time, as the worker does.
   void silence(std::int64_t duration_ns) {
     const std::int64_t end_ns = now_ns + duration_ns;
     for (; now_ns < end_ns; now_ns += kMs) static_cast<void>(engine->tick(now_ns, out));
@@ -83,7 +83,7 @@ class Hand {
 
 }  // namespace
 
-TEST_CASE("frames leave as late as the lag says, under their own sequence and times") {
+TEST_CASE("frames leave after the lag, with their own sequence and times") {
   Hand hand;
   hand.frames(20);
   const Frame& last = hand.out.frames.back();
@@ -96,7 +96,7 @@ TEST_CASE("frames leave as late as the lag says, under their own sequence and ti
   }
 }
 
-TEST_CASE("silence and the end let out the frames that wait; then the stream is stale") {
+TEST_CASE("silence and the end release the frames that wait; then the stream is stale") {
   Hand hand;
   hand.frames(20);
   hand.silence(90 * kMs);
@@ -142,7 +142,7 @@ TEST_CASE("a play shows labels from the acknowledged frame on, and then the live
   CHECK(std::ranges::count(hand.out.events, v1::Event::KIND_PLAYED) == 1);
 }
 
-TEST_CASE("a performance goes on in silence, at the stream's rate") {
+TEST_CASE("a performance continues while the device is silent, at the stream's rate") {
   Hand hand;
   hand.frames(20);
   static_cast<void>(hand.play("g p"));
@@ -155,14 +155,14 @@ TEST_CASE("a performance goes on in silence, at the stream's rate") {
   CHECK(hand.engine->state() == StreamState::kStale);
 }
 
-TEST_CASE("ticks and plays decide the same frames again") {
+TEST_CASE("the recorded ticks and plays give the same frames again") {
   Hand live;
   live.frames(30);
   static_cast<void>(live.play("c 3"));
   live.frames(10);
   live.silence(700 * kMs);
   live.frames(40);
-  Hand again;  // driven by the decisions alone
+  Hand again;  // a second engine, driven by the decisions alone
   std::size_t next = 0;
   const auto decided = [&](std::uint64_t before) {
     for (; next < live.out.decisions.size(); ++next) {

@@ -28,7 +28,7 @@ TEST_CASE("a ring holds half a second and refuses when full") {
   CHECK(sum == 123);
 }
 
-TEST_CASE("no element is slept over, whoever comes second") {
+TEST_CASE("no element is missed by a consumer that falls asleep") {
   constexpr int kElements = 20'000;
   Ring<int> ring(64);
   const auto wake = EventFd::open().value();
@@ -49,7 +49,7 @@ TEST_CASE("no element is slept over, whoever comes second") {
     })) {
     }
     wake->going_to_sleep();
-    // A lost wake-up would be seen as a test that never ends.
+    // If a wake-up were missed, this test would never end.
     if (ring.empty() && last < kElements) static_cast<void>(poller->wait(kForever_ns));
     wake->awake();
   }

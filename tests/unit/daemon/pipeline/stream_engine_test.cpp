@@ -16,7 +16,7 @@ class Collected final : public EngineOut {
   void item(const Item& item) noexcept override { items.push_back(item); }
   void decision(const Decision& decision) noexcept override { decisions.push_back(decision); }
 
-  // The frames that came, and the events in order.
+  // The frames that were published.
   [[nodiscard]] std::vector<Frame> frames(Item::Kind kind = Item::Kind::kFrame) const {
     std::vector<Frame> found;
     for (const Item& item : items) {
@@ -53,7 +53,7 @@ EngineOptions plain() {
 
 }  // namespace
 
-TEST_CASE("without a style stage frames pass as they came") {
+TEST_CASE("without a style stage frames pass unchanged") {
   StreamEngine engine(plain());
   Collected out;
   CHECK(engine.state() == StreamState::kWaiting);
@@ -77,7 +77,7 @@ TEST_CASE("the raw input goes out before the styled frame") {
   CHECK(out.items[2].kind == Item::Kind::kFrame);
 }
 
-TEST_CASE("a notice of a change carries what was before and what is now") {
+TEST_CASE("the event of a change names the old and the new value") {
   const auto model = test::toy_model(1);
   const auto skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
   EngineOptions options = plain();
@@ -89,21 +89,21 @@ TEST_CASE("a notice of a change carries what was before and what is now") {
   Collected out;
   static_cast<void>(engine.apply({.kind = Command::Kind::kAlpha, .alpha = 0.5F}, out));
   REQUIRE(out.items.size() == 1);
-  StreamEvent told = out.items[0].stream_event;
-  CHECK(told.kind == v1::Event::KIND_CONTROL);
-  CHECK(told.change == Change::kAlpha);
-  CHECK(told.alpha_before == 1.0F);
-  CHECK(told.value == 0.5);
+  StreamEvent change = out.items[0].stream_event;
+  CHECK(change.kind == v1::Event::KIND_CONTROL);
+  CHECK(change.change == Change::kAlpha);
+  CHECK(change.alpha_before == 1.0F);
+  CHECK(change.value == 0.5);
   CHECK(engine.alpha_target() == 0.5F);
-  CHECK(engine.alpha() == 0.0F);  // it slides there with the frames
+  CHECK(engine.alpha() == 0.0F);  // alpha moves towards its target with the frames
   static_cast<void>(engine.apply({.kind = Command::Kind::kModel, .model = two.get()}, out));
-  told = out.items[1].stream_event;
-  CHECK(told.change == Change::kStyleModel);
-  CHECK(told.before.text() == "one.style");
-  CHECK(told.after.text() == "two.style");
+  change = out.items[1].stream_event;
+  CHECK(change.change == Change::kStyleModel);
+  CHECK(change.before.text() == "one.style");
+  CHECK(change.after.text() == "two.style");
 }
 
-TEST_CASE("a gap in the sequence is a shed, decided before the frame behind it") {
+TEST_CASE("a gap in the sequence is recorded as shed, before the frame after it") {
   StreamEngine engine(plain());
   Collected out;
   engine.on_frame(frame_at(1, 0), out);
@@ -167,7 +167,7 @@ TEST_CASE("samples keep a stream alive and pass through") {
   CHECK(engine.next_tick_ns() == 105 * kMs);
   REQUIRE(out.items.back().kind == Item::Kind::kSample);
   CHECK(out.items.back().sample.value_count == 2);
-  // Nothing to hold: only the event.
+  // There is no pose to repeat: only the event.
   CHECK(engine.tick(105 * kMs, out));
   CHECK(out.frames().empty());
 }

@@ -46,7 +46,7 @@ class Rig {
     REQUIRE(ring.push(item));
     wake->notify();
   }
-  // Takes messages until `topic` has come `count` times; false after ten seconds.
+  // Receives messages until `topic` has come `count` times; false after ten seconds.
   bool receive(const std::string& topic, int count) {
     const std::int64_t until_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
     while (seen[topic] < count && system::monotonic_ns() < until_ns) {
@@ -81,9 +81,9 @@ Item frame_item(std::uint64_t sequence) {
 
 }  // namespace
 
-TEST_CASE("each kind of item goes out under its topic") {
+TEST_CASE("each kind of item is published under its topic") {
   Rig rig;
-  REQUIRE(rig.receive("skeleton/toy", 1));  // answers the subscription
+  REQUIRE(rig.receive("skeleton/toy", 1));  // sent because of the subscription
   REQUIRE(rig.receive("skeleton/toy-raw", 1));
   Item item = frame_item(41);
   rig.put(item);
@@ -141,23 +141,24 @@ TEST_CASE("each kind of item goes out under its topic") {
   CHECK(stats.rss_bytes() > 0);
 }
 
-TEST_CASE("skipped frames are told at once, then as a sum a second, and none is left out") {
+TEST_CASE(
+    "skipped frames are reported at once, then as a sum once a second, and every one is counted") {
   constexpr std::int64_t kStep_ns = kNanosPerSecond / 100;
   ShedTally tally;
-  std::uint64_t told = 0, lines = 0;
-  for (std::uint64_t i = 0; i < 1000; ++i) {  // ten seconds; of four frames one goes out
+  std::uint64_t reported = 0, lines = 0;
+  for (std::uint64_t i = 0; i < 1000; ++i) {  // ten seconds; one frame of four is published
     tally.add(4 * i + 1, 3);
     const auto sum = tally.take(static_cast<std::int64_t>(i) * kStep_ns);
     if (!sum) continue;
-    CHECK(sum->first == told / 3 * 4 + 1);
+    CHECK(sum->first == reported / 3 * 4 + 1);
     CHECK(sum->last == 4 * i + 3);
-    told += sum->frames;
+    reported += sum->frames;
     ++lines;
   }
   CHECK(lines == 10);
   const auto rest = tally.take(999 * kStep_ns, true);
   REQUIRE(rest);
-  CHECK(told + rest->frames == 3000);
+  CHECK(reported + rest->frames == 3000);
   CHECK_FALSE(tally.take(2000 * kStep_ns, true));
 }
 
@@ -181,34 +182,34 @@ TEST_CASE("a flood of skipped frames is one event, and its sum when the stream e
   }
   CHECK(texts[0] == "9 frames, 1 to 9, were skipped: newer ones waited");
   CHECK(texts[texts.size() - 2].contains("to 499, were skipped"));
-  std::uint64_t told = 0;
+  std::uint64_t reported = 0;
   for (const std::string& text : texts) {
-    if (text.contains("skipped")) told += std::stoull(text);
+    if (text.contains("skipped")) reported += std::stoull(text);
   }
-  CHECK(told == 450);
-  CHECK(texts.size() < 50);  // three, unless the machine took seconds for this
+  CHECK(reported == 450);
+  CHECK(texts.size() < 50);  // three, unless the machine was very slow
 }
 
-TEST_CASE("a glove is away only once the reader has begun to look for it") {
+TEST_CASE("a glove counts as unplugged only after the reader has started") {
   pipeline::StreamCounters counters;
   StreamInfo info;
   info.name = "right";
   info.comes_and_goes = true;
   info.counters = &counters;
-  PublishedStream outlet(std::move(info));
+  PublishedStream published(std::move(info));
   v1::StreamStats stats;
-  outlet.report(stats, 1.0);
+  published.report(stats, 1.0);
   CHECK_FALSE(stats.away());
   counters.reader.link_ns = 7;
-  outlet.report(stats, 1.0);
+  published.report(stats, 1.0);
   CHECK(stats.away());
   CHECK(stats.link_ns() == 7);
   counters.reader.connected = true;
-  outlet.report(stats, 1.0);
+  published.report(stats, 1.0);
   CHECK_FALSE(stats.away());
 }
 
-TEST_CASE("the status is of this moment, though stats go out once a second") {
+TEST_CASE("the status is current, although stats are published once a second") {
   Rig rig;
   REQUIRE(rig.receive("stats", 1));
   rig.counters.pipeline.alpha_target = 0.5F;
@@ -235,10 +236,10 @@ TEST_CASE("the status is of this moment, though stats go out once a second") {
   CHECK(stats.stream(0).outcome_size() == kOutcomes);
 }
 
-TEST_CASE("a busy port is one sentence that names it") {
+TEST_CASE("a busy port gives one sentence that names it") {
   Rig rig;
   pipeline::Ring<Item> ring(64);
-  const net::Context other = net::open_context().value();  // as another daemon has
+  const net::Context other = net::open_context().value();  // the context of another daemon
   PublisherOptions options;
   options.context = other.get();
   options.endpoint = rig.publisher->endpoint();

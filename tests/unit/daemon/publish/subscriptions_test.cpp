@@ -10,7 +10,7 @@ bool is_walker(std::string_view prefix) {
   return std::string_view("pose/walker").starts_with(prefix);
 }
 
-TEST_CASE("what could become a topic, and what could not") {
+TEST_CASE("which prefixes could become a topic") {
   for (const char* prefix : {"", "p", "pose", "pose/", "pose/left-hand_2", "skeleton/x-raw",
                              "sensor/", "event/a", "s", "stats", "sta"}) {
     CAPTURE(prefix);
@@ -25,8 +25,7 @@ TEST_CASE("what could become a topic, and what could not") {
   CHECK_FALSE(could_become_topic("pose/" + std::string(37, 'a')));
 }
 
-TEST_CASE(
-    "topics that exist cost nothing; others are counted once each, and leave with their peer") {
+TEST_CASE("existing topics cost nothing; others are counted once each, until their peer leaves") {
   Subscriptions subscriptions(is_walker);
   CHECK(subscriptions.ask(1, "pose/walker", true, 0));
   CHECK(subscriptions.ask(1, "", true, 0));
@@ -35,34 +34,34 @@ TEST_CASE(
   CHECK(subscriptions.wanted() == 1);
   CHECK(subscriptions.ask(1, "pose/runner", false, 0));
   CHECK(subscriptions.wanted() == 1);                    // the second peer still waits for it
-  CHECK(subscriptions.ask(1, "pose/runner", false, 0));  // as if nothing were there
+  CHECK(subscriptions.ask(1, "pose/runner", false, 0));  // unsubscribing twice does no harm
   subscriptions.forget(2);
   CHECK(subscriptions.wanted() == 0);
 }
 
-TEST_CASE("there is an end to subscriptions that wait, and to those that wait in vain") {
+TEST_CASE("the subscriptions that match no topic yet, or never can, are limited") {
   Subscriptions subscriptions(is_walker);
-  for (std::size_t i = 0; i < kMostWanted; ++i) {
+  for (std::size_t i = 0; i < kMaxWanted; ++i) {
     const int peer = static_cast<int>(i % 2);
     REQUIRE(subscriptions.ask(peer, "pose/" + std::to_string(i), true, 0));
   }
   CHECK_FALSE(subscriptions.ask(3, "pose/one-more", true, 0));
   CHECK(subscriptions.ask(3, "pose/walker", true, 0));
-  for (std::size_t i = 0; i < kMostImpossible; ++i) {
+  for (std::size_t i = 0; i < kMaxImpossible; ++i) {
     REQUIRE(subscriptions.ask(4, "nonsense " + std::to_string(i), true, 0));
   }
   CHECK_FALSE(subscriptions.ask(4, "nonsense", true, 0));
   subscriptions.forget(0);
   subscriptions.forget(3);
-  CHECK(subscriptions.wanted() == kMostWanted / 2);
+  CHECK(subscriptions.wanted() == kMaxWanted / 2);
 }
 
-TEST_CASE("a peer that asks over and over has soon asked too often, and may again later") {
+TEST_CASE("a peer that subscribes too often is refused, and admitted again later") {
   Subscriptions subscriptions(is_walker);
   int asked = 0;
   while (subscriptions.ask(1, "pose/", true, 0)) REQUIRE(++asked < 10'000);
   CHECK(asked == 8192);
-  CHECK(subscriptions.ask(2, "pose/", true, 0));  // another is not meant
+  CHECK(subscriptions.ask(2, "pose/", true, 0));  // another peer is not affected
   CHECK(subscriptions.ask(1, "pose/", true, kNanosPerSecond));
 }
 

@@ -1,4 +1,5 @@
-// The recorder: everything that fitted is in the log, everything that did not is counted there.
+// The recorder: every record that fitted is in the log, and every one that did not is counted
+// there.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -44,7 +45,7 @@ log::Writer make_writer(const std::filesystem::path& path, std::uint32_t streams
   return std::move(*writer);
 }
 
-// Everything a log holds of its chunks: sequences in order, per stream.
+// The sequences of all chunks in a log, in order, by stream.
 std::vector<std::vector<std::uint64_t>> sequences(const std::filesystem::path& path) {
   auto reader = log::Reader::open(path);
   REQUIRE(reader);
@@ -81,7 +82,7 @@ void put_chunk(RecordSink& record_sink, std::uint32_t stream, std::uint64_t sequ
 
 }  // namespace
 
-TEST_CASE("what two hot threads put on the record_sink is in the log, in order, whole") {
+TEST_CASE("what two hot threads give to the record sink is complete and in order in the log") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 64}));
@@ -115,7 +116,7 @@ TEST_CASE("what two hot threads put on the record_sink is in the log, in order, 
   }
 }
 
-TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
+TEST_CASE("a full ring becomes a gap row where it happened, and is reported once") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(for_two({.chunk_bytes = 1024, .frame_bytes = 1024, .decisions = 2}));
@@ -141,7 +142,7 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is told once") {
   CHECK(lost(rows, 0, GapKind::kFrames) == 2);
 }
 
-TEST_CASE("a stream that fills its share of the rings costs its neighbour nothing") {
+TEST_CASE("a stream that fills its share of the rings does not affect another stream") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 8}));
@@ -168,8 +169,8 @@ TEST_CASE("a stream that fills its share of the rings costs its neighbour nothin
   }
 }
 
-// The pipeline decides later than the reader reads: the chunk that a lost decision concerns may be
-// in the log long before.
+// Decisions are made later than the reader reads: the chunk that a lost decision concerns may have
+// been in the log for a long time.
 TEST_CASE("the gap of a lost decision begins before the chunk that it concerns") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
@@ -179,7 +180,7 @@ TEST_CASE("the gap of a lost decision begins before the chunk that it concerns")
   log_writer.turn(kTurn_ns);
   rings.decision({.stream = 0, .item = 3, .sequence = 3});
   rings.decision({.stream = 0, .item = 5, .sequence = 5});  // does not fit
-  rings.decision({.stream = 0, .item = 7, .sequence = 7});  // nor this one
+  rings.decision({.stream = 0, .item = 7, .sequence = 7});  // does not fit either
   log_writer.turn(2 * kTurn_ns);
   rings.decision({.stream = 0, .item = 9, .sequence = 9});
   REQUIRE(log_writer.finish(3 * kTurn_ns));
@@ -189,7 +190,8 @@ TEST_CASE("the gap of a lost decision begins before the chunk that it concerns")
   CHECK(rows[0].after_chunk == 4);
 }
 
-TEST_CASE("a full disk: counted, told, and recording goes on with a gap row when there is room") {
+TEST_CASE(
+    "a full disk is counted and reported; with space again recording continues after a gap row") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(for_two({.chunk_bytes = 1 << 20, .frame_bytes = 0, .decisions = 64}));
@@ -220,7 +222,7 @@ TEST_CASE("a full disk: counted, told, and recording goes on with a gap row when
     CHECK(events.front().text.find(path.string()) != std::string::npos);
   }
   turns(400);
-  CHECK(events.size() < 16);  // retries slow down, and so does what is told
+  CHECK(events.size() < 16);  // retries slow down, and so do the events
   REQUIRE(log_writer.finish(now_ns));
   const auto found = sequences(path);
   const auto rows = gaps(path);
@@ -231,7 +233,7 @@ TEST_CASE("a full disk: counted, told, and recording goes on with a gap row when
   CHECK(lost(rows, 1, GapKind::kDecisions) > 50);
   CHECK(log_writer.lost_chunks() ==
         lost(rows, 0, GapKind::kChunks) + lost(rows, 1, GapKind::kChunks));
-  // A model that came while the disk was full is there: its bytes were kept until they were safe.
+  // A model that came while the disk was full is in the log: its bytes were kept in memory.
   const auto reader = log::Reader::open(path);
   REQUIRE(reader);
   CHECK(reader->blob(log::sha256_hex(bytes_of(model))));

@@ -1,4 +1,4 @@
-// A log's stream as a clip: the frames that were published, and what the clip lacks.
+// A log's stream as a clip: the frames that were published, and what is missing from the clip.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -55,8 +55,8 @@ bool says(const std::vector<std::string>& warnings, const std::string& text) {
       warnings, [&](const auto& warning) { return warning.find(text) != std::string::npos; });
 }
 
-// A figure with a place to stand above its hips, which move: each of `movers` has position
-// channels.
+// A skeleton whose root stays in place while the hips below it move: each joint of `movers` has
+// position channels.
 Skeleton standing_above(const std::vector<std::uint16_t>& movers) {
   Skeleton skeleton;
   for (const char* name : {"reference", "hips", "chest"}) {
@@ -95,7 +95,7 @@ TEST_CASE("a log's stream becomes a clip of its published frames") {
     const bool all = frames.size() == kFrames;
     CHECK(all == (id == 1));  // the other stream shed some
     CHECK(says(clip->warnings, "frames were skipped") == !all);
-    // As a file, to the precision of its text.
+    // Written to a file and read back, to the precision of its text.
     const auto out = folder.path() / "out.bvh";
     REQUIRE(clip::write_bvh(*clip, out));
     const auto back = clip::read_clip(out, {.metres_per_unit = 0.01});
@@ -104,7 +104,7 @@ TEST_CASE("a log's stream becomes a clip of its published frames") {
   }
 }
 
-TEST_CASE("which stream of a log is meant has to be said, and be there") {
+TEST_CASE("the stream of a log must be named if there are several, and must exist") {
   const TempFolder folder;
   const auto log = folder.path() / "take.plog";
   write_staged_log(log, 30);
@@ -144,7 +144,7 @@ TEST_CASE("the position goes to the channels that move the figure, wherever they
   }
 }
 
-TEST_CASE("what a frame lacks is held, and told") {
+TEST_CASE("values that a frame lacks keep their last value, with a warning") {
   const auto skeleton = std::make_shared<const Skeleton>(standing_above({}));
   clip::Clip clip;
   clip.skeleton = skeleton;

@@ -1,4 +1,4 @@
-// The pace of a replay: the recorded one, but for silences that nobody would sit through.
+// The pace of a replay: that of the recording, except for long silences.
 #include <catch2/catch.hpp>
 
 #include "daemon/replay/pace.hpp"
@@ -16,17 +16,18 @@ log::ChunkRow chunk_at(double at_s,
 
 }  // namespace
 
-TEST_CASE("chunks are due as they came, faster or slower by the factor") {
+TEST_CASE("chunks are due at their recorded times divided by the speed") {
   Pace half(0.5);
   CHECK(half.step(chunk_at(100.0)).due_ns == 0);
   CHECK(half.step(chunk_at(101.5)).due_ns == nanoseconds(3.0));
   CHECK(half.step(chunk_at(101.5)).due_ns == nanoseconds(3.0));
   Pace twice(2.0);
   CHECK(twice.step(chunk_at(100.0)).due_ns == 0);
-  CHECK(twice.step(chunk_at(140.0)).due_ns == nanoseconds(20.0));  // an unplugged glove: kept
+  // an unplugged glove: not skipped
+  CHECK(twice.step(chunk_at(140.0)).due_ns == nanoseconds(20.0));
 }
 
-TEST_CASE("one far time in a log is skipped and told, and the pace goes on after it") {
+TEST_CASE("a single wrong time in a log is skipped and reported, and the pace continues after it") {
   Pace pace(1.0);
   CHECK(pace.step(chunk_at(100.0)).due_ns == 0);
   const auto far = pace.step(chunk_at(1e9));
@@ -38,9 +39,9 @@ TEST_CASE("one far time in a log is skipped and told, and the pace goes on after
   CHECK(pace.step(chunk_at(100.6)).due_ns == nanoseconds(0.5));
 }
 
-// A calibration in use from the start was logged with the time 0 once: the replay of such a log
-// waited for as long as the machine had run.
-TEST_CASE("a calibration before the first chunk keeps nobody waiting") {
+// An older version logged a calibration that is in use from the start with the time 0: the replay
+// of such a log waited for as long as the machine had been running.
+TEST_CASE("a calibration before the first chunk causes no wait") {
   Pace pace(1.0);
   CHECK(pace.step(chunk_at(0.0, pipeline::Direction::kCalibration)).due_ns == 0);
   const auto first = pace.step(chunk_at(40000.0));
@@ -50,7 +51,7 @@ TEST_CASE("a calibration before the first chunk keeps nobody waiting") {
   CHECK(pace.step(chunk_at(40001.0)).due_ns == nanoseconds(1.0));
 }
 
-TEST_CASE("what was shed is known by its number, in whatever order it was told") {
+TEST_CASE("shed frames are found by number, in whatever order they were added") {
   replay::ShedRanges ranges;
   ranges.add(10, 3);
   ranges.add(1, 2);

@@ -1,7 +1,7 @@
 // Whatever happens while a daemon records, the replay of its log gives what it published, bit for
-// bit. Each seed is another run on the virtual clock: other stalls, unplugs, bursts and commands,
-// other turns of the daemon's parts. POSED_SEEDS=10000 runs that many instead of 200; POSED_SEED=n
-// runs that one alone.
+// bit. Each seed is another run on the virtual clock, with other stalls, unplugs, bursts and
+// commands, and another order of the parts' turns. POSED_SEEDS=10000 runs that many seeds instead
+// of 200; POSED_SEED=n runs only seed n.
 #include <catch2/catch.hpp>
 
 #include <cstdint>
@@ -79,7 +79,7 @@ VirtualCommand random_command(std::uint32_t stream, What what, Dice& dice) {
   return command;
 }
 
-// A run of the daemon as its seed wants it; the log is at `path`.
+// Runs the daemon as the seed determines; the log is at `path`.
 void record_run(std::uint64_t seed, const std::filesystem::path& path,
                 const record::RingSizes& record_sink = VirtualOptions{}.record_sink) {
   Dice dice(seed);
@@ -102,7 +102,7 @@ void record_run(std::uint64_t seed, const std::filesystem::path& path,
   daemon.run(kLength_s + dice.within(0.0, 2.5));
 }
 
-// The frames that were compared.
+// Returns the number of frames that were compared.
 std::uint64_t check_seed(std::uint64_t seed, const std::filesystem::path& path) {
   record_run(seed, path);
   const Replayed result = replayed(path);
@@ -131,7 +131,7 @@ std::pair<std::uint64_t, std::uint64_t> seeds(std::uint64_t part) {
 
 }  // namespace
 
-TEST_CASE("whatever happens while it is recorded, a log replays to the bit", "[property]") {
+TEST_CASE("whatever happens while it is recorded, a log replays bit for bit", "[property]") {
   const TempFolder folder;
   const auto path = folder.path() / "run.plog";
   const auto [first, last] = seeds(1);
@@ -140,9 +140,9 @@ TEST_CASE("whatever happens while it is recorded, a log replays to the bit", "[p
   WARN(last - first + 1 << " runs replayed, " << compared << " frames compared");
 }
 
-// A recorder that is held up loses chunks, decisions and frames. What its log still holds is
-// compared, what it lacks is counted, and nothing is called different that was not.
-TEST_CASE("a log with gaps replays what it holds and says what it lacks", "[property]") {
+// A recorder that is held up loses chunks, decisions and frames. What its log still contains is
+// compared, what is missing is counted, and no frame is reported as different that was equal.
+TEST_CASE("a log with gaps replays what it contains and reports what is missing", "[property]") {
   const TempFolder folder;
   const auto path = folder.path() / "gaps.plog";
   const auto [first, last] = seeds(4);
@@ -167,8 +167,8 @@ TEST_CASE("a log with gaps replays what it holds and says what it lacks", "[prop
     CHECK((sum.compared > 0 && sum.lost > 0 && sum.after_gap > 0));
 }
 
-// The decoder gives a sample before its frame. A replay that lets the sample in before the tick
-// that the silence had brought is not the live run.
+// The decoder gives a sample before its frame. A replay that passes on the sample before the tick
+// that ended the silence would differ from the live run.
 TEST_CASE("a glove that was silent, with frames waiting in the generate stage, replays") {
   for (const int lag : {0, 1, 2, 3}) {
     INFO("lag " << lag);

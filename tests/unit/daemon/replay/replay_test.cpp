@@ -1,5 +1,4 @@
-// Replay: the same log gives the same bits, those of the live run; and what a log lacks or hides is
-// said.
+// Replay: the same log gives the same bits as the live run; and what a log lacks is reported.
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -19,7 +18,7 @@ using namespace posed::test;
 
 namespace {
 
-// What is wrong with a log after `sql`, which changes it as if its writer had.
+// The difference found in a log after `sql` has changed it as if its writer had written that.
 std::string difference_after(const std::string& sql) {
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
@@ -74,13 +73,14 @@ TEST_CASE("two replays give the same bits, and those of the live run", "[replay]
   CHECK(!first.difference);
   CHECK(first.counts.compared == first.frames.size());
   CHECK(first.counts.lost + first.counts.after_gap + first.counts.past_end == 0);
-  // Raw and styled of two streams, less what was shed, and the held poses of the ticks.
+  // Raw and styled frames of two streams, without those that were shed, and with the poses repeated
+  // by ticks.
   CHECK(first.frames.size() == 4 * 120 - 2 * 5 + 4);
   CHECK(replayed(path, false).frames == first.frames);
 }
 
 TEST_CASE("the first difference is named by stream, sequence and field", "[replay]") {
-  // An alpha that was not there: the pose parts from the live one at the next frame.
+  // An alpha decision that never happened: the pose differs from the live one at the next frame.
   CHECK(has(
       difference_after("UPDATE decision SET value=" + number_value(0.75) + " WHERE name='alpha'"),
       "stream a, sequence 11, rotation_xyzw["));
@@ -92,7 +92,7 @@ TEST_CASE("the first difference is named by stream, sequence and field", "[repla
             "published live, but not replayed"));
 }
 
-TEST_CASE("a log that makes no sense is refused before anything is replayed", "[replay]") {
+TEST_CASE("an invalid log is refused before anything is replayed", "[replay]") {
   CHECK(has(difference_after("UPDATE decision SET name='beta' WHERE name='alpha'"),
             "makes no sense"));
   CHECK(has(
@@ -109,11 +109,11 @@ TEST_CASE("a log that makes no sense is refused before anything is replayed", "[
   CHECK(has(difference_after("UPDATE blob SET bytes=x'00'"), "does not match its hash"));
 }
 
-TEST_CASE("what a log lacks is counted, and nothing after it is compared", "[replay]") {
+TEST_CASE("what is missing in a log is counted, and nothing after it is compared", "[replay]") {
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
   write_staged_log(path, 60);
-  // Chunks of source 0 lost in the middle, as an overflow would leave it: those of frames 21 to 23.
+  // Removes chunks of source 0 in the middle, as an overflow would: those of frames 21 to 23.
   const std::string frame = "substr(sequences, 5, 1)";  // the lowest byte of next_frame
   forge(path,
         "INSERT INTO gap(kind,owner,after_chunk,lost,time_ns,crc)"
@@ -133,11 +133,11 @@ TEST_CASE("what a log lacks is counted, and nothing after it is compared", "[rep
   CHECK(result.counts.past_end == 0);
 }
 
-// tests/golden/replay/staged.plog: 30 frames of the staged run, recorded with --frames by a posed
-// that wrote format 1, and kept for it. staged-3.plog is the same in format 3, converted row by row
-// by a program that knew only what proto/README.md says; this test with POSED_MAKE_GOLDEN set
-// writes it anew. A new one needs its reason in the commit message.
-TEST_CASE("the golden logs' frames come again on any machine", "[replay]") {
+// tests/golden/replay/staged.plog: 30 frames of the staged run, recorded with --frames by a version
+// of posed that wrote format 1, and kept for this test. staged-3.plog is the same in format 3,
+// converted row by row by a program that knew only proto/README.md. With POSED_MAKE_GOLDEN set this
+// test writes it again. A new one needs its reason in the commit message.
+TEST_CASE("the golden logs' frames are reproduced on any machine", "[replay]") {
   const std::string name = GENERATE("replay/staged.plog", "replay/staged-3.plog");
   const auto path = golden(name);
   INFO(name);
@@ -145,7 +145,7 @@ TEST_CASE("the golden logs' frames come again on any machine", "[replay]") {
     std::filesystem::remove(path);
     write_staged_log(path, 30);
   }
-  const TempFolder dir;  // opening a log may write to it
+  const TempFolder dir;  // opening a log may write to it, so use a copy
   const auto copy = dir.path() / "staged.plog";
   std::filesystem::copy_file(path, copy);
   const Replayed result = replayed(copy, false);

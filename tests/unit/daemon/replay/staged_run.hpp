@@ -1,5 +1,6 @@
-// A live run without threads, clocks or luck: two streams through the real decoders, engines and
-// recorder, with every decision a pipeline can take: an alpha change, a model swap, a shed, ticks.
+// A reproducible live run without threads and clocks: two streams through the real decoders,
+// engines and recorder, with every kind of decision that a pipeline can make: an alpha change, a
+// model swap, a shed, ticks.
 #pragma once
 
 #include <fstream>
@@ -59,14 +60,16 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
             .style = {bytes.begin(), bytes.end()}};
   }
 
-  void set_tape(pipeline::RecordSink& record_sink) { tape_ = &record_sink; }
+  void set_record_sink(pipeline::RecordSink& record_sink) { record_sink_ = &record_sink; }
 
-  // The line of a clip, or a piece of it. A dropped chunk is decoded, but never reaches the engine.
+  // The line of a clip, or a part of it. A shed chunk is decoded, but its frame never reaches the
+  // engine.
   void feed(const std::string& line, std::int64_t arrival_ns, bool shed = false) {
     shed_ = shed;
     const auto bytes = std::as_bytes(std::span(line));
     intake_.arrived(arrival_ns);
-    tape_->chunk(id_, 0, pipeline::Direction::kFromDevice, arrival_ns, intake_.next(), bytes);
+    record_sink_->chunk(id_, 0, pipeline::Direction::kFromDevice, arrival_ns, intake_.next(),
+                        bytes);
     device_.decoder->feed(bytes, arrival_ns, intake_);
   }
 
@@ -84,7 +87,7 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
     const auto view = std::as_bytes(std::span(bytes));
     const std::string hash = log::sha256_hex(view);
     hash.copy(command.model_hash.data(), hash.size());
-    tape_->keep_model(view);
+    record_sink_->keep_model(view);
     static_cast<void>(engine_->apply(command, *this));
   }
 
@@ -109,12 +112,12 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
     const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
     if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
     const std::string bytes = (raw ? raw_ : styled_).encode(item.frame).SerializeAsString();
-    tape_->published(id_, item.frame.header.sequence, raw, std::as_bytes(std::span(bytes)));
+    record_sink_->published(id_, item.frame.header.sequence, raw, std::as_bytes(std::span(bytes)));
   }
   void decision(const pipeline::Decision& decision) noexcept override {
     pipeline::Decision placed = decision;
     placed.item = place_ != 0 ? place_ : next_item_;
-    tape_->decision(placed);
+    record_sink_->decision(placed);
   }
 
   std::uint32_t id_;
@@ -124,16 +127,16 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
   record::StreamSettings settings_;
   publish::FrameEncoder styled_, raw_;
   std::uint64_t& next_item_;
-  std::uint64_t place_ = 0;  // number of the item in the engine; 0 between two
+  std::uint64_t place_ = 0;  // number of the item in the engine; 0 between items
   pipeline::Intake intake_;
   Model model_;
   std::vector<Model> swapped_;
   std::optional<pipeline::StreamEngine> engine_;
-  pipeline::RecordSink* tape_ = nullptr;
+  pipeline::RecordSink* record_sink_ = nullptr;
   bool shed_ = false;
 };
 
-// The motion lines of a clip, each with its end of line.
+// The motion lines of a clip, each with its line end.
 inline std::vector<std::string> motion_lines(const std::filesystem::path& bvh) {
   std::ifstream file(bvh);
   std::vector<std::string> lines;
@@ -145,7 +148,7 @@ inline std::vector<std::string> motion_lines(const std::filesystem::path& bvh) {
   return lines;
 }
 
-// Writes the log of the staged run: `frames` of each stream, 60 Hz.
+// Writes the log of the staged run: `frames` frames of each stream, 60 Hz.
 inline void write_staged_log(const std::filesystem::path& path, std::size_t frames) {
   const TempFolder dir;
   const auto bvh = dir.path() / "toy.bvh";
@@ -171,14 +174,14 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
   options.clock = []() noexcept -> std::int64_t { return 1'000'000'000; };
   auto recorder = record::Recorder::open(std::move(options), std::move(rows));
   REQUIRE(recorder);
-  for (const auto& stream : streams) stream->set_tape((*recorder)->record_sink());
+  for (const auto& stream : streams) stream->set_record_sink((*recorder)->record_sink());
   std::int64_t now_ns = 5'000'000'000;
   for (std::size_t i = 0; i < frames; ++i) {
     now_ns += 16'666'667;
     if (i == frames / 6) streams[0]->set_alpha(-0.5F);
     if (i == frames / 4) streams[1]->set_model(two);
     if (i == frames / 2) {
-      streams[0]->set_model(one);  // a model that replaces itself
+      streams[0]->set_model(one);  // replaced by itself
       now_ns += 700'000'000;
       for (const auto& stream : streams) stream->tick(now_ns);
       now_ns += 1'100'000'000;
@@ -186,7 +189,7 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
     }
     const bool shed = i > 2 * frames / 3 && i < 2 * frames / 3 + 6;
     streams[0]->feed(lines[i], now_ns, shed);
-    // The other stream's lines come cut in two, and a foreign piece among them.
+    // The other stream's lines come in two parts, with foreign bytes between them.
     const std::size_t half = lines[i].size() / 2;
     streams[1]->feed(lines[i].substr(0, half), now_ns);
     streams[1]->feed(lines[i].substr(half), now_ns + 1000);

@@ -1,4 +1,4 @@
-// The clock of a recording that is replayed: what ages of its frames are measured by.
+// The clock of a recording that is replayed, with which the ages of its frames are measured.
 #include <catch2/catch.hpp>
 
 #include "daemon/replay/broadcast.hpp"
@@ -20,13 +20,13 @@ TEST_CASE("the recording's clock runs at the replay's speed from its first chunk
   CHECK(clock.now_ns() == 1'000'200);
   clock.reached(1'000'150);  // a little late: the clock never steps back
   CHECK(clock.now_ns() == 1'000'200);
-  clock.reached(1'900'000);  // what lay between was left out
+  clock.reached(1'900'000);  // the silence before it was skipped
   CHECK(clock.now_ns() == 1'900'000);
   host_ns += 50;
   CHECK(clock.now_ns() == 1'900'100);
 }
 
-TEST_CASE("as fast as possible, the recording's clock is where the replay is") {
+TEST_CASE("at full speed the recording's clock follows the replay") {
   host_ns = 0;
   TakeClock clock(0.0, 70, host);
   host_ns = 1'000'000;

@@ -1,5 +1,5 @@
-// No wake-up is missed: whatever two producers put where the consumer looks, it is woken for it.
-// Under the thread sanitizer, too; the argument for weak memory stands at EventFd.
+// No wake-up is missed: when one of two producers has added something, the consumer is woken. Also
+// runs under the thread sanitizer; for the argument for weak memory models see EventFd.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace posed::system {
 
 TEST_CASE("a consumer that sleeps is woken for each element of two producers") {
   constexpr std::uint64_t kEach = 20'000;
-  constexpr std::int64_t kPatience_ns = 10'000'000'000;  // over only when a wake-up is missed
+  constexpr std::int64_t kPatience_ns = 10'000'000'000;  // reached only if a wake-up is missed
   const auto wake = EventFd::open().value();
   const auto poller = Poller::open().value();
   REQUIRE(poller->add(*wake));
@@ -27,13 +27,13 @@ TEST_CASE("a consumer that sleeps is woken for each element of two producers") {
     for (std::uint64_t i = 1; i <= kEach; ++i) {
       mine.put.store(i, std::memory_order_release);
       wake->notify();
-      // In step with the consumer every now and then, so that it falls asleep.
+      // Waits for the consumer from time to time, so that it falls asleep.
       while (i % 4 == 0 && mine.taken.load(std::memory_order_acquire) < i) {
         std::this_thread::yield();
       }
     }
   };
-  // Whether something is there that has not been taken.
+  // Whether there are elements that have not been consumed.
   const auto more = [&] {
     return std::ranges::any_of(producers, [](const Producer& producer) {
       return producer.put.load(std::memory_order_acquire) !=
@@ -63,7 +63,7 @@ TEST_CASE("a consumer that sleeps is woken for each element of two producers") {
     }
     wake->awake();
   }
-  for (Producer& producer : producers) producer.taken.store(kEach);  // lets them end
+  for (Producer& producer : producers) producer.taken.store(kEach);  // ends the producers
   CHECK(sleeps > 0);
   CHECK(missed == 0);
   CHECK(seen == 2 * kEach);

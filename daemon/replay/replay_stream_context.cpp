@@ -1,4 +1,4 @@
-#include "daemon/replay/replay_lane.hpp"
+#include "daemon/replay/replay_stream_context.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -12,7 +12,8 @@ namespace {
 
 using Kind = pipeline::Decision::Kind;
 
-// No clock that counts from a machine's start gets there; sums of two stay within 64 bits.
+// No clock that counts from the start of a machine reaches this; sums of two such times fit 64
+// bits.
 constexpr std::int64_t kLastTime_ns = std::int64_t{1} << 61;
 
 bool possible(std::int64_t time_ns) { return time_ns >= 0 && time_ns <= kLastTime_ns; }
@@ -23,21 +24,19 @@ std::string text_of(const log::ChunkRow& chunk) {
 
 }  // namespace
 
-ReplayLane::ReplayLane(std::uint32_t lane, std::uint32_t stream_id, ReplayModels& models,
-                       LaneHost& host, std::string file)
-    : lane_(lane),
+ReplayStreamContext::ReplayStreamContext(std::uint32_t index, std::uint32_t stream_id,
+                                         ReplayModels& models, ReplayHost& host, std::string file)
+    : index_(index),
       stream_id_(stream_id),
       models_(models),
       host_(host),
       file_(std::move(file)),
-      intake_(lane, host.next_item, *this) {}
+      intake_(index, host.next_item, *this) {}
 
-Result<std::unique_ptr<ReplayLane>> ReplayLane::open(std::uint32_t lane,
-                                                     const log::SourceRow& source,
-                                                     const log::StreamRow& stream,
-                                                     ReplayModels& models, LaneHost& host,
-                                                     const std::string& file) {
-  auto self = std::make_unique<ReplayLane>(lane, stream.id, models, host, file);
+Result<std::unique_ptr<ReplayStreamContext>> ReplayStreamContext::open(
+    std::uint32_t index, const log::SourceRow& source, const log::StreamRow& stream,
+    ReplayModels& models, ReplayHost& host, const std::string& file) {
+  auto self = std::make_unique<ReplayStreamContext>(index, stream.id, models, host, file);
   self->stream_.name = stream.name;
   auto settings = record::settings_from_json(stream.stages_json, file);
   if (!settings) return std::unexpected(settings.error());
@@ -47,7 +46,7 @@ Result<std::unique_ptr<ReplayLane>> ReplayLane::open(std::uint32_t lane,
   return self;
 }
 
-Result<> ReplayLane::open_decoder(const log::SourceRow& source) {
+Result<> ReplayStreamContext::open_decoder(const log::SourceRow& source) {
   const drivers::Driver* driver = drivers::find_driver(source.driver);
   if (driver == nullptr) {
     return fail("stream " + in_quotes(stream_.name) + " comes from driver " +
@@ -64,7 +63,7 @@ Result<> ReplayLane::open_decoder(const log::SourceRow& source) {
   return {};
 }
 
-Result<> ReplayLane::open_engine() {
+Result<> ReplayStreamContext::open_engine() {
   const record::StreamSettings& settings = stream_.settings;
   const drivers::Description& device = stream_.description;
   if ((settings.style || settings.generate) && !device.skeleton) {
@@ -80,8 +79,8 @@ Result<> ReplayLane::open_engine() {
     if (!bound) return std::unexpected(bound.error());
     gesture_ = std::move(*bound);
   }
-  pipeline::EngineOptions options = pipeline::engine_options(lane_, settings, device.skeleton);
-  options.rate_hz = device.rate_hz;  // what the models are bound at
+  pipeline::EngineOptions options = pipeline::engine_options(index_, settings, device.skeleton);
+  options.rate_hz = device.rate_hz;  // the models are bound to this rate
   options.model = style_.get();
   options.gesture = gesture_.get();
   stream_.stages = pipeline::stage_names(options);
@@ -89,7 +88,7 @@ Result<> ReplayLane::open_engine() {
   return {};
 }
 
-Result<> ReplayLane::expect(const pipeline::Decision& decision) {
+Result<> ReplayStreamContext::expect(const pipeline::Decision& decision) {
   const record::StreamSettings& settings = stream_.settings;
   const std::string hash = decision.model_hash.data();
   switch (decision.kind) {
@@ -119,18 +118,18 @@ Result<> ReplayLane::expect(const pipeline::Decision& decision) {
   }
 }
 
-void ReplayLane::set_gap(std::int64_t after_chunk) {
+void ReplayStreamContext::set_gap(std::int64_t after_chunk) {
   gap_after_ = std::min(gap_after_.value_or(after_chunk), after_chunk);
 }
 
-// Frames that a stage still holds back depend on what comes next, and the last one may be repeated:
-// they are not to be trusted either.
-void ReplayLane::notice_gap(std::int64_t chunk) {
+// Frames that a stage still holds back depend on data after the gap, and the last published frame
+// may be repeated, so they are not reliable either.
+void ReplayStreamContext::apply_gap(std::int64_t chunk) {
   if (gap_after_ && !broken_at_ && chunk > *gap_after_) broken_at_ = last_out_;
 }
 
-// Formats 1 and 2 count frames only; the rest goes on by itself.
-Result<> ReplayLane::find_place(const log::ChunkRow& chunk) {
+// Formats 1 and 2 number only frames; the other numbers continue by counting.
+Result<> ReplayStreamContext::find_place(const log::ChunkRow& chunk) {
   const auto place = std::ranges::find(chunk.places, stream_id_, &log::StreamPosition::stream);
   if (place == chunk.places.end() || place->next_frame == 0 || !possible(chunk.arrival_ns)) {
     return log::damaged_row(file_, "chunk", chunk.id, "has an impossible time or place");
@@ -145,7 +144,7 @@ Result<> ReplayLane::find_place(const log::ChunkRow& chunk) {
   return {};
 }
 
-Result<> ReplayLane::feed(const log::ChunkRow& chunk) {
+Result<> ReplayStreamContext::feed(const log::ChunkRow& chunk) {
   if (auto found = find_place(chunk); !found) return found;
   switch (static_cast<pipeline::Direction>(chunk.direction)) {
     case pipeline::Direction::kFromDevice:
@@ -159,12 +158,12 @@ Result<> ReplayLane::feed(const log::ChunkRow& chunk) {
       return calibrate(text_of(chunk));
     default:
       return log::damaged_row(file_, "chunk", chunk.id,
-                              "holds what this posed does not know, or is of a newer one");
+                              "has an unknown kind, or comes from a newer posed");
   }
 }
 
-// The device came back, perhaps as another make of it; what the pipeline was bound to stays.
-Result<> ReplayLane::use_device(const std::string& info) {
+// The device came back, perhaps with other properties; what the pipeline was bound to stays.
+Result<> ReplayStreamContext::use_device(const std::string& info) {
   const drivers::Driver* driver = drivers::find_driver(stream_.description.driver);
   auto description = driver->describe(info, stream_.description.identity);
   if (!description) return std::unexpected(description.error());
@@ -177,9 +176,9 @@ Result<> ReplayLane::use_device(const std::string& info) {
   return {};
 }
 
-Result<> ReplayLane::calibrate(const std::string& toml) {
+Result<> ReplayStreamContext::calibrate(const std::string& toml) {
   drivers::Description device = device_;
-  device.identity.clear();  // whose it was, the live run has checked
+  device.identity.clear();  // the live run has checked to which device it belongs
   auto compiled = devices::compile_calibration(device, toml, "the log's calibration");
   if (!compiled) return std::unexpected(compiled.error());
   decoder_->calibrate(*(*compiled)->calibration);
@@ -187,8 +186,8 @@ Result<> ReplayLane::calibrate(const std::string& toml) {
   return {};
 }
 
-bool ReplayLane::item(pipeline::Item& item) noexcept {
-  host_.before(item, lane_);
+bool ReplayStreamContext::item(pipeline::Item& item) noexcept {
+  host_.before(item, index_);
   switch (item.kind) {
     case pipeline::Item::Kind::kSample:
       if (shed_samples_.contains(item.sample.header.sequence)) break;
@@ -204,11 +203,11 @@ bool ReplayLane::item(pipeline::Item& item) noexcept {
   return true;
 }
 
-void ReplayLane::apply(const pipeline::Decision& decision) noexcept {
+void ReplayStreamContext::apply(const pipeline::Decision& decision) noexcept {
   switch (decision.kind) {
     case Kind::kShed:
     case Kind::kShedSamples:
-      return;  // the engine decides it again when it meets the gap
+      return;  // the engine decides this again when it meets the gap
     case Kind::kTick:
       return engine_->tick_now(decision.now_ns, *this);
     case Kind::kEnd:
@@ -227,9 +226,9 @@ void ReplayLane::apply(const pipeline::Decision& decision) noexcept {
   }
 }
 
-// Where the stage of a swap is missing, it was ignored live, too. What was used before is freed
+// If the stream has no such stage, the live run ignored the swap, too. The previous model is freed
 // once it is no longer read.
-void ReplayLane::swap_style(const pipeline::Decision& decision) noexcept {
+void ReplayStreamContext::swap_style(const pipeline::Decision& decision) noexcept {
   if (!stream_.settings.style) return;
   auto bound =
       models_.style(decision.model_hash.data(), stream_.description, *stream_.settings.style);
@@ -243,7 +242,7 @@ void ReplayLane::swap_style(const pipeline::Decision& decision) noexcept {
   style_ = std::move(*bound);
 }
 
-void ReplayLane::swap_gesture(const pipeline::Decision& decision) noexcept {
+void ReplayStreamContext::swap_gesture(const pipeline::Decision& decision) noexcept {
   if (!stream_.settings.generate) return;
   auto bound = models_.gesture(decision.model_hash.data(), stream_.description);
   if (!bound) {
@@ -256,17 +255,17 @@ void ReplayLane::swap_gesture(const pipeline::Decision& decision) noexcept {
   gesture_ = std::move(*bound);
 }
 
-void ReplayLane::command(const pipeline::Command& command) noexcept {
+void ReplayStreamContext::command(const pipeline::Command& command) noexcept {
   static_cast<void>(engine_->apply(command, *this));
 }
 
-// Nothing more comes: what is missing of what was decoded last was shed.
-void ReplayLane::close_gaps() noexcept {
+// Nothing more comes: what was decoded last but never came was shed.
+void ReplayStreamContext::close_gaps() noexcept {
   const pipeline::Position next = intake_.next();
   engine_->close_gaps(next.frame - 1, next.sample - 1, *this);
 }
 
-Result<> ReplayLane::finish(bool ends) {
+Result<> ReplayStreamContext::finish(bool ends) {
   close_gaps();
   if (ends) {
     engine_->end(arrival_ns_, *this);
@@ -276,7 +275,7 @@ Result<> ReplayLane::finish(bool ends) {
   return outcome_so_far();
 }
 
-Result<> ReplayLane::outcome_so_far() {
+Result<> ReplayStreamContext::outcome_so_far() {
   if (error_) return std::unexpected(*error_);
   return {};
 }

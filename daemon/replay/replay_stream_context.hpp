@@ -1,5 +1,5 @@
-// ReplayLane: one stream of a log, computed again by what ran live: its decoder, its intake and its
-// engine. Cold.
+// ReplayStreamContext: one stream of a log. It computes the stream again with the same decoder,
+// intake and engine as the live run. Cold.
 #pragma once
 
 #include <cstdint>
@@ -22,58 +22,60 @@
 
 namespace posed::replay {
 
-// A stream as a replay's users see it.
+// A stream as the users of a replay see it.
 struct ReplayStream {
   std::string name;
   drivers::Description description;
   record::StreamSettings settings;
-  std::vector<std::string> stages{};  // in their order
+  std::vector<std::string> stages{};  // in the order in which they run
 };
 
-// What all lanes of a replay share.
-class LaneHost {
+// What all streams of a replay share.
+class ReplayHost {
  public:
-  LaneHost() = default;
-  LaneHost(const LaneHost&) = delete;
-  LaneHost& operator=(const LaneHost&) = delete;
-  virtual ~LaneHost() = default;
+  ReplayHost() = default;
+  ReplayHost(const ReplayHost&) = delete;
+  ReplayHost& operator=(const ReplayHost&) = delete;
+  virtual ~ReplayHost() = default;
 
-  // An item is about to enter the engine of a lane.
-  virtual void before(const pipeline::Item& item, std::uint32_t lane) noexcept = 0;
-  // What a lane publishes.
+  // Called before an item enters the engine of stream `index`.
+  virtual void before(const pipeline::Item& item, std::uint32_t index) noexcept = 0;
+  // Receives the items that a stream publishes.
   virtual void publish(const pipeline::Item& item) noexcept = 0;
 
-  std::uint64_t next_item = 1;  // Item::number of what comes next
+  std::uint64_t next_item = 1;  // the next Item::number
 };
 
-class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOut {
+class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline::EngineOut {
  public:
-  // Items that it publishes have `lane` as their stream. Host and models outlive it.
-  [[nodiscard]] static Result<std::unique_ptr<ReplayLane>> open(
-      std::uint32_t lane, const log::SourceRow& source, const log::StreamRow& stream,
-      ReplayModels& models, LaneHost& host, const std::string& file);
-  ReplayLane(std::uint32_t lane, std::uint32_t stream_id, ReplayModels& models, LaneHost& host,
-             std::string file);
+  // Published items have `index` as their stream. Host and models outlive the object.
+  [[nodiscard]] static Result<std::unique_ptr<ReplayStreamContext>> open(
+      std::uint32_t index, const log::SourceRow& source, const log::StreamRow& stream,
+      ReplayModels& models, ReplayHost& host, const std::string& file);
+  ReplayStreamContext(std::uint32_t index, std::uint32_t stream_id, ReplayModels& models,
+                      ReplayHost& host, std::string file);
 
-  // Before the first chunk, each decision of the stream in the log's order: tries what it needs, so
-  // that nothing can fail on the way, and remembers what never reached the engine.
+  // Before the first chunk, for each decision of the stream in the log's order: loads what the
+  // decision needs, so that nothing can fail later, and remembers which frames never reached the
+  // engine.
   [[nodiscard]] Result<> expect(const pipeline::Decision& decision);
   // The log lacks chunks or decisions after this chunk.
   void set_gap(std::int64_t after_chunk);
-  // After the last of both.
+  // Call after the last expect() and set_gap().
   void ready() {
     shed_frames_.finish();
     shed_samples_.finish();
   }
 
-  // Before the chunk of this id is fed to any lane: decisions that follow a gap of this stream may
-  // come with the chunks of another.
-  void notice_gap(std::int64_t chunk);
+  // Call before the chunk with this id is fed to any stream: if it lies behind this stream's gap,
+  // frames from here on cannot be compared. It may be a chunk of another stream, because decisions
+  // of this stream can come with it.
+  void apply_gap(std::int64_t chunk);
 
   [[nodiscard]] Result<> feed(const log::ChunkRow& chunk);
   void apply(const pipeline::Decision& decision) noexcept;
-  // After the last chunk and decision. `ends`: the log is of a format that does not say whether the
-  // stream ended.
+  // Call after the last chunk and decision. `ends`: the log has an old format that does not record
+  // whether the stream ended.
   [[nodiscard]] Result<> finish(bool ends);
 
   [[nodiscard]] const ReplayStream& stream() const noexcept { return stream_; }
@@ -95,24 +97,24 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
   // IntakeOut
   bool item(pipeline::Item& item) noexcept override;
   void outcome(Outcome) noexcept override {}
-  // EngineOut: the engine decides again what the log made it decide.
+  // EngineOut. The engine repeats the decisions that the log contains, so they are ignored here.
   void item(const pipeline::Item& item) noexcept override {
     if (item.kind == pipeline::Item::Kind::kFrame) last_out_ = item.frame.header.sequence;
     host_.publish(item);
   }
   void decision(const pipeline::Decision&) noexcept override {}
 
-  std::uint32_t lane_;
+  std::uint32_t index_;
   std::uint32_t stream_id_;  // in the log
   ReplayModels& models_;
-  LaneHost& host_;
+  ReplayHost& host_;
   std::string file_;
   ReplayStream stream_;
-  drivers::Description device_;  // as it introduced itself last
+  drivers::Description device_;  // from its latest device info
   std::unique_ptr<drivers::Decoder> decoder_;
-  std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: the device's default
-  std::unique_ptr<const style::BoundModel> style_;                // that the engine uses
-  std::unique_ptr<const generate::BoundModel> gesture_;           // the same
+  std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: use the device's default
+  std::unique_ptr<const style::BoundModel> style_;                // in use by the engine
+  std::unique_ptr<const generate::BoundModel> gesture_;           // in use by the engine
   std::set<std::string> tried_styles_, tried_gestures_;
   pipeline::Intake intake_;
   std::optional<pipeline::StreamEngine> engine_;
@@ -121,7 +123,7 @@ class ReplayLane final : private pipeline::IntakeOut, private pipeline::EngineOu
   std::uint64_t last_out_ = 0;  // sequence of the last frame that left the engine
   std::optional<std::int64_t> gap_after_;
   std::optional<std::uint64_t> broken_at_;
-  std::optional<Error> error_;  // the first that could not be returned at once
+  std::optional<Error> error_;  // the first error that could not be returned at once
 };
 
 }  // namespace posed::replay
