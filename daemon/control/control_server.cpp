@@ -119,24 +119,24 @@ bool ControlServer::take_request() {
     send({std::move(envelope), reply.SerializeAsString()});
     return true;
   }
-  if (auto answer = handler_.handle(std::move(envelope), part.bytes())) send(*answer);
+  if (auto reply = handler_.handle(std::move(envelope), part.bytes())) send(*reply);
   return true;
 }
 
 bool ControlServer::take_ack() {
-  std::optional<Reply> answer;
+  std::optional<Reply> reply;
   const bool taken =
-      ports_.acks->consume([&](const pipeline::Ack& ack) { answer = handler_.acknowledge(ack); });
-  if (answer) send(*answer);
+      ports_.acks->consume([&](const pipeline::Ack& ack) { reply = handler_.acknowledge(ack); });
+  if (reply) send(*reply);
   return taken;
 }
 
 // A ROUTER socket drops a reply that a slow or disconnected client does not accept.
-void ControlServer::send(const Reply& answer) {
-  for (const std::string& part : answer.to) {
+void ControlServer::send(const Reply& reply) {
+  for (const std::string& part : reply.to) {
     if (!net::send_part(router_.get(), part, true)) return;
   }
-  (void)net::send_part(router_.get(), answer.bytes, false);
+  (void)net::send_part(router_.get(), reply.bytes, false);
 }
 
 }  // namespace posed::control

@@ -48,7 +48,7 @@ class ControlServer {
   void sleep(long longest_ms);  // negative: until something comes
   [[nodiscard]] bool take_request();
   [[nodiscard]] bool take_ack();
-  void send(const Reply& answer);
+  void send(const Reply& reply);
 
   net::Socket router_;
   std::unique_ptr<net::PeerGuard> guard_;

@@ -70,8 +70,8 @@ Result<> RequestHandler::send_haptics(const v1::ControlRequest& request) {
   const std::string driver_name = stream.device->description()->driver;
   const drivers::Driver* driver = drivers::find_driver(driver_name);
   if (driver == nullptr || driver->encode_haptics == nullptr) {
-    return fail(fmt::format("stream {} has nothing that could be felt: driver '{}' sends only",
-                            stream.name, driver_name));
+    return fail(fmt::format("stream {} has no haptics: driver '{}' only sends data", stream.name,
+                            driver_name));
   }
   const auto haptics = read_haptics(request.haptics());
   if (!haptics) return std::unexpected(haptics.error());

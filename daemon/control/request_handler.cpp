@@ -20,14 +20,14 @@ using pipeline::Command;
 
 constexpr float kMaxAlpha = 2.0F;
 
-Reply answer(Requester to, const v1::ControlReply& reply) {
+Reply make_reply(Requester to, const v1::ControlReply& reply) {
   return {std::move(to), reply.SerializeAsString()};
 }
 
 Reply refusal(Requester to, const std::string& sentence) {
   v1::ControlReply reply;
   reply.set_error(sentence);
-  return answer(std::move(to), reply);
+  return make_reply(std::move(to), reply);
 }
 
 }  // namespace
@@ -56,7 +56,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
     case v1::ControlRequest::kModelPart: {
       const auto taken = take_model_part(request, requester);
       if (!taken) return refusal(std::move(requester), taken.error().text());
-      if (*taken) return answer(std::move(requester), reply);
+      if (*taken) return make_reply(std::move(requester), reply);
       break;
     }
     case v1::ControlRequest::kPlay:
@@ -70,14 +70,14 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       break;
     case v1::ControlRequest::kHaptics:
       done = send_haptics(request);
-      if (done) return answer(std::move(requester), reply);  // devices send no acknowledgement
+      if (done) return make_reply(std::move(requester), reply);  // devices send no acknowledgement
       break;
     case v1::ControlRequest::kStatus:
       daemon_control_.fill(*reply.mutable_status());
-      return answer(std::move(requester), reply);
+      return make_reply(std::move(requester), reply);
     case v1::ControlRequest::kStop:
       daemon_control_.stop();
-      return answer(std::move(requester), reply);
+      return make_reply(std::move(requester), reply);
     case v1::ControlRequest::REQUEST_NOT_SET:
       return refusal(std::move(requester), "the request is empty, or from a newer posed");
   }
@@ -274,7 +274,7 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   reply.set_ok(true);
   reply.set_stream(stream.name);
   reply.set_sequence(ack.sequence);
-  return answer(std::move(done.requester), reply);
+  return make_reply(std::move(done.requester), reply);
 }
 
 }  // namespace posed::control

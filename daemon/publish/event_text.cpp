@@ -56,7 +56,8 @@ std::string sentence(const StreamEvent& event) {
                          event.sequence + 1);
     }
     case v1::Event::KIND_CLOCK_JUMPED:
-      return "the device's own time jumped (did it restart?); it is mapped to the host's anew";
+      return "the device's own time jumped (did it restart?); it is mapped to the host's time "
+             "again";
     case v1::Event::KIND_PLAYING:
       return fmt::format("performs {:.0f} label{} ({}) from frame {} on, or after those that wait",
                          event.value, event.value == 1.0 ? "" : "s", words(event.after),

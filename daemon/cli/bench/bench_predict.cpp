@@ -39,7 +39,7 @@ constexpr const char* kBenchPredictFooter =
     R"(Synthetic walkers; queries from one who is not in the training set.
 hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
 frames of a 120 Hz stream. The reference sums as many floats as the process logically reads
-(N x 2D; gate rows are also held against the confidence's triangle added), with eight vector
+(N x 2D; gate rows are also compared with the confidence's triangle added), with eight vector
 accumulators; variants take turns, so that they run under the same conditions.
 
   posed bench predict

@@ -48,7 +48,7 @@ std::string config_text() {
   for (const ProfileText& text : config_texts()) {
     if (text.file != kDemoConfig) continue;
     std::string toml =
-        "# `posed demo` writes this file, and again when it learns anew: copy it "
+        "# `posed demo` writes this file, and again when it makes new models: copy it "
         "before you change it.\n" +
         std::string(text.toml);
     constexpr std::string_view kInSourceTree = "../build/demo/";
