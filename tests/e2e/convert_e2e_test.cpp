@@ -106,7 +106,7 @@ TEST_CASE("convert reports what a log lacks and wrong use") {
   const Outcome no_log =
       posed({"convert", stage.path("walk.bvh"), "--stream", "walk", "--out", stage.path("o.bvh")});
   CHECK(no_log.code == 2);
-  CHECK(has(no_log.err, "no device log"));
+  CHECK(has(no_log.err, "not a device log"));
 }
 
 }  // namespace posed::test

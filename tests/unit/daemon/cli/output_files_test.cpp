@@ -21,13 +21,13 @@ TEST_CASE("an output must not have the extension of another format") {
   const auto path = [&](const char* name) { return folder.path() / name; };
   CHECK(OutputFiles(false).writes(path("a.bvh"), {".bvh"}).check());
   CHECK(OutputFiles(false).writes(path("a.BVH"), {".bvh"}).check());
-  CHECK(refused(OutputFiles(false).writes(path("a.csv"), {".bvh"}).check(), "is .bvh"));
+  CHECK(refused(OutputFiles(false).writes(path("a.csv"), {".bvh"}).check(), "in .bvh"));
   CHECK(refused(OutputFiles(false).writes(path("a"), {".bvh", ".csv"}).check(), ".bvh or .csv"));
   // A format that is recognised by its contents may have any extension except those of other
   // formats.
   CHECK(OutputFiles(false).writes_any_but_other(path("a.model"), {".style"}).check());
   CHECK(refused(OutputFiles(false).writes_any_but_other(path("a.bvh"), {".style"}).check(),
-                "is .style"));
+                "in .style"));
 }
 
 TEST_CASE("an input is never overwritten, by whatever path it is named") {

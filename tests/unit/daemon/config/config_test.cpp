@@ -158,8 +158,7 @@ TEST_CASE("each mistake is one sentence with file and line") {
         std::string::npos);
   CHECK(complaint("[stream]\n").find("not TOML") != std::string::npos);
   CHECK(complaint("[control]\nendpoint = \"127.0.0.1:5\"\n")
-            .find(":8: '127.0.0.1:5' is no"
-                  " endpoint") != std::string::npos);
+            .find(":8: '127.0.0.1:5' is not an endpoint") != std::string::npos);
   CHECK(complaint("[control]\nendpoint = \"tcp://127.0.0.1:5570\"\n").find("cannot share") !=
         std::string::npos);
 }

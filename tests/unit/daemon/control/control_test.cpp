@@ -190,7 +190,7 @@ TEST_CASE("each refusal is a single sentence") {
   }
   CHECK(has(fixture.refused(alpha_request("\x1b[2J", 0.0F)), "'\\x1b[2J'"));
   CHECK(has(fixture.refused({}), "is empty"));
-  CHECK(has(reply_of(fixture.ask(std::string("\xff\xff\xff"))).error(), "no posed.v1"));
+  CHECK(has(reply_of(fixture.ask(std::string("\xff\xff\xff"))).error(), "not a valid posed.v1"));
 
   const std::string good = style::serialize_model(test::toy_model(1, 0.3));
   CHECK(has(fixture.refused(model_request("walker", "")), "a model file has 1 to"));

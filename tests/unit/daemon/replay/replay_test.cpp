@@ -101,7 +101,7 @@ TEST_CASE("an invalid log is refused before anything is replayed", "[replay]") {
   CHECK(has(difference_after("UPDATE source SET driver='no such'"), "which this posed does not"));
   CHECK(has(difference_after("UPDATE stream SET stages_json='{}'"), "settings"));
   CHECK(has(difference_after("UPDATE stream SET stages_json=replace(stages_json,'0.5','1e99')"),
-            "sense"));
+            "invalid"));
   CHECK(has(difference_after("UPDATE stream SET stages_json=replace(stages_json,'style','feet')"),
             "update posed"));
   CHECK(has(difference_after("UPDATE stream SET source=0"), "several bodies"));
