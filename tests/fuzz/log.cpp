@@ -224,7 +224,7 @@ class FuzzedLog {
   std::int64_t now_ns_ = 1'000'000'000;
 };
 
-void replay(const std::filesystem::path& path) {
+void replay_log(const std::filesystem::path& path) {
   auto reader = log::Reader::open(path);
   if (!reader) return;
   auto opened = replay::Replay::open(*reader);
@@ -258,7 +258,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       std::filesystem::exists("/dev/shm") ? "/dev/shm" : std::filesystem::temp_directory_path();
   static const std::filesystem::path path =
       folder / ("posed_fuzz_log_" + std::to_string(getpid()) + ".plog");
-  if (FuzzedLog(data, size, path).write()) replay(path);
+  if (FuzzedLog(data, size, path).write()) replay_log(path);
   std::error_code ignored;
   std::filesystem::remove(path, ignored);
   return 0;
