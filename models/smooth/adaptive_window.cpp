@@ -180,7 +180,7 @@ void AdaptiveWindow::speed_prior() noexcept {
     const double hand =
         hand_speeds_[static_cast<std::size_t>(to)] - hand_speeds_[static_cast<std::size_t>(from)];
     const double delta_s =
-        0.5 * (step_s_[static_cast<std::size_t>(i)] + step_s_[static_cast<std::size_t>(i + 1)]);
+        0.5 * (step_s_[static_cast<std::size_t>(i)] + step_s_[static_cast<std::size_t>(i) + 1]);
     const double curve_s3 = delta_delta_time_s3(i);
     const kernel::Spread spread{.per_s = (1.0 - kHandShare) * per_s,
                                 .hand = active > 0.0 ? kHandShare * hand * per_s / active : 0.0,
@@ -230,7 +230,7 @@ void AdaptiveWindow::solve(double period_s, InformationSource* extra) noexcept {
 // frames"). RT-safe.
 double AdaptiveWindow::delta_delta_time_s3(int index) const noexcept {
   const double before_s = step_s_[static_cast<std::size_t>(index)];
-  const double after_s = step_s_[static_cast<std::size_t>(index + 1)];
+  const double after_s = step_s_[static_cast<std::size_t>(index) + 1];
   return 2.0 * before_s * before_s * after_s * after_s / (before_s + after_s);
 }
 

@@ -236,7 +236,8 @@ void watch(const assembly::Daemon& daemon, const Turns& turns, int seconds, Watc
     watched.rss_end = system::resident_bytes();
     if (second < 10) watched.rss_10s = watched.rss_end;
   }
-  watched.pipeline_cpu_percent = static_cast<double>(pipeline_cpu_ns) * 1e-7 / ((seconds + 1) / 2);
+  const int measured_s = (seconds + 1) / 2;
+  watched.pipeline_cpu_percent = static_cast<double>(pipeline_cpu_ns) * 1e-7 / measured_s;
   for (const auto& stream : daemon.streams()) {
     const auto& counters = stream->counters;
     watched.dropped += counters.reader.dropped + counters.pipeline.dropped;
