@@ -23,7 +23,7 @@ using nlohmann::json;
 
 constexpr const char* kBenchGenerateFooter =
     R"(Three measurements in one run, with a
-model of a made-up signer unless --model names one:
+model of a synthetic signer unless --model names one:
   streaming   66 channels frame by frame, cost and error by delay, beside SPTK's mlpg over the whole
               file at the same delay (its -s S has delay S + 1)
   batch       366 frames of 45 channels at once, beside 45 calls of LAPACK's dpbsv
@@ -46,7 +46,7 @@ Result<gesture::GestureModel> synthetic_model() {
   constexpr double kRate_hz = 30.0;
   auto recording = gesture::recording_of(performance->clip, kRate_hz);
   if (!recording) return std::unexpected(recording.error());
-  if (auto cut = gesture::cut(*recording, performance->labels, "made-up labels"); !cut) {
+  if (auto cut = gesture::cut(*recording, performance->labels, "synthetic labels"); !cut) {
     return std::unexpected(cut.error());
   }
   return gesture::train_gesture({*recording}, {});
@@ -158,7 +158,7 @@ void add_bench_generate(CLI::App& bench_app, int& exit_code) {
   const auto options = std::make_shared<BenchGenerateOptions>();
   CLI::App* command = bench_app.add_subcommand("generate", "Trajectories from gesture models");
   command->footer(kBenchGenerateFooter);
-  command->add_option("--model", options->model, "A gesture model instead of the made-up one");
+  command->add_option("--model", options->model, "A gesture model instead of the synthetic one");
   command->add_option("--samples", options->samples, "Timed batch solves")
       ->check(CLI::Range(3, 1'000'000))
       ->capture_default_str();

@@ -141,7 +141,7 @@ TEST_CASE("check reports what a config would run, or everything that is wrong wi
 
 TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {
   Served served;
-  for (const char* name : {"server", "viewer", "director", "stranger", "other"}) {
+  for (const char* name : {"server", "viewer", "director", "unlisted", "other"}) {
     REQUIRE(posed({"keygen", name, "--out", served.folder.path().string()}).code == 0);
   }
   const std::string server = "[security]\nserver_key = \"server.key\"\n";
@@ -165,9 +165,9 @@ TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {
   const auto reaching = posed(as("viewer", {"ctl", "status"}));
   CHECK(reaching.code == 1);
   CHECK(has(reaching.err, "refuses this key: it is not on its list, or may not control"));
-  const auto stranger = posed(as("stranger", {"monitor", "--count", "1"}));
-  CHECK(stranger.code == 1);
-  CHECK(has(stranger.err, "refuses this key"));
+  const auto unlisted = posed(as("unlisted", {"monitor", "--count", "1"}));
+  CHECK(unlisted.code == 1);
+  CHECK(has(unlisted.err, "refuses this key"));
   const auto keyless = posed({"monitor", "--connect", served.publish, "--count", "1"});
   CHECK(keyless.code == 1);
   CHECK(has(keyless.err, "wants a key"));

@@ -74,13 +74,13 @@ TEST_CASE("a daemon that is gone is not shown as live") {
   served.start();
   Process top({"top", "--connect", served.publish});
   Process monitor({"monitor", "--connect", served.publish, "--topic", "stats"});
-  Process patient({"monitor", "--connect", served.publish, "--topic", "event", "--timeout", "4"});
+  Process waiting({"monitor", "--connect", served.publish, "--topic", "event", "--timeout", "4"});
   REQUIRE(top.line());
   REQUIRE(monitor.line());
   served.daemon->send(SIGSTOP);
   CHECK(comes_to_say(monitor, "s: the connection stands, but the daemon is stopped or stuck"));
-  CHECK(patient.exit_code() == 1);
-  CHECK(has(patient.errors(), "gave up after 4 s (--timeout)"));
+  CHECK(waiting.exit_code() == 1);
+  CHECK(has(waiting.errors(), "gave up after 4 s (--timeout)"));
   served.daemon->send(SIGCONT);
   CHECK(comes_to_say(monitor, "answers again, after "));
   served.daemon->send(SIGKILL);

@@ -16,7 +16,7 @@ namespace posed::test {
 
 inline gesture::Recording recording_of(const SyntheticHand& hand) {
   gesture::Recording recording;
-  recording.file = "made-up hand";
+  recording.file = "synthetic hand";
   recording.rate_hz = 30.0;
   recording.angles_rad = hand.angles * kDegree;
   for (std::size_t i = 0; i < hand.spans.size(); ++i) {

@@ -12,10 +12,10 @@ TEST_CASE("connections beyond the daemon's descriptor limit are cut, and cost no
   target.most_files = 64;
   target.start();
   Innocent innocent(target.publish);
-  std::vector<RawPeer> strangers;
+  std::vector<RawPeer> peers;
   for (int i = 0; i < 100; ++i) {
-    strangers.emplace_back(target.publish);
-    strangers.emplace_back(target.control);
+    peers.emplace_back(target.publish);
+    peers.emplace_back(target.control);
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   const double cpu_s = target.daemon->cpu_s();
@@ -23,10 +23,10 @@ TEST_CASE("connections beyond the daemon's descriptor limit are cut, and cost no
   CHECK(innocent.hears(60));
   const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
   const double share = (target.daemon->cpu_s() - cpu_s) / passed.count();
-  std::printf("200 strangers, 64 descriptors: cpu %.1f %%\n", 100.0 * share);
+  std::printf("200 peers, 64 descriptors: cpu %.1f %%\n", 100.0 * share);
   CHECK(share < 0.2);
   CHECK(innocent.lost == 0);
-  strangers.clear();
+  peers.clear();
   CHECK(target.ctl({"stop"}).code == 0);
 }
 

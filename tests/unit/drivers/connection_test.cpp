@@ -253,7 +253,7 @@ TEST_CASE("only peers may connect, and without peers only loopback listens") {
   const std::uint16_t port = free_port();
   const ListenSettings others{.endpoint = loopback(port), .peers = {"192.0.2.7"}};
   CHECK_FALSE(ports.accept(others));
-  const Client stranger(port);
+  const Client unknown(port);
   CHECK_FALSE(ports.accept(others));
   CHECK(ports.refused() == 1);
 }

@@ -22,7 +22,7 @@ struct Stage {
   KeyPair server = *write_new_keys("server", folder.path());
   KeyPair viewer = *write_new_keys("viewer", folder.path());
   KeyPair director = *write_new_keys("director", folder.path());
-  KeyPair stranger = *write_new_keys("stranger", folder.path());
+  KeyPair unknown = *write_new_keys("unknown", folder.path());
   KeyPair other_server = *write_new_keys("other_server", folder.path());
   Context here = *open_context();
   Context there = *open_context();
@@ -119,7 +119,7 @@ TEST_CASE("an unknown client receives nothing: no key, a key not listed, a wrong
   const Stage stage;
   const auto keyless = stage.client(ZMQ_SUB, stage.pose_endpoint, "");
   CHECK_FALSE(stage.hears(keyless.get(), kNever));
-  const auto unlisted = stage.client(ZMQ_SUB, stage.pose_endpoint, "stranger");
+  const auto unlisted = stage.client(ZMQ_SUB, stage.pose_endpoint, "unknown");
   CHECK_FALSE(stage.hears(unlisted.get(), kNever));
   const auto misled = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer", "other_server");
   CHECK_FALSE(stage.hears(misled.get(), kNever));

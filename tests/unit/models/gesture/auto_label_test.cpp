@@ -76,7 +76,7 @@ TEST_CASE("Nine of ten borders are proposed within 150 ms on real poses", "[auto
 TEST_CASE("Where people put the border is learnt from the examples", "[auto_label]") {
   const auto performance = make_performance({.gestures = 40});
   auto truth = recording_of(performance->clip, 30.0);
-  REQUIRE(cut(*truth, performance->labels, "made-up.lab").has_value());
+  REQUIRE(cut(*truth, performance->labels, "synthetic.lab").has_value());
   for (const int late :
        {0, 7}) {  // people put the border at the start or in the middle of the move
     Recording moved = *truth;

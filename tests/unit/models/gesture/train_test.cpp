@@ -19,7 +19,7 @@ Recording performed(const SignerOptions& options) {
   REQUIRE(performance.has_value());
   auto recording = recording_of(performance->clip, 30.0);
   REQUIRE(recording.has_value());
-  REQUIRE(cut(*recording, performance->labels, "made-up.lab").has_value());
+  REQUIRE(cut(*recording, performance->labels, "synthetic.lab").has_value());
   return *recording;
 }
 

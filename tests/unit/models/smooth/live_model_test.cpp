@@ -53,7 +53,7 @@ TEST_CASE("a live hand's gestures are recognised", "[live][labels]") {
           followed(noisy(hand.angles, noise_deg, 5), 30.0, with(1, noise_deg), &synthetic_model());
       score.add(told, recording_of(hand), 1);
     }
-    std::cout << "labels, made-up hand, " << noise_deg << " deg, lag 1: " << score.accuracy()
+    std::cout << "labels, synthetic hand, " << noise_deg << " deg, lag 1: " << score.accuracy()
               << " of frames right, p > 0.8 after " << score.median_delay() << " frames\n";
     CHECK(score.accuracy() >= least);
   }
