@@ -94,8 +94,9 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_state(kStateNames[static_cast<std::size_t>(pipeline.state.load())]);
   stats.set_dropped(reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
-  stats.clear_stage();
-  for (const std::string& stage : info.stages) stats.add_stage()->set_name(stage);
+  if (stats.stage().empty()) {  // else it holds the times of the last report
+    for (const std::string& stage : info.stages) stats.add_stage()->set_name(stage);
+  }
   stats.clear_outcome();
   for (const auto& outcome : reader.outcome) stats.add_outcome(outcome.load());
   stats.set_alpha(pipeline.alpha.load());

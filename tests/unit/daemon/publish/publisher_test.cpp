@@ -24,6 +24,7 @@ class Rig {
     info.description.skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
     info.description.samples = {.names = {"bend"}, .units = {"rad"}};
     info.rate_hz = 100.0;
+    info.stages = {"style"};
     info.raw = true;
     info.counters = &counters;
     PublisherOptions options;
@@ -80,6 +81,20 @@ Item frame_item(std::uint64_t sequence) {
 }
 
 }  // namespace
+
+TEST_CASE("status reports the stages by name with the times of the last second") {
+  Rig rig;
+  REQUIRE(rig.receive("stats", 1));
+  Item item = frame_item(1);
+  item.frame.stamps.decoded_ns = system::monotonic_ns();
+  item.frame.stage_us[0] = 50.0F;
+  rig.put(item);
+  REQUIRE(rig.receive("stats", 2));
+  const v1::Stats status = rig.publisher->stats();
+  REQUIRE(status.stream(0).stage_size() == 1);
+  CHECK(status.stream(0).stage(0).name() == "style");
+  CHECK(status.stream(0).stage(0).time().p50_us() == Approx(50.0).epsilon(0.2));
+}
 
 TEST_CASE("each kind of item is published under its topic") {
   Rig rig;
