@@ -30,8 +30,8 @@ double rate_of(const devices::OpenStream& stream) {
 }
 
 std::vector<std::string> stages_of(const devices::OpenStream& stream) {
-  return pipeline::stage_names(pipeline::engine_options(0, devices::stream_settings(stream),
-                                                        stream.device.description.skeleton));
+  return pipeline::stage_names(
+      pipeline::engine_options(0, stream.settings, stream.device.description.skeleton));
 }
 
 // How much of the ring to the pipeline a stream may fill: half a second of its frames and samples.
@@ -215,10 +215,8 @@ Result<> Daemon::Parts::open_engines() {
     if (!model) return std::unexpected(model.error());
     auto gesture = devices::bind_gesture(stream);
     if (!gesture) return std::unexpected(gesture.error());
-    const auto constrain = devices::bind_constrain(stream);
-    if (!constrain) return std::unexpected(constrain.error());
-    pipeline::EngineOptions engine = pipeline::engine_options(i, devices::stream_settings(stream),
-                                                              stream.device.description.skeleton);
+    pipeline::EngineOptions engine =
+        pipeline::engine_options(i, stream.settings, stream.device.description.skeleton);
     engine.model = model->get();
     engine.gesture = gesture->model.get();
     engine.clock = system::monotonic_ns;

@@ -66,24 +66,36 @@ Result<> open_slot(const drivers::Driver& driver, OpenStream& stream) {
   return {};
 }
 
-}  // namespace
+// Whether the constrain stage runs: on hands, unless the config says otherwise.
+Result<bool> wants_constrain(const OpenStream& stream) {
+  const auto& skeleton = stream.device.description.skeleton;
+  const bool hand = skeleton && hand_side(*skeleton);
+  if (stream.config.constrain.value_or(false) && !hand) {
+    return misuse("only hands (hand45) can be constrained; leave out its [stream.constrain] table");
+  }
+  return stream.config.constrain.value_or(hand);
+}
 
-pipeline::StreamSettings stream_settings(const OpenStream& stream) {
+Result<> fill_settings(OpenStream& stream) {
   const config::StreamConfig& config = stream.config;
-  pipeline::StreamSettings settings{.publish_raw = config.publish_raw,
-                                    .stale_after_s = config.stale_after_s,
-                                    .rate_hz = stream.device.description.rate_hz,
-                                    .constrain = bind_constrain(stream).value_or(false)};
+  const auto constrain = wants_constrain(stream);
+  if (!constrain) return std::unexpected(constrain.error());
+  stream.settings = {.publish_raw = config.publish_raw,
+                     .stale_after_s = config.stale_after_s,
+                     .rate_hz = stream.device.description.rate_hz,
+                     .constrain = *constrain};
   if (config.style) {
-    settings.style = config.style->filter;
-    settings.style_model.name = config.style->model.filename().string();
+    stream.settings.style = config.style->filter;
+    stream.settings.style_model.name = config.style->model.filename().string();
   }
   if (config.generate) {
-    settings.generate = config.generate->live;
-    settings.gesture_model.name = config.generate->model.filename().string();
+    stream.settings.generate = config.generate->live;
+    stream.settings.gesture_model.name = config.generate->model.filename().string();
   }
-  return settings;
+  return {};
 }
+
+}  // namespace
 
 std::unexpected<Error> of_stream(const std::string& name, Error error) {
   error.message = "stream '" + name + "': " + error.message;
@@ -101,6 +113,7 @@ Result<std::unique_ptr<OpenStream>> open_stream(const config::StreamConfig& conf
   Result<> opened = open_device(*driver, *stream);
   if (opened) opened = open_calibration(*stream);
   if (opened) opened = open_slot(*driver, *stream);
+  if (opened) opened = fill_settings(*stream);
   if (!opened) return of_stream(config.name, opened.error());
   if (config.style) {
     auto bytes = model_file::load(config.style->model);
@@ -169,18 +182,6 @@ Result<BoundGesture> bind_gesture(const OpenStream& stream) {
   if (!order) return of_stream(stream.config.name, order.error());
   bound.play = *order;
   return bound;
-}
-
-Result<bool> bind_constrain(const OpenStream& stream) {
-  const auto& skeleton = stream.device.description.skeleton;
-  const bool hand = skeleton && hand_side(*skeleton);
-  if (stream.config.constrain.value_or(false) && !hand) {
-    return of_stream(stream.config.name,
-                     misuse("only hands (hand45) can be constrained; leave out its"
-                            " [stream.constrain] table")
-                         .error());
-  }
-  return stream.config.constrain.value_or(hand);
 }
 
 }  // namespace posed::devices

@@ -22,6 +22,8 @@ namespace posed::devices {
 
 struct OpenStream {
   config::StreamConfig config;
+  // For its engine; without the hashes of its models, which only the recorder knows.
+  pipeline::StreamSettings settings;
   // Without transport and decoder if the device may be unplugged, because its supervisor opens it.
   // The description is there from the start, derived from the options.
   drivers::Device device;
@@ -55,13 +57,6 @@ struct BoundGesture {
   gesture::PlayOrder play;
 };
 [[nodiscard]] Result<BoundGesture> bind_gesture(const OpenStream& stream);
-
-// Whether the stream has a constrain stage: on a hand, unless the config disables it. Cold.
-[[nodiscard]] Result<bool> bind_constrain(const OpenStream& stream);
-
-// The settings for the stream's engine, without the hashes of its models, which only the recorder
-// knows. Cold.
-[[nodiscard]] pipeline::StreamSettings stream_settings(const OpenStream& stream);
 
 // Adds the stream's name to an error.
 [[nodiscard]] std::unexpected<Error> of_stream(const std::string& name, Error error);

@@ -87,7 +87,7 @@ RecordedStream recorded_stream(const devices::OpenStream& stream) {
                      .text = description.text,
                      .identity = description.identity,
                      .config = to_json(config.options)},
-          .settings = devices::stream_settings(stream),
+          .settings = stream.settings,
           .style = {style.begin(), style.end()},
           .gesture = {gesture.begin(), gesture.end()}};
 }

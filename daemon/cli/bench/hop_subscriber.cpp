@@ -71,10 +71,10 @@ class Noter {
     return true;
   }
 
-  [[nodiscard]] const Arrivals& noted() const { return noted_; }
+  [[nodiscard]] const ReceivedMessages& noted() const { return noted_; }
 
  private:
-  Arrivals noted_;
+  ReceivedMessages noted_;
   v1::Frame frame_;
   std::map<std::string, std::uint64_t> last_;  // sequence by stream
 };
@@ -100,7 +100,7 @@ int note_until_stopped(int from_parent, int to_parent) {
     while (noter.take(socket->get())) {
     }
   }
-  const Arrivals& noted = noter.noted();
+  const ReceivedMessages& noted = noter.noted();
   const bool sent =
       write_all(to_parent, &noted.gaps, sizeof noted.gaps) &&
       write_all(to_parent, noted.messages.data(), noted.messages.size() * sizeof(Arrival));
@@ -138,17 +138,17 @@ void HopSubscriber::begin(const std::string& pipeline_endpoint, const std::strin
   static_cast<void>(write_all(to_, lines.data(), lines.size()));
 }
 
-Result<Arrivals> HopSubscriber::finish() {
+Result<ReceivedMessages> HopSubscriber::finish() {
   close(to_);
   to_ = -1;
-  Arrivals arrivals;
-  if (!read_all(from_, &arrivals.gaps, sizeof arrivals.gaps)) {
+  ReceivedMessages received;
+  if (!read_all(from_, &received.gaps, sizeof received.gaps)) {
     return fail("the subscriber's process ended early");
   }
   for (Arrival arrival; read_all(from_, &arrival, sizeof arrival);) {
-    arrivals.messages.push_back(arrival);
+    received.messages.push_back(arrival);
   }
-  return arrivals;
+  return received;
 }
 
 }  // namespace posed::cli

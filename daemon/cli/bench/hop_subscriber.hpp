@@ -18,7 +18,7 @@ struct Arrival {
   bool bare = false;
 };
 
-struct Arrivals {
+struct ReceivedMessages {
   std::vector<Arrival> messages;
   std::uint64_t gaps = 0;  // missing sequence numbers, over all pose streams
 };
@@ -34,13 +34,13 @@ class HopSubscriber {
   // Makes the process connect to both endpoints; returns when the endpoints have been sent.
   void begin(const std::string& pipeline_endpoint, const std::string& bare_endpoint);
   // Ends the process and returns what it recorded.
-  [[nodiscard]] Result<Arrivals> finish();
+  [[nodiscard]] Result<ReceivedMessages> finish();
 
  private:
   HopSubscriber(int process, int to, int from) : process_(process), to_(to), from_(from) {}
   int process_;
   int to_;    // pipe to the child: two lines; closing it ends the child
-  int from_;  // pipe from the child: gaps, then Arrivals
+  int from_;  // pipe from the child: gaps, then ReceivedMessages
 };
 
 }  // namespace posed::cli

@@ -34,8 +34,6 @@ Result<ordered_json> try_stream(const config::StreamConfig& config) {
   if (!bound) return std::unexpected(bound.error());
   const auto gesture = devices::bind_gesture(**stream);
   if (!gesture) return std::unexpected(gesture.error());
-  const auto constrains = devices::bind_constrain(**stream);
-  if (!constrains) return std::unexpected(constrains.error());
   const drivers::Description& device = (*stream)->device.description;
   ordered_json summary{{"name", config.name},
                        {"driver", config.driver},
@@ -54,7 +52,7 @@ Result<ordered_json> try_stream(const config::StreamConfig& config) {
                                                1.0 / generate::stream_rate_hz(device.rate_hz));
     if (gesture->model) summary["gesture_model"] = gesture->model->name;
   }
-  summary["constrain"] = *constrains;
+  summary["constrain"] = (*stream)->settings.constrain;
   summary["present"] = missing->empty();
   summary["warnings"] = (*stream)->device.warnings;
   if (!missing->empty()) {
