@@ -7,12 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "drivers/emulator.hpp"
@@ -21,6 +19,7 @@
 #include "proto/frame/result.hpp"
 #include "proto/frame/sink.hpp"
 #include "proto/frame/skeleton.hpp"
+#include "proto/text/parameter.hpp"
 
 namespace posed::drivers {
 
@@ -134,15 +133,9 @@ struct Haptics {
 
 // The options that a driver accepts in its [stream.<driver>] table; the daemon's config reader
 // checks a config against this list.
-using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
-using Options = std::map<std::string, OptionValue>;
-struct OptionSpec {
-  std::string_view name;
-  OptionValue default_value;  // also fixes the type
-  bool required = false;
-  bool is_path = false;  // relative to the config file
-  std::string_view help;
-};
+using OptionValue = ParameterValue;
+using Options = Parameters;
+using OptionSpec = ParameterSpec;
 
 // One entry of the registry.
 struct Driver {

@@ -2,10 +2,17 @@
 // engine runs its stages as a list; live, offline commands and replay use the same objects.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
 
 #include "proto/frame/frame.hpp"
+#include "proto/text/short_text.hpp"
 
 namespace posed {
 
@@ -34,6 +41,44 @@ class StageOut {
   virtual void frame(const StageFrame& frame) noexcept = 0;
 };
 
+// A model bound to the skeleton and the rate of one stream; each stage with a model derives its own
+// from it. Built cold; the hot side borrows a plain pointer, and the cold side frees it.
+struct StageModel {
+  explicit StageModel(std::string file) : name(std::move(file)) {}
+  StageModel(const StageModel&) = delete;
+  StageModel& operator=(const StageModel&) = delete;
+  virtual ~StageModel() = default;
+
+  std::string name;  // of its file, for messages
+};
+
+// A live parameter, as a number; true and false are 1 and 0.
+struct ParameterState {
+  double now = 0.0;
+  double target = 0.0;  // differs from `now` while the stage changes it gradually
+};
+
+// A command to a stage, with whatever belongs to it, small enough for a ring.
+struct StageCommand {
+  std::uint16_t size = 0;
+  std::array<std::byte, 640> bytes{};
+
+  template <typename T>
+  [[nodiscard]] static StageCommand of(const T& value) noexcept {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= sizeof(bytes));
+    StageCommand command{.size = sizeof(T)};
+    std::memcpy(command.bytes.data(), &value, sizeof(T));
+    return command;
+  }
+  // What of() has put in. RT-safe.
+  template <typename T>
+  [[nodiscard]] T as() const noexcept {
+    T value{};
+    if (size == sizeof(T)) std::memcpy(&value, bytes.data(), sizeof(T));
+    return value;
+  }
+};
+
 // One stage of one stream, with all its state. It knows frame times and the times of ticks, never a
 // clock. All calls are RT-safe and come from one thread.
 class Stage {
@@ -56,6 +101,25 @@ class Stage {
   virtual void flush(StageOut& /*out*/) noexcept {}
   // Whether it emits a motion of its own, with or without input: such a stream is not silent.
   [[nodiscard]] virtual bool performs() const noexcept { return false; }
+
+  // Control. Parameters and commands are numbered as in the StageType; only live parameters are
+  // set, to values within their range. All of it applies from the next frame on: of set() and use()
+  // from the next that enters, of command() from the next that leaves.
+  virtual void set(std::size_t /*parameter*/, double /*value*/) noexcept {}
+  [[nodiscard]] virtual ParameterState state(std::size_t /*parameter*/) const noexcept {
+    return {};
+  }
+  // `model` is one that the StageType bound; it outlives its use. The one before is no longer read.
+  virtual void use(const StageModel& /*model*/) noexcept {}
+  [[nodiscard]] virtual const StageModel* model() const noexcept { return nullptr; }
+  // False: refused for now, and nothing has changed.
+  [[nodiscard]] virtual bool command(std::size_t /*index*/,
+                                     const StageCommand& /*command*/) noexcept {
+    return false;
+  }
+  // What the command does, for people: "g 1 c".
+  virtual void describe(std::size_t /*index*/, const StageCommand& /*command*/,
+                        ShortText& /*text*/) const noexcept {}
 };
 
 }  // namespace posed

@@ -29,11 +29,6 @@ double rate_of(const devices::OpenStream& stream) {
   return device.description.rate_hz > 0.0 ? device.description.rate_hz : kUnknownRate_hz;
 }
 
-std::vector<std::string> stages_of(const devices::OpenStream& stream) {
-  return pipeline::stage_names(
-      pipeline::engine_options(0, stream.settings, stream.device.description.skeleton));
-}
-
 // How much of the ring to the pipeline a stream may fill: half a second of its frames and samples.
 std::size_t decoded_slots(const devices::OpenStream& stream) {
   const drivers::Description& description = stream.device.description;
@@ -160,17 +155,12 @@ Result<> Daemon::Parts::open_sockets() {
   authenticator = std::move(*started);
   std::vector<publish::StreamInfo> infos;
   for (const auto& stream : streams) {
-    const auto& style = stream->config.style;
-    const auto& generate = stream->config.generate;
-    const std::filesystem::path model = style      ? style->model
-                                        : generate ? generate->model
-                                                   : std::filesystem::path();
     infos.push_back({.name = stream->config.name,
                      .description = stream->device.description,
                      .rate_hz = rate_of(*stream),
-                     .stages = stages_of(*stream),
+                     .stages = pipeline::stage_types_of(stream->settings),
                      .raw = stream->config.publish_raw,
-                     .model = model.filename().string(),
+                     .model = pipeline::first_model(stream->settings),
                      .comes_and_goes = stream->slot != nullptr,
                      .present = stream->present,
                      .counters = &stream->counters});
@@ -211,16 +201,12 @@ Result<> Daemon::Parts::open_engines() {
   std::vector<control::ControlledStream> controlled;
   for (std::uint32_t i = 0; i < streams.size(); ++i) {
     devices::OpenStream& stream = *streams[i];
-    auto model = devices::bind_style(stream);
-    if (!model) return std::unexpected(model.error());
-    auto gesture = devices::bind_gesture(stream);
-    if (!gesture) return std::unexpected(gesture.error());
-    pipeline::EngineOptions engine =
-        pipeline::engine_options(i, stream.settings, stream.device.description.skeleton);
-    engine.model = model->get();
-    engine.gesture = gesture->model.get();
-    engine.clock = system::monotonic_ns;
-    worker->add(engine, rate_of(stream), stream.counters, finished_slots(stream));
+    auto bound = devices::bind_stages(stream);
+    if (!bound) return std::unexpected(bound.error());
+    auto engine = devices::make_engine(i, stream, *bound);
+    if (!engine) return std::unexpected(engine.error());
+    engine->clock = system::monotonic_ns;
+    worker->add(std::move(*engine), rate_of(stream), stream.counters, finished_slots(stream));
     reader->add({.device = stream.device.transport ? &stream.device : nullptr,
                  .counters = &stream.counters,
                  .slot = stream.slot.get(),
@@ -229,19 +215,16 @@ Result<> Daemon::Parts::open_engines() {
     controlled.push_back({.name = stream.config.name,
                           .publishes_raw = stream.config.publish_raw,
                           .skeleton = stream.device.description.skeleton,
-                          .rate_hz = engine.rate_hz,
-                          .style = engine.style,
-                          .model = std::move(*model),
-                          .generates = engine.generate.has_value(),
-                          .gesture = std::move(gesture->model),
+                          .settings = stream.settings,
+                          .models = std::move(bound->models),
                           .device = stream.present,
                           .options = stream.config.options,
                           .calibration = nullptr});
-    // No client sent this command, so it has ticket 0 and no Ack follows. The ring has space for
-    // one from every stream.
-    if (gesture->play.size > 0 &&
-        !commands->push(
-            {.kind = pipeline::Command::Kind::kPlay, .stream = i, .play = gesture->play})) {
+    // No client sent these commands, so they have ticket 0 and no Ack follows. The ring has space
+    // for one from every stream.
+    for (pipeline::Command& command : bound->first_commands) {
+      command.stream = i;
+      if (commands->push(command)) continue;
       return devices::of_stream(stream.config.name,
                                 fail("too many streams perform from the start").error());
     }

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
-#include <numbers>
+#include <map>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/toml_reader.hpp"
 #include "daemon/net/keys.hpp"
-#include "models/gesture/play_order.hpp"
+#include "models/stages/registry.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/nearest_word.hpp"
@@ -22,19 +21,7 @@ using config::DaemonConfig;
 using config::SecurityConfig;
 using config::StreamConfig;
 
-constexpr Range kAlpha{-2.0, 2.0};
-constexpr Range kAlphaSlew{0.01, 1000.0};
-constexpr Range kGateFallback{0.0, 1.0};
-constexpr Range kTempo{gesture::kMinTempo, gesture::kMaxTempo};
-constexpr Range kLag_ms{0.0, smooth::kMaxLag_s * 1e3};
-constexpr Range kNoise_deg{0.0, 90.0};
 constexpr Range kStaleAfter{0.01, 3600.0};
-constexpr Range kAnyNumber{std::numeric_limits<double>::lowest(),
-                           std::numeric_limits<double>::max()};
-constexpr double kDegrees = 180.0 / std::numbers::pi;  // degrees in a radian
-// Above 60 Hz the lag is limited as a time; at no frame rate is that time longer than this many
-// frames.
-constexpr std::int64_t kMaxLagFrames = 170;
 constexpr std::array<std::string_view, 3> kIdentityKeys{"port", "id", "hand"};
 constexpr std::string_view kRawSuffix = "-raw";
 constexpr TomlLimits kLimits{
@@ -59,10 +46,12 @@ class Reader {
   void read_stream(TableReader table, StreamConfig& stream);
   void read_options(TableReader& stream_table, const drivers::Driver& driver,
                     drivers::Options& options);
-  void read_option(TableReader& table, const drivers::OptionSpec& spec,
-                   drivers::OptionValue& value);
-  void read_style(TableReader table, config::StyleConfig& style);
-  void read_generate(TableReader table, config::GenerateConfig& generate);
+  // A driver's option or a stage's parameter.
+  void read_parameter(TableReader& table, const ParameterSpec& spec, ParameterValue& value);
+  void read_stages(TableReader& table, StreamConfig& stream);
+  // Returns false if the table switches the stage off.
+  [[nodiscard]] bool read_stage(TableReader& table, StageConfig& stage);
+  [[nodiscard]] std::vector<const StageType*> read_order(TableReader& table);
   void check_names(const std::vector<StreamConfig>& streams, const std::vector<int>& lines);
 
   [[nodiscard]] std::filesystem::path resolve(const std::string& path) const {
@@ -180,14 +169,7 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
   std::string calibration;
   table.read("calibration", calibration);
   stream.calibration = resolve(calibration);
-  if (auto style = table.table("style")) read_style(*style, stream.style.emplace());
-  if (auto generate = table.table("generate")) {
-    read_generate(*generate, stream.generate.emplace());
-  }
-  if (auto constrain = table.table("constrain")) {
-    constrain->read("enabled", stream.constrain.emplace(true));
-    constrain->finish();
-  }
+  read_stages(table, stream);
   if (!stream.name.empty() && !is_stream_name(stream.name)) {
     table.add_error("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }
@@ -219,8 +201,8 @@ void Reader::read_options(TableReader& stream_table, const drivers::Driver& driv
     // stand in the driver's own table.
     const bool beside = driver.expect != nullptr &&
                         std::ranges::find(kIdentityKeys, spec.name) != kIdentityKeys.end();
-    if (beside) read_option(stream_table, spec, value);
-    if (!beside && table) read_option(*table, spec, value);
+    if (beside) read_parameter(stream_table, spec, value);
+    if (!beside && table) read_parameter(*table, spec, value);
     if (spec.required && !(beside ? stream_table.has(key) : table && table->has(key))) {
       findings_.add_error(table ? table->line() : stream_table.line(),
                           fmt::format("stream.{}.{} is missing: {}", name, key, spec.help));
@@ -230,61 +212,97 @@ void Reader::read_options(TableReader& stream_table, const drivers::Driver& driv
   if (table) table->finish();
 }
 
-void Reader::read_option(TableReader& table, const drivers::OptionSpec& spec,
-                         drivers::OptionValue& value) {
-  const std::string key(spec.name);
-  if (auto* flag = std::get_if<bool>(&value)) table.read(key.c_str(), *flag);
-  if (auto* integer = std::get_if<std::int64_t>(&value)) table.read(key.c_str(), *integer);
-  if (auto* number = std::get_if<double>(&value)) table.read(key.c_str(), *number, kAnyNumber);
-  if (auto* text = std::get_if<std::string>(&value)) {
-    table.read(key.c_str(), *text);
-    if (spec.is_path) *text = resolve(*text).string();
+void Reader::read_parameter(TableReader& table, const ParameterSpec& spec, ParameterValue& value) {
+  table.read(spec, value);
+  auto* text = std::get_if<std::string>(&value);
+  if (spec.is_path && text != nullptr) *text = resolve(*text).string();
+}
+
+// The stages of a stream: one for each of their tables, in the order of the registry or in that of
+// `stages = [...]`.
+void Reader::read_stages(TableReader& table, StreamConfig& stream) {
+  std::map<const StageType*, StageConfig> present;
+  for (const StageType* type : stage_types()) {
+    auto stage_table = table.table(std::string(type->name));
+    if (!stage_table) continue;
+    StageConfig stage{.type = type};
+    if (read_stage(*stage_table, stage)) {
+      present.emplace(type, std::move(stage));
+    } else {
+      stream.off.push_back(type);
+    }
+  }
+  stream.default_stages = !table.has("stages");
+  const std::size_t errors = findings_.errors.size();
+  std::vector<const StageType*> order = read_order(table);
+  if (findings_.errors.size() > errors) return;
+  if (stream.default_stages) order.assign(stage_types().begin(), stage_types().end());
+  for (const StageType* type : order) {
+    auto found = present.extract(type);
+    if (!found.empty()) {
+      stream.stages.push_back(std::move(found.mapped()));
+    } else if (!stream.default_stages && std::ranges::find(stream.off, type) == stream.off.end()) {
+      StageConfig stage{.type = type, .parameters = *complete_parameters(type->parameters, {})};
+      if (type->model_required) {
+        table.add_error("stages", fmt::format("stage {0} needs a model; add a [stream.{0}] table"
+                                              " with model = \"FILE\"",
+                                              type->name));
+      }
+      stream.stages.push_back(std::move(stage));
+    }
+  }
+  for (const auto& [type, stage] : present) {
+    table.add_error("stages", fmt::format("[stream.{0}] is there, but {0} is not in this list; add"
+                                          " it, or leave out its table",
+                                          type->name));
   }
 }
 
-void Reader::read_style(TableReader table, config::StyleConfig& style) {
+std::vector<const StageType*> Reader::read_order(TableReader& table) {
+  std::vector<std::string> names;
+  table.read("stages", names);
+  std::vector<const StageType*> order;
+  for (const std::string& name : names) {
+    const StageType* type = find_stage_type(name);
+    if (type == nullptr) {
+      std::string known;
+      for (const StageType* one : stage_types()) {
+        known += (known.empty() ? "" : ", ") + std::string(one->name);
+      }
+      table.add_error("stages",
+                      fmt::format("there is no stage {}; there is: {}", in_quotes(name), known));
+    } else if (std::ranges::find(order, type) != order.end()) {
+      table.add_error("stages",
+                      fmt::format("{} is in the list twice; a stream has each stage once", name));
+    } else {
+      order.push_back(type);
+    }
+  }
+  return order;
+}
+
+bool Reader::read_stage(TableReader& table, StageConfig& stage) {
+  const StageType& type = *stage.type;
+  bool enabled = true;
+  table.read("enabled", enabled);
   std::string model;
-  table.require("model", model);
-  style.model = resolve(model);
-  table.read("alpha", style.filter.alpha, kAlpha);
-  table.read("alpha_slew_per_s", style.filter.alpha_slew_per_s, kAlphaSlew);
-  table.read("gate", style.filter.gate);
-  table.read("gate_fallback", style.filter.gate_fallback, kGateFallback);
-  table.read("calibrate", style.filter.calibrate);
-  table.finish();
-}
-
-void Reader::read_generate(TableReader table, config::GenerateConfig& generate) {
-  std::int64_t lag_frames = generate.live.lag.frames;
-  double lag_ms = generate.live.lag.seconds * 1e3;
-  double noise_deg = generate.live.noise_rad * kDegrees;
-  std::string model, labels;
-  table.read("lag_frames", lag_frames);
-  if (lag_frames < 0 || lag_frames > kMaxLagFrames) {
-    table.add_error("lag_frames", fmt::format("stream.generate.lag_frames = {} is out of range: it"
-                                              " takes 0 to {} frames",
-                                              lag_frames, kMaxLagFrames));
-    lag_frames = generate.live.lag.frames;
+  if (type.model_required) {
+    table.require("model", model);
+  } else if (type.has_model()) {
+    table.read("model", model);
   }
-  table.read("lag_ms", lag_ms, kLag_ms);
-  table.read("noise_deg", noise_deg, kNoise_deg);
-  table.read("model", model);
-  table.read("labels", labels);
-  table.read("tempo", generate.tempo, kTempo);
-  table.read("loop", generate.loop);
-  generate.live = {.lag = {.frames = static_cast<int>(lag_frames), .seconds = lag_ms * 1e-3},
-                   .noise_rad = noise_deg / kDegrees};
-  generate.model = resolve(model);
-  generate.labels = gesture::split_labels(labels);
-  if (generate.labels.size() > gesture::kMostLabels) {
-    table.add_error("labels", fmt::format("{} labels are too many at once; give at most {}",
-                                          generate.labels.size(), gesture::kMostLabels));
+  stage.model = resolve(model);
+  for (const ParameterSpec& spec : type.parameters) {
+    ParameterValue value = spec.default_value;
+    read_parameter(table, spec, value);
+    stage.parameters.emplace(spec.name, std::move(value));
   }
-  if (!generate.labels.empty() && model.empty()) {
-    table.add_error("labels",
-                    "labels need a gesture model to perform them; add model = \"H.gesture\"");
+  if (type.check != nullptr) {
+    const auto fault = type.check(stage.parameters, !model.empty());
+    if (fault) table.add_error(fault->parameter, fault->sentence);
   }
   table.finish();
+  return enabled;
 }
 
 void Reader::check_names(const std::vector<StreamConfig>& streams, const std::vector<int>& lines) {
@@ -314,10 +332,8 @@ void Reader::check_names(const std::vector<StreamConfig>& streams, const std::ve
 std::set<std::string> all_keys(Drivers drivers) {
   std::string text = "[publish]\n[control]\n[security]\n[[security.client]]\n";
   for (const drivers::Driver& driver : drivers) {
-    text += fmt::format(
-        "[[stream]]\ndriver = \"{0}\"\n[stream.{0}]\n[stream.style]\n[stream.generate]\n"
-        "[stream.constrain]\n",
-        driver.name);
+    text += fmt::format("[[stream]]\ndriver = \"{0}\"\n[stream.{0}]\n", driver.name);
+    for (const StageType* stage : stage_types()) text += fmt::format("[stream.{}]\n", stage->name);
   }
   Findings findings{.file = {}, .errors = {}, .known = {}, .all_keys = {}};
   DaemonConfig ignored;

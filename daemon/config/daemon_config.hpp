@@ -4,28 +4,20 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/net/security.hpp"
 #include "drivers/driver.hpp"
-#include "models/smooth/live_options.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/stage_type.hpp"
 
 namespace posed::config {
 
-struct StyleConfig {
-  std::filesystem::path model;  // the model file
-  style::FilterOptions filter;
-};
-
-struct GenerateConfig {
-  smooth::LiveOptions live;         // lag and noise, with their defaults
-  std::filesystem::path model;      // the gesture model's file; empty: only smooth
-  std::vector<std::string> labels;  // performed from the start
-  double tempo = 1.0;
-  bool loop = false;
+// One stage of a stream, from its table.
+struct StageConfig {
+  const StageType* type = nullptr;
+  Parameters parameters{};        // complete
+  std::filesystem::path model{};  // the model's file; empty: none
 };
 
 struct StreamConfig {
@@ -35,10 +27,11 @@ struct StreamConfig {
   std::filesystem::path calibration;  // of a glove; empty: use the device's default
   bool publish_raw = false;           // publish the unstyled input too, as <name>-raw
   double stale_after_s = 0.5;         // after this long without data the stream is stale
-  std::optional<StyleConfig> style;
-  std::optional<GenerateConfig> generate;
-  // keep fingers apart and joints within their limits; default: on for hands
-  std::optional<bool> constrain;
+  // In the order in which they run. Some stages are there without a table (StageType::is_default);
+  // they are not in this list, because only the opened device says what its skeleton is.
+  std::vector<StageConfig> stages;
+  bool default_stages = true;         // false: the list is complete
+  std::vector<const StageType*> off;  // stages whose table says enabled = false
 };
 
 // Who may connect; without a server key CURVE is off.

@@ -1,7 +1,6 @@
 #include "daemon/config/toml_reader.hpp"
 
 #include <array>
-#include <cmath>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -11,23 +10,6 @@
 
 namespace posed::config {
 namespace {
-
-// The unit that the last letters of a key name, so that the error for a wrong value can state it.
-std::string unit_of(std::string_view key) {
-  constexpr std::array<std::pair<std::string_view, const char*>, 7> kUnits{{
-      {"_per_s", " per second"},
-      {"_ms", " of milliseconds"},
-      {"_s", " of seconds"},
-      {"_hz", " of hertz"},
-      {"_deg", " of degrees"},
-      {"_rad", " of radians"},
-      {"_m", " of metres"},
-  }};
-  for (const auto& [suffix, words] : kUnits) {
-    if (key.ends_with(suffix)) return words;
-  }
-  return {};
-}
 
 const char* kind_of(const toml::node& node) {
   switch (node.type()) {
@@ -112,17 +94,30 @@ void TableReader::read(const char* key, std::int64_t& value) {
 void TableReader::read(const char* key, double& value, Range range) {
   const toml::node* node = find(key);
   if (node == nullptr) return;
-  if (!node->is_number()) return add_type_error(*node, key, "a number" + unit_of(key));
+  if (!node->is_number()) return add_type_error(*node, key, "a number" + unit_words(key));
   const double number = *node->value<double>();
   if (number >= range.min && number <= range.max) {
     value = number;
     return;
   }
-  const bool bounded = std::isfinite(range.min) && std::isfinite(range.max);
-  const std::string wanted =
-      bounded ? fmt::format("from {} to {}", range.min, range.max) : std::string("finite");
-  add_error(key, fmt::format("{} = {} is out of range: it takes a number{} {}", full(key), number,
-                             unit_of(key), wanted));
+  add_error(key, out_of_range(full(key), number, range.min, range.max));
+}
+
+void TableReader::read(const ParameterSpec& spec, ParameterValue& value) {
+  const std::string key(spec.shown_name());
+  const toml::node* node = find(key);
+  if (node == nullptr) return;
+  ParameterValue given;
+  if (const auto* flag = node->as_boolean()) given = flag->get();
+  if (const auto* integer = node->as_integer()) given = integer->get();
+  if (const auto* number = node->as_floating_point()) given = number->get();
+  if (const auto* text = node->as_string()) given = text->get();
+  if (!node->is_value() || node->is_date() || node->is_time() || node->is_date_time()) {
+    return add_type_error(*node, key, "a single value");
+  }
+  auto checked = from_people(spec, given, full(key));
+  if (!checked) return add_error(key, checked.error().message);
+  value = std::move(*checked);
 }
 
 void TableReader::read(const char* key, std::string& value) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "proto/frame/result.hpp"
+#include "proto/text/parameter.hpp"
 #include "proto/text/toml.hpp"
 
 namespace posed::config {
@@ -50,6 +51,8 @@ class TableReader {
   void read(const char* key, std::int64_t& value);
   void read(const char* key, double& value, Range range);
   void read(const char* key, std::string& value);
+  // Under the name and in the unit that people use.
+  void read(const ParameterSpec& spec, ParameterValue& value);
   void read(const char* key, std::vector<std::string>& value);
   // The same, but adds an error if the key is absent.
   void require(const char* key, std::string& value);

@@ -1,27 +1,28 @@
 #include "daemon/control/request_handler.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
+#include "daemon/control/stage_requests.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
-#include "proto/model/model_file.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::control {
 namespace {
 
 using pipeline::Command;
-
-constexpr float kMaxAlpha = 2.0F;
+using pipeline::StageChange;
 
 Reply make_reply(Requester to, const v1::ControlReply& reply) {
   return {std::move(to), reply.SerializeAsString()};
+}
+
+std::unexpected<Error> of_stream(const std::string& name, Error error) {
+  error.message = "stream " + name + ": " + error.message;
+  return std::unexpected(std::move(error));
 }
 
 Reply refusal(Requester to, const std::string& sentence) {
@@ -50,8 +51,11 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   v1::ControlReply reply;
   reply.set_ok(true);
   switch (request.request_case()) {
-    case v1::ControlRequest::kSetAlpha:
-      done = set_alpha(request, requester);
+    case v1::ControlRequest::kSetParameter:
+      done = set_parameter(request, requester);
+      break;
+    case v1::ControlRequest::kStageCommand:
+      done = stage_command(request, requester);
       break;
     case v1::ControlRequest::kModelPart: {
       const auto taken = take_model_part(request, requester);
@@ -59,12 +63,6 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       if (*taken) return make_reply(std::move(requester), reply);
       break;
     }
-    case v1::ControlRequest::kPlay:
-      done = play(request, requester);
-      break;
-    case v1::ControlRequest::kStopPlaying:
-      done = stop_playing(request, requester);
-      break;
     case v1::ControlRequest::kCalibrate:
       done = calibrate(request, requester);
       break;
@@ -101,40 +99,28 @@ Result<std::uint32_t> RequestHandler::find_stream(const std::string& name) const
   return fail(fmt::format("there is no stream {}; there is: {}", in_quotes(name), names));
 }
 
-Result<std::uint32_t> RequestHandler::styled_stream(const std::string& name) const {
-  const auto stream = find_stream(name);
-  if (!stream || streams_[*stream].style) return stream;
-  return fail(fmt::format(
-      "stream {} has no style; give it a [stream.style] table in the config and start again",
-      name));
-}
-
-Result<std::uint32_t> RequestHandler::playing_stream(const std::string& name) const {
-  const auto stream = find_stream(name);
-  if (!stream) return stream;
-  if (!streams_[*stream].generates) {
-    return fail(fmt::format(
-        "stream {} performs no gestures; give it a [stream.generate] table in the config and"
-        " start again",
-        name));
-  }
-  if (coming_gesture(*stream) == nullptr) {
-    return fail(
-        fmt::format("stream {} has no gesture model; send one with `posed ctl model {} H.gesture`",
-                    name, name));
-  }
-  return stream;
-}
-
-Result<> RequestHandler::set_alpha(const v1::ControlRequest& request, const Requester& requester) {
-  const auto& wanted = request.set_alpha();
-  const auto stream = styled_stream(wanted.stream());
+Result<> RequestHandler::set_parameter(const v1::ControlRequest& request,
+                                       const Requester& requester) {
+  const auto& wanted = request.set_parameter();
+  const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
-  if (!(std::abs(wanted.alpha()) <= kMaxAlpha)) {
-    return fail(fmt::format("alpha {} is out of range; it goes from -2 to 2", wanted.alpha()));
-  }
-  Command command{.kind = Command::Kind::kAlpha, .stream = *stream, .alpha = wanted.alpha()};
-  return send(command, {.requester = requester});
+  const auto change = parameter_change(streams_[*stream].settings, wanted);
+  if (!change) return of_stream(wanted.stream(), change.error());
+  return send({.change = *change, .stream = *stream}, {.requester = requester});
+}
+
+Result<> RequestHandler::stage_command(const v1::ControlRequest& request,
+                                       const Requester& requester) {
+  const auto& wanted = request.stage_command();
+  const auto stream = find_stream(wanted.stream());
+  if (!stream) return std::unexpected(stream.error());
+  const auto found = find_command(streams_[*stream].settings, wanted.name());
+  if (!found) return of_stream(wanted.stream(), found.error());
+  const StageCommandType& type = found->change.type->commands[found->change.index];
+  const auto command = encode_command(type, coming_model(*stream, found->stage), wanted);
+  if (!command) return of_stream(wanted.stream(), command.error());
+  return send({.change = found->change, .stream = *stream, .command = *command},
+              {.requester = requester, .stage = found->stage, .refusal = type.refusal});
 }
 
 Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
@@ -158,81 +144,35 @@ Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
   return false;
 }
 
-// The file itself says which kind of model it is.
-Result<> RequestHandler::set_model(const std::string& stream, std::span<const std::byte> bytes,
+// The file itself says for which stage it is.
+Result<> RequestHandler::set_model(const std::string& stream_name, std::span<const std::byte> bytes,
                                    const std::string& name, const Requester& requester) {
-  const auto index = find_stream(stream);
+  const auto index = find_stream(stream_name);
   if (!index) return std::unexpected(index.error());
-  const auto file = model_file::open(bytes, name);
-  if (!file) return std::unexpected(file.error());
-  return file->has_gesture() ? set_gesture_model(*index, bytes, name, requester)
-                             : set_style_model(*index, bytes, name, requester);
-}
-
-Result<> RequestHandler::set_style_model(std::uint32_t index, std::span<const std::byte> bytes,
-                                         const std::string& name, const Requester& requester) {
-  const ControlledStream& stream = streams_[index];
-  if (auto styled = styled_stream(stream.name); !styled) return std::unexpected(styled.error());
-  const auto model = style::parse_model(bytes, name);
-  if (!model) return std::unexpected(model.error());
+  const ControlledStream& stream = streams_[*index];
+  const auto stage = stage_for_model(stream.settings, bytes, name);
+  if (!stage) return of_stream(stream.name, stage.error());
   if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
-  auto bound = style::bind_model(*model, *stream.skeleton, *stream.style, name);
+  const StageType& type = *stream.settings.stages[*stage].type;
+  auto bound = type.bind_model(
+      bytes, pipeline::stage_context(stream.settings, *stage, stream.skeleton), name);
   if (!bound) return std::unexpected(bound.error());
-  Command command{.kind = Command::Kind::kModel, .stream = index, .model = bound->get()};
-  keep_model(bytes, command);
-  return send(command, {.requester = requester, .model = std::move(*bound)});
-}
-
-Result<> RequestHandler::set_gesture_model(std::uint32_t index, std::span<const std::byte> bytes,
-                                           const std::string& name, const Requester& requester) {
-  const ControlledStream& stream = streams_[index];
-  if (!stream.generates) {
-    return fail(fmt::format(
-        "{} is a gesture model, and stream {} has no use for it; give it a [stream.generate]"
-        " table in the config and start again",
-        name, stream.name));
-  }
-  auto model = gesture::parse_model(bytes, name);
-  if (!model) return std::unexpected(model.error());
-  auto bound = generate::bind_model(std::move(*model), *stream.skeleton, stream.rate_hz, name);
-  if (!bound) return std::unexpected(bound.error());
-  Command command{.kind = Command::Kind::kGesture, .stream = index, .gesture = bound->get()};
-  keep_model(bytes, command);
-  return send(command, {.requester = requester, .gesture = std::move(*bound)});
-}
-
-void RequestHandler::keep_model(std::span<const std::byte> bytes, Command& command) {
+  Command command{.change = {.kind = StageChange::Kind::kModel, .type = &type},
+                  .stream = *index,
+                  .model = bound->get()};
   const std::string hash = log::sha256_hex(bytes);
   std::copy_n(hash.begin(), std::min(hash.size(), command.model_hash.size() - 1),
               command.model_hash.begin());
   daemon_control_.keep_model(bytes);
+  return send(command, {.requester = requester, .stage = *stage, .model = std::move(*bound)});
 }
 
-Result<> RequestHandler::play(const v1::ControlRequest& request, const Requester& requester) {
-  const auto& wanted = request.play();
-  const auto stream = playing_stream(wanted.stream());
-  if (!stream) return std::unexpected(stream.error());
-  const std::vector<std::string> names(wanted.label().begin(), wanted.label().end());
-  const auto order =
-      gesture::make_play_order(coming_gesture(*stream)->gesture(), names,
-                               wanted.tempo() == 0.0F ? 1.0 : wanted.tempo(), wanted.loop());
-  if (!order) return std::unexpected(order.error());
-  return send({.kind = Command::Kind::kPlay, .stream = *stream, .play = *order},
-              {.requester = requester});
-}
-
-Result<> RequestHandler::stop_playing(const v1::ControlRequest& request,
-                                      const Requester& requester) {
-  const auto stream = playing_stream(request.stop_playing().stream());
-  if (!stream) return std::unexpected(stream.error());
-  return send({.kind = Command::Kind::kStopPlaying, .stream = *stream}, {.requester = requester});
-}
-
-const generate::BoundModel* RequestHandler::coming_gesture(std::uint32_t stream) const {
+const StageModel* RequestHandler::coming_model(std::uint32_t stream, std::size_t stage) const {
   for (auto it = under_way_.rbegin(); it != under_way_.rend(); ++it) {
-    if (it->second.stream == stream && it->second.gesture) return it->second.gesture.get();
+    const UnderWay& change = it->second;
+    if (change.stream == stream && change.stage == stage && change.model) return change.model.get();
   }
-  return streams_[stream].gesture.get();
+  return streams_[stream].models[stage].get();
 }
 
 Result<> RequestHandler::send(Command command, UnderWay under_way) {
@@ -252,23 +192,19 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   under_way_.erase(found);
   ControlledStream& stream = streams_[ack.stream];
   if (done.model) {
-    stream.model = std::move(done.model);  // frees the model that it replaces
-    daemon_control_.model_in_use(ack.stream, stream.model->name);
+    auto& settings = stream.settings.stages[done.stage];
+    settings.model_name = done.model->name;
+    stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
+    daemon_control_.model_in_use(ack.stream, pipeline::first_model(stream.settings));
   }
   if (done.calibration) {
     stream.calibration = std::move(done.calibration);
     stream.device->calibrated(
         {.toml = stream.calibration->text, .file = "the calibration sent last"});
   }
-  if (done.gesture) {
-    stream.gesture = std::move(done.gesture);
-    if (!stream.style) daemon_control_.model_in_use(ack.stream, stream.gesture->name);
-  }
   if (ack.refused) {
-    return refusal(std::move(done.requester), "too many labels wait already on " + stream.name +
-                                                  "; try again later, or stop them with"
-                                                  " `posed ctl stop-playing " +
-                                                  stream.name + "`");
+    return refusal(std::move(done.requester),
+                   fmt::format("stream {}: {}", stream.name, done.refusal));
   }
   v1::ControlReply reply;
   reply.set_ok(true);

@@ -9,16 +9,16 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/control/uploads.hpp"
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/stream_settings.hpp"
 #include "daemon/system/clock.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
-#include "models/generate/bound_model.hpp"
-#include "models/style/style_filter.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -37,13 +37,11 @@ using pipeline::kMaxUnderWay;
 struct ControlledStream {
   std::string name;
   bool publishes_raw = false;
-  std::shared_ptr<const Skeleton> skeleton;   // models are bound to it; null: samples only
-  double rate_hz = 0.0;                       // nominal; 0: unknown
-  std::optional<style::FilterOptions> style;  // set: the stream has a style stage
-  // The model in use. The cold side owns every model; the pipeline only borrows it.
-  std::unique_ptr<const style::BoundModel> model;
-  bool generates = false;                               // true: the stream has a generate stage
-  std::unique_ptr<const generate::BoundModel> gesture;  // null while there is none
+  std::shared_ptr<const Skeleton> skeleton;  // models are bound to it; null: samples only
+  pipeline::StreamSettings settings{};       // with the stages
+  // The models in use, one for each stage, null while there is none. The cold side owns every
+  // model; the pipeline only borrows it.
+  std::vector<std::unique_ptr<const StageModel>> models{};
   // The device that calibrations must fit.
   std::shared_ptr<devices::PresentDevice> device = std::make_shared<devices::PresentDevice>();
   drivers::Options options;  // of its driver
@@ -103,32 +101,26 @@ class RequestHandler {
   struct UnderWay {
     Requester requester;
     std::uint32_t stream = 0;
-    std::unique_ptr<const style::BoundModel> model{};       // the new style model
-    std::unique_ptr<const generate::BoundModel> gesture{};  // the new gesture model
+    std::size_t stage = 0;
+    std::unique_ptr<const StageModel> model{};  // the stage's new model
+    std::string_view refusal{};                 // what the stage's refusal means
     std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
   };
   // Success means that the command is under way; acknowledge() then makes the reply.
-  [[nodiscard]] Result<> set_alpha(const v1::ControlRequest& request, const Requester& requester);
+  [[nodiscard]] Result<> set_parameter(const v1::ControlRequest& request,
+                                       const Requester& requester);
+  [[nodiscard]] Result<> stage_command(const v1::ControlRequest& request,
+                                       const Requester& requester);
   // Returns true if this was not the last piece, which is acknowledged at once.
   [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request,
                                              const Requester& requester);
   [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
                                    const std::string& name, const Requester& requester);
-  [[nodiscard]] Result<> set_style_model(std::uint32_t stream, std::span<const std::byte> bytes,
-                                         const std::string& name, const Requester& requester);
-  [[nodiscard]] Result<> set_gesture_model(std::uint32_t stream, std::span<const std::byte> bytes,
-                                           const std::string& name, const Requester& requester);
-  void keep_model(std::span<const std::byte> bytes, pipeline::Command& command);
-  [[nodiscard]] Result<> play(const v1::ControlRequest& request, const Requester& requester);
-  [[nodiscard]] Result<> stop_playing(const v1::ControlRequest& request,
-                                      const Requester& requester);
   [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
   [[nodiscard]] Result<std::uint32_t> find_stream(const std::string& name) const;
-  [[nodiscard]] Result<std::uint32_t> styled_stream(const std::string& name) const;
-  [[nodiscard]] Result<std::uint32_t> playing_stream(const std::string& name) const;
-  // The model that the pipeline will have when a command that is sent now takes effect.
-  [[nodiscard]] const generate::BoundModel* coming_gesture(std::uint32_t stream) const;
+  // The stage's model by the time that a command that is sent now takes effect.
+  [[nodiscard]] const StageModel* coming_model(std::uint32_t stream, std::size_t stage) const;
   [[nodiscard]] Result<> send(pipeline::Command command, UnderWay under_way);
 
   std::vector<ControlledStream> streams_;

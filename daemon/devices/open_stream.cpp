@@ -1,10 +1,12 @@
 #include "daemon/devices/open_stream.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "daemon/devices/calibration.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "drivers/transport/file.hpp"
-#include "models/gesture/model_file.hpp"
-#include "proto/frame/hand_skeleton.hpp"
+#include "models/stages/registry.hpp"
 #include "proto/model/model_file.hpp"
 
 namespace posed::devices {
@@ -66,31 +68,37 @@ Result<> open_slot(const drivers::Driver& driver, OpenStream& stream) {
   return {};
 }
 
-// Whether the constrain stage runs: on hands, unless the config says otherwise.
-Result<bool> wants_constrain(const OpenStream& stream) {
+// The stages that the config names, and those that a stream of this skeleton has by default.
+std::vector<config::StageConfig> stages_of(const OpenStream& stream) {
+  const config::StreamConfig& config = stream.config;
   const auto& skeleton = stream.device.description.skeleton;
-  const bool hand = skeleton && hand_side(*skeleton);
-  if (stream.config.constrain.value_or(false) && !hand) {
-    return misuse("only hands (hand45) can be constrained; leave out its [stream.constrain] table");
+  if (!config.default_stages || !skeleton) return config.stages;
+  std::vector<config::StageConfig> stages;
+  for (const StageType* type : stage_types()) {
+    const auto named = std::ranges::find(config.stages, type, &config::StageConfig::type);
+    const bool off = std::ranges::find(config.off, type) != config.off.end();
+    if (named != config.stages.end()) {
+      stages.push_back(*named);
+    } else if (!off && type->is_default != nullptr && type->is_default(*skeleton)) {
+      stages.push_back({.type = type, .parameters = *complete_parameters(type->parameters, {})});
+    }
   }
-  return stream.config.constrain.value_or(hand);
+  return stages;
 }
 
-Result<> fill_settings(OpenStream& stream) {
-  const config::StreamConfig& config = stream.config;
-  const auto constrain = wants_constrain(stream);
-  if (!constrain) return std::unexpected(constrain.error());
-  stream.settings = {.publish_raw = config.publish_raw,
-                     .stale_after_s = config.stale_after_s,
-                     .rate_hz = stream.device.description.rate_hz,
-                     .constrain = *constrain};
-  if (config.style) {
-    stream.settings.style = config.style->filter;
-    stream.settings.style_model.name = config.style->model.filename().string();
-  }
-  if (config.generate) {
-    stream.settings.generate = config.generate->live;
-    stream.settings.gesture_model.name = config.generate->model.filename().string();
+Result<> open_stages(OpenStream& stream) {
+  stream.settings = {.publish_raw = stream.config.publish_raw,
+                     .stale_after_s = stream.config.stale_after_s,
+                     .rate_hz = stream.device.description.rate_hz};
+  for (config::StageConfig& stage : stages_of(stream)) {
+    stream.settings.stages.push_back({.type = stage.type,
+                                      .parameters = std::move(stage.parameters),
+                                      .model_name = stage.model.filename().string()});
+    std::string& file = stream.model_files.emplace_back();
+    if (stage.model.empty()) continue;
+    auto bytes = model_file::load(stage.model);
+    if (!bytes) return std::unexpected(bytes.error());
+    file = std::move(*bytes);
   }
   return {};
 }
@@ -113,18 +121,8 @@ Result<std::unique_ptr<OpenStream>> open_stream(const config::StreamConfig& conf
   Result<> opened = open_device(*driver, *stream);
   if (opened) opened = open_calibration(*stream);
   if (opened) opened = open_slot(*driver, *stream);
-  if (opened) opened = fill_settings(*stream);
+  if (opened) opened = open_stages(*stream);
   if (!opened) return of_stream(config.name, opened.error());
-  if (config.style) {
-    auto bytes = model_file::load(config.style->model);
-    if (!bytes) return of_stream(config.name, bytes.error());
-    stream->model_file = std::move(*bytes);
-  }
-  if (config.generate && !config.generate->model.empty()) {
-    auto bytes = model_file::load(config.generate->model);
-    if (!bytes) return of_stream(config.name, bytes.error());
-    stream->gesture_file = std::move(*bytes);
-  }
   return stream;
 }
 
@@ -143,45 +141,42 @@ Result<std::string> try_kept_device(OpenStream& stream) {
   return std::string();
 }
 
-Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream) {
-  if (!stream.config.style) return nullptr;
-  if (!stream.device.description.skeleton) {
-    const std::string what =
-        "driver '" + stream.config.driver + "' gives no poses, so it cannot be styled";
-    return of_stream(stream.config.name, misuse(what).error());
+std::vector<const StageModel*> BoundStages::borrowed() const {
+  std::vector<const StageModel*> pointers;
+  for (const auto& model : models) pointers.push_back(model.get());
+  return pointers;
+}
+
+Result<BoundStages> bind_stages(const OpenStream& stream) {
+  BoundStages bound;
+  const auto& skeleton = stream.device.description.skeleton;
+  for (std::size_t i = 0; i < stream.settings.stages.size(); ++i) {
+    const pipeline::StageSettings& stage = stream.settings.stages[i];
+    auto& model = bound.models.emplace_back();
+    if (!skeleton || stream.model_files[i].empty()) continue;
+    auto ready = stage.type->bind_model(std::as_bytes(std::span(stream.model_files[i])),
+                                        pipeline::stage_context(stream.settings, i, skeleton),
+                                        stage.model_name);
+    if (!ready) return of_stream(stream.config.name, ready.error());
+    model = std::move(*ready);
+    if (stage.type->first_command == nullptr) continue;
+    const auto first = stage.type->first_command(stage.parameters, model.get());
+    if (!first) return of_stream(stream.config.name, first.error());
+    if (!*first) continue;
+    bound.first_commands.push_back({.change = {.kind = pipeline::StageChange::Kind::kCommand,
+                                               .index = static_cast<std::uint8_t>((*first)->index),
+                                               .type = stage.type},
+                                    .command = (*first)->command});
   }
-  const std::filesystem::path& path = stream.config.style->model;
-  const auto model = style::parse_model(std::as_bytes(std::span(stream.model_file)), path);
-  if (!model) return of_stream(stream.config.name, model.error());
-  auto bound = style::bind_model(*model, *stream.device.description.skeleton,
-                                 stream.config.style->filter, path.filename());
-  if (!bound) return of_stream(stream.config.name, bound.error());
   return bound;
 }
 
-Result<BoundGesture> bind_gesture(const OpenStream& stream) {
-  if (!stream.config.generate) return BoundGesture{};
-  const config::GenerateConfig& config = *stream.config.generate;
-  const drivers::Description& device = stream.device.description;
-  if (!device.skeleton || device.skeleton->channels.empty()) {
-    const std::string what = "driver '" + stream.config.driver +
-                             "' gives no joint angles, so there is nothing to generate";
-    return of_stream(stream.config.name, misuse(what).error());
-  }
-  BoundGesture bound;
-  if (config.model.empty()) return bound;
-  const std::string name = config.model.filename();
-  auto model = gesture::parse_model(std::as_bytes(std::span(stream.gesture_file)), config.model);
-  if (!model) return of_stream(stream.config.name, model.error());
-  auto ready = generate::bind_model(std::move(*model), *device.skeleton, device.rate_hz, name);
-  if (!ready) return of_stream(stream.config.name, ready.error());
-  bound.model = std::move(*ready);
-  if (config.labels.empty()) return bound;
-  const auto order =
-      gesture::make_play_order(bound.model->gesture(), config.labels, config.tempo, config.loop);
-  if (!order) return of_stream(stream.config.name, order.error());
-  bound.play = *order;
-  return bound;
+Result<pipeline::EngineOptions> make_engine(std::uint32_t id, const OpenStream& stream,
+                                            const BoundStages& bound) {
+  auto engine = pipeline::engine_options(id, stream.settings, stream.device.description.skeleton,
+                                         bound.borrowed());
+  if (!engine) return of_stream(stream.config.name, engine.error());
+  return engine;
 }
 
 }  // namespace posed::devices

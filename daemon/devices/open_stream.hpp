@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/devices/present_device.hpp"
@@ -13,9 +14,7 @@
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/transport/transport_factory.hpp"
-#include "models/generate/bound_model.hpp"
-#include "models/gesture/play_order.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/stage_type.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::devices {
@@ -32,9 +31,8 @@ struct OpenStream {
   // null: use the device's default
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
   std::unique_ptr<pipeline::DeviceSlot> slot;  // null for a device that cannot come back
-  bool endless = false;      // never ends by itself: a device that may be unplugged, a looping clip
-  std::string model_file;    // the bytes of the style model's file; empty without a style stage
-  std::string gesture_file;  // the same for the gesture model
+  bool endless = false;  // never ends by itself: a device that may be unplugged, a looping clip
+  std::vector<std::string> model_files;  // the bytes of each stage's model file; empty without one
   pipeline::StreamCounters counters;
 };
 
@@ -47,16 +45,22 @@ struct OpenStream {
 // device is not there now. May take a few seconds. Cold.
 [[nodiscard]] Result<std::string> try_kept_device(OpenStream& stream);
 
-// The style model, bound to the stream's skeleton; null without a style stage. Cold.
-[[nodiscard]] Result<std::unique_ptr<const style::BoundModel>> bind_style(const OpenStream& stream);
+// What the stages of a stream start with.
+struct BoundStages {
+  // One for each stage, bound to the stream's skeleton and rate; null for a stage without a model.
+  std::vector<std::unique_ptr<const StageModel>> models;
+  // What the stages do from the start on; without stream and ticket.
+  std::vector<pipeline::Command> first_commands;
 
-// What the generate stage of a stream needs, checked: the gesture model (null if there is none),
-// and the labels to perform from the start (empty if there are none). Cold.
-struct BoundGesture {
-  std::unique_ptr<const generate::BoundModel> model;
-  gesture::PlayOrder play;
+  [[nodiscard]] std::vector<const StageModel*> borrowed() const;
 };
-[[nodiscard]] Result<BoundGesture> bind_gesture(const OpenStream& stream);
+// Checks and binds the models. Cold.
+[[nodiscard]] Result<BoundStages> bind_stages(const OpenStream& stream);
+
+// The engine of stream number `id`, untimed. `bound` outlives it. Cold.
+[[nodiscard]] Result<pipeline::EngineOptions> make_engine(std::uint32_t id,
+                                                          const OpenStream& stream,
+                                                          const BoundStages& bound);
 
 // Adds the stream's name to an error.
 [[nodiscard]] std::unexpected<Error> of_stream(const std::string& name, Error error);

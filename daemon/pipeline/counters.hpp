@@ -27,14 +27,22 @@ struct alignas(64) ReaderCounters {
   std::atomic<std::int64_t> link_ns{kNoTime_ns};   // when `connected` last changed
 };
 
+inline constexpr std::size_t kMaxLiveParameters = 32;  // of one stream
+
+// As ParameterState.
+struct ParameterCounter {
+  std::atomic<double> now{0.0};
+  std::atomic<double> target{0.0};
+};
+
 struct alignas(64) PipelineCounters {
   std::atomic<std::uint64_t> consumed{0};  // sequence of the last frame taken from the ring
   std::atomic<std::uint64_t> taken{0};     // items taken from the ring
   std::atomic<std::uint64_t> shed{0};      // frames and samples skipped because newer ones waited
   std::atomic<std::uint64_t> dropped{0};   // items for which the publisher's ring was full
   std::atomic<StreamState> state{StreamState::kWaiting};
-  std::atomic<float> alpha{0.0F};         // the value in use now
-  std::atomic<float> alpha_target{0.0F};  // the value towards which alpha moves
+  // The live parameters of the stream's stages, in their order.
+  std::array<ParameterCounter, kMaxLiveParameters> parameter{};
 };
 
 struct alignas(64) PublisherCounters {

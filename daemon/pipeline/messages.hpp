@@ -2,46 +2,26 @@
 // boost::lockfree::spsc_queue rings.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
 #include <type_traits>
 
 #include "drivers/glove/calibration_file.hpp"
-#include "models/generate/bound_model.hpp"
-#include "models/gesture/play_order.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/stage_type.hpp"
 #include "proto/frame/frame.hpp"
+#include "proto/text/short_text.hpp"
 
 namespace posed::pipeline {
 
-// Short human-readable text that travels through a ring by value; longer text is cut. RT-safe.
-class ShortText {
- public:
-  ShortText() = default;
-  explicit ShortText(std::string_view text) noexcept { add(text); }
-
-  void add(std::string_view text) noexcept {
-    std::size_t fits = std::min(text.size(), bytes_.size() - size_);
-    cut_ = cut_ || fits < text.size();
-    // never split a UTF-8 character
-    while (fits > 0 && fits < text.size() && (text[fits] & 0xc0) == 0x80) --fits;
-    std::copy_n(text.begin(), fits, bytes_.begin() + size_);
-    size_ = static_cast<std::uint8_t>(size_ + fits);
-  }
-  [[nodiscard]] std::string_view text() const noexcept { return {bytes_.data(), size_}; }
-  [[nodiscard]] bool cut() const noexcept { return cut_; }  // the text was longer
-
- private:
-  std::array<char, 94> bytes_{};
-  std::uint8_t size_ = 0;
-  bool cut_ = false;
+// A change to one stage of a stream: asked for by control, kept in the log, announced by an event.
+struct StageChange {
+  enum class Kind : std::uint8_t { kSet, kModel, kCommand };
+  Kind kind = Kind::kSet;
+  std::uint8_t index = 0;           // kSet: in StageType::parameters; kCommand: in ::commands
+  const StageType* type = nullptr;  // of the stage, which the stream has at most once
+  double value = 0.0;               // kSet; true and false are 1 and 0
 };
-
-// What a KIND_CONTROL event changed.
-enum class Change : std::uint8_t { kAlpha, kStyleModel, kGestureModel, kStopPlaying };
 
 // Something that happened to a stream; published on event/<stream>.
 struct StreamEvent {
@@ -51,10 +31,10 @@ struct StreamEvent {
   std::uint64_t sequence;
   double value;
   std::uint64_t ticket = 0;  // of the command that caused it; 0 if no reply is expected
+  StageChange change{};      // of KIND_CONTROL and KIND_PLAYING
   // The old and the new value, so that the event can name both.
-  Change change = Change::kAlpha;  // of KIND_CONTROL
-  float alpha_before = 0.0F;       // kAlpha: the previous target; `value` is the new one
-  ShortText before{}, after{};     // names of models and calibrations, labels to perform
+  double value_before = 0.0;    // StageChange::kSet: the target until now
+  ShortText before{}, after{};  // names of models and calibrations; what a stage's command does
 };
 
 // reader -> pipeline -> publisher
@@ -92,18 +72,17 @@ struct Position {
   std::uint64_t item = 1;    // Item::number of the reader's next item, whatever its stream
 };
 
+// SHA-256 of a model file, in hex, with a closing zero.
+using ModelHash = std::array<char, 65>;
+
 // control -> pipeline. It takes effect at the next frame boundary of its stream.
 struct Command {
-  enum class Kind : std::uint8_t { kAlpha, kModel, kGesture, kPlay, kStopPlaying };
-  Kind kind = Kind::kAlpha;
+  StageChange change{};
   std::uint32_t stream = 0;
-  std::uint64_t ticket = 0;  // returned in the Ack; 0 if no Ack is expected
-  float alpha = 0.0F;
-  // kModel: bound and ready to use; owned by the cold side
-  const style::BoundModel* model = nullptr;
-  const generate::BoundModel* gesture = nullptr;  // kGesture: the same
-  std::array<char, 65> model_hash{};              // SHA-256 hex of the file's bytes, for the log
-  gesture::PlayOrder play{};                      // kPlay
+  std::uint64_t ticket = 0;           // returned in the Ack; 0 if no Ack is expected
+  const StageModel* model = nullptr;  // kModel: ready to use; owned by the cold side
+  ModelHash model_hash{};             // kModel: for the log
+  StageCommand command{};             // kCommand
 };
 static_assert(std::is_trivially_copyable_v<Command>);
 
@@ -124,7 +103,7 @@ struct Ack {
   std::uint64_t ticket = 0;
   std::uint32_t stream = 0;
   std::uint64_t sequence = 0;  // the first frame to which it applied
-  bool refused = false;  // a play order that did not fit into the queue of labels; nothing changed
+  bool refused = false;        // the stage did not take the command; nothing changed
 };
 
 // pipeline -> recorder: a decision that cannot be derived from the recorded bytes alone, so replay
@@ -134,26 +113,23 @@ struct Ack {
 // kShedSamples name the sequences that never reached it.
 struct Decision {
   enum class Kind : std::uint8_t {
-    kAlpha = 1,
-    kModel = 2,
-    kShed = 3,
-    kTick = 4,
-    kGesture = 5,
-    kPlay = 6,
-    kStopPlaying = 7,
-    kEnd = 8,         // the source has ended; the stages have emitted what they held back
-    kShedSamples = 9  // like kShed, for samples
+    kChange,
+    kShed,
+    kShedSamples,  // like kShed, for samples
+    kTick,
+    kEnd  // the source has ended; the stages have emitted what they held back
   };
-  Kind kind = Kind::kAlpha;
+  Kind kind = Kind::kTick;
   std::uint32_t stream = 0;
   std::uint64_t item = 0;  // set by the worker; engines do not know it
   // the stream's next frame; kShed, kShedSamples: the first one skipped
   std::uint64_t sequence = 0;
   std::uint64_t count = 0;  // kShed, kShedSamples: how many were skipped
   std::int64_t now_ns = 0;  // kTick, kEnd
-  float alpha = 0.0F;
-  std::array<char, 65> model_hash{};
-  gesture::PlayOrder play{};  // kPlay
+  // Of kChange, as in the Command.
+  StageChange change{};
+  ModelHash model_hash{};
+  StageCommand command{};
 };
 
 }  // namespace posed::pipeline

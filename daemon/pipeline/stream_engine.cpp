@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "models/hand/constrain_stage.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
@@ -11,41 +10,14 @@ namespace {
 
 constexpr std::int64_t kHeldEvery_ns = kNanosPerSecond;
 
-void add_labels(const gesture::GestureModel& model, const gesture::PlayOrder& order,
-                ShortText& text) noexcept {
-  for (const std::uint16_t label : order.labels()) {
-    if (label >= model.labels.size() || text.cut()) return;
-    if (!text.text().empty()) text.add(" ");
-    text.add(model.labels[label].name);
-  }
-}
-
 }  // namespace
 
-std::vector<std::string> stage_names(const EngineOptions& options) {
-  std::vector<std::string> names;
-  if (options.style) names.push_back("style");
-  if (options.generate) names.push_back("generate");
-  if (options.constrain) names.push_back("constrain");
-  return names;
-}
-
-StreamEngine::StreamEngine(const EngineOptions& options)
-    : options_(options), model_(options.model) {
-  if (options.style) {
-    auto stage = std::make_unique<style::StyleFilter>(options.model, *options.style);
-    style_ = stage.get();
-    stages_.push_back(std::move(stage));
-  }
-  if (options.generate) {
-    auto stage = std::make_unique<generate::GenerateStage>(
-        options.skeleton, *options.generate, generate::stream_rate_hz(options.rate_hz),
-        options.gesture);
-    generate_ = stage.get();
-    stages_.push_back(std::move(stage));
-  }
-  if (options.constrain) {
-    stages_.push_back(std::make_unique<hand::ConstrainStage>(options.skeleton));
+StreamEngine::StreamEngine(EngineOptions options) : options_(std::move(options)) {
+  for (const EngineStage& stage : options_.stages) {
+    const auto& table = stage.type->parameters;
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      if (table[i].live) live_.push_back({stage.stage.get(), i});
+    }
   }
 }
 
@@ -63,10 +35,10 @@ class StreamEngine::Chain final : public StageOut {
 
 // Runs the frame through the stages from `next` on, then emits it.
 void StreamEngine::run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept {
-  if (next == stages_.size()) return emit(frame.frame, out);
+  if (next == options_.stages.size()) return emit(frame.frame, out);
   Chain rest(*this, next + 1, out);
   const std::size_t before = time_stage(next);
-  stages_[next]->process(frame, rest);
+  options_.stages[next].stage->process(frame, rest);
   time_stage(before);
 }
 
@@ -82,9 +54,12 @@ std::size_t StreamEngine::time_stage(std::size_t stage) noexcept {
   return std::exchange(timed_stage_, stage);
 }
 
-float StreamEngine::alpha() const noexcept { return style_ ? style_->alpha() : 0.0F; }
-
-float StreamEngine::alpha_target() const noexcept { return style_ ? style_->alpha_target() : 0.0F; }
+Stage* StreamEngine::find(const StageType& type) const noexcept {
+  for (const EngineStage& stage : options_.stages) {
+    if (stage.type == &type) return stage.stage.get();
+  }
+  return nullptr;
+}
 
 void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   const Header& header = frame.header;
@@ -155,7 +130,7 @@ void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
 // Data arrived: a stream that was silent has recovered.
 void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
   last_arrival_ns_ = arrival_ns;
-  for (const auto& stage : stages_) stage->heard(arrival_ns);
+  for (const EngineStage& stage : options_.stages) stage.stage->heard(arrival_ns);
   const StreamState before = state_;
   state_ = StreamState::kLive;
   if (before == StreamState::kWaiting) {
@@ -175,15 +150,16 @@ std::int64_t StreamEngine::stale_due_ns() const noexcept {
 std::int64_t StreamEngine::stages_due_ns() const noexcept {
   if (state_ != StreamState::kLive && state_ != StreamState::kStale) return kNoTime_ns;
   std::int64_t first_ns = kNoTime_ns;
-  for (const auto& stage : stages_) {
-    const std::int64_t due_ns = stage->next_due_ns();
+  for (const EngineStage& stage : options_.stages) {
+    const std::int64_t due_ns = stage.stage->next_due_ns();
     if (due_ns != kNoTime_ns && (first_ns == kNoTime_ns || due_ns < first_ns)) first_ns = due_ns;
   }
   return first_ns;
 }
 
 bool StreamEngine::any_performs() const noexcept {
-  return std::ranges::any_of(stages_, [](const auto& stage) { return stage->performs(); });
+  return std::ranges::any_of(options_.stages,
+                             [](const EngineStage& stage) { return stage.stage->performs(); });
 }
 
 std::int64_t StreamEngine::next_tick_ns() const noexcept {
@@ -209,12 +185,13 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
   const bool stale = !stages_tick || now_ns >= stale_due_ns();
   if (stages_tick) {
     stage_us_.fill(0.0F);
-    for (std::size_t i = 0; i < stages_.size(); ++i) {
-      const std::int64_t stage_due_ns = stages_[i]->next_due_ns();
+    for (std::size_t i = 0; i < options_.stages.size(); ++i) {
+      Stage& stage = *options_.stages[i].stage;
+      const std::int64_t stage_due_ns = stage.next_due_ns();
       if (stage_due_ns == kNoTime_ns || now_ns < stage_due_ns) continue;
       Chain rest(*this, i + 1, out);
       const std::size_t before = time_stage(i);
-      stages_[i]->tick(now_ns, rest);
+      stage.tick(now_ns, rest);
       time_stage(before);
     }
     report_played(now_ns, out);
@@ -233,82 +210,55 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
 }
 
 Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
-  Ack ack{.ticket = command.ticket, .stream = options_.stream, .sequence = last_sequence_ + 1};
-  Decision decision{.stream = options_.stream, .sequence = ack.sequence};
-  StreamEvent change{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, 0, 0.0};
-  describe(command, change);
-  switch (command.kind) {
-    case Command::Kind::kAlpha:
-      decision.kind = Decision::Kind::kAlpha;
-      decision.alpha = command.alpha;
-      if (style_) style_->set_alpha(command.alpha);
-      break;
-    case Command::Kind::kModel:
-      decision.kind = Decision::Kind::kModel;
-      decision.model_hash = command.model_hash;
-      if (style_) static_cast<void>(style_->set_model(command.model));
-      if (style_) model_ = command.model;
-      break;
-    case Command::Kind::kGesture:
-      decision.kind = Decision::Kind::kGesture;
-      decision.model_hash = command.model_hash;
-      if (generate_) generate_->set_model(command.gesture);
-      break;
-    case Command::Kind::kPlay:
-      decision.kind = Decision::Kind::kPlay;
-      decision.play = command.play;
-      ack.refused = !generate_ || !generate_->play(command.play);
-      performs_ = performs_ || !ack.refused;
-      ack.sequence = last_out_ + 1;
-      break;
-    case Command::Kind::kStopPlaying:
-      decision.kind = Decision::Kind::kStopPlaying;
-      if (generate_) generate_->stop_playing();
-      ack.sequence = last_out_ + 1;
-      break;
-  }
-  out.decision(decision);
+  const bool leaving = command.change.kind == StageChange::Kind::kCommand;
+  Ack ack{.ticket = command.ticket,
+          .stream = options_.stream,
+          .sequence = (leaving ? last_out_ : last_sequence_) + 1};
+  out.decision({.kind = Decision::Kind::kChange,
+                .stream = options_.stream,
+                .sequence = last_sequence_ + 1,
+                .change = command.change,
+                .model_hash = command.model_hash,
+                .command = command.command});
+  StreamEvent event{options_.stream, v1::Event::KIND_CONTROL, last_arrival_ns_, ack.sequence, 0.0};
+  event.change = command.change;
+  Stage* const stage = find(*command.change.type);
+  ack.refused = stage == nullptr || !change(*stage, command, event);
   if (ack.refused) return ack;
-  change.sequence = ack.sequence;
+  performs_ = performs_ || any_performs();
   other_.kind = Item::Kind::kEvent;
-  other_.stream_event = change;
+  other_.stream_event = event;
   out.item(other_);
   return ack;
 }
 
-// Describes in the event what the command is about to change.
-void StreamEngine::describe(const Command& command, StreamEvent& event) const noexcept {
-  switch (command.kind) {
-    case Command::Kind::kAlpha:
-      event.alpha_before = alpha_target();
-      event.value = command.alpha;
-      break;
-    case Command::Kind::kModel:
-      event.change = Change::kStyleModel;
-      if (model_ != nullptr) event.before = ShortText(model_->name);
-      if (command.model != nullptr) event.after = ShortText(command.model->name);
-      break;
-    case Command::Kind::kGesture:
-      event.change = Change::kGestureModel;
-      if (gesture() != nullptr) event.before = ShortText(gesture()->name);
-      if (command.gesture != nullptr) event.after = ShortText(command.gesture->name);
-      break;
-    case Command::Kind::kPlay:
-      event.kind = v1::Event::KIND_PLAYING;
-      event.value = command.play.size;
-      if (gesture() != nullptr) add_labels(gesture()->gesture(), command.play, event.after);
-      break;
-    case Command::Kind::kStopPlaying:
-      event.change = Change::kStopPlaying;
-      break;
+// Makes the change and describes it in the event; false: refused, and nothing has changed.
+bool StreamEngine::change(Stage& stage, const Command& command, StreamEvent& event) noexcept {
+  const StageChange& change = command.change;
+  switch (change.kind) {
+    case StageChange::Kind::kSet:
+      event.value_before = stage.state(change.index).target;
+      stage.set(change.index, change.value);
+      return true;
+    case StageChange::Kind::kModel:
+      if (command.model == nullptr) return false;
+      if (stage.model() != nullptr) event.before = ShortText(stage.model()->name);
+      event.after = ShortText(command.model->name);
+      stage.use(*command.model);
+      return true;
+    case StageChange::Kind::kCommand:
+      stage.describe(change.index, command.command, event.after);
+      if (change.type->commands[change.index].performs) event.kind = v1::Event::KIND_PLAYING;
+      return stage.command(change.index, command.command);
   }
+  return false;
 }
 
 void StreamEngine::flush(EngineOut& out) noexcept {
   stage_us_.fill(0.0F);
-  for (std::size_t i = 0; i < stages_.size(); ++i) {
+  for (std::size_t i = 0; i < options_.stages.size(); ++i) {
     Chain rest(*this, i + 1, out);
-    stages_[i]->flush(rest);
+    options_.stages[i].stage->flush(rest);
   }
 }
 

@@ -5,15 +5,11 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
-#include "models/generate/generate_stage.hpp"
-#include "models/stage.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/stage_type.hpp"
 
 namespace posed::pipeline {
 
@@ -30,28 +26,24 @@ class EngineOut {
   virtual void decision(const Decision& decision) noexcept = 0;
 };
 
+struct EngineStage {
+  const StageType* type;  // each at most once
+  std::unique_ptr<Stage> stage;
+};
+
 struct EngineOptions {
   std::uint32_t stream = 0;
   std::int64_t stale_after_ns = kNanosPerSecond / 2;
   bool publish_raw = false;
-  std::optional<style::FilterOptions> style;      // set: the engine has this stage
-  const style::BoundModel* model = nullptr;       // not owned; null: frames pass through unchanged
-  std::optional<smooth::LiveOptions> generate{};  // set: the engine has this stage; hands only
-  const generate::BoundModel* gesture = nullptr;  // not owned; null: nothing can be performed
-  bool constrain = false;                         // true: the engine has this stage; hands only
-  double rate_hz = 0.0;                           // of the stream; used by `generate` only
-  std::shared_ptr<const Skeleton> skeleton{};  // of the stream; used by `generate` and `constrain`
-  Clock clock = nullptr;                       // to time the stages; null: they are not timed
+  std::vector<EngineStage> stages{};  // in the order in which they run
+  Clock clock = nullptr;              // to time the stages; null: they are not timed
 };
-
-// The names of the stages that the options ask for, in the order in which the engine runs them.
-[[nodiscard]] std::vector<std::string> stage_names(const EngineOptions& options);
 
 // Runs the stages of one stream as a list. All calls come from one thread and are RT-safe, except
 // for construction.
 class StreamEngine final {
  public:
-  explicit StreamEngine(const EngineOptions& options);
+  explicit StreamEngine(EngineOptions options);
 
   // A decoded frame, stamped with stream, sequence and arrival. If sequences are missing before it,
   // they are recorded as shed and reported before the frame itself.
@@ -72,8 +64,9 @@ class StreamEngine final {
   // When the next tick is due; kNoTime_ns while none is.
   [[nodiscard]] std::int64_t next_tick_ns() const noexcept;
 
-  // Alpha and models take effect at the next frame that enters, a play order at the next frame that
-  // leaves; the Ack holds its sequence.
+  // Parameters and models take effect at the next frame that enters, commands of a stage at the
+  // next frame that leaves; the Ack holds its sequence. A change to a stage that the stream does
+  // not have is refused.
   [[nodiscard]] Ack apply(const Command& command, EngineOut& out) noexcept;
 
   // No more frames come: the stages emit the frames that they hold back.
@@ -83,12 +76,13 @@ class StreamEngine final {
   void end(std::int64_t now_ns, EngineOut& out) noexcept;
 
   [[nodiscard]] StreamState state() const noexcept { return state_; }
-  [[nodiscard]] float alpha() const noexcept;         // the value in use now
-  [[nodiscard]] float alpha_target() const noexcept;  // the value towards which alpha moves
-  [[nodiscard]] const style::BoundModel* model() const noexcept { return model_; }
-  [[nodiscard]] const generate::BoundModel* gesture() const noexcept {
-    return generate_ ? generate_->model() : nullptr;
+  // The live parameters of all stages, in their order.
+  [[nodiscard]] std::size_t live_parameters() const noexcept { return live_.size(); }
+  [[nodiscard]] ParameterState live_parameter(std::size_t i) const noexcept {
+    return live_[i].stage->state(live_[i].parameter);
   }
+  // Null if the stream does not have it.
+  [[nodiscard]] Stage* find(const StageType& type) const noexcept;
 
  private:
   // Hands the output of one stage to the next, `next`.
@@ -106,13 +100,15 @@ class StreamEngine final {
   void heard(std::int64_t arrival_ns, EngineOut& out) noexcept;
   void event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
              EngineOut& out) noexcept;
-  void describe(const Command& command, StreamEvent& event) const noexcept;
+  [[nodiscard]] bool change(Stage& stage, const Command& command, StreamEvent& event) noexcept;
+
+  struct LiveParameter {
+    const Stage* stage;
+    std::size_t parameter;
+  };
 
   EngineOptions options_;
-  std::vector<std::unique_ptr<Stage>> stages_;
-  style::StyleFilter* style_ = nullptr;          // points into stages_; null without this stage
-  generate::GenerateStage* generate_ = nullptr;  // the same
-  const style::BoundModel* model_ = nullptr;
+  std::vector<LiveParameter> live_;
   StreamState state_ = StreamState::kWaiting;
   std::uint64_t last_sequence_ = 0;  // of the last frame that entered
   std::uint64_t last_out_ = 0;       // of the last frame that left
@@ -128,5 +124,14 @@ class StreamEngine final {
   Item pose_;              // the frame on its way out; afterwards the last pose
   Item other_;             // the sample or event on its way out
 };
+
+// Copies the engine's live parameters to where `stats` reads them. RT-safe.
+inline void publish_parameters(const StreamEngine& engine, PipelineCounters& counters) noexcept {
+  for (std::size_t i = 0; i < engine.live_parameters(); ++i) {
+    const ParameterState state = engine.live_parameter(i);
+    counters.parameter[i].now.store(state.now, std::memory_order_relaxed);
+    counters.parameter[i].target.store(state.target, std::memory_order_relaxed);
+  }
+}
 
 }  // namespace posed::pipeline

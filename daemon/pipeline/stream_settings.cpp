@@ -1,22 +1,59 @@
 #include "daemon/pipeline/stream_settings.hpp"
 
+#include <algorithm>
 #include <utility>
 
-#include "proto/frame/hand_skeleton.hpp"
+#include "daemon/pipeline/counters.hpp"
 
 namespace posed::pipeline {
 
-EngineOptions engine_options(std::uint32_t stream, const StreamSettings& settings,
-                             std::shared_ptr<const Skeleton> skeleton) {
-  const bool hand = skeleton && hand_side(*skeleton).has_value();
-  return {.stream = stream,
-          .stale_after_ns = nanoseconds(settings.stale_after_s),
-          .publish_raw = settings.publish_raw,
-          .style = settings.style,
-          .generate = settings.generate,
-          .constrain = settings.constrain && hand,
+StageSettings stage_settings(const StageType& type, const Parameters& changed) {
+  return {.type = &type, .parameters = complete_parameters(type.parameters, changed).value()};
+}
+
+std::vector<const StageType*> stage_types_of(const StreamSettings& settings) {
+  std::vector<const StageType*> types;
+  for (const StageSettings& stage : settings.stages) types.push_back(stage.type);
+  return types;
+}
+
+std::string first_model(const StreamSettings& settings) {
+  const auto has_model = [](const StageSettings& stage) { return !stage.model_name.empty(); };
+  const auto found = std::ranges::find_if(settings.stages, has_model);
+  return found == settings.stages.end() ? std::string() : found->model_name;
+}
+
+StageContext stage_context(const StreamSettings& settings, std::size_t stage,
+                           std::shared_ptr<const Skeleton> skeleton) {
+  return {.skeleton = std::move(skeleton),
           .rate_hz = settings.rate_hz,
-          .skeleton = std::move(skeleton)};
+          .parameters = settings.stages[stage].parameters};
+}
+
+Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings& settings,
+                                     const std::shared_ptr<const Skeleton>& skeleton,
+                                     std::span<const StageModel* const> models) {
+  EngineOptions options{.stream = stream,
+                        .stale_after_ns = nanoseconds(settings.stale_after_s),
+                        .publish_raw = settings.publish_raw};
+  std::size_t live = 0;
+  for (std::size_t i = 0; i < settings.stages.size(); ++i) {
+    const StageType& type = *settings.stages[i].type;
+    if (!skeleton) {
+      return misuse("it has no poses, only samples, so stage " + std::string(type.name) +
+                    " has nothing to work on");
+    }
+    auto stage = type.make(stage_context(settings, i, skeleton), models[i]);
+    if (!stage) return std::unexpected(stage.error());
+    options.stages.push_back({&type, std::move(*stage)});
+    live +=
+        static_cast<std::size_t>(std::ranges::count(type.parameters, true, &ParameterSpec::live));
+  }
+  if (options.stages.size() > kMaxStages || live > kMaxLiveParameters) {
+    return misuse("a stream has at most " + std::to_string(kMaxStages) + " stages, with " +
+                  std::to_string(kMaxLiveParameters) + " live parameters");
+  }
+  return options;
 }
 
 }  // namespace posed::pipeline

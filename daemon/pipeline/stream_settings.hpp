@@ -3,36 +3,53 @@
 #pragma once
 
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "daemon/pipeline/stream_engine.hpp"
-#include "models/smooth/live_options.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/stage_type.hpp"
+#include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::pipeline {
 
-// The model with which a stage started.
-struct StageModel {
-  std::string sha256{};  // of its file, which the log keeps; empty: no model
-  std::string name{};    // human-readable
+struct StageSettings {
+  const StageType* type = nullptr;
+  Parameters parameters{};  // complete
+  // The model with which the stage starts.
+  std::string model_sha256{};  // of its file, which the log keeps; empty: no model
+  std::string model_name{};    // for people
 };
 
 struct StreamSettings {
   bool publish_raw = false;
   double stale_after_s = 0.5;
-  double rate_hz = 0.0;                         // the device's nominal rate; 0: unknown
-  std::optional<style::FilterOptions> style{};  // set: the stream has a style stage
-  StageModel style_model{};
-  std::optional<smooth::LiveOptions> generate{};  // set: the stream has a generate stage
-  StageModel gesture_model{};
-  bool constrain = false;  // true: the stream has a constrain stage
+  double rate_hz = 0.0;                 // the device's nominal rate; 0: unknown
+  std::vector<StageSettings> stages{};  // in the order in which they run
 };
 
-// The options of the engine of stream number `stream`, without models, which the caller adds.
-// `skeleton` is null for a stream that has samples only. Cold.
-[[nodiscard]] EngineOptions engine_options(std::uint32_t stream, const StreamSettings& settings,
-                                           std::shared_ptr<const Skeleton> skeleton);
+// The stage's settings with every default. For tests and tools; `changed` must fit the table.
+[[nodiscard]] StageSettings stage_settings(const StageType& type, const Parameters& changed = {});
+
+// The kinds of the stages, in order.
+[[nodiscard]] std::vector<const StageType*> stage_types_of(const StreamSettings& settings);
+
+// The name of the first model, as far as there is one. For people.
+[[nodiscard]] std::string first_model(const StreamSettings& settings);
+
+// A stage's view of the stream.
+[[nodiscard]] StageContext stage_context(const StreamSettings& settings, std::size_t stage,
+                                         std::shared_ptr<const Skeleton> skeleton);
+
+// The options of the engine of stream number `stream`, with its stages. `models` has one entry for
+// each stage, null where it starts without one; they outlive the engine or are replaced. `skeleton`
+// is null for a stream that has samples only. The error says which stage cannot serve the stream.
+// Cold.
+[[nodiscard]] Result<EngineOptions> engine_options(std::uint32_t stream,
+                                                   const StreamSettings& settings,
+                                                   const std::shared_ptr<const Skeleton>& skeleton,
+                                                   std::span<const StageModel* const> models);
 
 }  // namespace posed::pipeline

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "daemon/system/hot_mark.hpp"
 #include "posed/v1/posed.pb.h"
@@ -39,9 +40,9 @@ bool within_share(const Item& item) noexcept {
 
 // One stream: its engine, and the place where that engine's output goes.
 struct Worker::StreamContext final : EngineOut {
-  StreamContext(const EngineOptions& options, double rate_hz, StreamCounters& stream_counters,
+  StreamContext(EngineOptions options, double rate_hz, StreamCounters& stream_counters,
                 const WorkerPorts& around, const std::uint64_t& next_item, std::size_t slots)
-      : engine(options),
+      : engine(std::move(options)),
         depth(shed_depth(rate_hz)),
         counters(stream_counters),
         ports(around),
@@ -98,8 +99,7 @@ struct Worker::StreamContext final : EngineOut {
 
   void publish_state() noexcept {
     counters.pipeline.state.store(engine.state(), std::memory_order_relaxed);
-    counters.pipeline.alpha.store(engine.alpha(), std::memory_order_relaxed);
-    counters.pipeline.alpha_target.store(engine.alpha_target(), std::memory_order_relaxed);
+    publish_parameters(engine, counters.pipeline);
   }
 
   StreamEngine engine;
@@ -124,10 +124,10 @@ Worker::Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller)
 
 Worker::~Worker() = default;
 
-void Worker::add(const EngineOptions& options, double rate_hz, StreamCounters& counters,
+void Worker::add(EngineOptions options, double rate_hz, StreamCounters& counters,
                  std::size_t slots) {
-  contexts_.push_back(
-      std::make_unique<StreamContext>(options, rate_hz, counters, ports_, position_, slots));
+  contexts_.push_back(std::make_unique<StreamContext>(std::move(options), rate_hz, counters, ports_,
+                                                      position_, slots));
 }
 
 const StreamEngine& Worker::engine(std::uint32_t stream) const { return contexts_[stream]->engine; }

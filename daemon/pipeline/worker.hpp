@@ -40,7 +40,7 @@ class Worker {
   // Streams are numbered in the order in which they are added. `rate_hz` is the nominal rate, 0
   // when unknown; `slots` is how many slots of `out` the stream may fill. Cold, before the first
   // turn.
-  void add(const EngineOptions& options, double rate_hz, StreamCounters& counters,
+  void add(EngineOptions options, double rate_hz, StreamCounters& counters,
            std::size_t slots = std::numeric_limits<std::size_t>::max());
 
   // One round: commands, a bounded number of items, and the ticks that are due. Returns the latest

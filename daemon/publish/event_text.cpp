@@ -8,12 +8,10 @@
 namespace posed::publish {
 namespace {
 
-using pipeline::Change;
+using pipeline::StageChange;
 using pipeline::StreamEvent;
 
-std::string words(const pipeline::ShortText& text) {
-  return clean(text.text()) + (text.cut() ? "..." : "");
-}
+std::string words(const ShortText& text) { return clean(text.text()) + (text.cut() ? "..." : ""); }
 
 // "march.style -> sway.style"; only the new name if there was no old one.
 std::string from_to(const StreamEvent& event) {
@@ -22,16 +20,21 @@ std::string from_to(const StreamEvent& event) {
 }
 
 std::string changed(const StreamEvent& event) {
-  switch (event.change) {
-    case Change::kAlpha:
-      return fmt::format("alpha {:.2f} -> {:.2f} from frame {}", event.alpha_before, event.value,
+  const StageChange& change = event.change;
+  if (change.type == nullptr) return {};
+  switch (change.kind) {
+    case StageChange::Kind::kSet: {
+      const ParameterSpec& spec = change.type->parameters[change.index];
+      return fmt::format("{} {:.2f} -> {:.2f} from frame {}", spec.shown_name(),
+                         event.value_before * spec.people_scale, change.value * spec.people_scale,
                          event.sequence);
-    case Change::kStyleModel:
-      return fmt::format("style model {} from frame {}", from_to(event), event.sequence);
-    case Change::kGestureModel:
-      return fmt::format("gesture model {} from frame {}", from_to(event), event.sequence);
-    case Change::kStopPlaying:
-      return fmt::format("stops performing at frame {}", event.sequence);
+    }
+    case StageChange::Kind::kModel:
+      return fmt::format("{} model {} from frame {}", change.type->name, from_to(event),
+                         event.sequence);
+    case StageChange::Kind::kCommand:
+      return fmt::format("{} at frame {}", change.type->commands[change.index].name,
+                         event.sequence);
   }
   return {};
 }
@@ -59,11 +62,10 @@ std::string sentence(const StreamEvent& event) {
       return "the device's own time jumped (did it restart?); it is mapped to the host's time "
              "again";
     case v1::Event::KIND_PLAYING:
-      return fmt::format("performs {:.0f} label{} ({}) from frame {} on, or after those that wait",
-                         event.value, event.value == 1.0 ? "" : "s", words(event.after),
-                         event.sequence);
+      return fmt::format("performs {} from frame {} on, or after what still waits",
+                         words(event.after), event.sequence);
     case v1::Event::KIND_PLAYED:
-      return "all labels are performed";
+      return "all is performed";
     default:
       return {};
   }

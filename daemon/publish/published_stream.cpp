@@ -27,6 +27,29 @@ void describe_device(const drivers::Description& device, v1::StreamStats& stats)
   if (driver != nullptr && driver->glove_model != nullptr) stats.set_device_info(device.text);
 }
 
+// The stages' names and live parameters; the times of the last report stay.
+void fill_stages(const std::vector<const StageType*>& stages,
+                 const pipeline::PipelineCounters& counters, v1::StreamStats& stats) {
+  std::size_t live = 0;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const bool known = static_cast<int>(i) < stats.stage_size();
+    v1::StageStats& stage = known ? *stats.mutable_stage(static_cast<int>(i)) : *stats.add_stage();
+    stage.set_name(std::string(stages[i]->name));
+    stage.clear_parameter();
+    for (const ParameterSpec& spec : stages[i]->parameters) {
+      if (!spec.live) continue;
+      const pipeline::ParameterCounter& counter = counters.parameter[live++];
+      v1::ParameterStats& parameter = *stage.add_parameter();
+      parameter.set_name(std::string(spec.shown_name()));
+      parameter.set_value(counter.now.load() * spec.people_scale);
+      parameter.set_target(counter.target.load() * spec.people_scale);
+      if (spec.name != "alpha") continue;
+      stats.set_alpha(static_cast<float>(parameter.value()));
+      stats.set_alpha_target(static_cast<float>(parameter.target()));
+    }
+  }
+}
+
 constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "ended"};
 
 }  // namespace
@@ -40,7 +63,9 @@ Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
       samples(name, info.description.samples) {
   if (info.description.skeleton) {
     skeleton = skeleton_message(name, *info.description.skeleton, info.rate_hz);
-    if (!unstyled) skeleton->mutable_stage()->Assign(info.stages.begin(), info.stages.end());
+    if (!unstyled) {
+      for (const StageType* stage : info.stages) skeleton->add_stage(std::string(stage->name));
+    }
   }
 }
 
@@ -94,13 +119,9 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_state(kStateNames[static_cast<std::size_t>(pipeline.state.load())]);
   stats.set_dropped(reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
-  if (stats.stage().empty()) {  // else it holds the times of the last report
-    for (const std::string& stage : info.stages) stats.add_stage()->set_name(stage);
-  }
+  fill_stages(info.stages, pipeline, stats);
   stats.clear_outcome();
   for (const auto& outcome : reader.outcome) stats.add_outcome(outcome.load());
-  stats.set_alpha(pipeline.alpha.load());
-  stats.set_alpha_target(pipeline.alpha_target.load());
   const std::int64_t link_ns = reader.link_ns.load();
   // before the reader has started, no device counts as absent
   const bool begun = link_ns != kNoTime_ns;

@@ -5,137 +5,162 @@
 #include <cmath>
 #include <limits>
 #include <string_view>
+#include <variant>
 
-#include "models/style/style_filter.hpp"
+#include "models/stages/registry.hpp"
 #include "posed/v1/log.pb.h"
 #include "proto/log/reader.hpp"
 
 namespace posed::record {
 namespace {
 
-using Kind = pipeline::Decision::Kind;
+using pipeline::Decision;
+using pipeline::StageChange;
 using Value = v1::DecisionValue;
 namespace words = log::words;
 
-// The stage and name under which a decision is stored, and the type of its value.
-struct Spelling {
-  Kind kind;
-  std::string_view stage, name;
-  Value::ValueCase value;
+// The names of the engine's own decisions. A change to a stage is stored under the names of the
+// stage and of its parameter, its command or "model".
+struct EngineWord {
+  Decision::Kind kind;
+  std::string_view name;
+  bool has_range;
 };
-constexpr std::array kSpellings{
-    Spelling{Kind::kAlpha, words::kStyle, words::kAlpha, Value::kNumber},
-    Spelling{Kind::kModel, words::kStyle, words::kModel, Value::kSha256},
-    Spelling{Kind::kShed, words::kEngine, words::kShed, Value::kRange},
-    Spelling{Kind::kShedSamples, words::kEngine, words::kShedSamples, Value::kRange},
-    Spelling{Kind::kTick, words::kEngine, words::kTick, Value::VALUE_NOT_SET},
-    Spelling{Kind::kEnd, words::kEngine, words::kEnd, Value::VALUE_NOT_SET},
-    Spelling{Kind::kGesture, words::kGenerate, words::kModel, Value::kSha256},
-    Spelling{Kind::kPlay, words::kGenerate, words::kPlay, Value::kPlay},
-    Spelling{Kind::kStopPlaying, words::kGenerate, words::kStopPlaying, Value::VALUE_NOT_SET},
+constexpr std::array kEngineWords{
+    EngineWord{Decision::Kind::kShed, words::kShed, true},
+    EngineWord{Decision::Kind::kShedSamples, words::kShedSamples, true},
+    EngineWord{Decision::Kind::kTick, words::kTick, false},
+    EngineWord{Decision::Kind::kEnd, words::kEnd, false},
 };
 
-const Spelling* find(std::string_view stage, std::string_view name) {
-  const auto found = std::ranges::find_if(kSpellings, [&](const Spelling& spelling) {
-    return spelling.stage == stage && spelling.name == name;
-  });
-  return found == kSpellings.end() ? nullptr : &*found;
+std::string_view name_of(const StageChange& change) {
+  switch (change.kind) {
+    case StageChange::Kind::kSet:
+      return change.type->parameters[change.index].name;
+    case StageChange::Kind::kCommand:
+      return change.type->commands[change.index].name;
+    case StageChange::Kind::kModel:
+      break;
+  }
+  return words::kModel;
 }
 
-// Each reads one kind of value; false if no pipeline can have written it.
-bool read_alpha(double alpha, pipeline::Decision& decision) {
-  decision.alpha = static_cast<float>(alpha);
-  return std::abs(alpha) <= style::kMaxAlpha;  // false for NaN
+void write_change(const Decision& decision, Value& value) {
+  const StageChange& change = decision.change;
+  switch (change.kind) {
+    case StageChange::Kind::kSet:
+      if (std::holds_alternative<bool>(change.type->parameters[change.index].default_value)) {
+        value.set_flag(change.value != 0.0);
+      } else {
+        value.set_number(change.value);
+      }
+      return;
+    case StageChange::Kind::kModel:
+      value.set_sha256(decision.model_hash.data());
+      return;
+    case StageChange::Kind::kCommand:
+      if (const auto to_log = change.type->commands[change.index].to_log) {
+        to_log(decision.command, value);
+      }
+      return;
+  }
 }
 
-bool read_range(const Value::Range& range, pipeline::Decision& decision) {
-  decision.sequence = range.first();
-  decision.count = range.count();
-  return range.first() > 0 &&
-         range.count() <= std::numeric_limits<std::uint64_t>::max() - range.first();
+// Each of the following reads one kind of value; false if no pipeline can have written it.
+bool read_set(const ParameterSpec& spec, const Value& value, Decision& decision) {
+  const bool flag = std::holds_alternative<bool>(spec.default_value);
+  if (value.value_case() != (flag ? Value::kFlag : Value::kNumber)) return false;
+  decision.change.value = flag ? (value.flag() ? 1.0 : 0.0) : value.number();
+  return spec.live && decision.change.value >= spec.min && decision.change.value <= spec.max;
 }
 
-bool read_hash(const std::string& sha256, pipeline::Decision& decision) {
-  if (sha256.size() + 1 != decision.model_hash.size()) return false;
+bool read_hash(const Value& value, Decision& decision) {
+  const std::string& sha256 = value.sha256();
+  if (value.value_case() != Value::kSha256 || sha256.size() + 1 != decision.model_hash.size()) {
+    return false;
+  }
   std::ranges::copy(sha256, decision.model_hash.begin());
   return true;
 }
 
-bool read_play(const Value::PlayOrder& play, pipeline::Decision& decision) {
-  constexpr std::uint32_t kMaxLabelIndex = std::numeric_limits<std::uint16_t>::max();
-  gesture::PlayOrder& order = decision.play;
-  const auto count = static_cast<std::size_t>(play.label_size());
-  if (count == 0 || count > order.label.size()) return false;
-  for (const std::uint32_t label : play.label()) {
-    if (label > kMaxLabelIndex) return false;
-    order.label[order.size++] = static_cast<std::uint16_t>(label);
-  }
-  order.tempo = play.tempo();
-  order.loop = play.loop();
-  return order.tempo >= static_cast<float>(gesture::kMinTempo) &&
-         order.tempo <= static_cast<float>(gesture::kMaxTempo);
+bool read_command(const StageCommandType& type, const Value& value, Decision& decision) {
+  if (type.from_log == nullptr) return value.value_case() == Value::VALUE_NOT_SET;
+  const auto command = type.from_log(value);
+  if (command) decision.command = *command;
+  return command.has_value();
 }
 
-bool read_value(const Value& value, pipeline::Decision& decision) {
-  switch (value.value_case()) {
-    case Value::kNumber:
-      return read_alpha(value.number(), decision);
-    case Value::kRange:
-      return read_range(value.range(), decision);
-    case Value::kSha256:
-      return read_hash(value.sha256(), decision);
-    case Value::kPlay:
-      return read_play(value.play(), decision);
-    default:
-      return true;
+bool read_change(const StageType& type, std::string_view name, const Value& value,
+                 Decision& decision) {
+  decision.kind = Decision::Kind::kChange;
+  StageChange& change = decision.change;
+  change.type = &type;
+  if (name == words::kModel && type.has_model()) {
+    change.kind = StageChange::Kind::kModel;
+    return read_hash(value, decision);
   }
+  for (std::size_t i = 0; i < type.parameters.size(); ++i) {
+    if (type.parameters[i].name != name) continue;
+    change.index = static_cast<std::uint8_t>(i);
+    return read_set(type.parameters[i], value, decision);
+  }
+  change.kind = StageChange::Kind::kCommand;
+  for (std::size_t i = 0; i < type.commands.size(); ++i) {
+    if (type.commands[i].name != name) continue;
+    change.index = static_cast<std::uint8_t>(i);
+    return read_command(type.commands[i], value, decision);
+  }
+  return false;
+}
+
+bool read_engine(std::string_view name, const Value& value, Decision& decision) {
+  const auto word = std::ranges::find(kEngineWords, name, &EngineWord::name);
+  if (word == kEngineWords.end()) return false;
+  decision.kind = word->kind;
+  if (!word->has_range) return value.value_case() == Value::VALUE_NOT_SET;
+  decision.sequence = value.range().first();
+  decision.count = value.range().count();
+  return decision.sequence > 0 &&
+         decision.count <= std::numeric_limits<std::uint64_t>::max() - decision.sequence;
 }
 
 }  // namespace
 
-log::DecisionRow row_of(const pipeline::Decision& decision) {
-  const Spelling& spelling =
-      *std::ranges::find(kSpellings, decision.kind, [](const Spelling& one) { return one.kind; });
+log::DecisionRow row_of(const Decision& decision) {
+  log::DecisionRow row;
+  row.item = decision.item;
+  row.stream = decision.stream;
+  row.now_ns = decision.now_ns;
   Value value;
-  switch (spelling.value) {
-    case Value::kNumber:
-      value.set_number(decision.alpha);
-      break;
-    case Value::kRange:
+  if (decision.kind == Decision::Kind::kChange) {
+    row.stage = decision.change.type->name;
+    row.name = name_of(decision.change);
+    write_change(decision, value);
+  } else {
+    const auto word = std::ranges::find(kEngineWords, decision.kind, &EngineWord::kind);
+    row.stage = words::kEngine;
+    row.name = word->name;
+    if (word->has_range) {
       value.mutable_range()->set_first(decision.sequence);
       value.mutable_range()->set_count(decision.count);
-      break;
-    case Value::kSha256:
-      value.set_sha256(decision.model_hash.data());
-      break;
-    case Value::kPlay:
-      for (const std::uint16_t label : decision.play.labels()) {
-        value.mutable_play()->add_label(label);
-      }
-      value.mutable_play()->set_tempo(decision.play.tempo);
-      value.mutable_play()->set_loop(decision.play.loop);
-      break;
-    default:
-      break;
+    }
   }
-  return {.item = decision.item,
-          .stream = decision.stream,
-          .stage = std::string(spelling.stage),
-          .name = std::string(spelling.name),
-          .value = value.SerializeAsString(),
-          .now_ns = decision.now_ns};
+  row.value = value.SerializeAsString();
+  return row;
 }
 
-Result<pipeline::Decision> decision_of(const log::DecisionRow& row, const std::string& file) {
-  pipeline::Decision decision{
+Result<Decision> decision_of(const log::DecisionRow& row, const std::string& file) {
+  Decision decision{
       .stream = row.stream, .item = row.item, .sequence = row.before_frame, .now_ns = row.now_ns};
   Value value;
-  const Spelling* spelling = find(row.stage, row.name);
-  if (spelling != nullptr) decision.kind = spelling->kind;
-  if (spelling == nullptr || !value.ParseFromString(row.value) ||
-      value.value_case() != spelling->value || !read_value(value, decision)) {
-    return log::damaged_row(file, "decision", row.id, "makes no sense");
+  bool sound = value.ParseFromString(row.value);
+  if (sound && row.stage == words::kEngine) {
+    sound = read_engine(row.name, value, decision);
+  } else if (sound) {
+    const StageType* type = find_stage_type(row.stage);
+    sound = type != nullptr && read_change(*type, row.name, value, decision);
   }
+  if (!sound) return log::damaged_row(file, "decision", row.id, "makes no sense");
   return decision;
 }
 

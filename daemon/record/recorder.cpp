@@ -69,9 +69,9 @@ std::map<std::string, std::string> meta_of(const RecorderOptions& options) {
 }
 
 // Stores a model's file in the log and returns its hash; empty if there is no model.
-Result<std::string> keep(log::Writer& writer, std::span<const std::byte> bytes) {
-  if (bytes.empty()) return std::string();
-  return writer.add_blob(bytes);
+Result<std::string> keep(log::Writer& writer, const std::string& file) {
+  if (file.empty()) return std::string();
+  return writer.add_blob(std::as_bytes(std::span(file)));
 }
 
 }  // namespace
@@ -79,8 +79,6 @@ Result<std::string> keep(log::Writer& writer, std::span<const std::byte> bytes) 
 RecordedStream recorded_stream(const devices::OpenStream& stream) {
   const drivers::Description& description = stream.device.description;
   const config::StreamConfig& config = stream.config;
-  const auto style = std::as_bytes(std::span(stream.model_file));
-  const auto gesture = std::as_bytes(std::span(stream.gesture_file));
   return {.source = {.id = 0,
                      .name = config.name,
                      .driver = description.driver,
@@ -88,8 +86,7 @@ RecordedStream recorded_stream(const devices::OpenStream& stream) {
                      .identity = description.identity,
                      .config = to_json(config.options)},
           .settings = stream.settings,
-          .style = {style.begin(), style.end()},
-          .gesture = {gesture.begin(), gesture.end()}};
+          .model_files = stream.model_files};
 }
 
 Result<log::Writer> begin_log(const RecorderOptions& options,
@@ -99,12 +96,11 @@ Result<log::Writer> begin_log(const RecorderOptions& options,
   for (std::uint32_t id = 0; id < streams.size(); ++id) {
     RecordedStream& stream = streams[id];
     stream.source.id = id;
-    auto style = keep(*writer, stream.style);
-    if (!style) return std::unexpected(style.error());
-    stream.settings.style_model.sha256 = std::move(*style);
-    auto gesture = keep(*writer, stream.gesture);
-    if (!gesture) return std::unexpected(gesture.error());
-    stream.settings.gesture_model.sha256 = std::move(*gesture);
+    for (std::size_t i = 0; i < stream.settings.stages.size(); ++i) {
+      auto hash = keep(*writer, stream.model_files[i]);
+      if (!hash) return std::unexpected(hash.error());
+      stream.settings.stages[i].model_sha256 = std::move(*hash);
+    }
     if (auto done = writer->add(stream.source); !done) return std::unexpected(done.error());
     const log::StreamRow row{.id = id,
                              .source = id,

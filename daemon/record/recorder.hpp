@@ -25,10 +25,9 @@ namespace posed::record {
 
 // One stream before its first chunk: a source of the log with one body.
 struct RecordedStream {
-  log::SourceRow source;             // begin_log() sets its id, which is its index
-  StreamSettings settings{};         // begin_log() sets the hashes of its models
-  std::vector<std::byte> style{};    // the file of the style model at the start
-  std::vector<std::byte> gesture{};  // the file of the gesture model at the start
+  log::SourceRow source;                   // begin_log() sets its id, which is its index
+  StreamSettings settings{};               // begin_log() sets the hashes of its models
+  std::vector<std::string> model_files{};  // one for each stage, empty without a model
 };
 // What a recorder needs of an opened stream.
 [[nodiscard]] RecordedStream recorded_stream(const devices::OpenStream& stream);

@@ -1,10 +1,12 @@
 #include "daemon/record/stream_settings.hpp"
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
-#include "proto/log/rows.hpp"
+#include "models/stages/registry.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::record {
@@ -12,84 +14,60 @@ namespace posed::record {
 namespace {
 
 using Json = nlohmann::ordered_json;
-namespace words = log::words;
+using pipeline::StageSettings;
+
+Json to_json_value(const ParameterValue& value) {
+  return std::visit([](const auto& it) { return Json(it); }, value);
+}
+
+ParameterValue from_json_value(const Json& value) {
+  if (value.is_boolean()) return value.get<bool>();
+  if (value.is_number_integer()) return value.get<std::int64_t>();
+  if (value.is_number()) return value.get<double>();
+  return value.get<std::string>();
+}
+
+Json to_json(const StageSettings& stage) {
+  Json json{{"stage", stage.type->name}};
+  if (stage.type->has_model()) {
+    json["model"] = stage.model_sha256;
+    json["model_name"] = stage.model_name;
+  }
+  Json& parameters = json["parameters"] = Json::object();
+  for (const ParameterSpec& spec : stage.type->parameters) {
+    const std::string name(spec.name);
+    parameters[name] = to_json_value(stage.parameters.at(name));
+  }
+  return json;
+}
+
+// Empty if this version of posed does not have the stage, or cannot run it so.
+std::optional<StageSettings> stage_of(const Json& json) {
+  const StageType* type = find_stage_type(json.at("stage").get<std::string>());
+  if (type == nullptr) return std::nullopt;
+  Parameters given;
+  for (const auto& [name, value] : json.at("parameters").items()) {
+    given.emplace(name, from_json_value(value));
+  }
+  auto parameters = complete_parameters(type->parameters, given);
+  if (!parameters) return std::nullopt;
+  return StageSettings{.type = type,
+                       .parameters = std::move(*parameters),
+                       .model_sha256 = json.value("model", ""),
+                       .model_name = json.value("model_name", "")};
+}
 
 bool sound(const StreamSettings& settings) {
-  constexpr double kMaxSetting =
-      1e6;  // seconds, Hz, per second: far beyond sense, far below overflow
-  const auto within = [](double value) { return value >= -kMaxSetting && value <= kMaxSetting; };
-  const style::FilterOptions style = settings.style.value_or(style::FilterOptions{});
-  const smooth::LiveOptions live = settings.generate.value_or(smooth::LiveOptions{});
-  return settings.stale_after_s > 0.0 && within(settings.stale_after_s) &&
-         within(settings.rate_hz) && within(style.alpha) && within(style.alpha_slew_per_s) &&
-         within(style.gate_fallback) && live.lag.frames >= 0 && live.lag.frames <= 1000 &&
-         live.lag.seconds >= 0.0 && within(live.lag.seconds) && live.noise_rad >= 0.0 &&
-         within(live.noise_rad);
-}
-
-Json stage(const char* name, const StageModel& model, Json parameters) {
-  return {{"stage", name},
-          {"model", model.sha256},
-          {"model_name", model.name},
-          {"parameters", std::move(parameters)}};
-}
-
-StageModel model_of(const Json& stage) {
-  return {.sha256 = stage.value("model", ""), .name = stage.value("model_name", "")};
-}
-
-style::FilterOptions style_of(const Json& parameters) {
-  return {.alpha = parameters.at("alpha").get<double>(),
-          .alpha_slew_per_s = parameters.at("alpha_slew_per_s").get<double>(),
-          .gate = parameters.at("gate").get<bool>(),
-          .gate_fallback = parameters.at("gate_fallback").get<double>(),
-          .calibrate = parameters.at("calibrate").get<bool>()};
-}
-
-smooth::LiveOptions generate_of(const Json& parameters) {
-  return {.lag = {.frames = parameters.at("lag_frames").get<int>(),
-                  .seconds = parameters.at("lag_s").get<double>()},
-          .noise_rad = parameters.at("noise_rad").get<double>()};
-}
-
-// False if this version of posed does not have the stage, or runs it in another order.
-bool add_stage(const Json& stage, StreamSettings& settings) {
-  const auto name = stage.at("stage").get<std::string>();
-  if (name == words::kStyle && !settings.style && !settings.generate && !settings.constrain) {
-    settings.style = style_of(stage.at("parameters"));
-    settings.style_model = model_of(stage);
-    return true;
-  }
-  if (name == words::kGenerate && !settings.generate && !settings.constrain) {
-    settings.generate = generate_of(stage.at("parameters"));
-    settings.gesture_model = model_of(stage);
-    return true;
-  }
-  if (name == words::kConstrain && !settings.constrain) return settings.constrain = true;
-  return false;
+  constexpr double kMaxSetting = 1e6;  // s, Hz: far beyond sense, far below overflow
+  return settings.stale_after_s > 0.0 && settings.stale_after_s <= kMaxSetting &&
+         settings.rate_hz >= 0.0 && settings.rate_hz <= kMaxSetting;
 }
 
 }  // namespace
 
 std::string to_json(const StreamSettings& settings) {
   Json stages = Json::array();
-  if (settings.style) {
-    stages.push_back(stage(words::kStyle, settings.style_model,
-                           {{"alpha", settings.style->alpha},
-                            {"alpha_slew_per_s", settings.style->alpha_slew_per_s},
-                            {"gate", settings.style->gate},
-                            {"gate_fallback", settings.style->gate_fallback},
-                            {"calibrate", settings.style->calibrate}}));
-  }
-  if (settings.generate) {
-    stages.push_back(stage(words::kGenerate, settings.gesture_model,
-                           {{"lag_frames", settings.generate->lag.frames},
-                            {"lag_s", settings.generate->lag.seconds},
-                            {"noise_rad", settings.generate->noise_rad}}));
-  }
-  if (settings.constrain) {
-    stages.push_back({{"stage", words::kConstrain}, {"parameters", Json::object()}});
-  }
+  for (const StageSettings& stage : settings.stages) stages.push_back(to_json(stage));
   return json_text(Json{{"publish_raw", settings.publish_raw},
                         {"stale_after_s", settings.stale_after_s},
                         {"rate_hz", settings.rate_hz},
@@ -104,10 +82,15 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
     settings.stale_after_s = root.at("stale_after_s").get<double>();
     settings.rate_hz = root.at("rate_hz").get<double>();
     for (const Json& stage : root.at("stages")) {
-      if (add_stage(stage, settings)) continue;
-      return fail("this posed cannot run the stages of a stream as recorded in the log (" +
-                      json_text(stage.at("stage")) + "); update posed",
-                  file);
+      auto read = stage_of(stage);
+      const bool twice = read && std::ranges::find(settings.stages, read->type,
+                                                   &StageSettings::type) != settings.stages.end();
+      if (!read || twice) {
+        return fail("this posed cannot run the stages of a stream as recorded in the log (" +
+                        json_text(stage.at("stage")) + "); update posed",
+                    file);
+      }
+      settings.stages.push_back(std::move(*read));
     }
     if (!sound(settings)) return fail("the log is damaged (a stream's settings are invalid)", file);
     return settings;
@@ -120,7 +103,7 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
 std::string to_json(const drivers::Options& options) {
   Json json = Json::object();
   for (const auto& [name, value] : options) {
-    std::visit([&, key = name](const auto& it) { json[key] = it; }, value);
+    json[name] = to_json_value(value);
   }
   return json_text(json);
 }

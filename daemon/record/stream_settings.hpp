@@ -10,7 +10,6 @@
 
 namespace posed::record {
 
-using pipeline::StageModel;
 using pipeline::StreamSettings;
 
 [[nodiscard]] std::string to_json(const StreamSettings& settings);

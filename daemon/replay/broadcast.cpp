@@ -67,10 +67,9 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
     infos.push_back({.name = stream.name,
                      .description = stream.description,
                      .rate_hz = stream.settings.rate_hz,
-                     .stages = stream.stages,
+                     .stages = pipeline::stage_types_of(stream.settings),
                      .raw = stream.settings.publish_raw,
-                     .model = stream.settings.style ? stream.settings.style_model.name
-                                                    : stream.settings.gesture_model.name,
+                     .model = pipeline::first_model(stream.settings),
                      .counters = nullptr});
     frames_per_s += stream.settings.rate_hz * 2.0;  // raw and styled
   }
@@ -78,8 +77,7 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
       new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(*wake)));
   for (std::uint32_t id = 0; id < streams; ++id) {
     infos[id].counters = &self->counters_[id];
-    const auto& style = replay.stream(id).settings.style;
-    if (style) self->counters_[id].pipeline.alpha_target.store(static_cast<float>(style->alpha));
+    pipeline::publish_parameters(replay.engine(id), self->counters_[id].pipeline);
   }
   auto context = net::open_context();
   if (!context) return std::unexpected(context.error());
@@ -115,7 +113,7 @@ void Broadcast::add(const pipeline::Item& item) {
   if (item.kind == pipeline::Item::Kind::kEvent) note(item.stream_event);
   if (item.kind == pipeline::Item::Kind::kFrame) {
     const std::uint32_t stream = item.frame.header.stream;
-    counters_[stream].pipeline.alpha.store(replay_.alpha(stream));
+    pipeline::publish_parameters(replay_.engine(stream), counters_[stream].pipeline);
   }
   while (!ring_.push(item)) std::this_thread::sleep_for(kLookAgain);
   wake_->notify();
@@ -123,7 +121,6 @@ void Broadcast::add(const pipeline::Item& item) {
 
 // Updates what the pipeline's counters and the control thread knew in the live run.
 void Broadcast::note(const pipeline::StreamEvent& event) {
-  using pipeline::Change;
   using pipeline::StreamState;
   auto& counters = counters_[event.stream].pipeline;
   switch (event.kind) {
@@ -141,9 +138,8 @@ void Broadcast::note(const pipeline::StreamEvent& event) {
       pipeline::count(counters.shed, static_cast<std::uint64_t>(event.value));
       break;
     case v1::Event::KIND_CONTROL:
-      if (event.change == Change::kAlpha) {
-        counters.alpha_target.store(static_cast<float>(event.value));
-      } else if (event.change != Change::kStopPlaying) {
+      pipeline::publish_parameters(replay_.engine(event.stream), counters);
+      if (event.change.kind == pipeline::StageChange::Kind::kModel) {
         publisher_->set_model_name(event.stream, std::string(event.after.text()));
       }
       break;

@@ -95,7 +95,9 @@ void Replay::apply(const Schedule::Entry& entry) noexcept {
     contexts_[entry.stream]->apply(*decision);
 }
 
-float Replay::alpha(std::uint32_t stream) const { return contexts_[stream]->alpha(); }
+const pipeline::StreamEngine& Replay::engine(std::uint32_t stream) const {
+  return contexts_[stream]->engine();
+}
 
 Result<> Replay::run(const Out& out, const Pace& pace) {
   out_ = &out;

@@ -31,8 +31,8 @@ class Replay final : private ReplayHost {
   }
   [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
-  // The stream's current alpha, during run() and afterwards; 0 without a style stage.
-  [[nodiscard]] float alpha(std::uint32_t stream) const;
+  // During run() and afterwards.
+  [[nodiscard]] const pipeline::StreamEngine& engine(std::uint32_t stream) const;
 
   // Items in pipeline order.
   using Out = std::function<void(const pipeline::Item&)>;

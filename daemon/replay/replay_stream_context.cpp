@@ -64,33 +64,52 @@ Result<> ReplayStreamContext::open_decoder(const log::SourceRow& source) {
 }
 
 Result<> ReplayStreamContext::open_engine() {
-  const record::StreamSettings& settings = stream_.settings;
-  const drivers::Description& device = stream_.description;
-  if ((settings.style || settings.generate) && !device.skeleton) {
+  record::StreamSettings& settings = stream_.settings;
+  const auto& skeleton = stream_.description.skeleton;
+  if (!settings.stages.empty() && !skeleton) {
     return fail("stream " + in_quotes(stream_.name) + " has stages but no skeleton", file_);
   }
-  if (settings.style && !settings.style_model.sha256.empty()) {
-    auto bound = models_.style(settings.style_model.sha256, device, *settings.style);
-    if (!bound) return std::unexpected(bound.error());
-    style_ = std::move(*bound);
+  settings.rate_hz = stream_.description.rate_hz;  // the models are bound to this rate
+  models_in_use_.resize(settings.stages.size());
+  std::vector<const StageModel*> borrowed;
+  for (std::size_t i = 0; i < settings.stages.size(); ++i) {
+    if (!settings.stages[i].model_sha256.empty()) {
+      auto bound = bind(i, settings.stages[i].model_sha256);
+      if (!bound) return std::unexpected(bound.error());
+      models_in_use_[i] = std::move(*bound);
+    }
+    borrowed.push_back(models_in_use_[i].get());
   }
-  if (settings.generate && !settings.gesture_model.sha256.empty()) {
-    auto bound = models_.gesture(settings.gesture_model.sha256, device);
-    if (!bound) return std::unexpected(bound.error());
-    gesture_ = std::move(*bound);
+  auto options = pipeline::engine_options(index_, settings, skeleton, borrowed);
+  if (!options) {
+    Error error = options.error();
+    error.file = file_;
+    return std::unexpected(std::move(error));
   }
-  pipeline::EngineOptions options = pipeline::engine_options(index_, settings, device.skeleton);
-  options.rate_hz = device.rate_hz;  // the models are bound to this rate
-  options.model = style_.get();
-  options.gesture = gesture_.get();
-  stream_.stages = pipeline::stage_names(options);
-  engine_.emplace(options);
+  engine_.emplace(std::move(*options));
   return {};
 }
 
-Result<> ReplayStreamContext::expect(const pipeline::Decision& decision) {
+Result<std::unique_ptr<const StageModel>> ReplayStreamContext::bind(std::size_t stage,
+                                                                    const std::string& hash) {
   const record::StreamSettings& settings = stream_.settings;
-  const std::string hash = decision.model_hash.data();
+  const StageType& type = *settings.stages[stage].type;
+  if (!type.has_model()) return fail("stage " + std::string(type.name) + " has no model", file_);
+  return models_.bind(hash, type,
+                      pipeline::stage_context(settings, stage, stream_.description.skeleton));
+}
+
+// Index of the stage; empty if the stream does not have it: then the live run ignored the change,
+// too.
+std::optional<std::size_t> ReplayStreamContext::stage_of(
+    const pipeline::StageChange& change) const {
+  const auto& stages = stream_.settings.stages;
+  const auto found = std::ranges::find(stages, change.type, &pipeline::StageSettings::type);
+  if (found == stages.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - stages.begin());
+}
+
+Result<> ReplayStreamContext::expect(const pipeline::Decision& decision) {
   switch (decision.kind) {
     case Kind::kShed:
       shed_frames_.add(decision.sequence, decision.count);
@@ -98,15 +117,12 @@ Result<> ReplayStreamContext::expect(const pipeline::Decision& decision) {
     case Kind::kShedSamples:
       shed_samples_.add(decision.sequence, decision.count);
       return {};
-    case Kind::kModel: {
-      if (!settings.style || !tried_styles_.insert(hash).second) return {};
-      const auto bound = models_.style(hash, stream_.description, *settings.style);
-      if (!bound) return std::unexpected(bound.error());
-      return {};
-    }
-    case Kind::kGesture: {
-      if (!settings.generate || !tried_gestures_.insert(hash).second) return {};
-      const auto bound = models_.gesture(hash, stream_.description);
+    case Kind::kChange: {
+      const std::string hash = decision.model_hash.data();
+      const auto stage = stage_of(decision.change);
+      if (decision.change.kind != pipeline::StageChange::Kind::kModel || !stage) return {};
+      if (!tried_.emplace(*stage, hash).second) return {};
+      const auto bound = bind(*stage, hash);
       if (!bound) return std::unexpected(bound.error());
       return {};
     }
@@ -213,50 +229,29 @@ void ReplayStreamContext::apply(const pipeline::Decision& decision) noexcept {
     case Kind::kEnd:
       close_gaps();
       return engine_->end(decision.now_ns, *this);
-    case Kind::kAlpha:
-      return command({.kind = pipeline::Command::Kind::kAlpha, .alpha = decision.alpha});
-    case Kind::kModel:
-      return swap_style(decision);
-    case Kind::kGesture:
-      return swap_gesture(decision);
-    case Kind::kPlay:
-      return command({.kind = pipeline::Command::Kind::kPlay, .play = decision.play});
-    case Kind::kStopPlaying:
-      return command({.kind = pipeline::Command::Kind::kStopPlaying});
+    case Kind::kChange:
+      return change(decision);
   }
 }
 
-// If the stream has no such stage, the live run ignored the swap, too. The previous model is freed
-// once it is no longer read.
-void ReplayStreamContext::swap_style(const pipeline::Decision& decision) noexcept {
-  if (!stream_.settings.style) return;
-  auto bound =
-      models_.style(decision.model_hash.data(), stream_.description, *stream_.settings.style);
-  if (!bound) {
-    error_ = std::move(bound.error());
-    return;
+// The model that is replaced is freed once it is no longer read.
+void ReplayStreamContext::change(const pipeline::Decision& decision) noexcept {
+  const auto stage = stage_of(decision.change);
+  if (!stage) return;
+  pipeline::Command command{
+      .change = decision.change, .model_hash = decision.model_hash, .command = decision.command};
+  std::unique_ptr<const StageModel> model;
+  if (decision.change.kind == pipeline::StageChange::Kind::kModel) {
+    auto bound = bind(*stage, decision.model_hash.data());
+    if (!bound) {
+      error_ = std::move(bound.error());
+      return;
+    }
+    model = std::move(*bound);
+    command.model = model.get();
   }
-  command({.kind = pipeline::Command::Kind::kModel,
-           .model = bound->get(),
-           .model_hash = decision.model_hash});
-  style_ = std::move(*bound);
-}
-
-void ReplayStreamContext::swap_gesture(const pipeline::Decision& decision) noexcept {
-  if (!stream_.settings.generate) return;
-  auto bound = models_.gesture(decision.model_hash.data(), stream_.description);
-  if (!bound) {
-    error_ = std::move(bound.error());
-    return;
-  }
-  command({.kind = pipeline::Command::Kind::kGesture,
-           .gesture = bound->get(),
-           .model_hash = decision.model_hash});
-  gesture_ = std::move(*bound);
-}
-
-void ReplayStreamContext::command(const pipeline::Command& command) noexcept {
   static_cast<void>(engine_->apply(command, *this));
+  if (model) models_in_use_[*stage] = std::move(model);
 }
 
 // Nothing more comes: what was decoded last but never came was shed.

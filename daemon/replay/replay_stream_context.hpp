@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/devices/calibration.hpp"
@@ -27,7 +28,6 @@ struct ReplayStream {
   std::string name;
   drivers::Description description;
   record::StreamSettings settings;
-  std::vector<std::string> stages{};  // in the order in which they run
 };
 
 // What all streams of a replay share.
@@ -80,7 +80,7 @@ class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline:
 
   [[nodiscard]] const ReplayStream& stream() const noexcept { return stream_; }
   [[nodiscard]] std::optional<std::uint64_t> broken_at() const noexcept { return broken_at_; }
-  [[nodiscard]] float alpha() const noexcept { return engine_->alpha(); }
+  [[nodiscard]] const pipeline::StreamEngine& engine() const noexcept { return *engine_; }
 
  private:
   [[nodiscard]] Result<> open_decoder(const log::SourceRow& source);
@@ -88,9 +88,10 @@ class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline:
   [[nodiscard]] Result<> find_place(const log::ChunkRow& chunk);
   [[nodiscard]] Result<> use_device(const std::string& info);
   [[nodiscard]] Result<> calibrate(const std::string& toml);
-  void swap_style(const pipeline::Decision& decision) noexcept;
-  void swap_gesture(const pipeline::Decision& decision) noexcept;
-  void command(const pipeline::Command& command) noexcept;
+  [[nodiscard]] std::optional<std::size_t> stage_of(const pipeline::StageChange& change) const;
+  [[nodiscard]] Result<std::unique_ptr<const StageModel>> bind(std::size_t stage,
+                                                               const std::string& hash);
+  void change(const pipeline::Decision& decision) noexcept;
   void close_gaps() noexcept;
   [[nodiscard]] Result<> outcome_so_far();
 
@@ -113,9 +114,8 @@ class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline:
   drivers::Description device_;  // from its latest device info
   std::unique_ptr<drivers::Decoder> decoder_;
   std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: use the device's default
-  std::unique_ptr<const style::BoundModel> style_;                // in use by the engine
-  std::unique_ptr<const generate::BoundModel> gesture_;           // in use by the engine
-  std::set<std::string> tried_styles_, tried_gestures_;
+  std::vector<std::unique_ptr<const StageModel>> models_in_use_;  // one for each stage, or null
+  std::set<std::pair<std::size_t, std::string>> tried_;           // stage and hash
   pipeline::Intake intake_;
   std::optional<pipeline::StreamEngine> engine_;
   ShedRanges shed_frames_, shed_samples_;

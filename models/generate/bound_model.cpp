@@ -25,8 +25,8 @@ Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model
   if (!live) return std::unexpected(live.error());
   auto shared = std::make_shared<const gesture::GestureModel>(std::move(model));
   auto bound = std::make_unique<BoundModel>(
-      BoundModel{trajectory::StateInformation(std::move(shared), stream_rate_hz(rate_hz)), nullptr,
-                 std::move(*live), std::move(name)});
+      trajectory::StateInformation(std::move(shared), stream_rate_hz(rate_hz)), std::move(*live),
+      std::move(name));
   bound->player = std::make_unique<perform::LabelSequencePlayer>(
       bound->information,
       perform::PlayerOptions{.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4});

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "models/gesture/gesture_model.hpp"
 #include "models/perform/label_sequence_player.hpp"
 #include "models/smooth/live_model.hpp"
+#include "models/stage.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -18,11 +20,14 @@ namespace posed::generate {
 
 inline constexpr int kMostWaiting = 1024;  // most labels of one stream that wait to be performed
 
-struct BoundModel {
+struct BoundModel final : StageModel {
+  BoundModel(trajectory::StateInformation states, std::unique_ptr<const smooth::LiveModel> smoother,
+             std::string file)
+      : StageModel(std::move(file)), information(std::move(states)), live(std::move(smoother)) {}
+
   trajectory::StateInformation information;  // holds the gesture model
   std::unique_ptr<perform::LabelSequencePlayer> player;
   std::unique_ptr<const smooth::LiveModel> live;
-  std::string name;  // of its file, for messages
 
   [[nodiscard]] const gesture::GestureModel& gesture() const noexcept {
     return information.model();

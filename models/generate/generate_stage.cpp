@@ -28,10 +28,30 @@ GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton,
 }
 
 // RT-safe.
-void GenerateStage::set_model(const BoundModel* model) noexcept {
-  model_ = model;
-  static_cast<void>(smoother_.set_model(model != nullptr ? model->live.get() : nullptr));
-  player_.set_model(model);
+void GenerateStage::use(const StageModel& model) noexcept {
+  model_ = static_cast<const BoundModel*>(&model);
+  static_cast<void>(smoother_.set_model(model_->live.get()));
+  player_.set_model(model_);
+}
+
+// RT-safe.
+bool GenerateStage::command(std::size_t index, const StageCommand& command) noexcept {
+  if (index == kPlay) return player_.play(command.as<gesture::PlayOrder>());
+  player_.stop();
+  return true;
+}
+
+// RT-safe.
+void GenerateStage::describe(std::size_t index, const StageCommand& command,
+                             ShortText& text) const noexcept {
+  if (index != kPlay || model_ == nullptr) return;
+  const auto& labels = model_->gesture().labels;
+  const auto order = command.as<gesture::PlayOrder>();
+  for (const std::uint16_t label : order.labels()) {
+    if (label >= labels.size() || text.cut()) return;
+    if (!text.text().empty()) text.add(" ");
+    text.add(labels[label].name);
+  }
 }
 
 class GenerateStage::Smoothed final : public StageOut {

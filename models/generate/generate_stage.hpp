@@ -21,6 +21,10 @@ namespace posed::generate {
 
 class GenerateStage final : public Stage {
  public:
+  // The commands, as generate_type() numbers them: labels to perform (a gesture::PlayOrder), and
+  // back to the live hand.
+  enum Command : std::size_t { kPlay, kStopPlaying };
+
   // `model` is not owned and must outlive its use here; it may be null, and must be null for a
   // skeleton that is not a hand.
   GenerateStage(std::shared_ptr<const Skeleton> skeleton, const smooth::LiveOptions& options,
@@ -37,12 +41,12 @@ class GenerateStage final : public Stage {
   void flush(StageOut& out) noexcept override;
   [[nodiscard]] bool performs() const noexcept override { return player_.busy(); }
 
-  // All RT-safe; they take effect at the next emitted frame.
-  [[nodiscard]] bool play(const gesture::PlayOrder& order) noexcept { return player_.play(order); }
-  void stop_playing() noexcept { player_.stop(); }
-  void set_model(const BoundModel* model) noexcept;
-
-  [[nodiscard]] const BoundModel* model() const noexcept { return model_; }
+  // RT-safe.
+  void use(const StageModel& model) noexcept override;
+  [[nodiscard]] const BoundModel* model() const noexcept override { return model_; }
+  [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
+  void describe(std::size_t index, const StageCommand& command,
+                ShortText& text) const noexcept override;
 
  private:
   // Where the smoother puts its frames.

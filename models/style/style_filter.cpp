@@ -77,9 +77,8 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
     error.file = name;
     return std::unexpected(std::move(error));
   }
-  return std::make_unique<const BoundModel>(
-      BoundModel{std::move(*space), std::move(*predictor), model.limit_rad.cast<float>(),
-                 model.input_mean.cast<float>(), model.input_sd.cast<float>(), std::move(name)});
+  return std::make_unique<const BoundModel>(model, std::move(*space), std::move(*predictor),
+                                            std::move(name));
 }
 
 StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept
@@ -98,6 +97,47 @@ void StyleFilter::set_alpha(float alpha) noexcept {
 const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   discontinuity_ = true;
   return std::exchange(model_, model);
+}
+
+// RT-safe
+void StyleFilter::set(std::size_t parameter, double value) noexcept {
+  switch (parameter) {
+    case kAlpha:
+      return set_alpha(static_cast<float>(value));
+    case kAlphaSlew:
+      options_.alpha_slew_per_s = value;
+      return;
+    case kGateFallback:
+      options_.gate_fallback = value;
+      return;
+    case kCalibrate:
+      options_.calibrate = value != 0.0;
+      return;
+    default:
+      return;  // a predictor is built with or without a gate
+  }
+}
+
+// RT-safe
+ParameterState StyleFilter::state(std::size_t parameter) const noexcept {
+  const auto settled = [](double value) { return ParameterState{value, value}; };
+  switch (parameter) {
+    case kAlpha:
+      return {alpha_, alpha_target_};
+    case kAlphaSlew:
+      return settled(options_.alpha_slew_per_s);
+    case kGateFallback:
+      return settled(options_.gate_fallback);
+    case kCalibrate:
+      return settled(options_.calibrate ? 1.0 : 0.0);
+    default:
+      return settled(options_.gate ? 1.0 : 0.0);
+  }
+}
+
+// RT-safe
+void StyleFilter::use(const StageModel& model) noexcept {
+  static_cast<void>(set_model(static_cast<const BoundModel*>(&model)));
 }
 
 float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }

@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "models/gp/predictor.hpp"
 #include "models/motion/pose_space.hpp"
@@ -32,11 +33,19 @@ namespace posed::style {
 
 // A model bound to one skeleton, ready for the hot path. Built cold, then const; the hot side holds
 // a plain pointer and returns the old one to be freed by the cold side.
-struct BoundModel {
+struct BoundModel final : StageModel {
+  BoundModel(const StyleModel& model, motion::PoseSpace bound_space, gp::Predictor bound_predictor,
+             std::string file)
+      : StageModel(std::move(file)),
+        space(std::move(bound_space)),
+        predictor(std::move(bound_predictor)),
+        limit_rad(model.limit_rad.cast<float>()),
+        input_mean(model.input_mean.cast<float>()),
+        input_sd(model.input_sd.cast<float>()) {}
+
   motion::PoseSpace space;
   gp::Predictor predictor;
   Eigen::VectorXf limit_rad, input_mean, input_sd;  // [dims]
-  std::string name;
 };
 
 struct FilterOptions {
@@ -73,6 +82,13 @@ class StyleFilter final : public Stage {
 
   // Starts in the settled state for this frame (offline use): full alpha, known heading.
   void settle(const Frame& frame, double heading_rad) noexcept;
+
+  // The parameters, as style_type() numbers them. RT-safe.
+  enum Parameter : std::size_t { kAlpha, kAlphaSlew, kGate, kGateFallback, kCalibrate };
+  void set(std::size_t parameter, double value) noexcept override;
+  [[nodiscard]] ParameterState state(std::size_t parameter) const noexcept override;
+  void use(const StageModel& model) noexcept override;
+  [[nodiscard]] const BoundModel* model() const noexcept override { return model_; }
 
   [[nodiscard]] float alpha() const noexcept;  // the current value, while it slews
   [[nodiscard]] float alpha_target() const noexcept { return static_cast<float>(alpha_target_); }

@@ -33,6 +33,11 @@ TEST_CASE("ctl changes a running daemon and reports from which frame on") {
   CHECK(has(foreign.err, "walk.bvh"));
   CHECK(ctl({"set", "walker", "alpha", "fast"}).code == 2);
   CHECK(ctl({"set", "walker", "beta", "1"}).code == 2);
+  CHECK(ctl({"set", "walker", "style.calibrate", "true"}).code == 0);
+  CHECK(ctl({"set", "walker", "calibrate", "1"}).code == 2);
+  const auto absent = ctl({"play", "walker", "g"});
+  CHECK(absent.code == 1);
+  CHECK(has(absent.err, "[stream.generate]"));
   CHECK(ctl({"model", "walker", served.path("none.style")}).code == 1);
 
   CHECK(ctl({"stop"}).code == 0);
@@ -120,7 +125,7 @@ TEST_CASE("check reports what a config would run, or everything that is wrong wi
   CHECK(checked_config.at("ok") == true);
   CHECK(checked_config.at("streams").at(0).at("name") == "walker");
   CHECK(checked_config.at("streams").at(0).at("joints") == 5);
-  CHECK(checked_config.at("streams").at(0).at("model") == "one.style");
+  CHECK(checked_config.at("streams").at(0).at("stages").at(0).at("model") == "one.style");
   CHECK(posed({"check", "--config", served.path("posed.toml")}).code == 0);
 
   const auto bad = served.folder.write("bad.toml", "strem = 1\nrealtime = 2\n");

@@ -39,8 +39,9 @@ int flood(const std::string& endpoint, int count) {
   while (answered < count) {
     for (; sent < count && sent - answered < kUnderWay; ++sent) {
       v1::ControlRequest request;
-      request.mutable_set_alpha()->set_stream("walker");
-      request.mutable_set_alpha()->set_alpha(sent % 2 == 0 ? 0.25F : 0.75F);
+      request.mutable_set_parameter()->set_stream("walker");
+      request.mutable_set_parameter()->set_name("alpha");
+      request.mutable_set_parameter()->set_number(sent % 2 == 0 ? 0.25F : 0.75F);
       if (!net::send_part(socket.get(), request.SerializeAsString(), false)) break;
     }
     net::Message reply;

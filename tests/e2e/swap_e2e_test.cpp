@@ -102,8 +102,10 @@ v1::ControlRequest random_change(std::mt19937& random, const std::array<std::str
     part.set_bytes(model);  // small enough for one piece
     return request;
   }
-  request.mutable_set_alpha()->set_stream("walker");
-  request.mutable_set_alpha()->set_alpha(std::uniform_real_distribution<float>(-2, 2)(random));
+  request.mutable_set_parameter()->set_stream("walker");
+  request.mutable_set_parameter()->set_name("alpha");
+  request.mutable_set_parameter()->set_number(
+      std::uniform_real_distribution<double>(-2, 2)(random));
   return request;
 }
 

@@ -1,6 +1,5 @@
 // Any bytes as a control message, models and plays included: the result is a reply with an error
 // message, or a well-formed command; nothing crashes, hangs or leaks.
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <vector>
@@ -8,6 +7,8 @@
 #include "daemon/control/request_handler.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
+#include "tests/fuzz/check_command.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -17,7 +18,7 @@ using namespace posed;
 
 // What the pipeline assumes about a play command.
 void check_play(const pipeline::Command& command) {
-  const auto& play = command.play;
+  const auto play = command.command.as<gesture::PlayOrder>();
   if (command.stream != 1 || play.size == 0 || play.size > play.label.size()) std::abort();
   if (!(play.tempo >= 0.5F && play.tempo <= 2.0F)) std::abort();
 }
@@ -25,8 +26,11 @@ void check_play(const pipeline::Command& command) {
 class DaemonControl final : public control::DaemonControl {
  public:
   bool send(const pipeline::Command& command) override {
-    if (!(std::abs(command.alpha) <= 2.0F)) std::abort();
-    if (command.kind == pipeline::Command::Kind::kPlay) check_play(command);
+    fuzz::check_command(command);
+    if (command.change.kind == pipeline::StageChange::Kind::kCommand &&
+        command.change.index == generate::GenerateStage::kPlay) {
+      check_play(command);
+    }
     acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
     return true;
   }
@@ -51,13 +55,14 @@ std::vector<control::ControlledStream> two_streams() {
   std::vector<control::ControlledStream> streams(2);
   streams[1].name = "h";
   streams[1].skeleton = std::make_shared<const Skeleton>(hand_skeleton(Side::kRight));
-  streams[1].rate_hz = 30.0;
-  streams[1].generates = true;
-  streams[1].gesture =
-      generate::bind_model(test::toy_gesture_model(), *streams[1].skeleton, 30.0, "toy").value();
+  streams[1].settings.rate_hz = 30.0;
+  streams[1].settings.stages.push_back(pipeline::stage_settings(generate::generate_type()));
+  streams[1].models.push_back(
+      generate::bind_model(test::toy_gesture_model(), *streams[1].skeleton, 30.0, "toy").value());
   streams[0].name = "w";
   streams[0].skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
-  streams[0].style.emplace();
+  streams[0].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  streams[0].models.resize(1);
   return streams;
 }
 

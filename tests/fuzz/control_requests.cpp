@@ -2,7 +2,6 @@
 // come out of order or state absurd sizes, models with a right checksum and wrong numbers, plays,
 // calibrations with lines of TOML exchanged. Several clients at once.
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
@@ -17,7 +16,9 @@
 #include "posed/v1/control.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/digest.hpp"
+#include "tests/fuzz/check_command.hpp"
 #include "tests/fuzz/model_envelope.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -34,7 +35,7 @@ void demand(bool holds) {
 class DaemonControl final : public control::DaemonControl {
  public:
   bool send(const pipeline::Command& command) override {
-    demand(std::abs(command.alpha) <= 2.0F);
+    fuzz::check_command(command);
     acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
     return true;
   }
@@ -58,11 +59,13 @@ std::vector<control::ControlledStream> three_streams() {
   std::vector<control::ControlledStream> streams(3);
   streams[0].name = "w";
   streams[0].skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
-  streams[0].style.emplace();
+  streams[0].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  streams[0].models.resize(1);
   streams[1].name = "h";
   streams[1].skeleton = std::make_shared<const Skeleton>(hand_skeleton(Side::kRight));
-  streams[1].rate_hz = 30.0;
-  streams[1].generates = true;
+  streams[1].settings.rate_hz = 30.0;
+  streams[1].settings.stages.push_back(pipeline::stage_settings(generate::generate_type()));
+  streams[1].models.resize(1);
   streams[2].name = "g";
   streams[2].skeleton = streams[1].skeleton;
   const drivers::Driver* glove = drivers::find_driver("lucidgloves");
@@ -164,15 +167,26 @@ void send_other(FuzzedDataProvider& data, Fixture& fixture, const std::string& c
       request.mutable_calibrate()->set_name(data.ConsumeRandomLengthString(10));
       break;
     case 1:
-      request.mutable_set_alpha()->set_stream(stream_name(data));
-      request.mutable_set_alpha()->set_alpha(data.ConsumeFloatingPoint<float>());
+      request.mutable_set_parameter()->set_stream(stream_name(data));
+      request.mutable_set_parameter()->set_name(data.PickValueInArray(
+          {"alpha", "style.alpha", "style.gate", "calibrate", "lag_ms", "generate.labels", "."}));
+      if (data.ConsumeBool()) {
+        request.mutable_set_parameter()->set_number(data.ConsumeFloatingPoint<double>());
+      } else {
+        request.mutable_set_parameter()->set_flag(data.ConsumeBool());
+      }
       break;
     case 2:
-      request.mutable_play()->set_stream(stream_name(data));
+      request.mutable_stage_command()->set_stream(stream_name(data));
+      request.mutable_stage_command()->set_name(
+          data.PickValueInArray({"play", "generate.play", "stop-playing", "style.play", "x"}));
       for (int i = data.ConsumeIntegralInRange(0, 300); i > 0; --i) {
-        request.mutable_play()->add_label(data.PickValueInArray({"a", "b", "rest", "\x1b"}));
+        request.mutable_stage_command()->add_word(
+            data.PickValueInArray({"a", "b", "rest", "\x1b"}));
       }
-      request.mutable_play()->set_tempo(data.ConsumeFloatingPoint<float>());
+      (*request.mutable_stage_command()
+            ->mutable_number())[data.PickValueInArray({"tempo", "loop", "\x1b"})] =
+          data.ConsumeFloatingPoint<double>();
       break;
     default:
       request.mutable_haptics()->set_stream(stream_name(data));

@@ -19,6 +19,7 @@
 #include "proto/clip/hand_clip.hpp"
 #include "tests/rt/contract.hpp"
 #include "tests/rt/rig.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -97,8 +98,8 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   forget_breaches();
   rig.start();
   REQUIRE(rig.take_frames(200) == 200);
-  rig.command({.kind = Command::Kind::kAlpha, .stream = 0, .ticket = 1, .alpha = 0.5F});
-  rig.command({.kind = Command::Kind::kModel, .stream = 0, .ticket = 2, .model = second.get()});
+  rig.command(test::alpha_command(0, 0.5, 1));
+  rig.command(test::model_command(0, style::style_type(), second.get(), 2));
   REQUIRE(rig.take_frames(200) == 200);
   CHECK(rig.take_acks() == 2);
   CHECK(record_sink.chunks > 0);
@@ -138,11 +139,11 @@ TEST_CASE("hands keep the real-time contract: smoothed, constrained, performing,
   rig.start();
   REQUIRE(rig.take_frames(150) == 150);
   for (std::uint32_t i = 0; i < 3; ++i) {
-    rig.command({.kind = Command::Kind::kPlay, .stream = i, .ticket = 1 + i, .play = order});
+    rig.command(test::play_command(i, order, 1 + i));
   }
   REQUIRE(rig.take_frames(150) == 150);
-  rig.command({.kind = Command::Kind::kGesture, .stream = 0, .ticket = 4, .gesture = another});
-  rig.command({.kind = Command::Kind::kStopPlaying, .stream = 1, .ticket = 5});
+  rig.command(test::model_command(0, generate::generate_type(), another, 4));
+  rig.command(test::stop_playing_command(1, 5));
   REQUIRE(rig.take_frames(150) == 150);
   CHECK(rig.take_acks() == 5);
   check_no_breach();

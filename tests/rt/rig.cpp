@@ -1,4 +1,5 @@
 #include "tests/rt/rig.hpp"
+#include "tests/support/stage_commands.hpp"
 
 #include <chrono>
 
@@ -28,18 +29,19 @@ Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
   for (std::uint32_t i = 0; i < streams_.size(); ++i) {
     RigStream& stream = streams_[i];
     counters_.push_back(std::make_unique<pipeline::StreamCounters>());
-    pipeline::EngineOptions options{.stream = i,
-                                    .stale_after_ns = 50'000'000,
-                                    .publish_raw = true,
-                                    .style = std::nullopt,
-                                    .model = stream.style,
-                                    .gesture = stream.gesture,
-                                    .constrain = stream.gesture != nullptr,
-                                    .rate_hz = stream.device.description.rate_hz,
-                                    .skeleton = stream.device.description.skeleton};
-    if (stream.style != nullptr) options.style.emplace();
-    if (stream.gesture != nullptr) options.generate.emplace();
-    worker_->add(options, stream.device.description.rate_hz, *counters_.back());
+    pipeline::EngineOptions options{.stream = i, .stale_after_ns = 50'000'000, .publish_raw = true};
+    const drivers::Description& device = stream.device.description;
+    if (stream.style != nullptr) options.stages.push_back(test::style_stage(stream.style));
+    if (stream.gesture != nullptr) {
+      const StageContext context{.skeleton = device.skeleton, .rate_hz = device.rate_hz};
+      options.stages.push_back({&generate::generate_type(),
+                                std::make_unique<generate::GenerateStage>(
+                                    device.skeleton, smooth::LiveOptions{},
+                                    generate::stream_rate_hz(device.rate_hz), stream.gesture)});
+      options.stages.push_back(
+          {&hand::constrain_type(), hand::constrain_type().make(context, nullptr).value()});
+    }
+    worker_->add(std::move(options), stream.device.description.rate_hz, *counters_.back());
     reader_->add(
         {.device = &stream.device, .counters = counters_.back().get(), .slot = stream.slot});
   }

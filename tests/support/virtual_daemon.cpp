@@ -6,16 +6,14 @@
 
 #include <catch2/catch.hpp>
 
+#include "daemon/control/stage_requests.hpp"
 #include "daemon/devices/calibration.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/record/recorder.hpp"
-#include "models/generate/bound_model.hpp"
-#include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
-#include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/digest.hpp"
+#include "tests/support/stage_commands.hpp"
 
 namespace posed::test {
 namespace {
@@ -73,22 +71,15 @@ struct VirtualStreamContext {
     stream.settings.rate_hz = stream.description.rate_hz;
   }
 
-  const style::BoundModel* bind_style(const std::string& bytes) {
-    const auto model = style::parse_model(bytes_of(bytes), "virtual.style");
-    REQUIRE(model);
-    styles.push_back(
-        style::bind_model(*model, *stream.description.skeleton, *stream.settings.style, "virtual")
-            .value());
-    return styles.back().get();
-  }
-  const generate::BoundModel* bind_gesture(const std::string& bytes) {
-    auto model = gesture::parse_model(bytes_of(bytes), "virtual.gesture");
-    REQUIRE(model);
-    const drivers::Description& description = stream.description;
-    gestures.push_back(generate::bind_model(std::move(*model), *description.skeleton,
-                                            description.rate_hz, "virtual")
-                           .value());
-    return gestures.back().get();
+  // The file, bound to stage number `stage`.
+  const StageModel* bind(std::size_t stage, const std::string& bytes) {
+    const StageType& type = *stream.settings.stages[stage].type;
+    auto bound = type.bind_model(
+        bytes_of(bytes),
+        pipeline::stage_context(stream.settings, stage, stream.description.skeleton), "virtual");
+    REQUIRE(bound);
+    models.push_back(std::move(*bound));
+    return models.back().get();
   }
   const drivers::glove::OwnedCalibration* compile(const std::string& toml) {
     auto compiled = devices::compile_calibration(stream.description, toml, "virtual.toml");
@@ -121,8 +112,7 @@ struct VirtualStreamContext {
   pipeline::DeviceSlot slot;
   std::unique_ptr<drivers::Device> device;  // of the link in use
   std::size_t next_link = 0;
-  std::vector<std::unique_ptr<const style::BoundModel>> styles;
-  std::vector<std::unique_ptr<const generate::BoundModel>> gestures;
+  std::vector<std::unique_ptr<const StageModel>> models;
   std::vector<std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
   publish::FrameEncoder styled, raw;
   VirtualDaemon::Published published;
@@ -184,7 +174,6 @@ void VirtualDaemon::Parts::open_log() {
   std::vector<record::RecordedStream> streams;
   for (const auto& context : contexts) {
     const VirtualStream& stream = context->stream;
-    const auto style = bytes_of(stream.style_model), gesture = bytes_of(stream.gesture_model);
     streams.push_back({.source = {.id = 0,
                                   .name = stream.name,
                                   .driver = stream.description.driver,
@@ -192,8 +181,7 @@ void VirtualDaemon::Parts::open_log() {
                                   .identity = stream.description.identity,
                                   .config = "{}"},
                        .settings = stream.settings,
-                       .style = {style.begin(), style.end()},
-                       .gesture = {gesture.begin(), gesture.end()}});
+                       .model_files = stream.model_files});
   }
   record::RecorderOptions recorder;
   recorder.file = options.log;
@@ -208,19 +196,15 @@ void VirtualDaemon::Parts::open_log() {
 
 pipeline::EngineOptions VirtualDaemon::Parts::engine_of(VirtualStreamContext& context) const {
   const VirtualStream& stream = context.stream;
-  const record::StreamSettings& settings = stream.settings;
-  pipeline::EngineOptions engine;
-  engine.stream = context.id;
-  engine.stale_after_ns = nanoseconds(settings.stale_after_s);
-  engine.publish_raw = settings.publish_raw;
-  engine.style = settings.style;
-  engine.generate = settings.generate;
-  engine.constrain = settings.constrain;
-  engine.rate_hz = stream.description.rate_hz;
-  engine.skeleton = stream.description.skeleton;
-  if (!stream.style_model.empty()) engine.model = context.bind_style(stream.style_model);
-  if (!stream.gesture_model.empty()) engine.gesture = context.bind_gesture(stream.gesture_model);
-  return engine;
+  std::vector<const StageModel*> models;
+  for (std::size_t i = 0; i < stream.settings.stages.size(); ++i) {
+    const std::string& file = stream.model_files[i];
+    models.push_back(file.empty() ? nullptr : context.bind(i, file));
+  }
+  auto engine =
+      pipeline::engine_options(context.id, stream.settings, stream.description.skeleton, models);
+  REQUIRE(engine);
+  return std::move(*engine);
 }
 
 void VirtualDaemon::Parts::open() {
@@ -375,38 +359,35 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
                                    .calibration = context.compile(wanted.bytes)}));
     return reader->call();
   }
-  pipeline::Command command{.stream = wanted.stream, .ticket = ticket, .alpha = wanted.alpha};
-  const auto keep = [&] {
-    const std::string hash = log::sha256_hex(bytes_of(wanted.bytes));
-    hash.copy(command.model_hash.data(), hash.size());
-    if (record_sink) record_sink->keep_model(bytes_of(wanted.bytes));
-  };
+  pipeline::Command command;
   switch (wanted.kind) {
-    case Kind::kModel:
-      command.kind = pipeline::Command::Kind::kModel;
-      command.model = context.bind_style(wanted.bytes);
-      keep();
+    case Kind::kModel: {
+      const auto stage =
+          control::stage_for_model(context.stream.settings, bytes_of(wanted.bytes), "virtual");
+      REQUIRE(stage);
+      command = model_command(wanted.stream, *context.stream.settings.stages[*stage].type,
+                              context.bind(*stage, wanted.bytes));
+      const std::string hash = log::sha256_hex(bytes_of(wanted.bytes));
+      hash.copy(command.model_hash.data(), hash.size());
+      if (record_sink) record_sink->keep_model(bytes_of(wanted.bytes));
       break;
-    case Kind::kGesture:
-      command.kind = pipeline::Command::Kind::kGesture;
-      command.gesture = context.bind_gesture(wanted.bytes);
-      keep();
-      break;
+    }
     case Kind::kPlay: {
-      command.kind = pipeline::Command::Kind::kPlay;
-      const auto order =
-          gesture::make_play_order(context.gestures.back()->gesture(),
-                                   gesture::split_labels(wanted.labels), 1.0, wanted.loop);
+      const auto* gestures = static_cast<const generate::BoundModel*>(context.models.back().get());
+      const auto order = gesture::make_play_order(
+          gestures->gesture(), gesture::split_labels(wanted.labels), 1.0, wanted.loop);
       REQUIRE(order);
-      command.play = *order;
+      command = play_command(wanted.stream, *order);
       break;
     }
     case Kind::kStopPlaying:
-      command.kind = pipeline::Command::Kind::kStopPlaying;
+      command = stop_playing_command(wanted.stream);
       break;
     default:
+      command = alpha_command(wanted.stream, wanted.alpha);
       break;
   }
+  command.ticket = ticket;
   REQUIRE(commands->push(command));
 }
 

@@ -51,23 +51,22 @@ struct ScriptedLink {
 // A stream and everything that it needs; made by the functions below or by hand.
 struct VirtualStream {
   std::string name;
-  drivers::Description description;  // of a driver in the registry
-  record::StreamSettings settings;   // rate_hz and the models are set by the VirtualDaemon
-  std::string style_model;           // bytes of a model file; empty: none
-  std::string gesture_model;         // bytes of a model file; empty: none
-  std::string calibration;           // TOML; empty: the device's default
+  drivers::Description description;      // of a driver in the registry
+  record::StreamSettings settings;       // rate_hz and the models are set by the VirtualDaemon
+  std::vector<std::string> model_files;  // one for each stage: bytes of its model file, or empty
+  std::string calibration;               // TOML; empty: the device's default
   std::vector<ScriptedLink> links;
   std::size_t slots = 64;  // how many slots of each ring the stream may fill
 };
 
 // A command that a client sends during the run.
 struct VirtualCommand {
-  enum class Kind : std::uint8_t { kAlpha, kModel, kGesture, kPlay, kStopPlaying, kCalibrate };
+  enum class Kind : std::uint8_t { kAlpha, kModel, kPlay, kStopPlaying, kCalibrate };
   double at_s = 0.0;
   std::uint32_t stream = 0;
   Kind kind = Kind::kAlpha;
   float alpha = 0.0F;
-  std::string bytes{};   // kModel, kGesture: a model file; kCalibrate: TOML
+  std::string bytes{};   // kModel: a model file, for the stage that takes it; kCalibrate: TOML
   std::string labels{};  // kPlay: names of labels
   bool loop = false;     // kPlay
 };

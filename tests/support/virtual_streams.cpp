@@ -13,6 +13,7 @@
 #include "models/style/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/text_clip.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/virtual_daemon.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
@@ -49,9 +50,9 @@ VirtualStream walking_stream(const std::string& name, double length_s, unsigned 
   stream.name = name;
   stream.description = drivers::find_driver("file")->describe((*walk)->description, "walk").value();
   stream.settings.publish_raw = true;
-  stream.settings.style.emplace();
-  stream.settings.generate.emplace();
-  stream.style_model = style::serialize_model(toy_model(style_seed));
+  stream.settings.stages = {pipeline::stage_settings(style::style_type()),
+                            pipeline::stage_settings(generate::generate_type())};
+  stream.model_files = {style::serialize_model(toy_model(style_seed)), ""};
   stream.links.emplace_back();
   for (std::size_t i = 0; i < (*walk)->frames.size(); ++i) {
     stream.links[0].chunks.push_back({.at_s = static_cast<double>(i) / kWalkRate_hz,
@@ -65,10 +66,10 @@ VirtualStream glove_stream(const std::string& name, double length_s) {
   VirtualStream stream;
   stream.name = name;
   stream.description = driver.expect({}).value();
-  stream.settings.generate.emplace();
-  stream.settings.generate->lag.frames = 2;
-  stream.settings.constrain = true;
-  stream.gesture_model = gesture::serialize_model(toy_gesture_model());
+  stream.settings.stages = {
+      pipeline::stage_settings(generate::generate_type(), {{"lag_frames", std::int64_t{2}}}),
+      pipeline::stage_settings(hand::constrain_type())};
+  stream.model_files = {gesture::serialize_model(toy_gesture_model()), ""};
   stream.links.emplace_back();
   const auto glove = driver.emulate(drivers::complete_options(driver, {}).value()).value();
   using drivers::glove::Pose;

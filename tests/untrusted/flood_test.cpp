@@ -155,7 +155,8 @@ TEST_CASE("requests with invalid texts do not flood the log") {
   Target target;
   target.start();
   v1::ControlRequest request;
-  request.mutable_set_alpha()->set_stream("walker");
+  request.mutable_set_parameter()->set_stream("walker");
+  request.mutable_set_parameter()->set_name("alpha");
   std::string damaged = request.SerializeAsString();
   damaged[damaged.find("walker")] = '\xff';
   const RawPeer peer(target.control);

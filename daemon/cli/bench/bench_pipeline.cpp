@@ -26,6 +26,7 @@
 #include "models/gp/synthetic.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_model.hpp"
+#include "models/style/style_type.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -118,9 +119,11 @@ Result<config::DaemonConfig> make_config(const HopOptions& options, const WorkFo
     stream.driver = "file";
     stream.options = {{"path", (folder / "walker.bvh").string()}};
     stream.stale_after_s = 3.0;  // each gets its turn every other second
-    stream.style.emplace();
-    stream.style->model = folder / "model.style";
-    stream.style->filter.gate = options.gate;
+    const StageType& type = style::style_type();
+    stream.stages.push_back(
+        {.type = &type,
+         .parameters = *complete_parameters(type.parameters, {{"gate", options.gate}}),
+         .model = folder / "model.style"});
     config.streams.push_back(std::move(stream));
   }
   return config;

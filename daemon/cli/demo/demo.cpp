@@ -202,8 +202,10 @@ Result<std::filesystem::path> folder_of(const DemoOptions& options) {
   const auto config = config::load_config(options.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
   for (const config::StreamConfig& stream : config->streams) {
-    if (!stream.style || stream.style->model.filename() != kDemoModel) continue;
-    return std::filesystem::absolute(stream.style->model).lexically_normal().parent_path();
+    for (const config::StageConfig& stage : stream.stages) {
+      if (stage.model.filename() != kDemoModel) continue;
+      return std::filesystem::absolute(stage.model).lexically_normal().parent_path();
+    }
   }
   return misuse("no stream has the demo's model, " + std::string(kDemoModel) +
                     "; `posed run --config` streams any other config",

@@ -52,9 +52,10 @@ Result<> DemoHand::tend(double seconds) {
   if (frames_ > 0 && seconds >= next_play_s_) {
     next_play_s_ += kAgainAfter_s;
     v1::ControlRequest request;
-    auto& wanted = *request.mutable_play();
+    auto& wanted = *request.mutable_stage_command();
     wanted.set_stream(kDemoHandStream);
-    for (const char* label : kLabels) wanted.add_label(label);
+    wanted.set_name("play");
+    for (const char* label : kLabels) wanted.add_word(label);
     if (!net::send_part(connection_.socket(), request.SerializeAsString(), false)) {
       return fail("the demo's own play command cannot be sent");
     }

@@ -24,16 +24,29 @@ struct CheckOptions {
   bool json = false;
 };
 
+// The stage with its model and parameters, in the names and units of the config.
+ordered_json summary_of(const pipeline::StageSettings& stage) {
+  ordered_json summary{{"stage", stage.type->name}};
+  if (!stage.model_name.empty()) summary["model"] = stage.model_name;
+  for (const ParameterSpec& spec : stage.type->parameters) {
+    const ParameterValue& value = stage.parameters.at(std::string(spec.name));
+    ordered_json& shown = summary[std::string(spec.shown_name())];
+    std::visit([&](const auto& it) { shown = it; }, value);
+    if (std::holds_alternative<double>(value)) shown = std::get<double>(value) * spec.people_scale;
+  }
+  return summary;
+}
+
 // A description of what one stream would run, made with its device opened and its model bound.
 Result<ordered_json> try_stream(const config::StreamConfig& config) {
   const auto stream = devices::open_stream(config);
   if (!stream) return std::unexpected(stream.error());
   const auto missing = devices::try_kept_device(**stream);
   if (!missing) return std::unexpected(missing.error());
-  const auto bound = devices::bind_style(**stream);
+  const auto bound = devices::bind_stages(**stream);
   if (!bound) return std::unexpected(bound.error());
-  const auto gesture = devices::bind_gesture(**stream);
-  if (!gesture) return std::unexpected(gesture.error());
+  const auto engine = devices::make_engine(0, **stream, *bound);
+  if (!engine) return std::unexpected(engine.error());
   const drivers::Description& device = (*stream)->device.description;
   ordered_json summary{{"name", config.name},
                        {"driver", config.driver},
@@ -43,16 +56,10 @@ Result<ordered_json> try_stream(const config::StreamConfig& config) {
                        {"sample_values", device.samples.names.size()},
                        {"publish_raw", config.publish_raw},
                        {"stale_after_s", config.stale_after_s}};
-  if (*bound) {
-    summary["model"] = (*bound)->name;
-    summary["alpha"] = config.style->filter.alpha;
+  summary["stages"] = ordered_json::array();
+  for (const pipeline::StageSettings& stage : (*stream)->settings.stages) {
+    summary["stages"].push_back(summary_of(stage));
   }
-  if (config.generate) {
-    summary["lag_frames"] = smooth::lag_frames(config.generate->live.lag,
-                                               1.0 / generate::stream_rate_hz(device.rate_hz));
-    if (gesture->model) summary["gesture_model"] = gesture->model->name;
-  }
-  summary["constrain"] = (*stream)->settings.constrain;
   summary["present"] = missing->empty();
   summary["warnings"] = (*stream)->device.warnings;
   if (!missing->empty()) {
@@ -76,17 +83,16 @@ void print(const config::DaemonConfig& config, const ordered_json& streams) {
                 stream["driver"].get<std::string>().c_str(),
                 stream["present"].get<bool>() ? " " : " (away)", device.c_str(),
                 stream["rate_hz"].get<double>(), stream["joints"].get<int>());
-    if (stream.contains("model")) {
-      std::printf(", style %s at alpha %g", stream["model"].get<std::string>().c_str(),
-                  stream["alpha"].get<double>());
+    for (const ordered_json& stage : stream["stages"]) {
+      std::printf(", %s", stage["stage"].get<std::string>().c_str());
+      if (stage.contains("model")) {
+        std::printf(" %s", clean(stage["model"].get<std::string>()).c_str());
+      }
+      if (stage.contains("alpha")) std::printf(" at alpha %g", stage["alpha"].get<double>());
+      if (stage.contains("lag_frames")) {
+        std::printf(" with a lag of %d frames", stage["lag_frames"].get<int>());
+      }
     }
-    if (stream.contains("lag_frames")) {
-      std::printf(", generated with a lag of %d frames", stream["lag_frames"].get<int>());
-    }
-    if (stream.contains("gesture_model")) {
-      std::printf(" and %s", stream["gesture_model"].get<std::string>().c_str());
-    }
-    if (stream["constrain"].get<bool>()) std::printf(", fingers held apart");
     std::puts(stream["publish_raw"].get<bool>() ? ", raw input too" : "");
     for (const auto& warning : stream["warnings"]) {
       std::printf("  note: %s\n", clean(warning.get<std::string>()).c_str());

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -21,9 +22,12 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
+#include "models/stages/registry.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
+#include "proto/text/nearest_word.hpp"
 
 namespace posed::cli {
 namespace {
@@ -32,12 +36,11 @@ struct CtlOptions {
   ClientOptions client;
   double timeout_s = 5.0;
   bool json = false;
-  std::string stream, parameter;
-  float value = 0.0F;
+  std::string stream, parameter, value;
   std::filesystem::path model, calibration;
   std::vector<float> force, vibration;
   std::string labels;
-  float tempo = 1.0F;
+  double tempo = 1.0;
   bool loop = false;
 };
 
@@ -122,11 +125,45 @@ int change(const CtlOptions& options, const v1::ControlRequest& request, const s
   return show_change(options, ask(options, request), what);
 }
 
+ParameterValue value_of_text(const std::string& text) {
+  double number = 0.0;
+  if (CLI::detail::lexical_cast(text, number)) return number;
+  if (text == "true" || text == "false") return text == "true";
+  return text;
+}
+
+// What this posed knows to be wrong, without asking the daemon: it alone knows the stream's stages.
+Result<> check_parameter(const std::string& name, const ParameterValue& value) {
+  std::set<std::string> known;
+  for (const StageType* stage : stage_types()) {
+    for (const ParameterSpec& spec : stage->parameters) {
+      const std::string alone(spec.shown_name());
+      const std::string whole = fmt::format("{}.{}", stage->name, alone);
+      if (name == alone || name == whole) {
+        const auto checked = from_people(spec, value, name);
+        return checked ? Result<>() : std::unexpected(checked.error());
+      }
+      known.insert({alone, whole});
+    }
+  }
+  const std::string near = nearest(name, known);
+  return misuse(fmt::format("there is no parameter {}{}; `posed ctl set --help` lists them",
+                            in_quotes(name), near.empty() ? "" : ", only " + near));
+}
+
 int set_parameter(const CtlOptions& options) {
+  const ParameterValue value = value_of_text(options.value);
+  if (const auto sound = check_parameter(options.parameter, value); !sound) {
+    return report(sound.error());
+  }
   v1::ControlRequest request;
-  request.mutable_set_alpha()->set_stream(options.stream);
-  request.mutable_set_alpha()->set_alpha(options.value);
-  return change(options, request, fmt::format("alpha {:.2f}", options.value));
+  auto& wanted = *request.mutable_set_parameter();
+  wanted.set_stream(options.stream);
+  wanted.set_name(options.parameter);
+  if (const auto* number = std::get_if<double>(&value)) wanted.set_number(*number);
+  if (const auto* flag = std::get_if<bool>(&value)) wanted.set_flag(*flag);
+  if (const auto* text = std::get_if<std::string>(&value)) wanted.set_text(*text);
+  return change(options, request, options.parameter + " " + options.value);
 }
 
 int send_model(const CtlOptions& options) {
@@ -140,19 +177,21 @@ int send_model(const CtlOptions& options) {
 
 int play(const CtlOptions& options) {
   v1::ControlRequest request;
-  auto& wanted = *request.mutable_play();
+  auto& wanted = *request.mutable_stage_command();
   wanted.set_stream(options.stream);
+  wanted.set_name("play");
   for (std::string& label : gesture::split_labels(options.labels)) {
-    wanted.add_label(std::move(label));
+    wanted.add_word(std::move(label));
   }
-  wanted.set_tempo(options.tempo);
-  wanted.set_loop(options.loop);
+  (*wanted.mutable_number())["tempo"] = options.tempo;
+  (*wanted.mutable_number())["loop"] = options.loop ? 1.0 : 0.0;
   return change(options, request, "performs " + options.labels + " (after those that wait)");
 }
 
 int stop_playing(const CtlOptions& options) {
   v1::ControlRequest request;
-  request.mutable_stop_playing()->set_stream(options.stream);
+  request.mutable_stage_command()->set_stream(options.stream);
+  request.mutable_stage_command()->set_name("stop-playing");
   return change(options, request, "performs no more");
 }
 
@@ -250,15 +289,36 @@ class Actions {
   int& exit_code_;
 };
 
+// "  style.alpha   -2 to 2   how much style", a line each.
+std::string live_parameters() {
+  std::string lines;
+  for (const StageType* stage : stage_types()) {
+    for (const ParameterSpec& spec : stage->parameters) {
+      if (!spec.live) continue;
+      const bool flag = std::holds_alternative<bool>(spec.default_value);
+      const std::string range = flag ? "true or false"
+                                     : fmt::format("{:g} to {:g}", spec.min * spec.people_scale,
+                                                   spec.max * spec.people_scale);
+      lines += fmt::format("  {:<26} {:<14} {}\n",
+                           fmt::format("{}.{}", stage->name, spec.shown_name()), range, spec.help);
+    }
+  }
+  return lines;
+}
+
 void add_style_actions(Actions& actions, CtlOptions& options) {
-  CLI::App* set = actions.add_for_stream("set", "Change a stream's parameter", set_parameter,
-                                         R"(Example:
-  posed ctl set walker alpha 0.5     # half the style; alpha moves there slowly
-alpha: 0 no style, 1 the style as trained, 2 twice as much, -1 the opposite.)");
-  set->add_option("parameter", options.parameter, "alpha: how much style")
-      ->required()
-      ->check(CLI::IsMember({"alpha"}));
-  set->add_option("value", options.value, "The new value, -2 to 2")->required();
+  CLI::App* set =
+      actions.add_for_stream("set", "Change a parameter of a stream's stages", set_parameter,
+                             "Examples:\n"
+                             "  posed ctl set walker alpha 0.5          # half the "
+                             "style; alpha moves there slowly\n"
+                             "  posed ctl set walker style.calibrate true\n"
+                             "Parameters that a running daemon can change:\n" +
+                                 live_parameters());
+  set->add_option("parameter", options.parameter,
+                  "STAGE.PARAMETER; the parameter alone where only one stage has it")
+      ->required();
+  set->add_option("value", options.value, "The new value, as in the config")->required();
   CLI::App* model = actions.add_for_stream("model", "Give a stream another style or gesture model",
                                            send_model, R"(Examples:
   posed ctl model walker march.style   # another style, from the next frame on

@@ -81,8 +81,7 @@ Result<> check_out(const RecordOptions& options, const config::DaemonConfig& con
   files.reads(options.serve.config).writes_any_but_other(options.out, {".plog"});
   for (const config::StreamConfig& stream : config.streams) {
     files.reads(stream.calibration);
-    if (stream.style) files.reads(stream.style->model);
-    if (stream.generate) files.reads(stream.generate->model);
+    for (const config::StageConfig& stage : stream.stages) files.reads(stage.model);
     if (const auto path = stream.options.find("path"); path != stream.options.end()) {
       if (const auto* clip = std::get_if<std::string>(&path->second)) files.reads(*clip);
     }

@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/net/keys.hpp"
+#include "models/stages/registry.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -60,7 +61,7 @@ TEST_CASE("a small config gets every default") {
   const auto& stream = reading.config.streams[0];
   CHECK(stream.name == "walker");
   CHECK(stream.driver == "file");
-  CHECK_FALSE(stream.style);
+  CHECK(stream.stages.empty());
   CHECK(std::get<std::string>(stream.options.at("path")) == "stage/walk.bvh");
   CHECK(std::get<bool>(stream.options.at("loop")) == false);
   CHECK(std::get<double>(stream.options.at("pace")) == 1.0);
@@ -118,25 +119,69 @@ driver = "glove"
   CHECK(std::get<bool>(a.options.at("loop")));
   CHECK(std::get<double>(a.options.at("pace")) == 0.0);
   CHECK(std::get<std::int64_t>(a.options.at("first")) == 7);
-  REQUIRE(a.style);
-  CHECK(a.style->model == "stage/walk.style");
-  CHECK(a.style->filter.alpha == -1.5);
-  CHECK(a.style->filter.alpha_slew_per_s == 4.0);
-  CHECK(a.style->filter.gate);
-  CHECK(a.style->filter.gate_fallback == 0.25);
-  CHECK(a.style->filter.calibrate);
   CHECK(config.streams[1].driver == "glove");
-  REQUIRE(a.generate);
-  CHECK(a.generate->live.lag.frames == 3);
-  CHECK(a.generate->live.lag.seconds == Approx(0.05));
-  CHECK(a.generate->live.noise_rad == Approx(0.0349065850));
-  CHECK(a.generate->model == "stage/hand.gesture");
-  CHECK(a.generate->labels == std::vector<std::string>{"g", "1"});
-  CHECK(a.generate->tempo == 1.5);
-  CHECK(a.generate->loop);
-  CHECK(a.constrain == false);
-  CHECK_FALSE(config.streams[1].generate);
-  CHECK_FALSE(config.streams[1].constrain);
+  REQUIRE(a.stages.size() == 2);
+  const StageConfig& style = a.stages[0];
+  CHECK(style.type->name == "style");
+  CHECK(style.model == "stage/walk.style");
+  CHECK(parameter<double>(style.parameters, "alpha") == -1.5);
+  CHECK(parameter<double>(style.parameters, "alpha_slew_per_s") == 4.0);
+  CHECK(parameter<bool>(style.parameters, "gate"));
+  CHECK(parameter<double>(style.parameters, "gate_fallback") == 0.25);
+  CHECK(parameter<bool>(style.parameters, "calibrate"));
+  const StageConfig& generate = a.stages[1];
+  CHECK(generate.type->name == "generate");
+  CHECK(generate.model == "stage/hand.gesture");
+  CHECK(parameter<std::int64_t>(generate.parameters, "lag_frames") == 3);
+  CHECK(parameter<double>(generate.parameters, "lag_s") == Approx(0.05));
+  CHECK(parameter<double>(generate.parameters, "noise_rad") == Approx(0.0349065850));
+  CHECK(parameter<std::string>(generate.parameters, "labels") == "g 1");
+  CHECK(parameter<double>(generate.parameters, "tempo") == 1.5);
+  CHECK(parameter<bool>(generate.parameters, "loop"));
+  REQUIRE(a.off.size() == 1);
+  CHECK(a.off[0]->name == "constrain");
+  CHECK(a.default_stages);
+  CHECK(config.streams[1].stages.empty());
+  CHECK(config.streams[1].off.empty());
+}
+
+TEST_CASE("stages run in the order that the config says") {
+  const Reading reading = read(std::string(kWalker) + R"([stream.style]
+model = "m"
+[[stream]]
+name = "b"
+driver = "glove"
+stages = ["constrain", "generate"]
+[stream.generate]
+lag_ms = 170
+)");
+  REQUIRE(reading.errors.empty());
+  const auto& stream = reading.config.streams[1];
+  CHECK_FALSE(stream.default_stages);
+  REQUIRE(stream.stages.size() == 2);
+  CHECK(stream.stages[0].type->name == "constrain");
+  CHECK(stream.stages[1].type->name == "generate");
+  CHECK(parameter<double>(stream.stages[1].parameters, "lag_s") == Approx(0.17));
+}
+
+TEST_CASE("a wrong list of stages is one sentence") {
+  const auto complaint_for = [](const std::string& list) {
+    return complaint("", "[[stream]]\nname = \"a\"\ndriver = \"glove\"\nstages = " + list +
+                             "\n[stream.constrain]\n");
+  };
+  CHECK(complaint_for("[\"constrain\", \"feat\"]").contains("there is no stage 'feat'"));
+  CHECK(complaint_for("[\"constrain\", \"constrain\"]").contains("in the list twice"));
+  CHECK(complaint_for("[\"generate\"]").contains("constrain is not in this list"));
+  CHECK(complaint_for("[\"style\", \"constrain\"]").contains("stage style needs a model"));
+  CHECK(complaint_for("1").contains("stages"));
+}
+
+TEST_CASE("stages and drivers have different names") {
+  for (const StageType* stage : stage_types()) {
+    CHECK(drivers::find_driver(stage->name) == nullptr);
+    CHECK_FALSE(stage->summary.empty());
+    for (const ParameterSpec& spec : stage->parameters) CHECK_FALSE(spec.help.empty());
+  }
 }
 
 TEST_CASE("each mistake is one sentence with file and line") {
@@ -177,7 +222,8 @@ TEST_CASE("the error for an unknown key names its table, or the known keys") {
 
 TEST_CASE("generate: lags, tempo and labels are checked") {
   const std::string table = "[stream.generate]\nmodel = \"m\"\n";
-  CHECK(complaint(table + "lag_frames = -1\n").find("0 to 170 frames") != std::string::npos);
+  CHECK(complaint(table + "lag_frames = -1\n").find("an integer of frames from 0 to 170") !=
+        std::string::npos);
   CHECK(complaint(table + "lag_frames = 0.5\n").find("must be an integer") != std::string::npos);
   CHECK(complaint(table + "lag_ms = 200\n").find("from 0 to 170") != std::string::npos);
   CHECK(complaint(table + "tempo = 3\n").find("from 0.5 to 2") != std::string::npos);
@@ -352,24 +398,12 @@ TEST_CASE("the shipped config contains every key with its default") {
   CHECK(a.streams[0].publish_raw == b.streams[0].publish_raw);
   CHECK(a.streams[0].stale_after_s == b.streams[0].stale_after_s);
   CHECK(a.streams[0].options == b.streams[0].options);
-  REQUIRE(b.streams[0].style);
-  const style::FilterOptions defaults;
-  const style::FilterOptions& written = b.streams[0].style->filter;
-  CHECK(written.alpha == defaults.alpha);
-  CHECK(written.alpha_slew_per_s == defaults.alpha_slew_per_s);
-  CHECK(written.gate == defaults.gate);
-  CHECK(written.gate_fallback == defaults.gate_fallback);
-  CHECK(written.calibrate == defaults.calibrate);
-  REQUIRE(b.streams[0].generate);
-  const config::GenerateConfig generate;
-  CHECK(b.streams[0].generate->live.lag.frames == generate.live.lag.frames);
-  CHECK(b.streams[0].generate->live.lag.seconds == generate.live.lag.seconds);
-  CHECK(b.streams[0].generate->live.noise_rad == generate.live.noise_rad);
-  CHECK(b.streams[0].generate->model == generate.model);
-  CHECK(b.streams[0].generate->labels == generate.labels);
-  CHECK(b.streams[0].generate->tempo == generate.tempo);
-  CHECK(b.streams[0].generate->loop == generate.loop);
-  CHECK(b.streams[0].constrain == true);
+  REQUIRE(b.streams[0].stages.size() == stage_types().size());
+  for (const StageConfig& stage : b.streams[0].stages) {
+    INFO(stage.type->name);
+    CHECK(stage.parameters == *complete_parameters(stage.type->parameters, {}));
+  }
+  CHECK(b.streams[0].off.empty());
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "daemon/net/keys.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -56,19 +57,22 @@ std::vector<ControlledStream> three_streams() {
   streams[0].name = "walker";
   streams[0].publishes_raw = true;
   streams[0].skeleton = skeleton;
-  streams[0].style.emplace();
+  streams[0].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  streams[0].models.resize(1);
   streams[1].name = "plain";
   streams[1].skeleton = skeleton;
   streams[2].name = "runner";
   streams[2].skeleton = skeleton;
-  streams[2].style.emplace();
+  streams[2].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  streams[2].models.resize(1);
   return streams;
 }
 
 v1::ControlRequest alpha_request(const std::string& stream, float alpha) {
   v1::ControlRequest request;
-  request.mutable_set_alpha()->set_stream(stream);
-  request.mutable_set_alpha()->set_alpha(alpha);
+  request.mutable_set_parameter()->set_stream(stream);
+  request.mutable_set_parameter()->set_name("alpha");
+  request.mutable_set_parameter()->set_number(alpha);
   return request;
 }
 
@@ -138,9 +142,10 @@ TEST_CASE("an alpha goes to its stream, and the reply comes when it took effect"
   Fixture fixture;
   CHECK_FALSE(fixture.ask(alpha_request("runner", -2.0F)));
   REQUIRE(fixture.daemon_control.sent.size() == 1);
-  CHECK(fixture.daemon_control.sent[0].kind == Command::Kind::kAlpha);
+  CHECK(fixture.daemon_control.sent[0].change.type == &style::style_type());
+  CHECK(fixture.daemon_control.sent[0].change.index == style::StyleFilter::kAlpha);
   CHECK(fixture.daemon_control.sent[0].stream == 2);
-  CHECK(fixture.daemon_control.sent[0].alpha == -2.0F);
+  CHECK(fixture.daemon_control.sent[0].change.value == -2.0);
   const auto reply = fixture.acknowledge(77);
   CHECK(reply.ok());
   CHECK(reply.stream() == "runner");
@@ -184,7 +189,8 @@ TEST_CASE("each refusal is a single sentence") {
   CHECK(has(fixture.refused(alpha_request("nobody", 0.0F)),
             "there is no stream 'nobody'; there is: walker, plain, runner"));
   CHECK(has(fixture.refused(alpha_request("walker-raw", 0.0F)), "before its stages"));
-  CHECK(has(fixture.refused(alpha_request("plain", 0.0F)), "plain has no style"));
+  CHECK(has(fixture.refused(alpha_request("plain", 0.0F)),
+            "stream plain: 'alpha' is a parameter of stage style, which the stream does not have"));
   for (const float alpha : {2.1F, -3.0F, NAN, INFINITY}) {
     CHECK(has(fixture.refused(alpha_request("walker", alpha)), "out of range"));
   }
@@ -203,6 +209,39 @@ TEST_CASE("each refusal is a single sentence") {
 
   fixture.daemon_control.full = true;
   CHECK(has(fixture.refused(alpha_request("walker", 0.0F)), "too many changes"));
+}
+
+TEST_CASE("any live parameter of any stage can be set, by its name or with the stage before it") {
+  Fixture fixture;
+  const auto ask = [&](const std::string& name, auto&& fill) {
+    v1::ControlRequest request;
+    request.mutable_set_parameter()->set_stream("walker");
+    request.mutable_set_parameter()->set_name(name);
+    fill(*request.mutable_set_parameter());
+    return request;
+  };
+  const auto number = [](double value) {
+    return [value](auto& wanted) { wanted.set_number(value); };
+  };
+  const auto flag = [](auto& wanted) { wanted.set_flag(true); };
+  const auto text = [](auto& wanted) { wanted.set_text("much"); };
+  CHECK_FALSE(fixture.ask(ask("style.alpha", number(0.5))));
+  CHECK_FALSE(fixture.ask(ask("style.calibrate", flag)));
+  CHECK(fixture.daemon_control.sent[0].change.index == style::StyleFilter::kAlpha);
+  CHECK(fixture.daemon_control.sent[1].change.index == style::StyleFilter::kCalibrate);
+  CHECK(fixture.daemon_control.sent[1].change.value == 1.0);
+  fixture.daemon_control.sent.clear();
+  CHECK(has(fixture.refused(ask("alpha", number(2.5))),
+            "alpha = 2.5 is out of range: it takes a number from -2 to 2"));
+  CHECK(has(fixture.refused(ask("alpha", flag)), "alpha must be a number, not true or false"));
+  CHECK(has(fixture.refused(ask("alpha", text)), "alpha must be a number, not text"));
+  CHECK(has(fixture.refused(ask("calibrate", number(1.0))), "calibrate must be true or false"));
+  CHECK(has(fixture.refused(ask("gate", flag)), "gate cannot change while the daemon runs"));
+  CHECK(has(fixture.refused(ask("lag_ms", number(1.0))), "[stream.generate] table"));
+  CHECK(has(fixture.refused(ask("beta", number(1.0))),
+            "there is no parameter 'beta'; there is: style.alpha"));
+  CHECK(has(fixture.refused(ask("feet.alpha", number(1.0))), "there is no parameter"));
+  CHECK(has(fixture.refused(ask("", number(1.0))), "there is no parameter ''"));
 }
 
 TEST_CASE("a refusal repeats an untrusted name cleaned and cut") {
@@ -227,7 +266,7 @@ TEST_CASE("a refusal repeats an untrusted name cleaned and cut") {
 TEST_CASE("requests are bounded in size and in number") {
   Fixture fixture;
   auto request = alpha_request("walker", 0.0F);
-  request.mutable_set_alpha()->set_stream(std::string(kMaxRequest, 'x'));
+  request.mutable_set_parameter()->set_stream(std::string(kMaxRequest, 'x'));
   CHECK(has(fixture.refused(request), "too large"));
   CHECK(has(fixture.refused(model_request("walker", std::string(kMaxPiece + 1, 'x'))),
             "a piece of a model has"));

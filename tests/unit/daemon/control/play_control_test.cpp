@@ -7,6 +7,7 @@
 #include "daemon/control/request_handler.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 
 namespace posed::control {
@@ -37,12 +38,14 @@ std::vector<ControlledStream> hands() {
   for (int i = 0; i < 3; ++i) {
     streams[i].name = names[i];
     streams[i].skeleton = skeleton;
-    streams[i].rate_hz = 60.0;
-    streams[i].generates = i < 2;
+    streams[i].settings.rate_hz = 60.0;
+    if (i == 2) continue;
+    streams[i].settings.stages.push_back(pipeline::stage_settings(generate::generate_type()));
+    streams[i].models.resize(1);
   }
   auto bound = generate::bind_model(test::toy_gesture_model(), *skeleton, 60.0, "toy.gesture");
   REQUIRE(bound);
-  streams[0].gesture = std::move(*bound);
+  streams[0].models[0] = std::move(*bound);
   return streams;
 }
 
@@ -65,10 +68,11 @@ struct PlayDesk {
 v1::ControlRequest play(const std::string& stream, const std::vector<std::string>& labels,
                         float tempo = 1.0F) {
   v1::ControlRequest request;
-  auto& wanted = *request.mutable_play();
+  auto& wanted = *request.mutable_stage_command();
   wanted.set_stream(stream);
-  for (const std::string& label : labels) wanted.add_label(label);
-  wanted.set_tempo(tempo);
+  wanted.set_name("play");
+  for (const std::string& label : labels) wanted.add_word(label);
+  (*wanted.mutable_number())["tempo"] = tempo;
   return request;
 }
 
@@ -82,30 +86,33 @@ bool says(const std::string& sentence, const std::string& part) {
 TEST_CASE("a play becomes label indices, tempo and loop for its stream") {
   PlayDesk fixture;
   auto request = play("hand", {"g", "1", "p"}, 1.5F);
-  request.mutable_play()->set_loop(true);
+  (*request.mutable_stage_command()->mutable_number())["loop"] = 1.0;
   CHECK(fixture.refusal(request).empty());
   REQUIRE(fixture.daemon_control.sent.size() == 1);
   const Command& command = fixture.daemon_control.sent.front();
-  CHECK(command.kind == Command::Kind::kPlay);
+  CHECK(command.change.kind == pipeline::StageChange::Kind::kCommand);
+  CHECK(command.change.index == generate::GenerateStage::kPlay);
   CHECK(command.stream == 0);
-  CHECK(command.play.loop);
-  CHECK(command.play.tempo == 1.5F);
+  const auto order = command.command.as<gesture::PlayOrder>();
+  CHECK(order.loop);
+  CHECK(order.tempo == 1.5F);
   const auto model = test::toy_gesture_model();
-  REQUIRE(command.play.size == 3);
-  CHECK(command.play.label[0] == model.label_index("g"));
-  CHECK(command.play.label[1] == model.label_index("1"));
-  CHECK(command.play.label[2] == model.label_index("p"));
+  REQUIRE(order.size == 3);
+  CHECK(order.label[0] == model.label_index("g"));
+  CHECK(order.label[1] == model.label_index("1"));
+  CHECK(order.label[2] == model.label_index("p"));
 
   v1::ControlRequest stop;
-  stop.mutable_stop_playing()->set_stream("hand");
+  stop.mutable_stage_command()->set_stream("hand");
+  stop.mutable_stage_command()->set_name("generate.stop-playing");
   CHECK(fixture.refusal(stop).empty());
-  CHECK(fixture.daemon_control.sent.back().kind == Command::Kind::kStopPlaying);
+  CHECK(fixture.daemon_control.sent.back().change.index == generate::GenerateStage::kStopPlaying);
 }
 
 TEST_CASE("an invalid play is refused with one sentence and reaches no stream") {
   PlayDesk fixture;
   CHECK(says(fixture.refusal(play("nobody", {"g"})), "nobody"));
-  CHECK(says(fixture.refusal(play("plain", {"g"})), "generate"));
+  CHECK(says(fixture.refusal(play("plain", {"g"})), "[stream.generate]"));
   CHECK(says(fixture.refusal(play("smooth", {"g"})), "model"));
   CHECK_FALSE(fixture.refusal(play("hand", {})).empty());
   const std::string unknown = fixture.refusal(play("hand", {"g", "wave"}));

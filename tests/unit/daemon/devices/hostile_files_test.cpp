@@ -8,6 +8,8 @@
 #include "daemon/devices/calibration.hpp"
 #include "daemon/devices/open_stream.hpp"
 #include "drivers/options.hpp"
+#include "models/generate/generate_type.hpp"
+#include "models/style/style_type.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/toml_bombs.hpp"
 
@@ -45,10 +47,10 @@ TEST_CASE("a model or calibration that is not a regular file is refused at once"
         {pipe, "this is a device or a pipe"}}) {
     INFO(path);
     auto styled = stream_of("labels");
-    styled.style.emplace().model = path;
+    styled.stages.push_back({.type = &style::style_type(), .model = path});
     CHECK_THAT(refusal(styled), Catch::Contains(sentence));
     auto generated = stream_of("labels");
-    generated.generate.emplace().model = path;
+    generated.stages.push_back({.type = &generate::generate_type(), .model = path});
     CHECK_THAT(refusal(generated), Catch::Contains(sentence));
     auto calibrated = stream_of("lucidgloves", {{"port", std::string("/dev/none")}});
     calibrated.calibration = path;

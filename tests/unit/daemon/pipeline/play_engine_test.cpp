@@ -8,6 +8,7 @@
 #include "daemon/pipeline/stream_engine.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 
 namespace posed::pipeline {
@@ -36,11 +37,11 @@ class Hand {
     EngineOptions options;
     options.stream = 1;
     options.stale_after_ns = 500 * kMs;
-    options.generate = smooth::LiveOptions{.lag = {.frames = 2}};
-    options.rate_hz = 50.0;
-    options.skeleton = skeleton_;
-    options.gesture = model.get();
-    engine.emplace(options);
+    options.stages.push_back(
+        {&generate::generate_type(),
+         std::make_unique<generate::GenerateStage>(
+             skeleton_, smooth::LiveOptions{.lag = {.frames = 2}}, 50.0, model.get())});
+    engine.emplace(std::move(options));
   }
 
   void frames(int count) {
@@ -58,11 +59,10 @@ class Hand {
   }
 
   Ack play(const std::string& labels, double tempo = 1.0) {
-    Command command{.kind = Command::Kind::kPlay, .stream = 1, .ticket = 7};
-    command.play =
+    const auto order =
         gesture::make_play_order(model->gesture(), gesture::split_labels(labels), tempo, false)
             .value();
-    return engine->apply(command, out);
+    return engine->apply(test::play_command(1, order, 7), out);
   }
 
   // Calls the ticks that are due during this time, as the worker does.
@@ -123,9 +123,10 @@ TEST_CASE("a play shows labels from the acknowledged frame on, and then the live
   CHECK_FALSE(ack.refused);
   CHECK(ack.sequence == 19);
   REQUIRE(hand.out.decisions.size() == 1);
-  CHECK(hand.out.decisions[0].kind == Decision::Kind::kPlay);
+  CHECK(test::is_change(hand.out.decisions[0], generate::generate_type(),
+                        StageChange::Kind::kCommand));
   CHECK(hand.out.decisions[0].sequence == 21);
-  CHECK(hand.out.decisions[0].play.size == 2);
+  CHECK(hand.out.decisions[0].command.as<gesture::PlayOrder>().size == 2);
   hand.frames(300);
   for (const Frame& frame : hand.out.frames) {
     const bool performed = frame.source == Source::kLabels;
@@ -173,7 +174,7 @@ TEST_CASE("the recorded ticks and plays give the same frames again") {
         again.engine->tick_now(decision.now_ns, again.out);
       } else {
         static_cast<void>(again.engine->apply(
-            {.kind = Command::Kind::kPlay, .stream = 1, .play = decision.play}, again.out));
+            {.change = decision.change, .stream = 1, .command = decision.command}, again.out));
       }
     }
   };

@@ -4,6 +4,7 @@
 
 #include "daemon/pipeline/stream_engine.hpp"
 #include "posed/v1/posed.pb.h"
+#include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::pipeline {
@@ -69,7 +70,7 @@ TEST_CASE("without a style stage frames pass unchanged") {
 TEST_CASE("the raw input goes out before the styled frame") {
   EngineOptions options = plain();
   options.publish_raw = true;
-  StreamEngine engine(options);
+  StreamEngine engine(std::move(options));
   Collected out;
   engine.on_frame(frame_at(1, 0), out);
   REQUIRE(out.items.size() == 3);
@@ -81,24 +82,23 @@ TEST_CASE("the event of a change names the old and the new value") {
   const auto model = test::toy_model(1);
   const auto skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
   EngineOptions options = plain();
-  options.style = style::FilterOptions{};
-  const auto one = style::bind_model(model, *skeleton, *options.style, "one.style").value();
-  const auto two = style::bind_model(model, *skeleton, *options.style, "two.style").value();
-  options.model = one.get();
-  StreamEngine engine(options);
+  const auto one = style::bind_model(model, *skeleton, {}, "one.style").value();
+  const auto two = style::bind_model(model, *skeleton, {}, "two.style").value();
+  options.stages.push_back(test::style_stage(one.get()));
+  StreamEngine engine(std::move(options));
   Collected out;
-  static_cast<void>(engine.apply({.kind = Command::Kind::kAlpha, .alpha = 0.5F}, out));
+  static_cast<void>(engine.apply(test::alpha_command(3, 0.5), out));
   REQUIRE(out.items.size() == 1);
   StreamEvent change = out.items[0].stream_event;
   CHECK(change.kind == v1::Event::KIND_CONTROL);
-  CHECK(change.change == Change::kAlpha);
-  CHECK(change.alpha_before == 1.0F);
-  CHECK(change.value == 0.5);
-  CHECK(engine.alpha_target() == 0.5F);
-  CHECK(engine.alpha() == 0.0F);  // alpha moves towards its target with the frames
-  static_cast<void>(engine.apply({.kind = Command::Kind::kModel, .model = two.get()}, out));
+  CHECK(change.change.index == style::StyleFilter::kAlpha);
+  CHECK(change.value_before == 1.0);
+  CHECK(change.change.value == 0.5);
+  CHECK(engine.live_parameter(0).target == 0.5);
+  CHECK(engine.live_parameter(0).now == 0.0);  // alpha moves towards its target with the frames
+  static_cast<void>(engine.apply(test::model_command(3, style::style_type(), two.get()), out));
   change = out.items[1].stream_event;
-  CHECK(change.change == Change::kStyleModel);
+  CHECK(change.change.kind == StageChange::Kind::kModel);
   CHECK(change.before.text() == "one.style");
   CHECK(change.after.text() == "two.style");
 }
@@ -177,9 +177,8 @@ TEST_CASE("alpha and model take effect at the next frame; the old model comes ba
   const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
   const auto second = style::bind_model(test::toy_model(2), skeleton, {}, "second").value();
   EngineOptions options = plain();
-  options.style.emplace();
-  options.model = first.get();
-  StreamEngine engine(options);
+  options.stages.push_back(test::style_stage(first.get()));
+  StreamEngine engine(std::move(options));
   const clip::Clip walk = test::toy_walk(10);
   Collected out;
   for (int i = 0; i < 5; ++i) {
@@ -187,18 +186,17 @@ TEST_CASE("alpha and model take effect at the next frame; the old model comes ba
     frame.header.sequence = static_cast<std::uint64_t>(i) + 1;
     engine.on_frame(frame, out);
   }
-  Command command{.kind = Command::Kind::kModel, .stream = 3, .ticket = 9, .model = second.get()};
-  const Ack swapped = engine.apply(command, out);
+  const Ack swapped =
+      engine.apply(test::model_command(3, style::style_type(), second.get(), 9), out);
   CHECK(swapped.ticket == 9);
   CHECK(swapped.sequence == 6);
-  CHECK(engine.model() == second.get());
-  command = {.kind = Command::Kind::kAlpha, .stream = 3, .ticket = 10, .alpha = 0.25F};
-  const Ack faded = engine.apply(command, out);
+  CHECK(engine.find(style::style_type())->model() == second.get());
+  const Ack faded = engine.apply(test::alpha_command(3, 0.25, 10), out);
   CHECK(faded.sequence == 6);
   REQUIRE(out.decisions.size() == 2);
-  CHECK(out.decisions[0].kind == Decision::Kind::kModel);
-  CHECK(out.decisions[1].kind == Decision::Kind::kAlpha);
-  CHECK(out.decisions[1].alpha == 0.25F);
+  CHECK(test::is_change(out.decisions[0], style::style_type(), StageChange::Kind::kModel));
+  CHECK(test::is_change(out.decisions[1], style::style_type(), StageChange::Kind::kSet));
+  CHECK(out.decisions[1].change.value == 0.25);
   CHECK(out.decisions[1].sequence == 6);
 }
 

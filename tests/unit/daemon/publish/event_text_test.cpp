@@ -4,12 +4,11 @@
 #include <catch2/catch.hpp>
 
 #include "posed/v1/posed.pb.h"
+#include "tests/support/stage_commands.hpp"
 
 namespace posed::publish {
 namespace {
 
-using pipeline::Change;
-using pipeline::ShortText;
 using pipeline::StreamEvent;
 
 StreamEvent event_of(v1::Event::Kind kind) {
@@ -18,25 +17,24 @@ StreamEvent event_of(v1::Event::Kind kind) {
 
 TEST_CASE("the text of a change names the old and the new value") {
   StreamEvent event = event_of(v1::Event::KIND_CONTROL);
-  event.alpha_before = 1.0F;
-  event.value = 0.5;
+  event.value_before = 1.0;
+  event.change = test::alpha_command(0, 0.5).change;
   CHECK(sentence(event) == "alpha 1.00 -> 0.50 from frame 61");
-  event.change = Change::kStyleModel;
+  event.change = test::model_command(0, style::style_type(), nullptr).change;
   event.before = ShortText("march.style");
   event.after = ShortText("x.style");
   CHECK(sentence(event) == "style model march.style -> x.style from frame 61");
-  event.change = Change::kGestureModel;
+  event.change = test::model_command(0, generate::generate_type(), nullptr).change;
   event.before = {};
-  CHECK(sentence(event) == "gesture model x.style from frame 61");
-  event.change = Change::kStopPlaying;
-  CHECK(sentence(event) == "stops performing at frame 61");
+  CHECK(sentence(event) == "generate model x.style from frame 61");
+  event.change = test::stop_playing_command(0).change;
+  CHECK(sentence(event) == "stop-playing at frame 61");
   event = event_of(v1::Event::KIND_CALIBRATED);
   event.after = ShortText("ann.toml");
   CHECK(sentence(event) == "calibration ann.toml from frame 62");
   event = event_of(v1::Event::KIND_PLAYING);
-  event.value = 2.0;
   event.after = ShortText("g c");
-  CHECK(sentence(event) == "performs 2 labels (g c) from frame 61 on, or after those that wait");
+  CHECK(sentence(event) == "performs g c from frame 61 on, or after what still waits");
 }
 
 TEST_CASE("untrusted names in an event are cleaned and cut between two characters") {

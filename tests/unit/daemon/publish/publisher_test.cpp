@@ -7,6 +7,7 @@
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/shed_tally.hpp"
 #include "daemon/system/clock.hpp"
+#include "models/style/style_type.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::publish {
@@ -24,7 +25,7 @@ class Rig {
     info.description.skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
     info.description.samples = {.names = {"bend"}, .units = {"rad"}};
     info.rate_hz = 100.0;
-    info.stages = {"style"};
+    info.stages = {&style::style_type()};
     info.raw = true;
     info.counters = &counters;
     PublisherOptions options;
@@ -227,7 +228,7 @@ TEST_CASE("a glove counts as unplugged only after the reader has started") {
 TEST_CASE("the status is current, although stats are published once a second") {
   Rig rig;
   REQUIRE(rig.receive("stats", 1));
-  rig.counters.pipeline.alpha_target = 0.5F;
+  rig.counters.pipeline.parameter[0].target = 0.5;
   rig.counters.pipeline.state = pipeline::StreamState::kLive;
   rig.publisher->set_model_name(0, "other.style");
   v1::Stats stats = rig.publisher->stats();

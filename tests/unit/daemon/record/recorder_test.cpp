@@ -11,6 +11,7 @@
 
 #include "daemon/record/log_writer_loop.hpp"
 #include "daemon/record/recorder.hpp"
+#include "models/style/style_type.hpp"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/file_limit.hpp"
@@ -247,8 +248,8 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   };
   RecordedStream stream;
   stream.source.name = "a";
-  stream.settings.style.emplace();
-  stream.style = {std::byte{1}, std::byte{2}};
+  stream.settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  stream.model_files = {"12"};
   RecorderOptions options;
   options.file = path;
   options.frames = true;
@@ -271,7 +272,7 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   CHECK(reader->meta().contains("isa"));
   const auto settings = settings_from_json(reader->streams()[0].stages_json, "");
   REQUIRE(settings);
-  CHECK(reader->blob(settings->style_model.sha256)->size() == 2);
+  CHECK(reader->blob(settings->stages[0].model_sha256)->size() == 2);
 
   const auto again = Recorder::open(options, {stream});
   REQUIRE(!again);

@@ -41,19 +41,30 @@ class Dice {
 
 enum class What : std::uint8_t { kBody, kHand };
 
+void set_lag(pipeline::StageSettings& generate, int frames) {
+  generate.parameters["lag_frames"] = std::int64_t{frames};
+}
+
 VirtualStream random_body(const std::string& name, Dice& dice) {
   VirtualStream body = walking_stream(name, kLength_s, 1);
   body.settings.publish_raw = dice.below(2) == 0;
-  if (dice.below(2) == 0) body.settings.generate.reset();
-  if (body.settings.generate) body.settings.generate->lag.frames = dice.below(4);
+  if (dice.below(2) == 0) {
+    body.settings.stages.pop_back();
+    body.model_files.pop_back();
+  } else {
+    set_lag(body.settings.stages[1], dice.below(4));
+  }
   return body;
 }
 
 VirtualStream random_hand(const std::string& name, Dice& dice) {
   VirtualStream hand = glove_stream(name, kLength_s);
   hand.settings.publish_raw = dice.below(2) == 0;
-  hand.settings.generate->lag.frames = dice.below(4);
-  hand.settings.constrain = dice.below(4) != 0;
+  set_lag(hand.settings.stages[0], dice.below(4));
+  if (dice.below(4) == 0) {
+    hand.settings.stages.pop_back();
+    hand.model_files.pop_back();
+  }
   if (dice.below(2) == 0) hand.calibration = glove_calibration(dice.below(3));
   return hand;
 }
@@ -70,10 +81,10 @@ VirtualCommand random_command(std::uint32_t stream, What what, Dice& dice) {
     command.bytes = dice.below(2) == 0 ? one : two;
     return command;
   }
-  constexpr std::array kKinds{Kind::kPlay, Kind::kPlay, Kind::kStopPlaying, Kind::kGesture,
+  constexpr std::array kKinds{Kind::kPlay, Kind::kPlay, Kind::kStopPlaying, Kind::kModel,
                               Kind::kCalibrate};
   command.kind = kKinds[static_cast<std::size_t>(dice.below(kKinds.size()))];
-  command.bytes = command.kind == Kind::kGesture ? gestures : glove_calibration(dice.below(4));
+  command.bytes = command.kind == Kind::kModel ? gestures : glove_calibration(dice.below(4));
   command.labels = dice.below(2) == 0 ? "g 1 c" : "4";
   command.loop = dice.below(4) == 0;
   return command;
@@ -176,7 +187,7 @@ TEST_CASE("a glove that was silent, with frames waiting in the generate stage, r
     const auto path = folder.path() / "silent.plog";
     VirtualDaemon daemon({.seed = 1, .log = path, .holdups = false});
     VirtualStream hand = glove_stream("hand", 2.0);
-    hand.settings.generate->lag.frames = lag;
+    set_lag(hand.settings.stages[0], lag);
     for (ScriptedChunk& chunk : hand.links[0].chunks) {
       if (chunk.at_s >= 1.0) chunk.at_s += 0.3;
     }

@@ -3,6 +3,7 @@
 // model swap, a shed, ticks.
 #pragma once
 
+#include <array>
 #include <fstream>
 #include <memory>
 #include <optional>
@@ -18,8 +19,8 @@
 #include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/transport/transport_factory.hpp"
-#include "models/style/style_model.hpp"
 #include "proto/log/digest.hpp"
+#include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -41,14 +42,14 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
         intake_(id, next_item, *this) {
     settings_.publish_raw = true;
     settings_.rate_hz = device_.description.rate_hz;
-    settings_.style.emplace();
+    settings_.stages.push_back(pipeline::stage_settings(style::style_type()));
     model_ = bind(model_bytes_);
-    engine_.emplace(pipeline::EngineOptions{
-        .stream = id, .publish_raw = true, .style = settings_.style, .model = model_.get()});
+    const std::array<const StageModel*, 1> models{model_.get()};
+    engine_.emplace(
+        pipeline::engine_options(id, settings_, device_.description.skeleton, models).value());
   }
 
   [[nodiscard]] record::RecordedStream recorded() const {
-    const auto bytes = std::as_bytes(std::span(model_bytes_));
     const drivers::Description& description = device_.description;
     return {.source = {.id = 0,
                        .name = name_,
@@ -57,7 +58,7 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
                        .identity = "toy.bvh",
                        .config = "{}"},
             .settings = settings_,
-            .style = {bytes.begin(), bytes.end()}};
+            .model_files = {model_bytes_}};
   }
 
   void set_record_sink(pipeline::RecordSink& record_sink) { record_sink_ = &record_sink; }
@@ -76,14 +77,12 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
   void tick(std::int64_t now_ns) { CHECK(engine_->tick(now_ns, *this)); }
 
   void set_alpha(float alpha) {
-    static_cast<void>(engine_->apply(
-        {.kind = pipeline::Command::Kind::kAlpha, .stream = id_, .alpha = alpha}, *this));
+    static_cast<void>(engine_->apply(alpha_command(id_, alpha), *this));
   }
 
   void set_model(const std::string& bytes) {
     swapped_.push_back(bind(bytes));
-    pipeline::Command command{
-        .kind = pipeline::Command::Kind::kModel, .stream = id_, .model = swapped_.back().get()};
+    auto command = model_command(id_, style::style_type(), swapped_.back().get());
     const auto view = std::as_bytes(std::span(bytes));
     const std::string hash = log::sha256_hex(view);
     hash.copy(command.model_hash.data(), hash.size());
@@ -92,11 +91,11 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
   }
 
  private:
-  using Model = std::unique_ptr<const style::BoundModel>;
+  using Model = std::unique_ptr<const StageModel>;
   [[nodiscard]] Model bind(const std::string& bytes) const {
-    const auto model = style::parse_model(std::as_bytes(std::span(bytes)), "toy.style");
-    REQUIRE(model);
-    return style::bind_model(*model, *device_.description.skeleton, *settings_.style, "toy")
+    return style::style_type()
+        .bind_model(std::as_bytes(std::span(bytes)),
+                    pipeline::stage_context(settings_, 0, device_.description.skeleton), "toy")
         .value();
   }
 

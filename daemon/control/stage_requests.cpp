@@ -1,0 +1,187 @@
+#include "daemon/control/stage_requests.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "models/stages/registry.hpp"
+#include "proto/model/model_file.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::control {
+namespace {
+
+using pipeline::StageChange;
+using pipeline::StageSettings;
+using pipeline::StreamSettings;
+
+constexpr int kMaxWords = 256;
+constexpr std::size_t kMaxWord = 64;  // bytes
+constexpr int kMaxNumbers = 16;
+
+// Splits "style.alpha"; the stage is empty for "alpha".
+std::pair<std::string_view, std::string_view> split(std::string_view name) {
+  const auto dot = name.find('.');
+  if (dot == std::string_view::npos) return {{}, name};
+  return {name.substr(0, dot), name.substr(dot + 1)};
+}
+
+// One parameter or command of one stage of a stream.
+struct Place {
+  std::size_t stage = 0;
+  std::size_t index = 0;
+};
+
+// Where `name` stands in a stage's table. `entries(type)` are the names in the table, empty ones
+// for what cannot be named.
+template <typename Entries>
+std::optional<std::size_t> index_in(const StageType& type, const std::string& name,
+                                    const Entries& entries) {
+  const auto [stage_name, entry_name] = split(name);
+  if (!stage_name.empty() && stage_name != type.name) return std::nullopt;
+  const auto names = entries(type);
+  const auto found = std::ranges::find(names, entry_name);
+  if (entry_name.empty() || found == names.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+// `what` is "parameter" or "command".
+template <typename Entries>
+Result<Place> find_place(const StreamSettings& settings, const std::string& name, const char* what,
+                         const Entries& entries) {
+  std::vector<Place> found;
+  std::vector<std::string> known;
+  for (std::size_t stage = 0; stage < settings.stages.size(); ++stage) {
+    const StageType& type = *settings.stages[stage].type;
+    for (const std::string_view entry : entries(type)) {
+      if (!entry.empty()) known.push_back(fmt::format("{}.{}", type.name, entry));
+    }
+    if (const auto index = index_in(type, name, entries)) found.push_back({stage, *index});
+  }
+  if (found.size() == 1) return found.front();
+  if (found.size() > 1) {
+    return fail(fmt::format("{} is the name of several {}s; put the stage before it: {}",
+                            in_quotes(name), what, fmt::join(known, ", ")));
+  }
+  for (const StageType* type : stage_types()) {
+    if (!index_in(*type, name, entries)) continue;
+    return fail(
+        fmt::format("{0} is a {1} of stage {2}, which the stream does not have; give it a"
+                    " [stream.{2}] table in the config and start again",
+                    in_quotes(name), what, type->name));
+  }
+  return fail(fmt::format("there is no {} {}; there is: {}", what, in_quotes(name),
+                          known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
+}
+
+ParameterValue value_in(const v1::ControlRequest::SetParameter& wanted) {
+  switch (wanted.value_case()) {
+    case v1::ControlRequest::SetParameter::kNumber:
+      return wanted.number();
+    case v1::ControlRequest::SetParameter::kFlag:
+      return wanted.flag();
+    default:
+      return wanted.text();
+  }
+}
+
+// Options come as numbers, whatever their type.
+Result<Parameters> options_of(const StageCommandType& type,
+                              const v1::ControlRequest::StageCommand& wanted) {
+  Parameters given;
+  for (const auto& [name, number] : wanted.number()) {
+    const ParameterSpec* spec = find_parameter(type.options, name);
+    if (spec == nullptr) {
+      return fail(fmt::format("{} takes no {}", type.name, in_quotes(name)));
+    }
+    given.emplace(spec->name, value_of(*spec, number));
+  }
+  return complete_parameters(type.options, given);
+}
+
+}  // namespace
+
+Result<StageChange> parameter_change(const StreamSettings& settings,
+                                     const v1::ControlRequest::SetParameter& wanted) {
+  const auto names = [](const StageType& type) {
+    std::vector<std::string_view> all;
+    for (const ParameterSpec& spec : type.parameters) {
+      const bool text = std::holds_alternative<std::string>(spec.default_value);
+      all.push_back(text ? std::string_view() : spec.shown_name());
+    }
+    return all;
+  };
+  const auto place = find_place(settings, wanted.name(), "parameter", names);
+  if (!place) return std::unexpected(place.error());
+  const StageType& type = *settings.stages[place->stage].type;
+  const ParameterSpec& spec = type.parameters[place->index];
+  if (!spec.live) {
+    return fail(
+        fmt::format("{} cannot change while the daemon runs; set it in [stream.{}] and start"
+                    " again",
+                    spec.shown_name(), type.name));
+  }
+  const auto value = from_people(spec, value_in(wanted), spec.shown_name());
+  if (!value) return std::unexpected(value.error());
+  return StageChange{.kind = StageChange::Kind::kSet,
+                     .index = static_cast<std::uint8_t>(place->index),
+                     .type = &type,
+                     .value = number_of(*value)};
+}
+
+Result<FoundCommand> find_command(const StreamSettings& settings, const std::string& name) {
+  const auto names = [](const StageType& type) {
+    std::vector<std::string_view> all;
+    for (const StageCommandType& command : type.commands) all.push_back(command.name);
+    return all;
+  };
+  const auto place = find_place(settings, name, "command", names);
+  if (!place) return std::unexpected(place.error());
+  return FoundCommand{.stage = place->stage,
+                      .change = {.kind = StageChange::Kind::kCommand,
+                                 .index = static_cast<std::uint8_t>(place->index),
+                                 .type = settings.stages[place->stage].type}};
+}
+
+Result<StageCommand> encode_command(const StageCommandType& type, const StageModel* model,
+                                    const v1::ControlRequest::StageCommand& wanted) {
+  if (wanted.word_size() > kMaxWords || wanted.number_size() > kMaxNumbers) {
+    return fail(fmt::format("{} has too many words or options; it takes at most {} and {}",
+                            type.name, kMaxWords, kMaxNumbers));
+  }
+  for (const std::string& word : wanted.word()) {
+    if (word.size() <= kMaxWord) continue;
+    return fail(
+        fmt::format("{} is too long: a word has at most {} bytes", in_quotes(word), kMaxWord));
+  }
+  const auto options = options_of(type, wanted);
+  if (!options) return std::unexpected(options.error());
+  const std::vector<std::string> words(wanted.word().begin(), wanted.word().end());
+  return type.encode(model, words, *options);
+}
+
+Result<std::size_t> stage_for_model(const StreamSettings& settings, std::span<const std::byte> file,
+                                    const std::string& name) {
+  const auto opened = model_file::open(file, name);
+  if (!opened) return std::unexpected(opened.error());
+  const auto takes = [&](const StageType& type) {
+    return type.takes != nullptr && type.takes(*opened);
+  };
+  for (std::size_t i = 0; i < settings.stages.size(); ++i) {
+    if (takes(*settings.stages[i].type)) return i;
+  }
+  for (const StageType* type : stage_types()) {
+    if (!takes(*type)) continue;
+    return fail(
+        fmt::format("{0} is a model for stage {1}, which the stream does not have; give it a"
+                    " [stream.{1}] table in the config and start again",
+                    name, type->name));
+  }
+  return fail(fmt::format("{} is a model that no stage of this posed takes; update posed", name));
+}
+
+}  // namespace posed::control

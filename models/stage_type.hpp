@@ -1,0 +1,89 @@
+// StageType: what the rest of posed knows about a kind of stage: its name, its parameters, its
+// models and commands, and how one is made. models/stages/registry.cpp lists all of them. Config,
+// control, device log and replay work from this table and know no stage by name. Cold, but for the
+// constants.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "models/stage.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+#include "proto/text/parameter.hpp"
+
+namespace posed::v1 {
+class DecisionValue;
+class ModelFile;
+}  // namespace posed::v1
+
+namespace posed {
+
+// What a stage is made for.
+struct StageContext {
+  std::shared_ptr<const Skeleton> skeleton;  // of the frames that enter; never null
+  double rate_hz = 0.0;                      // nominal, of the stream; 0: unknown
+  Parameters parameters{};                   // complete
+};
+
+// A parameter that contradicts others.
+struct ParameterFault {
+  std::string_view parameter;  // as people write it
+  std::string sentence;
+};
+
+// Something that a stage does on request, once: "play". Control sends it, the device log keeps it.
+struct StageCommandType {
+  std::string_view name;
+  std::string_view help;
+  std::vector<ParameterSpec> options{};
+  bool performs = false;       // starts a motion of the stage's own
+  std::string_view refusal{};  // the sentence when the stage refuses it at the moment
+  // The command for `words` and complete `options`. `model` is the stage's model by the time that
+  // the command arrives; null: it has none.
+  Result<StageCommand> (*encode)(const StageModel* model, std::span<const std::string> words,
+                                 const Parameters& options) = nullptr;
+  // The command as the device log keeps it, and back; null when the name says everything. Empty for
+  // a value that encode() cannot have made.
+  void (*to_log)(const StageCommand& command, v1::DecisionValue& value) = nullptr;
+  std::optional<StageCommand> (*from_log)(const v1::DecisionValue& value) = nullptr;
+};
+
+struct StageType {
+  std::string_view name;  // no other stage or driver has it; the name of its table in the config
+  std::string_view summary;
+  std::vector<ParameterSpec> parameters{};
+
+  // Whether a stream without a table for this stage has it all the same; null: never.
+  bool (*is_default)(const Skeleton& skeleton) = nullptr;
+  // Checks what the range of a single parameter cannot; null: nothing.
+  std::optional<ParameterFault> (*check)(const Parameters& parameters, bool has_model) = nullptr;
+  // Returns an error for a skeleton that the stage cannot serve. `model` is one that bind_model
+  // made for the same context; null: none. It outlives the stage, or its successor does.
+  Result<std::unique_ptr<Stage>> (*make)(const StageContext& context, const StageModel* model);
+
+  // A stage with a model; all null for one without.
+  bool model_required = false;
+  bool (*takes)(const v1::ModelFile& file) = nullptr;  // whether the file is for this stage
+  Result<std::unique_ptr<const StageModel>> (*bind_model)(std::span<const std::byte> file,
+                                                          const StageContext& context,
+                                                          const std::string& name) = nullptr;
+
+  std::vector<StageCommandType> commands{};
+  // The command that the parameters ask for at the start of a live run (index in `commands`), if
+  // any; null: never.
+  struct FirstCommand {
+    std::size_t index;
+    StageCommand command;
+  };
+  Result<std::optional<FirstCommand>> (*first_command)(const Parameters& parameters,
+                                                       const StageModel* model) = nullptr;
+
+  [[nodiscard]] bool has_model() const noexcept { return bind_model != nullptr; }
+};
+
+}  // namespace posed

@@ -1,0 +1,27 @@
+// Each new stage adds one line here.
+#include "models/stages/registry.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "models/generate/generate_type.hpp"
+#include "models/hand/constrain_type.hpp"
+#include "models/style/style_type.hpp"
+
+namespace posed {
+
+std::span<const StageType* const> stage_types() {
+  static const std::array types{
+      &style::style_type(),
+      &generate::generate_type(),
+      &hand::constrain_type(),
+  };
+  return types;
+}
+
+const StageType* find_stage_type(std::string_view name) {
+  const auto at = std::ranges::find(stage_types(), name, &StageType::name);
+  return at == stage_types().end() ? nullptr : *at;
+}
+
+}  // namespace posed

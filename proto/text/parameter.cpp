@@ -1,0 +1,130 @@
+#include "proto/text/parameter.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+namespace posed {
+namespace {
+
+constexpr std::array<std::string_view, 4> kWanted{"true or false", "an integer", "a number",
+                                                  "text in quotes"};
+constexpr std::array<std::string_view, 4> kGiven{"true or false", "an integer", "a number", "text"};
+
+std::string text_of(double number) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
+  return {text.data(), end};
+}
+
+double in_range_of_people(const ParameterSpec& spec, double bound) {
+  const double scaled = bound * spec.people_scale;
+  // A bound such as 90 degrees stays a round number on its way to radians and back.
+  const double rounded = std::round(scaled * 1e9) / 1e9;
+  return std::isfinite(rounded) ? rounded : bound;
+}
+
+bool within(const ParameterSpec& spec, double value) {
+  return value >= spec.min && value <= spec.max;  // false for NaN
+}
+
+}  // namespace
+
+const ParameterSpec* find_parameter(std::span<const ParameterSpec> table, std::string_view name) {
+  const auto found = std::ranges::find_if(table, [&](const ParameterSpec& spec) {
+    return spec.name == name || spec.people_name == name;
+  });
+  return name.empty() || found == table.end() ? nullptr : &*found;
+}
+
+Result<ParameterValue> from_people(const ParameterSpec& spec, const ParameterValue& value,
+                                   std::string_view place) {
+  const auto* whole = std::get_if<std::int64_t>(&value);
+  const bool real = std::holds_alternative<double>(spec.default_value);
+  if (value.index() != spec.default_value.index() && !(real && whole != nullptr)) {
+    return misuse(std::string(place) + " must be " +
+                  std::string(kWanted[spec.default_value.index()]) +
+                  (real ? unit_words(spec.shown_name()) : "") + ", not " +
+                  std::string(kGiven[value.index()]));
+  }
+  if (real) {
+    const double given = whole != nullptr ? static_cast<double>(*whole) : std::get<double>(value);
+    const double ours = given / spec.people_scale;
+    if (within(spec, ours)) return ours;
+    return misuse(out_of_range(place, given, in_range_of_people(spec, spec.min),
+                               in_range_of_people(spec, spec.max)));
+  }
+  if (whole != nullptr && !within(spec, static_cast<double>(*whole))) {
+    return misuse(out_of_range(place, static_cast<double>(*whole), spec.min, spec.max, true));
+  }
+  return value;
+}
+
+Result<Parameters> complete_parameters(std::span<const ParameterSpec> table,
+                                       const Parameters& given) {
+  for (const auto& [name, value] : given) {
+    if (std::ranges::find(table, std::string_view(name), &ParameterSpec::name) == table.end()) {
+      return misuse("there is no " + name);
+    }
+  }
+  Parameters complete;
+  for (const ParameterSpec& spec : table) {
+    const std::string name(spec.name);
+    const auto at = given.find(name);
+    if (at == given.end()) {
+      if (spec.required) return misuse(name + " is missing");
+      complete.emplace(name, spec.default_value);
+      continue;
+    }
+    ParameterSpec ours = spec;
+    ours.people_name = {};
+    ours.people_scale = 1.0;
+    auto value = from_people(ours, at->second, name);
+    if (!value) return std::unexpected(value.error());
+    complete.emplace(name, std::move(*value));
+  }
+  return complete;
+}
+
+double number_of(const ParameterValue& value) {
+  if (const auto* flag = std::get_if<bool>(&value)) return *flag ? 1.0 : 0.0;
+  if (const auto* whole = std::get_if<std::int64_t>(&value)) return static_cast<double>(*whole);
+  return std::get<double>(value);
+}
+
+ParameterValue value_of(const ParameterSpec& spec, double number) {
+  if (std::holds_alternative<bool>(spec.default_value)) return number != 0.0;
+  if (std::holds_alternative<std::int64_t>(spec.default_value)) {
+    return static_cast<std::int64_t>(number);
+  }
+  return number;
+}
+
+std::string unit_words(std::string_view name) {
+  constexpr std::array<std::pair<std::string_view, const char*>, 8> kUnits{{
+      {"_per_s", " per second"},
+      {"_ms", " of milliseconds"},
+      {"_s", " of seconds"},
+      {"_hz", " of hertz"},
+      {"_deg", " of degrees"},
+      {"_rad", " of radians"},
+      {"_m", " of metres"},
+      {"_frames", " of frames"},
+  }};
+  for (const auto& [suffix, words] : kUnits) {
+    if (name.ends_with(suffix)) return words;
+  }
+  return {};
+}
+
+std::string out_of_range(std::string_view place, double value, double min, double max, bool whole) {
+  constexpr double kUnbounded = std::numeric_limits<double>::max();
+  const bool bounded = min > -kUnbounded && max < kUnbounded;
+  return std::string(place) + " = " + text_of(value) + " is out of range: it takes " +
+         (whole ? "an integer" : "a number") + unit_words(place) +
+         (bounded ? " from " + text_of(min) + " to " + text_of(max) : " that is finite");
+}
+
+}  // namespace posed

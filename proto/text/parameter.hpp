@@ -1,0 +1,74 @@
+// Tables of named, typed, range-checked values: the options of a driver, the parameters of a stage,
+// the options of a stage's command. Config, control, device log and replay all read the same table.
+// Cold.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "proto/frame/result.hpp"
+
+namespace posed {
+
+using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
+using Parameters = std::map<std::string, ParameterValue>;  // by ParameterSpec::name
+
+struct ParameterSpec {
+  std::string_view name;         // its unit last: "lag_s"
+  ParameterValue default_value;  // also fixes the type
+  bool required = false;
+  bool is_path = false;  // relative to the config file
+  std::string_view help;
+  // The range of a number, both ends included.
+  double min = std::numeric_limits<double>::lowest();
+  double max = std::numeric_limits<double>::max();
+  bool live = false;  // control can change it while the stream runs; numbers and flags only
+  // People write some numbers in another unit: as `people_name` ("lag_ms"), with `people_scale` of
+  // their units to one of ours (1000). Empty: the same name and unit.
+  std::string_view people_name{};
+  double people_scale = 1.0;
+
+  [[nodiscard]] std::string_view shown_name() const noexcept {
+    return people_name.empty() ? name : people_name;
+  }
+};
+
+// The entry of this name, as people write it or as the log does; null if there is none.
+[[nodiscard]] const ParameterSpec* find_parameter(std::span<const ParameterSpec> table,
+                                                  std::string_view name);
+
+// Checks type and range of a value in people's units and returns it in ours; a whole number is
+// accepted for a real one. `place` names it in the error: "stream.style.alpha = 3 is out of range:
+// it takes a number from -2 to 2".
+[[nodiscard]] Result<ParameterValue> from_people(const ParameterSpec& spec,
+                                                 const ParameterValue& value,
+                                                 std::string_view place);
+
+// The values of `given`, which are in our units, checked, and the defaults of all others. A name
+// that is not in the table, another type and a number out of range are errors.
+[[nodiscard]] Result<Parameters> complete_parameters(std::span<const ParameterSpec> table,
+                                                     const Parameters& given);
+
+// The value of a complete table. Another name or type than the table's is a bug of the caller.
+template <typename T>
+[[nodiscard]] const T& parameter(const Parameters& parameters, const std::string& name) {
+  return std::get<T>(parameters.at(name));
+}
+
+// A flag as 0 or 1, a number as it is. Not for text.
+[[nodiscard]] double number_of(const ParameterValue& value);
+// The opposite, in the type of the table's entry.
+[[nodiscard]] ParameterValue value_of(const ParameterSpec& spec, double number);
+
+// " of milliseconds" for a name that ends in _ms, and so on; empty without a known unit.
+[[nodiscard]] std::string unit_words(std::string_view name);
+// "PLACE = 3 is out of range: it takes a number from -2 to 2".
+[[nodiscard]] std::string out_of_range(std::string_view place, double value, double min, double max,
+                                       bool whole = false);
+
+}  // namespace posed
