@@ -88,6 +88,7 @@ class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline:
   [[nodiscard]] Result<> find_place(const log::ChunkRow& chunk);
   [[nodiscard]] Result<> use_device(const std::string& info);
   [[nodiscard]] Result<> calibrate(const std::string& toml);
+  void use_calibration();
   void swap_style(const pipeline::Decision& decision) noexcept;
   void swap_gesture(const pipeline::Decision& decision) noexcept;
   void command(const pipeline::Command& command) noexcept;
