@@ -37,6 +37,13 @@ std::int64_t stamp_ns(msghdr& header) noexcept {
   return kNoTime_ns;
 }
 
+// Never waits. Returns whether the kernel took the datagram.
+bool write_to(const Address& to, int fd, std::span<const std::byte> bytes) noexcept {
+  const ssize_t sent =
+      ::sendto(fd, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL, to.get(), to.size);
+  return sent == static_cast<ssize_t>(bytes.size());
+}
+
 struct Wanted {
   Address listen;
   std::optional<Address> group, to;
@@ -217,10 +224,7 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
 // RT-safe except for its write.
 bool UdpTransport::send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept {
   if (socket >= sockets_.size() || !sockets_[socket].to) return false;
-  const Address& to = *sockets_[socket].to;
-  const ssize_t sent = ::sendto(sockets_[socket].fd, bytes.data(), bytes.size(),
-                                MSG_DONTWAIT | MSG_NOSIGNAL, to.get(), to.size);
-  return sent == static_cast<ssize_t>(bytes.size());
+  return write_to(*sockets_[socket].to, sockets_[socket].fd, bytes);
 }
 
 }  // namespace posed::drivers
