@@ -11,6 +11,7 @@
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/record/recorder.hpp"
+#include "drivers/glove/calibrated_decoder.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
@@ -108,6 +109,7 @@ struct VirtualStreamContext {
     device->description = stream.description;
     device->transport = std::make_unique<ScriptedTransport>(link);
     device->decoder = driver->make_decoder(stream.description).value();
+    device->calibrated = drivers::glove::calibrated_decoder(*device->decoder);
     return device.get();
   }
   [[nodiscard]] std::int64_t next_device_ns() const {
