@@ -3,7 +3,6 @@
 // into frames. A log of the chunks therefore replays through the same decoder that ran live.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -14,8 +13,6 @@
 #include <vector>
 
 #include "drivers/emulator.hpp"
-#include "drivers/glove/model.hpp"
-#include "proto/frame/hand.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/sink.hpp"
 #include "proto/frame/skeleton.hpp"
@@ -25,6 +22,11 @@ namespace posed::drivers {
 
 class TransportFactory;  // drivers/transport/transport_factory.hpp
 
+namespace glove {
+class CalibratedDecoder;  // drivers/glove/calibrated_decoder.hpp
+struct GloveTraits;       // drivers/glove/traits.hpp
+}  // namespace glove
+
 inline constexpr std::size_t kMaxChunk = 64 * 1024;  // bytes; a Transport never gives more
 
 // The result of one read.
@@ -32,6 +34,13 @@ struct Chunk {
   std::span<const std::byte> bytes;  // valid until the next read; empty when nothing was available
   bool end = false;   // delivered alone after the last bytes: the source has ended for good
   bool lost = false;  // delivered alone: the connection is lost; the device may return on a new one
+  std::uint8_t socket = 0;  // where the bytes came from, for a device with several sockets
+  // Host time at which the kernel received the bytes; kNoTime_ns: the time after the read counts.
+  std::int64_t arrival_ns = kNoTime_ns;
+  // Datagrams dropped since the last chunk, counted also beside empty bytes: from senders that are
+  // not among the peers, and empty or too long ones.
+  std::uint32_t foreign = 0;
+  std::uint32_t damaged = 0;
 };
 
 // The source of bytes. After open(), one reader thread uses it.
@@ -46,8 +55,8 @@ class Transport {
   // -1 for a source driven by time only.
   [[nodiscard]] virtual int poll_fd() const noexcept = 0;
 
-  // Host time of the next chunk of a source driven by time (files, replay); kNoTime_ns for a source
-  // whose descriptor announces chunks. RT-safe.
+  // Host time of the next chunk of a source driven by time (files, replay), and of one that was
+  // received but not yet read; kNoTime_ns when only the descriptor announces chunks. RT-safe.
   [[nodiscard]] virtual std::int64_t next_due_ns() const noexcept { return kNoTime_ns; }
 
   // True when the source must not lose frames and may wait instead (a file played as fast as
@@ -66,7 +75,37 @@ class Transport {
 
   // Sends bytes to the device, all or none; returns false when the link does not accept them now.
   // RT-safe except for its write.
-  [[nodiscard]] virtual bool send(std::span<const std::byte> /*bytes*/) noexcept { return false; }
+  [[nodiscard]] virtual bool send(std::span<const std::byte> /*bytes*/,
+                                  std::uint8_t /*socket*/) noexcept {
+    return false;
+  }
+  [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept { return send(bytes, 0); }
+};
+
+// Names and units of the sample values of a device or body.
+struct SampleLayout {
+  std::vector<std::string> names;
+  std::vector<std::string> units;  // "rad", "1", "m"
+};
+
+// One of the bodies that a source delivers.
+struct Body {
+  std::string name;                          // as the device calls it
+  std::shared_ptr<const Skeleton> skeleton;  // null for a body with samples only
+  SampleLayout samples{};
+  double rate_hz = 0.0;  // nominal; 0 when unknown
+};
+
+// The bodies of a source, compiled from the device's description. A driver derives from it to add
+// the tables that its decoder needs. Immutable once built: threads share it.
+class SourceLayout {
+ public:
+  SourceLayout() = default;
+  SourceLayout(const SourceLayout&) = delete;
+  SourceLayout& operator=(const SourceLayout&) = delete;
+  virtual ~SourceLayout() = default;
+
+  std::vector<Body> bodies;  // [body of Sink::frame], at most kMaxBodies
 };
 
 // Turns bytes into frames. Pure: no clock, no I/O, no allocation after construction.
@@ -83,15 +122,15 @@ class Decoder {
   virtual void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept = 0;
 
-  // Uses this calibration from the next packet on; the calibration must outlive its use. Until the
-  // first call the device's default applies; a device other than a glove ignores the call. RT-safe.
-  virtual void calibrate(const glove::Calibration& /*calibration*/) noexcept {}
-};
+  // The same for one chunk of a device with several sockets. RT-safe.
+  virtual void feed_socket(std::uint8_t /*socket*/, std::span<const std::byte> bytes,
+                           std::int64_t arrival_ns, Sink& sink) noexcept {
+    feed(bytes, arrival_ns, sink);
+  }
 
-// Names and units of a device's sample values.
-struct SampleLayout {
-  std::vector<std::string> names;
-  std::vector<std::string> units;  // "rad", "1", "m"
+  // From the next packet on these are the bodies. The layout comes from the same driver's
+  // make_layout and outlives its use. A device with one body ignores the call. RT-safe.
+  virtual void use(const SourceLayout& /*layout*/) noexcept {}
 };
 
 // What is known about a device before it streams. Stored in the log; enough to decode its bytes
@@ -100,8 +139,10 @@ struct Description {
   std::string driver;  // registry name
   // Device info: the device's own header (a BVH's HIERARCHY); input of the decoder.
   std::string text;
-  std::string identity;                      // stable name of the device: path, serial number
-  std::shared_ptr<const Skeleton> skeleton;  // null for a device that emits samples only
+  std::string identity;  // stable name of the device: path, serial number
+  // Null for a device that emits samples only, and for one with several bodies
+  // (Driver::make_layout).
+  std::shared_ptr<const Skeleton> skeleton;
   SampleLayout samples;
   double rate_hz = 0.0;  // nominal; 0 when unknown
 };
@@ -121,14 +162,7 @@ struct Device {
   std::vector<std::string> warnings;
   Poll poll{};
   double reopen_after_s = 0.0;  // seconds of silence after which the link is reopened; 0: never
-};
-
-// A control message for a glove with motors, in units of the hand.
-struct Haptics {
-  std::array<float, kFingers> force{};  // thumb to little: 0 free, 1 blocked, negative unchanged
-  float vibration_hz = 0.0F;
-  float vibration_s = 0.0F;  // 0: no vibration
-  float vibration = 0.0F;    // amplitude, 0 to 1
+  glove::CalibratedDecoder* calibrated = nullptr;  // the decoder, if it is a glove's
 };
 
 // The options that a driver accepts in its [stream.<driver>] table; the daemon's config reader
@@ -151,11 +185,12 @@ struct Driver {
   // For a device that may be connected later: its description according to the options. The device
   // found by open() has the same skeleton and samples. Null: the device must be present at start.
   Result<Description> (*expect)(const Options& options) = nullptr;
-  // The sensors of a glove and their meaning before calibration; null for other devices.
-  Result<glove::Model> (*glove_model)(const Description& description) = nullptr;
-  // Encodes a haptics message for the device; null for a device without motors.
-  Result<std::vector<std::byte>> (*encode_haptics)(const Options& options,
-                                                   const Haptics& haptics) = nullptr;
+  // Compiles the bytes of Sink::description, which are untrusted. Null: the device has one body,
+  // described above. Cold.
+  Result<std::unique_ptr<const SourceLayout>> (*make_layout)(
+      std::span<const std::byte> description) = nullptr;
+  // What only gloves have; null for other devices.
+  const glove::GloveTraits* glove = nullptr;
   // Emulates the device, for tests, `posed emulate` and the demo; null when there is no emulator.
   Result<std::unique_ptr<Emulator>> (*emulate)(const Options& options) = nullptr;
 };

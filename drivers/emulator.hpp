@@ -1,16 +1,14 @@
-// Emulator: simulates a device. It holds the device's command set and state, takes a hand pose and
-// produces the bytes that the real device would send. Pure: no clock, no I/O, so that tests, the
-// demo and `posed emulate` drive the same object at any speed.
+// Emulator: simulates a device. It holds the device's command set and state, takes the poses of its
+// bodies and produces the bytes that the real device would send. Pure: no clock, no I/O, so that
+// tests, the demo and `posed emulate` drive the same object at any speed.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "proto/frame/hand.hpp"
-#include "proto/frame/time.hpp"
+#include "proto/frame/frame.hpp"
 
 namespace posed::drivers {
 
@@ -23,14 +21,25 @@ class Emulator {
   Emulator& operator=(const Emulator&) = delete;
   virtual ~Emulator() = default;
 
-  // Sets the hand pose from now on [rad].
-  virtual void pose(const HandAngles& angles) = 0;
+  // Sets the pose of one of its bodies from now on. A body that it does not have is ignored.
+  virtual void pose(std::size_t body, const Frame& frame) = 0;
 
-  // Takes bytes from the host, cut at any position; immediate answers are added to `answer`.
+  // Takes bytes from the host: of a byte stream cut at any position, of UDP one datagram. Immediate
+  // answers are added to `answer`.
   virtual void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) = 0;
+
+  // The same for a device with several sockets: the bytes come from this socket of the host, and
+  // the answer goes there.
+  virtual void receive_socket(std::uint8_t /*socket*/, std::span<const std::byte> bytes,
+                              std::int64_t now_ns, Bytes& answer) {
+    receive(bytes, now_ns, answer);
+  }
 
   // Time at which the next record is due; kNoTime_ns while the device does not stream.
   [[nodiscard]] virtual std::int64_t next_due_ns() const = 0;
+
+  // The socket of the host that this record goes to.
+  [[nodiscard]] virtual std::uint8_t next_socket() const { return 0; }
 
   // Adds the record that is due now to `out`: one packet of the device.
   virtual void emit(std::int64_t now_ns, Bytes& out) = 0;

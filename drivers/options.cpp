@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <sstream>
 
 namespace posed::drivers {
 namespace {
@@ -40,6 +41,15 @@ Result<Options> complete_options(const Driver& driver, const Options& given) {
     complete.emplace(name, std::move(value));
   }
   return complete;
+}
+
+std::vector<std::string> words_option(const Options& options, const std::string& name) {
+  std::string text = option<std::string>(options, name);
+  std::ranges::replace(text, ',', ' ');
+  std::istringstream words(text);
+  std::vector<std::string> found;
+  for (std::string word; words >> word;) found.push_back(word);
+  return found;
 }
 
 }  // namespace posed::drivers

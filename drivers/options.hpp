@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "drivers/driver.hpp"
 
@@ -18,5 +19,9 @@ template <typename T>
 [[nodiscard]] const T& option(const Options& options, const std::string& name) {
   return std::get<T>(options.at(name));
 }
+
+// A completed option that is a list of words, separated by blanks or commas.
+[[nodiscard]] std::vector<std::string> words_option(const Options& options,
+                                                    const std::string& name);
 
 }  // namespace posed::drivers

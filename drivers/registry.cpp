@@ -11,13 +11,15 @@
 #include "drivers/lucidgloves/lucidgloves.hpp"
 #include "drivers/p5/p5.hpp"
 #include "drivers/template/template.hpp"
+#include "drivers/template_mocap/template_mocap.hpp"
 
 namespace posed::drivers {
 
 std::span<const Driver> registry() {
   static const std::array drivers{
-      cyberglove_driver(), described_driver(),   file_driver(), fivedt_driver(),
-      labels_driver(),     lucidgloves_driver(), p5_driver(),   template_driver(),
+      cyberglove_driver(), described_driver(), file_driver(),
+      fivedt_driver(),     labels_driver(),    lucidgloves_driver(),
+      p5_driver(),         template_driver(),  template_mocap_driver(),
   };
   return drivers;
 }

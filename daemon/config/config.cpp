@@ -176,6 +176,11 @@ void Reader::read_stream(TableReader table, StreamConfig& stream) {
   const auto driver = std::ranges::find(drivers_, stream.driver, &drivers::Driver::name);
   if (driver != drivers_.end()) {
     read_options(table, *driver, stream.options);
+    if (driver->make_layout != nullptr) {
+      table.add_error("driver", fmt::format("{} delivers several bodies, which this posed cannot"
+                                            " stream yet; one stream takes a device with one body",
+                                            driver->name));
+    }
   } else if (!stream.driver.empty()) {
     std::set<std::string> names;
     for (const drivers::Driver& known : drivers_) names.emplace(known.name);

@@ -6,6 +6,7 @@
 
 #include "daemon/control/request_handler.hpp"
 #include "daemon/devices/calibration.hpp"
+#include "drivers/glove/traits.hpp"
 #include "posed/v1/control.pb.h"
 
 namespace posed::control {
@@ -20,10 +21,10 @@ bool within(float value, float least, float most) {
   return std::isfinite(value) && value >= least && value <= most;
 }
 
-Result<drivers::Haptics> read_haptics(const v1::ControlRequest::Haptics& wanted) {
-  drivers::Haptics haptics{.vibration_hz = wanted.vibration_hz(),
-                           .vibration_s = wanted.vibration_s(),
-                           .vibration = wanted.vibration_amplitude()};
+Result<drivers::glove::Haptics> read_haptics(const v1::ControlRequest::Haptics& wanted) {
+  drivers::glove::Haptics haptics{.vibration_hz = wanted.vibration_hz(),
+                                  .vibration_s = wanted.vibration_s(),
+                                  .vibration = wanted.vibration_amplitude()};
   haptics.force.fill(-1.0F);
   if (static_cast<std::size_t>(wanted.force_size()) > haptics.force.size()) {
     return fail("a hand has five fingers: give at most five forces, thumb to little");
@@ -69,13 +70,13 @@ Result<> RequestHandler::send_haptics(const v1::ControlRequest& request) {
   const ControlledStream& stream = streams_[*found];
   const std::string driver_name = stream.device->description()->driver;
   const drivers::Driver* driver = drivers::find_driver(driver_name);
-  if (driver == nullptr || driver->encode_haptics == nullptr) {
+  if (driver == nullptr || driver->glove == nullptr || driver->glove->encode_haptics == nullptr) {
     return fail(fmt::format("stream {} has no haptics: driver '{}' only sends data", stream.name,
                             driver_name));
   }
   const auto haptics = read_haptics(request.haptics());
   if (!haptics) return std::unexpected(haptics.error());
-  const auto bytes = driver->encode_haptics(stream.options, *haptics);
+  const auto bytes = driver->glove->encode_haptics(stream.options, *haptics);
   if (!bytes) return std::unexpected(bytes.error());
   if (stream.device->away()) {
     return fail("the glove of stream " + stream.name + " is away: plug it in and try again");

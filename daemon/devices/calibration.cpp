@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "drivers/glove/traits.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/clean.hpp"
 
@@ -11,11 +12,11 @@ Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
     const drivers::Description& description, const std::string& toml, const std::string& file) {
   const drivers::Driver* driver = drivers::find_driver(description.driver);
   const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
-  if (driver == nullptr || driver->glove_model == nullptr || !hand) {
+  if (driver == nullptr || driver->glove == nullptr || !hand) {
     return misuse(
         "driver " + in_quotes(description.driver) + " has no sensors that can be calibrated", file);
   }
-  const auto model = driver->glove_model(description);
+  const auto model = driver->glove->glove_model(description);
   if (!model) return std::unexpected(model.error());
   const auto parsed = drivers::glove::parse_calibration(toml, file);
   if (!parsed) return std::unexpected(parsed.error());

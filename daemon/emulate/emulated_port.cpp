@@ -1,15 +1,14 @@
 #include "daemon/emulate/emulated_port.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <system_error>
 #include <utility>
 
-#include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -17,6 +16,9 @@
 #include <sys/socket.h>
 #include <termios.h>
 #include <unistd.h>
+
+#include "drivers/driver.hpp"
+#include "drivers/transport/address.hpp"
 
 namespace posed::emulate {
 namespace {
@@ -50,7 +52,8 @@ Result<EmulatedPort> EmulatedPort::open_pty(const std::filesystem::path& link) {
     return fail("cannot make a pseudo-terminal: " + why);
   }
   const int slave = ::open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC);
-  EmulatedPort port(master, slave, name.data(), {});
+  EmulatedPort port(Kind::kTerminal, {master}, name.data());
+  port.other_side_ = slave;
   termios mode{};
   if (slave < 0 || tcgetattr(slave, &mode) != 0) {
     return fail("cannot open the pseudo-terminal's other side: " + reason());
@@ -64,19 +67,10 @@ Result<EmulatedPort> EmulatedPort::open_pty(const std::filesystem::path& link) {
 }
 
 Result<EmulatedPort> EmulatedPort::connect_tcp(const std::string& endpoint) {
-  const auto colon = endpoint.rfind(':');
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  std::uint16_t number = 0;
-  const char* const end = endpoint.data() + endpoint.size();
-  if (colon == std::string::npos ||
-      std::from_chars(endpoint.data() + colon + 1, end, number).ptr != end || number == 0 ||
-      inet_pton(AF_INET, endpoint.substr(0, colon).c_str(), &address.sin_addr) != 1) {
-    return misuse("'" + endpoint + "' is not an address; it looks like 127.0.0.1:5200");
-  }
-  address.sin_port = htons(number);
-  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd < 0 || ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+  const auto address = drivers::parse_endpoint(endpoint);
+  if (!address) return std::unexpected(address.error());
+  const int fd = ::socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (fd < 0 || ::connect(fd, address->get(), address->size) != 0) {
     const std::string why = reason();
     if (fd >= 0) ::close(fd);
     return fail("nothing listens at " + endpoint + " (" + why +
@@ -85,11 +79,29 @@ Result<EmulatedPort> EmulatedPort::connect_tcp(const std::string& endpoint) {
   const int on = 1;
   setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);
-  return EmulatedPort(fd, -1, endpoint, {});
+  return EmulatedPort(Kind::kTcp, {fd}, endpoint);
+}
+
+Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endpoints) {
+  EmulatedPort port(Kind::kUdp, {}, "");
+  for (const std::string& endpoint : endpoints) {
+    const auto address = drivers::parse_endpoint(endpoint);
+    if (!address) return std::unexpected(address.error());
+    const int fd =
+        ::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd >= 0) port.fds_.push_back(fd);
+    if (fd < 0 || ::connect(fd, address->get(), address->size) != 0) {
+      return fail("cannot send to " + endpoint + " (" + reason() +
+                  "); name an address that this machine reaches");
+    }
+    port.name_ += (port.name_.empty() ? "" : ", ") + endpoint;
+  }
+  return port;
 }
 
 EmulatedPort::EmulatedPort(EmulatedPort&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)),
+    : kind_(other.kind_),
+      fds_(std::exchange(other.fds_, {})),
       other_side_(std::exchange(other.other_side_, -1)),
       name_(std::move(other.name_)),
       link_(std::exchange(other.link_, {})) {}
@@ -101,27 +113,33 @@ EmulatedPort::~EmulatedPort() {
     std::filesystem::remove(link_, ignored);
   }
   if (other_side_ >= 0) ::close(other_side_);
-  if (fd_ >= 0) ::close(fd_);
+  for (const int fd : fds_) ::close(fd);
 }
 
-std::optional<std::vector<std::byte>> EmulatedPort::receive(std::chrono::nanoseconds patience) {
-  pollfd wait{fd_, POLLIN, 0};
+std::optional<EmulatedPort::Heard> EmulatedPort::receive(std::chrono::nanoseconds patience) {
+  std::vector<pollfd> wait;
+  for (const int fd : fds_) wait.push_back({.fd = fd, .events = POLLIN, .revents = 0});
   const auto whole_s = std::chrono::duration_cast<std::chrono::seconds>(patience);
   const timespec timeout{.tv_sec = whole_s.count(), .tv_nsec = (patience - whole_s).count()};
-  if (ppoll(&wait, 1, &timeout, nullptr) <= 0) return std::vector<std::byte>{};
-  std::vector<std::byte> bytes(4096);
-  const ssize_t size = ::read(fd_, bytes.data(), bytes.size());
-  if (size < 0 && (errno == EAGAIN || errno == EINTR)) return std::vector<std::byte>{};
-  if (size <= 0) return std::nullopt;
-  bytes.resize(static_cast<std::size_t>(size));
-  return bytes;
+  if (ppoll(wait.data(), wait.size(), &timeout, nullptr) <= 0) return Heard{};
+  const auto ready = std::ranges::find_if(wait, [](const pollfd& fd) { return fd.revents != 0; });
+  Heard heard{.socket = static_cast<std::uint8_t>(ready - wait.begin()),
+              .bytes = std::vector<std::byte>(drivers::kMaxChunk)};
+  const ssize_t size = ::read(ready->fd, heard.bytes.data(), heard.bytes.size());
+  // A UDP host that is not there yet answers with an error.
+  const bool later = kind_ == Kind::kUdp || errno == EAGAIN || errno == EINTR;
+  if (size < 0 && later) return Heard{};
+  if (size <= 0 && kind_ != Kind::kUdp) return std::nullopt;
+  heard.bytes.resize(static_cast<std::size_t>(size));
+  return heard;
 }
 
-void EmulatedPort::send(std::span<const std::byte> bytes) noexcept {
+void EmulatedPort::send(std::uint8_t socket, std::span<const std::byte> bytes) noexcept {
+  if (socket >= fds_.size()) return;
   while (!bytes.empty()) {
-    const bool is_socket = other_side_ < 0;
-    const ssize_t sent = is_socket ? ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL)
-                                   : ::write(fd_, bytes.data(), bytes.size());
+    const ssize_t sent = kind_ == Kind::kTerminal
+                             ? ::write(fds_[socket], bytes.data(), bytes.size())
+                             : ::send(fds_[socket], bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent <= 0) return;
     bytes = bytes.subspan(static_cast<std::size_t>(sent));
   }

@@ -1,9 +1,11 @@
-// EmulatedPort connects an emulator with a program that expects a glove: through a pseudo-terminal
-// for serial gloves, or through a TCP connection to the host for gloves that connect to it. Cold.
+// EmulatedPort connects an emulator with a program that expects a device: through a pseudo-terminal
+// for serial gloves, through a TCP connection to the host for gloves that connect to it, or through
+// UDP for mocap systems. Cold.
 #pragma once
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -22,6 +24,9 @@ class EmulatedPort {
   // Connects to HOST:PORT, numbers only; fails if nothing listens there.
   [[nodiscard]] static Result<EmulatedPort> connect_tcp(const std::string& endpoint);
 
+  // Sends datagrams to these sockets of the host, "IP:PORT", whether or not it is there already.
+  [[nodiscard]] static Result<EmulatedPort> open_udp(const std::vector<std::string>& endpoints);
+
   ~EmulatedPort();
   EmulatedPort(EmulatedPort&& other) noexcept;
   EmulatedPort& operator=(EmulatedPort&&) = delete;
@@ -31,20 +36,26 @@ class EmulatedPort {
   // What the host opens: "/dev/pts/3", "127.0.0.1:5200".
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
 
+  struct Heard {
+    std::uint8_t socket = 0;  // of the host
+    std::vector<std::byte> bytes{};
+  };
   // What the host sent. Waits for at most `patience`; empty if nothing came, nullopt if the host
   // has closed the connection for good.
-  [[nodiscard]] std::optional<std::vector<std::byte>> receive(std::chrono::nanoseconds patience);
+  [[nodiscard]] std::optional<Heard> receive(std::chrono::nanoseconds patience);
   // Sends what fits: a host that does not read loses bytes, as with a real device.
-  void send(std::span<const std::byte> bytes) noexcept;
+  void send(std::uint8_t socket, std::span<const std::byte> bytes) noexcept;
 
  private:
-  EmulatedPort(int fd, int other_side, std::string name, std::filesystem::path link)
-      : fd_(fd), other_side_(other_side), name_(std::move(name)), link_(std::move(link)) {}
+  enum class Kind : std::uint8_t { kTerminal, kTcp, kUdp };
+  EmulatedPort(Kind kind, std::vector<int> fds, std::string name) noexcept
+      : kind_(kind), fds_(std::move(fds)), name_(std::move(name)) {}
 
-  int fd_;
+  Kind kind_;
+  std::vector<int> fds_;  // [socket of the host]
   // the host's end of a pseudo-terminal, kept open so that the terminal survives a host that closes
   // its own
-  int other_side_;
+  int other_side_ = -1;
   std::string name_;
   std::filesystem::path link_;
 };

@@ -16,7 +16,7 @@ class LogEmulator final : public drivers::Emulator {
   // `speaker` may be null: a device that streams by itself and ignores what the host sends.
   LogEmulator(drivers::Recording recording, std::unique_ptr<drivers::Emulator> speaker);
 
-  void pose(const HandAngles&) override {}
+  void pose(std::size_t /*body*/, const Frame& /*frame*/) override {}
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override;
   void emit(std::int64_t now_ns, Bytes& out) override;

@@ -27,7 +27,7 @@ SyntheticSigner::SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, Em
                                  clip::HandClip clip)
     : clip_(std::move(clip)),
       glove_(std::move(emulator), std::move(port),
-             [this](double time_s) { return pose_at(clip_, time_s); }, {}),
+             hand_motion([this](double time_s) { return pose_at(clip_, time_s); }), {}),
       thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
 
 }  // namespace posed::emulate

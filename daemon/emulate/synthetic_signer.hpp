@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/emulated_device.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::emulate {
@@ -28,7 +28,7 @@ class SyntheticSigner {
                   clip::HandClip clip);
 
   clip::HandClip clip_;
-  EmulatedGlove glove_;
+  EmulatedDevice glove_;
   std::jthread thread_;
 };
 

@@ -4,7 +4,8 @@
 
 namespace posed::pipeline {
 
-void Intake::frame(Frame& frame) noexcept {
+void Intake::frame(std::size_t body, Frame& frame) noexcept {
+  if (body != 0) return outcome(Outcome::kForeign);
   frame.header.stream = stream_;
   frame.header.sequence = ++frames_;
   frame.header.arrival_ns = arrival_ns_;
@@ -19,7 +20,8 @@ void Intake::frame(Frame& frame) noexcept {
   put();
 }
 
-void Intake::sample(Sample& sample) noexcept {
+void Intake::sample(std::size_t body, Sample& sample) noexcept {
+  if (body != 0) return outcome(Outcome::kForeign);
   sample.header.stream = stream_;
   sample.header.sequence = ++samples_;
   sample.header.arrival_ns = arrival_ns_;

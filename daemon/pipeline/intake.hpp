@@ -59,8 +59,9 @@ class Intake final : public Sink {
                             std::string_view name = {}) noexcept;
 
   // Sink: called by the decoder.
-  void frame(Frame& frame) noexcept override;
-  void sample(Sample& sample) noexcept override;
+  // Only body 0 has a stream; what comes of other bodies is counted as foreign.
+  void frame(std::size_t body, Frame& frame) noexcept override;
+  void sample(std::size_t body, Sample& sample) noexcept override;
   void outcome(Outcome outcome) noexcept override { out_.outcome(outcome); }
 
  private:

@@ -10,6 +10,7 @@
 #include "daemon/pipeline/intake.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/system/hot_mark.hpp"
+#include "drivers/glove/calibrated_decoder.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
@@ -54,7 +55,9 @@ class Reader::Source final : private IntakeOut {
   // When the source must be read although its descriptor is not ready; kNoTime_ns: never.
   [[nodiscard]] std::int64_t due_ns() const noexcept {
     if (device_ == nullptr || ended_) return kNoTime_ns;
-    return poll_due_ns_ != kNoTime_ns ? poll_due_ns_ : device_->transport->next_due_ns();
+    const std::int64_t next_ns = device_->transport->next_due_ns();
+    if (poll_due_ns_ == kNoTime_ns || next_ns == kNoTime_ns) return std::max(poll_due_ns_, next_ns);
+    return std::min(poll_due_ns_, next_ns);
   }
   [[nodiscard]] bool must_wait() const noexcept { return device_ != nullptr && !may_read(); }
 
@@ -69,7 +72,7 @@ class Reader::Source final : private IntakeOut {
   void calibrate(const DeviceCommand& command) noexcept {
     calibration_ = command.calibration;
     record_calibration();
-    if (device_ != nullptr) device_->decoder->calibrate(*calibration_->calibration);
+    if (device_ != nullptr) use_calibration(*device_);
     static_cast<void>(report(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
   }
 
@@ -136,10 +139,12 @@ class Reader::Source final : private IntakeOut {
   // Reads and decodes one chunk; returns its length in bytes, 0 when none was due.
   std::size_t read_one() noexcept {
     const drivers::Chunk chunk = read();
-    arrived(ports_.clock());
+    arrived(chunk.arrival_ns != kNoTime_ns ? chunk.arrival_ns : ports_.clock());
+    count(counters_.reader.outcome[static_cast<std::size_t>(Outcome::kForeign)], chunk.foreign);
+    count(counters_.reader.outcome[static_cast<std::size_t>(Outcome::kShort)], chunk.damaged);
     if (!chunk.bytes.empty()) {
-      record_sink(pipeline::Direction::kFromDevice, chunk.bytes);
-      device_->decoder->feed(chunk.bytes, arrival_ns_, intake_);
+      record_sink(pipeline::Direction::kFromDevice, chunk.bytes, chunk.socket);
+      device_->decoder->feed_socket(chunk.socket, chunk.bytes, arrival_ns_, intake_);
     }
     if (chunk.end) end();
     if (chunk.lost) give_back();
@@ -165,8 +170,12 @@ class Reader::Source final : private IntakeOut {
     if (poll_due_ns_ < now_ns) poll_due_ns_ = now_ns + device_->poll.period_ns;
   }
 
+  void use_calibration(drivers::Device& device) noexcept {
+    if (device.calibrated != nullptr) device.calibrated->calibrate(*calibration_->calibration);
+  }
+
   void use(drivers::Device& device) noexcept {
-    if (calibration_ != nullptr) device.decoder->calibrate(*calibration_->calibration);
+    if (calibration_ != nullptr) use_calibration(device);
     poll_due_ns_ = device.poll.request.empty() ? kNoTime_ns : ports_.clock();
     const std::int64_t now_ns = ports_.clock();
     counters_.reader.heard_ns.store(now_ns, std::memory_order_relaxed);
@@ -245,9 +254,10 @@ class Reader::Source final : private IntakeOut {
   void record_calibration() noexcept {
     record_sink(pipeline::Direction::kCalibration, std::as_bytes(std::span(calibration_->text)));
   }
-  void record_sink(pipeline::Direction direction, std::span<const std::byte> bytes) noexcept {
+  void record_sink(pipeline::Direction direction, std::span<const std::byte> bytes,
+                   std::uint8_t socket = 0) noexcept {
     if (ports_.record_sink == nullptr) return;
-    ports_.record_sink->chunk(stream_, 0, direction, arrival_ns_, intake_.next(), bytes);
+    ports_.record_sink->chunk(stream_, socket, direction, arrival_ns_, intake_.next(), bytes);
   }
 
   ReadStream read_;

@@ -24,7 +24,7 @@ void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t
 void describe_device(const drivers::Description& device, v1::StreamStats& stats) {
   const drivers::Driver* driver = drivers::find_driver(device.driver);
   stats.set_identity(device.identity);
-  if (driver != nullptr && driver->glove_model != nullptr) stats.set_device_info(device.text);
+  if (driver != nullptr && driver->glove != nullptr) stats.set_device_info(device.text);
 }
 
 // The stages' names and live parameters; the times of the last report stay.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/pipeline/record_sink.hpp"
+#include "drivers/glove/calibrated_decoder.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 
@@ -164,7 +165,8 @@ Result<> ReplayStreamContext::feed(const log::ChunkRow& chunk) {
   if (auto found = find_place(chunk); !found) return found;
   switch (static_cast<pipeline::Direction>(chunk.direction)) {
     case pipeline::Direction::kFromDevice:
-      decoder_->feed(chunk.bytes, arrival_ns_, intake_);
+      decoder_->feed_socket(static_cast<std::uint8_t>(chunk.socket), chunk.bytes, arrival_ns_,
+                            intake_);
       return outcome_so_far();
     case pipeline::Direction::kToDevice:
       return {};
@@ -188,7 +190,7 @@ Result<> ReplayStreamContext::use_device(const std::string& info) {
   decoder_ = std::move(*decoder);
   device_ = std::move(*description);
   intake_.new_link();
-  if (calibration_) decoder_->calibrate(*calibration_->calibration);
+  if (calibration_) use_calibration();
   return {};
 }
 
@@ -197,9 +199,14 @@ Result<> ReplayStreamContext::calibrate(const std::string& toml) {
   device.identity.clear();  // the live run has checked to which device it belongs
   auto compiled = devices::compile_calibration(device, toml, "the log's calibration");
   if (!compiled) return std::unexpected(compiled.error());
-  decoder_->calibrate(*(*compiled)->calibration);
   calibration_ = std::move(*compiled);
+  use_calibration();
   return {};
+}
+
+void ReplayStreamContext::use_calibration() {
+  auto* const glove = drivers::glove::calibrated_decoder(*decoder_);
+  if (glove != nullptr) glove->calibrate(*calibration_->calibration);
 }
 
 bool ReplayStreamContext::item(pipeline::Item& item) noexcept {

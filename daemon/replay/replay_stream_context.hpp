@@ -88,6 +88,7 @@ class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline:
   [[nodiscard]] Result<> find_place(const log::ChunkRow& chunk);
   [[nodiscard]] Result<> use_device(const std::string& info);
   [[nodiscard]] Result<> calibrate(const std::string& toml);
+  void use_calibration();
   [[nodiscard]] std::optional<std::size_t> stage_of(const pipeline::StageChange& change) const;
   [[nodiscard]] Result<std::unique_ptr<const StageModel>> bind(std::size_t stage,
                                                                const std::string& hash);

@@ -9,6 +9,7 @@
 #include "drivers/cyberglove/start.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
+#include "drivers/glove/traits.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"
@@ -167,7 +168,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
 
 // The motors can only shake; they cannot hold a finger. So a force sets how strongly a finger's
 // motor shakes. A vibration is refused, because posed would have to end it after its duration.
-Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptics& haptics) {
+Result<std::vector<std::byte>> encode_haptics(const Options& given, const glove::Haptics& haptics) {
   const auto requested = requested_config_of_given(given);
   if (!requested) return std::unexpected(requested.error());
   if (requested->layout.form == Form::k16Bit) return misuse("CyberTouch goes with form = \"8bit\"");
@@ -224,6 +225,8 @@ std::vector<OptionSpec> all_options() {
 }  // namespace cyberglove
 
 const Driver& cyberglove_driver() {
+  static const glove::GloveTraits traits{.glove_model = cyberglove::model_of,
+                                         .encode_haptics = cyberglove::encode_haptics};
   static const Driver driver{.name = "cyberglove",
                              .summary = "CyberGlove I, II and III over a serial port or TCP",
                              .options = cyberglove::all_options(),
@@ -231,8 +234,7 @@ const Driver& cyberglove_driver() {
                              .make_decoder = cyberglove::make_decoder,
                              .describe = cyberglove::describe,
                              .expect = cyberglove::expect,
-                             .glove_model = cyberglove::model_of,
-                             .encode_haptics = cyberglove::encode_haptics,
+                             .glove = &traits,
                              .emulate = cyberglove::emulate};
   return driver;
 }

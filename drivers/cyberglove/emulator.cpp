@@ -29,7 +29,7 @@ CyberGloveEmulator::CyberGloveEmulator(EmulatorSettings settings, glove::Model m
       calibration_(std::move(calibration)),
       sub_frame_(settings_.first_sub_frame) {
   power_up();
-  pose(HandAngles{});
+  pose_hand(HandAngles{});
 }
 
 Result<std::unique_ptr<CyberGloveEmulator>> CyberGloveEmulator::make(EmulatorSettings settings) {
@@ -41,7 +41,7 @@ Result<std::unique_ptr<CyberGloveEmulator>> CyberGloveEmulator::make(EmulatorSet
       new CyberGloveEmulator(std::move(settings), std::move(*model), std::move(*calibration)));
 }
 
-void CyberGloveEmulator::pose(const HandAngles& angles) {
+void CyberGloveEmulator::pose_hand(const HandAngles& angles) {
   std::array<double, kSensors> value{};
   const auto rows = std::span(calibration_->map).first(calibration_->map_rows);
   for (const glove::MapRow& row : rows) {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "drivers/cyberglove/protocol.hpp"
-#include "drivers/emulator.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/glove/model.hpp"
 #include "proto/frame/result.hpp"
 
@@ -34,11 +34,11 @@ struct EmulatorSettings {
   std::uint8_t stuck_at = 128;
 };
 
-class CyberGloveEmulator final : public Emulator {
+class CyberGloveEmulator final : public glove::GloveEmulator {
  public:
   [[nodiscard]] static Result<std::unique_ptr<CyberGloveEmulator>> make(EmulatorSettings settings);
 
-  void pose(const HandAngles& angles) override;
+  void pose_hand(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override;
   void emit(std::int64_t now_ns, Bytes& out) override;

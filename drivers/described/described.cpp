@@ -11,6 +11,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
 #include "drivers/glove/device_info.hpp"
+#include "drivers/glove/traits.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"
@@ -213,6 +214,7 @@ std::vector<OptionSpec> all_options() {
 }  // namespace described
 
 const Driver& described_driver() {
+  static const glove::GloveTraits traits{.glove_model = described::glove_model};
   static const Driver driver{
       .name = "described",
       .summary = "any device that a TOML file describes: VMG30, OpenCyberGlove, BeBop Forte, yours",
@@ -221,7 +223,7 @@ const Driver& described_driver() {
       .make_decoder = described::make_decoder,
       .describe = described::describe,
       .expect = described::expect,
-      .glove_model = described::glove_model,
+      .glove = &traits,
       .emulate = described::emulate};
   return driver;
 }

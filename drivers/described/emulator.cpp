@@ -29,11 +29,11 @@ std::int64_t period_ns(const Table& table) {
 DescribedEmulator::DescribedEmulator(std::shared_ptr<const Table> table,
                                      std::shared_ptr<const glove::Calibration> calibration)
     : table_(std::move(table)), calibration_(std::move(calibration)), pace_(period_ns(*table_)) {
-  pose({});
+  pose_hand({});
   if (table_->link.start.empty()) pace_.start(0);
 }
 
-void DescribedEmulator::pose(const HandAngles& angles) {
+void DescribedEmulator::pose_hand(const HandAngles& angles) {
   for (std::size_t s = 0; s < calibration_->sensors; ++s) {
     const auto rows = std::span(calibration_->map).first(calibration_->map_rows);
     const auto row = std::ranges::find(rows, s, &glove::MapRow::sensor);

@@ -7,19 +7,19 @@
 #include <vector>
 
 #include "drivers/described/table.hpp"
-#include "drivers/emulator.hpp"
+#include "drivers/emulate/pace.hpp"
 #include "drivers/glove/calibration.hpp"
-#include "drivers/glove/pace.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 
 namespace posed::drivers::described {
 
-class DescribedEmulator final : public Emulator {
+class DescribedEmulator final : public glove::GloveEmulator {
  public:
   DescribedEmulator(std::shared_ptr<const Table> table,
                     std::shared_ptr<const glove::Calibration> calibration);
 
   // Sets each sensor from the pose, by its first entry in the angle map.
-  void pose(const HandAngles& angles) override;
+  void pose_hand(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
@@ -40,7 +40,7 @@ class DescribedEmulator final : public Emulator {
   std::array<double, glove::kMaxSensors> raw_{};
   std::array<double, kMaxExtras> extra_{};
   std::vector<std::byte> heard_;
-  glove::Pace pace_;
+  emulate::Pace pace_;
   std::int64_t clock_ns_ = 0;  // the device's own time
 };
 

@@ -60,10 +60,10 @@ std::array<double, kMaxValues> wide_bends(const HandAngles& angles) {
 FiveDtEmulator::FiveDtEmulator(Side side, const Settings& settings)
     : side_(side), settings_(settings), pace_(kPeriod_ns[static_cast<std::size_t>(settings.form)]) {
   if (settings.form != Form::kFive) pace_.start(0);
-  pose({});
+  pose_hand({});
 }
 
-void FiveDtEmulator::pose(const HandAngles& angles) {
+void FiveDtEmulator::pose_hand(const HandAngles& angles) {
   const Form form = settings_.form;
   const bool bytes = form == Form::kFive || form == Form::kFiveWireless;
   const auto bends = sensors_of(form) == kFingers ? narrow_bends(angles) : wide_bends(angles);

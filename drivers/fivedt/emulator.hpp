@@ -1,18 +1,18 @@
 // Emulates a 5DT glove of any form.
 #pragma once
 
-#include "drivers/emulator.hpp"
+#include "drivers/emulate/pace.hpp"
 #include "drivers/fivedt/decoder.hpp"
-#include "drivers/glove/pace.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 
 namespace posed::drivers::fivedt {
 
-class FiveDtEmulator final : public Emulator {
+class FiveDtEmulator final : public glove::GloveEmulator {
  public:
   // A Data Glove 5 sends nothing until it receives D or C; all others stream at once.
   FiveDtEmulator(Side side, const Settings& settings);
 
-  void pose(const HandAngles& angles) override;
+  void pose_hand(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
@@ -22,7 +22,7 @@ class FiveDtEmulator final : public Emulator {
 
   Side side_;
   Settings settings_;
-  glove::Pace pace_;
+  emulate::Pace pace_;
   Reading reading_;
   int records_ = 0;
 };

@@ -8,6 +8,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
 #include "drivers/glove/device_info.hpp"
+#include "drivers/glove/traits.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"
@@ -194,6 +195,7 @@ std::vector<OptionSpec> all_options() {
 }  // namespace fivedt
 
 const Driver& fivedt_driver() {
+  static const glove::GloveTraits traits{.glove_model = fivedt::glove_model};
   static const Driver driver{.name = fivedt::kName,
                              .summary = "5DT data gloves: serial, Ultra Wireless and Ultra USB",
                              .options = fivedt::all_options(),
@@ -201,7 +203,7 @@ const Driver& fivedt_driver() {
                              .make_decoder = fivedt::make_decoder,
                              .describe = fivedt::describe,
                              .expect = fivedt::expect,
-                             .glove_model = fivedt::glove_model,
+                             .glove = &traits,
                              .emulate = fivedt::emulate};
   return driver;
 }

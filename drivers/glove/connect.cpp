@@ -12,21 +12,13 @@ namespace {
 
 constexpr std::int64_t kMaxBaud = 4'000'000;
 
-std::vector<std::string> words_of(std::string text) {
-  std::ranges::replace(text, ',', ' ');
-  std::istringstream words(text);
-  std::vector<std::string> found;
-  for (std::string word; words >> word;) found.push_back(word);
-  return found;
-}
-
 std::string link_of(const Options& options) {
   return options.contains("link") ? option<std::string>(options, "link") : "serial";
 }
 
 ListenSettings listen_settings(const Options& options) {
   return {.endpoint = option<std::string>(options, "listen"),
-          .peers = words_of(option<std::string>(options, "peers"))};
+          .peers = words_option(options, "peers")};
 }
 
 }  // namespace

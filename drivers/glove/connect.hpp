@@ -7,6 +7,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/connection.hpp"
+#include "proto/frame/hand.hpp"
 
 namespace posed::drivers::glove {
 

@@ -8,8 +8,8 @@
 #include <memory>
 #include <span>
 
-#include "drivers/driver.hpp"
-#include "drivers/glove/calibration.hpp"
+#include "drivers/glove/calibrated_decoder.hpp"
+#include "drivers/glove/model.hpp"
 
 namespace posed::drivers::glove {
 
@@ -26,7 +26,7 @@ struct Packet {
 [[nodiscard]] SampleLayout sample_layout(const Model& model,
                                          std::span<const std::string> extras = {});
 
-class GloveDecoder : public Decoder {
+class GloveDecoder : public Decoder, public CalibratedDecoder {
  public:
   // A calibration with a different number of sensors is ignored. RT-safe.
   void calibrate(const Calibration& calibration) noexcept override {

@@ -29,10 +29,10 @@ void add_text(const std::string& text, Emulator::Bytes& out) {
 LucidEmulator::LucidEmulator(Side side, Encoding encoding, int max_analog)
     : side_(side), encoding_(encoding), max_(max_analog), pace_(kPeriod_ns) {
   pace_.start(0);
-  pose({});
+  pose_hand({});
 }
 
-void LucidEmulator::pose(const HandAngles& angles) {
+void LucidEmulator::pose_hand(const HandAngles& angles) {
   line_ = {};
   const auto set = [&](std::size_t place, double share) {
     line_.has[place] = true;

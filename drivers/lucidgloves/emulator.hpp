@@ -5,18 +5,18 @@
 #include <cstdint>
 #include <string>
 
-#include "drivers/emulator.hpp"
-#include "drivers/glove/pace.hpp"
+#include "drivers/emulate/pace.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/lucidgloves/protocol.hpp"
 
 namespace posed::drivers::lucidgloves {
 
-class LucidEmulator final : public Emulator {
+class LucidEmulator final : public glove::GloveEmulator {
  public:
   // kAuto sends the alpha encoding.
   LucidEmulator(Side side, Encoding encoding, int max_analog);
 
-  void pose(const HandAngles& angles) override;
+  void pose_hand(const HandAngles& angles) override;
   // Commands end with a line end; all except (ZA), (ZZ), Z and forces are ignored.
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
@@ -32,7 +32,7 @@ class LucidEmulator final : public Emulator {
   Side side_;
   Encoding encoding_;
   int max_;
-  glove::Pace pace_;
+  emulate::Pace pace_;
   Line line_;
   Forces forces_{};
   std::string vibration_;

@@ -6,6 +6,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
 #include "drivers/glove/device_info.hpp"
+#include "drivers/glove/traits.hpp"
 #include "drivers/lucidgloves/decoder.hpp"
 #include "drivers/lucidgloves/emulator.hpp"
 #include "drivers/lucidgloves/start.hpp"
@@ -119,7 +120,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   return device;
 }
 
-Result<std::vector<std::byte>> encode_haptics(const Options& given, const Haptics& haptics) {
+Result<std::vector<std::byte>> encode_haptics(const Options& given, const glove::Haptics& haptics) {
   const auto options = complete_options(lucidgloves_driver(), given);
   if (!options) return std::unexpected(options.error());
   const auto glove = from_options(*options);
@@ -179,6 +180,8 @@ std::vector<OptionSpec> all_options() {
 }  // namespace lucidgloves
 
 const Driver& lucidgloves_driver() {
+  static const glove::GloveTraits traits{.glove_model = lucidgloves::glove_model,
+                                         .encode_haptics = lucidgloves::encode_haptics};
   static const Driver driver{
       .name = lucidgloves::kName,
       .summary = "LucidGloves and others that speak OpenGloves, over a serial port or TCP",
@@ -187,8 +190,7 @@ const Driver& lucidgloves_driver() {
       .make_decoder = lucidgloves::make_decoder,
       .describe = lucidgloves::describe,
       .expect = lucidgloves::expect,
-      .glove_model = lucidgloves::glove_model,
-      .encode_haptics = lucidgloves::encode_haptics,
+      .glove = &traits,
       .emulate = lucidgloves::emulate};
   return driver;
 }

@@ -67,10 +67,10 @@ P5Emulator::P5Emulator() : pace_(kPeriod_ns) {
     const std::size_t led = 2 * i;
     report_.spot[i] = rig.project(led, palm_m + rig.led_m[led]);
   }
-  pose({});
+  pose_hand({});
 }
 
-void P5Emulator::pose(const HandAngles& angles) {
+void P5Emulator::pose_hand(const HandAngles& angles) {
   for (std::size_t f = 0; f < kFingers; ++f) {
     report_.bend[f] = static_cast<std::uint8_t>(std::lround(kMaxBend * bend(angles, f)));
   }

@@ -2,6 +2,7 @@
 
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/connect.hpp"
+#include "drivers/glove/traits.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/p5/decoder.hpp"
@@ -97,6 +98,7 @@ Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
 }  // namespace p5
 
 const Driver& p5_driver() {
+  static const glove::GloveTraits traits{.glove_model = p5::glove_model};
   static const Driver driver{
       .name = p5::kName,
       .summary = "Essential Reality P5, over libusb",
@@ -110,7 +112,7 @@ const Driver& p5_driver() {
       .make_decoder = p5::make_decoder,
       .describe = p5::describe,
       .expect = p5::expect,
-      .glove_model = p5::glove_model,
+      .glove = &traits,
       .emulate = p5::emulate};
   return driver;
 }

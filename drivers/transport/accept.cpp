@@ -1,8 +1,5 @@
 // Accepts gloves that connect over TCP. TCP is not encrypted here, so without a list of peers posed
 // listens on loopback only.
-#include <arpa/inet.h>
-#include <netdb.h>
-#include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -14,6 +11,7 @@
 #include <cstring>
 #include <optional>
 
+#include "drivers/transport/address.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers {
@@ -24,58 +22,8 @@ constexpr int kBacklog = 8;
 // Connections per call: an untrusted client may open them without end.
 constexpr int kMostAtOnce = 64;
 
-struct Address {
-  sockaddr_storage storage{};
-  socklen_t size = sizeof(sockaddr_storage);
-
-  [[nodiscard]] const sockaddr* get() const {
-    return reinterpret_cast<const sockaddr*>(&storage);  // NOLINT: how sockets take addresses
-  }
-  [[nodiscard]] sockaddr* get() { return reinterpret_cast<sockaddr*>(&storage); }  // NOLINT
-};
-
-std::string host_of(const Address& address) {
-  std::array<char, NI_MAXHOST> host{};
-  const int failed = ::getnameinfo(address.get(), address.size, host.data(), host.size(), nullptr,
-                                   0, NI_NUMERICHOST);
-  if (failed != 0) return "?";
-  const std::string_view text(host.data());
-  constexpr std::string_view kMapped = "::ffff:";  // an IPv4 peer of an IPv6 socket
-  return std::string(text.starts_with(kMapped) ? text.substr(kMapped.size()) : text);
-}
-
-bool is_loopback(const std::string& host) { return host.starts_with("127.") || host == "::1"; }
-
-// Parses "127.0.0.1:5200" or "[::1]:5200". Numbers only: a name may resolve differently tomorrow.
-Result<Address> parse_endpoint(const std::string& endpoint) {
-  const auto colon = endpoint.rfind(':');
-  const auto wrong = [&] {
-    return misuse("'" + endpoint + "' should be an address and a port, like 127.0.0.1:5200");
-  };
-  if (colon == std::string::npos || colon == 0) return wrong();
-  std::string host = endpoint.substr(0, colon);
-  const std::string port = endpoint.substr(colon + 1);
-  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  addrinfo wish{};
-  wish.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE;
-  wish.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  if (port.empty() || ::getaddrinfo(host.c_str(), port.c_str(), &wish, &found) != 0) return wrong();
-  Address address;
-  std::memcpy(&address.storage, found->ai_addr, found->ai_addrlen);
-  address.size = found->ai_addrlen;
-  ::freeaddrinfo(found);
-  return address;
-}
-
 Result<Address> address_of(const ListenSettings& settings) {
-  auto address = parse_endpoint(settings.endpoint);
-  if (!address) return address;
-  if (settings.peers.empty() && !is_loopback(host_of(*address))) {
-    return misuse("to listen on " + settings.endpoint +
-                  ", name the gloves' addresses in peers; without them only loopback listens");
-  }
-  return address;
+  return listen_address(settings.endpoint, settings.peers, "the gloves'");
 }
 
 Result<int> listen_at(const ListenSettings& settings) {
@@ -110,9 +58,9 @@ std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
               ", but posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
 }
 
-bool may_connect(const std::string& host, const std::vector<std::string>& peers) {
-  if (peers.empty()) return is_loopback(host);
-  return std::ranges::find(peers, host) != peers.end();
+bool may_connect(const Address& peer, const std::vector<std::string>& peers) {
+  if (peers.empty()) return is_loopback(host_of(peer));
+  return std::ranges::find(peers, host_text(peer)) != peers.end();
 }
 
 }  // namespace
@@ -144,10 +92,10 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     if (fd < 0 && (errno == EINTR || errno == ECONNABORTED)) continue;
     if (fd < 0 && (errno == EMFILE || errno == ENFILE) && !newest) return no_descriptor(settings);
     if (fd < 0) break;
-    const std::string host = host_of(peer);
+    const std::string host = host_text(peer);
     Connection link(fd, settings.endpoint + " from " + host, "tcp " + host);
     link.heed(cancel_);
-    if (!may_connect(host, settings.peers)) {
+    if (!may_connect(peer, settings.peers)) {
       ++refused_;
       continue;
     }

@@ -48,7 +48,7 @@ class LinkTransport final : public Transport {
   [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
-  [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
+  [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
 
  private:
   bool flush() noexcept;
@@ -90,7 +90,7 @@ bool LinkTransport::flush() noexcept {
 }
 
 // RT-safe except for the write.
-bool LinkTransport::send(std::span<const std::byte> bytes) noexcept {
+bool LinkTransport::send(std::span<const std::byte> bytes, std::uint8_t /*socket*/) noexcept {
   if (bytes.size() > unsent_.size() || !flush()) return false;
   const ssize_t sent = write_some(link_.fd(), bytes);
   if (sent < 0) return false;

@@ -18,7 +18,7 @@ HidTransport::~HidTransport() {
 }
 
 // RT-safe but for the write to the eventfd.
-bool HidTransport::send(std::span<const std::byte> bytes) noexcept {
+bool HidTransport::send(std::span<const std::byte> bytes, std::uint8_t /*socket*/) noexcept {
   if (bytes.size() > sending_.bytes.size()) return false;
   sending_.size = bytes.size();
   std::memcpy(sending_.bytes.data(), bytes.data(), bytes.size());

@@ -27,7 +27,7 @@ class HidTransport final : public Transport, public ColdWriter {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override { return reader_->read(now_ns); }
   // Queues the report and wakes the supervisor with one write to an eventfd. RT-safe except for
   // that.
-  [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept override;
+  [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
 
   [[nodiscard]] int waiting_fd() const noexcept override { return waiting_; }
   void write_waiting() noexcept override;

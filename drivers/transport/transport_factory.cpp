@@ -8,4 +8,10 @@ TransportFactory::~TransportFactory() {
   for (const auto& [endpoint, listener] : listeners_) ::close(listener);
 }
 
+Result<std::unique_ptr<UdpTransport>> TransportFactory::udp(const UdpSettings& settings) {
+  if (const auto ok = check_udp(settings); !ok) return std::unexpected(ok.error());
+  if (only_prepare_) return not_opened();
+  return UdpTransport::open(settings);
+}
+
 }  // namespace posed::drivers

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "drivers/transport/connection.hpp"
+#include "drivers/transport/udp.hpp"
 #include "drivers/transport/usb.hpp"
 #include "proto/frame/result.hpp"
 
@@ -61,6 +62,9 @@ class TransportFactory {
 
   // Opens a USB device without a node of its own kind and claims its interface. Cold.
   [[nodiscard]] Result<UsbLink> usb(const UsbSettings& settings);
+
+  // Opens the sockets of a device that sends datagrams. Does not wait for it. Cold.
+  [[nodiscard]] Result<std::unique_ptr<UdpTransport>> udp(const UdpSettings& settings);
 
   // Ends present and future waits, here and on the links made here; for a thread that stops posed
   // while a device is being opened. Any thread.

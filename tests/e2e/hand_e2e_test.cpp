@@ -136,7 +136,8 @@ TEST_CASE("an impossible play gives one error message and an exit code") {
   CHECK(has(refusal({"play", "walker", "g"}), "[stream.generate]"));
   CHECK(has(refusal({"play", "bare", "g"}), "no gesture model"));
   CHECK(has(refusal({"stop-playing", "walker"}), "[stream.generate]"));
-  CHECK(has(refusal({"model", "walker", served.path("toy.gesture")}), "is a model for stage generate"));
+  CHECK(has(refusal({"model", "walker", served.path("toy.gesture")}),
+            "is a model for stage generate"));
   CHECK(has(refusal({"model", "hand", served.path("one.style")}), "[stream.style]"));
   const auto model =
       posed({"ctl", "--connect", served.control, "model", "bare", served.path("toy.gesture")});

@@ -12,6 +12,7 @@
 
 #include "daemon/control/request_handler.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/traits.hpp"
 #include "models/gesture/model_file.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
@@ -78,7 +79,7 @@ std::vector<control::ControlledStream> three_streams() {
 // Names every sensor of the glove.
 std::string calibration_text() {
   const drivers::Driver* glove = drivers::find_driver("lucidgloves");
-  const auto model = glove->glove_model(glove->expect({}).value()).value();
+  const auto model = glove->glove->glove_model(glove->expect({}).value()).value();
   drivers::glove::CalibrationFile file;
   file.driver = model.driver;
   for (const auto& sensor : model.sensors) {

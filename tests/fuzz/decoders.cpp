@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "drivers/driver.hpp"
+#include "drivers/template_mocap/protocol.hpp"
 #include "proto/frame/hand.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
@@ -94,6 +95,40 @@ void try_bytes(const char* driver, const std::string& text, std::size_t piece,
   }
 }
 
+// Two bodies, of one joint and of two, as in the drawing of drivers/template_mocap/protocol.hpp.
+std::string mocap_bodies() {
+  const std::string offset(12, '\0');
+  const std::string hips = std::string("\4hips\xff") + offset;
+  return std::string("\2\1\0\1A\1", 6) + hips + std::string("\2\0\1B\2", 5) + hips +
+         std::string("\4head\0", 6) + offset;
+}
+
+// The bytes are a datagram, a datagram's content with a right head and checksum, and a description.
+void try_mocap(std::span<const std::byte> bytes) {
+  const posed::drivers::Driver* driver = posed::drivers::find_driver("template_mocap");
+  static const auto layout =
+      driver->make_layout(std::as_bytes(std::span<const char>(mocap_bodies())));
+  demand(layout.has_value());
+  const auto decoder = decoder_of("template_mocap", "template_mocap rate=100");
+  CollectSink sink(0);
+  decoder->feed(bytes, 0, sink);
+  decoder->use(**layout);
+  decoder->feed(bytes, 0, sink);
+  if (bytes.size() <= 60'000) {
+    for (const auto kind :
+         {posed::drivers::mocap::Kind::kDescription, posed::drivers::mocap::Kind::kFrame}) {
+      decoder->feed(posed::drivers::mocap::encode_datagram(kind, bytes), 0, sink);
+    }
+  }
+  for (const std::size_t body : sink.bodies) demand(body < (*layout)->bodies.size());
+  check(sink);
+  const auto any = driver->make_layout(bytes);
+  if (!any) return;
+  demand((*any)->bodies.size() <= posed::kMaxBodies);
+  decoder->use(**any);
+  decoder->feed(bytes, 0, sink);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -101,7 +136,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::span bytes = std::as_bytes(std::span(data + 2, size - 2));
   const std::size_t piece = 1U + data[1];
   const std::string text(reinterpret_cast<const char*>(data + 2), size - 2);
-  switch (data[0] % 10) {
+  switch (data[0] % 11) {
     case 0:
       try_bytes("file", std::string(kBvh), piece, bytes);
       break;
@@ -145,6 +180,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       (void)decoder_of("p5", text);
       break;
     }
+    case 9:
+      try_mocap(bytes);
+      (void)decoder_of("template_mocap", text);
+      break;
     default:
       if (const auto decoder = decoder_of("file", text)) {
         CollectSink sink(0);

@@ -28,8 +28,12 @@ void demand(bool holds) {
 
 class SoundSink final : public posed::Sink {
  public:
-  void frame(posed::Frame& frame) noexcept override { demand(posed::test::is_sound(frame)); }
-  void sample(posed::Sample& sample) noexcept override { demand(posed::test::is_sound(sample)); }
+  void frame(std::size_t /*body*/, posed::Frame& frame) noexcept override {
+    demand(posed::test::is_sound(frame));
+  }
+  void sample(std::size_t /*body*/, posed::Sample& sample) noexcept override {
+    demand(posed::test::is_sound(sample));
+  }
   void outcome(posed::Outcome /*outcome*/) noexcept override {}
 };
 
@@ -60,7 +64,7 @@ std::vector<Glove> make_gloves() {
       {"device", posed::drivers::described::shipped_devices()}};
   std::vector<Glove> gloves;
   for (const Driver& driver : posed::drivers::registry()) {
-    if (driver.emulate == nullptr) continue;
+    if (driver.glove == nullptr || driver.emulate == nullptr) continue;
     const auto takes = [&driver](const auto& kind) {
       return std::ranges::find(driver.options, kind.first, &posed::drivers::OptionSpec::name) !=
              driver.options.end();

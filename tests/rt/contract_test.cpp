@@ -10,8 +10,9 @@
 #include <mutex>
 #include <thread>
 
-#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/emulated_device.hpp"
 #include "daemon/system/clock.hpp"
+#include "drivers/glove/traits.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "models/gesture/synthetic_signer.hpp"
@@ -157,9 +158,9 @@ TEST_CASE("a glove keeps the real-time contract: read, calibrated, vibrated, unp
     auto emulator =
         drivers::find_driver("lucidgloves")
             ->emulate(drivers::complete_options(*drivers::find_driver("lucidgloves"), {}).value());
-    return std::make_unique<emulate::EmulatedGlove>(std::move(*emulator),
-                                                    emulate::EmulatedPort::open_pty().value(),
-                                                    nullptr, emulate::EmulatedGlove::Settings{});
+    return std::make_unique<emulate::EmulatedDevice>(std::move(*emulator),
+                                                     emulate::EmulatedPort::open_pty().value(),
+                                                     nullptr, emulate::EmulatedDevice::Settings{});
   };
   auto glove = plug_in();
   const auto wear = [&] {
@@ -172,7 +173,7 @@ TEST_CASE("a glove keeps the real-time contract: read, calibrated, vibrated, unp
   streams.push_back(
       {.device = open_device("lucidgloves", {{"port", glove->port()}}), .slot = &slot});
   const auto model =
-      drivers::find_driver("lucidgloves")->glove_model(streams[0].device.description);
+      drivers::find_driver("lucidgloves")->glove->glove_model(streams[0].device.description);
   const drivers::glove::OwnedCalibration calibration{
       drivers::glove::default_calibration(*model).value(), "calibration"};
   drivers::Device again;

@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/emulated_device.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/fit.hpp"
 
@@ -19,8 +19,10 @@ class PosingGlove {
   explicit PosingGlove(const std::string& driver = "cyberglove",
                        emulate::EmulatedPort port = emulate::EmulatedPort::open_pty({}).value(),
                        const drivers::Options& options = {})
-      : glove_(drivers::find_driver(driver)->emulate(options).value(), std::move(port),
-               [this](double) { return drivers::glove::hand_in(pose_.load()); }, {}),
+      : glove_(
+            drivers::find_driver(driver)->emulate(options).value(), std::move(port),
+            emulate::hand_motion([this](double) { return drivers::glove::hand_in(pose_.load()); }),
+            {}),
         thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
 
   [[nodiscard]] std::string port() const { return glove_.port(); }
@@ -28,7 +30,7 @@ class PosingGlove {
 
  private:
   std::atomic<Pose> pose_{Pose::kFlat};
-  emulate::EmulatedGlove glove_;
+  emulate::EmulatedDevice glove_;
   std::jthread thread_;
 };
 

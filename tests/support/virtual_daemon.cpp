@@ -12,6 +12,7 @@
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/record/recorder.hpp"
+#include "drivers/glove/calibrated_decoder.hpp"
 #include "proto/log/digest.hpp"
 #include "tests/support/stage_commands.hpp"
 
@@ -99,6 +100,7 @@ struct VirtualStreamContext {
     device->description = stream.description;
     device->transport = std::make_unique<ScriptedTransport>(link);
     device->decoder = driver->make_decoder(stream.description).value();
+    device->calibrated = drivers::glove::calibrated_decoder(*device->decoder);
     return device.get();
   }
   [[nodiscard]] std::int64_t next_device_ns() const {

@@ -8,6 +8,7 @@
 #include "drivers/emulator.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/fit.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/options.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
@@ -80,7 +81,7 @@ VirtualStream glove_stream(const std::string& name, double length_s) {
     const double closed = 0.5 - 0.5 * std::cos(2.0 * kPi * at_s);
     HandAngles angles = flat;
     for (std::size_t c = 0; c < angles.size(); ++c) angles[c] += closed * (fist[c] - flat[c]);
-    glove->pose(angles);
+    glove->pose(0, drivers::glove::hand_frame(angles));
     drivers::Emulator::Bytes line;
     glove->emit(nanoseconds(at_s), line);
     stream.links[0].chunks.push_back({.at_s = at_s, .bytes = text_of(line)});

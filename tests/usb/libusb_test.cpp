@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "drivers/driver.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/p5/emulator.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
@@ -134,7 +135,7 @@ TEST_CASE("the P5 driver reads heads, LEDs and reports from libusb") {
   const auto decoder = driver->make_decoder(device->description);
   REQUIRE(decoder);
   for (std::size_t i = 0; i < 50; ++i) {
-    emulator.pose(closing_hand(i, 50));
+    emulator.pose(0, drivers::glove::hand_frame(closing_hand(i, 50)));
     P5Glove::Bytes report;
     emulator.emit(emulator.next_due_ns(), report);
     glove.say(report);

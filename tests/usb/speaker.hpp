@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/emulator.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "tests/unit/drivers/emulated.hpp"
 #include "tests/usb/hid_glove.hpp"
 
@@ -41,7 +41,7 @@ class Speaker {
       emulator_->receive(glove_.heard(), now_ns, report);
       if (emulator_->next_due_ns() != kNoTime_ns) {
         now_ns = emulator_->next_due_ns();
-        emulator_->pose(closing_hand(i++ % kPoses, kPoses));
+        emulator_->pose(0, drivers::glove::hand_frame(closing_hand(i++ % kPoses, kPoses)));
         emulator_->emit(now_ns, report);
       }
       const std::lock_guard lock(mutex_);

@@ -49,11 +49,11 @@ its frame in a ring (decoded); packets take turns between the two, one a millise
 // Does what a reader's sink does: puts items into a ring.
 class RingSink final : public Sink {
  public:
-  void frame(Frame& frame) noexcept override {
+  void frame(std::size_t /*body*/, Frame& frame) noexcept override {
     static_cast<void>(ring_.push(frame));
     ++frames;
   }
-  void sample(Sample& /*sample*/) noexcept override { ++samples; }
+  void sample(std::size_t /*body*/, Sample& /*sample*/) noexcept override { ++samples; }
   void outcome(Outcome outcome) noexcept override { bad += outcome == Outcome::kOk ? 0 : 1; }
   void empty_ring() noexcept {
     while (ring_.consume([](Frame&) {})) {
@@ -140,7 +140,7 @@ Result<json> decoder_latency(BenchGlove& glove, int samples) {
       next_record(glove, static_cast<std::size_t>(++sent), record);
       size.store(record.size());
       line.written_ns.store(monotonic_ns());
-      line.port.send(record);
+      line.port.send(0, record);
     }
   });
   for (int i = 0; i < 2 * samples; ++i) {

@@ -4,8 +4,9 @@
 #include <numbers>
 #include <thread>
 
-#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/emulated_device.hpp"
 #include "drivers/described/device_file.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
 namespace posed::cli {
@@ -19,7 +20,7 @@ using drivers::Options;
 class LentEmulator final : public Emulator {
  public:
   explicit LentEmulator(Emulator& emulator) : emulator_(emulator) {}
-  void pose(const HandAngles& angles) override { emulator_.pose(angles); }
+  void pose(std::size_t body, const Frame& frame) override { emulator_.pose(body, frame); }
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override {
     emulator_.receive(bytes, now_ns, answer);
   }
@@ -36,7 +37,7 @@ Result<std::unique_ptr<drivers::Decoder>> opened_decoder(const Driver& driver, O
   auto port = emulate::EmulatedPort::open_pty();
   if (!port) return std::unexpected(port.error());
   options["port"] = port->name();
-  emulate::EmulatedGlove glove(std::make_unique<LentEmulator>(emulator), std::move(*port), {}, {});
+  emulate::EmulatedDevice glove(std::make_unique<LentEmulator>(emulator), std::move(*port), {}, {});
   const std::jthread thread([&](const std::stop_token& stop) { glove.run(stop); });
   drivers::TransportFactory ports;
   auto device = driver.open(options, ports);
@@ -84,7 +85,7 @@ std::vector<std::pair<std::string, Options>> glove_kinds(const Driver& driver) {
 Result<std::vector<BenchGlove>> bench_gloves() {
   std::vector<BenchGlove> gloves;
   for (const Driver& driver : drivers::registry()) {
-    if (driver.emulate == nullptr) continue;
+    if (driver.glove == nullptr || driver.emulate == nullptr) continue;
     for (const auto& [name, options] : glove_kinds(driver)) {
       auto glove = make_bench_glove(driver, name, options);
       if (!glove) return std::unexpected(glove.error());
@@ -99,7 +100,7 @@ void next_record(BenchGlove& glove, std::size_t index, std::vector<std::byte>& o
   HandAngles angles{};
   const double turn = 2.0 * std::numbers::pi * static_cast<double>(index) / kRecordsATurn;
   for (std::size_t i = 0; i < angles.size(); i += 3) angles[i] = 0.5 - 0.5 * std::cos(turn);
-  glove.emulator->pose(angles);
+  glove.emulator->pose(0, drivers::glove::hand_frame(angles));
   glove.emulator->emit(glove.emulator->next_due_ns(), out);
 }
 

@@ -17,6 +17,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/device_info.hpp"
 #include "drivers/glove/import.hpp"
+#include "drivers/glove/traits.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::cli {
@@ -44,11 +45,10 @@ struct CalibrateOptions {
 
 Result<const drivers::Driver*> named_driver(const std::string& name) {
   const drivers::Driver* driver = drivers::find_driver(name);
-  if (driver != nullptr && driver->glove_model != nullptr) return driver;
+  if (driver != nullptr && driver->glove != nullptr) return driver;
   std::string known;
   for (const drivers::Driver& other : drivers::registry()) {
-    if (other.glove_model != nullptr)
-      known += (known.empty() ? "" : ", ") + std::string(other.name);
+    if (other.glove != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
   }
   return misuse("--driver names the glove's driver, one of " + known);
 }
@@ -172,7 +172,7 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   if (!completed) return std::unexpected(completed.error());
   const auto description = (*driver)->expect(*completed);
   if (!description) return std::unexpected(description.error());
-  const auto model = (*driver)->glove_model(*description);
+  const auto model = (*driver)->glove->glove_model(*description);
   if (!model) return std::unexpected(model.error());
   const Side hand = options.hand == "left" ? Side::kLeft : Side::kRight;
   return drivers::glove::import_calibration(options.import, *model, hand);

@@ -1,4 +1,4 @@
-// `posed emulate`: emulates a glove for any program that expects one.
+// `posed emulate`: emulates a device for any program that expects one.
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -14,7 +14,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/devices/driver_options.hpp"
 #include "daemon/cli/live/client.hpp"
-#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/emulated_device.hpp"
 #include "daemon/emulate/log_emulator.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "proto/text/json_text.hpp"
@@ -26,6 +26,7 @@ struct EmulateOptions {
   std::string what;  // a log's path or a driver's name
   std::string stream;
   std::string tcp;
+  std::vector<std::string> udp;
   std::filesystem::path link, clip;
   std::vector<std::string> set;     // KEY=VALUE
   std::vector<std::string> faults;  // KIND:RATE
@@ -35,8 +36,14 @@ struct EmulateOptions {
   std::optional<double> seconds;
 };
 
-// The motion of the emulated hand: a clip, or gestures of a synthetic person.
-Result<std::function<HandAngles(double)>> motion(const EmulateOptions& options) {
+// The motion of an emulated hand: a clip, or gestures of a synthetic person. Other devices move by
+// themselves.
+Result<emulate::Motion> motion(const EmulateOptions& options) {
+  const drivers::Driver* driver = drivers::find_driver(options.what);
+  if (driver != nullptr && driver->glove == nullptr) {
+    if (options.clip.empty()) return emulate::Motion();
+    return misuse("'" + options.what + "' is not a glove: leave out --clip");
+  }
   auto clip = std::make_shared<clip::HandClip>();
   if (!options.clip.empty()) {
     auto read = clip::read_hand_clip(options.clip);
@@ -48,7 +55,7 @@ Result<std::function<HandAngles(double)>> motion(const EmulateOptions& options) 
     if (!made) return std::unexpected(made.error());
     *clip = std::move(made->clip);
   }
-  return [clip](double time_s) { return emulate::pose_at(*clip, time_s); };
+  return emulate::hand_motion([clip](double time_s) { return emulate::pose_at(*clip, time_s); });
 }
 
 Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name,
@@ -60,7 +67,7 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
       if (other.emulate != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
     }
     return misuse("'" + name +
-                  "' is neither a log nor a glove that can be emulated; there is: " + known);
+                  "' is neither a log nor a device that can be emulated; there is: " + known);
   }
   auto options = parse_driver_options(*driver, set);
   if (!options) return std::unexpected(options.error());
@@ -90,11 +97,31 @@ Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& o
   return std::make_unique<emulate::LogEmulator>(std::move(device->recording), std::move(speaker));
 }
 
+// The address that a device over UDP sends to when --udp does not say: where posed listens.
+std::optional<std::string> default_udp(const EmulateOptions& options) {
+  const drivers::Driver* driver = drivers::find_driver(options.what);
+  if (driver == nullptr) return std::nullopt;
+  const auto set = parse_driver_options(*driver, options.set);
+  if (!set) return std::nullopt;
+  const auto listen = set->find("listen");
+  if (listen == set->end() || set->contains("port")) return std::nullopt;
+  return std::get<std::string>(listen->second);
+}
+
+Result<emulate::EmulatedPort> open_port(const EmulateOptions& options) {
+  if (!options.udp.empty()) return emulate::EmulatedPort::open_udp(options.udp);
+  if (!options.tcp.empty()) return emulate::EmulatedPort::connect_tcp(options.tcp);
+  if (const auto to = default_udp(options); to && !options.pty && options.link.empty()) {
+    return emulate::EmulatedPort::open_udp({*to});
+  }
+  return emulate::EmulatedPort::open_pty(options.link);
+}
+
 Result<> emulate(const EmulateOptions& options) {
   const Interrupt interrupt;
   auto emulator = open_emulator(options);
   if (!emulator) return std::unexpected(emulator.error());
-  emulate::EmulatedGlove::Settings settings{.speed = options.speed};
+  emulate::EmulatedDevice::Settings settings{.speed = options.speed};
   for (const std::string& word : options.faults) {
     const auto fault = drivers::emulate::parse_fault(word);
     if (!fault) return std::unexpected(fault.error());
@@ -102,13 +129,12 @@ Result<> emulate(const EmulateOptions& options) {
   }
   auto moves = motion(options);
   if (!moves) return std::unexpected(moves.error());
-  auto port = options.tcp.empty() ? emulate::EmulatedPort::open_pty(options.link)
-                                  : emulate::EmulatedPort::connect_tcp(options.tcp);
+  auto port = open_port(options);
   if (!port) return std::unexpected(port.error());
   const nlohmann::ordered_json ready{
       {"port", options.link.empty() ? port->name() : options.link.string()}};
-  emulate::EmulatedGlove glove(std::move(*emulator), std::move(*port), std::move(*moves),
-                               std::move(settings));
+  emulate::EmulatedDevice glove(std::move(*emulator), std::move(*port), std::move(*moves),
+                                std::move(settings));
   std::printf("%s\n", json_text(ready).c_str());
   std::fflush(stdout);
   std::atomic<bool> ended{false};
@@ -133,16 +159,20 @@ Result<> emulate(const EmulateOptions& options) {
 }  // namespace
 
 void add_emulate(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("emulate", "Emulate a glove on a pseudo-terminal or a TCP connection");
+  auto* command = app.add_subcommand(
+      "emulate", "Emulate a device on a pseudo-terminal, a TCP connection or over UDP");
   auto options = std::make_shared<EmulateOptions>();
   command->add_option("WHAT", options->what, "A device log (.plog) or a driver's name")->required();
   auto* pty = command->add_flag("--pty", options->pty, "Behind a pseudo-terminal (the default)");
   auto* tcp = command->add_option("--tcp", options->tcp, "Connect to a host that waits for gloves");
   tcp->type_name("HOST:PORT")->excludes(pty);
+  auto* udp = command->add_option("--udp", options->udp,
+                                  "Send datagrams to a host; several: one for each of its sockets");
+  udp->type_name("IP:PORT")->excludes(pty)->excludes(tcp);
   command->add_option("--link", options->link, "Also a link to the pseudo-terminal, by this name")
       ->type_name("PATH")
-      ->excludes(tcp);
+      ->excludes(tcp)
+      ->excludes(udp);
   command->add_option("--speed", options->speed, "Times the device's own pace, 0.01 to 1000")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
@@ -166,6 +196,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
   command->footer(R"(Prints one JSON line {"port": ...} when it can be opened. Examples:
   posed emulate cyberglove --link /tmp/glove   # and a stream with port = "/tmp/glove"
   posed emulate lucidgloves --tcp 127.0.0.1:65432
+  posed emulate template_mocap --udp 127.0.0.1:7400
   posed emulate take1.plog --stream right      # the bytes of a recorded glove
   posed emulate cyberglove --fault drop:0.01 --fault burst:0.001
 Faults of so many bytes: drop, zero, flip, insert, noise (any of drop, flip, insert);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "drivers/glove/traits.hpp"
 #include "drivers/transport/cold_writer.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
@@ -43,9 +44,9 @@ std::int64_t now_ns() {
 class RawSink final : public Sink {
  public:
   RawSink(std::size_t sensors, const GloveSource::Take& take) : sensors_(sensors), take_(take) {}
-  void frame(Frame& /*frame*/) noexcept override {}
+  void frame(std::size_t /*body*/, Frame& /*frame*/) noexcept override {}
   void outcome(Outcome /*outcome*/) noexcept override {}
-  void sample(Sample& sample) noexcept override {
+  void sample(std::size_t /*body*/, Sample& sample) noexcept override {
     GloveSource::Raw raw{};
     GloveSource::Valid valid;
     for (std::size_t i = 0; i < sensors_ && sensors_ + i < sample.value_count; ++i) {
@@ -97,7 +98,7 @@ class OpenedGlove final : public GloveSource {
       const drivers::Chunk chunk = device_.transport->read(now);
       if (chunk.lost || chunk.end) return gone();
       if (chunk.bytes.empty()) return {};
-      device_.decoder->feed(chunk.bytes, now, sink);
+      device_.decoder->feed_socket(chunk.socket, chunk.bytes, now, sink);
     }
   }
 
@@ -213,10 +214,10 @@ class PublishedGlove final : public GloveSource {
 Result<GloveSource::Glove> GloveSource::known(const drivers::Driver& driver,
                                               const drivers::Description& description) {
   const auto hand = description.skeleton ? hand_side(*description.skeleton) : std::nullopt;
-  if (driver.glove_model == nullptr || !hand) {
+  if (driver.glove == nullptr || !hand) {
     return misuse("driver " + in_quotes(driver.name) + " is not for gloves");
   }
-  auto model = driver.glove_model(description);
+  auto model = driver.glove->glove_model(description);
   if (!model) return std::unexpected(model.error());
   return Glove{.model = std::move(*model), .identity = description.identity, .hand = *hand};
 }

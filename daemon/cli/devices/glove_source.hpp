@@ -11,7 +11,9 @@
 
 #include "daemon/cli/live/client.hpp"
 #include "drivers/driver.hpp"
+#include "drivers/glove/model.hpp"
 #include "drivers/transport/transport_factory.hpp"
+#include "proto/frame/hand.hpp"
 
 namespace posed::cli {
 

@@ -4,6 +4,7 @@
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/glove/fit.hpp"
 #include "drivers/glove/import.hpp"
+#include "drivers/glove/traits.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/text/load_file.hpp"
 #include "tests/support/shared.hpp"
@@ -178,8 +179,8 @@ TEST_CASE("poses without a flat hand, or without any movement, fit nothing") {
 
 TEST_CASE("each pose sets a finger's share to zero or full, on every glove") {
   for (const Driver& driver : registry()) {
-    if (driver.glove_model == nullptr || driver.name == "described") continue;
-    const auto model = driver.glove_model(driver.expect({}).value()).value();
+    if (driver.glove == nullptr || driver.name == "described") continue;
+    const auto model = driver.glove->glove_model(driver.expect({}).value()).value();
     for (std::size_t p = 0; p < kPoses; ++p) {
       const auto values = values_of(model, hand_in(static_cast<Pose>(p))).value();
       for (std::size_t i = 0; i < values.size(); ++i) {

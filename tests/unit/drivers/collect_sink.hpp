@@ -14,10 +14,19 @@ class CollectSink final : public Sink {
  public:
   explicit CollectSink(std::size_t room = 4096) {
     frames.reserve(room);
+    bodies.reserve(room);
+    described.reserve(kMaxDescription);
     samples.reserve(room);
   }
-  void frame(Frame& frame) noexcept override { frames.push_back(frame); }
-  void sample(Sample& sample) noexcept override { samples.push_back(sample); }
+  void frame(std::size_t body, Frame& frame) noexcept override {
+    frames.push_back(frame);
+    bodies.push_back(body);
+  }
+  void sample(std::size_t /*body*/, Sample& sample) noexcept override { samples.push_back(sample); }
+  void description(std::span<const std::byte> bytes) noexcept override {
+    ++descriptions;
+    described.assign(bytes.begin(), bytes.end());
+  }
   void outcome(Outcome outcome) noexcept override { ++outcomes[static_cast<std::size_t>(outcome)]; }
 
   [[nodiscard]] int count(Outcome outcome) const {
@@ -25,12 +34,16 @@ class CollectSink final : public Sink {
   }
   void clear() {
     frames.clear();
+    bodies.clear();
     samples.clear();
     outcomes.fill(0);
   }
 
   std::vector<Frame> frames;
+  std::vector<std::size_t> bodies;  // [frame]
   std::vector<Sample> samples;
+  int descriptions = 0;
+  std::vector<std::byte> described;  // the newest description
   std::array<int, kOutcomes> outcomes{};
 };
 

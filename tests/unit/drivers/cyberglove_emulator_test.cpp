@@ -1,6 +1,7 @@
 // The emulated CyberGlove: its replies, its motors, its faults.
 #include <catch2/catch.hpp>
 
+#include "drivers/glove/traits.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/cyberglove_rig.hpp"
 
@@ -53,7 +54,7 @@ TEST_CASE("the emulated CyberGlove answers like the real one") {
 
 TEST_CASE("a CyberTouch vibrates the fingers with a force, and samples continue") {
   const auto bytes =
-      cyberglove_driver().encode_haptics({}, {.force = {1.0F, -1.0F, 0.0F, -1.0F, 0.5F}});
+      cyberglove_driver().glove->encode_haptics({}, {.force = {1.0F, -1.0F, 0.0F, -1.0F, 0.5F}});
   REQUIRE(bytes);
   CHECK(text_of(*bytes) == std::string("A\x03\x00\xFF\x02\x00\x04\x80", 8));
   const auto emulator = emulator_of({});
@@ -66,8 +67,8 @@ TEST_CASE("a CyberTouch vibrates the fingers with a force, and samples continue"
   CHECK(sink.outcomes == std::array<int, kOutcomes>{2, 0, 0, 0, 0});
   CHECK(text_of(tell(*emulator, "?A")) == std::string("?A\xFF\0\0\0\x80\0\0", 9));
   const auto driver = cyberglove_driver();
-  CHECK_FALSE(driver.encode_haptics({}, {.force = {2.0F}}));
-  CHECK_FALSE(driver.encode_haptics({}, {.vibration_s = 1.0F}));
+  CHECK_FALSE(driver.glove->encode_haptics({}, {.force = {2.0F}}));
+  CHECK_FALSE(driver.glove->encode_haptics({}, {.vibration_s = 1.0F}));
 }
 
 TEST_CASE("a CyberGlove's sensor that is stuck stays where it is") {

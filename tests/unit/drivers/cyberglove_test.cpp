@@ -7,6 +7,7 @@
 
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/cyberglove/stamp_clock.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/grasps.hpp"
@@ -193,7 +194,7 @@ TEST_CASE("a pose given to the CyberGlove's emulator comes out of the decoder, e
     pose[3 * kFingerChannels + 1] = kRing;
     pose[4 * kFingerChannels + 1] = 0.25;
     pose[2 * kFingerChannels + 1] = kMiddle;
-    emulator->pose(pose);
+    emulator->pose(0, drivers::glove::hand_frame(pose));
     CollectSink sink;
     decoder->feed(next(*emulator), 0, sink);
     REQUIRE(sink.frames.size() == 1);

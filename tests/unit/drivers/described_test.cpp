@@ -12,6 +12,7 @@
 #include "drivers/described/emulator.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/device_fixtures.hpp"
@@ -173,7 +174,7 @@ TEST_CASE("the shipped descriptions are valid and emulate what they decode") {
     glove.receive(table.link.start, 0, answer);
     HandAngles fist{};
     for (std::size_t i = 0; i < fist.size(); i += 3) fist[i] = 0.6;
-    glove.pose(fist);
+    glove.pose(0, drivers::glove::hand_frame(fist));
     test::CollectSink sink;
     Bytes bytes;
     while (sink.frames.size() < 10) {

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <map>
 
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/unit/drivers/emulated.hpp"
@@ -168,6 +169,13 @@ std::vector<DeviceFixture> make_specimens() {
        .loop_chunks = 256,
        .chunk_frames = 1,
        .chunk_samples = 1},
+      {.name = "template-mocap",
+       .driver = "template_mocap",
+       .options = {},
+       .loop_chunks = 24,
+       .chunk_frames = 2,
+       .emulated = true,
+       .datagrams = true},
   };
 }
 
@@ -186,6 +194,25 @@ drivers::Device open_device(const DeviceFixture& fixture) {
   auto device = driver->open(fixture.options, ports);
   if (!device) FAIL(device.error().text());
   return std::move(*device);
+}
+
+const drivers::SourceLayout* layout_of(const DeviceFixture& fixture) {
+  static std::map<std::string, std::unique_ptr<const drivers::SourceLayout>> made;
+  const drivers::Driver* driver = drivers::find_driver(fixture.driver);
+  REQUIRE(driver != nullptr);
+  if (driver->make_layout == nullptr) return nullptr;
+  auto& layout = made[fixture.name];
+  if (layout == nullptr) layout = emulated_layout(fixture);
+  return layout.get();
+}
+
+std::unique_ptr<drivers::Decoder> new_decoder(const DeviceFixture& fixture,
+                                              const drivers::Description& description) {
+  auto decoder = drivers::find_driver(description.driver)->make_decoder(description);
+  if (!decoder) FAIL(decoder.error().text());
+  const auto* layout = layout_of(fixture);
+  if (layout != nullptr) (*decoder)->use(*layout);
+  return std::move(*decoder);
 }
 
 std::vector<Bytes> read_chunks(drivers::Transport& transport, std::size_t count) {

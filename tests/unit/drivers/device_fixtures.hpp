@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct DeviceFixture {
   std::size_t chunk_packets = 1;
   bool emulated = false;       // its driver's emulator replaces the device (emulated.hpp)
   bool whole_reports = false;  // over USB: a packet arrives complete or not at all
+  bool datagrams = false;      // over UDP: a chunk is a packet, complete or not
   std::string start{};         // bytes that the emulator needs before it streams
 };
 
@@ -29,6 +31,11 @@ struct DeviceFixture {
 [[nodiscard]] const std::vector<DeviceFixture>& device_fixtures();
 
 [[nodiscard]] drivers::Device open_device(const DeviceFixture& fixture);
+// The bodies of a device with several; null for others.
+[[nodiscard]] const drivers::SourceLayout* layout_of(const DeviceFixture& fixture);
+// A decoder for the same device, with the same bodies.
+[[nodiscard]] std::unique_ptr<drivers::Decoder> new_decoder(
+    const DeviceFixture& fixture, const drivers::Description& description);
 [[nodiscard]] std::vector<Bytes> read_chunks(drivers::Transport& transport, std::size_t count);
 
 // Writes a file with this text into that folder.

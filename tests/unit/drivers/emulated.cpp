@@ -8,8 +8,11 @@
 #include <fstream>
 #include <numbers>
 
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/transport/file.hpp"
+#include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::test {
 namespace {
@@ -46,6 +49,33 @@ std::string log_line(std::int64_t at_ns, std::span<const std::byte> bytes) {
   return line + '\n';
 }
 
+// Poses all bodies; the motion repeats after a loop.
+void pose(const DeviceFixture& fixture, std::size_t index, drivers::Emulator& emulator) {
+  if (driver_of(fixture).glove != nullptr) {
+    emulator.pose(0, drivers::glove::hand_frame(closing_hand(index, fixture.loop_chunks)));
+    return;
+  }
+  const double turn = 2.0 * std::numbers::pi * static_cast<double>(index % fixture.loop_chunks) /
+                      static_cast<double>(fixture.loop_chunks);
+  for (std::size_t body = 0; body < fixture.chunk_frames; ++body) {
+    const double angle_rad = 0.5 * std::sin(turn + static_cast<double>(body));
+    Frame frame;
+    frame.joint_count = kMaxJoints;
+    frame.valid.set();
+    frame.rotation_xyzw.fill(from_eigen(axis_rotation(Axis::kX, angle_rad)));
+    frame.root_position_m = {static_cast<float>(angle_rad), 1.0F, static_cast<float>(body)};
+    emulator.pose(body, frame);
+  }
+}
+
+// The description that a datagram holds; empty when it holds none.
+Bytes description_in(const DeviceFixture& fixture, const Bytes& datagram) {
+  const auto decoder = driver_of(fixture).make_decoder(promised(fixture)).value();
+  CollectSink sink;
+  decoder->feed(datagram, 0, sink);
+  return sink.described;
+}
+
 }  // namespace
 
 HandAngles closing_hand(std::size_t index, std::size_t count) {
@@ -69,16 +99,31 @@ std::vector<std::pair<std::int64_t, Bytes>> emulated_chunks(const DeviceFixture&
   std::vector<std::pair<std::int64_t, Bytes>> chunks;
   Bytes answer;
   (*emulator)->receive(std::as_bytes(std::span(fixture.start)), 0, answer);
-  for (std::size_t i = 0; i < rounds * fixture.loop_chunks; ++i) {
+  while (chunks.size() < rounds * fixture.loop_chunks) {
     const std::int64_t due_ns = (*emulator)->next_due_ns();
     REQUIRE(due_ns != kNoTime_ns);
-    (*emulator)->pose(closing_hand(i, fixture.loop_chunks));
+    pose(fixture, chunks.size(), **emulator);
     Bytes chunk;
     (*emulator)->emit(due_ns, chunk);
     REQUIRE_FALSE(chunk.empty());
-    chunks.emplace_back(due_ns, std::move(chunk));
+    if (!fixture.datagrams || description_in(fixture, chunk).empty()) {
+      chunks.emplace_back(due_ns, std::move(chunk));
+    }
   }
   return chunks;
+}
+
+std::unique_ptr<const drivers::SourceLayout> emulated_layout(const DeviceFixture& fixture) {
+  const auto emulator = driver_of(fixture).emulate(fixture.options).value();
+  for (;;) {
+    Bytes chunk;
+    emulator->emit(emulator->next_due_ns(), chunk);
+    const Bytes description = description_in(fixture, chunk);
+    if (description.empty()) continue;
+    auto layout = driver_of(fixture).make_layout(description);
+    if (!layout) FAIL(layout.error().text());
+    return std::move(*layout);
+  }
 }
 
 drivers::Device open_emulated(const DeviceFixture& fixture) {
@@ -87,11 +132,10 @@ drivers::Device open_emulated(const DeviceFixture& fixture) {
   auto transport = drivers::FileTransport::open(std::move(chunks), {.rate_hz = 100.0, .pace = 0.0});
   if (!transport) FAIL(transport.error().text());
   drivers::Description description = promised(fixture);
-  auto decoder = driver_of(fixture).make_decoder(description);
-  if (!decoder) FAIL(decoder.error().text());
+  auto decoder = new_decoder(fixture, description);
   return {.description = std::move(description),
           .transport = std::move(*transport),
-          .decoder = std::move(*decoder),
+          .decoder = std::move(decoder),
           .warnings = {}};
 }
 
@@ -128,7 +172,7 @@ std::string emulated_log(const DeviceFixture& fixture) {
 // recorded_log_test writes their expected output.
 TEST_CASE("write the logs of emulated gloves", "[.write-logs]") {
   for (const DeviceFixture& fixture : device_fixtures()) {
-    if (!fixture.emulated) continue;
+    if (!fixture.emulated || fixture.datagrams) continue;  // template_mocap_test writes its own
     const auto path = golden("devices") / (fixture.name + ".log");
     if (!std::filesystem::exists(path)) std::ofstream(path) << emulated_log(fixture);
   }

@@ -1,4 +1,4 @@
-// The output of gloves' emulators, as a device to open and as a log.
+// The output of the emulators, as a device to open and as a log.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,10 @@
 #include "tests/unit/drivers/device_fixtures.hpp"
 
 namespace posed::test {
+
+// The bodies that the emulator describes.
+[[nodiscard]] std::unique_ptr<const drivers::SourceLayout> emulated_layout(
+    const DeviceFixture& fixture);
 
 // Pose `index` of a hand that closes and opens finger by finger, with a period of `count` poses.
 [[nodiscard]] HandAngles closing_hand(std::size_t index, std::size_t count);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/glove/traits.hpp"
 #include "drivers/lucidgloves/decoder.hpp"
 #include "drivers/lucidgloves/emulator.hpp"
 #include "drivers/transport/transport_factory.hpp"
@@ -49,8 +50,8 @@ void feed(Decoder& decoder, std::string_view text, Sink& sink) {
   decoder.feed(std::as_bytes(std::span(text)), 0, sink);
 }
 
-std::string haptics_text(const Options& options, const Haptics& haptics) {
-  const auto bytes = driver().encode_haptics(options, haptics);
+std::string haptics_text(const Options& options, const glove::Haptics& haptics) {
+  const auto bytes = driver().glove->encode_haptics(options, haptics);
   if (!bytes) return "refused: " + bytes.error().message;
   return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
 }
@@ -225,7 +226,7 @@ TEST_CASE("forces and vibrations reach the glove as requested, and negative ones
   CHECK(haptics_text(legacy, {.force = {0.1F, 0, 0, 0, 1.0F}}) == "100&0&0&0&1000\n");
   tell(haptics_text(legacy, {.force = {0.1F, 0.2F, 0, -1.0F, 1.0F}}));
   CHECK(glove.forces() == lucidgloves::Forces{100, 200, 0, 0, 1000});
-  const Haptics buzz{
+  const glove::Haptics buzz{
       .force = {-1, -1, -1, -1, -1}, .vibration_hz = 80.0F, .vibration_s = 0.1F, .vibration = 0.5F};
   CHECK(haptics_text({}, buzz) == "A-1B-1C-1D-1E-1\nF80.00G0.10H0.50\n");
   tell(haptics_text({}, buzz));

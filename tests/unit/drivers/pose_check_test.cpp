@@ -1,5 +1,6 @@
 // Whether recorded poses are good enough for a calibration.
 #include "drivers/glove/pose_check.hpp"
+#include "drivers/glove/traits.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -12,7 +13,7 @@ namespace {
 
 Model cyberglove() {
   const Driver* driver = find_driver("cyberglove");
-  return driver->glove_model(driver->expect({}).value()).value();
+  return driver->glove->glove_model(driver->expect({}).value()).value();
 }
 
 // The raw value that the default calibration maps to `value`.

@@ -56,6 +56,21 @@ std::string line_of(const Sample& sample) {
   return line + '\n';
 }
 
+std::string use_bodies(const drivers::Driver& driver, std::span<const std::byte> description,
+                       drivers::Decoder& decoder,
+                       std::vector<std::unique_ptr<const drivers::SourceLayout>>& layouts) {
+  REQUIRE(driver.make_layout != nullptr);
+  auto layout = driver.make_layout(description);
+  if (!layout) FAIL(layout.error().text());
+  std::string line = "bodies";
+  for (const drivers::Body& body : (*layout)->bodies) {
+    line += " '" + body.name + "' " + std::to_string(body.skeleton->joints.size());
+  }
+  decoder.use(**layout);
+  layouts.push_back(std::move(*layout));
+  return line + '\n';
+}
+
 bool same_word(const std::string& a, const std::string& b) {
   if (a == b) return true;
   char* end_a = nullptr;
@@ -103,14 +118,14 @@ RecordedLog read_recorded_log(const std::filesystem::path& path) {
       std::string form;
       REQUIRE(key == "at");
       REQUIRE(words >> arrival_ns >> form);
-      REQUIRE((form == "hex" || form == "line"));
-      if (form == "hex") {
-        log.chunks.emplace_back(arrival_ns, hex_bytes(words));
+      REQUIRE((form == "hex" || form == "line" || form == "bodies"));
+      if (form != "line") {
+        log.rows.push_back({arrival_ns, hex_bytes(words), form == "bodies"});
         continue;
       }
       const std::string text = rest_of(words) + '\n';
       const auto bytes = std::as_bytes(std::span(text));
-      log.chunks.emplace_back(arrival_ns, std::vector(bytes.begin(), bytes.end()));
+      log.rows.push_back({arrival_ns, std::vector(bytes.begin(), bytes.end())});
     }
   }
   return log;
@@ -125,11 +140,24 @@ std::string decoded_lines(const RecordedLog& log) {
   REQUIRE(decoder);
   CollectSink sink;
   std::string lines;
-  for (const auto& [arrival_ns, bytes] : log.chunks) {
-    (*decoder)->feed(bytes, arrival_ns, sink);
-    for (const Frame& frame : sink.frames) lines += line_of(frame);
+  std::vector<std::unique_ptr<const drivers::SourceLayout>> layouts;
+  for (const RecordedLog::Row& row : log.rows) {
+    if (row.bodies) {
+      lines += use_bodies(*driver, row.bytes, **decoder, layouts);
+      continue;
+    }
+    sink.descriptions = 0;
+    (*decoder)->feed(row.bytes, row.arrival_ns, sink);
+    if (sink.descriptions > 0) {
+      lines += "description of " + std::to_string(sink.described.size()) + " bytes\n";
+    }
+    for (std::size_t i = 0; i < sink.frames.size(); ++i) {
+      if (driver->make_layout != nullptr) lines += "body " + std::to_string(sink.bodies[i]) + ' ';
+      lines += line_of(sink.frames[i]);
+    }
     for (const Sample& sample : sink.samples) lines += line_of(sample);
     sink.frames.clear();
+    sink.bodies.clear();
     sink.samples.clear();
   }
   lines += "outcomes ok " + std::to_string(sink.count(Outcome::kOk)) + " short " +

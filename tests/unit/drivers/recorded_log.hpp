@@ -7,6 +7,7 @@
 //   text BEND1 rate=100           a line of the description; repeated, they are joined by line ends
 //   at 1000000 hex a5 00 34       a chunk that came at this time [ns], as bytes
 //   at 2000000 line 0 0 0 90      the same as text, with its line end
+//   at 3000000 bodies 02 01 00    from here on the bodies of this description are used, as bytes
 #pragma once
 
 #include <cstdint>
@@ -22,12 +23,17 @@ struct RecordedLog {
   std::string driver;
   std::string identity;
   std::string text;
-  std::vector<std::pair<std::int64_t, std::vector<std::byte>>> chunks;
+  struct Row {
+    std::int64_t arrival_ns = 0;
+    std::vector<std::byte> bytes;
+    bool bodies = false;  // a description in use, not a chunk
+  };
+  std::vector<Row> rows;
 };
 
 [[nodiscard]] RecordedLog read_recorded_log(const std::filesystem::path& path);
 
-// One line for each frame and sample, and one that counts outcomes.
+// One line for each frame, sample and description, and one that counts outcomes.
 [[nodiscard]] std::string decoded_lines(const RecordedLog& log);
 
 // The first line in which two such texts differ by more than 1e-5 in a number or at all in a word;

@@ -7,15 +7,16 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/devices/device_supervisor.hpp"
-#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/emulated_device.hpp"
 #include "daemon/system/clock.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/traits.hpp"
 #include "drivers/options.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::devices {
 
-using emulate::EmulatedGlove;
+using emulate::EmulatedDevice;
 using emulate::EmulatedPort;
 namespace {
 
@@ -31,7 +32,7 @@ class PluggedGlove {
         thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
 
  private:
-  EmulatedGlove glove_;
+  EmulatedDevice glove_;
   std::jthread thread_;
 };
 
@@ -115,7 +116,8 @@ TEST_CASE("a supervised glove is read each time it is plugged in, and calibrated
   const auto port = folder.path() / "glove";
   const auto description = lucidgloves().expect({{"port", port.string()}}).value();
   const drivers::glove::OwnedCalibration calibration{
-      drivers::glove::default_calibration(lucidgloves().glove_model(description).value()).value(),
+      drivers::glove::default_calibration(lucidgloves().glove->glove_model(description).value())
+          .value(),
       "calibration"};
   SupervisedStream kept(port);
   CHECK(kept.take_frames(0) == 0);

@@ -1,12 +1,12 @@
-// Pace: the time at which an emulated glove's next record is due. The schedule is absolute, so late
-// calls do not add up. Records missed during a long pause are skipped, as on a real glove.
+// Pace: the time at which an emulated device's next record is due. The schedule is absolute, so
+// late calls do not add up. Records missed during a long pause are skipped, as on a real device.
 #pragma once
 
 #include <cstdint>
 
 #include "proto/frame/time.hpp"
 
-namespace posed::drivers::glove {
+namespace posed::drivers::emulate {
 
 class Pace {
  public:
@@ -30,4 +30,4 @@ class Pace {
   std::int64_t due_ns_ = kNoTime_ns;
 };
 
-}  // namespace posed::drivers::glove
+}  // namespace posed::drivers::emulate

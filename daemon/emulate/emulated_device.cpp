@@ -1,4 +1,4 @@
-#include "daemon/emulate/emulated_glove.hpp"
+#include "daemon/emulate/emulated_device.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/system/clock.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 
 namespace posed::emulate {
 namespace {
@@ -35,14 +36,20 @@ HandAngles pose_at(const clip::HandClip& clip, double time_s) {
   return pose;
 }
 
-EmulatedGlove::EmulatedGlove(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
-                             std::function<HandAngles(double time_s)> motion, Settings settings)
+Motion hand_motion(std::function<HandAngles(double time_s)> angles_at) {
+  return [angles_at = std::move(angles_at)](double time_s, drivers::Emulator& emulator) {
+    emulator.pose(0, drivers::glove::hand_frame(angles_at(time_s)));
+  };
+}
+
+EmulatedDevice::EmulatedDevice(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
+                               Motion motion, Settings settings)
     : emulator_(std::move(emulator)),
       port_(std::move(port)),
       motion_(std::move(motion)),
       settings_(std::move(settings)) {}
 
-void EmulatedGlove::run(const std::stop_token& stop) {
+void EmulatedDevice::run(const std::stop_token& stop) {
   const std::int64_t start_ns = system::monotonic_ns();
   const auto device_time_ns = [&] {
     return static_cast<std::int64_t>(static_cast<double>(system::monotonic_ns() - start_ns) *
@@ -59,21 +66,22 @@ void EmulatedGlove::run(const std::stop_token& stop) {
     const auto heard = port_.receive(std::chrono::nanoseconds(wait_ns));
     if (!heard) return;
     const std::int64_t now_ns = device_time_ns();
-    if (motion_) emulator_->pose(motion_(seconds(now_ns)));
-    if (!heard->empty()) {
+    if (motion_) motion_(seconds(now_ns), *emulator_);
+    if (!heard->bytes.empty()) {
       Bytes answer;
-      emulator_->receive(*heard, now_ns, answer);
-      port_.send(answer);
+      emulator_->receive_socket(heard->socket, heard->bytes, now_ns, answer);
+      port_.send(heard->socket, answer);
     }
     emit(now_ns);
   }
 }
 
-void EmulatedGlove::emit(std::int64_t device_ns) {
+void EmulatedDevice::emit(std::int64_t device_ns) {
   for (int i = 0; i < kPacketsInARow; ++i) {
     const std::int64_t due_ns = emulator_->next_due_ns();
     if (due_ns == kNoTime_ns || due_ns > device_ns) return;
     packet_.clear();
+    const std::uint8_t socket = emulator_->next_socket();
     emulator_->emit(device_ns, packet_);
     ++packets_;
     for (auto& fault : settings_.faults) {
@@ -81,7 +89,7 @@ void EmulatedGlove::emit(std::int64_t device_ns) {
       static_cast<void>(fault.pass(packet_, device_ns, passed_));
       std::swap(packet_, passed_);
     }
-    port_.send(packet_);
+    port_.send(socket, packet_);
   }
 }
 

@@ -1,4 +1,4 @@
-// EmulatedGlove runs an emulator: it connects a hand's motion, a port and the host's clock. `posed
+// EmulatedDevice runs an emulator: it connects a motion, a port and the host's clock. `posed
 // emulate` runs one until it ends, the demo runs one on a thread.
 #pragma once
 
@@ -21,7 +21,13 @@ namespace posed::emulate {
 // are zero.
 [[nodiscard]] HandAngles pose_at(const clip::HandClip& clip, double time_s);
 
-class EmulatedGlove {
+// Poses the emulator's bodies for a time since the start; empty: they move by themselves, or not.
+using Motion = std::function<void(double time_s, drivers::Emulator& emulator)>;
+
+// The motion of a glove whose hand has these angles.
+[[nodiscard]] Motion hand_motion(std::function<HandAngles(double time_s)> angles_at);
+
+class EmulatedDevice {
  public:
   using Bytes = drivers::Emulator::Bytes;
   struct Settings {
@@ -30,9 +36,8 @@ class EmulatedGlove {
     std::vector<drivers::emulate::FaultInjector> faults{};
   };
 
-  // `motion` returns the hand's pose at a time since the start; if empty the pose does not change.
-  EmulatedGlove(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
-                std::function<HandAngles(double time_s)> motion, Settings settings);
+  EmulatedDevice(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port, Motion motion,
+                 Settings settings);
 
   [[nodiscard]] const std::string& port() const noexcept { return port_.name(); }
 
@@ -46,7 +51,7 @@ class EmulatedGlove {
 
   std::unique_ptr<drivers::Emulator> emulator_;
   EmulatedPort port_;
-  std::function<HandAngles(double time_s)> motion_;
+  Motion motion_;
   Settings settings_;
   Bytes packet_, passed_;
   std::atomic<std::uint64_t> packets_{0};

@@ -1,0 +1,137 @@
+#include "drivers/template_mocap/emulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "proto/frame/rotation.hpp"
+
+namespace posed::drivers::mocap {
+namespace {
+
+constexpr std::int64_t kDescribeEvery_ns = kNanosPerSecond;
+constexpr double kStep_hz = 0.9;  // double steps and waves a second
+constexpr double kPath_m = 1.0;   // radius of the circle that the walker follows
+constexpr double kLap_s = 12.0;
+
+// A person of 1.7 m in T-pose.
+std::vector<JointEntry> upper_body() {
+  return {{"hips", -1, {0.0F, 0.95F, 0.0F}},         {"chest", 0, {0.0F, 0.3F, 0.0F}},
+          {"head", 1, {0.0F, 0.3F, 0.0F}},           {"leftUpperArm", 1, {0.18F, 0.2F, 0.0F}},
+          {"leftLowerArm", 3, {0.28F, 0.0F, 0.0F}},  {"rightUpperArm", 1, {-0.18F, 0.2F, 0.0F}},
+          {"rightLowerArm", 5, {-0.28F, 0.0F, 0.0F}}};
+}
+
+std::vector<JointEntry> whole_body() {
+  auto joints = upper_body();
+  joints.push_back({"leftUpperLeg", 0, {0.1F, -0.05F, 0.0F}});
+  joints.push_back({"leftLowerLeg", 7, {0.0F, -0.45F, 0.0F}});
+  joints.push_back({"rightUpperLeg", 0, {-0.1F, -0.05F, 0.0F}});
+  joints.push_back({"rightLowerLeg", 9, {0.0F, -0.45F, 0.0F}});
+  return joints;
+}
+
+Quatf turned(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
+
+// Arms hang down and swing against the legs; the path is a circle, so the motion has no end.
+void walk(double time_s, BodyPose& pose) {
+  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
+  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
+  pose.root_m = {static_cast<float>(-kPath_m * std::cos(lap)), 0.95F,
+                 static_cast<float>(kPath_m * std::sin(lap))};
+  auto& q = pose.rotation_xyzw;
+  q[0] = turned(Axis::kY, lap);
+  q[3] = from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3));
+  q[5] = from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3));
+  q[7] = turned(Axis::kX, -swing);
+  q[8] = turned(Axis::kX, std::max(0.0, swing));
+  q[9] = turned(Axis::kX, swing);
+  q[10] = turned(Axis::kX, std::max(0.0, -swing));
+}
+
+void wave(double time_s, BodyPose& pose) {
+  const double swing = 0.4 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
+  pose.root_m = {0.0F, 0.95F, 2.5F};
+  auto& q = pose.rotation_xyzw;
+  q[3] = turned(Axis::kZ, -1.3);
+  q[5] = turned(Axis::kZ, -0.6);
+  q[6] = turned(Axis::kZ, -0.9 + swing);
+}
+
+}  // namespace
+
+MocapEmulator::MocapEmulator(double rate_hz)
+    : frames_(nanoseconds(1.0 / rate_hz)), descriptions_(kDescribeEvery_ns) {
+  people_.push_back({.entry = {.id = 1, .name = "Walker", .joints = whole_body()}, .pose = {}});
+  people_.push_back({.entry = {.id = 7, .name = "Waver", .joints = upper_body()}, .pose = {}});
+  for (Person& person : people_) {
+    person.pose.id = person.entry.id;
+    person.pose.rotation_xyzw.assign(person.entry.joints.size(), kIdentity);
+  }
+  frames_.start(0);
+  descriptions_.start(0);
+}
+
+void MocapEmulator::pose(std::size_t body, const Frame& frame) {
+  if (body >= people_.size()) return;
+  Person& person = people_[body];
+  person.posed = true;
+  person.pose.root_m = frame.root_position_m;
+  auto& rotations = person.pose.rotation_xyzw;
+  for (std::size_t j = 0; j < std::min<std::size_t>(rotations.size(), frame.joint_count); ++j) {
+    rotations[j] = frame.valid[j] ? frame.rotation_xyzw[j] : Quatf{};
+  }
+}
+
+void MocapEmulator::receive(std::span<const std::byte> bytes, std::int64_t /*now_ns*/,
+                            Bytes& /*answer*/) {
+  Datagram datagram;
+  if (decode_datagram(bytes, datagram) == Outcome::kOk && datagram.kind == Kind::kRequest) {
+    changed_ = true;
+  }
+}
+
+void MocapEmulator::set_present(std::size_t body, bool present) {
+  people_[body].present = present;
+  changed_ = true;
+}
+
+// A new body is described before its first frame.
+std::int64_t MocapEmulator::next_due_ns() const {
+  if (changed_) return frames_.due_ns() - 1;
+  return std::min(frames_.due_ns(), descriptions_.due_ns());
+}
+
+void MocapEmulator::emit(std::int64_t now_ns, Bytes& out) {
+  if (changed_ || descriptions_.due_ns() <= frames_.due_ns()) {
+    if (!changed_) descriptions_.step(now_ns);
+    changed_ = false;
+    return describe(out);
+  }
+  const std::int64_t time_ns = frames_.due_ns();
+  frames_.step(now_ns);
+  move(seconds(time_ns));
+  FramePacket packet{
+      .number = number_++, .time_us = static_cast<std::uint32_t>(time_ns / 1000), .bodies = {}};
+  for (const Person& person : people_) {
+    if (person.present) packet.bodies.push_back(person.pose);
+  }
+  const auto bytes = encode_frame(packet);
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+void MocapEmulator::move(double time_s) {
+  if (!people_[0].posed) walk(time_s, people_[0].pose);
+  if (!people_[1].posed) wave(time_s, people_[1].pose);
+}
+
+void MocapEmulator::describe(Bytes& out) const {
+  std::vector<BodyEntry> entries;
+  for (const Person& person : people_) {
+    if (person.present) entries.push_back(person.entry);
+  }
+  const auto bytes = encode_description(entries);
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+}  // namespace posed::drivers::mocap

@@ -1,0 +1,25 @@
+// The bodies of the template mocap system, compiled from its description.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "drivers/driver.hpp"
+
+namespace posed::drivers::mocap {
+
+class MocapLayout final : public SourceLayout {
+ public:
+  std::vector<std::uint16_t> id;  // [body], as the device numbers them
+
+  // The index of a body; bodies.size() when there is no such body. RT-safe.
+  [[nodiscard]] std::size_t body_of(std::uint16_t wanted) const noexcept;
+};
+
+// Driver::make_layout. Cold.
+[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
+    std::span<const std::byte> description);
+
+}  // namespace posed::drivers::mocap

@@ -1,0 +1,217 @@
+#include "drivers/template_mocap/protocol.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <set>
+#include <string_view>
+
+#include "drivers/byte_reader.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/frame/plausible.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::drivers::mocap {
+namespace {
+
+constexpr std::string_view kMagic = "MCAP";
+constexpr std::size_t kHeadBytes = 8;
+constexpr std::size_t kChecksumBytes = 4;
+constexpr std::size_t kLeastJoint = 15;  // bytes: a name of one letter, parent, offset
+constexpr std::string_view kDeviceInfoPrefix = "template_mocap rate=";
+constexpr double kMaxRate_hz = 1000.0;
+
+std::uint32_t checksum(std::span<const std::byte> bytes) noexcept {
+  return static_cast<std::uint32_t>(
+      ::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+// Builds one datagram.
+class Writer {
+ public:
+  explicit Writer(Kind kind) {
+    text(kMagic);
+    number(static_cast<std::uint32_t>(kind), 2);
+    number(0, 2);
+  }
+  void number(std::uint32_t value, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      bytes_.push_back(static_cast<std::byte>(value >> 8 * i & 0xFF));
+    }
+  }
+  void real(float value) { number(std::bit_cast<std::uint32_t>(value), 4); }
+  void text(std::string_view value) {
+    for (const char c : value) bytes_.push_back(static_cast<std::byte>(c));
+  }
+  void name(const std::string& value) {
+    number(static_cast<std::uint32_t>(value.size()), 1);
+    text(value);
+  }
+  [[nodiscard]] std::vector<std::byte> finish() {
+    const std::size_t length = bytes_.size() - kHeadBytes;
+    bytes_[6] = static_cast<std::byte>(length & 0xFF);
+    bytes_[7] = static_cast<std::byte>(length >> 8 & 0xFF);
+    number(checksum(bytes_), kChecksumBytes);
+    return std::move(bytes_);
+  }
+
+ private:
+  std::vector<std::byte> bytes_;
+};
+
+std::unexpected<Error> wrong(const std::string& what) {
+  return fail("the mocap system's description " + what +
+              "; restart its server, or update it if that does not help");
+}
+
+Result<std::string> read_name(ByteReader& reader) {
+  const std::string_view name = reader.text(reader.u8());
+  if (!reader.ok()) return wrong("ends too early");
+  if (name.empty()) return wrong("has an empty name");
+  const bool control = std::ranges::any_of(
+      name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
+  if (control) return wrong("has a name that is not text: " + in_quotes(name));
+  return std::string(name);
+}
+
+Result<BodyEntry> read_body(ByteReader& reader) {
+  BodyEntry body;
+  body.id = reader.u16();
+  auto name = read_name(reader);
+  if (!name) return std::unexpected(name.error());
+  body.name = std::move(*name);
+  const std::string place = "of body " + in_quotes(body.name) + " ";
+  const std::size_t joints = reader.u8();
+  if (joints == 0 || joints > kMaxJoints) {
+    return wrong(place + "has " + std::to_string(joints) + " joints instead of 1 to " +
+                 std::to_string(kMaxJoints));
+  }
+  if (joints * kLeastJoint > reader.left()) return wrong(place + "ends too early");
+  std::set<std::string, std::less<>> names;
+  for (std::size_t j = 0; j < joints; ++j) {
+    auto joint_name = read_name(reader);
+    if (!joint_name) return std::unexpected(joint_name.error());
+    if (!names.insert(*joint_name).second) {
+      return wrong(place + "has two joints " + in_quotes(*joint_name));
+    }
+    JointEntry& joint = body.joints.emplace_back();
+    joint.name = std::move(*joint_name);
+    joint.parent = static_cast<std::int8_t>(reader.u8());
+    for (float& x_m : joint.offset_m) x_m = reader.f32();
+    if (!reader.ok()) return wrong(place + "ends too early");
+    const bool rooted =
+        j == 0 ? joint.parent == -1 : joint.parent >= 0 && joint.parent < static_cast<int>(j);
+    if (!rooted) return wrong(place + "gives joint " + in_quotes(joint.name) + " a wrong parent");
+    const bool near = std::ranges::all_of(joint.offset_m, [](float x_m) {
+      return std::abs(static_cast<double>(x_m)) <= kMaxPosition_m;
+    });
+    if (!near) return wrong(place + "puts joint " + in_quotes(joint.name) + " out of the room");
+  }
+  return body;
+}
+
+}  // namespace
+
+// RT-safe.
+Outcome decode_datagram(std::span<const std::byte> bytes, Datagram& datagram) noexcept {
+  ByteReader reader(bytes);
+  if (reader.text(kMagic.size()) != kMagic) return Outcome::kForeign;
+  const std::uint8_t kind = reader.u8();
+  const std::uint8_t zero = reader.u8();
+  const std::size_t length = reader.u16();
+  if (!reader.ok() || reader.left() != length + kChecksumBytes) return Outcome::kShort;
+  datagram.content = reader.bytes(length);
+  if (reader.u32() != checksum(bytes.first(kHeadBytes + length))) return Outcome::kBadChecksum;
+  if (kind < 1 || kind > 3 || zero != 0) return Outcome::kForeign;
+  datagram.kind = static_cast<Kind>(kind);
+  return Outcome::kOk;
+}
+
+Result<std::vector<BodyEntry>> parse_description(std::span<const std::byte> content) {
+  if (content.size() > kMaxDescription) return wrong("is too long");
+  ByteReader reader(content);
+  const std::size_t count = reader.u8();
+  if (!reader.ok()) return wrong("is empty");
+  if (count > kMaxBodies) {
+    return wrong("has " + std::to_string(count) + " bodies, more than " +
+                 std::to_string(kMaxBodies));
+  }
+  std::vector<BodyEntry> bodies;
+  std::set<std::string, std::less<>> names;
+  std::set<std::uint16_t> ids;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto body = read_body(reader);
+    if (!body) return std::unexpected(body.error());
+    if (!names.insert(body->name).second || !ids.insert(body->id).second) {
+      return wrong("has two bodies with the name or number of " + in_quotes(body->name));
+    }
+    bodies.push_back(std::move(*body));
+  }
+  if (reader.left() != 0) return wrong("goes on after its last body");
+  return bodies;
+}
+
+std::vector<std::byte> encode_datagram(Kind kind, std::span<const std::byte> content) {
+  Writer writer(kind);
+  writer.text({reinterpret_cast<const char*>(content.data()), content.size()});
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_request() { return encode_datagram(Kind::kRequest, {}); }
+
+std::vector<std::byte> encode_description(std::span<const BodyEntry> bodies) {
+  Writer writer(Kind::kDescription);
+  writer.number(static_cast<std::uint32_t>(bodies.size()), 1);
+  for (const BodyEntry& body : bodies) {
+    writer.number(body.id, 2);
+    writer.name(body.name);
+    writer.number(static_cast<std::uint32_t>(body.joints.size()), 1);
+    for (const JointEntry& joint : body.joints) {
+      writer.name(joint.name);
+      writer.number(static_cast<std::uint32_t>(joint.parent), 1);
+      for (const float x_m : joint.offset_m) writer.real(x_m);
+    }
+  }
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_frame(const FramePacket& frame) {
+  Writer writer(Kind::kFrame);
+  writer.number(frame.number, 4);
+  writer.number(frame.time_us, 4);
+  writer.number(static_cast<std::uint32_t>(frame.bodies.size()), 1);
+  for (const BodyPose& body : frame.bodies) {
+    writer.number(body.id, 2);
+    writer.number(static_cast<std::uint32_t>(body.rotation_xyzw.size()), 1);
+    for (const float x_m : body.root_m) writer.real(x_m);
+    for (const Quatf& rotation : body.rotation_xyzw) {
+      for (const float x : rotation) writer.real(x);
+    }
+  }
+  return writer.finish();
+}
+
+std::string device_info_text(double rate_hz) {
+  return std::string(kDeviceInfoPrefix) + clip::number_text(rate_hz);
+}
+
+Result<double> parse_device_info(const std::string& text, const std::string& identity) {
+  double rate_hz = 0.0;
+  if (text.starts_with(kDeviceInfoPrefix)) {
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] =
+        std::from_chars(text.data() + kDeviceInfoPrefix.size(), end, rate_hz);
+    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= kMaxRate_hz) {
+      return rate_hz;
+    }
+  }
+  return fail(
+      "is not described as a template mocap system ('template_mocap rate=100'); is it "
+      "another device?",
+      identity);
+}
+
+}  // namespace posed::drivers::mocap

@@ -1,0 +1,107 @@
+#include "drivers/transport/address.hpp"
+
+#include <netdb.h>
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+
+namespace posed::drivers {
+namespace {
+
+constexpr Host kMapped{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF};
+constexpr std::size_t kMappedBytes = 12;
+constexpr Host kLoopback6{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1};
+
+bool is_v4(const Host& host) noexcept {
+  return std::equal(kMapped.begin(), kMapped.begin() + kMappedBytes, host.begin());
+}
+
+std::optional<Address> parse_numbers(const std::string& host, const char* port) {
+  addrinfo wish{};
+  wish.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE;
+  wish.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (::getaddrinfo(host.c_str(), port, &wish, &found) != 0) return std::nullopt;
+  Address address;
+  std::memcpy(&address.storage, found->ai_addr, found->ai_addrlen);
+  address.size = found->ai_addrlen;
+  ::freeaddrinfo(found);
+  return address;
+}
+
+}  // namespace
+
+// RT-safe.
+Host host_of(const Address& address) noexcept {
+  Host host{};
+  if (address.storage.ss_family == AF_INET6) {
+    sockaddr_in6 v6{};
+    std::memcpy(&v6, &address.storage, sizeof v6);
+    std::memcpy(host.data(), &v6.sin6_addr, host.size());
+  } else {
+    sockaddr_in v4{};
+    std::memcpy(&v4, &address.storage, sizeof v4);
+    host = kMapped;
+    std::memcpy(host.data() + kMappedBytes, &v4.sin_addr, sizeof v4.sin_addr);
+  }
+  return host;
+}
+
+// RT-safe.
+bool is_loopback(const Host& host) noexcept {
+  return is_v4(host) ? host[kMappedBytes] == 127 : host == kLoopback6;
+}
+
+bool is_multicast(const Host& host) noexcept {
+  return is_v4(host) ? host[kMappedBytes] >> 4 == 14 : host[0] == 0xFF;
+}
+
+std::string host_text(const Address& address) {
+  std::array<char, NI_MAXHOST> host{};
+  const int failed = ::getnameinfo(address.get(), address.size, host.data(), host.size(), nullptr,
+                                   0, NI_NUMERICHOST);
+  if (failed != 0) return "?";
+  const std::string_view text(host.data());
+  constexpr std::string_view kMappedText = "::ffff:";  // an IPv4 peer of an IPv6 socket
+  return std::string(text.starts_with(kMappedText) ? text.substr(kMappedText.size()) : text);
+}
+
+std::string endpoint_text(const Address& address) {
+  std::uint16_t port = 0;  // at the same place for IPv4 and IPv6
+  std::memcpy(&port, reinterpret_cast<const char*>(&address.storage) + 2, sizeof port);
+  const std::string host = host_text(address);
+  const bool v6 = host.contains(':');
+  return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(ntohs(port));
+}
+
+Result<Address> parse_endpoint(const std::string& endpoint) {
+  const auto colon = endpoint.rfind(':');
+  const bool split = colon != std::string::npos && colon != 0 && colon + 1 < endpoint.size();
+  std::string host = split ? endpoint.substr(0, colon) : "";
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  const auto address =
+      split ? parse_numbers(host, endpoint.c_str() + colon + 1) : std::optional<Address>();
+  if (address) return *address;
+  return misuse("'" + endpoint + "' should be an address and a port, like 127.0.0.1:5200");
+}
+
+Result<Address> parse_host(const std::string& host) {
+  // An empty text would mean any address.
+  const auto address = host.empty() ? std::optional<Address>() : parse_numbers(host, nullptr);
+  if (address) return *address;
+  return misuse("'" + host + "' should be an address in numbers, like 192.168.1.20");
+}
+
+Result<Address> listen_address(const std::string& endpoint, const std::vector<std::string>& peers,
+                               std::string_view whose) {
+  auto address = parse_endpoint(endpoint);
+  if (!address) return address;
+  if (peers.empty() && !is_loopback(host_of(*address))) {
+    return misuse("to listen on " + endpoint + ", name " + std::string(whose) +
+                  " addresses in peers; without them only loopback listens");
+  }
+  return address;
+}
+
+}  // namespace posed::drivers

@@ -1,0 +1,54 @@
+// Network addresses of devices: parsed from numbers only, because a name may resolve differently
+// tomorrow. Shared by TCP and UDP.
+#pragma once
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::drivers {
+
+// An address with its port, as sockets take it.
+struct Address {
+  sockaddr_storage storage{};
+  socklen_t size = sizeof(sockaddr_storage);
+
+  [[nodiscard]] const sockaddr* get() const noexcept {
+    return reinterpret_cast<const sockaddr*>(&storage);  // NOLINT: how sockets take addresses
+  }
+  [[nodiscard]] sockaddr* get() noexcept {
+    return reinterpret_cast<sockaddr*>(&storage);  // NOLINT: how sockets take addresses
+  }
+};
+
+// An address without its port; an IPv4 one in the form ::ffff:1.2.3.4, so that a peer of an IPv6
+// socket compares equal to itself.
+using Host = std::array<std::uint8_t, 16>;
+
+[[nodiscard]] Host host_of(const Address& address) noexcept;  // RT-safe
+[[nodiscard]] bool is_loopback(const Host& host) noexcept;    // RT-safe
+[[nodiscard]] bool is_multicast(const Host& host) noexcept;
+[[nodiscard]] std::string host_text(const Address& address);  // "192.168.1.20"
+[[nodiscard]] std::string endpoint_text(
+    const Address& address);  // "192.168.1.20:1511", "[::1]:1511"
+
+// Parses "127.0.0.1:5200" or "[::1]:5200". Cold.
+[[nodiscard]] Result<Address> parse_endpoint(const std::string& endpoint);
+
+// Parses "127.0.0.1" or "::1"; the port is 0. Cold.
+[[nodiscard]] Result<Address> parse_host(const std::string& host);
+
+// The address to listen on. Devices are not authenticated, so without a list of peers it must be
+// loopback; `whose` ("the gloves'") says whose addresses belong there. Cold.
+[[nodiscard]] Result<Address> listen_address(const std::string& endpoint,
+                                             const std::vector<std::string>& peers,
+                                             std::string_view whose);
+
+}  // namespace posed::drivers

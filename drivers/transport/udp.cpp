@@ -1,0 +1,230 @@
+#include "drivers/transport/udp.hpp"
+
+#include <netinet/in.h>
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "drivers/transport/multicast.hpp"
+
+namespace posed::drivers {
+namespace {
+
+constexpr std::size_t kBatch = 16;            // datagrams per system call
+constexpr std::size_t kMaxDatagram = 65'507;  // bytes; the most that IPv4 carries
+constexpr std::size_t kControlBytes = 64;     // room for the kernel's time stamp
+constexpr int kReceiveBuffer = 1024 * 1024;   // bytes; about a tenth of a second of a large system
+constexpr std::int64_t kMaxAge_ns = 50'000'000;  // an older stamp means that the wall clock was set
+static_assert(kMaxDatagram <= kMaxChunk);
+
+std::int64_t to_ns(const timespec& time) noexcept {
+  return std::int64_t{time.tv_sec} * kNanosPerSecond + time.tv_nsec;
+}
+
+// The stamp that the kernel put beside a datagram, by the wall clock. RT-safe.
+std::int64_t stamp_ns(msghdr& header) noexcept {
+  for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
+    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_TIMESTAMPNS) continue;
+    timespec stamp{};
+    std::memcpy(&stamp, CMSG_DATA(part), sizeof stamp);
+    return to_ns(stamp);
+  }
+  return kNoTime_ns;
+}
+
+// Never waits. Returns whether the kernel took the datagram.
+bool write_to(const Address& to, int fd, std::span<const std::byte> bytes) noexcept {
+  const ssize_t sent =
+      ::sendto(fd, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL, to.get(), to.size);
+  return sent == static_cast<ssize_t>(bytes.size());
+}
+
+struct Wanted {
+  Address listen;
+  std::optional<Address> group, to;
+};
+
+Result<Wanted> wanted_of(const UdpSocketSettings& socket, const UdpSettings& all) {
+  Wanted wanted;
+  const auto listen = listen_address(socket.listen, all.peers, "the senders'");
+  if (!listen) return std::unexpected(listen.error());
+  wanted.listen = *listen;
+  if (!socket.to.empty()) {
+    const auto to = parse_endpoint(socket.to);
+    if (!to) return std::unexpected(to.error());
+    wanted.to = *to;
+  }
+  if (socket.group.empty()) return wanted;
+  const auto group = parse_host(socket.group);
+  if (!group) return std::unexpected(group.error());
+  if (!is_multicast(host_of(*group))) {
+    return misuse("'" + socket.group + "' should be a multicast address, like 239.255.42.99");
+  }
+  const bool same_family = group->storage.ss_family == listen->storage.ss_family;
+  if (!same_family || is_loopback(host_of(*listen))) {
+    return misuse("to receive the group " + socket.group + ", listen on " +
+                  (group->storage.ss_family == AF_INET6 ? "[::]" : "0.0.0.0") + ":PORT, not on " +
+                  socket.listen);
+  }
+  wanted.group = *group;
+  return wanted;
+}
+
+}  // namespace
+
+struct UdpTransport::Batch {
+  std::array<mmsghdr, kBatch> message{};
+  std::array<iovec, kBatch> part{};
+  std::array<Address, kBatch> sender{};
+  std::array<std::array<std::byte, kMaxDatagram>, kBatch> bytes{};
+  alignas(cmsghdr) std::array<std::array<std::byte, kControlBytes>, kBatch> control{};
+
+  // The kernel changes the headers with every call. RT-safe.
+  void prepare() noexcept {
+    for (std::size_t i = 0; i < kBatch; ++i) {
+      part[i] = {.iov_base = bytes[i].data(), .iov_len = bytes[i].size()};
+      msghdr& header = message[i].msg_hdr;
+      header = {};
+      header.msg_name = &sender[i].storage;
+      header.msg_namelen = sizeof sender[i].storage;
+      header.msg_iov = &part[i];
+      header.msg_iovlen = 1;
+      header.msg_control = control[i].data();
+      header.msg_controllen = control[i].size();
+    }
+  }
+};
+
+Result<> check_udp(const UdpSettings& settings) {
+  if (settings.sockets.empty()) return misuse("name an address to listen on, like 127.0.0.1:1511");
+  for (const std::string& peer : settings.peers) {
+    if (const auto host = parse_host(peer); !host) return std::unexpected(host.error());
+  }
+  for (const UdpSocketSettings& socket : settings.sockets) {
+    const auto wanted = wanted_of(socket, settings);
+    if (!wanted) return std::unexpected(wanted.error());
+  }
+  return {};
+}
+
+UdpTransport::UdpTransport() : batch_(std::make_unique<Batch>()) {}
+
+UdpTransport::~UdpTransport() {
+  for (const Socket& socket : sockets_) {
+    if (socket.fd >= 0) ::close(socket.fd);
+  }
+  if (epoll_ >= 0) ::close(epoll_);
+}
+
+Result<std::unique_ptr<UdpTransport>> UdpTransport::open(const UdpSettings& settings) {
+  if (const auto ok = check_udp(settings); !ok) return std::unexpected(ok.error());
+  std::unique_ptr<UdpTransport> self(new UdpTransport());
+  for (const std::string& peer : settings.peers) self->peers_.push_back(host_of(*parse_host(peer)));
+  self->epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
+  if (self->epoll_ < 0) {
+    return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
+  }
+  for (const UdpSocketSettings& socket : settings.sockets) {
+    if (const auto ok = self->add(socket, settings); !ok) return std::unexpected(ok.error());
+  }
+  return self;
+}
+
+Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings& all) {
+  const auto wanted = wanted_of(settings, all);
+  if (!wanted) return std::unexpected(wanted.error());
+  Socket& socket = sockets_.emplace_back();
+  socket.to = wanted->to;
+  socket.keeps_to = wanted->to.has_value();
+  const sa_family_t family = wanted->listen.storage.ss_family;
+  socket.fd = ::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int yes = 1;
+  if (socket.fd >= 0) {
+    ::setsockopt(socket.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
+    ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof kReceiveBuffer);
+    // Several programs may receive a group; a single address belongs to one.
+    if (wanted->group) ::setsockopt(socket.fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  }
+  epoll_event event{};
+  event.events = EPOLLIN;
+  if (socket.fd < 0 || ::bind(socket.fd, wanted->listen.get(), wanted->listen.size) != 0 ||
+      ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket.fd, &event) != 0) {
+    return fail("cannot listen on " + settings.listen + " (" + std::strerror(errno) +
+                "); use an address of this machine and a port that is free");
+  }
+  if (!wanted->group) return {};
+  return join_group(socket.fd, *wanted->group, all.interface);
+}
+
+std::string UdpTransport::endpoint(std::size_t socket) const {
+  Address address;
+  ::getsockname(sockets_[socket].fd, address.get(), &address.size);
+  return endpoint_text(address);
+}
+
+// RT-safe.
+bool UdpTransport::may_send(const Host& host) const noexcept {
+  if (peers_.empty()) return is_loopback(host);
+  return std::ranges::find(peers_, host) != peers_.end();
+}
+
+// RT-safe except for its reads.
+bool UdpTransport::receive(std::int64_t now_ns) noexcept {
+  timespec wall{};
+  ::clock_gettime(CLOCK_REALTIME, &wall);
+  next_ = received_ = 0;
+  for (std::size_t tried = 0; tried < sockets_.size() && received_ == 0; ++tried) {
+    socket_ = (socket_ + 1) % sockets_.size();
+    batch_->prepare();
+    const int got =
+        ::recvmmsg(sockets_[socket_].fd, batch_->message.data(), kBatch, MSG_DONTWAIT, nullptr);
+    // An error is the answer to an earlier datagram of ours: it says nothing about this socket.
+    if (got > 0) received_ = static_cast<std::size_t>(got);
+  }
+  batch_ns_ = now_ns;
+  wall_ns_ = to_ns(wall);
+  return received_ > 0;
+}
+
+// RT-safe except for its reads. A flood of datagrams to be dropped ends the call after one batch.
+Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
+  Chunk chunk;
+  if (next_ >= received_ && !receive(now_ns)) return chunk;
+  while (next_ < received_) {
+    const std::size_t i = next_++;
+    mmsghdr& message = batch_->message[i];
+    Address& sender = batch_->sender[i];
+    sender.size = message.msg_hdr.msg_namelen;
+    if (!may_send(host_of(sender))) {
+      ++chunk.foreign;
+      continue;
+    }
+    if (message.msg_len == 0 || (message.msg_hdr.msg_flags & MSG_TRUNC) != 0) {
+      ++chunk.damaged;
+      continue;
+    }
+    Socket& socket = sockets_[socket_];
+    if (!socket.keeps_to) socket.to = sender;
+    chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
+    chunk.socket = static_cast<std::uint8_t>(socket_);
+    const std::int64_t stamp = stamp_ns(message.msg_hdr);
+    if (stamp != kNoTime_ns) {
+      chunk.arrival_ns = batch_ns_ - std::clamp<std::int64_t>(wall_ns_ - stamp, 0, kMaxAge_ns);
+    }
+    break;
+  }
+  return chunk;
+}
+
+// RT-safe except for its write.
+bool UdpTransport::send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept {
+  if (socket >= sockets_.size() || !sockets_[socket].to) return false;
+  return write_to(*sockets_[socket].to, sockets_[socket].fd, bytes);
+}
+
+}  // namespace posed::drivers

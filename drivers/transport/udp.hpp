@@ -1,0 +1,80 @@
+// UdpTransport: receives the datagrams of a device on one or several sockets. It hands out one
+// datagram per read, with the time at which the kernel received it. Nothing is allocated after
+// open().
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/driver.hpp"
+#include "drivers/transport/address.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::drivers {
+
+struct UdpSocketSettings {
+  std::string listen{};  // "0.0.0.0:1511"; numbers only, IPv4 or IPv6
+  std::string group{};   // multicast group to join, "239.255.42.99"; empty: none
+  std::string to{};      // where send() goes; empty: to the last sender
+};
+
+struct UdpSettings {
+  std::vector<UdpSocketSettings> sockets{};  // [Chunk::socket]
+  // On which the groups are joined: its name or one of its addresses; empty: the system's choice.
+  std::string interface{};
+  std::vector<std::string> peers{};  // addresses that may send; empty: loopback only
+};
+
+// Checks these settings without opening a socket. Cold.
+[[nodiscard]] Result<> check_udp(const UdpSettings& settings);
+
+class UdpTransport final : public Transport {
+ public:
+  // An address other than loopback without peers is an error. Cold.
+  [[nodiscard]] static Result<std::unique_ptr<UdpTransport>> open(const UdpSettings& settings);
+  ~UdpTransport() override;
+
+  // Where a socket really listens: "127.0.0.1:40123". Cold.
+  [[nodiscard]] std::string endpoint(std::size_t socket) const;
+
+  [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
+  // In the past while datagrams wait in this object, where poll_fd does not show them.
+  [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
+    return next_ < received_ ? batch_ns_ : kNoTime_ns;
+  }
+  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+  using Transport::send;
+  [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
+
+ private:
+  struct Socket {
+    int fd = -1;
+    std::optional<Address> to;  // a configured one, or the last sender
+    bool keeps_to = false;      // `to` is configured
+  };
+  struct Batch;  // the buffers of one recvmmsg
+
+  UdpTransport();
+  [[nodiscard]] Result<> add(const UdpSocketSettings& settings, const UdpSettings& all);
+  // Fills the batch from the next socket that has datagrams; false when none has.
+  [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool may_send(const Host& host) const noexcept;
+
+  int epoll_ = -1;
+  std::vector<Socket> sockets_;
+  std::vector<Host> peers_;
+  std::unique_ptr<Batch> batch_;
+  std::size_t received_ = 0, next_ = 0;  // datagrams in the batch, and those handed out
+  std::size_t socket_ = 0;               // that the batch came from
+  std::int64_t batch_ns_ = 0;            // host time and wall clock, taken before the batch
+  std::int64_t wall_ns_ = 0;
+};
+
+}  // namespace posed::drivers
