@@ -1,10 +1,10 @@
 // The program computes in radians; the user interface shows degrees.
 #pragma once
 
-#include <numbers>
+#include "proto/frame/degree.hpp"
 
 namespace posed::cli {
 
-inline constexpr double kDegrees = 180.0 / std::numbers::pi;  // degrees in a radian
+inline constexpr double kDegrees = 1.0 / kDegree;  // degrees in a radian
 
 }  // namespace posed::cli

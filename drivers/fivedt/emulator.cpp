@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::fivedt {
 namespace {
@@ -13,14 +14,12 @@ constexpr int kInfoEvery = 64;  // records of a Data Glove 16
 constexpr std::array<std::int64_t, 6> kPeriod_ns{10'000'000, 12'500'000, 20'000'000,
                                                  13'333'333, 16'666'667, 16'666'667};
 
-constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
-
 // Angles of a fully bent sensor, as in config/devices/fivedt-*.toml: a finger's three joints, a
 // thumb's last two.
-constexpr std::array<double, kFingerJoints> kFinger_rad{radians(90.0), radians(100.0),
-                                                        radians(70.0)};
-constexpr std::array<double, kFingerJoints> kThumb_rad{0.0, radians(60.0), radians(80.0)};
-constexpr double kSpread_rad = radians(20.0);
+constexpr std::array<double, kFingerJoints> kFinger_rad{90.0 * kDegree, 100.0 * kDegree,
+                                                        70.0 * kDegree};
+constexpr std::array<double, kFingerJoints> kThumb_rad{0.0, 60.0 * kDegree, 80.0 * kDegree};
+constexpr double kSpread_rad = 20.0 * kDegree;
 
 double share(const HandAngles& angles, std::size_t finger, std::size_t joint) {
   const double whole = (finger == 0 ? kThumb_rad : kFinger_rad)[joint];

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::lucidgloves {
 namespace {
@@ -10,14 +11,12 @@ namespace {
 constexpr std::int64_t kPeriod_ns = 5'000'000;  // some firmware is faster; hosts must keep up
 constexpr int kFirmware = 5;
 
-constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
-
 // Angles of a fully curled finger, as in config/devices/lucidgloves.toml; joints 0 to 3. A joint
 // with 0 is not sent.
-constexpr std::array<double, kJoints> kThumb_rad{0.0, radians(60.0), radians(80.0), 0.0};
-constexpr std::array<double, kJoints> kFinger_rad{0.0, radians(90.0), radians(100.0),
-                                                  radians(70.0)};
-constexpr double kSplay_rad = radians(20.0);
+constexpr std::array<double, kJoints> kThumb_rad{0.0, 60.0 * kDegree, 80.0 * kDegree, 0.0};
+constexpr std::array<double, kJoints> kFinger_rad{0.0, 90.0 * kDegree, 100.0 * kDegree,
+                                                  70.0 * kDegree};
+constexpr double kSplay_rad = 20.0 * kDegree;
 
 void add_text(const std::string& text, Emulator::Bytes& out) {
   const auto bytes = std::as_bytes(std::span(text));

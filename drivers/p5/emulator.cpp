@@ -2,19 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::p5 {
 namespace {
 
 constexpr std::int64_t kPeriod_ns = 20'000'000;  // users of libp5glove report 40 to 60 per second
 
-constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
-
 // Angles of a fully bent finger, as in config/devices/p5.toml.
-constexpr std::array<double, kFingerJoints> kFinger_rad{radians(90.0), radians(100.0),
-                                                        radians(70.0)};
-constexpr std::array<double, kFingerJoints> kThumb_rad{0.0, radians(60.0), radians(80.0)};
+constexpr std::array<double, kFingerJoints> kFinger_rad{90.0 * kDegree, 100.0 * kDegree,
+                                                        70.0 * kDegree};
+constexpr std::array<double, kFingerJoints> kThumb_rad{0.0, 60.0 * kDegree, 80.0 * kDegree};
 
 double bend(const HandAngles& angles, std::size_t finger) {
   const auto& whole = finger == 0 ? kThumb_rad : kFinger_rad;

@@ -6,14 +6,6 @@
 #include "proto/text/clean.hpp"
 
 namespace posed::generate {
-namespace {
-
-// Look-ahead into the label sequence: with 20 frames at 30 Hz the jerk of a streamed trajectory is
-// within 3 % of the full solution's (models/trajectory/README.md, "Look-ahead").
-constexpr double kLookAhead_s = 20.0 / 30.0;
-
-}  // namespace
-
 Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
                                                      const Skeleton& skeleton, double rate_hz,
                                                      std::string name) {
@@ -24,13 +16,9 @@ Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model
   auto live = smooth::bind_live_model(model, skeleton, name);
   if (!live) return std::unexpected(live.error());
   auto shared = std::make_shared<const gesture::GestureModel>(std::move(model));
-  auto bound = std::make_unique<BoundModel>(
+  return std::make_unique<const BoundModel>(
       trajectory::StateInformation(std::move(shared), stream_rate_hz(rate_hz)), std::move(*live),
       std::move(name));
-  bound->player = std::make_unique<perform::LabelSequencePlayer>(
-      bound->information,
-      perform::PlayerOptions{.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4});
-  return bound;
 }
 
 }  // namespace posed::generate

@@ -1,7 +1,6 @@
 // BoundModel: a gesture model prepared for one stream: its state information at the stream's rate,
-// the player that performs it, and the live smoother's model (models/generate/README.md, "Binding a
-// model"). Built cold; the hot side borrows a plain pointer. Only the player changes, and only its
-// stream uses it.
+// and the live smoother's model (models/generate/README.md, "Binding a model"). Built cold, then
+// const; the hot side borrows a plain pointer.
 #pragma once
 
 #include <algorithm>
@@ -10,9 +9,9 @@
 #include <utility>
 
 #include "models/gesture/gesture_model.hpp"
-#include "models/perform/label_sequence_player.hpp"
 #include "models/smooth/live_model.hpp"
 #include "models/stage.hpp"
+#include "models/trajectory/state_information.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -26,7 +25,6 @@ struct BoundModel final : StageModel {
       : StageModel(std::move(file)), information(std::move(states)), live(std::move(smoother)) {}
 
   trajectory::StateInformation information;  // holds the gesture model
-  std::unique_ptr<perform::LabelSequencePlayer> player;
   std::unique_ptr<const smooth::LiveModel> live;
 
   [[nodiscard]] const gesture::GestureModel& gesture() const noexcept {

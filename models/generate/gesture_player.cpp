@@ -8,15 +8,23 @@ namespace posed::generate {
 namespace {
 
 constexpr double kWayBack_s = 0.8;
+// Look-ahead into the label sequence: with 20 frames at 30 Hz the jerk of a streamed trajectory is
+// within 3 % of the full solution's (models/trajectory/README.md, "Look-ahead").
+constexpr double kLookAhead_s = 20.0 / 30.0;
 // Labels of a loop that are planned ahead: those within the look-ahead, and one neighbour.
 constexpr int kLoopAhead = 3;
 
 }  // namespace
 
+GesturePlayer::GesturePlayer(double rate_hz)
+    : rate_hz_(rate_hz),
+      player_(rate_hz, {.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4}) {}
+
 // RT-safe.
 void GesturePlayer::set_model(const BoundModel* model) noexcept {
   stop();
   model_ = model;
+  if (model_ != nullptr) player_.use(model_->information);
 }
 
 // RT-safe.
@@ -27,7 +35,7 @@ bool GesturePlayer::play(const gesture::PlayOrder& order) noexcept {
   const auto is_known = [known](std::uint16_t label) { return label < known; };
   if (!std::ranges::all_of(order.labels(), is_known)) return false;
   if (stopping_) {  // the stopped performance is dropped, even while the hand is led back
-    model_->player->clear();
+    player_.clear();
     phase_ = Phase::kIdle;
     stopping_ = false;
   }
@@ -35,18 +43,18 @@ bool GesturePlayer::play(const gesture::PlayOrder& order) noexcept {
   loop_.size = 0;
   loop_next_ = 0;
   if (order.loop) loop_ = order;
-  model_->player->set_tempo(order.tempo);
+  player_.set_tempo(order.tempo);
   return true;
 }
 
 // RT-safe.
 void GesturePlayer::append(int label) noexcept {
-  if (model_->player->append(label)) ++ahead_;
+  if (player_.add(label)) ++ahead_;
 }
 
 // RT-safe.
 void GesturePlayer::stop() noexcept {
-  if (model_ != nullptr) model_->player->clear();
+  player_.clear();
   ahead_ = 0;
   loop_.size = 0;
   stopping_ = phase_ == Phase::kPerforming;
@@ -62,7 +70,7 @@ const GesturePlayer::Pose& GesturePlayer::step(const HandAngles* live) noexcept 
     begin_way_back(live != nullptr);
   }
   if (phase_ != Phase::kPerforming && ahead_ > 0) {
-    model_->player->start(past_[0], past_[1]);
+    player_.start(past_[0], past_[1]);
     phase_ = next_performed() ? Phase::kPerforming : Phase::kIdle;
   }
   if (live != nullptr) live_ = {live_[1], *live};
@@ -87,7 +95,7 @@ const GesturePlayer::Pose& GesturePlayer::step(const HandAngles* live) noexcept 
 bool GesturePlayer::next_performed() noexcept {
   keep_looping();
   const int before = played_.state;
-  if (!model_->player->next(played_)) return false;
+  if (!player_.next(played_)) return false;
   if (played_.state == 0 && before != 0) --ahead_;  // the next label begins
   return true;
 }
@@ -103,7 +111,7 @@ void GesturePlayer::keep_looping() noexcept {
 // RT-safe.
 void GesturePlayer::begin_way_back(bool live) noexcept {
   stopping_ = false;
-  if (model_ != nullptr) model_->player->clear();
+  player_.clear();
   ahead_ = 0;
   played_.state = -1;
   hold_ = past_[1];

@@ -13,13 +13,15 @@
 #include "models/generate/bound_model.hpp"
 #include "models/generate/quintic_offset.hpp"
 #include "models/gesture/play_order.hpp"
+#include "models/perform/label_sequence_player.hpp"
 
 namespace posed::generate {
 
-// RT-safe; one thread.
+// One thread.
 class GesturePlayer {
  public:
-  explicit GesturePlayer(double rate_hz) noexcept : rate_hz_(rate_hz) {}
+  // Allocates; all else is RT-safe. `rate_hz` is that of the models, too.
+  explicit GesturePlayer(double rate_hz);
 
   // Ends the performance as stop() does; the old model is no longer read. May be null.
   void set_model(const BoundModel* model) noexcept;
@@ -59,6 +61,7 @@ class GesturePlayer {
   bool started_ = false;  // past_ holds poses
   bool stopping_ = false;
 
+  perform::LabelSequencePlayer player_;
   int ahead_ = 0;            // number of labels that wait in the player
   gesture::PlayOrder loop_;  // the order that repeats; empty: none
   int loop_next_ = 0;

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <tuple>
 
 #include "models/gesture/embedded.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::gesture {
 namespace {
@@ -14,11 +14,10 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kFloorShare = 0.01;  // of each feature's variance over all recordings
-constexpr double kNoise_rad = 0.2 * std::numbers::pi / 180.0;  // lower bound of a sensor's noise
-constexpr double kStill_rad =
-    1e-4 * std::numbers::pi / 180.0;  // a channel with a smaller deviation is constant
-constexpr double kOwnModelFrom = 3;   // examples; with fewer, a context uses its label's model
+constexpr double kFloorShare = 0.01;           // of each feature's variance over all recordings
+constexpr double kNoise_rad = 0.2 * kDegree;   // lower bound of a sensor's noise
+constexpr double kStill_rad = 1e-4 * kDegree;  // a channel with a smaller deviation is constant
+constexpr double kOwnModelFrom = 3;  // examples; with fewer, a context uses its label's model
 
 // One segment: its context, and its frames within a recording.
 struct Example {

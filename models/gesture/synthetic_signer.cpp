@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string_view>
 
 #include "models/random.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/hand.hpp"
 
 namespace posed::gesture {
@@ -14,7 +14,6 @@ namespace {
 
 using Hand = Eigen::RowVectorXd;  // 45 angles [deg]
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 enum class Stance : std::uint8_t { kClosed, kStraight, kSpread };
 
 struct Gesture {
@@ -142,7 +141,7 @@ class SyntheticSigner {
         const int c = channel_of(sensor);
         const double measured = rows_[t][c] + options_.noise_deg * random_.normal();
         if (std::abs(measured - shown[c]) > options_.dead_band_deg) shown[c] = measured;
-        clip.angles[t][c] = kRadiansPerDegree * shown[c];
+        clip.angles[t][c] = kDegree * shown[c];
       }
     }
     return clip;

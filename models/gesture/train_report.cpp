@@ -1,10 +1,10 @@
 #include "models/gesture/train_report.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 #include <algorithm>
 #include <filesystem>
-#include <numbers>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -17,9 +17,8 @@ using nlohmann::json;
 constexpr int kFewGestures =
     20;  // with fewer, unseen labels get wrong poses (models/gesture/README.md, measured figures)
 constexpr int kFewExamples = 2;
-constexpr std::array<int, 2> kHold{2, 3};  // the states in which a gesture's pose is held
-constexpr double kAlike_rad =
-    10.0 * std::numbers::pi / 180.0;  // poses closer than this count as the same
+constexpr std::array<int, 2> kHold{2, 3};      // the states in which a gesture's pose is held
+constexpr double kAlike_rad = 10.0 * kDegree;  // poses closer than this count as the same
 
 using Counts = std::array<std::array<int, kFingers>, kStates>;
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::motion {
@@ -12,7 +12,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 Quaterniond cmu43_axis_frame(const Cmu43Joint& joint) {
-  return rotation_from_euler_xyz(Vector3d(joint.axis_deg.data()) * (std::numbers::pi / 180.0));
+  return rotation_from_euler_xyz(Vector3d(joint.axis_deg.data()) * kDegree);
 }
 
 // RT-safe

@@ -7,11 +7,10 @@
 #include <vector>
 
 #include "models/random.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::motion {
 namespace {
-
-constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 
 struct JointSpec {
   const char* name;
@@ -180,7 +179,7 @@ Result<clip::Clip> make_walker(const WalkerOptions& options) {
       } else {
         const double turn = person.vigour * waves[channel.joint][axis].at(theta) +
                             person.carriage_deg[channel.joint][axis];
-        value = kRadiansPerDegree * (turn + options.noise_deg * random.normal());
+        value = kDegree * (turn + options.noise_deg * random.normal());
       }
     }
   }

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "models/perform/state_duration.hpp"
 #include "models/trajectory/pentadiagonal.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::perform {
 namespace {
@@ -14,7 +14,7 @@ constexpr int kStride = trajectory::padded(kHandChannels);
 constexpr int kSettling = 3;  // frames that a permanent elimination needs (pentadiagonal.hpp)
 
 // The lead-in lasts 1.5 times as long as the farthest channel would need at this speed.
-constexpr double kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
+constexpr double kLeadSpeed_rad_s = 300.0 * kDegree;
 constexpr double kMinLead_s = 0.2, kMaxLead_s = 0.8;
 
 hwy::AlignedFreeUniquePtr<double[]> rows(int count) {
@@ -43,16 +43,14 @@ void clamp_to(const HandAngles& before, const HandAngles& last, const double* p2
 
 }  // namespace
 
-LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& information,
-                                         const PlayerOptions& options)
-    : information_(information),
-      options_(options),
-      look_ahead_(std::max(kSettling, frames_in(options.look_ahead_s, information.rate_hz()))),
+LabelSequencePlayer::LabelSequencePlayer(double rate_hz, const PlayerOptions& options)
+    : options_(options),
+      look_ahead_(std::max(kSettling, frames_in(options.look_ahead_s, rate_hz))),
       script_(options.capacity),
       states_(kHandChannels, 2 + look_ahead_),
       carry_(rows(trajectory::kernel::kCarryRows)),
       variance_(rows(1)) {
-  const int most = frames_in(kMaxLead_s, information.rate_hz()) + look_ahead_ + 1;
+  const int most = frames_in(kMaxLead_s, rate_hz) + look_ahead_ + 1;
   frames_.resize(static_cast<std::size_t>(most));
   x_ = rows(most);
   factor_rows_ = rows(most * trajectory::kernel::kFactorRows);
@@ -60,6 +58,18 @@ LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& inf
     factors_.push_back(factor_rows_.get() +
                        static_cast<std::ptrdiff_t>(i) * trajectory::kernel::kFactorRows * kStride);
   }
+}
+
+LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& information,
+                                         const PlayerOptions& options)
+    : LabelSequencePlayer(information.rate_hz(), options) {
+  information_ = &information;
+}
+
+// RT-safe.
+void LabelSequencePlayer::use(const trajectory::StateInformation& information) noexcept {
+  clear();
+  information_ = &information;
 }
 
 // RT-safe.
@@ -78,7 +88,7 @@ void LabelSequencePlayer::start() noexcept {
   started_ = !script_.empty();
   carries_ = false;
   lead_left_ = shown_ = 0;
-  if (started_) cursor_ = enter(script_, information_, script_.first(), tempo_);
+  if (started_) cursor_ = enter(script_, *information_, script_.first(), tempo_);
 }
 
 // RT-safe.
@@ -93,7 +103,7 @@ void LabelSequencePlayer::start(const HandAngles& before, const HandAngles& last
 // Starts the lead-in from the last two poses into the cursor's state. RT-safe.
 void LabelSequencePlayer::glide() noexcept {
   double* lead = states_.row(0, trajectory::kPosition);
-  information_.fill(script_.context(cursor_.position), 0, lead);
+  information_->fill(script_.context(cursor_.position), 0, lead);
   double farthest_rad = 0.0;
   for (int c = 0; c < kHandChannels; ++c) {
     const double goal =
@@ -101,7 +111,7 @@ void LabelSequencePlayer::glide() noexcept {
     farthest_rad = std::max(farthest_rad, std::abs(goal - last_[c]));
   }
   const double lead_s = std::clamp(1.5 * farthest_rad / kLeadSpeed_rad_s, kMinLead_s, kMaxLead_s);
-  lead_left_ = frames_in(lead_s, information_.rate_hz());
+  lead_left_ = frames_in(lead_s, information_->rate_hz());
   std::fill_n(lead, kHandChannels, 0.0);  // only the first state's delta-delta precision is kept
   std::fill(lead + trajectory::kPositionMean * kStride, lead + trajectory::kDeltaDelta * kStride,
             0.0);
@@ -121,13 +131,13 @@ int LabelSequencePlayer::plan(Cursor& shown) noexcept {
   for (bool entered = true; frames < most; ++frames) {
     if (ahead.frames_left == 0 && !options_.rest && !script_.has_next(ahead.position)) break;
     if (entered) {
-      information_.fill(script_.context(ahead.position), ahead.state,
-                        states_.row(++slot, trajectory::kPosition));
+      information_->fill(script_.context(ahead.position), ahead.state,
+                         states_.row(++slot, trajectory::kPosition));
     }
     if (frames == shown_) shown = ahead;
     frames_[frames] = states_.frame(slot);
     const Cursor before = ahead;
-    step(ahead, script_, information_, tempo_);
+    step(ahead, script_, *information_, tempo_);
     entered = ahead.state != before.state || ahead.position != before.position;
   }
   return frames;
@@ -143,7 +153,7 @@ void LabelSequencePlayer::advance(int frames) noexcept {
   if (lead_left_ > 0) {
     --lead_left_;
   } else {
-    step(cursor_, script_, information_, tempo_);
+    step(cursor_, script_, *information_, tempo_);
     script_.forget_before(cursor_.position);
   }
 }
@@ -153,7 +163,7 @@ bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
   if (!started_) return false;
   if (cursor_.frames_left == 0 &&
       script_.has_next(cursor_.position)) {  // an appended label ends the rest
-    step(cursor_, script_, information_, tempo_);
+    step(cursor_, script_, *information_, tempo_);
     glide();
   }
   Cursor shown = cursor_;

@@ -34,15 +34,19 @@ struct PlayedFrame {
 
 class LabelSequencePlayer {
  public:
-  // `information` must outlive the player; its rate is the frame rate.
+  // Without a model until the first use().
+  LabelSequencePlayer(double rate_hz, const PlayerOptions& options);
+  // `information` must outlive its use here; its rate is the frame rate.
   LabelSequencePlayer(const trajectory::StateInformation& information,
                       const PlayerOptions& options);
 
   // Returns false when `capacity` labels already wait. `label` is an index into the model's labels.
-  [[nodiscard]] bool append(int label) noexcept { return script_.append(label); }
+  [[nodiscard]] bool add(int label) noexcept { return script_.append(label); }
   void set_loop(bool loop) noexcept { script_.set_loop(loop); }
   void set_tempo(double tempo) noexcept;  // clamped to kMinTempo..kMaxTempo; from the next state on
   void clear() noexcept;                  // forgets all labels and the motion
+  // Another model of the same rate: forgets all labels and the motion, too.
+  void use(const trajectory::StateInformation& information) noexcept;
 
   // Starts with the first appended label: without a past, or from the last two poses of a hand, one
   // frame apart. At least one label must have been appended.
@@ -60,7 +64,7 @@ class LabelSequencePlayer {
   int plan(Cursor& shown) noexcept;
   void advance(int frames) noexcept;
 
-  const trajectory::StateInformation& information_;
+  const trajectory::StateInformation* information_ = nullptr;
   PlayerOptions options_;
   int look_ahead_;  // frames
   LabelSequence script_;

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "models/smooth/live_options.hpp"
 #include "models/smooth/speed_prior.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::smooth {
 namespace {
 
-constexpr double kDegree2 = (std::numbers::pi / 180.0) * (std::numbers::pi / 180.0);  // [rad^2]
+constexpr double kDegree2 = kDegree * kDegree;  // [rad^2]
 
 // The constants of models/smooth/README.md, "Speed-adaptive prior".
 constexpr double kLooseCurve = 8000.0 * kDegree2;  // variance of the first solve [rad^2/s^3]

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "proto/frame/degree.hpp"
 
 namespace posed::smooth {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180.0;
-constexpr double kFirstGuess_rad = 1.0 * kRadians;  // used until there are enough values
-constexpr double kLeast_rad = 0.02 * kRadians;
+constexpr double kFirstGuess_rad = 1.0 * kDegree;  // used until there are enough values
+constexpr double kLeast_rad = 0.02 * kDegree;
 constexpr double kSmallest_rad = 1e-6;  // the first bin's lower edge
 constexpr double kEnough = 40.0;        // values needed before the median is used
 constexpr double kMemory = 12000.0;     // values; when reached, all counts are halved

@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "models/style/harmonics.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::style {
 namespace {
@@ -19,7 +19,7 @@ constexpr double kMinNoise_rad2 = 3.05e-7;
 // Start of the search for the kernel values of --mode paper: the data's own variance, length 50
 // degrees, little noise.
 gp::Hyper paper_start(const MatrixXd& Y) {
-  constexpr double kLength_rad = 50.0 * std::numbers::pi / 180.0;
+  constexpr double kLength_rad = 50.0 * kDegree;
   const Eigen::RowVectorXd mean = Y.colwise().mean();
   const double variance = (Y.rowwise() - mean).squaredNorm() / static_cast<double>(Y.size());
   const double constant = mean.squaredNorm() / static_cast<double>(mean.size());
@@ -58,7 +58,7 @@ Grid grid_of(const std::vector<Pairing>& training_pairs) {
 std::vector<double> candidate_lengths_rad(int dims) {
   std::vector<double> lengths;
   for (const double length_deg : {30.0, 50.0, 75.0, 100.0}) {
-    lengths.push_back(length_deg * std::numbers::pi / 180.0 * std::sqrt(dims / 63.0));
+    lengths.push_back(length_deg * kDegree * std::sqrt(dims / 63.0));
   }
   return lengths;
 }

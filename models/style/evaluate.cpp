@@ -2,10 +2,14 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "models/motion/motion.hpp"
 #include "models/style/difference.hpp"
 #include "models/style/harmonics.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::style {
@@ -14,8 +18,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr int kRootDims = 3;           // the root is the first joint of the native space
 constexpr double kNothing_rad = 1e-6;  // differences below this are rounding of float poses
 
 double rms(const MatrixXd& m) {
@@ -34,7 +36,11 @@ struct View {
 Result<View> view_of(const motion::Motion& motion, const motion::PoseSpaceSpec& spec,
                      const std::string& path) {
   const auto space = motion::PoseSpace::bind(spec, *motion.skeleton);
-  if (!space) return fail(space.error().message, path);
+  if (!space) {
+    return fail("this clip cannot be compared in the model's pose space, " +
+                    std::string(motion::space_name(spec.space)) + ": " + space.error().message,
+                path);
+  }
   const auto leg = motion::leg_signal(motion);
   if (!leg) return fail("the skeleton names no upper legs to find the stride by", path);
   if (!has_stride(motion.size(), motion.rate_hz)) {
@@ -43,10 +49,30 @@ Result<View> view_of(const motion::Motion& motion, const motion::PoseSpaceSpec& 
   const Stride stride = find_stride(*leg, motion.rate_hz);
   View view;
   const MatrixXd all = motion::pose_vectors(motion, *space, motion::walk_heading_rad(motion));
-  view.q = all.rightCols(all.cols() - kRootDims);
+  std::vector<int> dims;  // those that do not belong to the root
+  for (int d = 0; d < space->dims(); ++d) {
+    if (space->joint_of_dim(d) != spec.root) dims.push_back(d);
+  }
+  view.q = all(Eigen::all, dims);
   view.phase = clip_phase(stride.theta0, stride.dtheta, motion.size());
   view.period_s = 2.0 * std::numbers::pi / stride.dtheta / motion.rate_hz;
   return view;
+}
+
+// The space to compare in, about the target's mean pose.
+Result<motion::PoseSpaceSpec> space_about(const motion::PoseSpaceSpec& model_space,
+                                          const motion::Motion& target) {
+  motion::PoseSpaceSpec spec = model_space;
+  if (spec.space == motion::Space::kNative) {
+    auto native = motion::describe_space(spec.space, *target.skeleton);
+    if (!native) return native;
+    spec = std::move(*native);
+  }
+  const motion::Motion* of_target[] = {&target};
+  if (auto set = motion::set_mean_rotations(of_target, spec); !set) {
+    return std::unexpected(set.error());
+  }
+  return spec;
 }
 
 double jerk(const MatrixXd& q) {
@@ -59,16 +85,12 @@ double jerk(const MatrixXd& q) {
 }  // namespace
 
 Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
-                                  const clip::Clip& target) {
+                                  const clip::Clip& target, const motion::PoseSpaceSpec& space) {
   auto target_motion = motion::motion_of(target);
   if (!target_motion) return std::unexpected(target_motion.error());
   if (motion::begins_with_added_pose(*target_motion)) motion::drop_first_frame(*target_motion);
-  auto spec = motion::describe_space(motion::Space::kNative, *target.skeleton);
-  if (!spec) return std::unexpected(spec.error());
-  const motion::Motion* of_target[] = {&*target_motion};
-  if (auto set = motion::set_mean_rotations(of_target, *spec); !set) {
-    return std::unexpected(set.error());
-  }
+  const auto spec = space_about(space, *target_motion);
+  if (!spec) return fail(spec.error().message, target.path);
   const auto goal = view_of(*target_motion, *spec, target.path);
   if (!goal) return std::unexpected(goal.error());
   auto source_motion = motion::motion_of(source);
@@ -105,8 +127,8 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
   score.cycle_ratio = rms(grid * after->coefficients() - goal_cycle) / apart;
   score.ratio = rms(after->q - at(*after)) / rms(before->q - at(*before));
   score.jerk_ratio = jerk(after->q) / source_jerk;
-  score.component_rms_deg = kDegrees * rms(after->q - before->q);
-  score.source_component_rms_deg = kDegrees * apart;
+  score.component_rms_deg = rms(after->q - before->q) / kDegree;
+  score.source_component_rms_deg = apart / kDegree;
   score.source_period_s = before->period_s;
   score.target_period_s = goal->period_s;
   return score;

@@ -1,12 +1,14 @@
 // How close a styled clip is to clips of the target style (README.md, "Evaluation"). Cold.
 #pragma once
 
+#include "models/motion/pose_space.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::style {
 
-// All on the rotation vectors of every joint but the root, about the target's mean rotation.
+// All on the components of the pose vector that do not belong to the root: rotation vectors about
+// the target's mean rotation, or the angles of cmu43.
 struct StyleScore {
   double cycle_ratio =
       0.0;                  // rms of styled - target average cycle (28 phases) over source - target
@@ -23,8 +25,10 @@ struct StyleScore {
 // `styled` is `source` after the filter, with the same skeleton names, rate and frames. Phases come
 // from each clip's own leg signal. Errors name the clip. A source that stands still or that walks
 // like the target is an error, because the ratios divide by the difference between source and
-// target.
+// target. The poses are compared in `space`, the model's own; in the native space over all joints
+// of the target, which the source must have. The error names the joints that a clip lacks.
 [[nodiscard]] Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
-                                                const clip::Clip& target);
+                                                const clip::Clip& target,
+                                                const motion::PoseSpaceSpec& space = {});
 
 }  // namespace posed::style

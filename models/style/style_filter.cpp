@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <utility>
 
+#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 constexpr double kMaxStep_s = 0.1;
 constexpr double kGateTau_s = 0.2;
 constexpr double kCalibrationTau_s = 10.0;
-constexpr float kCalibrationMax_rad = 20.0F * std::numbers::pi_v<float> / 180.0F;
+constexpr float kCalibrationMax_rad = static_cast<float>(20.0 * kDegree);
 constexpr double kNoTurn_rad = 1e-6;  // too small for single precision
 constexpr float kInputSpread = 3.0F;  // standard deviations of the training inputs
 

@@ -12,6 +12,7 @@
 #include "models/style/harmonics.hpp"
 #include "models/style/training_check.hpp"
 #include "models/style/training_pairs.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::style {
@@ -227,7 +228,7 @@ json report_of(const Dataset& dataset, const Learnt& learnt) {
   report["kernel"]["lambda"] = p.lambda;
   report["kernel"]["mu"] = p.mu;
   report["kernel"]["b"] = p.b;
-  report["kernel"]["length_deg"] = 180.0 / std::numbers::pi / std::sqrt(p.mu);
+  report["kernel"]["length_deg"] = 1.0 / (kDegree * std::sqrt(p.mu));
   report["noise"] = p.noise;
   report["log_likelihood"]["gp"] = gp::log_marginal(p.inputs, residual, hyper).log_likelihood;
   report["pose_space"] = motion::space_name(dataset.spec.space);

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "models/gp/regression.hpp"
 #include "models/motion/motion.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::style {
 namespace {
@@ -47,7 +47,7 @@ Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& mode
   std::ranges::nth_element(squares, middle);
   const auto joints = static_cast<double>(model.space.joints.size());
   WalkerFit fit;
-  fit.distance_deg = 180.0 / std::numbers::pi * std::sqrt(*middle / joints);
+  fit.distance_deg = std::sqrt(*middle / joints) / kDegree;
   fit.mean_change = gp::posterior_mean(model.process, q).colwise().mean();
   return fit;
 }

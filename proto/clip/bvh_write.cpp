@@ -1,15 +1,15 @@
 #include <array>
 #include <charconv>
-#include <numbers>
 #include <ostream>
 
 #include "proto/clip/clip.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::clip {
 namespace {
 
-constexpr double kDegreesPerRad = 180.0 / std::numbers::pi;
+constexpr double kDegreesPerRad = 1.0 / kDegree;
 
 // Writes fixed notation, because some readers do not accept exponents. Nine digits keep an angle
 // within 1e-6 deg over any number of round trips.

@@ -26,7 +26,8 @@ constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
 
-The source goes through the same stage as live. cycle_ratio: how far the styled walk's average cycle
+The source goes through the same stage as live, and is compared in the model's pose space.
+cycle_ratio: how far the styled walk's average cycle
 is from the target's, over how far the unstyled one was (0 is the target, 1 is no change);
 constant_cycle_ratio: the same for the model's average change alone, added to every frame; ratio:
 cycle_ratio frame by frame; jerk_ratio: roughness of the styled walk over the unstyled one's;
@@ -123,7 +124,7 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
     const auto styled =
         style::apply_to_clip(full ? *model : constant, options.model, *source, apply);
     if (!styled) return std::unexpected(styled.error());
-    const auto score = style::evaluate_style(*source, styled->clip, *target);
+    const auto score = style::evaluate_style(*source, styled->clip, *target, model->space);
     if (!score) return std::unexpected(score.error());
     (full ? evaluation.score : evaluation.constant) = *score;
     evaluation.moved_rms_deg = styled->rms_change_rad * kDegrees;

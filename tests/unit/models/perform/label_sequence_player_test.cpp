@@ -29,7 +29,7 @@ StateInformation toy(double rate_hz = 30.0) {
 void append(LabelSequencePlayer& player, const StateInformation& information,
             const std::string& labels) {
   for (const char label : labels) {
-    REQUIRE(player.append(information.model().label_index(std::string(1, label))));
+    REQUIRE(player.add(information.model().label_index(std::string(1, label))));
   }
 }
 
@@ -205,12 +205,12 @@ TEST_CASE("a player does not allocate and reports when it is full", "[generate]"
   player.start();
   CHECK_FALSE(player.started());
   append(player, information, "gcpg");
-  CHECK_FALSE(player.append(0));
+  CHECK_FALSE(player.add(0));
   const std::uint64_t before = test::allocations();
   player.start(HandAngles{}, HandAngles{});
   for (int t = 0; t < 150; ++t) static_cast<void>(player.next(frame));
   player.set_tempo(1.7);
-  CHECK(player.append(1));  // there is space again, because performed labels are forgotten
+  CHECK(player.add(1));  // there is space again, because performed labels are forgotten
   while (player.next(frame)) {
   }
   player.clear();

@@ -42,3 +42,22 @@ TEST_CASE("a target that is the source itself, or a source that stands still, ha
   CHECK(held.error().message.find("does not move") != std::string::npos);
   CHECK(held.error().file == "still.bvh");
 }
+
+TEST_CASE("a model of the canonical skeleton is compared on a target with other joint names",
+          "[style][evaluate]") {
+  const auto march = make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
+  auto sway = make_walker({.family = WalkerFamily::kSway, .person = 1}).value();
+  auto renamed = std::make_shared<Skeleton>(*sway.skeleton);
+  for (Joint& joint : renamed->joints) joint.name = "my_" + joint.name;
+  sway.skeleton = renamed;
+  sway.path = "sway.bvh";
+  const auto native = style::evaluate_style(march, march, sway);
+  REQUIRE_FALSE(native);
+  CHECK(native.error().message.contains("pose space, native"));
+  CHECK(native.error().message.contains("my_"));
+  const auto space = motion::describe_space(motion::Space::kHumanoid, *march.skeleton).value();
+  const auto alone = style::evaluate_style(march, march, sway, space);
+  REQUIRE(alone);
+  CHECK(alone->cycle_ratio == 1.0);
+  CHECK(alone->source_component_rms_deg > 1.0);
+}
