@@ -25,7 +25,7 @@ namespace posed {
 
 // What a stage is made for.
 struct StageContext {
-  std::shared_ptr<const Skeleton> skeleton;  // of the frames that enter; never null
+  std::shared_ptr<const Skeleton> skeleton{};  // of the frames that enter; never null
   double rate_hz = 0.0;                      // nominal, of the stream; 0: unknown
   Parameters parameters{};                   // complete
 };

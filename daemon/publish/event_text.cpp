@@ -25,9 +25,9 @@ std::string changed(const StreamEvent& event) {
   switch (change.kind) {
     case StageChange::Kind::kSet: {
       const ParameterSpec& spec = change.type->parameters[change.index];
-      return fmt::format("{} {:.2f} -> {:.2f} from frame {}", spec.shown_name(),
-                         event.value_before * spec.people_scale, change.value * spec.people_scale,
-                         event.sequence);
+      return fmt::format("{}.{} {:.2f} -> {:.2f} from frame {}", change.type->name,
+                         spec.shown_name(), event.value_before * spec.people_scale,
+                         change.value * spec.people_scale, event.sequence);
     }
     case StageChange::Kind::kModel:
       return fmt::format("{} model {} from frame {}", change.type->name, from_to(event),

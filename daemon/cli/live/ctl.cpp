@@ -143,7 +143,7 @@ Result<> check_parameter(const std::string& name, const ParameterValue& value) {
         const auto checked = from_people(spec, value, name);
         return checked ? Result<>() : std::unexpected(checked.error());
       }
-      known.insert({alone, whole});
+      if (spec.live) known.insert({alone, whole});
     }
   }
   const std::string near = nearest(name, known);

@@ -8,6 +8,7 @@
 
 #include "daemon/cli/live/monitor_line.hpp"
 #include "daemon/cli/paint.hpp"
+#include "models/stages/registry.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
@@ -86,6 +87,18 @@ std::string stages_row(const v1::StreamStats& stream) {
   if (stream.lag_frames() > 0) {
     add(fmt::format("lag {} frame{} ({:.0f} ms)", stream.lag_frames(),
                     stream.lag_frames() == 1 ? "" : "s", stream.lag_ms()));
+  }
+  // Parameters that differ from their defaults; alpha has its own column.
+  for (const v1::StageStats& one : stream.stage()) {
+    const StageType* type = find_stage_type(one.name());
+    for (const v1::ParameterStats& parameter : one.parameter()) {
+      const ParameterSpec* spec =
+          type == nullptr ? nullptr : find_parameter(type->parameters, parameter.name());
+      if (spec == nullptr || parameter.name() == "alpha") continue;
+      const double usual = number_of(spec->default_value) * spec->people_scale;
+      if (parameter.value() == usual) continue;
+      add(fmt::format("{}.{} {:g}", clean_name(one.name()), parameter.name(), parameter.value()));
+    }
   }
   // As far as the column shows, alpha has reached its target.
   if (std::abs(stream.alpha_target() - stream.alpha()) >= 0.005F) {

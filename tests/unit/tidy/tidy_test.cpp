@@ -71,6 +71,28 @@ TEST_CASE("a folder includes only what its target links, and no targets form a c
             [&](const SourceFile& file) { return posed::tidy::check_links(file, targets); }) == "");
 }
 
+TEST_CASE("every folder of unit tests is built into a program", "[tidy]") {
+  std::ifstream file(posed::test::source_dir() / "tests/CMakeLists.txt");
+  const std::string programs{std::istreambuf_iterator<char>(file), {}};
+  const auto is_built = [&](const std::string& folder) {
+    for (const char end : {' ', ')', '\n'}) {
+      if (programs.find(" " + folder + end) != std::string::npos) return true;
+    }
+    return false;
+  };
+  REQUIRE_FALSE(is_built("unit/models/no_such"));
+  std::set<std::string> folders;
+  for (const SourceFile& source : tree()) {
+    if (!source.path.starts_with("tests/unit/") || !source.path.ends_with(".cpp")) continue;
+    folders.insert(source.path.substr(6, source.path.rfind('/') - 6));
+  }
+  REQUIRE(folders.size() > 10);
+  for (const std::string& folder : folders) {
+    INFO(folder << " is in no posed_test line of tests/CMakeLists.txt");
+    CHECK(is_built(folder));
+  }
+}
+
 TEST_CASE("no file names a page outside the repository", "[tidy]") {
   REQUIRE(posed::tidy::check_references("a.md", std::string("x\nsee ../sha") + "red/a\n").size() ==
           1);

@@ -145,6 +145,14 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   CHECK(below() == "  walker0   performs g");
   stream.set_alpha_target(1.0F);
   CHECK(below() == "  walker0   performs g, alpha slides to 1.00");
+  v1::StageStats& style = *stream.add_stage();
+  style.set_name("style");
+  v1::ParameterStats& parameter = *style.add_parameter();
+  parameter.set_name("gate_fallback");
+  parameter.set_value(1.0);
+  CHECK_FALSE(below().contains("gate_fallback"));  // as usual
+  parameter.set_value(0.25);
+  CHECK(below() == "  walker0   performs g, style.gate_fallback 0.25, alpha slides to 1.00");
   stats.set_replay_file("take1.plog");
   stats.set_replay_speed(1.0);
   CHECK(below() == "  a replay of take1.plog, 1 x its pace; all times are the recording's");

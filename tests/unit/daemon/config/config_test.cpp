@@ -377,14 +377,13 @@ TEST_CASE("the shipped config contains every key with its default") {
   const Reading full = read_real(shipped(true));
   // the key files of the example do not exist; there must be no other error
   for (const Error& error : full.errors) {
-    INFO(error.text());
-    CHECK(error.message.find("cannot read the key") != std::string::npos);
+    if (error.message.find("cannot read the key") == std::string::npos) FAIL_CHECK(error.text());
   }
   // The file contains every key that the reader looks up.
   const std::string text = shipped(true);
   for (const std::string& key : full.known) {
     const std::string last = key.substr(key.rfind('.') + 1);
-    INFO(key);
+    INFO("config/posed.toml lacks the key " << key);
     CHECK(std::regex_search(text, std::regex("(^|\n)" + last + " = |\n\\[+" + key + "\\]")));
   }
   // The values in the file are the defaults: uncommenting all of them changes nothing.
@@ -400,8 +399,10 @@ TEST_CASE("the shipped config contains every key with its default") {
   CHECK(a.streams[0].options == b.streams[0].options);
   REQUIRE(b.streams[0].stages.size() == stage_types().size());
   for (const StageConfig& stage : b.streams[0].stages) {
-    INFO(stage.type->name);
-    CHECK(stage.parameters == *complete_parameters(stage.type->parameters, {}));
+    for (const ParameterSpec& spec : stage.type->parameters) {
+      INFO("config/posed.toml: " << stage.type->name << "." << spec.shown_name());
+      CHECK((stage.parameters.at(std::string(spec.name)) == spec.default_value));
+    }
   }
   CHECK(b.streams[0].off.empty());
 }
