@@ -26,8 +26,8 @@ namespace posed {
 // What a stage is made for.
 struct StageContext {
   std::shared_ptr<const Skeleton> skeleton{};  // of the frames that enter; never null
-  double rate_hz = 0.0;                      // nominal, of the stream; 0: unknown
-  Parameters parameters{};                   // complete
+  double rate_hz = 0.0;                        // nominal, of the stream; 0: unknown
+  Parameters parameters{};                     // complete
 };
 
 // A parameter that contradicts others.
@@ -60,7 +60,8 @@ struct StageType {
 
   // Whether a stream without a table for this stage has it all the same; null: never.
   bool (*is_default)(const Skeleton& skeleton) = nullptr;
-  // Checks what the range of a single parameter cannot; null: nothing.
+  // Checks what the range of a single parameter cannot, before the stage is made; live parameters
+  // must be sound in any combination. Null: nothing.
   std::optional<ParameterFault> (*check)(const Parameters& parameters, bool has_model) = nullptr;
   // Returns an error for a skeleton that the stage cannot serve. `model` is one that bind_model
   // made for the same context; null: none. It outlives the stage, or its successor does.

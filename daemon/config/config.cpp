@@ -247,16 +247,21 @@ void Reader::read_stages(TableReader& table, StreamConfig& stream) {
     if (!found.empty()) {
       stream.stages.push_back(std::move(found.mapped()));
     } else if (!stream.default_stages && std::ranges::find(stream.off, type) == stream.off.end()) {
-      StageConfig stage{.type = type, .parameters = *complete_parameters(type->parameters, {})};
+      auto parameters = complete_parameters(type->parameters, {});
       if (type->model_required) {
         table.add_error("stages", fmt::format("stage {0} needs a model; add a [stream.{0}] table"
                                               " with model = \"FILE\"",
                                               type->name));
+      } else if (!parameters) {
+        table.add_error("stages", fmt::format("stage {0} needs a [stream.{0}] table: {1}",
+                                              type->name, parameters.error().message));
+      } else {
+        stream.stages.push_back({.type = type, .parameters = std::move(*parameters)});
       }
-      stream.stages.push_back(std::move(stage));
     }
   }
-  for (const auto& [type, stage] : present) {
+  for (const StageType* type : stage_types()) {
+    if (!present.contains(type)) continue;
     table.add_error("stages", fmt::format("[stream.{0}] is there, but {0} is not in this list; add"
                                           " it, or leave out its table",
                                           type->name));
@@ -291,7 +296,7 @@ bool Reader::read_stage(TableReader& table, StageConfig& stage) {
   bool enabled = true;
   table.read("enabled", enabled);
   std::string model;
-  if (type.model_required) {
+  if (type.model_required && enabled) {
     table.require("model", model);
   } else if (type.has_model()) {
     table.read("model", model);
@@ -300,9 +305,13 @@ bool Reader::read_stage(TableReader& table, StageConfig& stage) {
   for (const ParameterSpec& spec : type.parameters) {
     ParameterValue value = spec.default_value;
     read_parameter(table, spec, value);
+    if (spec.required && enabled && !table.has(spec.shown_name())) {
+      table.add_error(spec.shown_name(), fmt::format("stream.{}.{} is missing: {}", type.name,
+                                                     spec.shown_name(), spec.help));
+    }
     stage.parameters.emplace(spec.name, std::move(value));
   }
-  if (type.check != nullptr) {
+  if (type.check != nullptr && enabled) {
     const auto fault = type.check(stage.parameters, !model.empty());
     if (fault) table.add_error(fault->parameter, fault->sentence);
   }

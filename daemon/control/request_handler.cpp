@@ -77,7 +77,8 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       daemon_control_.stop();
       return make_reply(std::move(requester), reply);
     case v1::ControlRequest::REQUEST_NOT_SET:
-      return refusal(std::move(requester), "the request is empty, or from a newer posed");
+      return refusal(std::move(requester),
+                     "the request is empty, or from another version of posed");
   }
   if (!done) return refusal(std::move(requester), done.error().text());
   return std::nullopt;  // acknowledge() makes the reply
@@ -191,6 +192,10 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   UnderWay done = std::move(found->second);
   under_way_.erase(found);
   ControlledStream& stream = streams_[ack.stream];
+  if (ack.refused) {  // nothing has changed, so the model in use stays
+    const std::string_view why = done.refusal.empty() ? "the stage refused this" : done.refusal;
+    return refusal(std::move(done.requester), fmt::format("stream {}: {}", stream.name, why));
+  }
   if (done.model) {
     auto& settings = stream.settings.stages[done.stage];
     settings.model_name = done.model->name;
@@ -201,10 +206,6 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     stream.calibration = std::move(done.calibration);
     stream.device->calibrated(
         {.toml = stream.calibration->text, .file = "the calibration sent last"});
-  }
-  if (ack.refused) {
-    return refusal(std::move(done.requester),
-                   fmt::format("stream {}: {}", stream.name, done.refusal));
   }
   v1::ControlReply reply;
   reply.set_ok(true);

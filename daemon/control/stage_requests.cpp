@@ -45,7 +45,7 @@ std::optional<std::size_t> index_in(const StageType& type, const std::string& na
   if (!stage_name.empty() && stage_name != type.name) return std::nullopt;
   const auto names = entries(type);
   const auto found = std::ranges::find(names, entry_name);
-  if (entry_name.empty() || found == names.end()) return std::nullopt;
+  if (found == names.end()) return std::nullopt;
   return static_cast<std::size_t>(found - names.begin());
 }
 
@@ -58,7 +58,7 @@ Result<Place> find_place(const StreamSettings& settings, const std::string& name
   for (std::size_t stage = 0; stage < settings.stages.size(); ++stage) {
     const StageType& type = *settings.stages[stage].type;
     for (const std::string_view entry : entries(type)) {
-      if (!entry.empty()) known.push_back(fmt::format("{}.{}", type.name, entry));
+      known.push_back(fmt::format("{}.{}", type.name, entry));
     }
     if (const auto index = index_in(type, name, entries)) found.push_back({stage, *index});
   }
@@ -89,16 +89,21 @@ ParameterValue value_in(const v1::ControlRequest::SetParameter& wanted) {
   }
 }
 
-// Options come as numbers, whatever their type.
+// Options come as numbers, whatever their type: a flag as 0 or 1.
 Result<Parameters> options_of(const StageCommandType& type,
                               const v1::ControlRequest::StageCommand& wanted) {
   Parameters given;
   for (const auto& [name, number] : wanted.number()) {
-    const ParameterSpec* spec = find_parameter(type.options, name);
-    if (spec == nullptr) {
+    const auto spec = std::ranges::find(type.options, name, &ParameterSpec::shown_name);
+    if (spec == type.options.end()) {
       return fail(fmt::format("{} takes no {}", type.name, in_quotes(name)));
     }
-    given.emplace(spec->name, value_of(*spec, number));
+    const bool flag = std::holds_alternative<bool>(spec->default_value);
+    const bool is_flag = flag && (number == 0.0 || number == 1.0);
+    const auto value =
+        from_people(*spec, is_flag ? ParameterValue(number == 1.0) : ParameterValue(number), name);
+    if (!value) return std::unexpected(value.error());
+    given.emplace(spec->name, *value);
   }
   return complete_parameters(type.options, given);
 }
@@ -109,10 +114,7 @@ Result<StageChange> parameter_change(const StreamSettings& settings,
                                      const v1::ControlRequest::SetParameter& wanted) {
   const auto names = [](const StageType& type) {
     std::vector<std::string_view> all;
-    for (const ParameterSpec& spec : type.parameters) {
-      const bool text = std::holds_alternative<std::string>(spec.default_value);
-      all.push_back(text ? std::string_view() : spec.shown_name());
-    }
+    for (const ParameterSpec& spec : type.parameters) all.push_back(spec.shown_name());
     return all;
   };
   const auto place = find_place(settings, wanted.name(), "parameter", names);

@@ -69,7 +69,7 @@ Result<> open_slot(const drivers::Driver& driver, OpenStream& stream) {
 }
 
 // The stages that the config names, and those that a stream of this skeleton has by default.
-std::vector<config::StageConfig> stages_of(const OpenStream& stream) {
+Result<std::vector<config::StageConfig>> stages_of(const OpenStream& stream) {
   const config::StreamConfig& config = stream.config;
   const auto& skeleton = stream.device.description.skeleton;
   if (!config.default_stages || !skeleton) return config.stages;
@@ -80,7 +80,9 @@ std::vector<config::StageConfig> stages_of(const OpenStream& stream) {
     if (named != config.stages.end()) {
       stages.push_back(*named);
     } else if (!off && type->is_default != nullptr && type->is_default(*skeleton)) {
-      stages.push_back({.type = type, .parameters = *complete_parameters(type->parameters, {})});
+      auto parameters = complete_parameters(type->parameters, {});
+      if (!parameters) return std::unexpected(parameters.error());
+      stages.push_back({.type = type, .parameters = std::move(*parameters)});
     }
   }
   return stages;
@@ -90,7 +92,9 @@ Result<> open_stages(OpenStream& stream) {
   stream.settings = {.publish_raw = stream.config.publish_raw,
                      .stale_after_s = stream.config.stale_after_s,
                      .rate_hz = stream.device.description.rate_hz};
-  for (config::StageConfig& stage : stages_of(stream)) {
+  auto stages = stages_of(stream);
+  if (!stages) return std::unexpected(stages.error());
+  for (config::StageConfig& stage : *stages) {
     stream.settings.stages.push_back({.type = stage.type,
                                       .parameters = std::move(stage.parameters),
                                       .model_name = stage.model.filename().string()});
@@ -153,12 +157,13 @@ Result<BoundStages> bind_stages(const OpenStream& stream) {
   for (std::size_t i = 0; i < stream.settings.stages.size(); ++i) {
     const pipeline::StageSettings& stage = stream.settings.stages[i];
     auto& model = bound.models.emplace_back();
-    if (!skeleton || stream.model_files[i].empty()) continue;
-    auto ready = stage.type->bind_model(std::as_bytes(std::span(stream.model_files[i])),
-                                        pipeline::stage_context(stream.settings, i, skeleton),
-                                        stage.model_name);
-    if (!ready) return of_stream(stream.config.name, ready.error());
-    model = std::move(*ready);
+    if (skeleton && !stream.model_files[i].empty()) {
+      auto ready = stage.type->bind_model(std::as_bytes(std::span(stream.model_files[i])),
+                                          pipeline::stage_context(stream.settings, i, skeleton),
+                                          stage.model_name);
+      if (!ready) return of_stream(stream.config.name, ready.error());
+      model = std::move(*ready);
+    }
     if (stage.type->first_command == nullptr) continue;
     const auto first = stage.type->first_command(stage.parameters, model.get());
     if (!first) return of_stream(stream.config.name, first.error());

@@ -43,6 +43,10 @@ Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings&
       return misuse("it has no poses, only samples, so stage " + std::string(type.name) +
                     " has nothing to work on");
     }
+    if (type.check != nullptr) {
+      const auto fault = type.check(settings.stages[i].parameters, models[i] != nullptr);
+      if (fault) return misuse(fault->sentence);
+    }
     auto stage = type.make(stage_context(settings, i, skeleton), models[i]);
     if (!stage) return std::unexpected(stage.error());
     options.stages.push_back({&type, std::move(*stage)});

@@ -19,22 +19,30 @@ std::string from_to(const StreamEvent& event) {
   return (before.empty() ? "" : before + " -> ") + words(event.after);
 }
 
+// A parameter as the config writes it.
+std::string shown(const ParameterSpec& spec, double value) {
+  if (std::holds_alternative<bool>(spec.default_value)) return value != 0.0 ? "true" : "false";
+  return fmt::format("{:g}", value * spec.people_scale);
+}
+
 std::string changed(const StreamEvent& event) {
   const StageChange& change = event.change;
   if (change.type == nullptr) return {};
   switch (change.kind) {
     case StageChange::Kind::kSet: {
       const ParameterSpec& spec = change.type->parameters[change.index];
-      return fmt::format("{}.{} {:.2f} -> {:.2f} from frame {}", change.type->name,
-                         spec.shown_name(), event.value_before * spec.people_scale,
-                         change.value * spec.people_scale, event.sequence);
+      return fmt::format("{}.{} {} -> {} from frame {}", change.type->name, spec.shown_name(),
+                         shown(spec, event.value_before), shown(spec, change.value),
+                         event.sequence);
     }
     case StageChange::Kind::kModel:
       return fmt::format("{} model {} from frame {}", change.type->name, from_to(event),
                          event.sequence);
-    case StageChange::Kind::kCommand:
-      return fmt::format("{} at frame {}", change.type->commands[change.index].name,
-                         event.sequence);
+    case StageChange::Kind::kCommand: {
+      const std::string what = words(event.after);
+      return fmt::format("{}{} at frame {}", change.type->commands[change.index].name,
+                         what.empty() ? "" : " " + what, event.sequence);
+    }
   }
   return {};
 }

@@ -37,7 +37,7 @@ struct StreamInfo {
   double rate_hz = 0.0;                  // expected frame rate; 0: unknown
   std::vector<const StageType*> stages;  // in the order in which they run
   bool raw = false;                      // the unstyled input is published as <name>-raw
-  std::string model;                     // the style model's name at the start
+  std::string model;                     // the first stage's model at the start, by name
   bool comes_and_goes = false;           // the device may be unplugged
   std::shared_ptr<const devices::PresentDevice> present{};  // null: the stream has no device
   pipeline::StreamCounters* counters = nullptr;

@@ -71,7 +71,10 @@ bool read_set(const ParameterSpec& spec, const Value& value, Decision& decision)
   const bool flag = std::holds_alternative<bool>(spec.default_value);
   if (value.value_case() != (flag ? Value::kFlag : Value::kNumber)) return false;
   decision.change.value = flag ? (value.flag() ? 1.0 : 0.0) : value.number();
-  return spec.live && decision.change.value >= spec.min && decision.change.value <= spec.max;
+  const double number = decision.change.value;
+  const bool whole = std::holds_alternative<std::int64_t>(spec.default_value);
+  return spec.live && number >= spec.min && number <= spec.max &&
+         (!whole || std::trunc(number) == number);
 }
 
 bool read_hash(const Value& value, Decision& decision) {

@@ -77,6 +77,7 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
       new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(*wake)));
   for (std::uint32_t id = 0; id < streams; ++id) {
     infos[id].counters = &self->counters_[id];
+    self->settings_.push_back(replay.stream(id).settings);
     pipeline::publish_parameters(replay.engine(id), self->counters_[id].pipeline);
   }
   auto context = net::open_context();
@@ -140,7 +141,11 @@ void Broadcast::note(const pipeline::StreamEvent& event) {
     case v1::Event::KIND_CONTROL:
       pipeline::publish_parameters(replay_.engine(event.stream), counters);
       if (event.change.kind == pipeline::StageChange::Kind::kModel) {
-        publisher_->set_model_name(event.stream, std::string(event.after.text()));
+        pipeline::StreamSettings& settings = settings_[event.stream];
+        for (pipeline::StageSettings& stage : settings.stages) {
+          if (stage.type == event.change.type) stage.model_name = event.after.text();
+        }
+        publisher_->set_model_name(event.stream, pipeline::first_model(settings));
       }
       break;
     default:

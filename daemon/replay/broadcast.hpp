@@ -75,6 +75,7 @@ class Broadcast {
   net::Context context_;
   std::unique_ptr<net::ZapAuthenticator> authenticator_;
   std::vector<pipeline::StreamCounters> counters_;
+  std::vector<pipeline::StreamSettings> settings_;  // with the names of the models in use
   pipeline::Ring<pipeline::Item> ring_;
   std::unique_ptr<system::EventFd> wake_;
   std::unique_ptr<publish::Publisher> publisher_;

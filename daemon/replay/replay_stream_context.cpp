@@ -257,8 +257,8 @@ void ReplayStreamContext::change(const pipeline::Decision& decision) noexcept {
     model = std::move(*bound);
     command.model = model.get();
   }
-  static_cast<void>(engine_->apply(command, *this));
-  if (model) models_in_use_[*stage] = std::move(model);
+  const bool refused = engine_->apply(command, *this).refused;
+  if (model && !refused) models_in_use_[*stage] = std::move(model);
 }
 
 // Nothing more comes: what was decoded last but never came was shed.

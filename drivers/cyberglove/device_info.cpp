@@ -8,7 +8,7 @@ namespace posed::drivers::cyberglove {
 namespace {
 
 // Longer than the period of any rate that the options allow.
-constexpr int kMostTicks = 65535 * 1024;
+constexpr int kMaxTicks = 65535 * 1024;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ Result<GloveSettings> read_device_info(const std::string& text, const std::strin
   glove.layout.mode = static_cast<Mode>(reader.choice("mode", kModes));
   glove.layout.time = reader.whole("time", 0, 1) == 1;
   glove.layout.status = reader.whole("status", 0, 1) == 1;
-  glove.ticks = reader.whole("ticks", 0, kMostTicks);
+  glove.ticks = reader.whole("ticks", 0, kMaxTicks);
   glove.layout.multiplier = reader.whole("multiplier", 1, kMaxMultiplier);
   if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
   if (std::popcount(glove.layout.mask) != sensors) {

@@ -10,7 +10,7 @@ constexpr milliseconds kQuiet{60};
 constexpr milliseconds kAfterSet{20};  // time for bytes after the answer to a set command
 constexpr milliseconds kInfo{2000};    // the text may take a second
 constexpr milliseconds kAnswer{1000};
-constexpr std::size_t kMostText = 4096;  // limit for a device that streams and never ends its text
+constexpr std::size_t kMaxText = 4096;  // limit for a device that streams and never ends its text
 
 }  // namespace
 
@@ -19,7 +19,7 @@ Result<std::string> Session::listen(milliseconds patience, Done done) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point deadline = Clock::now() + patience;
   std::string heard;
-  while (!done(heard) && heard.size() < kMostText) {
+  while (!done(heard) && heard.size() < kMaxText) {
     const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) break;
     const auto bytes = link_.read(left);

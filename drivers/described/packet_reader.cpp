@@ -15,7 +15,7 @@ using Words = std::span<const std::string_view>;
 
 constexpr std::size_t kMaxPackets = 16;
 constexpr std::size_t kMaxMarkBytes = 16;
-constexpr std::int64_t kMostBytes = kMaxPacketBytes;
+constexpr std::int64_t kMaxBytes = kMaxPacketBytes;
 constexpr std::array<std::string_view, 2> kOrders{"little", "big"};
 constexpr std::array<std::string_view, 3> kForms{"unsigned", "signed", "float"};
 constexpr std::array<std::string_view, 3> kKinds{"sensor", "extra", "time"};
@@ -69,7 +69,7 @@ void PacketReader::read_packet(const toml::table& from) {
 
 void PacketReader::read_length(const toml::table& from, PacketRule& packet) {
   const toml::table* const length = toml_.table(from, "length");
-  const std::int64_t bytes = toml_.whole(from, "bytes", 0, 1, kMostBytes);
+  const std::int64_t bytes = toml_.whole(from, "bytes", 0, 1, kMaxBytes);
   if (bytes == 0) {
     toml_.add_error(from,
                     "a packet needs its length: bytes = 24; with a length field in the packet, "
@@ -79,12 +79,12 @@ void PacketReader::read_length(const toml::table& from, PacketRule& packet) {
   packet.min_bytes = packet.max_bytes = static_cast<std::size_t>(bytes);
   if (length == nullptr) return;
   toml_.allow(*length, "length", kLengthKeys);
-  const std::int64_t byte = toml_.whole(*length, "byte", -1, 0, kMostBytes - 1);
+  const std::int64_t byte = toml_.whole(*length, "byte", -1, 0, kMaxBytes - 1);
   const std::int64_t bits = toml_.whole(*length, "bits", 8, 1, 16);
   if (byte < 0) toml_.add_error(*length, "length needs the byte where it stands: byte = 2");
   packet.length.fixed = false;
   packet.max_bytes = kMaxPacketBytes;
-  packet.length.add = static_cast<int>(toml_.whole(*length, "add", 0, -kMostBytes, kMostBytes));
+  packet.length.add = static_cast<int>(toml_.whole(*length, "add", 0, -kMaxBytes, kMaxBytes));
   const bool big = toml_.word(*length, "order", kOrders, 0) == 1;
   packet.length.place = place(*length, 8 * byte, bits, big, packet);
 }
@@ -96,7 +96,7 @@ void PacketReader::read_checksum(const toml::table& from, PacketRule& packet) {
   ChecksumRule& rule = packet.checksum;
   rule.kind = static_cast<ChecksumKind>(toml_.word(*sum, "kind", kChecksums, 0));
   const auto at = [&](std::string_view key, std::int64_t without) {
-    return static_cast<int>(toml_.whole(*sum, key, without, -kMostBytes, kMostBytes));
+    return static_cast<int>(toml_.whole(*sum, key, without, -kMaxBytes, kMaxBytes));
   };
   const int width = rule.kind == ChecksumKind::kCrc32 ? 4 : 1;
   rule.at = at("byte", -width);
@@ -148,9 +148,9 @@ void PacketReader::read_field(const toml::table& from, PacketRule& packet) {
   if (from.contains("bit") == from.contains("byte")) {
     return toml_.add_error(from, "a field needs its place: bit = 24, or byte = 3");
   }
-  std::int64_t bit = from.contains("bit") ? toml_.whole(from, "bit", 0, 0, 8 * kMostBytes)
-                                          : 8 * toml_.whole(from, "byte", 0, 0, kMostBytes);
-  const std::int64_t step = toml_.whole(from, "step", bits, 1, 8 * kMostBytes);
+  std::int64_t bit = from.contains("bit") ? toml_.whole(from, "bit", 0, 0, 8 * kMaxBytes)
+                                          : 8 * toml_.whole(from, "byte", 0, 0, kMaxBytes);
+  const std::int64_t step = toml_.whole(from, "step", bits, 1, 8 * kMaxBytes);
   const bool big = toml_.word(from, "order", kOrders, 0) == 1;
   for (const std::string& name : names) {
     if (name != "-") {

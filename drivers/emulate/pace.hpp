@@ -20,8 +20,8 @@ class Pace {
 
   // Call it when the due record was sent.
   void step(std::int64_t now_ns) noexcept {
-    constexpr std::int64_t kMostLate = 10;  // periods
-    const bool paused = now_ns - due_ns_ > kMostLate * period_ns_;
+    constexpr std::int64_t kMaxLate = 10;  // periods
+    const bool paused = now_ns - due_ns_ > kMaxLate * period_ns_;
     due_ns_ = (paused ? now_ns : due_ns_) + period_ns_;
   }
 

@@ -9,8 +9,10 @@
 namespace posed::drivers::mocap {
 namespace {
 
-// A frame that is late by more than these is the first of a restarted device.
-constexpr std::uint32_t kMostLate = 8;  // frames
+// The network delivers a frame at most this late; one that is further behind, or many in a row, are
+// those of a restarted device.
+constexpr std::uint32_t kMaxLate = 15;  // frames
+constexpr int kMaxLateInARow = 3;
 // Deviation of a rotation's squared length from 1 that rounding explains.
 constexpr double kTolerance = 1e-3;
 
@@ -64,8 +66,9 @@ void MocapDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival
 
 // RT-safe.
 bool MocapDecoder::is_new(std::uint32_t number) noexcept {
-  const bool late = has_number_ && number_ - number < kMostLate;
-  if (late) return false;
+  const bool late = has_number_ && number_ - number <= kMaxLate;  // numbers wrap
+  if (late && ++late_ <= kMaxLateInARow) return false;
+  late_ = 0;
   has_number_ = true;
   number_ = number;
   return true;

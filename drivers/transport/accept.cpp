@@ -20,7 +20,7 @@ namespace {
 constexpr int kPatience_ms = 500;
 constexpr int kBacklog = 8;
 // Connections per call: an untrusted client may open them without end.
-constexpr int kMostAtOnce = 64;
+constexpr int kMaxAtOnce = 64;
 
 Result<Address> address_of(const ListenSettings& settings) {
   return listen_address(settings.endpoint, settings.peers, "the gloves'");
@@ -85,7 +85,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
   // If several are waiting, the newest is used: a glove that restarts leaves its old connection
   // behind.
   std::optional<Connection> newest;
-  for (int i = 0; i < kMostAtOnce; ++i) {
+  for (int i = 0; i < kMaxAtOnce; ++i) {
     Address peer;
     const int fd =
         ::accept4(listener->second, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);

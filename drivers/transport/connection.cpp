@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 constexpr std::size_t kRead = 4096;  // bytes; enough for a HID report or a terminal's buffer
 constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
-constexpr int kMostWaiting = 256;  // reads; hidraw keeps 64 reports
+constexpr int kMaxWaiting = 256;  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
   return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
@@ -63,7 +63,7 @@ class LinkTransport final : public Transport {
 // Discards bytes that came while other devices were being opened: they are old, and all would get
 // one arrival time. Bounded, because a device may send without pause.
 Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
-  for (int i = 0; i < kMostWaiting && ::read(link_.fd(), buffer_.data(), buffer_.size()) > 0; ++i) {
+  for (int i = 0; i < kMaxWaiting && ::read(link_.fd(), buffer_.data(), buffer_.size()) > 0; ++i) {
   }
   return {};
 }

@@ -18,8 +18,10 @@ namespace {
 constexpr std::size_t kBatch = 16;            // datagrams per system call
 constexpr std::size_t kMaxDatagram = 65'507;  // bytes; the most that IPv4 carries
 constexpr std::size_t kControlBytes = 64;     // room for the kernel's time stamp
-constexpr int kReceiveBuffer = 1024 * 1024;   // bytes; about a tenth of a second of a large system
-constexpr std::int64_t kMaxAge_ns = 50'000'000;  // an older stamp means that the wall clock was set
+// Bytes, about a tenth of a second of a large system; the kernel grants at most net.core.rmem_max.
+constexpr int kReceiveBuffer = 1024 * 1024;
+// A datagram counts as at most this old: an older stamp means that the wall clock was set.
+constexpr std::int64_t kMaxAge_ns = 50'000'000;
 static_assert(kMaxDatagram <= kMaxChunk);
 
 std::int64_t to_ns(const timespec& time) noexcept {

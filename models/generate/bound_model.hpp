@@ -17,7 +17,7 @@
 
 namespace posed::generate {
 
-inline constexpr int kMostWaiting = 1024;  // most labels of one stream that wait to be performed
+inline constexpr int kMaxWaiting = 1024;  // most labels of one stream that wait to be performed
 
 struct BoundModel final : StageModel {
   BoundModel(trajectory::StateInformation states, std::unique_ptr<const smooth::LiveModel> smoother,

@@ -53,10 +53,10 @@ Result<std::unique_ptr<const StageModel>> bind(std::span<const std::byte> file,
 
 std::optional<ParameterFault> check(const Parameters& parameters, bool has_model) {
   const auto labels = gesture::split_labels(parameter<std::string>(parameters, "labels"));
-  if (labels.size() > gesture::kMostLabels) {
+  if (labels.size() > gesture::kMaxLabels) {
     return ParameterFault{"labels", std::to_string(labels.size()) +
                                         " labels are too many at once; give at most " +
-                                        std::to_string(gesture::kMostLabels)};
+                                        std::to_string(gesture::kMaxLabels)};
   }
   if (!labels.empty() && !has_model) {
     return ParameterFault{"labels",

@@ -18,7 +18,7 @@ constexpr int kLoopAhead = 3;
 
 GesturePlayer::GesturePlayer(double rate_hz)
     : rate_hz_(rate_hz),
-      player_(rate_hz, {.look_ahead_s = kLookAhead_s, .capacity = kMostWaiting + 4}) {}
+      player_(rate_hz, {.look_ahead_s = kLookAhead_s, .capacity = kMaxWaiting + 4}) {}
 
 // RT-safe.
 void GesturePlayer::set_model(const BoundModel* model) noexcept {
@@ -30,7 +30,7 @@ void GesturePlayer::set_model(const BoundModel* model) noexcept {
 // RT-safe.
 bool GesturePlayer::play(const gesture::PlayOrder& order) noexcept {
   if (model_ == nullptr || order.size == 0 || order.size > order.label.size()) return false;
-  if (order.size > kMostWaiting - ahead_) return false;
+  if (order.size > kMaxWaiting - ahead_) return false;
   const std::size_t known = model_->gesture().labels.size();
   const auto is_known = [known](std::uint16_t label) { return label < known; };
   if (!std::ranges::all_of(order.labels(), is_known)) return false;

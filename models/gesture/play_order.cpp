@@ -18,9 +18,9 @@ std::string known_labels(const GestureModel& model) {
 Result<PlayOrder> make_play_order(const GestureModel& model, std::span<const std::string> names,
                                   double tempo, bool loop) {
   if (names.empty()) return misuse("there is no label to perform; give some, as in \"g 1 c\"");
-  if (names.size() > kMostLabels) {
+  if (names.size() > kMaxLabels) {
     return misuse(std::to_string(names.size()) + " labels are too many at once; give at most " +
-                  std::to_string(kMostLabels));
+                  std::to_string(kMaxLabels));
   }
   if (!(tempo >= kMinTempo && tempo <= kMaxTempo)) {
     return misuse("the tempo is out of range; it goes from 0.5 to 2");

@@ -14,15 +14,15 @@
 
 namespace posed::gesture {
 
-inline constexpr int kMostLabels = 256;  // most labels of one order
+inline constexpr int kMaxLabels = 256;  // most labels of one order
 inline constexpr double kMinTempo = 0.5;
 inline constexpr double kMaxTempo = 2.0;
 
 struct PlayOrder {
-  float tempo = 1.0F;                              // kMinTempo to kMaxTempo; 2 takes half the time
-  bool loop = false;                               // begin again after the last label
-  std::uint16_t size = 0;                          // labels in use
-  std::array<std::uint16_t, kMostLabels> label{};  // indices into GestureModel::labels
+  float tempo = 1.0F;                             // kMinTempo to kMaxTempo; 2 takes half the time
+  bool loop = false;                              // begin again after the last label
+  std::uint16_t size = 0;                         // labels in use
+  std::array<std::uint16_t, kMaxLabels> label{};  // indices into GestureModel::labels
 
   [[nodiscard]] std::span<const std::uint16_t> labels() const noexcept {
     return std::span(label).first(size);

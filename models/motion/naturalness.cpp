@@ -13,10 +13,10 @@ namespace posed::motion {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr double kMostHz = 10.0;          // upper end of the part of the spectrum that counts
-constexpr double kLeastAmplitude = 0.05;  // relative to the largest amplitude
-constexpr int kPadLevel = 4;              // zero-padding: 2^4 times the next power of two
-constexpr Eigen::Index kWindow = 30;      // frames of a feature
+constexpr double kMaxFrequency_hz = 10.0;  // upper end of the part of the spectrum that counts
+constexpr double kLeastAmplitude = 0.05;   // relative to the largest amplitude
+constexpr int kPadLevel = 4;               // zero-padding: 2^4 times the next power of two
+constexpr Eigen::Index kWindow = 30;       // frames of a feature
 constexpr Eigen::Index kWindowsPerDimension = 10;
 
 // Amplitude of the spectrum at each of the first `count` bins of `bins`.
@@ -93,7 +93,7 @@ double spectral_arc_length(std::span<const double> speed, double rate_hz) {
   const std::size_t bins = std::size_t{1} << static_cast<unsigned>(octaves + kPadLevel);
   const double bin_hz = rate_hz / static_cast<double>(bins);
   // Above half the rate the spectrum is the mirror image of what is below.
-  const double most_hz = std::min(kMostHz, rate_hz / 2);
+  const double most_hz = std::min(kMaxFrequency_hz, rate_hz / 2);
   const auto count = std::min(bins, static_cast<std::size_t>(most_hz / bin_hz) + 1);
   std::vector<double> amplitude = amplitudes(speed, bins, count);
   const double largest = *std::ranges::max_element(amplitude);

@@ -1,7 +1,7 @@
-// LabelSequencePlayer: performs labels frame by frame while more are being appended. Each frame is
+// LabelSequencePlayer: performs labels frame by frame while more are being added. Each frame is
 // the most likely one given the exact past and the label sequence up to `look_ahead_s` ahead
 // (models/perform/README.md, "Look-ahead player"). Because the future is the label sequence, there
-// is no latency. The frames ahead are planned anew in every frame, so labels appended and a tempo
+// is no latency. The frames ahead are planned anew in every frame, so labels added and a tempo
 // set while it plays affect only frames that are not shown yet.
 //
 // Started from a live hand, it continues that hand's last two poses and moves smoothly into the
@@ -48,8 +48,8 @@ class LabelSequencePlayer {
   // Another model of the same rate: forgets all labels and the motion, too.
   void use(const trajectory::StateInformation& information) noexcept;
 
-  // Starts with the first appended label: without a past, or from the last two poses of a hand, one
-  // frame apart. At least one label must have been appended.
+  // Starts with the first added label: without a past, or from the last two poses of a hand, one
+  // frame apart. At least one label must have been added.
   void start() noexcept;
   void start(const HandAngles& before, const HandAngles& last) noexcept;
 

@@ -18,7 +18,7 @@ namespace {
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 constexpr double kForgetAfter_s = 1.0;  // after a longer silence the past is forgotten
 constexpr int kMaxPending = static_cast<int>(kMaxLag_s * 1000.0) + 2;  // frames at 1000 Hz
-constexpr long kMostWaiting = 8;  // most frames that wait until the period is known
+constexpr long kMaxWaiting = 8;  // most frames that wait until the period is known
 constexpr double kEvenStep =
     1.5;  // periods: frames with a longer step between them are not neighbours
 
@@ -151,7 +151,7 @@ void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
   // Until the period is known, a lag in time cannot be converted into frames, so the first frames
   // wait.
   const bool in_time = s.options.lag.seconds > 0.0;
-  if (in_time && !s.clock.settled() && s.taken - s.emitted < kMostWaiting) return;
+  if (in_time && !s.clock.settled() && s.taken - s.emitted < kMaxWaiting) return;
   s.emit_until(s.taken - 1 - lag_frames(s.options.lag, period_s), out);
 }
 

@@ -108,9 +108,11 @@ void StyleFilter::set(std::size_t parameter, double value) noexcept {
       options_.alpha_slew_per_s = value;
       return;
     case kGateFallback:
+      discontinuity_ = discontinuity_ || value != options_.gate_fallback;
       options_.gate_fallback = value;
       return;
     case kCalibrate:
+      discontinuity_ = discontinuity_ || (value != 0.0) != options_.calibrate;
       options_.calibrate = value != 0.0;
       return;
     default:

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 // 50 deg rms and fit strides to 0.06; standing people's legs sway by 0.1 to 1.3 deg, a jump's by
 // 4 deg with a misfit of 0.67.
 constexpr double kLeastSwing_deg = 6.0;
-constexpr double kMostMisfit = 0.3;
+constexpr double kMaxMisfit = 0.3;
 
 // The file name alone, for use within a sentence.
 std::string name_of(const std::string& file) {
@@ -82,7 +82,7 @@ void check_strides(const Dataset& dataset, TrainingCheck& check) {
     std::string what;
     if (swing < kLeastSwing_deg) {
       what = "the legs swing by " + with_digits(swing, 1) + " deg rms only";
-    } else if (misfit > kMostMisfit) {
+    } else if (misfit > kMaxMisfit) {
       what = "the legs keep no rhythm (" + percent(std::min(1.0, misfit)) +
              " of their motion fits no stride)";
     } else {

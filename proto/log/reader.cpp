@@ -263,12 +263,12 @@ Result<std::optional<ChunkRow>> Reader::next_chunk() {
   if (!unpack_positions(select.bytes(6), state_->places)) {
     return damaged_row(state_->file, "chunk", id, "has sequences that are cut short");
   }
-  constexpr std::int64_t kMostDirection = std::numeric_limits<std::uint8_t>::max();
+  constexpr std::int64_t kMaxDirection = std::numeric_limits<std::uint8_t>::max();
   return ChunkRow{.id = id,
                   .source = static_cast<std::uint32_t>(source),
                   .socket = static_cast<std::uint32_t>(select.integer(2)),
                   .direction = static_cast<std::uint8_t>(
-                      std::clamp<std::int64_t>(select.integer(3), 0, kMostDirection)),
+                      std::clamp<std::int64_t>(select.integer(3), 0, kMaxDirection)),
                   .arrival_ns = select.integer(4),
                   .first_item = unsigned_of(select.integer(5)),
                   .places = state_->places,

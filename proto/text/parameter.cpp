@@ -26,6 +26,12 @@ double in_range_of_people(const ParameterSpec& spec, double bound) {
   return std::isfinite(rounded) ? rounded : bound;
 }
 
+// Whether an integer holds the number exactly.
+bool is_whole(double number) {
+  constexpr double kExact = 9007199254740992.0;                       // 2^53
+  return std::abs(number) <= kExact && std::trunc(number) == number;  // false for NaN
+}
+
 bool within(const ParameterSpec& spec, double value) {
   return value >= spec.min && value <= spec.max;  // false for NaN
 }
@@ -41,8 +47,13 @@ const ParameterSpec* find_parameter(std::span<const ParameterSpec> table, std::s
 
 Result<ParameterValue> from_people(const ParameterSpec& spec, const ParameterValue& value,
                                    std::string_view place) {
-  const auto* whole = std::get_if<std::int64_t>(&value);
   const bool real = std::holds_alternative<double>(spec.default_value);
+  if (const auto* number = std::get_if<double>(&value);
+      number != nullptr && is_whole(*number) &&
+      std::holds_alternative<std::int64_t>(spec.default_value)) {
+    return from_people(spec, static_cast<std::int64_t>(*number), place);
+  }
+  const auto* whole = std::get_if<std::int64_t>(&value);
   if (value.index() != spec.default_value.index() && !(real && whole != nullptr)) {
     return misuse(std::string(place) + " must be " +
                   std::string(kWanted[spec.default_value.index()]) +
@@ -94,14 +105,6 @@ double number_of(const ParameterValue& value) {
   return std::get<double>(value);
 }
 
-ParameterValue value_of(const ParameterSpec& spec, double number) {
-  if (std::holds_alternative<bool>(spec.default_value)) return number != 0.0;
-  if (std::holds_alternative<std::int64_t>(spec.default_value)) {
-    return static_cast<std::int64_t>(number);
-  }
-  return number;
-}
-
 std::string unit_words(std::string_view name) {
   constexpr std::array<std::pair<std::string_view, const char*>, 8> kUnits{{
       {"_per_s", " per second"},
@@ -121,10 +124,16 @@ std::string unit_words(std::string_view name) {
 
 std::string out_of_range(std::string_view place, double value, double min, double max, bool whole) {
   constexpr double kUnbounded = std::numeric_limits<double>::max();
-  const bool bounded = min > -kUnbounded && max < kUnbounded;
+  std::string wanted = " that is finite";
+  if (min > -kUnbounded && max < kUnbounded) {
+    wanted = " from " + text_of(min) + " to " + text_of(max);
+  } else if (min > -kUnbounded) {
+    wanted = " of at least " + text_of(min);
+  } else if (max < kUnbounded) {
+    wanted = " of at most " + text_of(max);
+  }
   return std::string(place) + " = " + text_of(value) + " is out of range: it takes " +
-         (whole ? "an integer" : "a number") + unit_words(place) +
-         (bounded ? " from " + text_of(min) + " to " + text_of(max) : " that is finite");
+         (whole ? "an integer" : "a number") + unit_words(place) + wanted;
 }
 
 }  // namespace posed

@@ -42,9 +42,9 @@ struct ParameterSpec {
 [[nodiscard]] const ParameterSpec* find_parameter(std::span<const ParameterSpec> table,
                                                   std::string_view name);
 
-// Checks type and range of a value in people's units and returns it in ours; a whole number is
-// accepted for a real one. `place` names it in the error: "stream.style.alpha = 3 is out of range:
-// it takes a number from -2 to 2".
+// Checks type and range of a value in people's units and returns it in ours; an integer is accepted
+// for a real number, and a real number without a fraction for an integer. `place` names it in the
+// error: "stream.style.alpha = 3 is out of range: it takes a number from -2 to 2".
 [[nodiscard]] Result<ParameterValue> from_people(const ParameterSpec& spec,
                                                  const ParameterValue& value,
                                                  std::string_view place);
@@ -62,8 +62,6 @@ template <typename T>
 
 // A flag as 0 or 1, a number as it is. Not for text.
 [[nodiscard]] double number_of(const ParameterValue& value);
-// The opposite, in the type of the table's entry.
-[[nodiscard]] ParameterValue value_of(const ParameterSpec& spec, double number);
 
 // " of milliseconds" for a name that ends in _ms, and so on; empty without a known unit.
 [[nodiscard]] std::string unit_words(std::string_view name);

@@ -127,8 +127,8 @@ TEST_CASE("a status is as new as the acknowledgement before it, and events say w
     CHECK(has(set.out, ": alpha "));
     CHECK(stream().at("alphaTarget") == alpha);
   }
-  CHECK(event_with(events, "style.alpha 1.00 -> 0.50 from frame ") != "");
-  CHECK(event_with(events, "style.alpha 0.50 -> -0.25 from frame ") != "");
+  CHECK(event_with(events, "style.alpha 1 -> 0.5 from frame ") != "");
+  CHECK(event_with(events, "style.alpha 0.5 -> -0.25 from frame ") != "");
   const std::uint64_t before = std::stoull(stream().at("frames").get<std::string>());
   for (const char* model : {"two.style", "one.style", "two.style"}) {
     REQUIRE(served.ctl({"model", "walker", served.path(model)}).code == 0);

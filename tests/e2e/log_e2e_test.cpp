@@ -124,7 +124,7 @@ TEST_CASE("log lines that nobody read are written once somebody reads") {
   CHECK(log.size() >= held);
   stop(served);
   log += err.take();
-  CHECK(has(log.substr(held), "walker: alpha "));
+  CHECK(has(log.substr(held), "walker: style.alpha "));
   CHECK(has(log.substr(held), "ending"));
 }
 

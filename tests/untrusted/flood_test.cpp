@@ -48,7 +48,7 @@ void check_bounded(const char* what, const std::function<void(const Target&)>& w
   for (int i = 0; i < 2 && damage.longest_s > kLongestWait_s; ++i) damage = attack(work);
   std::printf("%s: memory +%.1f MB, longest wait %.3f s, lost %llu\n", what, damage.growth_MB,
               damage.longest_s, static_cast<unsigned long long>(damage.lost));
-  CHECK(damage.growth_MB < kMostGrowth_MB);
+  CHECK(damage.growth_MB < kMaxGrowth_MB);
   CHECK(damage.lost == 0);
   CHECK(damage.longest_s <= kLongestWait_s);
 }

@@ -133,13 +133,13 @@ Result<> emulate(const EmulateOptions& options) {
   if (!port) return std::unexpected(port.error());
   const nlohmann::ordered_json ready{
       {"port", options.link.empty() ? port->name() : options.link.string()}};
-  emulate::EmulatedDevice glove(std::move(*emulator), std::move(*port), std::move(*moves),
-                                std::move(settings));
+  emulate::EmulatedDevice device(std::move(*emulator), std::move(*port), std::move(*moves),
+                                 std::move(settings));
   std::printf("%s\n", json_text(ready).c_str());
   std::fflush(stdout);
   std::atomic<bool> ended{false};
   std::jthread thread([&](const std::stop_token& stop) {
-    glove.run(stop);
+    device.run(stop);
     ended = true;
   });
   const auto start = std::chrono::steady_clock::now();
@@ -152,7 +152,7 @@ Result<> emulate(const EmulateOptions& options) {
   }
   thread.request_stop();
   thread.join();
-  std::fprintf(stderr, "%llu packets sent\n", static_cast<unsigned long long>(glove.packets()));
+  std::fprintf(stderr, "%llu packets sent\n", static_cast<unsigned long long>(device.packets()));
   return {};
 }
 

@@ -28,9 +28,10 @@ struct CheckOptions {
 ordered_json summary_of(const pipeline::StageSettings& stage) {
   ordered_json summary{{"stage", stage.type->name}};
   if (!stage.model_name.empty()) summary["model"] = stage.model_name;
+  summary["parameters"] = ordered_json::object();
   for (const ParameterSpec& spec : stage.type->parameters) {
     const ParameterValue& value = stage.parameters.at(std::string(spec.name));
-    ordered_json& shown = summary[std::string(spec.shown_name())];
+    ordered_json& shown = summary["parameters"][std::string(spec.shown_name())];
     std::visit([&](const auto& it) { shown = it; }, value);
     if (std::holds_alternative<double>(value)) shown = std::get<double>(value) * spec.people_scale;
   }
@@ -88,10 +89,11 @@ void print(const config::DaemonConfig& config, const ordered_json& streams) {
       if (stage.contains("model")) {
         std::printf(" %s", clean(stage["model"].get<std::string>()).c_str());
       }
-      if (stage.contains("alpha")) std::printf(" at alpha %g", stage["alpha"].get<double>());
-      if (stage.contains("lag_frames")) {
-        std::printf(" with a lag of %d frames", stage["lag_frames"].get<int>());
+      std::string values;
+      for (const auto& [name, value] : stage["parameters"].items()) {
+        values += (values.empty() ? "" : " ") + name + "=" + json_text(value);
       }
+      if (!values.empty()) std::printf(" (%s)", clean(values).c_str());
     }
     std::puts(stream["publish_raw"].get<bool>() ? ", raw input too" : "");
     for (const auto& warning : stream["warnings"]) {

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -135,17 +136,19 @@ ParameterValue value_of_text(const std::string& text) {
 // What this posed knows to be wrong, without asking the daemon: it alone knows the stream's stages.
 Result<> check_parameter(const std::string& name, const ParameterValue& value) {
   std::set<std::string> known;
+  std::optional<Error> wrong;  // for the first stage that has it
   for (const StageType* stage : stage_types()) {
     for (const ParameterSpec& spec : stage->parameters) {
       const std::string alone(spec.shown_name());
       const std::string whole = fmt::format("{}.{}", stage->name, alone);
-      if (name == alone || name == whole) {
-        const auto checked = from_people(spec, value, name);
-        return checked ? Result<>() : std::unexpected(checked.error());
-      }
       if (spec.live) known.insert({alone, whole});
+      if (name != alone && name != whole) continue;
+      const auto checked = from_people(spec, value, name);
+      if (checked) return {};
+      if (!wrong) wrong = checked.error();
     }
   }
+  if (wrong) return std::unexpected(*wrong);
   const std::string near = nearest(name, known);
   return misuse(fmt::format("there is no parameter {}{}; `posed ctl set --help` lists them",
                             in_quotes(name), near.empty() ? "" : ", only " + near));
@@ -179,7 +182,7 @@ int play(const CtlOptions& options) {
   v1::ControlRequest request;
   auto& wanted = *request.mutable_stage_command();
   wanted.set_stream(options.stream);
-  wanted.set_name("play");
+  wanted.set_name("generate.play");
   for (std::string& label : gesture::split_labels(options.labels)) {
     wanted.add_word(std::move(label));
   }
@@ -191,7 +194,7 @@ int play(const CtlOptions& options) {
 int stop_playing(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_stage_command()->set_stream(options.stream);
-  request.mutable_stage_command()->set_name("stop-playing");
+  request.mutable_stage_command()->set_name("generate.stop-playing");
   return change(options, request, "performs no more");
 }
 

@@ -64,15 +64,26 @@ std::string state_of(const v1::StreamStats& stream) {
   return stream.away() ? "away" : clean_name(stream.state());
 }
 
+// "-" for a stream whose stages have no alpha.
+std::string alpha_of(const v1::StreamStats& stream) {
+  bool has = stream.stage().empty();
+  for (const v1::StageStats& stage : stream.stage()) {
+    for (const v1::ParameterStats& parameter : stage.parameter()) {
+      has = has || parameter.name() == "alpha";
+    }
+  }
+  return has ? fmt::format("{:.2f}", stream.alpha()) : "-";
+}
+
 std::string row(const v1::StreamStats& stream, const Widths& widths, bool silent) {
   const std::string rate =
       silent ? "-" : fmt::format("{:.1f}", std::min(stream.rate_hz(), 9999.9F));
   const auto now = [&](const v1::Percentiles& times) { return silent ? "-" : stage(times); };
-  return fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5.2f} {}",
+  return fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} {}",
                      fit(clean_name(stream.stream()), widths.name),
                      fit(silent ? "?" : state_of(stream), 7), rate, short_count(stream.dropped()),
                      short_count(stream.shed()), now(stream.decode()), now(stream.stages()),
-                     now(stream.publish()), stream.alpha(),
+                     now(stream.publish()), alpha_of(stream),
                      fit(clean_name(stream.model()), widths.model));
 }
 
@@ -94,7 +105,7 @@ std::string stages_row(const v1::StreamStats& stream) {
     for (const v1::ParameterStats& parameter : one.parameter()) {
       const ParameterSpec* spec =
           type == nullptr ? nullptr : find_parameter(type->parameters, parameter.name());
-      if (spec == nullptr || parameter.name() == "alpha") continue;
+      if (spec == nullptr || !spec->live || parameter.name() == "alpha") continue;
       const double usual = number_of(spec->default_value) * spec->people_scale;
       if (parameter.value() == usual) continue;
       add(fmt::format("{}.{} {:g}", clean_name(one.name()), parameter.name(), parameter.value()));

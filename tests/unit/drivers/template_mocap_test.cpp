@@ -220,14 +220,20 @@ TEST_CASE("a joint that was not seen is not valid") {
 
 TEST_CASE("late and repeated datagrams are dropped, a restarted system goes on") {
   Rig rig;
-  for (const std::uint32_t number : {100U, 102U, 101U, 102U, 103U, 0U, 1U}) {
-    rig.decoder->feed(mocap::encode_frame({number, number * 10'000, {still(5, 1)}}), 0, rig.sink);
-  }
+  const auto feed = [&](std::initializer_list<std::uint32_t> numbers) {
+    for (const std::uint32_t number : numbers) {
+      rig.decoder->feed(mocap::encode_frame({number, number * 10'000, {still(5, 1)}}), 0, rig.sink);
+    }
+  };
+  feed({100, 102, 101, 102, 90, 103});  // 101, 102 and 90 are late or repeated
+  feed({0, 1});                         // started again
   CHECK(rig.sink.frames.size() == 5);
-  CHECK(rig.sink.count(Outcome::kOutOfRange) == 2);
-  CHECK(rig.sink.frames[2].header.device_ns == 30'000'000);
+  CHECK(rig.sink.count(Outcome::kOutOfRange) == 3);
+  CHECK(rig.sink.frames[2].header.device_ns == 30'000'000);  // a late frame moves no clock
   CHECK(rig.sink.frames[3].header.device_ns == 30'000'000);  // time does not go back
   CHECK(rig.sink.frames[4].header.device_ns == 40'000'000);
+  feed({2, 3, 4, 0, 1, 2, 3, 4});  // started again soon: the fourth in a row shows it
+  CHECK(rig.sink.frames.size() == 10);
 }
 
 TEST_CASE("damaged datagrams are told apart") {

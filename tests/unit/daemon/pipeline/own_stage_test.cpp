@@ -1,4 +1,4 @@
-// A stage that posed does not have: config, engine, control and log work from its StageType alone.
+// A stage that posed does not have: the engine runs it from its StageType alone.
 #include <catch2/catch.hpp>
 
 #include <algorithm>

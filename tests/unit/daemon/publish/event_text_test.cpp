@@ -19,7 +19,7 @@ TEST_CASE("the text of a change names the old and the new value") {
   StreamEvent event = event_of(v1::Event::KIND_CONTROL);
   event.value_before = 1.0;
   event.change = test::alpha_command(0, 0.5).change;
-  CHECK(sentence(event) == "style.alpha 1.00 -> 0.50 from frame 61");
+  CHECK(sentence(event) == "style.alpha 1 -> 0.5 from frame 61");
   event.change = test::model_command(0, style::style_type(), nullptr).change;
   event.before = ShortText("march.style");
   event.after = ShortText("x.style");
@@ -28,6 +28,7 @@ TEST_CASE("the text of a change names the old and the new value") {
   event.before = {};
   CHECK(sentence(event) == "generate model x.style from frame 61");
   event.change = test::stop_playing_command(0).change;
+  event.after = {};
   CHECK(sentence(event) == "stop-playing at frame 61");
   event = event_of(v1::Event::KIND_CALIBRATED);
   event.after = ShortText("ann.toml");

@@ -223,7 +223,7 @@ TEST_CASE("what cannot be performed is refused", "[playback]") {
   CHECK_FALSE(player.play(unknown));
   CHECK_FALSE(player.play(gesture::PlayOrder{}));
   std::string many;
-  for (int i = 0; i < gesture::kMostLabels; ++i) many += "g ";
+  for (int i = 0; i < gesture::kMaxLabels; ++i) many += "g ";
   for (int i = 0; i < 4; ++i) CHECK(player.play(order(*model, many)));
   CHECK_FALSE(player.play(one));  // too many labels
   CHECK(gesture::make_play_order(model->gesture(), gesture::split_labels("g x"), 1.0, false)
