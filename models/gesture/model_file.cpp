@@ -13,7 +13,7 @@ namespace {
 using model_file::kMaxNumber;
 using model_file::Validator;
 
-constexpr int kMaxLabels = 1'000;
+constexpr int kMaxModelLabels = 1'000;
 constexpr int kMaxLeaves = 1 << kQuestions;  // because no path asks a question twice
 constexpr double kMinVariance = 1e-20;       // its inverse can still be summed without overflow
 
@@ -86,7 +86,8 @@ Tree<Gaussian> read_tree(const v1::GestureTree& from, Validator& check) {
 std::vector<Label> read_labels(const v1::GestureModel& from, Validator& check) {
   std::vector<Label> labels;
   std::set<std::string> names;
-  check.want(from.label_size() >= 1 && from.label_size() <= kMaxLabels, "the number of labels");
+  check.want(from.label_size() >= 1 && from.label_size() <= kMaxModelLabels,
+             "the number of labels");
   if (!check.sound()) return labels;
   for (const v1::GestureLabel& label : from.label()) {
     Label read{.name = label.name(), .trained = label.trained()};

@@ -19,7 +19,7 @@ std::string text_of(double number) {
   return {text.data(), end};
 }
 
-double in_range_of_people(const ParameterSpec& spec, double bound) {
+double people_bound(const ParameterSpec& spec, double bound) {
   const double scaled = bound * spec.people_scale;
   // A bound such as 90 degrees stays a round number on its way to radians and back.
   const double rounded = std::round(scaled * 1e9) / 1e9;
@@ -64,8 +64,8 @@ Result<ParameterValue> from_people(const ParameterSpec& spec, const ParameterVal
     const double given = whole != nullptr ? static_cast<double>(*whole) : std::get<double>(value);
     const double ours = given / spec.people_scale;
     if (within(spec, ours)) return ours;
-    return misuse(out_of_range(place, given, in_range_of_people(spec, spec.min),
-                               in_range_of_people(spec, spec.max)));
+    return misuse(
+        out_of_range(place, given, people_bound(spec, spec.min), people_bound(spec, spec.max)));
   }
   if (whole != nullptr && !within(spec, static_cast<double>(*whole))) {
     return misuse(out_of_range(place, static_cast<double>(*whole), spec.min, spec.max, true));
