@@ -1,6 +1,7 @@
 #include "daemon/control/stage_requests.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -16,7 +17,6 @@ namespace posed::control {
 namespace {
 
 using pipeline::StageChange;
-using pipeline::StageSettings;
 using pipeline::StreamSettings;
 
 constexpr int kMaxWords = 256;
@@ -35,6 +35,15 @@ struct Place {
   std::size_t stage = 0;
   std::size_t index = 0;
 };
+
+// The names of a table's entries, read through the member `name`.
+template <typename Table, typename Name>
+std::vector<std::string_view> names_of(const Table& table, Name name) {
+  std::vector<std::string_view> names(table.size());
+  std::ranges::transform(table, names.begin(),
+                         [&](const auto& entry) { return std::invoke(name, entry); });
+  return names;
+}
 
 // Where `name` stands in a stage's table. `entries(type)` are the names in the table, empty ones
 // for what cannot be named.
@@ -113,9 +122,7 @@ Result<Parameters> options_of(const StageCommandType& type,
 Result<StageChange> parameter_change(const StreamSettings& settings,
                                      const v1::ControlRequest::SetParameter& wanted) {
   const auto names = [](const StageType& type) {
-    std::vector<std::string_view> all;
-    for (const ParameterSpec& spec : type.parameters) all.push_back(spec.shown_name());
-    return all;
+    return names_of(type.parameters, &ParameterSpec::shown_name);
   };
   const auto place = find_place(settings, wanted.name(), "parameter", names);
   if (!place) return std::unexpected(place.error());
@@ -137,9 +144,7 @@ Result<StageChange> parameter_change(const StreamSettings& settings,
 
 Result<FoundCommand> find_command(const StreamSettings& settings, const std::string& name) {
   const auto names = [](const StageType& type) {
-    std::vector<std::string_view> all;
-    for (const StageCommandType& command : type.commands) all.push_back(command.name);
-    return all;
+    return names_of(type.commands, &StageCommandType::name);
   };
   const auto place = find_place(settings, name, "command", names);
   if (!place) return std::unexpected(place.error());

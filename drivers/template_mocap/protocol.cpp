@@ -99,7 +99,8 @@ Result<BodyEntry> read_body(ByteReader& reader) {
     }
     JointEntry& joint = body.joints.emplace_back();
     joint.name = std::move(*joint_name);
-    joint.parent = static_cast<std::int8_t>(reader.u8());
+    const int parent = reader.u8();
+    joint.parent = parent == 0xff ? -1 : parent;
     for (float& x_m : joint.offset_m) x_m = reader.f32();
     if (!reader.ok()) return wrong(place + "ends too early");
     const bool rooted =
