@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <atomic>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include <spdlog/spdlog.h>
 
+#include "daemon/assembly/body_streams.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/devices/device_supervisor.hpp"
 #include "daemon/net/keys.hpp"
@@ -24,14 +26,14 @@ namespace {
 constexpr double kUnknownRate_hz = 1000.0;  // assumed for the rings if a device states no rate
 
 double rate_of(const devices::OpenStream& stream) {
-  const drivers::Device& device = stream.device;
+  const drivers::Device& device = stream.source->device;
   if (device.transport && device.transport->rate_hz() > 0.0) return device.transport->rate_hz();
   return device.description.rate_hz > 0.0 ? device.description.rate_hz : kUnknownRate_hz;
 }
 
 // How much of the ring to the pipeline a stream may fill: half a second of its frames and samples.
 std::size_t decoded_slots(const devices::OpenStream& stream) {
-  const drivers::Description& description = stream.device.description;
+  const drivers::Description& description = stream.source->device.description;
   const int kinds = (description.skeleton ? 1 : 0) + (description.samples.names.empty() ? 0 : 1);
   return pipeline::ring_slots(rate_of(stream) * std::max(kinds, 1));
 }
@@ -86,6 +88,7 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<pipeline::Ring<pipeline::Command>> commands;
   std::unique_ptr<pipeline::Ring<pipeline::DeviceCommand>> device_commands;
   std::unique_ptr<pipeline::Ring<pipeline::Ack>> acks;
+  std::unique_ptr<BodyStreams> bodies;               // null: no device has several
   std::unique_ptr<control::RequestHandler> handler;  // owns the models
   std::unique_ptr<publish::Publisher> publisher;
   std::unique_ptr<pipeline::Worker> worker;
@@ -98,13 +101,22 @@ class Daemon::Parts final : public control::DaemonControl {
   Result<> open_sockets();
   Result<> open_engines();
   Result<> start_threads();
+  [[nodiscard]] StreamUsers users() const {
+    return {.publisher = publisher.get(),
+            .handler = handler.get(),
+            .worker = worker.get(),
+            .reader = reader.get(),
+            .record = hooks.record_stream};
+  }
+  // Names that the bodies of sources must leave alone.
+  [[nodiscard]] std::set<std::string> stream_names() const;
 };
 
 Result<> Daemon::Parts::open() {
   for (const config::StreamConfig& stream_config : config.streams) {
     auto stream = devices::open_stream(stream_config);
     if (!stream) return std::unexpected(stream.error());
-    for (const std::string& warning : (*stream)->device.warnings) {
+    for (const std::string& warning : (*stream)->source->device.warnings) {
       spdlog::warn("{}: {}", stream_config.name, warning);
     }
     streams.push_back(std::move(*stream));
@@ -116,6 +128,17 @@ Result<> Daemon::Parts::open() {
   for (const auto& stream : streams) {
     into_pipeline += decoded_slots(*stream);
     out_of_pipeline += finished_slots(*stream);
+  }
+  auto opened_bodies = BodyStreams::open(config, static_cast<std::uint32_t>(streams.size()));
+  if (!opened_bodies) return std::unexpected(opened_bodies.error());
+  bodies = std::move(*opened_bodies);
+  if (bodies != nullptr) {
+    into_pipeline += bodies->all_decoded_slots() + bodies->count();
+    out_of_pipeline += bodies->all_finished_slots() + bodies->count();
+    spdlog::info(
+        "room for {} streams at once: {:.0f} MB for what is on its way",
+        streams.size() + bodies->count(),
+        static_cast<double>((into_pipeline + out_of_pipeline) * sizeof(pipeline::Item)) / 1e6);
   }
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(into_pipeline);
   finished = std::make_unique<pipeline::Ring<pipeline::Item>>(out_of_pipeline);
@@ -155,15 +178,17 @@ Result<> Daemon::Parts::open_sockets() {
   authenticator = std::move(*started);
   std::vector<publish::StreamInfo> infos;
   for (const auto& stream : streams) {
-    infos.push_back({.name = stream->config.name,
-                     .description = stream->device.description,
+    infos.push_back({.stream = static_cast<std::uint32_t>(infos.size()),
+                     .name = stream->config.name,
+                     .description = stream->source->device.description,
                      .rate_hz = rate_of(*stream),
-                     .stages = pipeline::stage_types_of(stream->settings),
+                     .stages = pipeline::stage_types_of(stream->stages.settings),
                      .raw = stream->config.publish_raw,
-                     .model = pipeline::first_model(stream->settings),
-                     .comes_and_goes = stream->slot != nullptr,
-                     .present = stream->present,
-                     .counters = &stream->counters});
+                     .model = pipeline::first_model(stream->stages.settings),
+                     .comes_and_goes = stream->source->slot != nullptr,
+                     .present = stream->source->present,
+                     .counters = &stream->counters,
+                     .source_counters = &stream->source->counters});
   }
   publish::PublisherOptions options{.context = context.get(),
                                     .endpoint = config.publish_endpoint,
@@ -171,7 +196,12 @@ Result<> Daemon::Parts::open_sockets() {
                                     .secret_z85 = secret_z85,
                                     .more_stats = hooks.more_stats,
                                     .record_sink = hooks.record_sink,
-                                    .clock = system::monotonic_ns};
+                                    .clock = system::monotonic_ns,
+                                    .slots = streams.size()};
+  if (bodies != nullptr) {
+    options.slots += bodies->count();
+    options.more_messages_per_s = bodies->rate_hz() * static_cast<double>(bodies->count());
+  }
   auto bound =
       publish::Publisher::open(std::move(options), std::move(infos), *finished, *publisher_wake);
   if (!bound) return std::unexpected(bound.error());
@@ -187,6 +217,7 @@ Result<> Daemon::Parts::open_engines() {
                                                .wake = pipeline_wake.get(),
                                                .publisher = publisher_wake.get(),
                                                .control = control_wake.get(),
+                                               .streams = bodies ? &bodies->exchange() : nullptr,
                                                .record_sink = hooks.record_sink,
                                                .clock = system::monotonic_ns});
   if (!opened_worker) return std::unexpected(opened_worker.error());
@@ -201,23 +232,26 @@ Result<> Daemon::Parts::open_engines() {
   std::vector<control::ControlledStream> controlled;
   for (std::uint32_t i = 0; i < streams.size(); ++i) {
     devices::OpenStream& stream = *streams[i];
-    auto bound = devices::bind_stages(stream);
-    if (!bound) return std::unexpected(bound.error());
-    auto engine = devices::make_engine(i, stream, *bound);
-    if (!engine) return std::unexpected(engine.error());
+    auto bound = devices::bind_stages(stream.stages);
+    if (!bound) return devices::of_stream(stream.config.name, bound.error());
+    auto engine = devices::make_engine(i, stream.stages, *bound);
+    if (!engine) return devices::of_stream(stream.config.name, engine.error());
     engine->clock = system::monotonic_ns;
     worker->add(std::move(*engine), rate_of(stream), stream.counters, finished_slots(stream));
-    reader->add({.device = stream.device.transport ? &stream.device : nullptr,
-                 .counters = &stream.counters,
-                 .slot = stream.slot.get(),
-                 .calibration = stream.calibration.get(),
-                 .slots = decoded_slots(stream)});
-    controlled.push_back({.name = stream.config.name,
+    devices::OpenSource& source = *stream.source;
+    reader->add({.device = source.device.transport ? &source.device : nullptr,
+                 .counters = &source.counters,
+                 .slot = source.slot.get(),
+                 .calibration = source.calibration.get(),
+                 .body = pipeline::ReadBody{
+                     .stream = i, .counters = &stream.counters, .slots = decoded_slots(stream)}});
+    controlled.push_back({.stream = i,
+                          .name = stream.config.name,
                           .publishes_raw = stream.config.publish_raw,
-                          .skeleton = stream.device.description.skeleton,
-                          .settings = stream.settings,
+                          .skeleton = stream.stages.skeleton,
+                          .settings = stream.stages.settings,
                           .models = std::move(bound->models),
-                          .device = stream.present,
+                          .device = source.present,
                           .options = stream.config.options,
                           .calibration = nullptr});
     // No client sent these commands, so they have ticket 0 and no Ack follows. The ring has space
@@ -229,6 +263,7 @@ Result<> Daemon::Parts::open_engines() {
                                 fail("too many streams perform from the start").error());
     }
   }
+  if (bodies != nullptr) bodies->add_to(*reader);
   handler = std::make_unique<control::RequestHandler>(std::move(controlled), *this);
   return {};
 }
@@ -253,10 +288,14 @@ Result<> Daemon::Parts::start_threads() {
     worker->run();
   });
   for (const auto& stream : streams) {
-    if (!stream->device.transport) continue;
-    if (auto started = stream->device.transport->start(system::monotonic_ns()); !started) {
+    drivers::Transport* const transport = stream->source->device.transport.get();
+    if (transport == nullptr) continue;
+    if (auto started = transport->start(system::monotonic_ns()); !started) {
       return devices::of_stream(stream->config.name, started.error());
     }
+  }
+  if (bodies != nullptr) {
+    if (auto started = bodies->start(users(), stream_names()); !started) return started;
   }
   reader_thread = std::thread([this, fifo] {
     system::enter_hot_thread("posed-reader", fifo ? system::kReaderPriority : 0);
@@ -264,16 +303,29 @@ Result<> Daemon::Parts::start_threads() {
     reader->run();
   });
   for (std::uint32_t i = 0; i < streams.size(); ++i) {
-    if (!streams[i]->slot) continue;
+    if (!streams[i]->source->slot) continue;
     devices::SupervisorPorts ports{
         .reader = reader.get(), .clock = system::monotonic_ns, .report = {}};
     ports.report = [this, i](v1::Event::Kind kind, const std::string& text) {
       publisher->post_event(i, kind, text);
     };
     supervisors.push_back(
-        std::make_unique<devices::DeviceSupervisor>(*streams[i], std::move(ports)));
+        std::make_unique<devices::DeviceSupervisor>(*streams[i]->source, std::move(ports)));
   }
   return {};
+}
+
+std::set<std::string> Daemon::Parts::stream_names() const {
+  std::set<std::string> names;
+  const auto add = [&](const config::StreamConfig& stream) {
+    names.insert(stream.name);
+    if (stream.publish_raw) names.insert(stream.name + "-raw");
+  };
+  for (const config::StreamConfig& stream : config.streams) add(stream);
+  for (const config::SourceConfig& source : config.sources) {
+    for (const auto& named : source.named) add(named.stream);
+  }
+  return names;
 }
 
 // Stops the threads in the order of the data, from the devices to the clients, so that each still
@@ -281,9 +333,11 @@ Result<> Daemon::Parts::start_threads() {
 void Daemon::Parts::halt() noexcept {
   for (const auto& supervisor : supervisors)
     supervisor->stop();  // all at once, whatever they are waiting for
+  if (bodies) bodies->stop_supervisors();
   if (reader) reader->stop();
   if (reader_thread.joinable()) reader_thread.join();
   supervisors.clear();
+  if (bodies) bodies->stop();
   if (worker) worker->stop();
   if (worker_thread.joinable()) worker_thread.join();
   control.reset();
@@ -303,6 +357,13 @@ Result<std::unique_ptr<Daemon>> Daemon::open(const config::DaemonConfig& config)
 std::span<const std::unique_ptr<devices::OpenStream>> Daemon::streams() const noexcept {
   return parts_->streams;
 }
+std::span<const std::unique_ptr<devices::BodySource>> Daemon::sources() const noexcept {
+  if (parts_->bodies == nullptr) return {};
+  return parts_->bodies->sources();
+}
+std::size_t Daemon::slots_to_come() const noexcept {
+  return parts_->bodies ? parts_->bodies->count() : 0;
+}
 Result<> Daemon::start(DaemonHooks hooks) { return parts_->start(std::move(hooks)); }
 void Daemon::stop() noexcept { parts_->halt(); }
 const std::string& Daemon::publish_endpoint() const noexcept {
@@ -315,7 +376,7 @@ v1::Stats Daemon::stats() const { return parts_->publisher->stats(); }
 bool Daemon::all_ended() const noexcept {
   bool any = false;
   for (const auto& stream : parts_->streams) {
-    if (stream->endless) continue;
+    if (stream->source->endless) continue;
     any = true;
     if (stream->counters.pipeline.state.load() != pipeline::StreamState::kEnded) return false;
   }

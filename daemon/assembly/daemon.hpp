@@ -11,6 +11,7 @@
 
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/devices/open_stream.hpp"
+#include "daemon/devices/source_builder.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
@@ -21,7 +22,9 @@ namespace posed::assembly {
 // Optional extras for start(); all of them outlive the daemon's stop().
 struct DaemonHooks {
   pipeline::RecordSink* record_sink = nullptr;  // null: no recording
-  std::function<void(v1::Stats&)> more_stats;   // adds the recorder's counters; may be empty
+  // Called for each stream that comes while the daemon runs, before its first item; may be empty.
+  std::function<void(const devices::NewStream&)> record_stream{};
+  std::function<void(v1::Stats&)> more_stats;  // adds the recorder's counters; may be empty
   // called first on each hot thread; may be empty
   std::function<void(const char* name)> hot_thread;
 };
@@ -36,6 +39,11 @@ class Daemon {
 
   // In the order of the config; the index is the stream number everywhere.
   [[nodiscard]] std::span<const std::unique_ptr<devices::OpenStream>> streams() const noexcept;
+
+  // Devices with several bodies, which have the numbers behind those of the streams as sources.
+  [[nodiscard]] std::span<const std::unique_ptr<devices::BodySource>> sources() const noexcept;
+  // how many streams of their bodies there may be at once
+  [[nodiscard]] std::size_t slots_to_come() const noexcept;
 
   // Starts the threads and the devices. Call once.
   [[nodiscard]] Result<> start(DaemonHooks hooks = {});

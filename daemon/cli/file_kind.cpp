@@ -77,7 +77,7 @@ FileKind kind_of(std::string_view bytes) {
   if (bytes.starts_with("SQLite format 3")) return FileKind::kDeviceLog;
   if (looks_like_key(bytes)) return FileKind::kKey;
   if (bytes.find('\0') != std::string_view::npos) return FileKind::kOther;
-  if (has_line(bytes, "[[stream]]")) return FileKind::kConfig;
+  if (has_line(bytes, "[[stream]]") || has_line(bytes, "[[source]]")) return FileKind::kConfig;
   if (has_line(bytes, "[sensors]") && has_line(bytes, "driver")) return FileKind::kCalibration;
   if (has_line(bytes, "HIERARCHY") || has_line(bytes, ":units") || has_line(bytes, ":DEGREES") ||
       has_line(bytes, "time_s,")) {

@@ -34,6 +34,25 @@ struct StreamConfig {
   std::vector<const StageType*> off;  // stages whose table says enabled = false
 };
 
+// A device with several bodies (Driver::make_layout). Its bodies become streams as they come.
+struct SourceConfig {
+  // One of its bodies, by the device's own name for it: a [[stream]] table with source and body.
+  struct NamedBody {
+    std::string body;
+    StreamConfig stream;  // without driver, options and calibration
+  };
+
+  std::string name;  // [a-z0-9_-]{1,32}, unique among streams and sources
+  std::string driver;
+  drivers::Options options;  // complete
+  double rate_hz = 0.0;      // frames a second of each body; 0: what the driver says, or else 120
+  std::vector<NamedBody> named;
+  // Whether the other bodies are streamed, too (streams = "all"), as <source>-<body>. `every` is
+  // what is common to them: a stream without name, driver, options and calibration.
+  bool all = false;
+  StreamConfig every;
+};
+
 // Who may connect; without a server key CURVE is off.
 struct SecurityConfig {
   std::filesystem::path server_key;  // NAME.key; empty: no CURVE
@@ -47,7 +66,11 @@ struct DaemonConfig {
   bool control_insecure = false;
   bool realtime = true;  // ask for SCHED_FIFO and mlockall; a refusal is only a warning
   SecurityConfig security;
-  std::vector<StreamConfig> streams;
+  std::vector<StreamConfig> streams;  // of devices with one body
+  std::vector<SourceConfig> sources;
+  // How many streams there may be at once, with those that come while the daemon runs. Memory is
+  // set aside for all of them only if there is a source.
+  int max_streams = 64;
   std::string text;  // the TOML text of the config, kept in the device log
 };
 

@@ -30,6 +30,19 @@ const char* kind_of(const toml::node& node) {
   }
 }
 
+constexpr std::string_view kSource = "source";
+constexpr std::string_view kStream = "stream";
+
+bool is_within(std::string_view table, std::string_view top) {
+  return table.starts_with(top) && (table.size() == top.size() || table[top.size()] == '.');
+}
+
+// "stream.style" for "source.style"; empty for a table of another name.
+std::string replace_top(std::string_view table, std::string_view from, std::string_view to) {
+  if (!is_within(table, from)) return {};
+  return std::string(to) + std::string(table.substr(from.size()));
+}
+
 int line_of_node(const toml::node& node) { return static_cast<int>(node.source().begin.line); }
 
 }  // namespace
@@ -49,6 +62,11 @@ int TableReader::line() const { return line_of_node(table_); }
 int TableReader::line_of(std::string_view key) const {
   const toml::node* node = table_.get(key);
   return node == nullptr ? line() : line_of_node(*node);
+}
+
+bool TableReader::has_text(std::string_view key) const {
+  const toml::node* node = table_.get(key);
+  return node != nullptr && node->is_string();
 }
 
 std::string TableReader::full(std::string_view key) const {
@@ -81,14 +99,17 @@ void TableReader::read(const char* key, bool& value) {
   }
 }
 
-void TableReader::read(const char* key, std::int64_t& value) {
+void TableReader::read(const char* key, int& value, Range range) {
   const toml::node* node = find(key);
   if (node == nullptr) return;
-  if (const auto* integer = node->as_integer()) {
-    value = integer->get();
-  } else {
-    add_type_error(*node, key, "an integer");
+  const auto* integer = node->as_integer();
+  if (integer == nullptr) return add_type_error(*node, key, "an integer");
+  const auto number = static_cast<double>(integer->get());
+  if (number >= range.min && number <= range.max) {
+    value = static_cast<int>(integer->get());
+    return;
   }
+  add_error(key, out_of_range(full(key), number, range.min, range.max, true));
 }
 
 void TableReader::read(const char* key, double& value, Range range) {
@@ -181,14 +202,28 @@ std::vector<TableReader> TableReader::tables(const std::string& key, std::size_t
   return readers;
 }
 
-std::string TableReader::advice(const std::string& unknown_key) const {
-  constexpr std::size_t kMaxPlaces = 3;
-  std::vector<std::string> places;
+std::vector<std::string> TableReader::places_of(const std::string& key) const {
+  std::set<std::string> tables;
   for (const std::string& path : findings_.all_keys) {
     const std::size_t dot = path.rfind('.');
-    if (dot == std::string::npos || path.substr(dot + 1) != unknown_key) continue;
-    places.push_back("[" + path.substr(0, dot) + "]");
+    if (dot == std::string::npos || path.substr(dot + 1) != key) continue;
+    if (path.substr(0, dot) != path_) tables.insert(path.substr(0, dot));
   }
+  // A source repeats a stream's settings. A key that both know belongs to the one that this is.
+  std::vector<std::string> places;
+  const bool in_source = is_within(path_, kSource);
+  for (const std::string& table : tables) {
+    const bool of_source = is_within(table, kSource);
+    const std::string twin =
+        of_source ? replace_top(table, kSource, kStream) : replace_top(table, kStream, kSource);
+    if (of_source == in_source || !tables.contains(twin)) places.push_back("[" + table + "]");
+  }
+  return places;
+}
+
+std::string TableReader::advice(const std::string& unknown_key) const {
+  constexpr std::size_t kMaxPlaces = 3;
+  const std::vector<std::string> places = places_of(unknown_key);
   // If several tables can have such a key, prefer those that this file has.
   std::vector<std::string> present = places;
   std::erase_if(present, [this](const std::string& place) {

@@ -42,13 +42,15 @@ class TableReader {
  public:
   TableReader(const toml::table& table, std::string path, Findings& findings);
 
+  [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
+  [[nodiscard]] bool has_text(std::string_view key) const;
   [[nodiscard]] int line() const;  // of the table's header
   // of the key's value, or of the table if the key is absent
   [[nodiscard]] int line_of(std::string_view key) const;
 
   void read(const char* key, bool& value);
-  void read(const char* key, std::int64_t& value);
+  void read(const char* key, int& value, Range range);
   void read(const char* key, double& value, Range range);
   void read(const char* key, std::string& value);
   // Under the name and in the unit that people use.
@@ -63,6 +65,11 @@ class TableReader {
   // If there are more than `most` tables, adds an error and reads none.
   [[nodiscard]] std::vector<TableReader> tables(const std::string& key, std::size_t most);
 
+  // For a key that must not stand here, if there is a better error than that it is unknown.
+  void skip(std::string_view key) {
+    if (has(key)) asked_.emplace(key);
+  }
+
   void add_error(std::string_view key, const std::string& message);  // with the key's line
   // Adds an error for every key that was not looked up. It names the table where the key belongs,
   // the key of which it is a misspelling, or all keys of this table.
@@ -73,6 +80,8 @@ class TableReader {
   const toml::node* find(std::string_view key);
   void add_type_error(const toml::node& node, std::string_view key, const std::string& wanted);
   [[nodiscard]] std::string full(std::string_view key) const;
+  // The other tables that may have a key of this name.
+  [[nodiscard]] std::vector<std::string> places_of(const std::string& key) const;
   [[nodiscard]] std::string advice(const std::string& unknown_key) const;
 
   const toml::table& table_;

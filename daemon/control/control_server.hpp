@@ -28,8 +28,7 @@ struct ControlPorts {
 
 class ControlServer {
  public:
-  // Binds and starts the thread. Until the destructor has returned, only that thread uses
-  // `handler`.
+  // Binds and starts the thread. `handler` outlives the server.
   [[nodiscard]] static Result<std::unique_ptr<ControlServer>> start(void* context,
                                                                     const std::string& endpoint,
                                                                     const ControlPorts& ports,

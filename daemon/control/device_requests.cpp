@@ -42,15 +42,26 @@ Result<drivers::glove::Haptics> read_haptics(const v1::ControlRequest::Haptics& 
 
 }  // namespace
 
+Result<ControlledStream*> RequestHandler::find_device(const std::string& name) {
+  const auto found = find_stream(name);
+  if (found && !(*found)->source.empty()) {
+    return fail(
+        fmt::format("stream {} is a body of source {}; calibrations and haptics are for gloves",
+                    name, (*found)->source));
+  }
+  return found;
+}
+
 Result<> RequestHandler::calibrate(const v1::ControlRequest& request, const Requester& requester) {
   const auto& wanted = request.calibrate();
-  const auto stream = find_stream(wanted.stream());
-  if (!stream) return std::unexpected(stream.error());
-  auto compiled = devices::compile_calibration(*streams_[*stream].device->description(),
-                                               wanted.toml(), wanted.name());
+  const auto found = find_device(wanted.stream());
+  if (!found) return std::unexpected(found.error());
+  const ControlledStream& stream = **found;
+  auto compiled =
+      devices::compile_calibration(*stream.device->description(), wanted.toml(), wanted.name());
   if (!compiled) return std::unexpected(compiled.error());
   const DeviceCommand command{.kind = DeviceCommand::Kind::kCalibrate,
-                              .stream = *stream,
+                              .stream = pipeline::slot_of(stream.stream),
                               .ticket = last_ticket_ + 1,
                               .calibration = compiled->get(),
                               .size = 0,
@@ -58,16 +69,17 @@ Result<> RequestHandler::calibrate(const v1::ControlRequest& request, const Requ
   if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
-  under_way_.emplace(
-      ++last_ticket_,
-      UnderWay{.requester = requester, .stream = *stream, .calibration = std::move(*compiled)});
+  under_way_.emplace(++last_ticket_, UnderWay{.requester = requester,
+                                              .stream = stream.stream,
+                                              .name = stream.name,
+                                              .calibration = std::move(*compiled)});
   return {};
 }
 
 Result<> RequestHandler::send_haptics(const v1::ControlRequest& request) {
-  const auto found = find_stream(request.haptics().stream());
+  const auto found = find_device(request.haptics().stream());
   if (!found) return std::unexpected(found.error());
-  const ControlledStream& stream = streams_[*found];
+  const ControlledStream& stream = **found;
   const std::string driver_name = stream.device->description()->driver;
   const drivers::Driver* driver = drivers::find_driver(driver_name);
   if (driver == nullptr || driver->glove == nullptr || driver->glove->encode_haptics == nullptr) {
@@ -81,7 +93,8 @@ Result<> RequestHandler::send_haptics(const v1::ControlRequest& request) {
   if (stream.device->away()) {
     return fail("the glove of stream " + stream.name + " is away: plug it in and try again");
   }
-  DeviceCommand command{.kind = DeviceCommand::Kind::kSend, .stream = *found};
+  DeviceCommand command{.kind = DeviceCommand::Kind::kSend,
+                        .stream = pipeline::slot_of(stream.stream)};
   if (bytes->size() > command.bytes.size()) return fail("the device's message is too long");
   command.size = static_cast<std::uint16_t>(bytes->size());
   std::ranges::copy(*bytes, command.bytes.begin());

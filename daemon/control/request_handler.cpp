@@ -35,7 +35,12 @@ Reply refusal(Requester to, const std::string& sentence) {
 
 RequestHandler::RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
                                Clock clock)
-    : streams_(std::move(streams)), daemon_control_(daemon_control), clock_(clock) {}
+    : daemon_control_(daemon_control), clock_(clock) {
+  for (std::uint32_t i = 0; i < streams.size(); ++i) {
+    streams[i].stream = i;
+    streams_.emplace(i, std::move(streams[i]));
+  }
+}
 
 RequestHandler::~RequestHandler() = default;
 
@@ -50,6 +55,12 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   Result<> done;
   v1::ControlReply reply;
   reply.set_ok(true);
+  if (request.has_status() || request.has_stop()) {  // without the lock: these need no stream
+    if (request.has_stop()) daemon_control_.stop();
+    if (request.has_status()) daemon_control_.fill(*reply.mutable_status());
+    return make_reply(std::move(requester), reply);
+  }
+  const std::scoped_lock lock(mutex_);
   switch (request.request_case()) {
     case v1::ControlRequest::kSetParameter:
       done = set_parameter(request, requester);
@@ -70,13 +81,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       done = send_haptics(request);
       if (done) return make_reply(std::move(requester), reply);  // devices send no acknowledgement
       break;
-    case v1::ControlRequest::kStatus:
-      daemon_control_.fill(*reply.mutable_status());
-      return make_reply(std::move(requester), reply);
-    case v1::ControlRequest::kStop:
-      daemon_control_.stop();
-      return make_reply(std::move(requester), reply);
-    case v1::ControlRequest::REQUEST_NOT_SET:
+    default:
       return refusal(std::move(requester),
                      "the request is empty, or from another version of posed");
   }
@@ -84,11 +89,18 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   return std::nullopt;  // acknowledge() makes the reply
 }
 
-Result<std::uint32_t> RequestHandler::find_stream(const std::string& name) const {
+bool RequestHandler::is_earlier(Streams::iterator stream) const {
+  const auto next = std::next(stream);
+  return next != streams_.end() &&
+         pipeline::slot_of(next->first) == pipeline::slot_of(stream->first);
+}
+
+Result<ControlledStream*> RequestHandler::find_stream(const std::string& name) {
   std::string names;
-  for (std::size_t i = 0; i < streams_.size(); ++i) {
-    const ControlledStream& stream = streams_[i];
-    if (stream.name == name) return static_cast<std::uint32_t>(i);
+  for (auto it = streams_.begin(); it != streams_.end(); ++it) {
+    if (is_earlier(it)) continue;
+    ControlledStream& stream = it->second;
+    if (stream.name == name) return &stream;
     if (stream.publishes_raw && stream.name + "-raw" == name) {
       return fail(
           fmt::format("{} is the input of {} before its stages and cannot be changed; name"
@@ -97,7 +109,8 @@ Result<std::uint32_t> RequestHandler::find_stream(const std::string& name) const
     }
     names += (names.empty() ? "" : ", ") + stream.name;
   }
-  return fail(fmt::format("there is no stream {}; there is: {}", in_quotes(name), names));
+  return fail(fmt::format("there is no stream {}; there is: {}", in_quotes(name),
+                          names.empty() ? "none" : names));
 }
 
 Result<> RequestHandler::set_parameter(const v1::ControlRequest& request,
@@ -105,9 +118,9 @@ Result<> RequestHandler::set_parameter(const v1::ControlRequest& request,
   const auto& wanted = request.set_parameter();
   const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
-  const auto change = parameter_change(streams_[*stream].settings, wanted);
+  const auto change = parameter_change((*stream)->settings, wanted);
   if (!change) return of_stream(wanted.stream(), change.error());
-  return send({.change = *change, .stream = *stream}, {.requester = requester});
+  return send(**stream, {.change = *change}, {.requester = requester});
 }
 
 Result<> RequestHandler::stage_command(const v1::ControlRequest& request,
@@ -115,13 +128,14 @@ Result<> RequestHandler::stage_command(const v1::ControlRequest& request,
   const auto& wanted = request.stage_command();
   const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
-  const auto found = find_command(streams_[*stream].settings, wanted.name());
+  const auto found = find_command((*stream)->settings, wanted.name());
   if (!found) return of_stream(wanted.stream(), found.error());
   const StageCommandType& type = found->change.type->commands[found->change.index];
-  const auto command = encode_command(type, coming_model(*stream, found->stage), wanted);
+  const std::string_view why = type.refusal.empty() ? "the stage refused this" : type.refusal;
+  const auto command = encode_command(type, coming_model(**stream, found->stage), wanted);
   if (!command) return of_stream(wanted.stream(), command.error());
-  return send({.change = found->change, .stream = *stream, .command = *command},
-              {.requester = requester, .stage = found->stage, .refusal = type.refusal});
+  return send(**stream, {.change = found->change, .command = *command},
+              {.requester = requester, .stage = found->stage, .refusal = why});
 }
 
 Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
@@ -148,9 +162,9 @@ Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
 // The file itself says for which stage it is.
 Result<> RequestHandler::set_model(const std::string& stream_name, std::span<const std::byte> bytes,
                                    const std::string& name, const Requester& requester) {
-  const auto index = find_stream(stream_name);
-  if (!index) return std::unexpected(index.error());
-  const ControlledStream& stream = streams_[*index];
+  const auto found = find_stream(stream_name);
+  if (!found) return std::unexpected(found.error());
+  const ControlledStream& stream = **found;
   const auto stage = stage_for_model(stream.settings, bytes, name);
   if (!stage) return of_stream(stream.name, stage.error());
   if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
@@ -159,59 +173,89 @@ Result<> RequestHandler::set_model(const std::string& stream_name, std::span<con
       bytes, pipeline::stage_context(stream.settings, *stage, stream.skeleton), name);
   if (!bound) return std::unexpected(bound.error());
   Command command{.change = {.kind = StageChange::Kind::kModel, .type = &type},
-                  .stream = *index,
                   .model = bound->get()};
   const std::string hash = log::sha256_hex(bytes);
   std::copy_n(hash.begin(), std::min(hash.size(), command.model_hash.size() - 1),
               command.model_hash.begin());
   daemon_control_.keep_model(bytes);
-  return send(command, {.requester = requester, .stage = *stage, .model = std::move(*bound)});
+  return send(stream, command,
+              {.requester = requester, .stage = *stage, .model = std::move(*bound)});
 }
 
-const StageModel* RequestHandler::coming_model(std::uint32_t stream, std::size_t stage) const {
+const StageModel* RequestHandler::coming_model(const ControlledStream& stream,
+                                               std::size_t stage) const {
   for (auto it = under_way_.rbegin(); it != under_way_.rend(); ++it) {
     const UnderWay& change = it->second;
-    if (change.stream == stream && change.stage == stage && change.model) return change.model.get();
+    if (change.stream == stream.stream && change.stage == stage && change.model) {
+      return change.model.get();
+    }
   }
-  return streams_[stream].models[stage].get();
+  return stream.models[stage].get();
 }
 
-Result<> RequestHandler::send(Command command, UnderWay under_way) {
+Result<> RequestHandler::send(const ControlledStream& stream, Command command, UnderWay under_way) {
+  command.stream = stream.stream;
   command.ticket = last_ticket_ + 1;
   if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
-  under_way.stream = command.stream;
+  under_way.stream = stream.stream;
+  under_way.name = stream.name;
   under_way_.emplace(++last_ticket_, std::move(under_way));
   return {};
 }
 
 std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
+  const std::scoped_lock lock(mutex_);
   const auto found = under_way_.find(ack.ticket);
   if (found == under_way_.end()) return std::nullopt;
   UnderWay done = std::move(found->second);
   under_way_.erase(found);
-  ControlledStream& stream = streams_[ack.stream];
+  const auto stream = streams_.find(done.stream);
+  const bool gone = stream == streams_.end();
   if (ack.refused) {  // nothing has changed, so the model in use stays
-    const std::string_view why = done.refusal.empty() ? "the stage refused this" : done.refusal;
-    return refusal(std::move(done.requester), fmt::format("stream {}: {}", stream.name, why));
+    // A stage refuses only commands; anything else meets a refusal after its stream's end.
+    const bool left = gone || is_earlier(stream) || done.refusal.empty();
+    return refusal(std::move(done.requester),
+                   left ? fmt::format("stream {} has left before this took effect", done.name)
+                        : fmt::format("stream {}: {}", done.name, done.refusal));
   }
+  if (!gone) apply(stream->second, done);
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  reply.set_stream(done.name);
+  reply.set_sequence(ack.sequence);
+  return make_reply(std::move(done.requester), reply);
+}
+
+void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
   if (done.model) {
     auto& settings = stream.settings.stages[done.stage];
     settings.model_name = done.model->name;
     stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
-    daemon_control_.model_in_use(ack.stream, pipeline::first_model(stream.settings));
+    daemon_control_.model_in_use(stream.stream, pipeline::first_model(stream.settings));
   }
   if (done.calibration) {
     stream.calibration = std::move(done.calibration);
     stream.device->calibrated(
         {.toml = stream.calibration->text, .file = "the calibration sent last"});
   }
-  v1::ControlReply reply;
-  reply.set_ok(true);
-  reply.set_stream(stream.name);
-  reply.set_sequence(ack.sequence);
-  return make_reply(std::move(done.requester), reply);
+}
+
+std::int64_t RequestHandler::forget_old(std::int64_t now_ns) {
+  const std::scoped_lock lock(mutex_);
+  return uploads_.forget_old(now_ns);
+}
+
+void RequestHandler::add_stream(ControlledStream stream) {
+  const std::scoped_lock lock(mutex_);
+  const std::uint32_t id = stream.stream;
+  streams_.insert_or_assign(id, std::move(stream));
+}
+
+void RequestHandler::remove_stream(std::uint32_t stream) {
+  const std::scoped_lock lock(mutex_);
+  streams_.erase(stream);
 }
 
 }  // namespace posed::control

@@ -1,15 +1,18 @@
 // RequestHandler gives control messages their effect. No socket, no thread: untrusted bytes in,
-// replies out. The control thread and the fuzz target drive the same object.
+// replies out. The control thread and the fuzz target drive the same object. Any thread may call
+// any function.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "daemon/control/uploads.hpp"
@@ -35,6 +38,7 @@ using pipeline::kMaxUnderWay;
 
 // A stream as the control thread sees it.
 struct ControlledStream {
+  std::uint32_t stream = 0;  // id
   std::string name;
   bool publishes_raw = false;
   std::shared_ptr<const Skeleton> skeleton;  // models are bound to it; null: samples only
@@ -47,6 +51,9 @@ struct ControlledStream {
   drivers::Options options;  // of its driver
   // The calibration that was sent last and is in use by the reader; null: the one from the start.
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
+  // Of a body of a device with several: the source's name in the config. Of a device with one, the
+  // reader's number is the stream's slot.
+  std::string source{};
 };
 
 // What the handler needs from the rest of the daemon. All calls come from the control thread.
@@ -79,7 +86,8 @@ struct Reply {
 class RequestHandler {
  public:
   // `daemon_control` outlives the handler. Destroy the handler after the pipeline thread has ended,
-  // because it owns the models in use.
+  // because it owns the models in use. The ids of `streams` are their indices, whatever
+  // ControlledStream::stream says.
   RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
                  Clock clock = system::monotonic_ns);
   ~RequestHandler();
@@ -92,18 +100,34 @@ class RequestHandler {
   [[nodiscard]] std::optional<Reply> handle(Requester requester, std::span<const std::byte> bytes);
 
   // Forgets uploads that have stalled. Returns when to call it next at the latest.
-  [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns) { return uploads_.forget_old(now_ns); }
+  [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns);
 
   // The pipeline has applied a command: returns its reply, and frees the model that it replaced.
   [[nodiscard]] std::optional<Reply> acknowledge(const pipeline::Ack& ack);
 
+  // A stream comes. If its slot has an earlier generation, requests no longer reach that one.
+  void add_stream(ControlledStream stream);
+  // The stream has left, and nothing reads its models any more. Commands under way to it are still
+  // acknowledged; until then the handler keeps the models that they brought.
+  void remove_stream(std::uint32_t stream);
+
  private:
+  struct BySlot {
+    [[nodiscard]] bool operator()(std::uint32_t a, std::uint32_t b) const noexcept {
+      return std::pair(pipeline::slot_of(a), a) < std::pair(pipeline::slot_of(b), b);
+    }
+  };
+
+  // By id, the generations of a slot in their order. An earlier one stays until it is removed,
+  // because the pipeline may still read its models.
+  using Streams = std::map<std::uint32_t, ControlledStream, BySlot>;
   struct UnderWay {
     Requester requester;
     std::uint32_t stream = 0;
+    std::string name{};  // of the stream, for when it has left
     std::size_t stage = 0;
     std::unique_ptr<const StageModel> model{};  // the stage's new model
-    std::string_view refusal{};                 // what the stage's refusal means
+    std::string_view refusal{};                 // of a command: what the stage's refusal means
     std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
   };
   // Success means that the command is under way; acknowledge() then makes the reply.
@@ -118,14 +142,24 @@ class RequestHandler {
                                    const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
-  [[nodiscard]] Result<std::uint32_t> find_stream(const std::string& name) const;
+  // Whether the slot has a later generation.
+  [[nodiscard]] bool is_earlier(Streams::iterator stream) const;
+  // The live stream of this name: of a slot's generations, only the newest lives.
+  [[nodiscard]] Result<ControlledStream*> find_stream(const std::string& name);
+  // The same, if requests for devices fit it.
+  [[nodiscard]] Result<ControlledStream*> find_device(const std::string& name);
   // The stage's model by the time that a command that is sent now takes effect.
-  [[nodiscard]] const StageModel* coming_model(std::uint32_t stream, std::size_t stage) const;
-  [[nodiscard]] Result<> send(pipeline::Command command, UnderWay under_way);
+  [[nodiscard]] const StageModel* coming_model(const ControlledStream& stream,
+                                               std::size_t stage) const;
+  [[nodiscard]] Result<> send(const ControlledStream& stream, pipeline::Command command,
+                              UnderWay under_way);
+  // What acknowledge() does to the stream.
+  void apply(ControlledStream& stream, UnderWay& done);
 
-  std::vector<ControlledStream> streams_;
   DaemonControl& daemon_control_;
   Clock clock_;
+  std::mutex mutex_;  // guards all below
+  Streams streams_;
   Uploads uploads_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by ticket
   std::uint64_t last_ticket_ = 0;

@@ -24,14 +24,12 @@ constexpr std::chrono::nanoseconds kSettles = std::chrono::seconds(1);
 
 }  // namespace
 
-bool DeviceSupervisor::wanted(const devices::OpenStream& stream) {
-  return drivers::find_driver(stream.config.driver)->expect != nullptr;
-}
+bool DeviceSupervisor::wanted(const OpenSource& source) { return source.driver->expect != nullptr; }
 
-DeviceSupervisor::DeviceSupervisor(devices::OpenStream& stream, SupervisorPorts ports)
-    : stream_(stream),
+DeviceSupervisor::DeviceSupervisor(OpenSource& source, SupervisorPorts ports)
+    : source_(source),
       ports_(std::move(ports)),
-      driver_(*drivers::find_driver(stream.config.driver)),
+      driver_(*source.driver),
       thread_([this] { run(); }) {}
 
 DeviceSupervisor::~DeviceSupervisor() {
@@ -41,14 +39,14 @@ DeviceSupervisor::~DeviceSupervisor() {
 
 void DeviceSupervisor::stop() noexcept {
   stop_.store(true);
-  stream_.ports->cancel();
-  stream_.slot->supervisor->notify();
+  source_.ports->cancel();
+  source_.slot->supervisor->notify();
 }
 
 void DeviceSupervisor::run() {
-  system::name_thread("dev-" + stream_.config.name);
+  system::name_thread("dev-" + source_.name);
   while (!stop_.load()) {
-    while (stream_.slot->out.consume([this](drivers::Device* /*device_*/) { take_back(); })) {
+    while (source_.slot->out.consume([this](drivers::Device* /*device_*/) { take_back(); })) {
     }
     if (away_) {
       look_for_device();
@@ -61,9 +59,9 @@ void DeviceSupervisor::run() {
 }
 
 void DeviceSupervisor::sleep() {
-  system::EventFd& wake = *stream_.slot->supervisor;
+  system::EventFd& wake = *source_.slot->supervisor;
   wake.going_to_sleep();
-  if (stream_.slot->out.empty() && !stop_.load()) {
+  if (source_.slot->out.empty() && !stop_.load()) {
     // When a device node appears it is tried at once. Where node events are not available, it is
     // tried at the next turn.
     const auto turn = !away_ ? kLookEvery : settling() ? kTrySoon : kTryEvery;
@@ -89,7 +87,7 @@ void DeviceSupervisor::take_back() {
   writer_ = nullptr;
   device_.reset();
   away_ = true;
-  stream_.present->gone();
+  source_.present->gone();
   const std::string why = std::exchange(asked_back_, false)
                               ? "nothing usable came from the device for a while"
                               : "the link to the device is lost";
@@ -99,12 +97,12 @@ void DeviceSupervisor::take_back() {
 
 void DeviceSupervisor::watch_silence() {
   if (device_->reopen_after_s <= 0.0 || asked_back_) return;
-  const auto& reader = stream_.counters.reader;
-  if (!reader.connected.load()) return;
-  const std::int64_t silent_ns = ports_.clock() - reader.heard_ns.load();
+  const pipeline::SourceCounters& counters = source_.counters;
+  if (!counters.connected.load()) return;
+  const std::int64_t silent_ns = ports_.clock() - counters.heard_ns.load();
   if (seconds(silent_ns) < device_->reopen_after_s) return;
   asked_back_ = true;
-  stream_.slot->give_back.store(true);
+  source_.slot->give_back.store(true);
   ports_.reader->call();
 }
 
@@ -140,9 +138,9 @@ void DeviceSupervisor::look_for_device() {
   for (const std::string& warning : device_->warnings) {
     ports_.report(v1::Event::KIND_WARNING, warning);
   }
-  stream_.present->connected(device_->description);
-  stream_.slot->give_back.store(false);  // that request was for the previous device
-  static_cast<void>(stream_.slot->in.push(device_.get()));
+  source_.present->connected(device_->description);
+  source_.slot->give_back.store(false);  // that request was for the previous device
+  static_cast<void>(source_.slot->in.push(device_.get()));
   ports_.reader->call();
   ports_.report(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
 }
@@ -150,17 +148,17 @@ void DeviceSupervisor::look_for_device() {
 // Refuses a device that differs from what the stream was set up for: its data would silently be
 // taken for other joints.
 Result<std::unique_ptr<drivers::Device>> DeviceSupervisor::try_open() {
-  auto opened = driver_.open(stream_.config.options, *stream_.ports);
+  auto opened = driver_.open(source_.options, *source_.ports);
   if (!opened) return std::unexpected(opened.error());
   auto device = std::make_unique<drivers::Device>(std::move(*opened));
   const drivers::Description& is = device->description;
-  const drivers::Description& was = stream_.device.description;
+  const drivers::Description& was = source_.device.description;
   const auto id = [](const drivers::Description& d) { return d.skeleton ? d.skeleton->id : 0; };
   if (id(is) != id(was) || is.samples.names != was.samples.names) {
     return fail("another device answers (" + is.identity +
                 "); connect the one that the stream began with, or start posed again");
   }
-  if (const auto in_use = stream_.present->calibration(); !in_use.toml.empty()) {
+  if (const auto in_use = source_.present->calibration(); !in_use.toml.empty()) {
     const auto fits = compile_calibration(is, in_use.toml, in_use.file);
     if (!fits) return std::unexpected(fits.error());
   }

@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "daemon/devices/open_stream.hpp"
+#include "daemon/devices/open_source.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "drivers/transport/cold_writer.hpp"
 #include "drivers/transport/hotplug_monitor.hpp"
@@ -29,11 +29,11 @@ struct SupervisorPorts {
 class DeviceSupervisor {
  public:
   // Whether a stream's device may be unplugged and return; only such streams have a supervisor.
-  [[nodiscard]] static bool wanted(const devices::OpenStream& stream);
+  [[nodiscard]] static bool wanted(const OpenSource& source);
 
-  // Starts the thread, which opens the device as soon as it is there. `stream` outlives the
+  // Starts the thread, which opens the device as soon as it is there. `source` outlives the
   // supervisor.
-  DeviceSupervisor(devices::OpenStream& stream, SupervisorPorts ports);
+  DeviceSupervisor(OpenSource& source, SupervisorPorts ports);
   ~DeviceSupervisor();  // call after the reader's thread has ended; stops the thread first
   DeviceSupervisor(const DeviceSupervisor&) = delete;
   DeviceSupervisor& operator=(const DeviceSupervisor&) = delete;
@@ -51,7 +51,7 @@ class DeviceSupervisor {
   void sleep();
   [[nodiscard]] bool settling() const;  // a device node appeared a moment ago
 
-  devices::OpenStream& stream_;
+  OpenSource& source_;
   SupervisorPorts ports_;
   const drivers::Driver& driver_;
   drivers::HotplugMonitor hotplug_;

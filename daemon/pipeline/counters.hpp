@@ -1,5 +1,5 @@
-// What the hot threads count about one stream, for `stats`. Relaxed atomics: each one is written by
-// one thread only and may be read by any thread.
+// What the hot threads count about sources and streams, for `stats`. Relaxed atomics: each one is
+// written by one thread only and may be read by any thread.
 #pragma once
 
 #include <array>
@@ -13,6 +13,15 @@ namespace posed::pipeline {
 
 enum class StreamState : std::uint8_t { kWaiting, kLive, kStale, kEnded };
 
+// Of one source. The streams of its bodies share it.
+struct alignas(64) SourceCounters {
+  std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
+  std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
+  std::atomic<bool> connected{false};              // a link to the device is open
+  std::atomic<std::uint64_t> connections{0};       // links opened since the start
+  std::atomic<std::int64_t> link_ns{kNoTime_ns};   // when `connected` last changed
+};
+
 struct alignas(64) ReaderCounters {
   std::atomic<std::uint64_t> newest{0};   // sequence of the last frame that went into the ring
   std::atomic<std::uint64_t> frames{0};   // sequence of the last decoded frame
@@ -20,11 +29,6 @@ struct alignas(64) ReaderCounters {
   // sequence of the last sample that went into the ring
   std::atomic<std::uint64_t> newest_sample{0};
   std::atomic<std::uint64_t> dropped{0};  // frames and samples for which the ring was full
-  std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
-  std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
-  std::atomic<bool> connected{false};              // a link to the device is open
-  std::atomic<std::uint64_t> connections{0};       // links opened since the start
-  std::atomic<std::int64_t> link_ns{kNoTime_ns};   // when `connected` last changed
 };
 
 inline constexpr std::size_t kMaxLiveParameters = 32;  // of one stream
@@ -49,30 +53,46 @@ struct alignas(64) PublisherCounters {
   std::atomic<std::uint64_t> taken{0};  // items taken from the pipeline's ring
 };
 
+// Of one slot; the streams that have the slot one after the other count on.
 struct StreamCounters {
   ReaderCounters reader;
   PipelineCounters pipeline;
   PublisherCounters publisher;
 };
 
+// Prepares the counters of a slot for a stream of another name, whose next frame and sample get
+// these sequences. Call while no thread uses the slot. What the RingShares compare with goes on.
+inline void restart(StreamCounters& counters, std::uint64_t frame, std::uint64_t sample) noexcept {
+  counters.reader.newest = frame - 1;
+  counters.reader.frames = frame - 1;
+  counters.reader.samples = sample - 1;
+  counters.reader.newest_sample = sample - 1;
+  counters.reader.dropped = 0;
+  counters.pipeline.consumed = frame - 1;
+  counters.pipeline.shed = 0;
+  counters.pipeline.dropped = 0;
+  counters.pipeline.state = StreamState::kWaiting;
+}
+
 // The part of a shared ring that one stream may fill, in items or in bytes. Because of it no stream
 // can take the space of another. It belongs to the producer; `taken` is the consumer's count of
-// what it has removed for this stream.
+// what it has removed for this stream, or for those that had the stream's slot before it.
 class RingShare {
  public:
+  // Nothing of an earlier stream of the slot may be in the ring any more.
   RingShare(std::size_t size, const std::atomic<std::uint64_t>& taken) noexcept
-      : size_(size), taken_(taken) {}
+      : size_(size), put_(taken.load(std::memory_order_acquire)), taken_(&taken) {}
   // RT-safe.
   [[nodiscard]] bool has_room(std::size_t amount = 1) const noexcept {
-    return put_ - taken_.load(std::memory_order_acquire) + amount <= size_;
+    return put_ - taken_->load(std::memory_order_acquire) + amount <= size_;
   }
   // Counts what was just put into the ring for this stream. RT-safe.
   void add(std::size_t amount = 1) noexcept { put_ += amount; }
 
  private:
   std::uint64_t size_;
-  std::uint64_t put_ = 0;
-  const std::atomic<std::uint64_t>& taken_;
+  std::uint64_t put_;
+  const std::atomic<std::uint64_t>* taken_;
 };
 
 // Adds `n`. Only one thread may write the counter. RT-safe.

@@ -4,45 +4,74 @@
 
 namespace posed::pipeline {
 
+void Intake::set_streams(std::span<const StreamPosition> of_body) noexcept {
+  count_ = 0;
+  place_of_.fill(kNoPlace);
+  for (std::size_t body = 0; body < of_body.size() && body < place_of_.size(); ++body) {
+    if (of_body[body].stream == kNoStream) continue;
+    place_of_[body] = static_cast<std::uint8_t>(count_);
+    streams_[count_++] = of_body[body];
+  }
+}
+
+void Intake::go_to(const Position& next) noexcept {
+  next_item_ = next.item;
+  for (const StreamPosition& position : next.streams) {
+    for (std::size_t place = 0; place < count_; ++place) {
+      if (streams_[place].stream == position.stream) streams_[place] = position;
+    }
+  }
+}
+
 void Intake::frame(std::size_t body, Frame& frame) noexcept {
-  if (body != 0) return outcome(Outcome::kForeign);
-  frame.header.stream = stream_;
-  frame.header.sequence = ++frames_;
+  const std::uint8_t place = place_of(body);
+  if (place == kNoPlace) return;
+  frame.header.stream = streams_[place].stream;
+  frame.header.sequence = streams_[place].frame++;
   frame.header.arrival_ns = arrival_ns_;
   clock_.stamp(frame);
-  if (clock_.jumps() != jumps_reported_) {
-    jumps_reported_ = clock_.jumps();
-    // If the ring is full the event is lost like a frame would be, and its number is skipped.
-    if (!report(v1::Event::KIND_CLOCK_JUMPED, 0)) ++next_item_;
-  }
+  if (clock_.jumps() != jumps_reported_) report_jump();
   item_.kind = Item::Kind::kFrame;
   item_.frame = frame;
-  put();
+  put(place);
+}
+
+// The clock is that of all bodies.
+void Intake::report_jump() noexcept {
+  jumps_reported_ = clock_.jumps();
+  for (std::size_t place = 0; place < count_; ++place) {
+    // If the ring is full the event is lost like a frame would be, and its number is skipped.
+    if (!report(place, v1::Event::KIND_CLOCK_JUMPED, 0)) ++next_item_;
+  }
 }
 
 void Intake::sample(std::size_t body, Sample& sample) noexcept {
-  if (body != 0) return outcome(Outcome::kForeign);
-  sample.header.stream = stream_;
-  sample.header.sequence = ++samples_;
+  const std::uint8_t place = place_of(body);
+  if (place == kNoPlace) return;
+  sample.header.stream = streams_[place].stream;
+  sample.header.sequence = streams_[place].sample++;
   sample.header.arrival_ns = arrival_ns_;
   item_.kind = Item::Kind::kSample;
   item_.sample = sample;
-  put();
+  put(place);
 }
 
-bool Intake::report(std::uint8_t event, std::uint64_t ticket, std::string_view name) noexcept {
+bool Intake::report(std::size_t place, std::uint8_t event, std::uint64_t ticket,
+                    std::string_view name) noexcept {
+  const StreamPosition& stream = streams_[place];
   item_.kind = Item::Kind::kEvent;
   item_.number = next_item_;
-  item_.stream_event = {stream_, event, arrival_ns_, frames_, 0.0, ticket};
+  item_.stream_event = {stream.stream, event, arrival_ns_, stream.frame - 1, 0.0, ticket};
+  item_.stream_event.last_sample = stream.sample - 1;
   item_.stream_event.after = ShortText(name);
-  if (!out_.item(item_)) return false;
+  if (!out_.item(place, item_)) return false;
   ++next_item_;
   return true;
 }
 
-void Intake::put() noexcept {
+void Intake::put(std::size_t place) noexcept {
   item_.number = next_item_++;
-  static_cast<void>(out_.item(item_));
+  static_cast<void>(out_.item(place, item_));
 }
 
 }  // namespace posed::pipeline

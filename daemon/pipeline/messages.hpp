@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <type_traits>
 
 #include "drivers/glove/calibration_file.hpp"
@@ -30,8 +31,9 @@ struct StreamEvent {
   std::int64_t time_ns;
   std::uint64_t sequence;
   double value;
-  std::uint64_t ticket = 0;  // of the command that caused it; 0 if no reply is expected
-  StageChange change{};      // of KIND_CONTROL and KIND_PLAYING
+  std::uint64_t ticket = 0;       // of the command that caused it; 0 if no reply is expected
+  std::uint64_t last_sample = 0;  // of KIND_ENDED from the reader: sequence of the last sample
+  StageChange change{};           // of KIND_CONTROL and KIND_PLAYING
   // The old and the new value, so that the event can name both.
   double value_before = 0.0;    // StageChange::kSet: the target until now
   ShortText before{}, after{};  // names of models and calibrations; what a stage's command does
@@ -64,12 +66,35 @@ static_assert(std::is_trivially_copyable_v<Item>);
 // their Ack.
 inline constexpr std::size_t kMaxUnderWay = 64;
 
-// The numbers that the next frame and sample of a stream, and the next item of its reader, will
-// get.
+// Stream ids are generation << 16 | slot. Hot code finds a stream by its slot, of which there are
+// as many as streams at once; the generation tells apart the streams that have the slot one after
+// the other. Streams that are there from the start have generation 0.
+[[nodiscard]] constexpr std::uint32_t slot_of(std::uint32_t stream) noexcept {
+  return stream & 0xffff;
+}
+[[nodiscard]] constexpr std::uint32_t stream_id(std::uint32_t slot,
+                                                std::uint32_t generation) noexcept {
+  return generation << 16 | slot;
+}
+[[nodiscard]] constexpr std::uint32_t generation_of(std::uint32_t stream) noexcept {
+  return stream >> 16;
+}
+inline constexpr std::uint32_t kMaxGeneration = 0xfffe;
+
+// The id of no stream: of a body that nobody wants.
+inline constexpr std::uint32_t kNoStream = 0xffff'ffff;
+
+// The numbers that the next frame and sample of a stream will get.
+struct StreamPosition {
+  std::uint32_t stream = 0;
+  std::uint64_t frame = 1;   // Header::sequence of its next frame
+  std::uint64_t sample = 1;  // Header::sequence of its next sample
+};
+
+// The numbers that come next from a source. The span is valid until the source reads on.
 struct Position {
-  std::uint64_t frame = 1;   // Header::sequence of the stream's next frame
-  std::uint64_t sample = 1;  // Header::sequence of the stream's next sample
-  std::uint64_t item = 1;    // Item::number of the reader's next item, whatever its stream
+  std::uint64_t item = 1;  // Item::number of the reader's next item, whatever its stream
+  std::span<const StreamPosition> streams{};
 };
 
 // SHA-256 of a model file, in hex, with a closing zero.

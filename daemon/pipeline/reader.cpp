@@ -29,9 +29,9 @@ Reader::Reader(const ReaderPorts& ports, std::unique_ptr<system::EventFd> wake,
 
 Reader::~Reader() = default;
 
-void Reader::add(const ReadStream& stream) {
+void Reader::add(const ReadSource& source) {
   const auto index = static_cast<std::uint32_t>(sources_.size());
-  sources_.push_back(std::make_unique<Source>(index, stream, ports_, *poller_, next_item_));
+  sources_.push_back(std::make_unique<Source>(index, source, ports_, *poller_, next_item_));
 }
 
 void Reader::begin() noexcept {
@@ -40,7 +40,7 @@ void Reader::begin() noexcept {
 
 std::int64_t Reader::turn(std::int64_t now_ns) noexcept {
   const bool all_taken = take_requests();
-  for (const std::uint32_t stream : std::exchange(ready_, {})) sources_[stream]->serve();
+  for (const std::uint32_t source : std::exchange(ready_, {})) sources_[source]->serve();
   const std::int64_t due_ns = serve_timed(now_ns);
   return all_taken ? due_ns : std::min(due_ns, now_ns + kLookAgain_ns);
 }
@@ -67,11 +67,12 @@ void Reader::call() noexcept {
   wake_->notify();
 }
 
-// A calibration is acknowledged by an event, which needs a free slot in the ring: while there is
-// none, the commands wait.
+// A calibration is acknowledged by an event, and a body that leaves is reported by one; events need
+// a free slot in the ring: while there is none, the requests wait.
 bool Reader::take_requests() noexcept {
-  if (!called_.exchange(false, std::memory_order_acq_rel) && !commands_wait_) return true;
-  for (const auto& source : sources_) source->exchange();
+  if (!called_.exchange(false, std::memory_order_acq_rel) && !requests_wait_) return true;
+  requests_wait_ = false;
+  for (const auto& source : sources_) requests_wait_ |= !source->exchange();
   const auto apply = [this](const DeviceCommand& command) noexcept {
     Source& source = *sources_[command.stream];
     if (command.kind == DeviceCommand::Kind::kCalibrate) {
@@ -80,11 +81,12 @@ bool Reader::take_requests() noexcept {
       source.send(std::span(command.bytes).first(command.size));
     }
   };
-  if (ports_.commands == nullptr) return true;
-  while (ports_.out->has_room() && ports_.commands->consume(apply)) {
+  if (ports_.commands != nullptr) {
+    while (ports_.out->has_room() && ports_.commands->consume(apply)) {
+    }
+    requests_wait_ |= !ports_.commands->empty();
   }
-  commands_wait_ = !ports_.commands->empty();
-  return !commands_wait_;
+  return !requests_wait_;
 }
 
 std::int64_t Reader::serve_timed(std::int64_t now_ns) noexcept {

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "daemon/pipeline/counters.hpp"
+#include "daemon/pipeline/description_box.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
@@ -17,6 +19,37 @@
 #include "drivers/driver.hpp"
 
 namespace posed::pipeline {
+
+// A body of a source on its way to the pipeline.
+struct ReadBody {
+  std::uint32_t stream = kNoStream;  // kNoStream: frames of this body are left out
+  StreamCounters* counters = nullptr;
+  // how many slots of `out` it may fill
+  std::size_t slots = std::numeric_limits<std::size_t>::max();
+  // Where its numbers begin, unless the source already has a stream in this slot: its numbers go
+  // on.
+  StreamPosition first{};
+};
+
+// The bodies of a source from now on, built by cold code.
+struct SourceUpdate {
+  std::shared_ptr<const drivers::SourceLayout> layout;
+  std::vector<ReadBody> bodies;  // [body]
+  std::vector<std::byte> log;    // the row that the log keeps (pipeline/description_row.hpp)
+};
+
+// What the reader and the cold thread that builds streams exchange about a device with several
+// bodies.
+struct BodyExchange {
+  explicit BodyExchange(system::EventFd& wakes_builder)
+      : builder(wakes_builder), descriptions(wakes_builder) {}
+
+  system::EventFd& builder;
+  DescriptionBox descriptions;
+  // An update comes back in `taken` when it is in use, which ends the use of the one before it.
+  Ring<const SourceUpdate*> updates{kUpdates}, taken{kUpdates};
+  static constexpr std::size_t kUpdates = 4;
+};
 
 // Passes a device that may be unplugged between its supervisor (daemon/devices) and the reader.
 // Every device that went in comes back once: when its link is lost, or when the supervisor asks for
@@ -37,14 +70,14 @@ struct ReaderPorts {
   Ring<DeviceCommand>* commands = nullptr;  // from control; may be null
 };
 
-// One stream that the reader is to serve; what it points to outlives the reader.
-struct ReadStream {
+// One source that the reader is to serve; what it points to outlives the reader.
+struct ReadSource {
   drivers::Device* device = nullptr;  // null while it is unplugged
-  StreamCounters* counters = nullptr;
+  SourceCounters* counters = nullptr;
   DeviceSlot* slot = nullptr;  // null: a device that cannot come back
   const drivers::glove::OwnedCalibration* calibration = nullptr;  // null: use the device's default
-  // how many slots of `out` it may fill
-  std::size_t slots = std::numeric_limits<std::size_t>::max();
+  std::optional<ReadBody> body{};                                 // of a device with one body
+  BodyExchange* bodies = nullptr;                                 // of a device with several
 };
 
 class Reader {
@@ -52,8 +85,8 @@ class Reader {
   [[nodiscard]] static Result<std::unique_ptr<Reader>> open(const ReaderPorts& ports);
   ~Reader();
 
-  // Streams are numbered in the order in which they are added. Cold, before run().
-  void add(const ReadStream& stream);
+  // Sources are numbered in the order in which they are added. Cold, before run().
+  void add(const ReadSource& source);
 
   // Takes over the first devices; call before the first turn. RT-safe, except for one epoll_ctl for
   // each device.
@@ -86,7 +119,7 @@ class Reader {
   std::span<const std::uint32_t> ready_;
   std::vector<std::unique_ptr<Source>> sources_;
   std::uint64_t next_item_ = 1;  // the next Item::number
-  bool commands_wait_ = false;   // for space in `out`
+  bool requests_wait_ = false;   // for space in `out`
   std::atomic<bool> called_{false};
   std::atomic<bool> stop_{false};
 };

@@ -1,11 +1,14 @@
-// Reader::Source: one stream of the reader. Private to reader.cpp. RT-safe throughout, except for
+// Reader::Source: one source of the reader. Private to reader.cpp. RT-safe throughout, except for
 // the reads, writes and wake-ups that are marked as allowed.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "daemon/pipeline/intake.hpp"
 #include "daemon/pipeline/reader.hpp"
@@ -15,7 +18,7 @@
 
 namespace posed::pipeline {
 
-// One stream: its device, if one is connected, and the handling of what the device sends.
+// One source: its device, if one is connected, and the handling of what the device sends.
 class Reader::Source final : private IntakeOut {
   // The most that one source may deliver in one turn; the rest waits for the next turn. A source
   // that always has data then costs each of the others only a fraction of a millisecond. No real
@@ -27,18 +30,18 @@ class Reader::Source final : private IntakeOut {
   static constexpr std::uint64_t kFramesUnderWay = 2;
 
  public:
-  Source(std::uint32_t stream, const ReadStream& read, const ReaderPorts& ports,
+  Source(std::uint32_t number, const ReadSource& read, const ReaderPorts& ports,
          system::Poller& poller, std::uint64_t& next_item)
       : read_(read),
         counters_(*read.counters),
         ports_(ports),
         poller_(poller),
-        stream_(stream),
+        number_(number),
         device_(read.device),
         calibration_(read.calibration),
-        share_(read.slots, counters_.pipeline.taken),
-        half_(read.slots - read.slots / 2, counters_.pipeline.taken),
-        intake_(stream, next_item, *this) {}
+        intake_(next_item, *this) {
+    if (read.body) set_bodies(std::span(&*read.body, 1));
+  }
 
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
@@ -46,10 +49,16 @@ class Reader::Source final : private IntakeOut {
   // source waits while its earlier frames are still in the pipeline.
   [[nodiscard]] bool may_read() const noexcept {
     if (device_ == nullptr || ended_) return false;
-    return !device_->transport->lossless() ||
-           counters_.reader.frames.load(std::memory_order_relaxed) -
-                   counters_.pipeline.consumed.load(std::memory_order_acquire) <
-               kFramesUnderWay;
+    if (!device_->transport->lossless()) return true;
+    for (std::size_t i = 0; i < places_; ++i) {
+      const StreamCounters& stream = *place_[i]->body.counters;
+      if (stream.reader.frames.load(std::memory_order_relaxed) -
+              stream.pipeline.consumed.load(std::memory_order_acquire) >=
+          kFramesUnderWay) {
+        return false;
+      }
+    }
+    return true;
   }
 
   // When the source must be read although its descriptor is not ready; kNoTime_ns: never.
@@ -65,7 +74,7 @@ class Reader::Source final : private IntakeOut {
   void begin() noexcept {
     arrived(ports_.clock());
     if (calibration_ != nullptr) record_calibration();
-    counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
+    counters_.link_ns.store(ports_.clock(), std::memory_order_relaxed);
     if (device_ != nullptr) use(*device_);
   }
 
@@ -73,7 +82,9 @@ class Reader::Source final : private IntakeOut {
     calibration_ = command.calibration;
     record_calibration();
     if (device_ != nullptr) use_calibration(*device_);
-    static_cast<void>(report(v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
+    for (std::size_t i = 0; i < places_; ++i) {
+      static_cast<void>(report(i, v1::Event::KIND_CALIBRATED, command.ticket, calibration_->name));
+    }
   }
 
   void send(std::span<const std::byte> bytes) noexcept {
@@ -83,9 +94,11 @@ class Reader::Source final : private IntakeOut {
     record_sink(pipeline::Direction::kToDevice, bytes);
   }
 
-  // Takes a new device from the slot, and returns the current one if the supervisor asks for it.
-  void exchange() noexcept {
-    if (read_.slot == nullptr) return;
+  // Takes over new bodies and a new device, and returns the current device if the supervisor asks
+  // for it. False while bodies wait for space in the ring.
+  bool exchange() noexcept {
+    const bool all_taken = take_update();
+    if (read_.slot == nullptr) return all_taken;
     if (device_ != nullptr && read_.slot->give_back.exchange(false)) give_back();
     static_cast<void>(read_.slot->in.consume([this](drivers::Device* device) noexcept {
       device_ = device;
@@ -95,6 +108,7 @@ class Reader::Source final : private IntakeOut {
                   std::as_bytes(std::span(device->description.text)));
       use(*device);
     }));
+    return all_taken;
   }
 
   void serve() noexcept {
@@ -112,27 +126,35 @@ class Reader::Source final : private IntakeOut {
   }
 
   // IntakeOut: counts the item and puts it into the ring.
-  bool item(Item& item) noexcept override {
+  bool item(std::size_t place, Item& item) noexcept override {
+    Place& to = *place_[place];
+    ReaderCounters& reader = to.body.counters->reader;
     switch (item.kind) {
       case Item::Kind::kSample:
-        counters_.reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
+        reader.samples.store(item.sample.header.sequence, std::memory_order_relaxed);
         break;
       case Item::Kind::kEvent:
-        return push_event(item);
+        return push_event(to, item);
       default:
         item.frame.stamps.decoded_ns = ports_.clock();
-        counters_.reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
+        reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
     }
-    counters_.reader.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
-    if (!push(item)) {
-      count(counters_.reader.dropped);
+    counters_.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
+    if (!push(to, item)) {
+      count(reader.dropped);
       return false;
     }
     return true;
   }
 
+  void description(std::span<const std::byte> bytes) noexcept override {
+    if (read_.bodies == nullptr) return;
+    const system::AllowedCall the_wake;
+    read_.bodies->descriptions.put(bytes);
+  }
+
   void outcome(Outcome outcome) noexcept override {
-    count(counters_.reader.outcome[static_cast<std::size_t>(outcome)]);
+    count(counters_.outcome[static_cast<std::size_t>(outcome)]);
   }
 
  private:
@@ -140,8 +162,8 @@ class Reader::Source final : private IntakeOut {
   std::size_t read_one() noexcept {
     const drivers::Chunk chunk = read();
     arrived(chunk.arrival_ns != kNoTime_ns ? chunk.arrival_ns : ports_.clock());
-    count(counters_.reader.outcome[static_cast<std::size_t>(Outcome::kForeign)], chunk.foreign);
-    count(counters_.reader.outcome[static_cast<std::size_t>(Outcome::kShort)], chunk.damaged);
+    count(counters_.outcome[static_cast<std::size_t>(Outcome::kForeign)], chunk.foreign);
+    count(counters_.outcome[static_cast<std::size_t>(Outcome::kShort)], chunk.damaged);
     if (!chunk.bytes.empty()) {
       record_sink(pipeline::Direction::kFromDevice, chunk.bytes, chunk.socket);
       device_->decoder->feed_socket(chunk.socket, chunk.bytes, arrival_ns_, intake_);
@@ -176,15 +198,16 @@ class Reader::Source final : private IntakeOut {
 
   void use(drivers::Device& device) noexcept {
     if (calibration_ != nullptr) use_calibration(device);
+    if (used_ != nullptr) device.decoder->use(*used_->layout);
     poll_due_ns_ = device.poll.request.empty() ? kNoTime_ns : ports_.clock();
     const std::int64_t now_ns = ports_.clock();
-    counters_.reader.heard_ns.store(now_ns, std::memory_order_relaxed);
-    counters_.reader.link_ns.store(now_ns, std::memory_order_relaxed);
-    counters_.reader.connected.store(true, std::memory_order_release);
-    count(counters_.reader.connections);
+    counters_.heard_ns.store(now_ns, std::memory_order_relaxed);
+    counters_.link_ns.store(now_ns, std::memory_order_relaxed);
+    counters_.connected.store(true, std::memory_order_release);
+    count(counters_.connections);
     if (device.transport->poll_fd() < 0) return;
     const system::AllowedCall the_call;  // once for each connection, before any data flows
-    static_cast<void>(poller_.add(device.transport->poll_fd(), stream_));
+    static_cast<void>(poller_.add(device.transport->poll_fd(), number_));
   }
 
   // If a device without a supervisor is lost, its stream has ended.
@@ -195,8 +218,8 @@ class Reader::Source final : private IntakeOut {
       poller_.remove(device_->transport->poll_fd());
     }
     poll_due_ns_ = kNoTime_ns;
-    counters_.reader.link_ns.store(ports_.clock(), std::memory_order_relaxed);
-    counters_.reader.connected.store(false, std::memory_order_release);
+    counters_.link_ns.store(ports_.clock(), std::memory_order_relaxed);
+    counters_.connected.store(false, std::memory_order_release);
     // never full: the slot has more entries than there are devices
     static_cast<void>(read_.slot->out.push(device_));
     device_ = nullptr;
@@ -204,46 +227,138 @@ class Reader::Source final : private IntakeOut {
     read_.slot->supervisor->notify();
   }
 
-  // The end event must not be lost: if the ring is full it is tried again at the next read.
-  void end() noexcept { ended_ = report(v1::Event::KIND_ENDED, 0); }
-
-  bool report(v1::Event::Kind event, std::uint64_t ticket, std::string_view name = {}) noexcept {
-    return intake_.report(static_cast<std::uint8_t>(event), ticket, name);
+  // The end events must not be lost: while the ring has no room for all of them, they are tried
+  // again at the next read.
+  void end() noexcept {
+    if (!ports_.out->has_room(places_)) return;
+    for (std::size_t i = 0; i < places_; ++i) leave(i);
+    ended_ = true;
   }
 
-  // Once its share of the ring is full, a stream may add nothing until half of the share is free. A
-  // device that floods then loses long runs of frames instead of every other one, and each run is a
-  // single decision in the log.
-  bool share_is_open() noexcept {
-    if (!share_.has_room()) open_ = false;
-    if (!open_) open_ = half_.has_room();
-    return open_;
+  // Ends the stream of a place, once. The ring has room.
+  void leave(std::size_t place) noexcept {
+    Place& left = *place_[place];
+    if (!std::exchange(left.left, true)) {
+      static_cast<void>(report(place, v1::Event::KIND_ENDED, 0));
+    }
+  }
+
+  bool report(std::size_t place, v1::Event::Kind event, std::uint64_t ticket,
+              std::string_view name = {}) noexcept {
+    return intake_.report(place, static_cast<std::uint8_t>(event), ticket, name);
+  }
+
+  // A stream of the source: what it may put into the ring to the pipeline.
+  struct Place {
+    explicit Place(const ReadBody& of) noexcept
+        : body(of),
+          share(of.slots, of.counters->pipeline.taken),
+          half(of.slots - of.slots / 2, of.counters->pipeline.taken) {}
+
+    // Once its share of the ring is full, a stream may add nothing until half of the share is free.
+    // A device that floods then loses long runs of frames instead of every other one, and each run
+    // is a single decision in the log.
+    bool is_open() noexcept {
+      if (!share.has_room()) open = false;
+      if (!open) open = half.has_room();
+      return open && !left;
+    }
+
+    ReadBody body;
+    RingShare share, half;
+    bool open = true;
+    bool left = false;  // its end was reported
+  };
+
+  // From now on these are the bodies. A stream goes on with the numbers and the share of the stream
+  // that had its slot, which is the same stream or the one of the same name before it.
+  void set_bodies(std::span<const ReadBody> bodies) noexcept {
+    std::array<std::optional<Place>, kMaxBodies> places;
+    std::array<StreamPosition, kMaxBodies> positions;
+    std::size_t count = 0;
+    const std::span<const StreamPosition> now = intake_.next().streams;
+    bodies = bodies.first(std::min(bodies.size(), kMaxBodies));
+    for (std::size_t body = 0; body < bodies.size(); ++body) {
+      const ReadBody& one = bodies[body];
+      positions[body] = one.first;
+      positions[body].stream = one.stream;
+      if (one.stream == kNoStream) continue;
+      const std::size_t before = place_in(slot_of(one.stream));
+      if (before < places_) {
+        places[count] = place_[before];
+        places[count]->body = one;
+        places[count]->left = false;
+        positions[body].frame = now[before].frame;
+        positions[body].sample = now[before].sample;
+      } else {
+        places[count].emplace(one);
+      }
+      ++count;
+    }
+    place_ = places;
+    places_ = count;
+    intake_.set_streams(std::span(positions).first(bodies.size()));
+  }
+
+  [[nodiscard]] std::size_t place_in(std::uint32_t slot) const noexcept {
+    std::size_t place = 0;
+    while (place < places_ && slot_of(place_[place]->body.stream) != slot) ++place;
+    return place;
+  }
+
+  // Takes over the bodies that cold code has built: ends the streams that leave, swaps, records the
+  // row. False while there is no room for an end event in the ring.
+  bool take_update() noexcept {
+    if (read_.bodies == nullptr) return true;
+    if (update_ == nullptr) {
+      static_cast<void>(read_.bodies->updates.consume(
+          [this](const SourceUpdate* update) noexcept { update_ = update; }));
+    }
+    if (update_ == nullptr) return true;
+    if (!ports_.out->has_room(places_)) return false;  // for all that may leave, or for none
+    arrived(ports_.clock());
+    for (std::size_t i = 0; i < places_; ++i) {
+      const auto is_body = [&](const ReadBody& body) {
+        return body.stream == place_[i]->body.stream;
+      };
+      if (std::ranges::none_of(update_->bodies, is_body)) leave(i);
+    }
+    set_bodies(update_->bodies);
+    record_sink(pipeline::Direction::kDescription, update_->log);
+    if (device_ != nullptr) device_->decoder->use(*update_->layout);
+    used_ = std::exchange(update_, nullptr);
+    // never full: there are no more updates than entries
+    static_cast<void>(read_.bodies->taken.push(used_));
+    const system::AllowedCall the_wake;
+    read_.bodies->builder.notify();
+    return true;
   }
 
   // Puts the item into the ring and counts it against the stream's share.
-  bool put(const Item& item) noexcept {
+  bool put(Place& place, const Item& item) noexcept {
     if (!ports_.out->push(item)) return false;
-    share_.add();
-    half_.add();
+    place.share.add();
+    place.half.add();
     ports_.pipeline->notify();
     return true;
   }
 
   // Puts a frame or sample into the stream's share of the ring.
-  bool push(const Item& item) noexcept {
-    if (!share_is_open() || !put(item)) return false;
+  bool push(Place& place, const Item& item) noexcept {
+    if (!place.is_open() || !put(place, item)) return false;
+    ReaderCounters& reader = place.body.counters->reader;
     if (item.kind == Item::Kind::kSample) {
-      counters_.reader.newest_sample.store(item.sample.header.sequence, std::memory_order_release);
+      reader.newest_sample.store(item.sample.header.sequence, std::memory_order_release);
     } else {
-      counters_.reader.newest.store(item.frame.header.sequence, std::memory_order_release);
+      reader.newest.store(item.frame.header.sequence, std::memory_order_release);
     }
     return true;
   }
 
   // Events that a device can trigger at any rate count against its stream's share, too.
-  bool push_event(const Item& item) noexcept {
+  bool push_event(Place& place, const Item& item) noexcept {
     const bool shared = item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
-    return (!shared || share_is_open()) && put(item);
+    return (!shared || place.is_open()) && put(place, item);
   }
 
   void arrived(std::int64_t arrival_ns) noexcept {
@@ -257,21 +372,23 @@ class Reader::Source final : private IntakeOut {
   void record_sink(pipeline::Direction direction, std::span<const std::byte> bytes,
                    std::uint8_t socket = 0) noexcept {
     if (ports_.record_sink == nullptr) return;
-    ports_.record_sink->chunk(stream_, socket, direction, arrival_ns_, intake_.next(), bytes);
+    ports_.record_sink->chunk(number_, socket, direction, arrival_ns_, intake_.next(), bytes);
   }
 
-  ReadStream read_;
-  StreamCounters& counters_;
+  ReadSource read_;
+  SourceCounters& counters_;
   const ReaderPorts& ports_;
   system::Poller& poller_;
-  std::uint32_t stream_;
+  std::uint32_t number_;
   drivers::Device* device_;  // null while it is unplugged
   const drivers::glove::OwnedCalibration* calibration_;
+  const SourceUpdate* update_ = nullptr;  // waits for space in the ring
+  const SourceUpdate* used_ = nullptr;    // null before the first one
   std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
   bool ended_ = false;
-  RingShare share_, half_;  // this stream's share of the ring to the pipeline
-  bool open_ = true;
+  std::array<std::optional<Place>, kMaxBodies> place_;  // as in intake_.next().streams
+  std::size_t places_ = 0;
   Intake intake_;
 };
 

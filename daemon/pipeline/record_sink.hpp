@@ -33,7 +33,7 @@ class RecordSink {
   // made from this chunk will get; with them replay can continue after a gap. A source may have
   // several sockets; the first is 0. If the ring is full the chunk is counted as lost, and the log
   // gets a gap row and an event. RT-safe.
-  virtual void chunk(std::uint32_t stream, std::uint8_t socket, Direction direction,
+  virtual void chunk(std::uint32_t source, std::uint8_t socket, Direction direction,
                      std::int64_t arrival_ns, const pipeline::Position& next,
                      std::span<const std::byte> bytes) noexcept = 0;
 

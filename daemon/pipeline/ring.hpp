@@ -34,8 +34,10 @@ class Ring {
 
   // Producer. False when full. RT-safe.
   [[nodiscard]] bool push(const T& item) noexcept { return queue_.push(item); }
-  // Producer. RT-safe.
-  [[nodiscard]] bool has_room() const noexcept { return queue_.write_available() > 0; }
+  // Producer: whether so many pushes will succeed. RT-safe.
+  [[nodiscard]] bool has_room(std::size_t count = 1) const noexcept {
+    return queue_.write_available() >= count;
+  }
 
   // Consumer: hands the oldest element to `use(T&)` in place, then frees its slot. False when
   // empty. RT-safe if `use` is.

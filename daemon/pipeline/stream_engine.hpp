@@ -45,6 +45,13 @@ class StreamEngine final {
  public:
   explicit StreamEngine(EngineOptions options);
 
+  // Call before the first frame and sample: these are their sequences, because earlier ones belong
+  // to the stream of the same name before it.
+  void start_at(std::uint64_t frame, std::uint64_t sample) noexcept {
+    last_sequence_ = frame - 1;
+    last_sample_ = sample - 1;
+  }
+
   // A decoded frame, stamped with stream, sequence and arrival. If sequences are missing before it,
   // they are recorded as shed and reported before the frame itself.
   void on_frame(const Frame& frame, EngineOut& out) noexcept;
@@ -83,6 +90,8 @@ class StreamEngine final {
   }
   // Null if the stream does not have it.
   [[nodiscard]] Stage* find(const StageType& type) const noexcept;
+
+  [[nodiscard]] std::uint32_t stream() const noexcept { return options_.stream; }
 
  private:
   // Hands the output of one stage to the next, `next`.

@@ -1,9 +1,9 @@
 #include "daemon/pipeline/worker.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
+#include "daemon/pipeline/stream_context.hpp"
 #include "daemon/system/hot_mark.hpp"
 #include "posed/v1/posed.pb.h"
 
@@ -19,99 +19,6 @@ constexpr std::int64_t kAcksAgain_ns = 1'000'000;
 
 }  // namespace
 
-std::uint64_t shed_depth(double rate_hz) noexcept {
-  return static_cast<std::uint64_t>(std::max(3.0, std::ceil(rate_hz * 0.05)));
-}
-
-namespace {
-
-bool is_pose(const Item& item) noexcept {
-  return item.kind == Item::Kind::kFrame || item.kind == Item::Kind::kRawFrame;
-}
-
-// Events that a device can trigger at any rate must fit into its stream's share of the ring; of the
-// others only a few ever come at once.
-bool within_share(const Item& item) noexcept {
-  return item.kind != Item::Kind::kEvent || item.stream_event.kind == v1::Event::KIND_SHED ||
-         item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
-}
-
-}  // namespace
-
-// One stream: its engine, and the place where that engine's output goes.
-struct Worker::StreamContext final : EngineOut {
-  StreamContext(EngineOptions options, double rate_hz, StreamCounters& stream_counters,
-                const WorkerPorts& around, const std::uint64_t& next_item, std::size_t slots)
-      : engine(std::move(options)),
-        depth(shed_depth(rate_hz)),
-        counters(stream_counters),
-        ports(around),
-        position(next_item),
-        share(slots, counters.publisher.taken) {}
-
-  void item(const Item& item) noexcept override {
-    outgoing = item;
-    if ((within_share(outgoing) && !share.has_room()) || !ports.out->push(outgoing)) {
-      if (ports.record_sink != nullptr && is_pose(outgoing))
-        ports.record_sink->unpublished(outgoing.frame.header.stream);
-      return count(counters.pipeline.dropped);
-    }
-    share.add();
-    ports.publisher->notify();
-  }
-
-  void decision(const Decision& decision) noexcept override {
-    if (ports.record_sink == nullptr) return;
-    placed = decision;
-    placed.item = position;
-    ports.record_sink->decision(placed);
-  }
-
-  // Nothing more comes from the reader: what was decoded last but never came was shed.
-  void close_gaps() noexcept {
-    engine.close_gaps(counters.reader.frames.load(std::memory_order_acquire),
-                      counters.reader.samples.load(std::memory_order_acquire), *this);
-  }
-
-  // Newest data wins: a frame that has `depth` or more newer frames waiting behind it is skipped.
-  // The engine detects the gap at the next frame.
-  void frame(const Frame& frame) noexcept {
-    const std::uint64_t sequence = frame.header.sequence;
-    counters.pipeline.consumed.store(sequence, std::memory_order_release);
-    if (counters.reader.newest.load(std::memory_order_acquire) >= sequence + depth) {
-      return count(counters.pipeline.shed);
-    }
-    engine.on_frame(frame, *this);
-  }
-
-  // The same for samples.
-  void sample(const Sample& sample) noexcept {
-    const std::uint64_t newest = counters.reader.newest_sample.load(std::memory_order_acquire);
-    if (newest >= sample.header.sequence + depth) return count(counters.pipeline.shed);
-    engine.on_sample(sample, *this);
-  }
-
-  // Call after an item of the stream has been handled.
-  void taken() noexcept {
-    count(counters.pipeline.taken);
-    publish_state();
-  }
-
-  void publish_state() noexcept {
-    counters.pipeline.state.store(engine.state(), std::memory_order_relaxed);
-    publish_parameters(engine, counters.pipeline);
-  }
-
-  StreamEngine engine;
-  std::uint64_t depth;
-  StreamCounters& counters;
-  const WorkerPorts& ports;
-  const std::uint64_t& position;
-  RingShare share;  // of ports.out
-  Item outgoing;    // kept here because it is large
-  Decision placed;  // the same
-};
-
 Result<std::unique_ptr<Worker>> Worker::open(const WorkerPorts& ports) {
   auto poller = system::Poller::open();
   if (!poller) return std::unexpected(poller.error());
@@ -120,20 +27,35 @@ Result<std::unique_ptr<Worker>> Worker::open(const WorkerPorts& ports) {
 }
 
 Worker::Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller)
-    : ports_(ports), poller_(std::move(poller)) {}
+    : ports_(ports), poller_(std::move(poller)) {
+  if (ports_.streams == nullptr) return;
+  contexts_.resize(ports_.streams->slots);
+  coming_.resize(ports_.streams->slots);
+}
 
 Worker::~Worker() = default;
 
-void Worker::add(EngineOptions options, double rate_hz, StreamCounters& counters,
-                 std::size_t slots) {
-  contexts_.push_back(std::make_unique<StreamContext>(std::move(options), rate_hz, counters, ports_,
-                                                      position_, slots));
+std::unique_ptr<StreamContext> Worker::make_context(EngineOptions options, double rate_hz,
+                                                    StreamCounters& counters,
+                                                    std::size_t slots) const {
+  return std::make_unique<StreamContext>(std::move(options), rate_hz, counters, slots, ports_,
+                                         position_);
 }
 
-const StreamEngine& Worker::engine(std::uint32_t stream) const { return contexts_[stream]->engine; }
+void Worker::add(EngineOptions options, double rate_hz, StreamCounters& counters,
+                 std::size_t slots) {
+  owned_.push_back(make_context(std::move(options), rate_hz, counters, slots));
+  if (contexts_.size() < owned_.size()) contexts_.resize(owned_.size());
+  contexts_[owned_.size() - 1] = owned_.back().get();
+}
+
+const StreamEngine& Worker::engine(std::uint32_t stream) const {
+  return contexts_[slot_of(stream)]->engine();
+}
 
 std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
   send_acks();
+  take_streams();
   apply_commands();
   take_items(kItemsATurn);
   tick(now_ns);
@@ -143,8 +65,9 @@ std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
 std::int64_t Worker::next_due_ns(std::int64_t now_ns) const noexcept {
   if (!ports_.in->empty()) return now_ns;
   std::int64_t due_ns = unsent_count_ > 0 ? now_ns + kAcksAgain_ns : system::kForever_ns;
-  for (const auto& context : contexts_) {
-    const std::int64_t tick_ns = context->engine.next_tick_ns();
+  for (const StreamContext* context : contexts_) {
+    if (context == nullptr) continue;
+    const std::int64_t tick_ns = context->engine().next_tick_ns();
     if (tick_ns != kNoTime_ns) due_ns = std::min(due_ns, tick_ns);
   }
   return due_ns;
@@ -154,9 +77,8 @@ void Worker::finish() noexcept {
   send_acks();
   apply_commands();
   while (!ports_.in->empty()) take_items(kItemsATurn);
-  for (const auto& context : contexts_) {
-    context->close_gaps();
-    context->engine.flush(*context);
+  for (StreamContext* context : contexts_) {
+    if (context != nullptr) context->flush();
   }
 }
 
@@ -180,12 +102,46 @@ bool Worker::idle() const noexcept {
   return ports_.in->empty() && ports_.commands->empty() && !stop_.load(std::memory_order_acquire);
 }
 
+// A stream that takes the slot of another waits until that one has left.
+void Worker::take_streams() noexcept {
+  if (ports_.streams == nullptr) return;
+  const auto take_one = [this](StreamContext* context) noexcept {
+    const std::uint32_t slot = slot_of(context->stream());
+    (contexts_[slot] == nullptr ? contexts_ : coming_)[slot] = context;
+  };
+  while (ports_.streams->coming.consume(take_one)) {
+  }
+}
+
+// Null if there is no such stream any more. A stream is handed over before its first item and its
+// first command can come.
+StreamContext* Worker::find(std::uint32_t stream) noexcept {
+  const std::uint32_t slot = slot_of(stream);
+  if (slot >= contexts_.size()) return nullptr;
+  if (contexts_[slot] == nullptr) take_streams();
+  StreamContext* const context = contexts_[slot];
+  return context != nullptr && context->stream() == stream ? context : nullptr;
+}
+
+// The stream has left: its owner gets it back, and the slot goes to the stream that waits for it.
+void Worker::give_back(StreamContext& context, const StreamEvent& end) noexcept {
+  const std::uint32_t slot = slot_of(context.stream());
+  take_streams();
+  contexts_[slot] = std::exchange(coming_[slot], nullptr);
+  if (contexts_[slot] != nullptr) contexts_[slot]->follow(context, end);
+  // never full: it has room for all streams that are there and that wait
+  static_cast<void>(ports_.streams->gone.push(&context));
+  ports_.streams->builder.notify();
+}
+
 void Worker::apply_commands() noexcept {
   const auto apply = [this](const Command& command) noexcept {
-    StreamContext& context = *contexts_[command.stream];
-    const Ack ack = context.engine.apply(command, context);
-    context.publish_state();  // before the Ack, because its receiver may ask for the status at once
-    acknowledge(ack);
+    StreamContext* const context = find(command.stream);
+    acknowledge(context != nullptr ? context->apply(command)
+                                   : Ack{.ticket = command.ticket,
+                                         .stream = command.stream,
+                                         .sequence = 0,
+                                         .refused = true});
   };
   while (ports_.commands->consume(apply)) {
   }
@@ -222,48 +178,38 @@ void Worker::send_acks() noexcept {
 
 void Worker::take(const Item& item) noexcept {
   position_ = item.number;
-  switch (item.kind) {
-    case Item::Kind::kFrame:
-    case Item::Kind::kRawFrame: {
-      StreamContext& context = *contexts_[item.frame.header.stream];
-      context.frame(item.frame);
-      context.taken();
-      break;
-    }
-    case Item::Kind::kSample: {
-      StreamContext& context = *contexts_[item.sample.header.stream];
-      context.sample(item.sample);
-      context.taken();
-      break;
-    }
-    case Item::Kind::kEvent: {
-      StreamContext& context = *contexts_[item.stream_event.stream];
-      if (item.stream_event.kind == v1::Event::KIND_ENDED) {
-        context.close_gaps();
-        context.engine.end(item.stream_event.time_ns, context);
-      } else {
-        pass_on(item.stream_event, context);
-      }
-      context.taken();
-      break;
-    }
-  }
+  StreamContext* const context = find(stream_of(item));
+  if (context != nullptr) take(item, *context);
   position_ = item.number + 1;
 }
 
-// Passes on an event of the reader. It comes from the same ring as the frames, so it keeps its
-// place between them.
-void Worker::pass_on(const StreamEvent& event, StreamContext& context) noexcept {
-  acknowledge({.ticket = event.ticket, .stream = event.stream, .sequence = event.sequence + 1});
-  Item item;
-  item.kind = Item::Kind::kEvent;
-  item.stream_event = event;
-  context.item(item);
+void Worker::take(const Item& item, StreamContext& context) noexcept {
+  context.begin();
+  switch (item.kind) {
+    case Item::Kind::kFrame:
+    case Item::Kind::kRawFrame:
+      context.frame(item.frame);
+      return context.taken();
+    case Item::Kind::kSample:
+      context.sample(item.sample);
+      return context.taken();
+    case Item::Kind::kEvent:
+      break;
+  }
+  const StreamEvent& event = item.stream_event;
+  if (event.kind != v1::Event::KIND_ENDED) {
+    acknowledge({.ticket = event.ticket, .stream = event.stream, .sequence = event.sequence + 1});
+    context.pass_on(event);
+    return context.taken();
+  }
+  context.end(event);
+  context.taken();
+  if (slot_of(context.stream()) >= owned_.size()) give_back(context, event);
 }
 
 void Worker::tick(std::int64_t now_ns) noexcept {
-  for (const auto& context : contexts_) {
-    if (context->engine.tick(now_ns, *context)) context->publish_state();
+  for (StreamContext* context : contexts_) {
+    if (context != nullptr) context->tick(now_ns);
   }
 }
 

@@ -19,6 +19,20 @@
 
 namespace posed::pipeline {
 
+class StreamContext;
+
+// Streams that come and go while the worker runs. The cold side builds and owns them; they are
+// lent to the worker by pointer.
+struct StreamExchange {
+  StreamExchange(std::size_t slot_count, system::EventFd& wakes_builder)
+      : slots(slot_count), builder(wakes_builder), coming(slot_count), gone(2 * slot_count) {}
+
+  std::size_t slots;            // streams at once, with those from the start
+  system::EventFd& builder;     // notified when `gone` has something
+  Ring<StreamContext*> coming;  // at most one for each slot
+  Ring<StreamContext*> gone;    // the worker does not use it any more
+};
+
 // The rings and event descriptors around the worker; all of them outlive it.
 struct WorkerPorts {
   Ring<Item>* in = nullptr;
@@ -28,6 +42,7 @@ struct WorkerPorts {
   system::EventFd* wake = nullptr;       // wakes this thread
   system::EventFd* publisher = nullptr;  // notified when `out` has something
   system::EventFd* control = nullptr;    // notified when `acks` has something; may be null
+  StreamExchange* streams = nullptr;     // null: only those from the start
   pipeline::RecordSink* record_sink = nullptr;
   Clock clock = nullptr;
 };
@@ -37,11 +52,15 @@ class Worker {
   [[nodiscard]] static Result<std::unique_ptr<Worker>> open(const WorkerPorts& ports);
   ~Worker();
 
-  // Streams are numbered in the order in which they are added. `rate_hz` is the nominal rate, 0
-  // when unknown; `slots` is how many slots of `out` the stream may fill. Cold, before the first
-  // turn.
+  // The streams that are there from the start have the first slots, in the order in which they are
+  // added. `rate_hz` is the nominal rate, 0 when unknown; `slots` is how many slots of `out` the
+  // stream may fill. Cold, before the first turn.
   void add(EngineOptions options, double rate_hz, StreamCounters& counters,
            std::size_t slots = std::numeric_limits<std::size_t>::max());
+  // The same for a stream that comes later, through StreamExchange. Cold, any thread.
+  [[nodiscard]] std::unique_ptr<StreamContext> make_context(EngineOptions options, double rate_hz,
+                                                            StreamCounters& counters,
+                                                            std::size_t slots) const;
 
   // One round: commands, a bounded number of items, and the ticks that are due. Returns the latest
   // time at which the next turn is due [ns]; kForever_ns: only when a ring has something. RT-safe.
@@ -59,21 +78,25 @@ class Worker {
   [[nodiscard]] const StreamEngine& engine(std::uint32_t stream) const;
 
  private:
-  struct StreamContext;
   Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller);
   void apply_commands() noexcept;
   void take_items(int most) noexcept;
   void take(const Item& item) noexcept;
+  void take(const Item& item, StreamContext& context) noexcept;
+  void take_streams() noexcept;
+  [[nodiscard]] StreamContext* find(std::uint32_t stream) noexcept;
+  void give_back(StreamContext& context, const StreamEvent& end) noexcept;
   void acknowledge(const Ack& ack) noexcept;
   void send_acks() noexcept;
   [[nodiscard]] std::int64_t next_due_ns(std::int64_t now_ns) const noexcept;
-  void pass_on(const StreamEvent& event, StreamContext& context) noexcept;
   void tick(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool idle() const noexcept;
 
   WorkerPorts ports_;
   std::unique_ptr<system::Poller> poller_;
-  std::vector<std::unique_ptr<StreamContext>> contexts_;
+  std::vector<std::unique_ptr<StreamContext>> owned_;  // those from the start
+  std::vector<StreamContext*> contexts_;               // by slot; null where there is none
+  std::vector<StreamContext*> coming_;                 // by slot: follow when the slot is free
   std::uint64_t position_ = 1;  // number of the item before which a decision made now takes effect
   // Acks for which the ring was full; never more than there are commands under way.
   std::array<Ack, kMaxUnderWay> unsent_{};

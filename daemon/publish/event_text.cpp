@@ -86,4 +86,8 @@ std::string sentence(const ShedTally::Sum& shed) {
   return which + " skipped: newer ones waited";
 }
 
+std::string body_words(const std::string& source, const std::string& body) {
+  return fmt::format("body {} of source {}", in_quotes(body), source);
+}
+
 }  // namespace posed::publish

@@ -14,4 +14,7 @@ namespace posed::publish {
 [[nodiscard]] std::string sentence(const pipeline::StreamEvent& event);
 [[nodiscard]] std::string sentence(const ShedTally::Sum& shed);
 
+// "body 'Ann' of source optitrack": the device's own name for the body may hold anything.
+[[nodiscard]] std::string body_words(const std::string& source, const std::string& body);
+
 }  // namespace posed::publish

@@ -73,6 +73,7 @@ PublishedStream::PublishedStream(StreamInfo stream_info)
     : info(std::move(stream_info)), styled(info.name, info, false) {
   if (info.raw) raw.emplace(info.name + "-raw", info, true);
   now_.model = info.model;
+  if (!info.refusal.empty()) styled.skeleton.reset();  // no pose will ever need it
 }
 
 void PublishedStream::measure(const Frame& frame, const StageStamps& stamps) noexcept {
@@ -111,24 +112,33 @@ void PublishedStream::set_model(std::string name) {
   now_.model = std::move(name);
 }
 
+void PublishedStream::fill_device(v1::StreamStats& stats) const {
+  const pipeline::SourceCounters& source = *info.source_counters;
+  stats.clear_outcome();
+  for (const auto& outcome : source.outcome) stats.add_outcome(outcome.load());
+  const std::int64_t link_ns = source.link_ns.load();
+  // before the reader has started, no device counts as absent
+  const bool begun = link_ns != kNoTime_ns;
+  stats.set_away(info.comes_and_goes && begun && !source.connected.load());
+  stats.set_connections(source.connections.load());
+  stats.set_link_ns(begun ? link_ns : 0);
+  if (info.present) describe_device(*info.present->description(), stats);
+}
+
 void PublishedStream::fill(v1::StreamStats& stats) const {
-  const auto& reader = info.counters->reader;
   const auto& pipeline = info.counters->pipeline;
   stats.set_stream(info.name);
   stats.set_driver(info.description.driver);
-  stats.set_state(kStateNames[static_cast<std::size_t>(pipeline.state.load())]);
-  stats.set_dropped(reader.dropped.load() + pipeline.dropped.load());
+  stats.set_source_name(info.source);
+  stats.set_body(info.body);
+  stats.set_refusal(info.refusal);
+  stats.set_state(info.refusal.empty()
+                      ? kStateNames[static_cast<std::size_t>(pipeline.state.load())]
+                      : "refused");
+  stats.set_dropped(info.counters->reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
   fill_stages(info.stages, pipeline, stats);
-  stats.clear_outcome();
-  for (const auto& outcome : reader.outcome) stats.add_outcome(outcome.load());
-  const std::int64_t link_ns = reader.link_ns.load();
-  // before the reader has started, no device counts as absent
-  const bool begun = link_ns != kNoTime_ns;
-  stats.set_away(info.comes_and_goes && begun && !reader.connected.load());
-  stats.set_connections(reader.connections.load());
-  stats.set_link_ns(begun ? link_ns : 0);
-  if (info.present) describe_device(*info.present->description(), stats);
+  fill_device(stats);
   const std::scoped_lock lock(mutex_);
   stats.set_frames(now_.frames);
   stats.set_samples(now_.samples);
@@ -142,7 +152,18 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_clock_drift_ppm(now_.clock.drift_ppm);
 }
 
-void PublishedStream::report(v1::StreamStats& stats, double seconds_since) {
+v1::StreamStats PublishedStream::stats() const {
+  v1::StreamStats stats;
+  {
+    const std::scoped_lock lock(mutex_);
+    stats = reported_;
+  }
+  fill(stats);
+  return stats;
+}
+
+v1::StreamStats PublishedStream::report(double seconds_since) {
+  v1::StreamStats stats;
   fill(stats);
   const auto frames = static_cast<double>(stats.frames() - frames_reported_);
   stats.set_rate_hz(seconds_since > 0.0 ? static_cast<float>(frames / seconds_since) : 0.0F);
@@ -153,6 +174,9 @@ void PublishedStream::report(v1::StreamStats& stats, double seconds_since) {
     *stats.mutable_stage(static_cast<int>(i))->mutable_time() = percentiles(stage_[i]);
   }
   *stats.mutable_publish() = percentiles(publish_);
+  const std::scoped_lock lock(mutex_);
+  reported_ = stats;
+  return stats;
 }
 
 }  // namespace posed::publish

@@ -30,7 +30,7 @@ struct Channel {
   std::int64_t skeleton_due_ns = 0;
 };
 
-// Publisher thread, except for set_model() and fill(): any thread.
+// Publisher thread, except for set_model() and stats(): any thread.
 class PublishedStream {
  public:
   explicit PublishedStream(StreamInfo stream_info);
@@ -41,19 +41,19 @@ class PublishedStream {
   void count_sample();
   void set_model(std::string name);
 
-  // The state at this moment: everything in `stats` except rates and percentiles, which cover a
-  // whole second.
-  void fill(v1::StreamStats& stats) const;
-  // The same with the rates and percentiles of the second that ends here; starts the next one.
-  void report(v1::StreamStats& stats, double seconds_since);
+  // The state at this moment, with the rates and percentiles of the last whole second.
+  [[nodiscard]] v1::StreamStats stats() const;
+  // The same with those of the second that ends here; starts the next one.
+  [[nodiscard]] v1::StreamStats report(double seconds_since);
 
   StreamInfo info;
   Channel styled;
   std::optional<Channel> raw;
   ShedTally shed;
+  bool announced = false;  // its skeleton was sent, and an event if it is a body
 
  private:
-  // What fill() reads while the publisher continues.
+  // What stats() reads while the publisher continues.
   struct Now {
     std::uint64_t frames = 0;
     std::uint64_t samples = 0;
@@ -68,9 +68,13 @@ class PublishedStream {
   };
 
   void measure(const Frame& frame, const StageStamps& stamps) noexcept;
+  // Everything except rates and percentiles.
+  void fill(v1::StreamStats& stats) const;
+  void fill_device(v1::StreamStats& stats) const;
 
   mutable std::mutex mutex_;
-  Now now_;  // under mutex_
+  Now now_;                   // under mutex_
+  v1::StreamStats reported_;  // by the last report(); under mutex_
   std::uint64_t frames_reported_ = 0;
   LatencyHistogram decode_, stages_, publish_;
   std::array<LatencyHistogram, kMaxStages> stage_;

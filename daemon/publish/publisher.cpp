@@ -4,13 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <time.h>
 
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/event_text.hpp"
-#include "daemon/publish/published_stream.hpp"
+#include "daemon/publish/published_slots.hpp"
+#include "daemon/publish/publisher_requests.hpp"
 #include "daemon/system/process.hpp"
 
 namespace posed::publish {
@@ -58,24 +60,6 @@ Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake,
 
 }  // namespace
 
-// Requests of other threads, and results for them. Cold: never used by the hot threads.
-struct Publisher::SharedState {
-  struct Posted {
-    std::uint32_t stream;
-    v1::Event::Kind kind;
-    std::string text;
-  };
-  mutable std::mutex mutex;
-  std::vector<Posted> events;
-  bool check = false;
-  v1::Stats stats;
-  std::atomic<bool> asked{false};  // `events` or `check` has something new
-
-  // Used by the publisher thread only: when it last published stats.
-  std::int64_t reported_ns = kNoTime_ns;
-  std::int64_t cpu_ns = 0;
-};
-
 int send_high_water_mark(double messages_per_s) {
   return std::max(kMinQueue, static_cast<int>(std::ceil(messages_per_s * kQueueDepth_s)));
 }
@@ -92,7 +76,7 @@ Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
                                                    system::EventFd& wake) {
   auto socket = net::open_socket(options.context, ZMQ_XPUB);
   if (!socket) return std::unexpected(socket.error());
-  double messages_per_s = 0.0;
+  double messages_per_s = options.more_messages_per_s;
   for (const StreamInfo& stream : streams) messages_per_s += stream.rate_hz * (stream.raw ? 2 : 1);
   if (auto set = set_queue_options(socket->get(), messages_per_s); !set) {
     return std::unexpected(set.error());
@@ -137,11 +121,14 @@ Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
       subscriptions_([this](std::string_view prefix) { return is_topic(prefix); }),
       endpoint_(std::move(endpoint)),
       poller_(std::move(poller)),
-      shared_(std::make_unique<SharedState>()) {
+      slots_(std::make_unique<PublishedSlots>(std::max(options_.slots, streams.size()))),
+      requests_(std::make_unique<Requests>()) {
   if (!options_.data_clock) options_.data_clock = options_.clock;
-  for (StreamInfo& stream : streams) {
-    published_.push_back(std::make_unique<PublishedStream>(std::move(stream)));
+  for (std::uint32_t i = 0; i < streams.size(); ++i) {
+    streams[i].stream = i;
+    slots_->add(std::make_unique<PublishedStream>(std::move(streams[i])));
   }
+  slots_->take_additions();
 }
 
 Publisher::~Publisher() = default;
@@ -156,37 +143,35 @@ void Publisher::take_all() {
 std::int64_t Publisher::turn(std::int64_t now_ns) {
   take_all();
   do_what_was_asked();
+  announce_new();
   // Also at the first turn, so that a status request that comes at once already finds the streams.
-  if (shared_->reported_ns == kNoTime_ns || now_ns >= shared_->reported_ns + kNanosPerSecond) {
+  if (reported_ns_ == kNoTime_ns || now_ns >= reported_ns_ + kNanosPerSecond) {
     every_second(now_ns);
   }
   const bool all_heard = hear_subscriptions(now_ns);
   const std::int64_t skeleton_ns = send_skeletons(now_ns);
   if (!all_heard) return now_ns;
-  return std::min(shared_->reported_ns + kNanosPerSecond, skeleton_ns);
+  return std::min(reported_ns_ + kNanosPerSecond, skeleton_ns);
 }
 
 void Publisher::finish(std::int64_t now_ns) {
   take_all();
-  for (std::uint32_t i = 0; i < published_.size(); ++i) report_shed(i, true);
+  slots_->for_each([this](PublishedStream& published) { report_shed(published, true); });
   every_second(now_ns);
 }
 
 void Publisher::run() {
+  begin_serving();
   while (!stop_.load(std::memory_order_acquire)) {
     const std::int64_t due_ns = turn(options_.clock());
     wake_.going_to_sleep();
-    if (in_.empty() && !shared_->asked.load() && !stop_.load(std::memory_order_acquire)) {
+    if (in_.empty() && !asked() && !stop_.load(std::memory_order_acquire)) {
       static_cast<void>(poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0)));
     }
     wake_.awake();
   }
   finish(options_.clock());
-}
-
-void Publisher::stop() noexcept {
-  stop_.store(true, std::memory_order_release);
-  wake_.notify();
+  end_serving();
 }
 
 void Publisher::send(std::string_view topic, const google::protobuf::MessageLite& message) {
@@ -200,51 +185,72 @@ void Publisher::send(std::string_view topic, const google::protobuf::MessageLite
   }
 }
 
+PublishedStream* Publisher::stream_of(const pipeline::Item& item) {
+  const std::uint32_t id = pipeline::stream_of(item);
+  if (PublishedStream* const published = slots_->current(id)) return published;
+  slots_->take_additions();
+  if (slots_->find(id) == nullptr) return nullptr;
+  // It is the first item of a later generation, so there are no more of the earlier ones.
+  const std::uint32_t slot = pipeline::slot_of(id);
+  while (slots_->current(id) == nullptr) {
+    report_shed(*slots_->holder(slot), true);
+    slots_->advance(slot);
+  }
+  announce_new();
+  return slots_->current(id);
+}
+
 void Publisher::take(const pipeline::Item& item) {
   using Kind = pipeline::Item::Kind;
-  pipeline::count(published_[pipeline::stream_of(item)]->info.counters->publisher.taken);
+  PublishedStream* const published = stream_of(item);
+  if (published == nullptr) return;
+  pipeline::count(published->info.counters->publisher.taken);
   switch (item.kind) {
     case Kind::kFrame:
     case Kind::kRawFrame:
-      take_frame(item.frame, item.kind == Kind::kRawFrame);
+      take_frame(*published, item.frame, item.kind == Kind::kRawFrame);
       break;
-    case Kind::kSample: {
-      PublishedStream& published = *published_[item.sample.header.stream];
-      published.count_sample();
-      send(published.styled.sensor_topic, published.styled.samples.encode(item.sample));
+    case Kind::kSample:
+      published->count_sample();
+      send(published->styled.sensor_topic, published->styled.samples.encode(item.sample));
       break;
-    }
     case Kind::kEvent:
-      take_notice(item.stream_event);
+      take_notice(*published, item.stream_event);
       break;
   }
 }
 
-void Publisher::take_notice(const pipeline::StreamEvent& event) {
+void Publisher::take_notice(PublishedStream& published, const pipeline::StreamEvent& event) {
   const auto kind = static_cast<v1::Event::Kind>(event.kind);
   if (kind == v1::Event::KIND_SHED) {
-    published_[event.stream]->shed.add(event.sequence, static_cast<std::uint64_t>(event.value));
-    return report_shed(event.stream, false);
+    published.shed.add(event.sequence, static_cast<std::uint64_t>(event.value));
+    return report_shed(published, false);
   }
-  if (kind == v1::Event::KIND_ENDED) report_shed(event.stream, true);
-  send_event(event.stream, kind, event.time_ns, event.sequence, sentence(event));
+  std::string text = sentence(event);
+  if (kind == v1::Event::KIND_ENDED) {
+    report_shed(published, true);
+    const StreamInfo& info = published.info;
+    if (!info.source.empty()) {
+      text = fmt::format("{} has left after frame {}", body_words(info.source, info.body),
+                         event.sequence);
+    }
+  }
+  send_event(published, kind, event.time_ns, event.sequence, text);
 }
 
-void Publisher::report_shed(std::uint32_t stream, bool at_end) {
+void Publisher::report_shed(PublishedStream& published, bool at_end) {
   const std::int64_t now_ns = options_.clock();
-  const auto sum = published_[stream]->shed.take(now_ns, at_end);
+  const auto sum = published.shed.take(now_ns, at_end);
   if (!sum) return;
-  send_event(stream, v1::Event::KIND_SHED, options_.data_clock(), sum->first, sentence(*sum));
+  send_event(published, v1::Event::KIND_SHED, options_.data_clock(), sum->first, sentence(*sum));
 }
 
-void Publisher::take_frame(const Frame& frame, bool raw) {
-  const std::uint32_t stream = frame.header.stream;
-  PublishedStream& published = *published_[stream];
+void Publisher::take_frame(PublishedStream& published, const Frame& frame, bool raw) {
   Channel& channel = raw ? *published.raw : published.styled;
   const v1::Frame& bare = channel.frames.encode(frame);
   if (options_.record_sink != nullptr && options_.record_sink->wants_published()) {
     bare.SerializeToString(&scratch_);
-    options_.record_sink->published(stream, frame.header.sequence, raw,
+    options_.record_sink->published(frame.header.stream, frame.header.sequence, raw,
                                     std::as_bytes(std::span(scratch_)));
   }
   StageStamps stamps = frame.stamps;
@@ -256,10 +262,10 @@ void Publisher::take_frame(const Frame& frame, bool raw) {
   if (!raw) published.count(frame, stamps);
 }
 
-void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
+void Publisher::send_event(PublishedStream& published, v1::Event::Kind kind, std::int64_t time_ns,
                            std::uint64_t sequence, const std::string& text) {
   v1::Event event;
-  event.set_stream(published_[stream]->info.name);
+  event.set_stream(published.info.name);
   event.set_kind(kind);
   event.set_time_ns(time_ns);
   event.set_sequence(sequence);
@@ -268,7 +274,7 @@ void Publisher::send_event(std::uint32_t stream, v1::Event::Kind kind, std::int6
                    kind == v1::Event::KIND_LOST || kind == v1::Event::KIND_CLOCK_JUMPED ||
                    (kind >= v1::Event::KIND_RECORDING_GAP && kind <= v1::Event::KIND_WARNING);
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "{}: {}", event.stream(), text);
-  send(published_[stream]->styled.event_topic, event);
+  send(published.styled.event_topic, event);
 }
 
 // A subscription message is one byte (1: subscribe, 0: unsubscribe), then the beginning of a topic.
@@ -299,9 +305,12 @@ bool Publisher::is_topic(std::string_view prefix) const {
     return channel.pose_topic.starts_with(prefix) || channel.skeleton_topic.starts_with(prefix) ||
            channel.sensor_topic.starts_with(prefix) || channel.event_topic.starts_with(prefix);
   };
-  return std::ranges::any_of(published_, [&](const auto& published) {
-    return begins_one_of(published->styled) || (published->raw && begins_one_of(*published->raw));
+  bool found = false;
+  slots_->for_each([&](const PublishedStream& published) {
+    found = found || begins_one_of(published.styled) ||
+            (published.raw && begins_one_of(*published.raw));
   });
+  return found;
 }
 
 // Schedules the skeletons of all topics that begin with `prefix`, after a subscription.
@@ -311,10 +320,31 @@ void Publisher::want_skeletons(std::string_view prefix) {
     channel.skeleton_due_ns =
         std::min(channel.skeleton_due_ns, channel.skeleton_sent_ns + kSkeletonPause_ns);
   };
-  for (const auto& published : published_) {
-    want(published->styled);
-    if (published->raw) want(*published->raw);
-  }
+  slots_->for_each([&](PublishedStream& published) {
+    want(published.styled);
+    if (published.raw) want(*published.raw);
+  });
+}
+
+// A subscriber must know the skeleton before the first pose.
+void Publisher::announce_new() {
+  const auto send_skeleton = [this](Channel& channel) {
+    if (!channel.skeleton) return;
+    channel.skeleton_sent_ns = options_.clock();
+    channel.skeleton_due_ns = channel.skeleton_sent_ns + kNanosPerSecond;
+    send(channel.skeleton_topic, *channel.skeleton);
+  };
+  slots_->for_each_new([&](PublishedStream& published) {
+    const StreamInfo& info = published.info;
+    if (!info.refusal.empty()) {
+      return send_event(published, v1::Event::KIND_WARNING, options_.data_clock(), 0, info.refusal);
+    }
+    send_skeleton(published.styled);
+    if (published.raw) send_skeleton(*published.raw);
+    if (info.source.empty()) return;
+    send_event(published, v1::Event::KIND_FOUND, options_.data_clock(), 0,
+               body_words(info.source, info.body) + " has come");
+  });
 }
 
 std::int64_t Publisher::send_skeletons(std::int64_t now_ns) {
@@ -328,90 +358,34 @@ std::int64_t Publisher::send_skeletons(std::int64_t now_ns) {
     }
     next_ns = std::min(next_ns, channel.skeleton_due_ns);
   };
-  for (const auto& published : published_) {
-    send_one(published->styled);
-    if (published->raw) send_one(*published->raw);
-  }
+  slots_->for_each([&](PublishedStream& published) {
+    send_one(published.styled);
+    if (published.raw) send_one(*published.raw);
+  });
   return next_ns;
 }
 
 void Publisher::every_second(std::int64_t now_ns) {
-  const bool first = shared_->reported_ns == kNoTime_ns;
-  const double since_s = first ? 0.0 : seconds(now_ns - shared_->reported_ns);
+  const bool first = reported_ns_ == kNoTime_ns;
+  const double since_s = first ? 0.0 : seconds(now_ns - reported_ns_);
   const std::int64_t cpu_ns = system::cpu_time_ns();
-  if (first) shared_->cpu_ns = cpu_ns;
+  if (first) reported_cpu_ns_ = cpu_ns;
   v1::Stats stats;
   const std::int64_t data_ns = options_.data_clock();
   stats.set_time_ns(data_ns);
   stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - data_ns);
   stats.set_rss_bytes(system::resident_bytes());
   stats.set_cpu_percent(
-      static_cast<float>(100.0 * seconds(cpu_ns - shared_->cpu_ns) / std::max(since_s, 1e-3)));
-  for (std::uint32_t i = 0; i < published_.size(); ++i) {
-    published_[i]->report(*stats.add_stream(), since_s);
-    report_shed(i, false);
-  }
-  if (options_.more_stats) options_.more_stats(stats);
-  shared_->reported_ns = now_ns;
-  shared_->cpu_ns = cpu_ns;
-  send("stats", stats);
-  const std::scoped_lock lock(shared_->mutex);
-  shared_->stats = std::move(stats);
-}
-
-void Publisher::do_what_was_asked() {
-  if (!shared_->asked.exchange(false)) return;
-  std::vector<SharedState::Posted> events;
-  bool check = false;
-  {
-    const std::scoped_lock lock(shared_->mutex);
-    events.swap(shared_->events);
-    check = std::exchange(shared_->check, false);
-  }
-  for (const SharedState::Posted& event : events) {
-    send_event(event.stream, event.kind, options_.data_clock(), 0, event.text);
-  }
-  if (!check || options_.authenticator == nullptr) return;
-  guard_->cut_unless([this](std::string_view user) {
-    return options_.authenticator->allows(user, net::Domain::kPublish);
+      static_cast<float>(100.0 * seconds(cpu_ns - reported_cpu_ns_) / std::max(since_s, 1e-3)));
+  keep_stats(stats);
+  slots_->for_each([&](PublishedStream& published) {
+    *stats.add_stream() = published.report(since_s);
+    report_shed(published, false);
   });
-}
-
-template <typename Change>
-void Publisher::ask(Change&& change) {
-  {
-    const std::scoped_lock lock(shared_->mutex);
-    change(*shared_);
-  }
-  shared_->asked.store(true);
-  wake_.notify();
-}
-
-void Publisher::set_model_name(std::uint32_t stream, std::string name) {
-  published_[stream]->set_model(std::move(name));
-}
-
-void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {
-  ask([&](SharedState& state) { state.events.push_back({stream, kind, std::move(text)}); });
-}
-
-void Publisher::check_subscribers() {
-  ask([](SharedState& state) { state.check = true; });
-}
-
-v1::Stats Publisher::stats() const {
-  v1::Stats stats;
-  {
-    const std::scoped_lock lock(shared_->mutex);
-    stats = shared_->stats;
-  }
-  for (int i = 0; i < static_cast<int>(published_.size()); ++i) {
-    if (i == stats.stream_size()) stats.add_stream();  // before the first stats
-    published_[static_cast<std::size_t>(i)]->fill(*stats.mutable_stream(i));
-  }
-  stats.set_time_ns(options_.data_clock());
   if (options_.more_stats) options_.more_stats(stats);
-  return stats;
+  reported_ns_ = now_ns;
+  reported_cpu_ns_ = cpu_ns;
+  send("stats", stats);
 }
 
 }  // namespace posed::publish

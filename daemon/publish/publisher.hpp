@@ -32,6 +32,7 @@ class PeerGuard;
 namespace posed::publish {
 
 struct StreamInfo {
+  std::uint32_t stream = 0;  // id; its slot is below PublisherOptions::slots
   std::string name;
   drivers::Description description;
   double rate_hz = 0.0;                  // expected frame rate; 0: unknown
@@ -40,7 +41,13 @@ struct StreamInfo {
   std::string model;                     // the first stage's model at the start, by name
   bool comes_and_goes = false;           // the device may be unplugged
   std::shared_ptr<const devices::PresentDevice> present{};  // null: the stream has no device
+  // Never null. They outlive the publisher, or Publisher::remove() of the stream.
   pipeline::StreamCounters* counters = nullptr;
+  const pipeline::SourceCounters* source_counters = nullptr;
+  // Of a body of a device with several: the source's name in the config, and the device's own name
+  // for the body.
+  std::string source{}, body{};
+  std::string refusal{};  // why a stage cannot serve the body; then nothing is ever published
 };
 
 struct PublisherOptions {
@@ -56,6 +63,10 @@ struct PublisherOptions {
   // publishes in the time of its recording.
   std::function<std::int64_t()> data_clock{};
   bool stamps = true;  // false: leaves published_ns out, because it would have no meaning
+  // How many streams there may be at once, with those that are there from the start. As many as
+  // those: none will come.
+  std::size_t slots = 0;
+  double more_messages_per_s = 0.0;  // of the streams that may come
 };
 
 // The length of a message queue that holds a quarter of a second of all streams together.
@@ -63,11 +74,13 @@ struct PublisherOptions {
 // Sets that queue length, and a small kernel buffer behind it. Call before bind.
 [[nodiscard]] Result<> set_queue_options(void* socket, double messages_per_s);
 
+class PublishedSlots;
 class PublishedStream;
 
 class Publisher {
  public:
-  // Binds. `in` and `wake` outlive the publisher.
+  // Binds. `in` and `wake` outlive the publisher. The ids of `streams` are their indices, whatever
+  // StreamInfo::stream says.
   [[nodiscard]] static Result<std::unique_ptr<Publisher>> open(PublisherOptions options,
                                                                std::vector<StreamInfo> streams,
                                                                pipeline::Ring<pipeline::Item>& in,
@@ -88,6 +101,14 @@ class Publisher {
 
   // All below: for any other thread; cold.
   void stop() noexcept;
+  // A stream comes. It is there at the publisher's next turn; but if its slot still has an earlier
+  // generation, at its own first item, or when the earlier one is removed.
+  void add(StreamInfo stream);
+  // The stream leaves; nothing happens if there is none of this id. Waits until everything that is
+  // in the ring now has been taken, and until nothing uses the stream's counters any more. If no
+  // thread is in run(), the caller does all that itself; so if turn() is used without run(), then
+  // only the thread that calls turn() may call remove().
+  void remove(std::uint32_t stream);
   void set_model_name(std::uint32_t stream, std::string name);
   // Publishes a message for people on event/<stream>.
   void post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text);
@@ -98,18 +119,22 @@ class Publisher {
   [[nodiscard]] v1::Stats stats() const;
 
  private:
-  struct SharedState;
+  struct Requests;
   Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
             pipeline::Ring<pipeline::Item>& in, system::EventFd& wake, net::Socket socket,
             std::string endpoint, std::unique_ptr<system::Poller> poller,
             std::unique_ptr<net::PeerGuard> guard);
   void take_all();
   void take(const pipeline::Item& item);
-  void take_frame(const Frame& frame, bool raw);
-  void take_notice(const pipeline::StreamEvent& event);
-  void report_shed(std::uint32_t stream, bool at_end);
-  void send_event(std::uint32_t stream, v1::Event::Kind kind, std::int64_t time_ns,
+  void take_frame(PublishedStream& published, const Frame& frame, bool raw);
+  void take_notice(PublishedStream& published, const pipeline::StreamEvent& event);
+  // The stream of an item; null if there is none.
+  [[nodiscard]] PublishedStream* stream_of(const pipeline::Item& item);
+  void report_shed(PublishedStream& published, bool at_end);
+  void send_event(PublishedStream& published, v1::Event::Kind kind, std::int64_t time_ns,
                   std::uint64_t sequence, const std::string& text);
+  // Sends the skeletons of the streams that have come, and says that they have.
+  void announce_new();
   // Sends the skeletons that are due; returns when the next one is.
   [[nodiscard]] std::int64_t send_skeletons(std::int64_t now_ns);
   void want_skeletons(std::string_view prefix);
@@ -117,7 +142,13 @@ class Publisher {
   [[nodiscard]] bool hear_subscriptions(std::int64_t now_ns);
   [[nodiscard]] bool is_topic(std::string_view prefix) const;
   void every_second(std::int64_t now_ns);
+  // These and the functions for other threads: publisher_requests.cpp.
+  [[nodiscard]] bool asked() const noexcept;
   void do_what_was_asked();
+  void remove_now(std::uint32_t stream);
+  void begin_serving();
+  void end_serving();
+  void keep_stats(v1::Stats stats);
   template <typename Change>
   void ask(Change&& change);
   void send(std::string_view topic, const google::protobuf::MessageLite& message);
@@ -130,8 +161,11 @@ class Publisher {
   Subscriptions subscriptions_;
   std::string endpoint_;
   std::unique_ptr<system::Poller> poller_;
-  std::vector<std::unique_ptr<PublishedStream>> published_;
-  std::unique_ptr<SharedState> shared_;
+  std::unique_ptr<PublishedSlots> slots_;
+  std::unique_ptr<Requests> requests_;
+  // When stats were last published, and the processor time at that moment.
+  std::int64_t reported_ns_ = kNoTime_ns;
+  std::int64_t reported_cpu_ns_ = 0;
   std::string scratch_;
   std::atomic<bool> stop_{false};
 };

@@ -9,11 +9,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "daemon/record/record_rings.hpp"
+#include "daemon/record/recorded_stream.hpp"
 #include "proto/log/writer.hpp"
 
 namespace posed::record {
@@ -22,15 +25,18 @@ namespace posed::record {
 struct RecorderEvent {
   enum class Kind : std::uint8_t { kGap, kError };
   Kind kind = Kind::kGap;
-  std::uint32_t stream = 0;  // of a gap; an error concerns all streams
+  // Which it concerns: those that a source has now if it lacks chunks; all of them for an error.
+  std::vector<std::uint32_t> streams;
   std::int64_t time_ns = 0;
   std::string text;
 };
 
 class LogWriterLoop {
  public:
-  // Calls `report` from within turn() and finish(). The rings must outlive this object.
+  // `streams`: those whose rows are in the log already. Calls `report` from within turn() and
+  // finish(). The rings must outlive this object.
   LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesystem::path path,
+                std::span<const RecordedStream> streams,
                 std::function<void(const RecorderEvent&)> report);
 
   // Call every 50 to 100 ms; commits when 250 ms have passed since the last commit.
@@ -44,46 +50,78 @@ class LogWriterLoop {
 
  private:
   using GapKind = log::GapRow::Kind;
-  static constexpr std::array kKinds{GapKind::kChunks, GapKind::kDecisions, GapKind::kFrames};
-  using Counts = std::array<std::uint64_t, kKinds.size()>;  // by GapKind
 
-  struct StreamState {
-    Counts uncommitted{};  // rows added since the last commit
-    Counts in_gaps{};      // records counted in the gap rows added since then
-    Counts lost{};         // lost and not in a gap row yet
-    Counts reported{};     // overflows already reported
-    // The first frame that is concerned by a decision or a gap row added since the last commit; and
-    // by a decision that is lost and not in a gap row yet.
+  // The rows of one kind of one owner: chunks belong to a source, the others to a stream.
+  struct Tally {
+    GapKind kind = GapKind::kChunks;
+    std::uint32_t owner = 0;
+    std::uint32_t source = 0;
+    const Losses* in_rings = nullptr;
+    std::uint64_t uncommitted = 0;  // rows added since the last commit
+    std::uint64_t in_gaps = 0;      // records counted in the gap rows added since then
+    std::uint64_t lost = 0;         // lost and not in a gap row yet
+    std::uint64_t reported = 0;     // overflows already reported
+    // Of decisions: the first frame that is concerned by one, or by a gap row, added since the last
+    // commit; and by one that is lost and not in a gap row yet.
     std::uint64_t uncommitted_from_frame = kNoFrame;
     std::uint64_t lost_from_frame = kNoFrame;
+  };
+  struct SourceState {
+    Tally chunks;
+    std::vector<std::uint32_t> streams;  // that it has, as of its last chunk
     std::int64_t last_chunk = 0;
     std::int64_t committed_chunk = 0;
   };
+  struct StreamState {
+    Tally decisions, frames;
+    std::optional<RecordedStream> row;  // until it is committed
+    bool named = false;                 // by a record, so that the log needs the row
+    std::uint64_t first_item = 0;       // of the records that name it; 0: unknown
+  };
 
-  [[nodiscard]] static std::size_t index(GapKind kind) { return static_cast<std::size_t>(kind); }
   void drain(std::int64_t now_ns);
-  // Adds a row of a stream, or counts it as lost while writing fails.
+  // Adds a row, or counts it as lost while writing fails.
   template <typename Row>
-  bool put(std::uint32_t stream, GapKind kind, const Row& row, std::int64_t now_ns);
+  bool put(Tally& tally, const Row& row, std::int64_t now_ns);
+  void put_chunk(const ChunkHeader& header, std::span<const pipeline::StreamPosition> positions,
+                 std::span<const std::byte> bytes, std::int64_t now_ns);
   void put_decision(const DecisionRecord& record, std::int64_t now_ns);
+  void put_frame(const FrameHeader& header, std::span<const std::byte> bytes, std::int64_t now_ns);
   // `from_frame`: the first frame that the lost decisions may concern.
-  void put_gap(std::uint32_t stream, GapKind kind, std::uint64_t lost, std::int64_t now_ns,
+  void put_gap(Tally& tally, std::uint64_t lost, std::int64_t now_ns,
                std::uint64_t from_frame = kNoFrame);
-  [[nodiscard]] Result<log::GapRow> gap_row(std::uint32_t stream, GapKind kind, std::uint64_t lost,
+  [[nodiscard]] Result<log::GapRow> gap_row(const Tally& tally, std::uint64_t lost,
                                             std::int64_t now_ns, std::uint64_t from_frame) const;
+  void take_streams();
+  void add_stream(std::uint32_t id, std::uint32_t source, std::optional<RecordedStream> row);
+  // The state of a stream that a record names; null if it was never added. `item`: from which on
+  // the record proves that the stream is there; 0: it does not say.
+  StreamState* meet(std::uint32_t id, std::uint64_t item);
+  [[nodiscard]] Result<> write_stream_rows();
   [[nodiscard]] Result<> write_lost(std::int64_t now_ns);
   [[nodiscard]] Result<> commit(std::int64_t now_ns);
-  void count_lost(std::uint32_t stream, GapKind kind, std::uint64_t count);
+  void count_lost(Tally& tally, std::uint64_t count);
   void fail(const Error& error, std::int64_t now_ns);
   void resume(std::int64_t now_ns);
   void report_overflows(std::int64_t now_ns);
+  void report_gap(const Tally& tally, std::int64_t now_ns, const std::string& text);
+  template <typename Each>
+  void each_tally(Each&& each) {
+    for (SourceState& source : sources_) each(source.chunks);
+    for (auto& [id, stream] : streams_) {
+      each(stream.decisions);
+      each(stream.frames);
+    }
+  }
 
   RecordRings& rings_;
   std::optional<log::Writer> writer_;  // empty while writing fails
   std::filesystem::path path_;
   std::function<void(const RecorderEvent&)> report_;
-  std::vector<StreamState> streams_;
-  std::vector<std::vector<std::byte>> models_;  // not yet committed
+  std::vector<SourceState> sources_;              // by number
+  std::map<std::uint32_t, StreamState> streams_;  // by id
+  std::vector<log::StreamPosition> places_;       // of the chunk that is written
+  std::vector<std::vector<std::byte>> models_;    // not yet committed
   std::int64_t last_commit_ns_ = 0;
   std::int64_t retry_ns_ = 0;        // when to try again
   std::int64_t retry_after_ns_ = 0;  // grows while attempts fail

@@ -15,7 +15,7 @@
 
 namespace posed::record {
 
-// Header: trivially copyable, with a member `bytes` that holds the length of the bytes behind it.
+// Header: trivially copyable, with a member `bytes` that holds the length of all bytes behind it.
 template <typename Header>
 class RecordRing {
   static_assert(std::is_trivially_copyable_v<Header>);
@@ -32,13 +32,16 @@ class RecordRing {
     return sizeof(Header) + header.bytes;
   }
 
-  // Producer. Returns false if the ring is full; then nothing was written. RT-safe.
-  [[nodiscard]] bool push(const Header& header, std::span<const std::byte> bytes) noexcept {
+  // Producer. The bytes behind the header are those of `first` and then those of `second`. Returns
+  // false if the ring is full; then nothing was written. RT-safe.
+  [[nodiscard]] bool push(const Header& header, std::span<const std::byte> first,
+                          std::span<const std::byte> second = {}) noexcept {
     if (ring_.write_available() < size_of(header)) return false;
     std::array<std::byte, sizeof(Header)> image;
     std::memcpy(image.data(), &header, sizeof(Header));
     ring_.push(image.data(), image.size());
-    ring_.push(bytes.data(), bytes.size());
+    ring_.push(first.data(), first.size());
+    ring_.push(second.data(), second.size());
     return true;
   }
 
@@ -55,7 +58,7 @@ class RecordRing {
         header_ready_ = true;
         budget -= sizeof(Header);
       }
-      // Header and bytes are two pushes: the second one may still be missing.
+      // Header and bytes are several pushes: the later ones may still be missing.
       if (budget < header_.bytes) return;
       scratch_.resize(header_.bytes);
       ring_.pop(scratch_.data(), scratch_.size());

@@ -1,107 +1,139 @@
 #include "daemon/record/record_rings.hpp"
 
 #include <algorithm>
+#include <numeric>
+#include <utility>
 
 namespace posed::record {
 namespace {
 
 constexpr auto kRelaxed = std::memory_order_relaxed;
 
-std::uint64_t pending(const auto& to) noexcept {
-  return to.total.load(kRelaxed) - to.carried.load(kRelaxed);
+std::size_t sum_of(const std::vector<SlotSizes>& slots, std::size_t SlotSizes::* size) {
+  std::size_t sum = 0;
+  for (const SlotSizes& slot : slots) sum += slot.*size;
+  return sum;
 }
 
-// Adds a record to its stream's share with `push`. A record that fits carries `lost_before`;
-// otherwise it is itself counted as lost, and the result is false.
-bool put(auto& to, std::size_t amount, std::uint64_t lost_before, auto&& push) noexcept {
-  if (to.share.has_room(amount) && push()) {
-    to.share.add(amount);
-    if (lost_before != 0) to.carried.fetch_add(lost_before, kRelaxed);
+// Adds a record to its share of a ring with `push`. A record that fits carries `lost_before`;
+// otherwise it is itself counted as lost, and the result is false. RT-safe.
+bool put(auto& share, Losses& lost, std::size_t amount, std::uint64_t lost_before,
+         auto&& push) noexcept {
+  if (share.share.has_room(amount) && push()) {
+    share.share.add(amount);
+    if (lost_before != 0) lost.carried.fetch_add(lost_before, kRelaxed);
     return true;
   }
-  to.total.fetch_add(1, kRelaxed);
+  lost.total.fetch_add(1, kRelaxed);
   return false;
-}
-
-std::size_t sum_of(const std::vector<RingSizes>& shares, std::size_t RingSizes::* size) {
-  std::size_t sum = 0;
-  for (const RingSizes& share : shares) sum += share.*size;
-  return sum;
 }
 
 }  // namespace
 
-RecordRings::RecordRings(const std::vector<RingSizes>& shares)
-    : chunks_(sum_of(shares, &RingSizes::chunk_bytes)),
-      frames_(sum_of(shares, &RingSizes::frame_bytes)),
-      decisions_(sum_of(shares, &RingSizes::decisions)),
-      wants_published_(sum_of(shares, &RingSizes::frame_bytes) != 0) {
-  for (const RingSizes& share : shares) shares_.emplace_back(share);
+RecordRings::RecordRings(const RingSizes& sizes)
+    : chunks_(std::reduce(sizes.chunk_bytes.begin(), sizes.chunk_bytes.end())),
+      frames_(sum_of(sizes.slots, &SlotSizes::frame_bytes)),
+      decisions_(sum_of(sizes.slots, &SlotSizes::decisions)),
+      wants_published_(sum_of(sizes.slots, &SlotSizes::frame_bytes) != 0) {
+  for (const std::size_t bytes : sizes.chunk_bytes) sources_.emplace_back(bytes);
+  for (const SlotSizes& of_slot : sizes.slots) {
+    Slot& slot = slots_.emplace_back(of_slot);
+    const auto first = static_cast<std::uint32_t>(slots_.size() - 1);
+    slot.newest = &slot.streams.emplace_back(first, nullptr);
+  }
+}
+
+void RecordRings::add_stream(RecordedStream stream) {
+  const std::lock_guard lock(added_mutex_);
+  const std::uint32_t place = pipeline::slot_of(stream.id);
+  if (place >= slots_.size()) return;
+  if (find(stream.id) == nullptr) {
+    Slot& slot = slots_[place];
+    StreamLosses& losses = slot.streams.emplace_back(stream.id, slot.newest.load(kRelaxed));
+    slot.newest.store(&losses, std::memory_order_release);
+  }
+  streams_.push_back(std::move(stream));
 }
 
 // RT-safe
-void RecordRings::chunk(std::uint32_t stream, std::uint8_t socket, pipeline::Direction direction,
+void RecordRings::chunk(std::uint32_t number, std::uint8_t socket, pipeline::Direction direction,
                         std::int64_t arrival_ns, const pipeline::Position& next,
                         std::span<const std::byte> bytes) noexcept {
-  StreamShare& to = share_of(stream, GapKind::kChunks);
-  const ChunkHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
-                           .stream = stream,
+  Source& source = sources_[number];
+  const auto positions = std::as_bytes(next.streams);
+  const ChunkHeader header{.bytes = static_cast<std::uint32_t>(positions.size() + bytes.size()),
+                           .source = number,
                            .socket = socket,
                            .direction = direction,
+                           .positions = static_cast<std::uint16_t>(next.streams.size()),
                            .arrival_ns = arrival_ns,
-                           .next = next,
-                           .lost_before = pending(to)};
-  put(to, chunks_.size_of(header), header.lost_before, [&] { return chunks_.push(header, bytes); });
+                           .item = next.item,
+                           .lost_before = source.lost.pending()};
+  put(source.share, source.lost, chunks_.size_of(header), header.lost_before,
+      [&] { return chunks_.push(header, positions, bytes); });
 }
 
 // RT-safe
 void RecordRings::decision(const pipeline::Decision& decision) noexcept {
-  StreamShare& to = share_of(decision.stream, GapKind::kDecisions);
+  StreamLosses* stream = find(decision.stream);
+  if (stream == nullptr) return;
+  Losses& lost = stream->decisions;
   const DecisionRecord record{.decision = decision,
-                              .lost_before = pending(to),
-                              .lost_from_frame = to.lost_from_frame.load(kRelaxed)};
-  if (put(to, 1, record.lost_before, [&] { return decisions_.push(record); })) return;
+                              .lost_before = lost.pending(),
+                              .lost_from_frame = lost.lost_from_frame.load(kRelaxed)};
+  Share& share = slots_[pipeline::slot_of(decision.stream)].decisions;
+  if (put(share, lost, 1, record.lost_before, [&] { return decisions_.push(record); })) return;
   const std::uint64_t before = record.lost_before == 0 ? kNoFrame : record.lost_from_frame;
-  to.lost_from_frame.store(std::min(before, first_frame_of(decision)), kRelaxed);
+  lost.lost_from_frame.store(std::min(before, first_frame_of(decision)), kRelaxed);
 }
 
 // RT-safe
-void RecordRings::published(std::uint32_t stream, std::uint64_t sequence, bool raw,
+void RecordRings::published(std::uint32_t id, std::uint64_t sequence, bool raw,
                             std::span<const std::byte> bytes) noexcept {
-  StreamShare& to = share_of(stream, GapKind::kFrames);
+  StreamLosses* stream = find(id);
+  if (stream == nullptr) return;
   const FrameHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
-                           .stream = stream,
+                           .stream = id,
                            .raw = raw,
                            .sequence = sequence,
-                           .lost_before = pending(to)};
-  put(to, frames_.size_of(header), header.lost_before, [&] { return frames_.push(header, bytes); });
+                           .lost_before = stream->frames.pending()};
+  put(slots_[pipeline::slot_of(id)].frames, stream->frames, frames_.size_of(header),
+      header.lost_before, [&] { return frames_.push(header, bytes); });
 }
 
 // RT-safe
-void RecordRings::unpublished(std::uint32_t stream) noexcept {
-  if (wants_published_) share_of(stream, GapKind::kFrames).total.fetch_add(1, kRelaxed);
+void RecordRings::unpublished(std::uint32_t id) noexcept {
+  if (!wants_published_) return;
+  if (StreamLosses* stream = find(id)) stream->frames.total.fetch_add(1, kRelaxed);
 }
 
 void RecordRings::keep_model(std::span<const std::byte> bytes) {
-  const std::lock_guard lock(models_mutex_);
+  const std::lock_guard lock(added_mutex_);
   models_.emplace_back(bytes.begin(), bytes.end());
 }
 
 std::vector<std::vector<std::byte>> RecordRings::take_models() {
-  const std::lock_guard lock(models_mutex_);
+  const std::lock_guard lock(added_mutex_);
   return std::exchange(models_, {});
 }
 
-std::uint64_t RecordRings::overflowed(std::uint32_t stream, GapKind kind) const noexcept {
-  return share_of(stream, kind).total.load(kRelaxed);
+std::vector<RecordedStream> RecordRings::take_streams() {
+  const std::lock_guard lock(added_mutex_);
+  return std::exchange(streams_, {});
 }
 
-std::uint64_t RecordRings::uncarried(std::uint32_t stream, GapKind kind) const noexcept {
-  return pending(share_of(stream, kind));
+// The stream is nearly always the newest of its slot, or the one before. RT-safe.
+StreamLosses* RecordRings::find(std::uint32_t stream) const noexcept {
+  const std::uint32_t slot = pipeline::slot_of(stream);
+  if (slot >= slots_.size()) return nullptr;
+  StreamLosses* found = slots_[slot].newest.load(std::memory_order_acquire);
+  while (found != nullptr && found->id != stream) found = found->older;
+  return found;
 }
 
-std::uint64_t RecordRings::uncarried_from_frame(std::uint32_t stream) const noexcept {
-  return share_of(stream, GapKind::kDecisions).lost_from_frame.load(kRelaxed);
+// RT-safe
+const StreamLosses* RecordRings::losses_of(std::uint32_t stream) const noexcept {
+  return find(stream);
 }
 
 }  // namespace posed::record

@@ -1,10 +1,11 @@
 // The rings behind RecordSink: the hot threads add records, the recorder thread removes them. Each
-// stream has a share of every ring, so that no stream can cause another to lose records. A record
-// that does not fit is counted, and the next record of the same stream that fits carries the count;
-// so the gap row stands in the log where the gap happened.
+// source has a share of the ring of chunks, and each slot for a stream a share of those of
+// decisions and frames, so that none can cause another to lose records. A record that does not fit
+// is counted as lost by its source or by its stream, and the next record of the same source or
+// stream that fits carries the count; so the gap row stands in the log where the gap happened.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -19,17 +20,21 @@
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/record/record_ring.hpp"
+#include "daemon/record/recorded_stream.hpp"
+#include "daemon/record/ring_sizes.hpp"
 #include "proto/log/rows.hpp"
 
 namespace posed::record {
 
+// Behind it are the positions of the source's streams, then the bytes of the chunk.
 struct ChunkHeader {
-  std::uint32_t bytes = 0;
-  std::uint32_t stream = 0;
+  std::uint32_t bytes = 0;  // of both
+  std::uint32_t source = 0;
   std::uint8_t socket = 0;
   pipeline::Direction direction = pipeline::Direction::kFromDevice;
+  std::uint16_t positions = 0;  // how many
   std::int64_t arrival_ns = 0;
-  pipeline::Position next{};
+  std::uint64_t item = 0;  // number of the first item made from it
   std::uint64_t lost_before = 0;
 };
 
@@ -56,20 +61,38 @@ struct DecisionRecord {
   std::uint64_t lost_from_frame = 0;  // the first frame that one of the lost decisions may concern
 };
 
-// How much of the rings one stream may use.
-struct RingSizes {
-  std::size_t chunk_bytes = 0;
-  std::size_t frame_bytes = 0;  // 0: published frames are not recorded
-  std::size_t decisions = 0;
+// The records of one kind that did not fit, of one source or stream. `total` is written by any
+// thread, the others by the single producer of this kind; any thread may read them.
+struct Losses {
+  std::atomic<std::uint64_t> total{0};
+  std::atomic<std::uint64_t> carried{0};          // how many of them a later record has reported
+  std::atomic<std::uint64_t> lost_from_frame{0};  // for decisions, see DecisionRecord
+
+  // Those that no later record carries yet.
+  [[nodiscard]] std::uint64_t pending() const noexcept {
+    return total.load(std::memory_order_relaxed) - carried.load(std::memory_order_relaxed);
+  }
+};
+
+// They belong to a stream, not to its slot: while a slot's share is full several generations may
+// have lost records. They stay until the recording ends.
+struct StreamLosses {
+  StreamLosses(std::uint32_t stream, StreamLosses* before) noexcept : id(stream), older(before) {}
+  const std::uint32_t id;
+  StreamLosses* const older;  // of the same slot
+  Losses decisions, frames;
 };
 
 class RecordRings final : public pipeline::RecordSink {
  public:
-  // A share for each stream, in stream order. Frames are recorded of all streams or of none.
-  explicit RecordRings(const std::vector<RingSizes>& shares);
+  // Frames are recorded of all streams or of none. The streams of generation 0 need not be added.
+  explicit RecordRings(const RingSizes& sizes);
 
-  // RecordSink, called by the hot threads.
-  void chunk(std::uint32_t stream, std::uint8_t socket, pipeline::Direction direction,
+  // Before the first record of the stream is made. Cold: allocates and locks; any thread.
+  void add_stream(RecordedStream stream);
+
+  // RecordSink, called by the hot threads. Records of a stream that was never added are ignored.
+  void chunk(std::uint32_t source, std::uint8_t socket, pipeline::Direction direction,
              std::int64_t arrival_ns, const pipeline::Position& next,
              std::span<const std::byte> bytes) noexcept override;
   void decision(const pipeline::Decision& decision) noexcept override;
@@ -79,18 +102,23 @@ class RecordRings final : public pipeline::RecordSink {
   void unpublished(std::uint32_t stream) noexcept override;
   void keep_model(std::span<const std::byte> bytes) override;
 
-  // Called by the recorder thread: each(header, bytes) or each(record) for what is there now.
+  // Called by the recorder thread for what is there now: each(header, positions, bytes),
+  // each(header, bytes) or each(record).
   template <typename Each>
   void drain_chunks(Each&& each) {
     chunks_.drain([&](const ChunkHeader& header, std::span<const std::byte> bytes) {
-      give_back(header.stream, GapKind::kChunks, chunks_.size_of(header));
-      each(header, bytes);
+      give_back(sources_[header.source].share, chunks_.size_of(header));
+      positions_.resize(header.positions);
+      const auto packed = std::as_writable_bytes(std::span(positions_));
+      std::ranges::copy(bytes.first(packed.size()), packed.begin());
+      each(header, std::span<const pipeline::StreamPosition>(positions_),
+           bytes.subspan(packed.size()));
     });
   }
   template <typename Each>
   void drain_frames(Each&& each) {
     frames_.drain([&](const FrameHeader& header, std::span<const std::byte> bytes) {
-      give_back(header.stream, GapKind::kFrames, frames_.size_of(header));
+      give_back(slots_[pipeline::slot_of(header.stream)].frames, frames_.size_of(header));
       each(header, bytes);
     });
   }
@@ -98,57 +126,57 @@ class RecordRings final : public pipeline::RecordSink {
   void drain_decisions(Each&& each) {
     DecisionRecord record;
     for (auto n = decisions_.read_available(); n > 0 && decisions_.pop(record); --n) {
-      give_back(record.decision.stream, GapKind::kDecisions, 1);
+      give_back(slots_[pipeline::slot_of(record.decision.stream)].decisions, 1);
       each(record);
     }
   }
   [[nodiscard]] std::vector<std::vector<std::byte>> take_models();
+  [[nodiscard]] std::vector<RecordedStream> take_streams();
 
-  using GapKind = log::GapRow::Kind;
-  // Records of one kind that did not fit since the start. Any thread.
-  [[nodiscard]] std::uint64_t overflowed(std::uint32_t stream, GapKind kind) const noexcept;
-  // How many of them no later record carries; valid once the producers have stopped.
-  [[nodiscard]] std::uint64_t uncarried(std::uint32_t stream, GapKind kind) const noexcept;
-  // The first frame that may be concerned by a lost decision that no later one carries.
-  [[nodiscard]] std::uint64_t uncarried_from_frame(std::uint32_t stream) const noexcept;
-  [[nodiscard]] std::size_t streams() const noexcept { return shares_.size(); }
+  [[nodiscard]] std::size_t sources() const noexcept { return sources_.size(); }
+  // Any thread.
+  [[nodiscard]] const Losses& losses_of_source(std::uint32_t source) const noexcept {
+    return sources_[source].lost;
+  }
+  // Null for a stream that was never added. RT-safe; any thread.
+  [[nodiscard]] const StreamLosses* losses_of(std::uint32_t stream) const noexcept;
 
  private:
-  // One stream's part of one ring. `share`, `carried` and `lost_from_frame` are written by the
-  // single producer of this kind, `total` by any thread, `taken` by the recorder. Any thread may
-  // read all of them except `share`.
-  struct StreamShare {
-    explicit StreamShare(std::size_t size) noexcept : share(size, taken) {}
+  // One source's or slot's part of one ring. `taken` is written by the recorder, `share` belongs to
+  // the single producer of this kind.
+  struct Share {
+    explicit Share(std::size_t size) noexcept : share(size, taken) {}
     std::atomic<std::uint64_t> taken{0};
     pipeline::RingShare share;
-    std::atomic<std::uint64_t> total{0};            // records that did not fit
-    std::atomic<std::uint64_t> carried{0};          // how many of them a later record has reported
-    std::atomic<std::uint64_t> lost_from_frame{0};  // for decisions, see DecisionRecord
   };
-  struct StreamShares {
-    explicit StreamShares(const RingSizes& sizes) noexcept
-        : by_kind{StreamShare(sizes.chunk_bytes), StreamShare(sizes.decisions),
-                  StreamShare(sizes.frame_bytes)} {}
-    std::array<StreamShare, 3> by_kind;  // by GapKind
+  struct Source {
+    explicit Source(std::size_t chunk_bytes) noexcept : share(chunk_bytes) {}
+    Share share;
+    Losses lost;
+  };
+  struct Slot {
+    explicit Slot(const SlotSizes& sizes) noexcept
+        : decisions(sizes.decisions), frames(sizes.frame_bytes) {}
+    Share decisions, frames;
+    std::atomic<StreamLosses*> newest{nullptr};
+    std::deque<StreamLosses> streams;
   };
 
-  [[nodiscard]] StreamShare& share_of(std::uint32_t stream, GapKind kind) noexcept {
-    return shares_[stream].by_kind[static_cast<std::size_t>(kind)];
-  }
-  [[nodiscard]] const StreamShare& share_of(std::uint32_t stream, GapKind kind) const noexcept {
-    return shares_[stream].by_kind[static_cast<std::size_t>(kind)];
-  }
-  void give_back(std::uint32_t stream, GapKind kind, std::size_t amount) noexcept {
-    share_of(stream, kind).taken.fetch_add(amount, std::memory_order_release);
+  [[nodiscard]] StreamLosses* find(std::uint32_t stream) const noexcept;
+  static void give_back(Share& share, std::size_t amount) noexcept {
+    share.taken.fetch_add(amount, std::memory_order_release);
   }
 
   RecordRing<ChunkHeader> chunks_;
   RecordRing<FrameHeader> frames_;
   boost::lockfree::spsc_queue<DecisionRecord> decisions_;
   bool wants_published_ = false;
-  std::deque<StreamShares> shares_;  // by stream
-  std::mutex models_mutex_;
+  std::deque<Source> sources_;                       // by number
+  std::deque<Slot> slots_;                           // by slot
+  std::vector<pipeline::StreamPosition> positions_;  // of the chunk that the recorder has
+  std::mutex added_mutex_;                           // of the following, and of adding to a slot
   std::vector<std::vector<std::byte>> models_;
+  std::vector<RecordedStream> streams_;
 };
 
 }  // namespace posed::record

@@ -3,34 +3,24 @@
 #pragma once
 
 #include <condition_variable>
-#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
-#include <vector>
+#include <utility>
 
-#include "daemon/devices/open_stream.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/record/log_writer_loop.hpp"
 #include "daemon/record/record_rings.hpp"
-#include "daemon/record/stream_settings.hpp"
+#include "daemon/record/recorded_stream.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
-#include "proto/log/rows.hpp"
+#include "proto/log/writer.hpp"
 
 namespace posed::record {
-
-// One stream before its first chunk: a source of the log with one body.
-struct RecordedStream {
-  log::SourceRow source;                   // begin_log() sets its id, which is its index
-  StreamSettings settings{};               // begin_log() sets the hashes of its models
-  std::vector<std::string> model_files{};  // one for each stage, empty without a model
-};
-// What a recorder needs of an opened stream.
-[[nodiscard]] RecordedStream recorded_stream(const devices::OpenStream& stream);
 
 struct RecorderOptions {
   std::filesystem::path file;
@@ -45,18 +35,22 @@ struct RecorderOptions {
 
 // Creates the log, and writes and commits its content before the first chunk.
 [[nodiscard]] Result<log::Writer> begin_log(const RecorderOptions& options,
-                                            std::vector<RecordedStream>& streams);
+                                            const RecordedSetup& setup);
 
 class Recorder {
  public:
-  // Creates the log and starts the thread. Stream ids are indices in `streams`.
+  // Creates the log and starts the thread.
   [[nodiscard]] static Result<std::unique_ptr<Recorder>> open(RecorderOptions options,
-                                                              std::vector<RecordedStream> streams);
+                                                              const RecordedSetup& setup);
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
   ~Recorder();
 
   [[nodiscard]] pipeline::RecordSink& record_sink() noexcept { return rings_; }
+
+  // A body of a source has become a stream. Call it before the first record of the stream is made;
+  // its row comes into the log with that record. Any thread.
+  void add_stream(RecordedStream stream) { rings_.add_stream(std::move(stream)); }
 
   // Stops the thread, writes the rest and leaves a single file. Call once, after every thread that
   // uses record_sink() has ended.
@@ -68,7 +62,7 @@ class Recorder {
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }
 
  private:
-  Recorder(RecorderOptions options, const std::vector<RecordedStream>& streams, log::Writer writer);
+  Recorder(RecorderOptions options, const RecordedSetup& setup, log::Writer writer);
   void run(const std::stop_token& stop);
 
   RecorderOptions options_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -13,6 +15,19 @@ namespace posed::replay {
 namespace {
 
 constexpr auto kLookAgain = std::chrono::milliseconds(1);
+
+// Of the streams that are there from the start, or of bodies: of those of one name, one at a time.
+double most_frames_per_s(const Replay& replay, bool of_bodies) {
+  std::map<std::string, double> rates_hz;
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+    if (replay.stream(id).body.empty() == of_bodies) continue;
+    double& rate_hz = rates_hz[replay.stream(id).name];
+    rate_hz = std::max(rate_hz, replay.stream(id).settings.rate_hz);
+  }
+  double frames_per_s = 0.0;
+  for (const auto& [name, rate_hz] : rates_hz) frames_per_s += 2.0 * rate_hz;  // raw and styled
+  return frames_per_s;
+}
 
 }  // namespace
 
@@ -46,6 +61,7 @@ Broadcast::Broadcast(const BroadcastOptions& options, const Replay& replay, std:
     : replay_(replay),
       clock_(options.speed, options.begin_ns, system::monotonic_ns),
       counters_(replay.streams()),
+      presence_(replay.streams(), Presence::kNotYet),
       ring_(slots),
       wake_(std::move(wake)) {}
 
@@ -59,26 +75,18 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
   }
   auto wake = system::EventFd::open();
   if (!wake) return std::unexpected(wake.error());
-  std::vector<publish::StreamInfo> infos;
-  double frames_per_s = 0.0;
-  const std::uint32_t streams = replay.streams();
-  for (std::uint32_t id = 0; id < streams; ++id) {
-    const ReplayStream& stream = replay.stream(id);
-    infos.push_back({.name = stream.name,
-                     .description = stream.description,
-                     .rate_hz = stream.settings.rate_hz,
-                     .stages = pipeline::stage_types_of(stream.settings),
-                     .raw = stream.settings.publish_raw,
-                     .model = pipeline::first_model(stream.settings),
-                     .counters = nullptr});
-    frames_per_s += stream.settings.rate_hz * 2.0;  // raw and styled
-  }
+  const double bodies_per_s = most_frames_per_s(replay, true);
+  const double frames_per_s = most_frames_per_s(replay, false) + bodies_per_s;
   std::unique_ptr<Broadcast> self(
       new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(*wake)));
-  for (std::uint32_t id = 0; id < streams; ++id) {
-    infos[id].counters = &self->counters_[id];
+  std::vector<publish::StreamInfo> infos;
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     self->settings_.push_back(replay.stream(id).settings);
-    pipeline::publish_parameters(replay.engine(id), self->counters_[id].pipeline);
+    // the publisher numbers its first streams from 0 on
+    if (!replay.stream(id).body.empty() || infos.size() < id) continue;
+    self->presence_[id] = Presence::kHere;
+    self->publish_parameters(id);
+    infos.push_back(self->info_of(id));
   }
   auto context = net::open_context();
   if (!context) return std::unexpected(context.error());
@@ -90,6 +98,8 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
   published.authenticator = self->authenticator_.get();
   published.context = self->context_.get();
   published.endpoint = endpoint;
+  published.slots = replay.streams();
+  published.more_messages_per_s = bodies_per_s;
   published.clock = system::monotonic_ns;
   published.data_clock = [clock = &self->clock_] { return clock->now_ns(); };
   // at full speed no frame has a meaningful time of publication
@@ -110,14 +120,53 @@ Broadcast::~Broadcast() {
   if (publisher_) publisher_->stop();
 }
 
-void Broadcast::add(const pipeline::Item& item) {
-  if (item.kind == pipeline::Item::Kind::kEvent) note(item.stream_event);
-  if (item.kind == pipeline::Item::Kind::kFrame) {
-    const std::uint32_t stream = item.frame.header.stream;
-    pipeline::publish_parameters(replay_.engine(stream), counters_[stream].pipeline);
+publish::StreamInfo Broadcast::info_of(std::uint32_t id) {
+  const ReplayStream& stream = replay_.stream(id);
+  return {.stream = id,
+          .name = stream.name,
+          .description = stream.description,
+          .rate_hz = stream.settings.rate_hz,
+          .stages = pipeline::stage_types_of(stream.settings),
+          .raw = stream.settings.publish_raw,
+          .model = pipeline::first_model(settings_[id]),
+          .counters = &counters_[id],
+          .source_counters = &source_counters_,
+          .source = stream.source,
+          .body = stream.body};
+}
+
+// If the log lacks the end of the stream that had the name before, it ends now.
+void Broadcast::come(std::uint32_t stream) {
+  for (std::uint32_t id = 0; id < replay_.streams(); ++id) {
+    if (presence_[id] == Presence::kHere && replay_.stream(id).name == replay_.stream(stream).name)
+      leave(id);
   }
+  presence_[stream] = Presence::kHere;
+  publish_parameters(stream);
+  publisher_->add(info_of(stream));
+}
+
+void Broadcast::leave(std::uint32_t stream) {
+  presence_[stream] = Presence::kGone;
+  publisher_->remove(stream);
+}
+
+void Broadcast::publish_parameters(std::uint32_t stream) {
+  const pipeline::StreamEngine* const engine = replay_.engine(stream);
+  if (engine != nullptr) pipeline::publish_parameters(*engine, counters_[stream].pipeline);
+}
+
+void Broadcast::add(const pipeline::Item& item) {
+  const std::uint32_t stream = pipeline::stream_of(item);
+  if (presence_[stream] == Presence::kNotYet) come(stream);
+  if (presence_[stream] == Presence::kGone) return;
+  const bool is_event = item.kind == pipeline::Item::Kind::kEvent;
+  if (is_event) note(item.stream_event);
+  if (item.kind == pipeline::Item::Kind::kFrame) publish_parameters(stream);
   while (!ring_.push(item)) std::this_thread::sleep_for(kLookAgain);
   wake_->notify();
+  const bool ends = is_event && item.stream_event.kind == v1::Event::KIND_ENDED;
+  if (ends && !replay_.stream(stream).body.empty()) leave(stream);
 }
 
 // Updates what the pipeline's counters and the control thread knew in the live run.
@@ -139,7 +188,7 @@ void Broadcast::note(const pipeline::StreamEvent& event) {
       pipeline::count(counters.shed, static_cast<std::uint64_t>(event.value));
       break;
     case v1::Event::KIND_CONTROL:
-      pipeline::publish_parameters(replay_.engine(event.stream), counters);
+      publish_parameters(event.stream);
       if (event.change.kind == pipeline::StageChange::Kind::kModel) {
         pipeline::StreamSettings& settings = settings_[event.stream];
         for (pipeline::StageSettings& stage : settings.stages) {

@@ -1,5 +1,6 @@
 // Broadcast publishes a replay as the live run did: same topics, same messages. All times are those
-// of the recording, and stats say that this is a replay. Cold.
+// of the recording, and stats say that this is a replay. Bodies are published while they are there.
+// Cold.
 #pragma once
 
 #include <cstdint>
@@ -68,6 +69,13 @@ class Broadcast {
  private:
   Broadcast(const BroadcastOptions& options, const Replay& replay, std::size_t slots,
             std::unique_ptr<system::EventFd> wake);
+  // A stream of a body is added with its first item and removed after its last, the end.
+  enum class Presence : std::uint8_t { kNotYet, kHere, kGone };
+
+  [[nodiscard]] publish::StreamInfo info_of(std::uint32_t stream);
+  void come(std::uint32_t stream);
+  void leave(std::uint32_t stream);
+  void publish_parameters(std::uint32_t stream);
   void note(const pipeline::StreamEvent& event);
 
   const Replay& replay_;
@@ -75,7 +83,10 @@ class Broadcast {
   net::Context context_;
   std::unique_ptr<net::ZapAuthenticator> authenticator_;
   std::vector<pipeline::StreamCounters> counters_;
-  std::vector<pipeline::StreamSettings> settings_;  // with the names of the models in use
+  pipeline::SourceCounters source_counters_;  // of all sources: a replay has no devices to count
+  std::vector<Presence> presence_;
+  std::vector<pipeline::StreamSettings>
+      settings_;  // of all streams, with the names of the models in use
   pipeline::Ring<pipeline::Item> ring_;
   std::unique_ptr<system::EventFd> wake_;
   std::unique_ptr<publish::Publisher> publisher_;

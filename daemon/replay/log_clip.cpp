@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -16,42 +17,85 @@
 namespace posed::replay {
 namespace {
 
+// The streams of one name, in the order in which they came.
+using Parts = std::vector<std::uint32_t>;
+
 // Only streams with a skeleton, because others have no pose.
-std::string names_of(const Replay& replay) {
-  std::string names;
+std::map<std::string, Parts> parts_by_name(const Replay& replay) {
+  std::map<std::string, Parts> parts;
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     const ReplayStream& stream = replay.stream(id);
-    if (stream.description.skeleton == nullptr) continue;
-    names += (names.empty() ? "" : ", ") + stream.name;
+    if (stream.description.skeleton != nullptr) parts[stream.name].push_back(id);
   }
-  return names;
+  const auto first_item = [&](std::uint32_t id) { return replay.stream(id).first_item; };
+  for (auto& [name, ids] : parts) std::ranges::stable_sort(ids, {}, first_item);
+  return parts;
 }
 
-Result<std::uint32_t> choose(const Replay& replay, const std::string& wanted,
-                             const std::string& path) {
-  const std::string names = names_of(replay);
-  if (names.empty()) return fail("has no stream with a skeleton", path);
-  std::optional<std::uint32_t> chosen;
-  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
-    const ReplayStream& stream = replay.stream(id);
-    if (stream.description.skeleton == nullptr) continue;
-    if (!wanted.empty() && stream.name != wanted) continue;
-    if (chosen) return misuse("has the streams " + names + "; name one by --stream", path);
-    chosen = id;
+const Skeleton& skeleton_of(const Replay& replay, std::uint32_t id) {
+  return *replay.stream(id).description.skeleton;
+}
+
+// The part that "walker#2" names; empty if there is none.
+Parts part_named(const std::map<std::string, Parts>& parts, const std::string& wanted) {
+  for (const auto& [name, ids] : parts) {
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      if (wanted == name + "#" + std::to_string(i + 1)) return {ids[i]};
+    }
   }
-  if (!chosen) {
+  return {};
+}
+
+// A clip has one skeleton.
+Result<> check_same_skeleton(const Replay& replay, const std::string& name, const Parts& ids,
+                             const std::string& path) {
+  const auto id_of = [&](std::uint32_t id) { return skeleton_of(replay, id).id; };
+  const auto differs = [&](std::uint32_t id) { return id_of(id) != id_of(ids.front()); };
+  if (std::ranges::none_of(ids, differs)) return {};
+  std::string list;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    list += (i == 0 ? "" : ", ") + name + "#" + std::to_string(i + 1) + " (" +
+            std::to_string(skeleton_of(replay, ids[i]).joints.size()) + " joints)";
+  }
+  return misuse("stream " + in_quotes(name) +
+                    " changed its skeleton, so its parts are clips of their own; name one by"
+                    " --stream: " +
+                    list,
+                path);
+}
+
+Result<Parts> choose(const Replay& replay, const std::string& wanted, const std::string& path) {
+  const auto parts = parts_by_name(replay);
+  if (parts.empty()) return fail("has no stream with a skeleton", path);
+  std::string names;
+  for (const auto& [name, ids] : parts) names += (names.empty() ? "" : ", ") + name;
+  if (wanted.empty() && parts.size() > 1) {
+    return misuse("has the streams " + names + "; name one by --stream", path);
+  }
+  const auto found = wanted.empty() ? parts.begin() : parts.find(wanted);
+  if (found == parts.end()) {
+    const Parts one = part_named(parts, wanted);
+    if (!one.empty()) return one;
     return misuse("has no stream " + in_quotes(wanted) + " with a skeleton, but " + names, path);
   }
-  return *chosen;
+  if (auto same = check_same_skeleton(replay, found->first, found->second, path); !same) {
+    return std::unexpected(same.error());
+  }
+  return found->second;
 }
 
-// Collects the frames of one stream as they were published, each once.
+// Collects the frames of a stream's parts as they were published, each once.
 class Collector {
  public:
   explicit Collector(std::shared_ptr<const Skeleton> skeleton) : clip_(std::move(skeleton)) {}
 
   void take(const Frame& frame) {
     const Header& header = frame.header;
+    if (part_ != header.stream) {
+      if (last_ != 0) ++returns_;
+      last_ = 0;
+      part_ = header.stream;
+    }
     if (header.sequence <= last_) return;  // repeated while the stream was stale
     missing_ += last_ == 0 ? 0 : header.sequence - last_ - 1;
     last_ = header.sequence;
@@ -65,6 +109,10 @@ class Collector {
     if (clip && missing_ > 0) {
       clip->warnings.push_back(std::to_string(missing_) +
                                " frames were skipped while the daemon ran and are not in the clip");
+    }
+    if (clip && returns_ > 0) {
+      clip->warnings.push_back("the body came back " + std::to_string(returns_) +
+                               " times; the clip goes on with its next frame");
     }
     return clip;
   }
@@ -84,7 +132,8 @@ class Collector {
   }
 
   clip::FramesClip clip_;
-  std::uint64_t last_ = 0, missing_ = 0;
+  std::uint32_t part_ = pipeline::kNoStream;
+  std::uint64_t last_ = 0, missing_ = 0, returns_ = 0;
   std::vector<std::int64_t> arrival_ns_, device_ns_;
 };
 
@@ -96,21 +145,26 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   auto opened = Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   Replay& replay = **opened;
-  const auto id = choose(replay, stream, path.string());
-  if (!id) return std::unexpected(id.error());
-  const drivers::Description& description = replay.stream(*id).description;
+  const auto ids = choose(replay, stream, path.string());
+  if (!ids) return std::unexpected(ids.error());
+  const drivers::Description& description = replay.stream(ids->front()).description;
   Collector collector(description.skeleton);
   const auto take = [&](const pipeline::Item& item) {
-    if (item.kind == pipeline::Item::Kind::kFrame && item.frame.header.stream == *id) {
+    if (item.kind == pipeline::Item::Kind::kFrame &&
+        std::ranges::find(*ids, item.frame.header.stream) != ids->end()) {
       collector.take(item.frame);
     }
   };
   const auto done = replay.run(take, [](const log::ChunkRow&) { return true; });
   if (!done) return std::unexpected(done.error());
   auto clip = collector.finish(path.string(), description.rate_hz);
-  if (const auto broken = replay.broken_at(*id); clip && broken) {
+  if (!clip) return clip;
+  for (const std::uint32_t id : *ids) {
+    const auto broken = replay.broken_at(id);
+    if (!broken) continue;
     clip->warnings.push_back("the log is known to lack data from frame " + std::to_string(*broken) +
                              " on");
+    break;
   }
   return clip;
 }

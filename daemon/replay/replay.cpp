@@ -10,8 +10,8 @@
 namespace posed::replay {
 namespace {
 
-// More than any posed records; a limit, because each stream costs a decoder and an engine.
-constexpr std::size_t kMaxStreams = 256;
+// Bodies that come and go for a day make less; a limit, because each stream costs some memory.
+constexpr std::size_t kMaxStreams = 4096;
 
 }  // namespace
 
@@ -21,6 +21,8 @@ Replay::Replay(log::Reader& reader)
 Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
   std::unique_ptr<Replay> replay(new Replay(reader));
   if (auto done = replay->open_contexts(); !done) return std::unexpected(done.error());
+  if (auto done = replay->open_sources(); !done) return std::unexpected(done.error());
+  if (auto done = replay->load_descriptions(); !done) return std::unexpected(done.error());
   if (auto done = replay->load_decisions(); !done) return std::unexpected(done.error());
   if (auto done = replay->load_gaps(); !done) return std::unexpected(done.error());
   for (const auto& context : replay->contexts_) context->ready();
@@ -35,18 +37,41 @@ Result<> Replay::open_contexts() {
                 reader_.file());
   }
   for (const log::StreamRow& row : streams) {
-    const log::SourceRow& source = reader_.source_of(row);
-    if (std::ranges::count(streams, row.source, &log::StreamRow::source) > 1) {
-      return fail("source " + in_quotes(source.name) +
-                      " has several bodies, which this posed cannot replay; update posed",
-                  reader_.file());
-    }
-    const auto id = static_cast<std::uint32_t>(contexts_.size());
-    auto context = ReplayStreamContext::open(id, source, row, models_, *this, reader_.file());
+    const auto index = static_cast<std::uint32_t>(contexts_.size());
+    auto context = ReplayStreamContext::open(index, reader_.source_of(row), row, models_, *this,
+                                             reader_.file());
     if (!context) return std::unexpected(context.error());
     contexts_.push_back(std::move(*context));
   }
   return {};
+}
+
+Result<> Replay::open_sources() {
+  for (const log::SourceRow& row : reader_.sources()) {
+    std::vector<ReplayStreamContext*> streams;
+    for (std::size_t i = 0; i < contexts_.size(); ++i) {
+      if (reader_.streams()[i].source == row.id) streams.push_back(contexts_[i].get());
+    }
+    sources_.emplace_back();
+    if (streams.empty()) continue;  // nothing of it was published
+    auto source = ReplaySource::open(row, std::move(streams), *this, reader_.file());
+    if (!source) return std::unexpected(source.error());
+    sources_.back() = std::move(*source);
+  }
+  return {};
+}
+
+Result<> Replay::load_descriptions() {
+  return reader_.each_description([this](const log::ChunkRow& row) -> Result<> {
+    ReplaySource* const source = source_of(row.source);
+    return source == nullptr ? Result<>() : source->expect(row);
+  });
+}
+
+ReplaySource* Replay::source_of(std::uint32_t log_id) const {
+  const auto& rows = reader_.sources();
+  const auto found = std::ranges::lower_bound(rows, log_id, {}, &log::SourceRow::id);
+  return sources_[static_cast<std::size_t>(found - rows.begin())].get();
 }
 
 Result<> Replay::load_decisions() {
@@ -72,8 +97,15 @@ Result<> Replay::load_gaps() {
       const bool decisions = gap.kind == log::GapRow::Kind::kDecisions && row.id == gap.owner;
       if (chunks || decisions) contexts_[i]->set_gap(gap.after_chunk);
     }
+    if (gap.kind != log::GapRow::Kind::kChunks) continue;
+    if (ReplaySource* const source = source_of(gap.owner)) source->set_gap(gap.after_chunk);
   }
+  for (const auto& context : contexts_) gapped_.push_back(context.get());
   return {};
+}
+
+void Replay::apply_gaps(std::int64_t chunk) {
+  std::erase_if(gapped_, [&](ReplayStreamContext* stream) { return stream->apply_gap(chunk); });
 }
 
 const ReplayStream& Replay::stream(std::uint32_t stream) const {
@@ -88,6 +120,10 @@ void Replay::before(const pipeline::Item& item, std::uint32_t index) noexcept {
   while (const Schedule::Entry* entry = schedule_.due(item, index)) apply(*entry);
 }
 
+void Replay::reach(std::uint64_t item) noexcept {
+  while (const Schedule::Entry* entry = schedule_.due(item)) apply(*entry);
+}
+
 void Replay::apply(const Schedule::Entry& entry) noexcept {
   // The row was already checked; decoding it again here saves several times the memory of keeping
   // all decoded decisions.
@@ -95,30 +131,31 @@ void Replay::apply(const Schedule::Entry& entry) noexcept {
     contexts_[entry.stream]->apply(*decision);
 }
 
-const pipeline::StreamEngine& Replay::engine(std::uint32_t stream) const {
+const pipeline::StreamEngine* Replay::engine(std::uint32_t stream) const {
   return contexts_[stream]->engine();
 }
 
 Result<> Replay::run(const Out& out, const Pace& pace) {
   out_ = &out;
-  const auto& streams = reader_.streams();
   for (;;) {
     const auto chunk = reader_.next_chunk();
     if (!chunk) return std::unexpected(chunk.error());
     if (!chunk->has_value()) break;
     if (!pace(**chunk)) return {};
-    for (const auto& context : contexts_) context->apply_gap((*chunk)->id);
-    const auto stream = std::ranges::find(streams, (*chunk)->source, &log::StreamRow::source);
-    if (stream == streams.end()) continue;  // a source without a body
-    ReplayStreamContext& context = *contexts_[static_cast<std::size_t>(stream - streams.begin())];
-    if (auto fed = context.feed(**chunk); !fed) return fed;
+    apply_gaps((*chunk)->id);
+    ReplaySource* const source = source_of((*chunk)->source);
+    if (source == nullptr) continue;
+    if (auto fed = source->feed(**chunk); !fed) return fed;
+    if (error_) return std::unexpected(*error_);
   }
-  for (const auto& context : contexts_)
-    context->apply_gap(std::numeric_limits<std::int64_t>::max());
+  apply_gaps(std::numeric_limits<std::int64_t>::max());
   while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry);
-  for (const auto& context : contexts_) {
-    if (auto done = context->finish(!reader_.counts_items()); !done) return done;
+  for (std::size_t i = 0; i < contexts_.size(); ++i) {
+    std::optional<std::int64_t> end_ns;
+    if (!reader_.counts_items()) end_ns = source_of(reader_.streams()[i].source)->arrival_ns();
+    contexts_[i]->finish(end_ns);
   }
+  if (error_) return std::unexpected(*error_);
   return {};
 }
 

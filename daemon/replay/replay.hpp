@@ -8,10 +8,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/replay/replay_models.hpp"
+#include "daemon/replay/replay_source.hpp"
 #include "daemon/replay/replay_stream_context.hpp"
 #include "daemon/replay/schedule.hpp"
 #include "proto/frame/result.hpp"
@@ -19,10 +21,12 @@
 
 namespace posed::replay {
 
-// Streams are numbered by their index in Reader::streams(), whatever their ids in the log are.
+// Streams are numbered by their index in Reader::streams(), whatever their ids in the log are. A
+// body that comes back or changes its skeleton is another stream, of the same name.
 class Replay final : private ReplayHost {
  public:
-  // Builds decoders, models and engines of all streams. The reader outlives the replay.
+  // Builds decoders, models and engines of all streams; those of bodies that come and go are built
+  // again when they come, so that only they are in memory. The reader outlives the replay.
   [[nodiscard]] static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
   ~Replay() override = default;
 
@@ -31,8 +35,8 @@ class Replay final : private ReplayHost {
   }
   [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
-  // During run() and afterwards.
-  [[nodiscard]] const pipeline::StreamEngine& engine(std::uint32_t stream) const;
+  // Null while there is none: the body has left, or not come yet.
+  [[nodiscard]] const pipeline::StreamEngine* engine(std::uint32_t stream) const;
 
   // Items in pipeline order.
   using Out = std::function<void(const pipeline::Item&)>;
@@ -47,19 +51,31 @@ class Replay final : private ReplayHost {
  private:
   explicit Replay(log::Reader& reader);
   [[nodiscard]] Result<> open_contexts();
+  [[nodiscard]] Result<> open_sources();
+  [[nodiscard]] Result<> load_descriptions();
   [[nodiscard]] Result<> load_decisions();
   [[nodiscard]] Result<> load_gaps();
+  void apply_gaps(std::int64_t chunk);
   void apply(const Schedule::Entry& entry) noexcept;
+  // Null if nothing is to be replayed of it.
+  [[nodiscard]] ReplaySource* source_of(std::uint32_t log_id) const;
 
   // ReplayHost
   void before(const pipeline::Item& item, std::uint32_t index) noexcept override;
+  void reach(std::uint64_t item) noexcept override;
   void publish(const pipeline::Item& item) noexcept override { (*out_)(item); }
+  void failed(Error error) noexcept override {
+    if (!error_) error_ = std::move(error);
+  }
 
   log::Reader& reader_;
   ReplayModels models_;
   std::vector<std::unique_ptr<ReplayStreamContext>> contexts_;
+  std::vector<std::unique_ptr<ReplaySource>> sources_;  // as in Reader::sources(); may be null
+  std::vector<ReplayStreamContext*> gapped_;            // whose gap is still to come
   Schedule schedule_;
   const Out* out_ = nullptr;  // of the current run()
+  std::optional<Error> error_;
 };
 
 }  // namespace posed::replay

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/pipeline/record_sink.hpp"
-#include "drivers/glove/calibrated_decoder.hpp"
-#include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::replay {
@@ -13,64 +10,44 @@ namespace {
 
 using Kind = pipeline::Decision::Kind;
 
-// No clock that counts from the start of a machine reaches this; sums of two such times fit 64
-// bits.
-constexpr std::int64_t kLastTime_ns = std::int64_t{1} << 61;
-
-bool possible(std::int64_t time_ns) { return time_ns >= 0 && time_ns <= kLastTime_ns; }
-
-std::string text_of(const log::ChunkRow& chunk) {
-  return {reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()};
-}
-
 }  // namespace
 
-ReplayStreamContext::ReplayStreamContext(std::uint32_t index, std::uint32_t stream_id,
+ReplayStreamContext::ReplayStreamContext(std::uint32_t index, std::uint32_t log_id,
                                          ReplayModels& models, ReplayHost& host, std::string file)
-    : index_(index),
-      stream_id_(stream_id),
-      models_(models),
-      host_(host),
-      file_(std::move(file)),
-      intake_(index, host.next_item, *this) {}
+    : index_(index), log_id_(log_id), models_(models), host_(host), file_(std::move(file)) {}
 
 Result<std::unique_ptr<ReplayStreamContext>> ReplayStreamContext::open(
     std::uint32_t index, const log::SourceRow& source, const log::StreamRow& stream,
     ReplayModels& models, ReplayHost& host, const std::string& file) {
   auto self = std::make_unique<ReplayStreamContext>(index, stream.id, models, host, file);
   self->stream_.name = stream.name;
+  self->stream_.body = stream.body;
+  if (!stream.body.empty()) self->stream_.source = source.name;
+  self->stream_.first_item = stream.first_item;
   auto settings = record::settings_from_json(stream.stages_json, file);
   if (!settings) return std::unexpected(settings.error());
   self->stream_.settings = std::move(*settings);
-  if (auto done = self->open_decoder(source); !done) return std::unexpected(done.error());
-  if (auto done = self->open_engine(); !done) return std::unexpected(done.error());
   return self;
 }
 
-Result<> ReplayStreamContext::open_decoder(const log::SourceRow& source) {
-  const drivers::Driver* driver = drivers::find_driver(source.driver);
-  if (driver == nullptr) {
-    return fail("stream " + in_quotes(stream_.name) + " comes from driver " +
-                    in_quotes(source.driver) + ", which this posed does not have",
-                file_);
-  }
-  auto description = driver->describe(source.text, source.identity);
-  if (!description) return std::unexpected(description.error());
-  stream_.description = *description;
-  device_ = std::move(*description);
-  auto decoder = driver->make_decoder(device_);
-  if (!decoder) return std::unexpected(decoder.error());
-  decoder_ = std::move(*decoder);
-  return {};
-}
-
-Result<> ReplayStreamContext::open_engine() {
+Result<> ReplayStreamContext::describe(drivers::Description description) {
   record::StreamSettings& settings = stream_.settings;
-  const auto& skeleton = stream_.description.skeleton;
-  if (!settings.stages.empty() && !skeleton) {
+  if (!settings.stages.empty() && !description.skeleton) {
     return fail("stream " + in_quotes(stream_.name) + " has stages but no skeleton", file_);
   }
-  settings.rate_hz = stream_.description.rate_hz;  // the models are bound to this rate
+  settings.rate_hz = description.rate_hz;  // the models are bound to this rate
+  stream_.description = std::move(description);
+  stream_.described = true;
+  return make_engine();
+}
+
+void ReplayStreamContext::set_aside() {
+  engine_.reset();
+  models_in_use_.clear();
+}
+
+Result<> ReplayStreamContext::make_engine() {
+  const record::StreamSettings& settings = stream_.settings;
   models_in_use_.resize(settings.stages.size());
   std::vector<const StageModel*> borrowed;
   for (std::size_t i = 0; i < settings.stages.size(); ++i) {
@@ -81,14 +58,26 @@ Result<> ReplayStreamContext::open_engine() {
     }
     borrowed.push_back(models_in_use_[i].get());
   }
-  auto options = pipeline::engine_options(index_, settings, skeleton, borrowed);
+  auto options = pipeline::engine_options(index_, settings, stream_.description.skeleton, borrowed);
   if (!options) {
     Error error = options.error();
     error.file = file_;
     return std::unexpected(std::move(error));
   }
-  engine_.emplace(std::move(*options));
+  engine_ = std::make_unique<pipeline::StreamEngine>(std::move(*options));
+  engine_->start_at(last_frame_ + 1, last_sample_ + 1);
   return {};
+}
+
+// A decision may be the first that comes: the live engine waits for its body's first frame, too.
+pipeline::StreamEngine* ReplayStreamContext::needed_engine() noexcept {
+  if (!engine_ && stream_.described && !gone_) {
+    if (auto made = make_engine(); !made) {
+      gone_ = true;
+      host_.failed(std::move(made.error()));
+    }
+  }
+  return engine_.get();
 }
 
 Result<std::unique_ptr<const StageModel>> ReplayStreamContext::bind(std::size_t stage,
@@ -121,14 +110,15 @@ Result<> ReplayStreamContext::expect(const pipeline::Decision& decision) {
     case Kind::kChange: {
       const std::string hash = decision.model_hash.data();
       const auto stage = stage_of(decision.change);
-      if (decision.change.kind != pipeline::StageChange::Kind::kModel || !stage) return {};
+      const bool is_model = decision.change.kind == pipeline::StageChange::Kind::kModel;
+      if (!is_model || !stage || !stream_.described) return {};
       if (!tried_.emplace(*stage, hash).second) return {};
       const auto bound = bind(*stage, hash);
       if (!bound) return std::unexpected(bound.error());
       return {};
     }
     default:
-      if (possible(decision.now_ns)) return {};
+      if (is_possible_time(decision.now_ns)) return {};
       return fail("the log is damaged (a decision of stream " + in_quotes(stream_.name) +
                       " was made at an impossible time); use another copy of it",
                   file_);
@@ -141,104 +131,44 @@ void ReplayStreamContext::set_gap(std::int64_t after_chunk) {
 
 // Frames that a stage still holds back depend on data after the gap, and the last published frame
 // may be repeated, so they are not reliable either.
-void ReplayStreamContext::apply_gap(std::int64_t chunk) {
+bool ReplayStreamContext::apply_gap(std::int64_t chunk) {
   if (gap_after_ && !broken_at_ && chunk > *gap_after_) broken_at_ = last_out_;
+  return !gap_after_ || broken_at_;
 }
 
-// Formats 1 and 2 number only frames; the other numbers continue by counting.
-Result<> ReplayStreamContext::find_place(const log::ChunkRow& chunk) {
-  const auto place = std::ranges::find(chunk.places, stream_id_, &log::StreamPosition::stream);
-  if (place == chunk.places.end() || place->next_frame == 0 || !possible(chunk.arrival_ns)) {
-    return log::damaged_row(file_, "chunk", chunk.id, "has an impossible time or place");
-  }
-  pipeline::Position next = intake_.next();
-  next.frame = place->next_frame;
-  if (place->next_sample != 0) next.sample = place->next_sample;
-  if (chunk.first_item != 0) next.item = chunk.first_item;
-  intake_.go_to(next);
-  arrival_ns_ = chunk.arrival_ns;
-  intake_.arrived(arrival_ns_);
-  return {};
+void ReplayStreamContext::begin(const pipeline::StreamPosition& first) noexcept {
+  last_frame_ = first.frame - 1;
+  last_sample_ = first.sample - 1;
+  if (engine_) engine_->start_at(first.frame, first.sample);
 }
 
-Result<> ReplayStreamContext::feed(const log::ChunkRow& chunk) {
-  if (auto found = find_place(chunk); !found) return found;
-  switch (static_cast<pipeline::Direction>(chunk.direction)) {
-    case pipeline::Direction::kFromDevice:
-      decoder_->feed_socket(static_cast<std::uint8_t>(chunk.socket), chunk.bytes, arrival_ns_,
-                            intake_);
-      return outcome_so_far();
-    case pipeline::Direction::kToDevice:
-      return {};
-    case pipeline::Direction::kDeviceInfo:
-      return use_device(text_of(chunk));
-    case pipeline::Direction::kCalibration:
-      return calibrate(text_of(chunk));
-    default:
-      return log::damaged_row(file_, "chunk", chunk.id,
-                              "has an unknown kind, or comes from a newer posed");
-  }
-}
-
-// The device came back, perhaps with other properties; what the pipeline was bound to stays.
-Result<> ReplayStreamContext::use_device(const std::string& info) {
-  const drivers::Driver* driver = drivers::find_driver(stream_.description.driver);
-  auto description = driver->describe(info, stream_.description.identity);
-  if (!description) return std::unexpected(description.error());
-  auto decoder = driver->make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  decoder_ = std::move(*decoder);
-  device_ = std::move(*description);
-  intake_.new_link();
-  if (calibration_) use_calibration();
-  return {};
-}
-
-Result<> ReplayStreamContext::calibrate(const std::string& toml) {
-  drivers::Description device = device_;
-  device.identity.clear();  // the live run has checked to which device it belongs
-  auto compiled = devices::compile_calibration(device, toml, "the log's calibration");
-  if (!compiled) return std::unexpected(compiled.error());
-  calibration_ = std::move(*compiled);
-  use_calibration();
-  return {};
-}
-
-void ReplayStreamContext::use_calibration() {
-  auto* const glove = drivers::glove::calibrated_decoder(*decoder_);
-  if (glove != nullptr) glove->calibrate(*calibration_->calibration);
-}
-
-bool ReplayStreamContext::item(pipeline::Item& item) noexcept {
+// What was decoded after the end never came: the reader gave the stream no more space in the ring.
+void ReplayStreamContext::take(pipeline::Item& item) noexcept {
   host_.before(item, index_);
+  pipeline::StreamEngine* const engine = needed_engine();
+  if (engine == nullptr || ended_) return;
   switch (item.kind) {
     case pipeline::Item::Kind::kSample:
-      if (shed_samples_.contains(item.sample.header.sequence)) break;
-      engine_->on_sample(item.sample, *this);
+      last_sample_ = item.sample.header.sequence;
+      if (!shed_samples_.contains(last_sample_)) engine->on_sample(item.sample, *this);
       break;
     case pipeline::Item::Kind::kEvent:
       host_.publish(item);
       break;
     default:
-      if (shed_frames_.contains(item.frame.header.sequence)) break;
-      engine_->on_frame(item.frame, *this);
+      last_frame_ = item.frame.header.sequence;
+      if (!shed_frames_.contains(last_frame_)) engine->on_frame(item.frame, *this);
   }
-  return true;
 }
 
 void ReplayStreamContext::apply(const pipeline::Decision& decision) noexcept {
-  switch (decision.kind) {
-    case Kind::kShed:
-    case Kind::kShedSamples:
-      return;  // the engine decides this again when it meets the gap
-    case Kind::kTick:
-      return engine_->tick_now(decision.now_ns, *this);
-    case Kind::kEnd:
-      close_gaps();
-      return engine_->end(decision.now_ns, *this);
-    case Kind::kChange:
-      return change(decision);
-  }
+  // The engine decides again what was shed when it meets the gap.
+  if (decision.kind == Kind::kShed || decision.kind == Kind::kShedSamples) return;
+  pipeline::StreamEngine* const engine = needed_engine();
+  if (engine == nullptr) return;
+  if (decision.kind == Kind::kTick) return engine->tick_now(decision.now_ns, *this);
+  if (decision.kind == Kind::kEnd) return end(decision.now_ns);
+  change(decision);
 }
 
 // The model that is replaced is freed once it is no longer read.
@@ -250,10 +180,7 @@ void ReplayStreamContext::change(const pipeline::Decision& decision) noexcept {
   std::unique_ptr<const StageModel> model;
   if (decision.change.kind == pipeline::StageChange::Kind::kModel) {
     auto bound = bind(*stage, decision.model_hash.data());
-    if (!bound) {
-      error_ = std::move(bound.error());
-      return;
-    }
+    if (!bound) return host_.failed(std::move(bound.error()));
     model = std::move(*bound);
     command.model = model.get();
   }
@@ -262,24 +189,25 @@ void ReplayStreamContext::change(const pipeline::Decision& decision) noexcept {
 }
 
 // Nothing more comes: what was decoded last but never came was shed.
-void ReplayStreamContext::close_gaps() noexcept {
-  const pipeline::Position next = intake_.next();
-  engine_->close_gaps(next.frame - 1, next.sample - 1, *this);
+void ReplayStreamContext::end(std::int64_t now_ns) noexcept {
+  engine_->close_gaps(last_frame_, last_sample_, *this);
+  engine_->end(now_ns, *this);
+  ended_ = true;
 }
 
-Result<> ReplayStreamContext::finish(bool ends) {
-  close_gaps();
-  if (ends) {
-    engine_->end(arrival_ns_, *this);
-  } else {
-    engine_->flush(*this);
-  }
-  return outcome_so_far();
+// The reader reports the end before the bodies change, so only a log that lacks the decision has
+// not ended the stream by now.
+void ReplayStreamContext::leave(std::int64_t now_ns) noexcept {
+  if (engine_ && !ended_) end(now_ns);
+  gone_ = true;
+  set_aside();
 }
 
-Result<> ReplayStreamContext::outcome_so_far() {
-  if (error_) return std::unexpected(*error_);
-  return {};
+void ReplayStreamContext::finish(std::optional<std::int64_t> end_ns) noexcept {
+  if (!engine_ || ended_) return;
+  if (end_ns) return end(*end_ns);
+  engine_->close_gaps(last_frame_, last_sample_, *this);
+  engine_->flush(*this);
 }
 
 }  // namespace posed::replay

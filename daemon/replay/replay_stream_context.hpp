@@ -1,9 +1,8 @@
-// ReplayStreamContext: one stream of a log. It computes the stream again with the same decoder,
-// intake and engine as the live run. Cold.
+// ReplayStreamContext: one stream of a log, from its items to what was published. It computes the
+// stream again with the same engine as the live run. Cold.
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -11,8 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/devices/calibration.hpp"
-#include "daemon/pipeline/intake.hpp"
+#include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "daemon/replay/replay_models.hpp"
@@ -23,11 +21,21 @@
 
 namespace posed::replay {
 
+// No clock that counts from the start of a machine reaches this; sums of two such times fit 64
+// bits.
+[[nodiscard]] constexpr bool is_possible_time(std::int64_t time_ns) {
+  return time_ns >= 0 && time_ns <= std::int64_t{1} << 61;
+}
+
 // A stream as the users of a replay see it.
 struct ReplayStream {
   std::string name;
-  drivers::Description description;
-  record::StreamSettings settings;
+  std::string source, body;      // of a device with several bodies, else empty
+  std::uint64_t first_item = 0;  // with which it begins
+  // False if the log lacks the description of its body: then nothing is replayed of it.
+  bool described = false;
+  drivers::Description description{};
+  record::StreamSettings settings{};
 };
 
 // What all streams of a replay share.
@@ -40,24 +48,35 @@ class ReplayHost {
 
   // Called before an item enters the engine of stream `index`.
   virtual void before(const pipeline::Item& item, std::uint32_t index) noexcept = 0;
+  // Called where the streams of a source change: what was decided up to the item with this number
+  // takes effect now.
+  virtual void reach(std::uint64_t item) noexcept = 0;
   // Receives the items that a stream publishes.
   virtual void publish(const pipeline::Item& item) noexcept = 0;
+  // An error that could not be returned at once; it ends the replay.
+  virtual void failed(Error error) noexcept = 0;
 
   std::uint64_t next_item = 1;  // the next Item::number
 };
 
-class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline::EngineOut {
+class ReplayStreamContext final : private pipeline::EngineOut {
  public:
   // Published items have `index` as their stream. Host and models outlive the object.
   [[nodiscard]] static Result<std::unique_ptr<ReplayStreamContext>> open(
       std::uint32_t index, const log::SourceRow& source, const log::StreamRow& stream,
       ReplayModels& models, ReplayHost& host, const std::string& file);
-  ReplayStreamContext(std::uint32_t index, std::uint32_t stream_id, ReplayModels& models,
+  ReplayStreamContext(std::uint32_t index, std::uint32_t log_id, ReplayModels& models,
                       ReplayHost& host, std::string file);
 
-  // Before the first chunk, for each decision of the stream in the log's order: loads what the
-  // decision needs, so that nothing can fail later, and remembers which frames never reached the
-  // engine.
+  // What the device says of the stream's body. Makes the models and the engine, so that nothing can
+  // fail later.
+  [[nodiscard]] Result<> describe(drivers::Description description);
+  // Frees the engine until something comes for the stream.
+  void set_aside();
+
+  // Before the first chunk, after describe(), for each decision of the stream in the log's order:
+  // loads what the decision needs, so that nothing can fail later, and remembers which frames never
+  // reached the engine.
   [[nodiscard]] Result<> expect(const pipeline::Decision& decision);
   // The log lacks chunks or decisions after this chunk.
   void set_gap(std::int64_t after_chunk);
@@ -67,38 +86,43 @@ class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline:
     shed_samples_.finish();
   }
 
-  // Call before the chunk with this id is fed to any stream: if it lies behind this stream's gap,
-  // frames from here on cannot be compared. It may be a chunk of another stream, because decisions
-  // of this stream can come with it.
-  void apply_gap(std::int64_t chunk);
+  // Call before the chunk with this id is fed to any source: if it lies behind this stream's gap,
+  // frames from here on cannot be compared. It may be a chunk of another source, because decisions
+  // of this stream can come with it. Returns whether nothing is left to wait for.
+  [[nodiscard]] bool apply_gap(std::int64_t chunk);
 
-  [[nodiscard]] Result<> feed(const log::ChunkRow& chunk);
+  // Its body comes: these are the numbers of its first frame and sample, because earlier ones
+  // belong to the streams of its name before it.
+  void begin(const pipeline::StreamPosition& first) noexcept;
+  // From the intake.
+  void take(pipeline::Item& item) noexcept;
   void apply(const pipeline::Decision& decision) noexcept;
-  // Call after the last chunk and decision. `ends`: the log has an old format that does not record
-  // whether the stream ended.
-  [[nodiscard]] Result<> finish(bool ends);
+  // Its body is no longer among those of the source, at this time: frees the engine for good.
+  void leave(std::int64_t now_ns) noexcept;
+  // Call after the last chunk and decision. `end_ns`: the log has an old format that does not
+  // record whether the stream ended; it ended then.
+  void finish(std::optional<std::int64_t> end_ns) noexcept;
 
+  [[nodiscard]] std::uint32_t index() const noexcept { return index_; }
+  [[nodiscard]] std::uint32_t log_id() const noexcept { return log_id_; }
   [[nodiscard]] const ReplayStream& stream() const noexcept { return stream_; }
-  [[nodiscard]] std::optional<std::uint64_t> broken_at() const noexcept { return broken_at_; }
-  [[nodiscard]] const pipeline::StreamEngine& engine() const noexcept { return *engine_; }
+  // 0 if nothing is replayed of it.
+  [[nodiscard]] std::optional<std::uint64_t> broken_at() const noexcept {
+    return stream_.described ? broken_at_ : 0;
+  }
+  // Null while there is none.
+  [[nodiscard]] const pipeline::StreamEngine* engine() const noexcept { return engine_.get(); }
 
  private:
-  [[nodiscard]] Result<> open_decoder(const log::SourceRow& source);
-  [[nodiscard]] Result<> open_engine();
-  [[nodiscard]] Result<> find_place(const log::ChunkRow& chunk);
-  [[nodiscard]] Result<> use_device(const std::string& info);
-  [[nodiscard]] Result<> calibrate(const std::string& toml);
-  void use_calibration();
+  [[nodiscard]] Result<> make_engine();
+  // Makes it when it is first needed; null if there is none.
+  [[nodiscard]] pipeline::StreamEngine* needed_engine() noexcept;
   [[nodiscard]] std::optional<std::size_t> stage_of(const pipeline::StageChange& change) const;
   [[nodiscard]] Result<std::unique_ptr<const StageModel>> bind(std::size_t stage,
                                                                const std::string& hash);
   void change(const pipeline::Decision& decision) noexcept;
-  void close_gaps() noexcept;
-  [[nodiscard]] Result<> outcome_so_far();
+  void end(std::int64_t now_ns) noexcept;
 
-  // IntakeOut
-  bool item(pipeline::Item& item) noexcept override;
-  void outcome(Outcome) noexcept override {}
   // EngineOut. The engine repeats the decisions that the log contains, so they are ignored here.
   void item(const pipeline::Item& item) noexcept override {
     if (item.kind == pipeline::Item::Kind::kFrame) last_out_ = item.frame.header.sequence;
@@ -107,24 +131,20 @@ class ReplayStreamContext final : private pipeline::IntakeOut, private pipeline:
   void decision(const pipeline::Decision&) noexcept override {}
 
   std::uint32_t index_;
-  std::uint32_t stream_id_;  // in the log
+  std::uint32_t log_id_;
   ReplayModels& models_;
   ReplayHost& host_;
   std::string file_;
   ReplayStream stream_;
-  drivers::Description device_;  // from its latest device info
-  std::unique_ptr<drivers::Decoder> decoder_;
-  std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: use the device's default
   std::vector<std::unique_ptr<const StageModel>> models_in_use_;  // one for each stage, or null
   std::set<std::pair<std::size_t, std::string>> tried_;           // stage and hash
-  pipeline::Intake intake_;
-  std::optional<pipeline::StreamEngine> engine_;
+  std::unique_ptr<pipeline::StreamEngine> engine_;
   ShedRanges shed_frames_, shed_samples_;
-  std::int64_t arrival_ns_ = 0;
+  std::uint64_t last_frame_ = 0, last_sample_ = 0;  // sequences of those decoded last
   std::uint64_t last_out_ = 0;  // sequence of the last frame that left the engine
+  bool ended_ = false, gone_ = false;
   std::optional<std::int64_t> gap_after_;
   std::optional<std::uint64_t> broken_at_;
-  std::optional<Error> error_;  // the first error that could not be returned at once
 };
 
 }  // namespace posed::replay

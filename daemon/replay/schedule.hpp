@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -30,12 +31,21 @@ class Schedule {
   // The next decision that takes effect before `item`; null if none is left that does. The pointer
   // stays valid.
   [[nodiscard]] const Entry* due(const pipeline::Item& item, std::size_t stream) {
-    Queue& queue = queues_[counts_items_ ? 0 : stream];
-    if (queue.next == queue.waiting.size()) return nullptr;
-    const Entry& entry = queue.waiting[queue.next];
-    if (counts_items_ ? entry.row.item > item.number : !before_frame(entry, item)) return nullptr;
-    ++queue.next;
-    return &entry;
+    if (counts_items_) return due(item.number);
+    Queue& queue = queues_[stream];
+    if (queue.next == queue.waiting.size() || !before_frame(queue.waiting[queue.next], item)) {
+      return nullptr;
+    }
+    return &queue.waiting[queue.next++];
+  }
+
+  // The same for all streams, before the item with this number. Only for format 3.
+  [[nodiscard]] const Entry* due(std::uint64_t item) {
+    Queue& queue = queues_[0];
+    if (queue.next == queue.waiting.size() || queue.waiting[queue.next].row.item > item) {
+      return nullptr;
+    }
+    return &queue.waiting[queue.next++];
   }
 
   // Call after the last item: the decisions that were made when no more items came; null after the

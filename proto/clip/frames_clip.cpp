@@ -13,8 +13,25 @@ namespace {
 
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
+// The skeleton of a device that gives rotations alone has no channels: here its root moves, and all
+// joints turn.
+std::shared_ptr<const Skeleton> with_moving_root(const Skeleton& skeleton) {
+  auto moving = std::make_shared<Skeleton>(skeleton);
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    moving->channels.push_back({.joint = static_cast<std::uint16_t>(moving->root_joint),
+                                .axis = axis,
+                                .translation = true});
+  }
+  (void)moving->finish();  // cannot fail: the same joints passed before; this only updates the id
+  return moving;
+}
+
 std::shared_ptr<const Skeleton> writable(std::shared_ptr<const Skeleton> skeleton) {
-  if (!is_acclaim(*skeleton)) return skeleton;
+  if (skeleton->channels.empty()) {
+    skeleton = with_moving_root(*skeleton);
+  } else if (!is_acclaim(*skeleton)) {
+    return skeleton;
+  }
   Clip none;
   none.skeleton = std::move(skeleton);
   none.channels.resize(0, std::ssize(none.skeleton->channels));

@@ -13,6 +13,9 @@ namespace posed::log {
 namespace {
 
 constexpr int kPatience_ms = 2000;
+constexpr const char* kSelectChunks =
+    "SELECT id, source, socket, direction, arrival_ns, first_item, sequences, bytes, crc FROM "
+    "chunk";
 
 std::uint64_t unsigned_of(std::int64_t stored) { return static_cast<std::uint64_t>(stored); }
 
@@ -138,6 +141,9 @@ struct Reader::State {
     return old ? select.step() : step_checked(select, table, file);
   }
 
+  // The row of the chunk table to which `select` has stepped; it refers to `positions`.
+  Result<ChunkRow> chunk(const Statement& select, std::vector<StreamPosition>& positions) const;
+
   Result<> read_described();
   // Fails when a row names a source or stream that the log does not describe.
   Result<> check_owner(std::int64_t id, const char* table, std::int64_t row, bool is_source) const;
@@ -164,6 +170,28 @@ Result<> Reader::State::read_described() {
     if (auto known = check_owner(row.source, "stream", row.id, true); !known) return known;
   }
   return {};
+}
+
+Result<ChunkRow> Reader::State::chunk(const Statement& select,
+                                      std::vector<StreamPosition>& positions) const {
+  const std::int64_t id = select.integer(0), source = select.integer(1);
+  if (auto known = check_owner(source, "chunk", id, true); !known) {
+    return std::unexpected(known.error());
+  }
+  if (old) return old_format::chunk(select, positions);
+  if (!unpack_positions(select.bytes(6), positions)) {
+    return damaged_row(file, "chunk", id, "has sequences that are cut short");
+  }
+  constexpr std::int64_t kMaxDirection = std::numeric_limits<std::uint8_t>::max();
+  return ChunkRow{.id = id,
+                  .source = static_cast<std::uint32_t>(source),
+                  .socket = static_cast<std::uint32_t>(select.integer(2)),
+                  .direction = static_cast<std::uint8_t>(
+                      std::clamp<std::int64_t>(select.integer(3), 0, kMaxDirection)),
+                  .arrival_ns = select.integer(4),
+                  .first_item = unsigned_of(select.integer(5)),
+                  .places = positions,
+                  .bytes = select.bytes(7)};
 }
 
 Result<> Reader::State::check_owner(std::int64_t id, const char* table, std::int64_t row,
@@ -203,10 +231,9 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
                                              .chunks = std::nullopt,
                                              .places = {}});
   if (auto done = state->read_described(); !done) return std::unexpected(done.error());
-  auto chunks = select_rows(state->database, state->old,
-                            "SELECT id, source, socket, direction, arrival_ns, first_item, "
-                            "sequences, bytes, crc FROM chunk ORDER BY id",
-                            old_format::select_chunks);
+  auto chunks =
+      select_rows(state->database, state->old,
+                  (std::string(kSelectChunks) + " ORDER BY id").c_str(), old_format::select_chunks);
   if (!chunks) return std::unexpected(chunks.error());
   state->chunks.emplace(std::move(*chunks));
   return Reader(std::move(state));
@@ -249,30 +276,26 @@ Result<std::optional<ChunkRow>> Reader::next_chunk() {
   const auto stepped = state_->step(select, "chunk");
   if (!stepped) return std::unexpected(stepped.error());
   if (!*stepped) return std::nullopt;
-  if (state_->old) {
-    const ChunkRow row = old_format::chunk(select, state_->places);
-    if (auto known = state_->check_owner(select.integer(1), "chunk", row.id, true); !known) {
-      return std::unexpected(known.error());
-    }
-    return row;
+  auto row = state_->chunk(select, state_->places);
+  if (!row) return std::unexpected(row.error());
+  return *row;
+}
+
+// Formats 1 and 2 know no sources with several bodies.
+Result<> Reader::each_description(const std::function<Result<>(const ChunkRow&)>& take) const {
+  if (state_->old) return {};
+  auto select =
+      state_->database.prepare(std::string(kSelectChunks) + " WHERE direction=4 ORDER BY id");
+  if (!select) return std::unexpected(select.error());
+  std::vector<StreamPosition> places;
+  for (;;) {
+    const auto stepped = state_->step(*select, "chunk");
+    if (!stepped) return std::unexpected(stepped.error());
+    if (!*stepped) return {};
+    const auto row = state_->chunk(*select, places);
+    if (!row) return std::unexpected(row.error());
+    if (auto taken = take(*row); !taken) return taken;
   }
-  const std::int64_t id = select.integer(0), source = select.integer(1);
-  if (auto known = state_->check_owner(source, "chunk", id, true); !known) {
-    return std::unexpected(known.error());
-  }
-  if (!unpack_positions(select.bytes(6), state_->places)) {
-    return damaged_row(state_->file, "chunk", id, "has sequences that are cut short");
-  }
-  constexpr std::int64_t kMaxDirection = std::numeric_limits<std::uint8_t>::max();
-  return ChunkRow{.id = id,
-                  .source = static_cast<std::uint32_t>(source),
-                  .socket = static_cast<std::uint32_t>(select.integer(2)),
-                  .direction = static_cast<std::uint8_t>(
-                      std::clamp<std::int64_t>(select.integer(3), 0, kMaxDirection)),
-                  .arrival_ns = select.integer(4),
-                  .first_item = unsigned_of(select.integer(5)),
-                  .places = state_->places,
-                  .bytes = select.bytes(7)};
 }
 
 Result<std::optional<Reader::Extent>> Reader::extent() const {

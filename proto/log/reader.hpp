@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -51,6 +52,11 @@ class Reader {
   // The next chunk of all sources in log order; empty after the last. Its bytes and places are
   // valid until the next call.
   [[nodiscard]] Result<std::optional<ChunkRow>> next_chunk();
+
+  // Calls `take` with each row that describes the bodies of a source, in log order, until it fails.
+  // The row is valid during the call, which may not use next_chunk().
+  [[nodiscard]] Result<> each_description(
+      const std::function<Result<>(const ChunkRow&)>& take) const;
 
   // Arrival times of the first and the last chunk from a device, which bound the length of the log.
   // Empty when none was logged. Cheap.

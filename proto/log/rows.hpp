@@ -29,10 +29,10 @@ struct SourceRow {
 struct StreamRow {
   std::uint32_t id = 0;
   std::uint32_t source = 0;
-  std::string body;         // its name in the source; empty if the source has only one body
-  std::string name;         // name on the wire
-  std::string stages_json;  // how it is published, and its stages in order (proto/README.md)
-  std::uint64_t first_item = 0;
+  std::string body;              // its name in the source; empty if the source has only one body
+  std::string name;              // name on the wire
+  std::string stages_json;       // how it is published, and its stages in order (proto/README.md)
+  std::uint64_t first_item = 0;  // 0: the log lacks the rows that would say it
 };
 
 // The numbers of the next frame and the next sample of a stream.

@@ -27,7 +27,7 @@ constexpr std::array<std::string_view, kSqlCount> kSql{
     "INSERT INTO frame VALUES(?,?,?,?,?,?)",
     "INSERT INTO gap VALUES(?,?,?,?,?,?,?)",
     "INSERT INTO source VALUES(?,?,?,?,?,?,?)",
-    "INSERT INTO stream VALUES(?,?,?,?,?,?,?)",
+    "INSERT OR REPLACE INTO stream VALUES(?,?,?,?,?,?,?)",
     "INSERT OR IGNORE INTO blob VALUES(?,?)",
     "BEGIN IMMEDIATE",
     "COMMIT",

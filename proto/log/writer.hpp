@@ -32,7 +32,9 @@ class Writer {
   ~Writer();
 
   // Chunks, decisions, frames and gaps get the next id of their table; the id in the row is
-  // ignored. Add a source before its streams, and a stream before the rows that refer to it.
+  // ignored. A row of a stream that is there already is replaced: whether a commit that failed has
+  // kept it is not known. Each source and stream that a row refers to must be added before the same
+  // commit.
   [[nodiscard]] Result<> add(const SourceRow& row);
   [[nodiscard]] Result<> add(const StreamRow& row);
   [[nodiscard]] Result<> add(const ChunkRow& row);

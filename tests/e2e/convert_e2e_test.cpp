@@ -96,7 +96,7 @@ TEST_CASE("convert reports what a log lacks and wrong use") {
   REQUIRE(stage.daemon->exit_code());
   const Outcome unclear = stage.convert("out.bvh");
   CHECK(unclear.code == 2);
-  CHECK(has(unclear.err, "walk, hand"));
+  CHECK(has(unclear.err, "hand, walk"));
   CHECK(has(unclear.err, "--stream"));
   CHECK(stage.convert("out.bvh", {"--stream", "nobody"}).code == 2);
   CHECK(stage.convert("out.plog", {"--stream", "walk"}).code == 2);

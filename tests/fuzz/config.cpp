@@ -15,6 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (error.text().find('\x1b') != std::string::npos)
       std::abort();  // no terminal escape sequences
   }
-  if (reading.errors.empty() && reading.config.streams.empty()) std::abort();
+  if (reading.errors.empty() && reading.config.streams.empty() && reading.config.sources.empty()) {
+    std::abort();
+  }
   return 0;
 }

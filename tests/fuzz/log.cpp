@@ -10,9 +10,12 @@
 #include <fuzzer/FuzzedDataProvider.h>
 #include <unistd.h>
 
+#include "daemon/pipeline/description_row.hpp"
+#include "daemon/pipeline/messages.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/replay/expectation.hpp"
 #include "daemon/replay/replay.hpp"
+#include "drivers/template_mocap/protocol.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
 #include "posed/v1/log.pb.h"
@@ -57,7 +60,11 @@ class FuzzedLog {
  private:
   void add_stream(std::uint32_t i) {
     const std::uint32_t id = input_.ConsumeBool() ? i : (1U << 16U | i);
-    std::string driver = input_.PickValueInArray<std::string>({"file", "lucidgloves", "labels"});
+    std::string driver =
+        input_.PickValueInArray<std::string>({"file", "lucidgloves", "labels", "template_mocap"});
+    // now and then another stream of the source before it
+    const bool again = driver == "template_mocap" && i > 0 && input_.ConsumeBool();
+    const std::string body = driver == "template_mocap" ? "b" + std::to_string(i) : "";
     std::string text = driver == "file" ? kBody : "";
     if (const auto* row = drivers::find_driver(driver); row->expect != nullptr) {
       text = row->expect({}).value().text;
@@ -65,8 +72,9 @@ class FuzzedLog {
     if (input_.ConsumeProbability<double>() < 0.1) driver = input_.ConsumeRandomLengthString(16);
     if (input_.ConsumeProbability<double>() < 0.2) text = input_.ConsumeRandomLengthString(400);
     ids_.push_back(id);
+    const std::uint32_t source = again ? ids_.front() : id;
     keep(writer_.add(log::SourceRow{id, "s", driver, text, "x", "{}"}));
-    keep(writer_.add(log::StreamRow{id, id, "", "s" + std::to_string(i), settings(), 1}));
+    keep(writer_.add(log::StreamRow{id, source, body, "s" + std::to_string(i), settings(), 1}));
   }
 
   std::string number() {
@@ -135,9 +143,43 @@ class FuzzedLog {
     }
   }
 
+  // A row that says which streams the bodies of a source are.
+  std::string description() {
+    std::vector<std::uint32_t> streams;
+    std::vector<drivers::mocap::BodyEntry> bodies;
+    for (int n = input_.ConsumeIntegralInRange(0, 3); n > 0; --n) {
+      streams.push_back(input_.ConsumeProbability<double>() < 0.1 ? pipeline::kNoStream : id());
+      bodies.push_back({.id = input_.ConsumeIntegralInRange<std::uint16_t>(1, 4),
+                        .name = std::string(1, static_cast<char>('a' + n)),
+                        .joints = {{"hips", -1, {}}}});
+      if (input_.ConsumeBool()) bodies.back().joints.push_back({"head", 0, {0.0F, 0.5F, 0.0F}});
+    }
+    const auto datagram = drivers::mocap::encode_description(bodies);
+    const auto content = std::span(datagram).subspan(8, datagram.size() - 12);
+    const auto row = pipeline::pack_description(streams, content);
+    places_.clear();
+    for (const std::uint32_t stream : streams) {
+      if (stream != pipeline::kNoStream) places_.push_back({stream, count(frames_), 1});
+    }
+    return {reinterpret_cast<const char*>(row.data()), row.size()};
+  }
+
+  // A frame of up to three of those bodies.
+  std::string mocap_frame() {
+    drivers::mocap::FramePacket frame{
+        .number = static_cast<std::uint32_t>(frames_), .time_us = 0, .bodies = {}};
+    for (int n = input_.ConsumeIntegralInRange(0, 3); n > 0; --n) {
+      auto& pose = frame.bodies.emplace_back();
+      pose.id = input_.ConsumeIntegralInRange<std::uint16_t>(1, 4);
+      pose.rotation_xyzw.assign(input_.ConsumeIntegralInRange<std::size_t>(0, 3), kIdentity);
+    }
+    const auto datagram = drivers::mocap::encode_frame(frame);
+    return {reinterpret_cast<const char*>(datagram.data()), datagram.size()};
+  }
+
   void add_chunk() {
     const std::uint32_t source = id();
-    const std::vector<log::StreamPosition> places{{source, count(frames_), count(frames_)}};
+    std::vector<log::StreamPosition> places{{source, count(frames_), count(frames_)}};
     frames_ += 1;
     items_ += 2;
     bytes_ = input_.PickValueInArray<std::string>(
@@ -147,6 +189,13 @@ class FuzzedLog {
     const auto direction = input_.ConsumeProbability<double>() < 0.8
                                ? std::uint8_t{0}
                                : input_.ConsumeIntegralInRange<std::uint8_t>(0, 5);
+    if (direction == 4 && input_.ConsumeProbability<double>() < 0.95) {
+      bytes_ = description();
+      places = places_;
+    } else if (!places_.empty() && input_.ConsumeBool()) {
+      bytes_ = mocap_frame();
+      places = places_;
+    }
     keep(writer_.add(log::ChunkRow{.source = source,
                                    .direction = direction,
                                    .arrival_ns = time_ns(),
@@ -219,7 +268,8 @@ class FuzzedLog {
   log::Writer writer_;
   std::array<std::string, 5> hashes_;
   std::vector<std::uint32_t> ids_;
-  std::string bytes_;  // of the current row
+  std::string bytes_;                        // of the current row
+  std::vector<log::StreamPosition> places_;  // of the latest description
   std::uint64_t frames_ = 1, items_ = 1;
   std::int64_t now_ns_ = 1'000'000'000;
 };

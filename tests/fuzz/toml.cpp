@@ -90,7 +90,7 @@ void try_config(const std::string& text) {
        .describe = nullptr}};
   const auto reading = posed::config::read_config(text, "/nowhere/fuzz.toml", drivers);
   for (const posed::Error& error : reading.errors) check_sentence(error);
-  demand(reading.errors.size() <= 101 && reading.config.streams.size() <= 64);
+  demand(reading.errors.size() <= 101 && reading.config.streams.size() <= 256);
 }
 
 }  // namespace

@@ -42,8 +42,11 @@ Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
           {&hand::constrain_type(), hand::constrain_type().make(context, nullptr).value()});
     }
     worker_->add(std::move(options), stream.device.description.rate_hz, *counters_.back());
-    reader_->add(
-        {.device = &stream.device, .counters = counters_.back().get(), .slot = stream.slot});
+    source_counters_.push_back(std::make_unique<pipeline::SourceCounters>());
+    reader_->add({.device = &stream.device,
+                  .counters = source_counters_.back().get(),
+                  .slot = stream.slot,
+                  .body = pipeline::ReadBody{.stream = i, .counters = counters_.back().get()}});
   }
 }
 

@@ -43,6 +43,7 @@ class Rig {
  private:
   std::vector<RigStream> streams_;
   std::vector<std::unique_ptr<pipeline::StreamCounters>> counters_;
+  std::vector<std::unique_ptr<pipeline::SourceCounters>> source_counters_;
   pipeline::Ring<pipeline::Item> decoded_{1024};
   pipeline::Ring<pipeline::Item> finished_{1024};
   pipeline::Ring<pipeline::Command> commands_{16};

@@ -111,6 +111,7 @@ struct VirtualStreamContext {
   VirtualStream stream;
   std::uint32_t id;
   pipeline::StreamCounters counters;
+  pipeline::SourceCounters source_counters;
   pipeline::DeviceSlot slot;
   std::unique_ptr<drivers::Device> device;  // of the link in use
   std::size_t next_link = 0;
@@ -173,27 +174,28 @@ class VirtualDaemon::Parts {
 
 void VirtualDaemon::Parts::open_log() {
   if (options.log.empty()) return;
-  std::vector<record::RecordedStream> streams;
+  record::RecordedSetup setup;
   for (const auto& context : contexts) {
     const VirtualStream& stream = context->stream;
-    streams.push_back({.source = {.id = 0,
-                                  .name = stream.name,
-                                  .driver = stream.description.driver,
-                                  .text = stream.description.text,
-                                  .identity = stream.description.identity,
-                                  .config = "{}"},
-                       .settings = stream.settings,
-                       .model_files = stream.model_files});
+    setup.add_device({.id = 0,
+                      .name = stream.name,
+                      .driver = stream.description.driver,
+                      .text = stream.description.text,
+                      .identity = stream.description.identity,
+                      .config = "{}"},
+                     stream.settings, stream.model_files);
   }
   record::RecorderOptions recorder;
   recorder.file = options.log;
   recorder.clock = virtual_clock;
-  auto writer = record::begin_log(recorder, streams);
+  auto writer = record::begin_log(recorder, setup);
   REQUIRE(writer);
-  record_sink = std::make_unique<record::RecordRings>(
-      std::vector<record::RingSizes>(contexts.size(), options.record_sink));
-  log_writer = std::make_unique<record::LogWriterLoop>(
-      *record_sink, std::move(*writer), options.log, [](const record::RecorderEvent&) {});
+  record_sink = std::make_unique<record::RecordRings>(record::RingSizes{
+      .chunk_bytes = std::vector<std::size_t>(setup.sources.size(), options.chunk_bytes),
+      .slots = std::vector<record::SlotSizes>(setup.streams.size(), options.record_slot)});
+  log_writer =
+      std::make_unique<record::LogWriterLoop>(*record_sink, std::move(*writer), options.log,
+                                              setup.streams, [](const record::RecorderEvent&) {});
 }
 
 pipeline::EngineOptions VirtualDaemon::Parts::engine_of(VirtualStreamContext& context) const {
@@ -242,10 +244,11 @@ void VirtualDaemon::Parts::open() {
     worker->add(engine_of(*context), stream.description.rate_hz, context->counters, stream.slots);
     reader->add(
         {.device = context->next_device(),
-         .counters = &context->counters,
+         .counters = &context->source_counters,
          .slot = &context->slot,
          .calibration = stream.calibration.empty() ? nullptr : context->compile(stream.calibration),
-         .slots = stream.slots});
+         .body = pipeline::ReadBody{
+             .stream = context->id, .counters = &context->counters, .slots = stream.slots}});
   }
   std::ranges::stable_sort(script, {}, &VirtualCommand::at_s);
   reader->begin();

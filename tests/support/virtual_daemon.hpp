@@ -77,8 +77,9 @@ struct VirtualOptions {
   bool holdups = true;         // the parts are held up from time to time, for up to 0.4 s
   double turn_us = 40.0;       // the longest duration of a turn
   std::size_t ack_slots = 64;  // of the ring to control
-  // Each stream's share of the recorder's rings.
-  record::RingSizes record_sink{.chunk_bytes = 4 << 20, .frame_bytes = 16 << 20, .decisions = 2048};
+  // Each device's and each stream's share of the recorder's rings.
+  std::size_t chunk_bytes = 4 << 20;
+  record::SlotSizes record_slot{.frame_bytes = 16 << 20, .decisions = 2048};
 };
 
 class VirtualDaemon {

@@ -215,7 +215,7 @@ struct Watched {
 
 // A serialized frame of the same size as the stream's.
 std::string sample_body(const devices::OpenStream& stream) {
-  const Skeleton& skeleton = *stream.device.description.skeleton;
+  const Skeleton& skeleton = *stream.source->device.description.skeleton;
   Frame frame;
   pose_from_channels(skeleton, std::vector<double>(skeleton.channels.size(), 0.1), frame);
   frame.header.sequence = frame.header.arrival_ns = system::monotonic_ns();
@@ -264,7 +264,7 @@ Result<Watched> measure(const HopOptions& options) {
   Turns turns;
   int place = 0;
   for (const auto& stream : (*daemon)->streams()) {
-    drivers::Device& device = stream->device;
+    drivers::Device& device = stream->source->device;
     device.decoder = std::make_unique<TurnDecoder>(std::move(device.decoder), **hop, turns);
     device.transport = std::make_unique<LaterTransport>(
         std::move(device.transport), nanoseconds(place++ / (kRate_hz * options.streams)));

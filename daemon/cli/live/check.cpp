@@ -42,13 +42,13 @@ ordered_json summary_of(const pipeline::StageSettings& stage) {
 Result<ordered_json> try_stream(const config::StreamConfig& config) {
   const auto stream = devices::open_stream(config);
   if (!stream) return std::unexpected(stream.error());
-  const auto missing = devices::try_kept_device(**stream);
-  if (!missing) return std::unexpected(missing.error());
-  const auto bound = devices::bind_stages(**stream);
-  if (!bound) return std::unexpected(bound.error());
-  const auto engine = devices::make_engine(0, **stream, *bound);
-  if (!engine) return std::unexpected(engine.error());
-  const drivers::Description& device = (*stream)->device.description;
+  const auto missing = devices::try_kept_device(*(*stream)->source);
+  if (!missing) return devices::of_stream(config.name, missing.error());
+  const auto bound = devices::bind_stages((*stream)->stages);
+  if (!bound) return devices::of_stream(config.name, bound.error());
+  const auto engine = devices::make_engine(0, (*stream)->stages, *bound);
+  if (!engine) return devices::of_stream(config.name, engine.error());
+  const drivers::Description& device = (*stream)->source->device.description;
   ordered_json summary{{"name", config.name},
                        {"driver", config.driver},
                        {"device", device.identity},
@@ -58,14 +58,24 @@ Result<ordered_json> try_stream(const config::StreamConfig& config) {
                        {"publish_raw", config.publish_raw},
                        {"stale_after_s", config.stale_after_s}};
   summary["stages"] = ordered_json::array();
-  for (const pipeline::StageSettings& stage : (*stream)->settings.stages) {
+  for (const pipeline::StageSettings& stage : (*stream)->stages.settings.stages) {
     summary["stages"].push_back(summary_of(stage));
   }
   summary["present"] = missing->empty();
-  summary["warnings"] = (*stream)->device.warnings;
+  summary["warnings"] = (*stream)->source->device.warnings;
   if (!missing->empty()) {
     summary["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
                                   *missing + ")");
+  }
+  return summary;
+}
+
+// What is known about a source before its device describes its bodies.
+ordered_json summary_of(const config::SourceConfig& source) {
+  ordered_json summary{{"name", source.name}, {"driver", source.driver}, {"all", source.all}};
+  summary["streams"] = ordered_json::array();
+  for (const auto& named : source.named) {
+    summary["streams"].push_back({{"name", named.stream.name}, {"body", named.body}});
   }
   return summary;
 }
@@ -75,7 +85,22 @@ std::string security_of(const config::DaemonConfig& config) {
   return "keys, " + std::to_string(config.security.clients.size()) + " clients allowed";
 }
 
-void print(const config::DaemonConfig& config, const ordered_json& streams) {
+// "optitrack: template_mocap, body 'Ann' as ann, all other bodies"
+void print_source(const ordered_json& source) {
+  std::printf("%s: %s", source["name"].get<std::string>().c_str(),
+              source["driver"].get<std::string>().c_str());
+  for (const ordered_json& stream : source["streams"]) {
+    std::printf(", body %s as %s", in_quotes(stream["body"].get<std::string>()).c_str(),
+                stream["name"].get<std::string>().c_str());
+  }
+  if (source["all"].get<bool>()) {
+    std::printf(", all %sbodies", source["streams"].empty() ? "" : "other ");
+  }
+  std::puts("");
+}
+
+void print(const config::DaemonConfig& config, const ordered_json& streams,
+           const ordered_json& sources) {
   std::printf("publishes on %s, controlled on %s (%s)\n", config.publish_endpoint.c_str(),
               config.control_endpoint.c_str(), security_of(config).c_str());
   for (const ordered_json& stream : streams) {
@@ -100,6 +125,7 @@ void print(const config::DaemonConfig& config, const ordered_json& streams) {
       std::printf("  note: %s\n", clean(warning.get<std::string>()).c_str());
     }
   }
+  for (const ordered_json& source : sources) print_source(source);
 }
 
 // Returns 0 if everything would run; 2 if the config is wrong; 1 if it is right, but a file or a
@@ -107,11 +133,15 @@ void print(const config::DaemonConfig& config, const ordered_json& streams) {
 int check(const CheckOptions& options) {
   config::Reading reading = config::read_config_file(options.config, drivers::registry());
   ordered_json streams = ordered_json::array();
+  ordered_json sources = ordered_json::array();
   if (reading.errors.empty()) {
     for (const config::StreamConfig& stream : reading.config.streams) {
       auto summary = try_stream(stream);
       if (summary) streams.push_back(std::move(*summary));
       if (!summary) reading.errors.push_back(summary.error());
+    }
+    for (const config::SourceConfig& source : reading.config.sources) {
+      sources.push_back(summary_of(source));
     }
   }
   int exit_code = 0;
@@ -125,10 +155,11 @@ int check(const CheckOptions& options) {
                            {"publish", reading.config.publish_endpoint},
                            {"control", reading.config.control_endpoint},
                            {"streams", streams},
+                           {"sources", sources},
                            {"errors", errors}};
     std::printf("%s\n", json_text(all).c_str());
   } else if (errors.empty()) {
-    print(reading.config, streams);
+    print(reading.config, streams, sources);
   }
   return exit_code;
 }

@@ -150,12 +150,23 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
   return text;
 }
 
+// Which body of which source the stream is, and why posed cannot serve it; empty if it is no body.
+std::string body_row(const v1::StreamStats& stream) {
+  std::string text;
+  if (!stream.source_name().empty()) {
+    text = fmt::format("body {} of {}", in_quotes(stream.body()), clean_name(stream.source_name()));
+  }
+  if (stream.refusal().empty()) return text;
+  return text + (text.empty() ? "" : ": ") + clean(stream.refusal());
+}
+
 // The lines below the rows of the streams.
 std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths) {
   std::vector<std::string> rows;
   if (!stats.replay_file().empty()) rows.push_back("  " + replay_words(stats));
   for (const v1::StreamStats& stream : stats.stream()) {
-    for (const std::string& text : {device_row(stream, stats.time_ns()), stages_row(stream)}) {
+    for (const std::string& text :
+         {body_row(stream), device_row(stream, stats.time_ns()), stages_row(stream)}) {
       if (text.empty()) continue;
       rows.push_back("  " + fit(clean_name(stream.stream()), widths.name - 1) + text);
     }
@@ -173,7 +184,7 @@ Widths widths_for(const v1::Stats& stats, int wanted) {
 }
 
 const char* colour_of(const v1::StreamStats& stream) {
-  if (stream.dropped() > 0 || stream.shed() > 0) return kRed;
+  if (stream.dropped() > 0 || stream.shed() > 0 || !stream.refusal().empty()) return kRed;
   if (stream.away() || stream.state() == "stale" || stream.state() == "waiting") return kYellow;
   return stream.state() == "ended" ? kDim : "";
 }
@@ -188,7 +199,8 @@ std::string short_duration(double microseconds) {
 }
 
 const char* const kColumnsHelp = R"(Columns, one row a stream:
-  STATE    waiting (nothing came yet), live, stale (fell silent), away (device unplugged), ended
+  STATE    waiting (nothing came yet), live, stale (fell silent), away (device unplugged), ended,
+           refused (a stage cannot serve this body; below the row is why)
   HZ       frames published in the last second
   DROP     frames lost so far because a queue was full (machine too slow)
   SHED     frames skipped so far because newer ones were waiting

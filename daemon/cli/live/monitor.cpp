@@ -15,6 +15,7 @@
 #include "daemon/cli/live/clock_time.hpp"
 #include "daemon/cli/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/text/clean.hpp"
 
 namespace posed::cli {
 namespace {
@@ -113,7 +114,8 @@ class Monitor {
     return {};
   }
 
-  // The first stats show which streams there are, and whether this is a replay.
+  // The first stats show which streams there are, and whether this is a replay. A name that is not
+  // there is an error, unless streams come and go here, as bodies of sources do.
   Result<> look_at(std::span<const std::byte> bytes) {
     v1::Stats stats;
     const auto size = static_cast<int>(bytes.size());
@@ -123,15 +125,22 @@ class Monitor {
       std::fprintf(stderr, "posed: %s\n", replay_words(stats).c_str());
     }
     std::string names;
+    bool come_and_go = false;
     for (const auto& stream : stats.stream()) {
       const std::string& name = stream.stream();
       if (options_.stream.empty() || options_.stream == name || options_.stream == name + "-raw") {
         return {};
       }
       names += (names.empty() ? "" : ", ") + name;
+      come_and_go = come_and_go || !stream.source_name().empty();
     }
-    return fail(fmt::format("the daemon at {} has no stream '{}'; it has: {}",
-                            options_.client.endpoint, options_.stream, names));
+    const std::string sentence =
+        fmt::format("the daemon at {} has no stream '{}'; it has: {}", options_.client.endpoint,
+                    options_.stream, clean(names));
+    if (!come_and_go) return fail(sentence);
+    quiet_topic_reported_ = true;
+    std::fprintf(stderr, "posed: waiting for it to come: %s\n", sentence.c_str());
+    return {};
   }
 
   void report_quiet_topic() {

@@ -109,6 +109,7 @@ std::string monitor_line(const v1::Stats& stats) {
     out += fmt::format("; {} {} {:.1f} Hz, {} dropped, {} shed", clean_name(stream.stream()),
                        stream.away() ? "away" : clean_name(stream.state()), stream.rate_hz(),
                        stream.dropped(), stream.shed());
+    if (!stream.refusal().empty()) out += ": " + clean(stream.refusal());
   }
   return out;
 }

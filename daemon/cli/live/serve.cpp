@@ -74,7 +74,7 @@ void prepare_to_serve() {
 }
 
 Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) {
-  const auto endless = [](const auto& stream) { return stream->endless; };
+  const auto endless = [](const auto& stream) { return stream->source->endless; };
   if (!options.until_end || !std::ranges::all_of(daemon.streams(), endless)) return {};
   return misuse(
       "--until-end: no source of this config ever ends (gloves come and go, clips loop); leave it"
@@ -87,6 +87,7 @@ void print_ready(const assembly::Daemon& daemon) {
                               {"control", daemon.control_endpoint()},
                               {"streams", nlohmann::json::array()}};
   for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
+  for (const auto& source : daemon.sources()) line["sources"].push_back(source->config.name);
   // Not through stdio, because a pipe that is full or that nobody reads must not delay the signals
   // that stop the daemon.
   if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kReadyLineWithin)) {

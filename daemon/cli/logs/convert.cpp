@@ -154,7 +154,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   command->add_option("--profile", convert->read.profile,
                       "Skeleton profile (default: found by the joints' names)");
   command->add_option("--stream", convert->stream,
-                      "Which of a log's streams (default: the only one)");
+                      "Which of a log's streams (default: the only one); NAME#2: its second part");
   command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape =

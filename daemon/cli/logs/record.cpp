@@ -1,10 +1,11 @@
 // `posed record`: `run` with a recorder as the record sink.
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
+#include <variant>
 
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
@@ -31,15 +32,23 @@ struct RecordOptions {
   ServeOptions serve;
 };
 
-// Publishes what the recorder reports on event/<stream>: a gap on its own stream, an error on all.
+// Publishes what the recorder reports on event/<stream> of the streams that it concerns.
 void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
-  if (event.kind == record::RecorderEvent::Kind::kGap) {
-    daemon.post_event(event.stream, v1::Event::KIND_RECORDING_GAP, event.text);
-    return;
+  const auto kind = event.kind == record::RecorderEvent::Kind::kGap
+                        ? v1::Event::KIND_RECORDING_GAP
+                        : v1::Event::KIND_RECORDING_ERROR;
+  for (const std::uint32_t stream : event.streams) daemon.post_event(stream, kind, event.text);
+}
+
+record::RecordedSetup setup_of(const assembly::Daemon& daemon) {
+  record::RecordedSetup setup;
+  for (const auto& stream : daemon.streams()) setup.add_device(*stream);
+  for (const auto& source : daemon.sources()) {
+    setup.add_bodies(*source);
+    setup.rate_to_come_hz = std::max(setup.rate_to_come_hz, devices::nominal_rate_hz(*source));
   }
-  for (std::uint32_t id = 0; id < daemon.streams().size(); ++id) {
-    daemon.post_event(id, v1::Event::KIND_RECORDING_ERROR, event.text);
-  }
+  setup.slots_to_come = daemon.slots_to_come();
+  return setup;
 }
 
 // Prints a summary. Gaps were already reported when they happened.
@@ -75,20 +84,34 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
                                 lost, errors));
 }
 
+void add_models(OutputFiles& files, const config::StreamConfig& stream) {
+  for (const config::StageConfig& stage : stream.stages) files.reads(stage.model);
+}
+
+void add_clip(OutputFiles& files, const drivers::Options& options) {
+  const auto path = options.find("path");
+  if (path == options.end()) return;
+  if (const auto* clip = std::get_if<std::string>(&path->second)) files.reads(*clip);
+}
+
 // The log must not be one of the files that the daemon reads.
 Result<> check_out(const RecordOptions& options, const config::DaemonConfig& config) {
   OutputFiles files(options.overwrite);
   files.reads(options.serve.config).writes_any_but_other(options.out, {".plog"});
   for (const config::StreamConfig& stream : config.streams) {
     files.reads(stream.calibration);
-    for (const config::StageConfig& stage : stream.stages) files.reads(stage.model);
-    if (const auto path = stream.options.find("path"); path != stream.options.end()) {
-      if (const auto* clip = std::get_if<std::string>(&path->second)) files.reads(*clip);
-    }
+    add_models(files, stream);
+    add_clip(files, stream.options);
+  }
+  for (const config::SourceConfig& source : config.sources) {
+    add_models(files, source.every);
+    for (const auto& named : source.named) add_models(files, named.stream);
+    add_clip(files, source.options);
   }
   return files.check();
 }
 
+// What the log says about the daemon's devices before the first chunk.
 Result<> record(const RecordOptions& options) {
   prepare_to_serve();
   auto config = config::load_config(options.serve.config, drivers::registry());
@@ -98,8 +121,6 @@ Result<> record(const RecordOptions& options) {
   if (!opened) return std::unexpected(opened.error());
   assembly::Daemon& daemon = **opened;
   if (auto sound = check_end(daemon, options.serve); !sound) return sound;
-  std::vector<record::RecordedStream> streams;
-  for (const auto& stream : daemon.streams()) streams.push_back(record::recorded_stream(*stream));
   auto started = std::make_shared<std::atomic<bool>>(false);
   record::RecorderOptions recorder_options{
       .file = options.out,
@@ -113,10 +134,13 @@ Result<> record(const RecordOptions& options) {
       }};
   auto replaced = SetAside::move(options.out);
   if (!replaced) return std::unexpected(replaced.error());
-  auto recorder = record::Recorder::open(std::move(recorder_options), std::move(streams));
+  auto recorder = record::Recorder::open(std::move(recorder_options), setup_of(daemon));
   if (!recorder) return std::unexpected(recorder.error());
   assembly::DaemonHooks hooks;
   hooks.record_sink = &(*recorder)->record_sink();
+  hooks.record_stream = [&recorder](const devices::NewStream& stream) {
+    (*recorder)->add_stream(record::recorded_stream(stream));
+  };
   hooks.more_stats = [&recorder](v1::Stats& stats) {
     stats.set_recorder_lost_chunks((*recorder)->lost_chunks());
     stats.set_recorder_errors((*recorder)->errors());

@@ -27,6 +27,7 @@
 #include "daemon/replay/replay.hpp"
 #include "models/gp/isa.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -186,6 +187,26 @@ void warn_of_gaps(const log::Reader& reader) {
   }
 }
 
+void warn_of_undescribed(const replay::Replay& replay) {
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+    const replay::ReplayStream& stream = replay.stream(id);
+    if (stream.described) continue;
+    spdlog::warn(
+        "stream {}: the log lacks the description of {}'s body {}, so nothing of it is"
+        " replayed",
+        clean_name(stream.name), clean_name(stream.source), clean_name(stream.body));
+  }
+}
+
+// Each once: a body that comes back is another stream of the same name.
+std::vector<std::string> stream_names(const log::Reader& reader) {
+  std::vector<std::string> names;
+  for (const log::StreamRow& row : reader.streams()) {
+    if (std::ranges::find(names, row.name) == names.end()) names.push_back(row.name);
+  }
+  return names;
+}
+
 void print_summary(const ReplayOptions& options, const Outputs& outputs, double took_s) {
   nlohmann::ordered_json line{
       {"frames", outputs.frames}, {"isa", gp::isa_name()}, {"took_s", took_s}};
@@ -238,7 +259,7 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
                                {"publish", outputs.broadcast->endpoint()},
                                {"replay", options.log},
                                {"streams", nlohmann::json::array()}};
-  for (const log::StreamRow& row : reader.streams()) ready["streams"].push_back(row.name);
+  for (const std::string& name : stream_names(reader)) ready["streams"].push_back(name);
   std::printf("%s\n", json_text(ready).c_str());
   std::fflush(stdout);
   return {};
@@ -268,6 +289,7 @@ Result<> replay(const ReplayOptions& options) {
   if (!opened) return std::unexpected(opened.error());
   replay::Replay& replay = **opened;
   warn_of_gaps(*reader);
+  warn_of_undescribed(replay);
   Outputs outputs(replay);
   if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
   const auto extent = reader->extent();

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/cli/json.hpp"
+#include "daemon/cli/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::cli {
@@ -97,6 +98,28 @@ TEST_CASE("the live view shows unplugged gloves, since when, and how a glove's c
       "drift +0.0 ppm"));
   CHECK(wide[8].contains("drift +7.3 ppm, /dev/\\x1b[2J"));
   CHECK(live_view(stats, {.height = 0, .colour = true})[3].starts_with("\x1b[33m"));
+}
+
+TEST_CASE("the live view says whose body a stream is, and why one is refused") {
+  v1::Stats stats = stats_of(3);
+  auto& ann = *stats.mutable_stream(1);
+  ann.set_source_name("optitrack");
+  ann.set_body("A\x1b[2Jnn");
+  auto& bob = *stats.mutable_stream(2);
+  bob.set_source_name("optitrack");
+  bob.set_body("Bob");
+  bob.set_state("refused");
+  bob.set_refusal("walk.style needs a joint Hips; leave the body out");
+  LiveViewOptions options{.title = "posed", .width = 0, .height = 0};
+  const auto lines = live_view(stats, options);
+  REQUIRE(lines.size() == 8);
+  CHECK(lines[4].starts_with("walker2     refused "));
+  CHECK(lines[5] == "  walker1   body 'A\\x1b[2Jnn' of optitrack");
+  CHECK(lines[6] ==
+        "  walker2   body 'Bob' of optitrack: walk.style needs a joint Hips; leave the body out");
+  options.colour = true;
+  CHECK(live_view(stats, options)[4].starts_with("\x1b[31m"));
+  CHECK(monitor_line(stats).ends_with("shed: walk.style needs a joint Hips; leave the body out"));
 }
 
 TEST_CASE("a daemon that does not answer is not shown as live") {

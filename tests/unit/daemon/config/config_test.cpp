@@ -405,6 +405,13 @@ TEST_CASE("the shipped config contains every key with its default") {
     }
   }
   CHECK(b.streams[0].off.empty());
+  CHECK(a.max_streams == b.max_streams);
+  REQUIRE(b.sources.size() == 1);
+  CHECK(b.sources[0].named.size() == 1);
+  for (const drivers::OptionSpec& option : drivers::find_driver(b.sources[0].driver)->options) {
+    INFO("config/posed.toml: " << b.sources[0].driver << "." << option.name);
+    CHECK((b.sources[0].options.at(std::string(option.name)) == option.default_value));
+  }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/devices/device_supervisor.hpp"
+#include "daemon/devices/open_stream.hpp"
 #include "daemon/emulate/emulated_device.hpp"
 #include "daemon/system/clock.hpp"
 #include "drivers/glove/calibration_file.hpp"
@@ -53,11 +54,12 @@ class SupervisedStream {
                                       .commands = &commands_})
                   .value();
     reader_->add({.device = nullptr,
-                  .counters = &stream->counters,
-                  .slot = stream->slot.get(),
-                  .calibration = nullptr});
+                  .counters = &stream->source->counters,
+                  .slot = stream->source->slot.get(),
+                  .calibration = nullptr,
+                  .body = pipeline::ReadBody{.stream = 0, .counters = &stream->counters}});
     reader_thread_ = std::thread([this] { reader_->run(); });
-    supervisor_.emplace(*stream,
+    supervisor_.emplace(*stream->source,
                         SupervisorPorts{.reader = reader_.get(),
                                         .clock = system::monotonic_ns,
                                         .report = [this](v1::Event::Kind kind, const std::string&) {

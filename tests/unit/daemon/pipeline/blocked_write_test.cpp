@@ -56,6 +56,7 @@ TEST_CASE("a device whose write blocks delays no other stream") {
   Ring<Item> decoded(1024);
   Ring<DeviceCommand> commands(16);
   StreamCounters of_glove, of_walker;
+  SourceCounters of_port, of_clip;
   const auto wake = EventFd::open().value();
   const auto reader = Reader::open({.out = &decoded,
                                     .pipeline = wake.get(),
@@ -63,8 +64,12 @@ TEST_CASE("a device whose write blocks delays no other stream") {
                                     .clock = monotonic_ns,
                                     .commands = &commands})
                           .value();
-  reader->add({.device = &glove, .counters = &of_glove});
-  reader->add({.device = &walker, .counters = &of_walker});
+  reader->add({.device = &glove,
+               .counters = &of_port,
+               .body = ReadBody{.stream = 0, .counters = &of_glove}});
+  reader->add({.device = &walker,
+               .counters = &of_clip,
+               .body = ReadBody{.stream = 1, .counters = &of_walker}});
   REQUIRE(walker.transport->start(monotonic_ns()));
   std::thread reads([&] { reader->run(); });
   DeviceCommand felt{.kind = DeviceCommand::Kind::kSend, .stream = 0};

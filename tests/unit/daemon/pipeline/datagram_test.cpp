@@ -57,6 +57,7 @@ TEST_CASE("datagrams of a mocap system come through the reader, with the kernel'
 
   Ring<Item> decoded(1024);
   StreamCounters counters;
+  SourceCounters of_system;
   Recorder recorder;
   const auto wake = EventFd::open().value();
   const auto reader = Reader::open({.out = &decoded,
@@ -65,7 +66,9 @@ TEST_CASE("datagrams of a mocap system come through the reader, with the kernel'
                                     .clock = monotonic_ns,
                                     .commands = nullptr})
                           .value();
-  reader->add({.device = &device, .counters = &counters});
+  reader->add({.device = &device,
+               .counters = &of_system,
+               .body = ReadBody{.stream = 0, .counters = &counters}});
   std::thread reads([&] { reader->run(); });
   int frames = 0;
   bool in_order = true;
@@ -88,9 +91,8 @@ TEST_CASE("datagrams of a mocap system come through the reader, with the kernel'
   CHECK(in_order);
   CHECK(recorder.requests >= 1);  // a request follows the first datagram
   CHECK(recorder.chunks >= 150);
-  // Only body 0 has a stream so far.
-  const auto foreign = counters.reader.outcome[static_cast<std::size_t>(Outcome::kForeign)].load();
-  CHECK(foreign >= 150);
+  CHECK(counters.reader.frames == static_cast<std::uint64_t>(frames));  // of body 0 only
+  CHECK(of_system.outcome[static_cast<std::size_t>(Outcome::kOk)] >= 150);
 }
 
 }  // namespace posed::pipeline

@@ -50,6 +50,7 @@ TEST_CASE("untrusted names in an event are cleaned and cut between two character
   CHECK(umlauts.starts_with(text.text()));
   event.after = text;
   CHECK(sentence(event).contains("... from frame"));
+  CHECK(body_words("optitrack", "\x1b[2JAnn") == "body '\\x1b[2JAnn' of source optitrack");
 }
 
 }  // namespace

@@ -1,92 +1,16 @@
 #include <catch2/catch.hpp>
 
-#include <map>
-#include <thread>
-
 #include "daemon/publish/published_stream.hpp"
-#include "daemon/publish/publisher.hpp"
 #include "daemon/publish/shed_tally.hpp"
-#include "daemon/system/clock.hpp"
-#include "models/style/style_type.hpp"
-#include "tests/unit/models/style/toy_style.hpp"
+#include "tests/unit/daemon/publish/publisher_rig.hpp"
 
 namespace posed::publish {
-namespace {
-
 using pipeline::Item;
 
-// A publisher of one stream on a free port, its thread, and a subscriber to everything.
-class Rig {
- public:
-  Rig() {
-    StreamInfo info;
-    info.name = "toy";
-    info.description.driver = "file";
-    info.description.skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
-    info.description.samples = {.names = {"bend"}, .units = {"rad"}};
-    info.rate_hz = 100.0;
-    info.stages = {&style::style_type()};
-    info.raw = true;
-    info.counters = &counters;
-    PublisherOptions options;
-    options.context = context.get();
-    options.endpoint = "tcp://127.0.0.1:*";
-    options.clock = system::monotonic_ns;
-    publisher = Publisher::open(std::move(options), {std::move(info)}, ring, *wake).value();
-    subscriber = net::open_socket(context.get(), ZMQ_SUB).value();
-    REQUIRE(net::set_option(subscriber.get(), ZMQ_SUBSCRIBE, std::string_view()));
-    REQUIRE(net::set_option(subscriber.get(), ZMQ_RCVTIMEO, 20));
-    REQUIRE(net::connect_socket(subscriber.get(), publisher->endpoint()));
-    thread = std::thread([this] { publisher->run(); });
-  }
-  ~Rig() {
-    publisher->stop();
-    thread.join();
-  }
-
-  void put(const Item& item) {
-    REQUIRE(ring.push(item));
-    wake->notify();
-  }
-  // Receives messages until `topic` has come `count` times; false after ten seconds.
-  bool receive(const std::string& topic, int count) {
-    const std::int64_t until_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
-    while (seen[topic] < count && system::monotonic_ns() < until_ns) {
-      net::Message name;
-      net::Message body;
-      if (!name.receive(subscriber.get(), 0) || !body.receive(subscriber.get(), 0)) continue;
-      ++seen[std::string(name.text())];
-      bodies[std::string(name.text())] = std::string(body.text());
-    }
-    return seen[topic] >= count;
-  }
-
-  pipeline::StreamCounters counters;
-  pipeline::Ring<Item> ring{64};
-  std::unique_ptr<system::EventFd> wake = system::EventFd::open().value();
-  net::Context context = net::open_context().value();
-  std::unique_ptr<Publisher> publisher;
-  net::Socket subscriber;
-  std::thread thread;
-  std::map<std::string, int> seen;
-  std::map<std::string, std::string> bodies;
-};
-
-Item frame_item(std::uint64_t sequence) {
-  Item item;
-  item.frame = test::toy_walk(3).frame(1);
-  item.frame.header.sequence = sequence;
-  item.frame.header.arrival_ns = 1000;
-  item.frame.header.device_ns = 500;
-  return item;
-}
-
-}  // namespace
-
 TEST_CASE("status reports the stages by name with the times of the last second") {
-  Rig rig;
+  PublisherRig rig;
   REQUIRE(rig.receive("stats", 1));
-  Item item = frame_item(1);
+  Item item = toy_frame_item(1);
   item.frame.stamps.decoded_ns = system::monotonic_ns();
   item.frame.stage_us[0] = 50.0F;
   rig.put(item);
@@ -98,10 +22,10 @@ TEST_CASE("status reports the stages by name with the times of the last second")
 }
 
 TEST_CASE("each kind of item is published under its topic") {
-  Rig rig;
+  PublisherRig rig;
   REQUIRE(rig.receive("skeleton/toy", 1));  // sent because of the subscription
   REQUIRE(rig.receive("skeleton/toy-raw", 1));
-  Item item = frame_item(41);
+  Item item = toy_frame_item(41);
   rig.put(item);
   item.kind = Item::Kind::kRawFrame;
   rig.put(item);
@@ -179,7 +103,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a flood of skipped frames is one event, and its sum when the stream ends") {
-  Rig rig;
+  PublisherRig rig;
   REQUIRE(rig.receive("skeleton/toy", 1));  // subscribed
   Item item;
   item.kind = Item::Kind::kEvent;
@@ -208,25 +132,23 @@ TEST_CASE("a flood of skipped frames is one event, and its sum when the stream e
 
 TEST_CASE("a glove counts as unplugged only after the reader has started") {
   pipeline::StreamCounters counters;
+  pipeline::SourceCounters source;
   StreamInfo info;
   info.name = "right";
   info.comes_and_goes = true;
   info.counters = &counters;
+  info.source_counters = &source;
   PublishedStream published(std::move(info));
-  v1::StreamStats stats;
-  published.report(stats, 1.0);
-  CHECK_FALSE(stats.away());
-  counters.reader.link_ns = 7;
-  published.report(stats, 1.0);
-  CHECK(stats.away());
-  CHECK(stats.link_ns() == 7);
-  counters.reader.connected = true;
-  published.report(stats, 1.0);
-  CHECK_FALSE(stats.away());
+  CHECK_FALSE(published.stats().away());
+  source.link_ns = 7;
+  CHECK(published.stats().away());
+  CHECK(published.report(1.0).link_ns() == 7);
+  source.connected = true;
+  CHECK_FALSE(published.stats().away());
 }
 
 TEST_CASE("the status is current, although stats are published once a second") {
-  Rig rig;
+  PublisherRig rig;
   REQUIRE(rig.receive("stats", 1));
   rig.counters.pipeline.parameter[0].target = 0.5;
   rig.counters.pipeline.state = pipeline::StreamState::kLive;
@@ -237,7 +159,7 @@ TEST_CASE("the status is current, although stats are published once a second") {
   CHECK(stats.stream(0).state() == "live");
   CHECK(stats.stream(0).model() == "other.style");
   CHECK(stats.stream(0).outcome_size() == kOutcomes);
-  Item item = frame_item(41);
+  Item item = toy_frame_item(41);
   item.frame.source = Source::kLabels;
   item.frame.label = {'g'};
   rig.put(item);
@@ -253,7 +175,7 @@ TEST_CASE("the status is current, although stats are published once a second") {
 }
 
 TEST_CASE("a busy port gives one sentence that names it") {
-  Rig rig;
+  PublisherRig rig;
   pipeline::Ring<Item> ring(64);
   const net::Context other = net::open_context().value();  // the context of another daemon
   PublisherOptions options;

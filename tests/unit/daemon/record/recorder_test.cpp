@@ -9,94 +9,31 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/record/log_writer_loop.hpp"
-#include "daemon/record/recorder.hpp"
 #include "models/style/style_type.hpp"
 #include "proto/log/digest.hpp"
-#include "proto/log/reader.hpp"
 #include "tests/support/file_limit.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/daemon/record/toy_recording.hpp"
 
 using namespace posed;
 using namespace posed::record;
-using pipeline::Direction;
-using pipeline::RecordSink;
-using GapKind = log::GapRow::Kind;
-
-namespace {
-
-constexpr std::int64_t kTurn_ns = 50'000'000;
-
-std::span<const std::byte> bytes_of(const std::string& text) {
-  return std::as_bytes(std::span(text));
-}
-
-// The shares of two streams.
-std::vector<RingSizes> for_two(const RingSizes& each) { return {each, each}; }
-
-log::Writer make_writer(const std::filesystem::path& path, std::uint32_t streams) {
-  auto writer = log::Writer::create(path, {}, false);
-  REQUIRE(writer);
-  for (std::uint32_t id = 0; id < streams; ++id) {
-    const std::string name = "s" + std::to_string(id);
-    REQUIRE(writer->add(log::SourceRow{id, name, "file", "", "", "{}"}));
-    REQUIRE(writer->add(log::StreamRow{id, id, "", name, "{}", 1}));
-  }
-  REQUIRE(writer->commit());
-  return std::move(*writer);
-}
-
-// The sequences of all chunks in a log, in order, by stream.
-std::vector<std::vector<std::uint64_t>> sequences(const std::filesystem::path& path) {
-  auto reader = log::Reader::open(path);
-  REQUIRE(reader);
-  std::vector<std::vector<std::uint64_t>> found(reader->streams().size());
-  for (;;) {
-    const auto chunk = reader->next_chunk();
-    REQUIRE(chunk);
-    if (!chunk->has_value()) return found;
-    found[(*chunk)->source].push_back((*chunk)->places[0].next_frame);
-  }
-}
-
-std::vector<log::GapRow> gaps(const std::filesystem::path& path) {
-  const auto reader = log::Reader::open(path);
-  REQUIRE(reader);
-  const auto rows = reader->gaps();
-  REQUIRE(rows);
-  return *rows;
-}
-
-std::uint64_t lost(const std::vector<log::GapRow>& rows, std::uint32_t stream, GapKind kind) {
-  std::uint64_t sum = 0;
-  for (const log::GapRow& row : rows) {
-    if (row.owner == stream && row.kind == kind) sum += row.lost;
-  }
-  return sum;
-}
-
-void put_chunk(RecordSink& record_sink, std::uint32_t stream, std::uint64_t sequence,
-               const std::string& text) {
-  record_sink.chunk(stream, 0, Direction::kFromDevice, static_cast<std::int64_t>(sequence),
-                    {.frame = sequence}, bytes_of(text));
-}
-
-}  // namespace
+using namespace posed::test;
 
 TEST_CASE("what two hot threads give to the record sink is complete and in order in the log") {
-  const test::TempFolder dir;
+  const TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  RecordRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 64}));
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path, [](const RecorderEvent&) {});
+  RecordRings rings(ring_sizes_of(2, 4096, {.frame_bytes = 4096, .decisions = 64}));
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
+                           [](const RecorderEvent&) {});
   constexpr std::uint64_t kChunks = 5000;
   std::atomic<bool> running{true};
   std::atomic<std::uint64_t> refused{0};
   std::thread reader([&] {
     for (std::uint64_t i = 1; i <= kChunks; ++i) {
       const auto stream = static_cast<std::uint32_t>(i % 2);
-      const auto before = rings.overflowed(stream, GapKind::kChunks);
+      const auto before = rings.losses_of_source(stream).total.load();
       put_chunk(rings, stream, i, std::string(i % 700, 'x'));
-      if (rings.overflowed(stream, GapKind::kChunks) != before) ++refused;
+      if (rings.losses_of_source(stream).total.load() != before) ++refused;
     }
     running = false;
   });
@@ -118,11 +55,11 @@ TEST_CASE("what two hot threads give to the record sink is complete and in order
 }
 
 TEST_CASE("a full ring becomes a gap row where it happened, and is reported once") {
-  const test::TempFolder dir;
+  const TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  RecordRings rings(for_two({.chunk_bytes = 1024, .frame_bytes = 1024, .decisions = 2}));
+  RecordRings rings(ring_sizes_of(2, 1024, {.frame_bytes = 1024, .decisions = 2}));
   std::vector<RecorderEvent> events;
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path,
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
                            [&](const RecorderEvent& event) { events.push_back(event); });
   const std::string line(400, '1');
   for (std::uint64_t i = 1; i <= 6; ++i) put_chunk(rings, 0, i, line);  // two fit
@@ -144,10 +81,11 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is reported once
 }
 
 TEST_CASE("a stream that fills its share of the rings does not affect another stream") {
-  const test::TempFolder dir;
+  const TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  RecordRings rings(for_two({.chunk_bytes = 4096, .frame_bytes = 4096, .decisions = 8}));
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path, [](const RecorderEvent&) {});
+  RecordRings rings(ring_sizes_of(2, 4096, {.frame_bytes = 4096, .decisions = 8}));
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
+                           [](const RecorderEvent&) {});
   const std::string line(40, '1');
   constexpr std::uint64_t kTurns = 20;
   for (std::uint64_t turn = 1; turn <= kTurns; ++turn) {
@@ -173,10 +111,11 @@ TEST_CASE("a stream that fills its share of the rings does not affect another st
 // Decisions are made later than the reader reads: the chunk that a lost decision concerns may have
 // been in the log for a long time.
 TEST_CASE("the gap of a lost decision begins before the chunk that it concerns") {
-  const test::TempFolder dir;
+  const TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  RecordRings rings({{.chunk_bytes = 4096, .frame_bytes = 0, .decisions = 1}});
-  LogWriterLoop log_writer(rings, make_writer(path, 1), path, [](const RecorderEvent&) {});
+  RecordRings rings(ring_sizes_of(1, 4096, {.frame_bytes = 0, .decisions = 1}));
+  LogWriterLoop log_writer(rings, make_writer(path, 1), path, one_body_streams(1),
+                           [](const RecorderEvent&) {});
   for (std::uint64_t frame = 1; frame <= 10; ++frame) put_chunk(rings, 0, frame, "1\n");
   log_writer.turn(kTurn_ns);
   rings.decision({.stream = 0, .item = 3, .sequence = 3});
@@ -193,11 +132,11 @@ TEST_CASE("the gap of a lost decision begins before the chunk that it concerns")
 
 TEST_CASE(
     "a full disk is counted and reported; with space again recording continues after a gap row") {
-  const test::TempFolder dir;
+  const TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  RecordRings rings(for_two({.chunk_bytes = 1 << 20, .frame_bytes = 0, .decisions = 64}));
+  RecordRings rings(ring_sizes_of(2, 1 << 20, {.frame_bytes = 0, .decisions = 64}));
   std::vector<RecorderEvent> events;
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path,
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
                            [&](const RecorderEvent& event) { events.push_back(event); });
   const std::string model = "model bytes";
   const std::string line(20'000, '1');
@@ -214,7 +153,7 @@ TEST_CASE(
   turns(10);
   CHECK(log_writer.errors() == 0);
   {
-    const test::FileLimit limit(400'000);
+    const FileLimit limit(400'000);
     rings.keep_model(bytes_of(model));
     turns(100);  // five seconds: several retries
     CHECK(log_writer.errors() >= 1);
@@ -241,21 +180,21 @@ TEST_CASE(
 }
 
 TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
-  const test::TempFolder dir;
+  const TempFolder dir;
   const auto path = dir.path() / "a.plog";
   const Clock clock = []() noexcept -> std::int64_t {
     return std::chrono::steady_clock::now().time_since_epoch().count();
   };
-  RecordedStream stream;
-  stream.source.name = "a";
-  stream.settings.stages.push_back(pipeline::stage_settings(style::style_type()));
-  stream.model_files = {"12"};
+  pipeline::StreamSettings settings;
+  settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  RecordedSetup setup;
+  setup.add_device(toy_source("a"), settings, {"12"});
   RecorderOptions options;
   options.file = path;
   options.frames = true;
   options.config_text = "x";
   options.clock = clock;
-  auto recorder = Recorder::open(options, {stream});
+  auto recorder = Recorder::open(options, setup);
   REQUIRE(recorder);
   CHECK((*recorder)->record_sink().wants_published());
   for (std::uint64_t i = 1; i <= 100; ++i) {
@@ -270,11 +209,11 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   REQUIRE(reader);
   CHECK(reader->meta().at("config") == "x");
   CHECK(reader->meta().contains("isa"));
-  const auto settings = settings_from_json(reader->streams()[0].stages_json, "");
-  REQUIRE(settings);
-  CHECK(reader->blob(settings->stages[0].model_sha256)->size() == 2);
+  const auto read = settings_from_json(reader->streams()[0].stages_json, "");
+  REQUIRE(read);
+  CHECK(reader->blob(read->stages[0].model_sha256)->size() == 2);
 
-  const auto again = Recorder::open(options, {stream});
+  const auto again = Recorder::open(options, setup);
   REQUIRE(!again);
   CHECK(again.error().message.find("exists already") != std::string::npos);
 }

@@ -92,9 +92,10 @@ VirtualCommand random_command(std::uint32_t stream, What what, Dice& dice) {
 
 // Runs the daemon as the seed determines; the log is at `path`.
 void record_run(std::uint64_t seed, const std::filesystem::path& path,
-                const record::RingSizes& record_sink = VirtualOptions{}.record_sink) {
+                VirtualOptions options = {}) {
   Dice dice(seed);
-  VirtualOptions options{.seed = dice.seed(), .log = path, .record_sink = record_sink};
+  options.seed = dice.seed();
+  options.log = path;
   VirtualDaemon daemon(options);
   const bool small_rings = dice.below(8) == 0;
   std::vector<What> streams{What::kBody, What::kHand};
@@ -160,10 +161,11 @@ TEST_CASE("a log with gaps replays what it contains and reports what is missing"
   replay::Expectation::Counts sum;
   for (std::uint64_t seed = first; seed <= last; ++seed) {
     Dice dice(~seed);
-    record_run(seed, path,
-               {.chunk_bytes = static_cast<std::size_t>(1000 * dice.below(40) + 2000),
-                .frame_bytes = static_cast<std::size_t>(4000 * dice.below(40) + 4000),
-                .decisions = static_cast<std::size_t>(dice.below(12) + 1)});
+    VirtualOptions scarce;
+    scarce.chunk_bytes = static_cast<std::size_t>(1000 * dice.below(40) + 2000);
+    scarce.record_slot = {.frame_bytes = static_cast<std::size_t>(4000 * dice.below(40) + 4000),
+                          .decisions = static_cast<std::size_t>(dice.below(12) + 1)};
+    record_run(seed, path, scarce);
     const Replayed result = replayed(path);
     INFO("seed " << seed << "; POSED_SEED=" << seed << " runs it alone");
     CHECK((result.difference ? result.difference->text() : "") == "");

@@ -39,7 +39,9 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
         styled_(name_),
         raw_(name_ + "-raw"),
         next_item_(next_item),
-        intake_(id, next_item, *this) {
+        intake_(next_item, *this) {
+    const pipeline::StreamPosition begin{.stream = id};
+    intake_.set_streams(std::span(&begin, 1));
     settings_.publish_raw = true;
     settings_.rate_hz = device_.description.rate_hz;
     settings_.stages.push_back(pipeline::stage_settings(style::style_type()));
@@ -49,16 +51,15 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
         pipeline::engine_options(id, settings_, device_.description.skeleton, models).value());
   }
 
-  [[nodiscard]] record::RecordedStream recorded() const {
+  void add_to(record::RecordedSetup& setup) const {
     const drivers::Description& description = device_.description;
-    return {.source = {.id = 0,
-                       .name = name_,
-                       .driver = description.driver,
-                       .text = description.text,
-                       .identity = "toy.bvh",
-                       .config = "{}"},
-            .settings = settings_,
-            .model_files = {model_bytes_}};
+    setup.add_device({.id = 0,
+                      .name = name_,
+                      .driver = description.driver,
+                      .text = description.text,
+                      .identity = "toy.bvh",
+                      .config = "{}"},
+                     settings_, {model_bytes_});
   }
 
   void set_record_sink(pipeline::RecordSink& record_sink) { record_sink_ = &record_sink; }
@@ -99,7 +100,7 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
         .value();
   }
 
-  bool item(pipeline::Item& item) noexcept override {
+  bool item(std::size_t /*place*/, pipeline::Item& item) noexcept override {
     place_ = item.number;
     if (!shed_) engine_->on_frame(item.frame, *this);
     place_ = 0;
@@ -157,7 +158,7 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
   const std::string one = style::serialize_model(toy_model(1));
   const std::string two = style::serialize_model(toy_model(2));
   std::vector<std::unique_ptr<StagedStream>> streams;
-  std::vector<record::RecordedStream> rows;
+  record::RecordedSetup setup;
   drivers::TransportFactory ports;
   std::uint64_t next_item = 1;
   for (std::uint32_t id = 0; id < 2; ++id) {
@@ -165,13 +166,13 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
     REQUIRE(device);
     streams.push_back(std::make_unique<StagedStream>(id, id == 0 ? "a" : "b", std::move(*device),
                                                      one, next_item));
-    rows.push_back(streams.back()->recorded());
+    streams.back()->add_to(setup);
   }
   record::RecorderOptions options;
   options.file = path;
   options.frames = true;
   options.clock = []() noexcept -> std::int64_t { return 1'000'000'000; };
-  auto recorder = record::Recorder::open(std::move(options), std::move(rows));
+  auto recorder = record::Recorder::open(std::move(options), setup);
   REQUIRE(recorder);
   for (const auto& stream : streams) stream->set_record_sink((*recorder)->record_sink());
   std::int64_t now_ns = 5'000'000'000;

@@ -1,0 +1,50 @@
+// The slots of the streams that come and go. Cold.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "daemon/pipeline/messages.hpp"
+
+namespace posed::devices {
+
+class StreamSlots {
+ public:
+  // The slots from `first` on; those before it belong to the streams from the start.
+  StreamSlots(std::uint32_t first, std::uint32_t count) {
+    for (std::uint32_t slot = first; slot < first + count; ++slot) free_.push_back({slot, 0});
+  }
+
+  // A free slot with a generation that it never had, as a stream id: that of the slot that is free
+  // for the longest time. Empty if none is free.
+  [[nodiscard]] std::optional<std::uint32_t> take() {
+    if (free_.empty()) return std::nullopt;
+    const Slot slot = free_.front();
+    free_.pop_front();
+    return pipeline::stream_id(slot.number, slot.generation);
+  }
+
+  // The next stream in the same slot; empty if the slot has no more generations.
+  [[nodiscard]] static std::optional<std::uint32_t> next(std::uint32_t stream) {
+    const std::uint32_t generation = pipeline::generation_of(stream);
+    if (generation >= pipeline::kMaxGeneration) return std::nullopt;
+    return pipeline::stream_id(pipeline::slot_of(stream), generation + 1);
+  }
+
+  // The slot's last stream has left.
+  void give_back(std::uint32_t stream) {
+    if (const auto id = next(stream)) {
+      free_.push_back({pipeline::slot_of(*id), pipeline::generation_of(*id)});
+    }
+  }
+
+ private:
+  struct Slot {
+    std::uint32_t number;
+    std::uint32_t generation;
+  };
+  std::deque<Slot> free_;
+};
+
+}  // namespace posed::devices

@@ -1,0 +1,89 @@
+#include "daemon/devices/stream_stages.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "models/stages/registry.hpp"
+#include "proto/model/model_file.hpp"
+
+namespace posed::devices {
+namespace {
+
+// The stages that the config names, and those that a stream of this skeleton has by default.
+Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& config,
+                                                   const Skeleton* skeleton) {
+  if (!config.default_stages || skeleton == nullptr) return config.stages;
+  std::vector<config::StageConfig> stages;
+  for (const StageType* type : stage_types()) {
+    const auto named = std::ranges::find(config.stages, type, &config::StageConfig::type);
+    const bool off = std::ranges::find(config.off, type) != config.off.end();
+    if (named != config.stages.end()) {
+      stages.push_back(*named);
+    } else if (!off && type->is_default != nullptr && type->is_default(*skeleton)) {
+      auto parameters = complete_parameters(type->parameters, {});
+      if (!parameters) return std::unexpected(parameters.error());
+      stages.push_back({.type = type, .parameters = std::move(*parameters)});
+    }
+  }
+  return stages;
+}
+
+}  // namespace
+
+Result<LoadedStages> load_stages(const config::StreamConfig& config,
+                                 std::shared_ptr<const Skeleton> skeleton, double rate_hz) {
+  LoadedStages loaded;
+  loaded.settings = {
+      .publish_raw = config.publish_raw, .stale_after_s = config.stale_after_s, .rate_hz = rate_hz};
+  auto stages = stages_of(config, skeleton.get());
+  if (!stages) return std::unexpected(stages.error());
+  loaded.skeleton = std::move(skeleton);
+  for (config::StageConfig& stage : *stages) {
+    loaded.settings.stages.push_back({.type = stage.type,
+                                      .parameters = std::move(stage.parameters),
+                                      .model_name = stage.model.filename().string()});
+    std::string& file = loaded.model_files.emplace_back();
+    if (stage.model.empty()) continue;
+    auto bytes = model_file::load(stage.model);
+    if (!bytes) return std::unexpected(bytes.error());
+    file = std::move(*bytes);
+  }
+  return loaded;
+}
+
+std::vector<const StageModel*> BoundStages::borrowed() const {
+  std::vector<const StageModel*> pointers;
+  for (const auto& model : models) pointers.push_back(model.get());
+  return pointers;
+}
+
+Result<BoundStages> bind_stages(const LoadedStages& stages) {
+  BoundStages bound;
+  for (std::size_t i = 0; i < stages.settings.stages.size(); ++i) {
+    const pipeline::StageSettings& stage = stages.settings.stages[i];
+    auto& model = bound.models.emplace_back();
+    if (stages.skeleton && !stages.model_files[i].empty()) {
+      auto ready = stage.type->bind_model(
+          std::as_bytes(std::span(stages.model_files[i])),
+          pipeline::stage_context(stages.settings, i, stages.skeleton), stage.model_name);
+      if (!ready) return std::unexpected(ready.error());
+      model = std::move(*ready);
+    }
+    if (stage.type->first_command == nullptr) continue;
+    const auto first = stage.type->first_command(stage.parameters, model.get());
+    if (!first) return std::unexpected(first.error());
+    if (!*first) continue;
+    bound.first_commands.push_back({.change = {.kind = pipeline::StageChange::Kind::kCommand,
+                                               .index = static_cast<std::uint8_t>((*first)->index),
+                                               .type = stage.type},
+                                    .command = (*first)->command});
+  }
+  return bound;
+}
+
+Result<pipeline::EngineOptions> make_engine(std::uint32_t stream, const LoadedStages& stages,
+                                            const BoundStages& bound) {
+  return pipeline::engine_options(stream, stages.settings, stages.skeleton, bound.borrowed());
+}
+
+}  // namespace posed::devices

@@ -1,0 +1,114 @@
+#include "daemon/pipeline/stream_context.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "posed/v1/posed.pb.h"
+
+namespace posed::pipeline {
+namespace {
+
+bool is_pose(const Item& item) noexcept {
+  return item.kind == Item::Kind::kFrame || item.kind == Item::Kind::kRawFrame;
+}
+
+// Events that a device can trigger at any rate must fit into its stream's share of the ring; of the
+// others only a few ever come at once.
+bool within_share(const Item& item) noexcept {
+  return item.kind != Item::Kind::kEvent || item.stream_event.kind == v1::Event::KIND_SHED ||
+         item.stream_event.kind == v1::Event::KIND_CLOCK_JUMPED;
+}
+
+}  // namespace
+
+std::uint64_t shed_depth(double rate_hz) noexcept {
+  return static_cast<std::uint64_t>(std::max(3.0, std::ceil(rate_hz * 0.05)));
+}
+
+StreamContext::StreamContext(EngineOptions options, double rate_hz, StreamCounters& counters,
+                             std::size_t slots, const WorkerPorts& ports,
+                             const std::uint64_t& next_item)
+    : engine_(std::move(options)),
+      stream_(engine_.stream()),
+      depth_(shed_depth(rate_hz)),
+      counters_(counters),
+      ports_(ports),
+      next_item_(next_item),
+      share_(slots, counters.publisher.taken) {
+  engine_.start_at(counters.reader.frames.load() + 1, counters.reader.samples.load() + 1);
+}
+
+void StreamContext::frame(const Frame& frame) noexcept {
+  const std::uint64_t sequence = frame.header.sequence;
+  counters_.pipeline.consumed.store(sequence, std::memory_order_release);
+  if (counters_.reader.newest.load(std::memory_order_acquire) >= sequence + depth_) {
+    return count(counters_.pipeline.shed);
+  }
+  engine_.on_frame(frame, *this);
+}
+
+void StreamContext::sample(const Sample& sample) noexcept {
+  const std::uint64_t newest = counters_.reader.newest_sample.load(std::memory_order_acquire);
+  if (newest >= sample.header.sequence + depth_) return count(counters_.pipeline.shed);
+  engine_.on_sample(sample, *this);
+}
+
+// What was decoded last but never came was shed.
+void StreamContext::end(const StreamEvent& event) noexcept {
+  engine_.close_gaps(event.sequence, event.last_sample, *this);
+  engine_.end(event.time_ns, *this);
+}
+
+void StreamContext::pass_on(const StreamEvent& event) noexcept {
+  Item passed;
+  passed.kind = Item::Kind::kEvent;
+  passed.stream_event = event;
+  item(passed);
+}
+
+void StreamContext::taken() noexcept {
+  count(counters_.pipeline.taken);
+  publish_state();
+}
+
+Ack StreamContext::apply(const Command& command) noexcept {
+  const Ack ack = engine_.apply(command, *this);
+  publish_state();  // before the Ack, because its receiver may ask for the status at once
+  return ack;
+}
+
+void StreamContext::tick(std::int64_t now_ns) noexcept {
+  if (engine_.tick(now_ns, *this)) publish_state();
+}
+
+void StreamContext::flush() noexcept {
+  engine_.close_gaps(counters_.reader.frames.load(std::memory_order_acquire),
+                     counters_.reader.samples.load(std::memory_order_acquire), *this);
+  engine_.flush(*this);
+}
+
+void StreamContext::item(const Item& item) noexcept {
+  outgoing_ = item;
+  if ((within_share(outgoing_) && !share_.has_room()) || !ports_.out->push(outgoing_)) {
+    if (ports_.record_sink != nullptr && is_pose(outgoing_))
+      ports_.record_sink->unpublished(outgoing_.frame.header.stream);
+    return count(counters_.pipeline.dropped);
+  }
+  share_.add();
+  ports_.publisher->notify();
+}
+
+void StreamContext::decision(const Decision& decision) noexcept {
+  if (ports_.record_sink == nullptr) return;
+  placed_ = decision;
+  placed_.item = next_item_;
+  ports_.record_sink->decision(placed_);
+}
+
+void StreamContext::publish_state() noexcept {
+  counters_.pipeline.state.store(engine_.state(), std::memory_order_relaxed);
+  publish_parameters(engine_, counters_.pipeline);
+}
+
+}  // namespace posed::pipeline

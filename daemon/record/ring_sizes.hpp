@@ -1,0 +1,24 @@
+// How much of the recorder's rings each source and each slot for a stream may use.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "daemon/record/recorded_stream.hpp"
+
+namespace posed::record {
+
+struct SlotSizes {
+  std::size_t frame_bytes = 0;  // 0: published frames are not recorded
+  std::size_t decisions = 0;
+};
+
+struct RingSizes {
+  std::vector<std::size_t> chunk_bytes{};  // by source
+  std::vector<SlotSizes> slots{};
+};
+
+// For a setup at its nominal rates; `frames`: the published frames are recorded, too.
+[[nodiscard]] RingSizes ring_sizes(const RecordedSetup& setup, bool frames);
+
+}  // namespace posed::record
