@@ -1,5 +1,6 @@
 #include "daemon/record/recorded_stream.hpp"
 
+#include <algorithm>
 #include <span>
 #include <utility>
 
@@ -7,6 +8,19 @@
 #include "daemon/devices/source_builder.hpp"
 
 namespace posed::record {
+namespace {
+
+// Without its id.
+log::SourceRow row_of(const devices::OpenSource& source) {
+  const drivers::Description& description = source.device.description;
+  return {.name = source.name,
+          .driver = description.driver,
+          .text = description.text,
+          .identity = description.identity,
+          .config = to_json(source.options)};
+}
+
+}  // namespace
 
 void RecordedSetup::add_device(log::SourceRow row, StreamSettings settings,
                                std::vector<std::string> model_files) {
@@ -20,27 +34,26 @@ void RecordedSetup::add_device(log::SourceRow row, StreamSettings settings,
   sources.push_back({.row = std::move(row), .rate_hz = streams.back().settings.rate_hz});
 }
 
-void RecordedSetup::add_device(const devices::OpenStream& stream) {
-  add_device(source_row(*stream.source), stream.stages.settings, stream.stages.model_files);
-}
-
 void RecordedSetup::add_bodies(log::SourceRow row, double rate_hz, std::size_t bodies) {
   row.id = static_cast<std::uint32_t>(sources.size());
   sources.push_back(
       {.row = std::move(row), .rate_hz = rate_hz, .bodies = bodies, .bodies_come = true});
 }
 
-void RecordedSetup::add_bodies(const devices::BodySource& source) {
-  add_bodies(source_row(*source.source), devices::nominal_rate_hz(source), kMaxBodies);
-}
-
-log::SourceRow source_row(const devices::OpenSource& source) {
-  const drivers::Description& description = source.device.description;
-  return {.name = source.name,
-          .driver = description.driver,
-          .text = description.text,
-          .identity = description.identity,
-          .config = to_json(source.options)};
+RecordedSetup recorded_setup(std::span<const std::unique_ptr<devices::OpenStream>> streams,
+                             std::span<const std::unique_ptr<devices::BodySource>> sources,
+                             std::size_t slots_to_come) {
+  RecordedSetup setup;
+  for (const auto& stream : streams) {
+    setup.add_device(row_of(*stream->source), stream->stages.settings, stream->stages.model_files);
+  }
+  for (const auto& source : sources) {
+    const double rate_hz = devices::nominal_rate_hz(*source);
+    setup.add_bodies(row_of(*source->source), rate_hz, kMaxBodies);
+    setup.rate_to_come_hz = std::max(setup.rate_to_come_hz, rate_hz);
+  }
+  setup.slots_to_come = slots_to_come;
+  return setup;
 }
 
 RecordedStream recorded_stream(const devices::NewStream& stream) {

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,7 +17,6 @@
 namespace posed::devices {
 struct BodySource;
 struct NewStream;
-struct OpenSource;
 struct OpenStream;
 }  // namespace posed::devices
 
@@ -49,14 +50,14 @@ struct RecordedSetup {
   // Adds a device with one body: a source and a stream, both with the next number.
   void add_device(log::SourceRow row, StreamSettings settings,
                   std::vector<std::string> model_files);
-  void add_device(const devices::OpenStream& stream);
   // Adds a device whose bodies come later, with the next number. `bodies` is how many at most.
   void add_bodies(log::SourceRow row, double rate_hz, std::size_t bodies);
-  void add_bodies(const devices::BodySource& source);
 };
 
-// The row of an opened device; without its id.
-[[nodiscard]] log::SourceRow source_row(const devices::OpenSource& source);
+// Of the daemon's devices, those with one body first.
+[[nodiscard]] RecordedSetup recorded_setup(
+    std::span<const std::unique_ptr<devices::OpenStream>> streams,
+    std::span<const std::unique_ptr<devices::BodySource>> sources, std::size_t slots_to_come);
 
 // For a body that has become a stream.
 [[nodiscard]] RecordedStream recorded_stream(const devices::NewStream& stream);

@@ -1,5 +1,4 @@
 // `posed record`: `run` with a recorder as the record sink.
-#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -38,17 +37,6 @@ void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
                         ? v1::Event::KIND_RECORDING_GAP
                         : v1::Event::KIND_RECORDING_ERROR;
   for (const std::uint32_t stream : event.streams) daemon.post_event(stream, kind, event.text);
-}
-
-record::RecordedSetup setup_of(const assembly::Daemon& daemon) {
-  record::RecordedSetup setup;
-  for (const auto& stream : daemon.streams()) setup.add_device(*stream);
-  for (const auto& source : daemon.sources()) {
-    setup.add_bodies(*source);
-    setup.rate_to_come_hz = std::max(setup.rate_to_come_hz, devices::nominal_rate_hz(*source));
-  }
-  setup.slots_to_come = daemon.slots_to_come();
-  return setup;
 }
 
 // Prints a summary. Gaps were already reported when they happened.
@@ -134,7 +122,9 @@ Result<> record(const RecordOptions& options) {
       }};
   auto replaced = SetAside::move(options.out);
   if (!replaced) return std::unexpected(replaced.error());
-  auto recorder = record::Recorder::open(std::move(recorder_options), setup_of(daemon));
+  auto recorder = record::Recorder::open(
+      std::move(recorder_options),
+      record::recorded_setup(daemon.streams(), daemon.sources(), daemon.slots_to_come()));
   if (!recorder) return std::unexpected(recorder.error());
   assembly::DaemonHooks hooks;
   hooks.record_sink = &(*recorder)->record_sink();
