@@ -39,7 +39,7 @@ using namespace drivers::mocap;
 using namespace std::chrono_literals;
 
 constexpr double kRate_hz = 100.0;
-constexpr std::size_t kPeople = 8;
+constexpr std::size_t kPeople = 12;
 
 // A room full of people; the first two stay. It sends to one endpoint.
 class Room {
@@ -54,7 +54,7 @@ class Room {
   // Some people enter, leave, or return with another skeleton.
   void change() {
     for (std::size_t i = 2; i < kPeople; ++i) {
-      const auto die = random_() % 4;
+      const auto die = random_() % 3;
       if (die == 0) present_ ^= 1U << i;
       if (die == 1) joints_[i] = 2 + static_cast<unsigned>(random_() % 5);
     }
