@@ -151,6 +151,7 @@ struct Description {
 struct Poll {
   std::vector<std::byte> request;  // empty: the device streams on its own
   std::int64_t period_ns = 0;
+  std::uint8_t socket = 0;  // where it goes, for a device with several sockets
 };
 
 // One opened device.

@@ -7,7 +7,6 @@
 
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
-#include "proto/model/model_file.hpp"
 
 namespace posed::assembly {
 namespace {
@@ -15,17 +14,6 @@ namespace {
 std::unexpected<Error> of_source(const std::string& name, Error error) {
   error.message = "source '" + name + "': " + error.message;
   return std::unexpected(std::move(error));
-}
-
-// Models are bound when a body is there; that their files can be read is known at the start.
-Result<> check_models(const config::StreamConfig& stream) {
-  for (const config::StageConfig& stage : stream.stages) {
-    if (stage.model.empty()) continue;
-    if (const auto bytes = model_file::load(stage.model); !bytes) {
-      return std::unexpected(bytes.error());
-    }
-  }
-  return {};
 }
 
 bool publishes_raw(const config::SourceConfig& source) {
@@ -58,10 +46,12 @@ Result<std::unique_ptr<BodyStreams>> BodyStreams::open(const config::DaemonConfi
   // The config reader makes sure that there is room for all streams that the config names.
   self->count_ = static_cast<std::size_t>(config.max_streams) - first;
   const bool raw = std::ranges::any_of(config.sources, publishes_raw);
+  double rate_hz = 0.0;  // of the fastest source
   for (const auto& source : self->sources_) {
-    self->rate_hz_ = std::max(self->rate_hz_, devices::nominal_rate_hz(*source));
+    rate_hz = std::max(rate_hz, devices::nominal_rate_hz(*source));
   }
-  self->decoded_slots_ = pipeline::ring_slots(self->rate_hz_);
+  self->decoded_slots_ = pipeline::ring_slots(rate_hz);
+  self->messages_per_s_ = rate_hz * static_cast<double>(self->count_) * (raw ? 2.0 : 1.0);
   self->finished_slots_ = self->decoded_slots_ * (raw ? 2 : 1);
   self->exchange_ = std::make_unique<pipeline::StreamExchange>(first + self->count_, *self->wake_);
   self->counters_ = std::make_unique<pipeline::StreamCounters[]>(self->count_);
@@ -69,12 +59,7 @@ Result<std::unique_ptr<BodyStreams>> BodyStreams::open(const config::DaemonConfi
 }
 
 Result<> BodyStreams::open_source(const config::SourceConfig& config, std::uint32_t number) {
-  if (auto fine = check_models(config.every); !fine) return fine;
-  for (const auto& named : config.named) {
-    if (auto fine = check_models(named.stream); !fine) return fine;
-  }
-  auto source = devices::open_source(
-      {.name = config.name, .driver = config.driver, .options = config.options});
+  auto source = devices::open_source(config, models_);
   if (!source) return std::unexpected(source.error());
   for (const std::string& warning : (*source)->device.warnings) {
     spdlog::warn("{}: {}", config.name, warning);
@@ -109,9 +94,11 @@ Result<> BodyStreams::start(StreamUsers users, std::set<std::string> reserved) {
       return of_source(source->config.name, started.error());
     }
   }
+  std::size_t named = 0;
+  for (const auto& source : sources_) named += source->config.named.size();
   builder_ = std::make_unique<devices::SourceBuilder>(
-      sources_, devices::StreamSlots(first_, static_cast<std::uint32_t>(count_)),
-      std::move(reserved), *this);
+      sources_, devices::StreamSlots(first_, static_cast<std::uint32_t>(count_), named),
+      std::move(reserved), models_, *this);
   thread_ = std::thread([this] { run(); });
   for (const auto& source : sources_) {
     if (!devices::DeviceSupervisor::wanted(*source->source)) continue;
@@ -128,8 +115,9 @@ Result<> BodyStreams::start(StreamUsers users, std::set<std::string> reserved) {
 
 void BodyStreams::run() {
   system::name_thread("posed-bodies");
-  while (!stop_.load(std::memory_order_acquire)) {
+  while (true) {
     wake_->going_to_sleep();  // before the turn, so that what comes during it ends the wait
+    if (stop_.load(std::memory_order_acquire)) break;
     const std::int64_t due_ns = builder_->turn(system::monotonic_ns());
     static_cast<void>(poller_->wait(system::time_left_ns(due_ns, system::monotonic_ns)));
     wake_->awake();
@@ -215,12 +203,16 @@ void BodyStreams::remove(std::uint32_t stream) {
 
 void BodyStreams::report(const devices::BodySource& source, v1::Event::Kind kind,
                          const std::string& text) {
+  const std::scoped_lock lock(mutex_);
+  bool told = false;
+  for (const auto& [stream, of] : source_of_) {
+    if (of != &source) continue;
+    users_.publisher->post_event(stream, kind, text);
+    told = true;
+  }
+  if (told) return;
   const bool bad = kind == v1::Event::KIND_WARNING || kind == v1::Event::KIND_LOST;
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "{}: {}", source.config.name, text);
-  const std::scoped_lock lock(mutex_);
-  for (const auto& [stream, of] : source_of_) {
-    if (of == &source) users_.publisher->post_event(stream, kind, text);
-  }
 }
 
 }  // namespace posed::assembly

@@ -25,7 +25,7 @@
 
 namespace posed::assembly {
 
-// The parts of the daemon that know streams; all of them outlive the BodyStreams.
+// The parts of the daemon that know streams. Nothing uses them after stop().
 struct StreamUsers {
   publish::Publisher* publisher = nullptr;
   control::RequestHandler* handler = nullptr;
@@ -45,8 +45,8 @@ class BodyStreams final : public devices::StreamHost {
   // Slots of the rings that the streams may fill together.
   [[nodiscard]] std::size_t all_decoded_slots() const { return count_ * decoded_slots_; }
   [[nodiscard]] std::size_t all_finished_slots() const { return count_ * finished_slots_; }
-  [[nodiscard]] std::size_t count() const { return count_; }  // streams at once
-  [[nodiscard]] double rate_hz() const { return rate_hz_; }   // of the fastest source
+  [[nodiscard]] std::size_t count() const { return count_; }               // streams at once
+  [[nodiscard]] double messages_per_s() const { return messages_per_s_; }  // of all of them
   [[nodiscard]] pipeline::StreamExchange& exchange() { return *exchange_; }
   [[nodiscard]] const std::vector<std::unique_ptr<devices::BodySource>>& sources() const {
     return sources_;
@@ -79,11 +79,12 @@ class BodyStreams final : public devices::StreamHost {
     report(source, v1::Event::KIND_WARNING, sentence);
   }
 
+  devices::ModelFiles models_;
   std::vector<std::unique_ptr<devices::BodySource>> sources_;
   std::uint32_t first_ = 0;  // slot
   std::size_t count_ = 0;
   std::size_t decoded_slots_ = 0, finished_slots_ = 0;  // of one stream
-  double rate_hz_ = 0.0;                                // of the fastest source
+  double messages_per_s_ = 0.0;                         // of all of them
   std::unique_ptr<system::EventFd> wake_;
   std::unique_ptr<system::Poller> poller_;
   std::unique_ptr<pipeline::StreamExchange> exchange_;

@@ -200,7 +200,14 @@ Result<> Daemon::Parts::open_sockets() {
                                     .slots = streams.size()};
   if (bodies != nullptr) {
     options.slots += bodies->count();
-    options.more_messages_per_s = bodies->rate_hz() * static_cast<double>(bodies->count());
+    for (const auto& source : bodies->sources()) {
+      options.sources.push_back({.name = source->config.name,
+                                 .driver = source->config.driver,
+                                 .comes_and_goes = source->source->slot != nullptr,
+                                 .present = source->source->present,
+                                 .counters = &source->source->counters});
+    }
+    options.more_messages_per_s = bodies->messages_per_s();
   }
   auto bound =
       publish::Publisher::open(std::move(options), std::move(infos), *finished, *publisher_wake);

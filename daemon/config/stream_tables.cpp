@@ -54,11 +54,18 @@ void StreamReader::read(TableReader& root) {
     names_.push_back({.name = source.name, .line = table.line(), .is_source = true});
   }
   std::vector<TableReader> streams = root.tables("stream", kMaxConfigStreams);
+  const bool all = std::ranges::any_of(config_.sources, &SourceConfig::all);
   if (std::cmp_greater(streams.size(), config_.max_streams)) {
     root.add_error(root.has("max_streams") ? "max_streams" : "stream",
                    fmt::format("there are {} [[stream]] tables, but max_streams is {}; it takes up"
                                " to {}",
                                streams.size(), config_.max_streams, kMaxConfigStreams));
+  } else if (all && std::cmp_equal(streams.size(), config_.max_streams)) {
+    root.add_error(root.has("max_streams") ? "max_streams" : "stream",
+                   fmt::format("the [[stream]] tables take all {} streams of max_streams, which"
+                               " leaves none for the bodies of streams = \"all\"; raise it, up"
+                               " to {}",
+                               streams.size(), kMaxConfigStreams));
   }
   for (TableReader& table : streams) read_stream(table);
   if (!root.has("stream") && !root.has("source")) {

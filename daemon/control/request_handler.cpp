@@ -214,11 +214,10 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   const auto stream = streams_.find(done.stream);
   const bool gone = stream == streams_.end();
   if (ack.refused) {  // nothing has changed, so the model in use stays
-    // A stage refuses only commands; anything else meets a refusal after its stream's end.
-    const bool left = gone || is_earlier(stream) || done.refusal.empty();
-    return refusal(std::move(done.requester),
-                   left ? fmt::format("stream {} has left before this took effect", done.name)
-                        : fmt::format("stream {}: {}", done.name, done.refusal));
+    std::string_view why = done.refusal.empty() ? "the stage refused this" : done.refusal;
+    if (ack.gone) why = "its body changes just now; try again";
+    if (gone || is_earlier(stream)) why = "it has left before this took effect";
+    return refusal(std::move(done.requester), fmt::format("stream {}: {}", done.name, why));
   }
   if (!gone) apply(stream->second, done);
   v1::ControlReply reply;

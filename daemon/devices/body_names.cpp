@@ -31,14 +31,19 @@ const std::string* BodyNames::name_of(const std::string& source, const std::stri
   const Body key{source, body, number};
   const auto known = names_.find(key);
   if (known != names_.end()) return &known->second;
-  if (names_.size() >= kMaxKept) return nullptr;
+  if (kept_[source] >= kMaxKept) return nullptr;
+  ++kept_[source];
   const std::string plain = plain_stream_name(source, body);
   std::string name = plain;
-  for (int i = 2; taken_.contains(name); ++i) {
+  const auto taken = [this](const std::string& one) {
+    return taken_.contains(one) || taken_.contains(one + "-raw");
+  };
+  for (int i = 2; taken(name); ++i) {
     const std::string suffix = "-" + std::to_string(i);
     name = plain.substr(0, kMaxName - suffix.size()) + suffix;
   }
   taken_.insert(name);
+  taken_.insert(name + "-raw");
   return &names_.emplace(key, std::move(name)).first->second;
 }
 

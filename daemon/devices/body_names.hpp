@@ -20,19 +20,20 @@ class BodyNames {
 
   // `number` counts the bodies that the source calls the same, from 1. If the plain name is taken
   // the body gets "-2", "-3" and so on, in the order in which bodies appear.
-  // Null once thousands of bodies have been named, because devices can invent names without end.
+  // Null once a source has named thousands of bodies, because devices can invent names without end.
   [[nodiscard]] const std::string* name_of(const std::string& source, const std::string& body,
                                            int number);
 
  private:
-  static constexpr std::size_t kMaxKept = 4096;
+  static constexpr std::size_t kMaxKept = 4096;  // of a source
   struct Body {
     std::string source, body;
     int number;
     auto operator<=>(const Body&) const = default;
   };
-  std::set<std::string> taken_;
+  std::set<std::string> taken_;  // also NAME-raw of each name, under which its input is published
   std::map<Body, std::string> names_;
+  std::map<std::string, std::size_t> kept_;  // by source
 };
 
 }  // namespace posed::devices

@@ -1,6 +1,7 @@
 #include "daemon/devices/open_source.hpp"
 
 #include <utility>
+#include <vector>
 
 #include "daemon/devices/calibration.hpp"
 #include "drivers/glove/load_calibration.hpp"
@@ -65,6 +66,20 @@ Result<> open_slot(OpenSource& source) {
   return {};
 }
 
+Result<> load_models(const config::SourceConfig& source, ModelFiles& files) {
+  std::vector<const config::StreamConfig*> streams{&source.every};
+  for (const auto& named : source.named) streams.push_back(&named.stream);
+  for (const config::StreamConfig* stream : streams) {
+    for (const config::StageConfig& stage : stream->stages) {
+      if (stage.model.empty()) continue;
+      if (const auto bytes = files.load(stage.model); !bytes) {
+        return std::unexpected(bytes.error());
+      }
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::unique_ptr<OpenSource>> open_source(const SourceOptions& options) {
@@ -79,6 +94,12 @@ Result<std::unique_ptr<OpenSource>> open_source(const SourceOptions& options) {
   if (opened) opened = open_slot(*source);
   if (!opened) return std::unexpected(opened.error());
   return source;
+}
+
+Result<std::unique_ptr<OpenSource>> open_source(const config::SourceConfig& config,
+                                                ModelFiles& files) {
+  if (auto loaded = load_models(config, files); !loaded) return std::unexpected(loaded.error());
+  return open_source({.name = config.name, .driver = config.driver, .options = config.options});
 }
 
 Result<std::string> try_kept_device(OpenSource& source) {

@@ -5,6 +5,8 @@
 #include <memory>
 #include <string>
 
+#include "daemon/config/daemon_config.hpp"
+#include "daemon/devices/model_files.hpp"
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/reader.hpp"
@@ -41,6 +43,11 @@ struct SourceOptions {
 // Opens the device, or works out from its options what it will be, and reads the calibration. Does
 // not wait for a device that may be unplugged. Cold.
 [[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(const SourceOptions& options);
+
+// The same for a device with several bodies. Reads the model files of its streams, too; they are
+// bound when a body is there.
+[[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(const config::SourceConfig& config,
+                                                              ModelFiles& files);
 
 // For a command that needs the result now (`check`): opens the device that a supervisor would open,
 // and tries the calibration on it. Returns an empty string, or one sentence that says why the

@@ -16,7 +16,8 @@ Result<std::unique_ptr<OpenStream>> open_stream(const config::StreamConfig& conf
                              .calibration = config.calibration});
   if (!source) return of_stream(config.name, source.error());
   const drivers::Description& description = (*source)->device.description;
-  auto stages = load_stages(config, description.skeleton, description.rate_hz);
+  ModelFiles files;
+  auto stages = load_stages(config, description.skeleton, description.rate_hz, files);
   if (!stages) return of_stream(config.name, stages.error());
   auto stream = std::make_unique<OpenStream>();
   stream->config = config;

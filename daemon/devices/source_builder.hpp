@@ -1,104 +1,35 @@
-// SourceBuilder makes streams of what devices with several bodies say about themselves. It takes a
-// source's newest description, builds skeletons, stages and engines from it, hands them to the rest
-// of the daemon, and then gives the reader the new bodies in one piece. What a description changes
-// happens between two packets; streams that it does not concern go on without a gap. Cold: it has a
-// thread of its own.
+// SourceBuilder makes streams of what devices with several bodies say about themselves. What a
+// description changes happens between two packets; streams that it does not concern go on without a
+// gap. Cold: it has a thread of its own (assembly::BodyStreams).
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "daemon/config/daemon_config.hpp"
-#include "daemon/devices/body_names.hpp"
-#include "daemon/devices/open_source.hpp"
-#include "daemon/devices/stream_slots.hpp"
-#include "daemon/devices/stream_stages.hpp"
-#include "daemon/pipeline/reader.hpp"
+#include "daemon/devices/source_bodies.hpp"
 
 namespace posed::devices {
-
-// A device with several bodies.
-struct BodySource {
-  config::SourceConfig config;
-  std::uint32_t number = 0;            // of the source, in the reader and in the log
-  std::unique_ptr<OpenSource> source;  // never null
-  std::unique_ptr<pipeline::BodyExchange> exchange;
-};
-
-// The rate of its bodies as the config or the device says, or else the usual one of mocap systems.
-[[nodiscard]] double nominal_rate_hz(const BodySource& source);
-
-// A body on its way to becoming a stream.
-struct NewStream {
-  std::uint32_t id = 0;
-  const BodySource& source;
-  const drivers::Body& body;
-  config::StreamConfig config;  // with its name; without driver and options
-  double rate_hz = 0.0;
-  LoadedStages stages{};
-  BoundStages bound{};
-  // Empty for a body that a stage cannot serve; `refusal` says why.
-  std::optional<pipeline::EngineOptions> engine{};
-  std::string refusal{};
-};
-
-// What the builder needs from the rest of the daemon. All calls come from the builder's thread.
-class StreamHost {
- public:
-  StreamHost() = default;
-  StreamHost(const StreamHost&) = delete;
-  StreamHost& operator=(const StreamHost&) = delete;
-  virtual ~StreamHost() = default;
-
-  // Of the slot of this stream; they outlive the host.
-  virtual pipeline::StreamCounters& counters(std::uint32_t stream) = 0;
-  // How many slots of the ring to the pipeline a stream may fill.
-  [[nodiscard]] virtual std::size_t decoded_slots() const = 0;
-  // Makes the stream known to publisher, control, log and worker, so that its first item may come.
-  virtual void add(NewStream stream) = 0;
-  // A stream that the worker has ended and does not use any more, each once; empty: none now.
-  virtual std::optional<std::uint32_t> take_gone() = 0;
-  // Removes what add() made. Returns when nothing uses it any more.
-  virtual void remove(std::uint32_t stream) = 0;
-  // The reader has an update to take.
-  virtual void call_reader() = 0;
-  // Tells people of a problem with a source.
-  virtual void warn(const BodySource& source, const std::string& sentence) = 0;
-};
 
 class SourceBuilder {
  public:
   // At most this often the bodies of a source change.
   static constexpr std::int64_t kBetweenUpdates_ns = 500'000'000;
 
-  // Sources and host outlive the builder, and the reader ends before it. `reserved` are the names
-  // of all other streams.
+  // Sources, models and host outlive the builder, and the reader ends before it. `reserved` are the
+  // names of all other streams.
   SourceBuilder(std::vector<std::unique_ptr<BodySource>>& sources, StreamSlots slots,
-                std::set<std::string> reserved, StreamHost& host);
-  ~SourceBuilder();
+                std::set<std::string> reserved, ModelFiles& models, StreamHost& host);
 
   // Does what is due. Returns when to call it next at the latest; call earlier if the EventFd of
   // the sources' BodyExchange is notified.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
 
  private:
-  class Source;
-  struct Numbers {
-    std::uint64_t frame = 1, sample = 1;
-  };
-  void remove_gone();
-  void remove(std::uint32_t stream, const std::string& name);
-
-  StreamHost& host_;
-  StreamSlots slots_;
-  BodyNames names_;
-  std::map<std::string, Numbers> numbers_;  // by the name of a stream that has left
-  std::vector<std::unique_ptr<Source>> sources_;
+  SharedBodies shared_;
+  std::vector<std::unique_ptr<SourceBodies>> sources_;
 };
 
 }  // namespace posed::devices

@@ -11,17 +11,20 @@ namespace posed::devices {
 
 class StreamSlots {
  public:
-  // The slots from `first` on; those before it belong to the streams from the start.
-  StreamSlots(std::uint32_t first, std::uint32_t count) {
+  // The slots from `first` on; those before it belong to the streams from the start. `reserved` of
+  // them are only for streams that the config names.
+  StreamSlots(std::uint32_t first, std::uint32_t count, std::size_t reserved)
+      : reserved_(reserved) {
     for (std::uint32_t slot = first; slot < first + count; ++slot) free_.push_back({slot, 0});
   }
 
   // A free slot with a generation that it never had, as a stream id: that of the slot that is free
   // for the longest time. Empty if none is free.
-  [[nodiscard]] std::optional<std::uint32_t> take() {
-    if (free_.empty()) return std::nullopt;
+  [[nodiscard]] std::optional<std::uint32_t> take(bool named) {
+    if (free_.size() <= (named ? 0 : reserved_)) return std::nullopt;
     const Slot slot = free_.front();
     free_.pop_front();
+    if (named) --reserved_;
     return pipeline::stream_id(slot.number, slot.generation);
   }
 
@@ -32,12 +35,17 @@ class StreamSlots {
     return pipeline::stream_id(pipeline::slot_of(stream), generation + 1);
   }
 
-  // The slot's last stream has left.
-  void give_back(std::uint32_t stream) {
+  // The slot's last stream has left; `named` as in take().
+  void give_back(std::uint32_t stream, bool named) {
+    if (named) ++reserved_;
+    ++freed_;
     if (const auto id = next(stream)) {
       free_.push_back({pipeline::slot_of(*id), pipeline::generation_of(*id)});
     }
   }
+
+  // How often a slot was given back.
+  [[nodiscard]] std::uint64_t freed() const { return freed_; }
 
  private:
   struct Slot {
@@ -45,6 +53,8 @@ class StreamSlots {
     std::uint32_t generation;
   };
   std::deque<Slot> free_;
+  std::size_t reserved_;
+  std::uint64_t freed_ = 0;
 };
 
 }  // namespace posed::devices

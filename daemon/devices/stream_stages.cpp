@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "models/stages/registry.hpp"
-#include "proto/model/model_file.hpp"
 
 namespace posed::devices {
 namespace {
@@ -31,7 +30,8 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
 }  // namespace
 
 Result<LoadedStages> load_stages(const config::StreamConfig& config,
-                                 std::shared_ptr<const Skeleton> skeleton, double rate_hz) {
+                                 std::shared_ptr<const Skeleton> skeleton, double rate_hz,
+                                 ModelFiles& files) {
   LoadedStages loaded;
   loaded.settings = {
       .publish_raw = config.publish_raw, .stale_after_s = config.stale_after_s, .rate_hz = rate_hz};
@@ -42,9 +42,9 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
     loaded.settings.stages.push_back({.type = stage.type,
                                       .parameters = std::move(stage.parameters),
                                       .model_name = stage.model.filename().string()});
-    std::string& file = loaded.model_files.emplace_back();
+    ModelBytes& file = loaded.model_files.emplace_back();
     if (stage.model.empty()) continue;
-    auto bytes = model_file::load(stage.model);
+    auto bytes = files.load(stage.model);
     if (!bytes) return std::unexpected(bytes.error());
     file = std::move(*bytes);
   }
@@ -62,9 +62,9 @@ Result<BoundStages> bind_stages(const LoadedStages& stages) {
   for (std::size_t i = 0; i < stages.settings.stages.size(); ++i) {
     const pipeline::StageSettings& stage = stages.settings.stages[i];
     auto& model = bound.models.emplace_back();
-    if (stages.skeleton && !stages.model_files[i].empty()) {
+    if (stages.skeleton && stages.model_files[i]) {
       auto ready = stage.type->bind_model(
-          std::as_bytes(std::span(stages.model_files[i])),
+          std::as_bytes(std::span(*stages.model_files[i])),
           pipeline::stage_context(stages.settings, i, stages.skeleton), stage.model_name);
       if (!ready) return std::unexpected(ready.error());
       model = std::move(*ready);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/config/daemon_config.hpp"
+#include "daemon/devices/model_files.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/stream_settings.hpp"
 #include "models/stage_type.hpp"
@@ -21,14 +22,14 @@ struct LoadedStages {
   std::shared_ptr<const Skeleton> skeleton;  // of the frames that enter; null: samples only
   // For the engine; without the hashes of the models, which only the recorder knows.
   pipeline::StreamSettings settings;
-  std::vector<std::string> model_files;  // the bytes of each stage's model file; empty without one
+  std::vector<ModelBytes> model_files;  // the bytes of each stage's model file; null without one
 };
 
 // Chooses the stages and reads their model files. `rate_hz` is the stream's nominal rate, 0 when
 // unknown.
 [[nodiscard]] Result<LoadedStages> load_stages(const config::StreamConfig& config,
                                                std::shared_ptr<const Skeleton> skeleton,
-                                               double rate_hz);
+                                               double rate_hz, ModelFiles& files);
 
 // What the stages of a stream start with.
 struct BoundStages {

@@ -72,6 +72,10 @@ inline void restart(StreamCounters& counters, std::uint64_t frame, std::uint64_t
   counters.pipeline.shed = 0;
   counters.pipeline.dropped = 0;
   counters.pipeline.state = StreamState::kWaiting;
+  for (ParameterCounter& parameter : counters.pipeline.parameter) {
+    parameter.now = 0.0;
+    parameter.target = 0.0;
+  }
 }
 
 // The part of a shared ring that one stream may fill, in items or in bytes. Because of it no stream

@@ -129,6 +129,7 @@ struct Ack {
   std::uint32_t stream = 0;
   std::uint64_t sequence = 0;  // the first frame to which it applied
   bool refused = false;        // the stage did not take the command; nothing changed
+  bool gone = false;           // the worker does not have the stream (any more, or yet)
 };
 
 // pipeline -> recorder: a decision that cannot be derived from the recorded bytes alone, so replay

@@ -87,11 +87,11 @@ class Reader::Source final : private IntakeOut {
     }
   }
 
-  void send(std::span<const std::byte> bytes) noexcept {
+  void send(std::span<const std::byte> bytes, std::uint8_t socket = 0) noexcept {
     if (device_ == nullptr) return;
     const system::AllowedCall the_write;
-    if (!device_->transport->send(bytes)) return;
-    record_sink(pipeline::Direction::kToDevice, bytes);
+    if (!device_->transport->send(bytes, socket)) return;
+    record_sink(pipeline::Direction::kToDevice, bytes, socket);
   }
 
   // Takes over new bodies and a new device, and returns the current device if the supervisor asks
@@ -139,7 +139,6 @@ class Reader::Source final : private IntakeOut {
         item.frame.stamps.decoded_ns = ports_.clock();
         reader.frames.store(item.frame.header.sequence, std::memory_order_relaxed);
     }
-    counters_.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
     if (!push(to, item)) {
       count(reader.dropped);
       return false;
@@ -148,12 +147,11 @@ class Reader::Source final : private IntakeOut {
   }
 
   void description(std::span<const std::byte> bytes) noexcept override {
-    if (read_.bodies == nullptr) return;
-    const system::AllowedCall the_wake;
-    read_.bodies->descriptions.put(bytes);
+    if (read_.bodies != nullptr) read_.bodies->descriptions.put(bytes);
   }
 
   void outcome(Outcome outcome) noexcept override {
+    if (outcome == Outcome::kOk) counters_.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
     count(counters_.outcome[static_cast<std::size_t>(outcome)]);
   }
 
@@ -187,7 +185,7 @@ class Reader::Source final : private IntakeOut {
     if (poll_due_ns_ == kNoTime_ns) return;
     const std::int64_t now_ns = ports_.clock();
     if (now_ns < poll_due_ns_) return;
-    send(device_->poll.request);
+    send(device_->poll.request, device_->poll.socket);
     poll_due_ns_ += device_->poll.period_ns;
     if (poll_due_ns_ < now_ns) poll_due_ns_ = now_ns + device_->poll.period_ns;
   }
@@ -315,7 +313,8 @@ class Reader::Source final : private IntakeOut {
           [this](const SourceUpdate* update) noexcept { update_ = update; }));
     }
     if (update_ == nullptr) return true;
-    if (!ports_.out->has_room(places_)) return false;  // for all that may leave, or for none
+    // For all that may leave, or for none; after the source's end also for those that come.
+    if (!ports_.out->has_room(places_ + update_->bodies.size())) return false;
     arrived(ports_.clock());
     for (std::size_t i = 0; i < places_; ++i) {
       const auto is_body = [&](const ReadBody& body) {
@@ -327,9 +326,9 @@ class Reader::Source final : private IntakeOut {
     record_sink(pipeline::Direction::kDescription, update_->log);
     if (device_ != nullptr) device_->decoder->use(*update_->layout);
     used_ = std::exchange(update_, nullptr);
+    if (ended_) end();
     // never full: there are no more updates than entries
     static_cast<void>(read_.bodies->taken.push(used_));
-    const system::AllowedCall the_wake;
     read_.bodies->builder.notify();
     return true;
   }

@@ -55,6 +55,7 @@ class StreamContext final : private EngineOut {
   void follow(const StreamContext& earlier, const StreamEvent& end) noexcept {
     share_ = earlier.share_;
     engine_.start_at(end.sequence + 1, end.last_sample + 1);
+    publish_state();
   }
 
  private:

@@ -137,11 +137,15 @@ void Worker::give_back(StreamContext& context, const StreamEvent& end) noexcept 
 void Worker::apply_commands() noexcept {
   const auto apply = [this](const Command& command) noexcept {
     StreamContext* const context = find(command.stream);
-    acknowledge(context != nullptr ? context->apply(command)
-                                   : Ack{.ticket = command.ticket,
-                                         .stream = command.stream,
-                                         .sequence = 0,
-                                         .refused = true});
+    if (context == nullptr) {
+      return acknowledge({.ticket = command.ticket,
+                          .stream = command.stream,
+                          .sequence = 0,
+                          .refused = true,
+                          .gone = true});
+    }
+    context->begin();  // what the config says comes before what control says
+    acknowledge(context->apply(command));
   };
   while (ports_.commands->consume(apply)) {
   }

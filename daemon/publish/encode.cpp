@@ -1,4 +1,5 @@
 #include "daemon/publish/encode.hpp"
+#include "proto/text/clean.hpp"
 
 #include <algorithm>
 #include <span>
@@ -85,11 +86,11 @@ v1::Skeleton skeleton_message(const std::string& stream, const Skeleton& skeleto
   v1::Skeleton message;
   message.set_stream(stream);
   message.set_id(skeleton.id);
-  message.set_name(skeleton.name);
+  message.set_name(clean(skeleton.name));  // a file's name need not be UTF-8, a message's must
   message.set_root_joint(static_cast<std::uint32_t>(skeleton.root_joint));
   message.set_rate_hz(rate_hz);
   for (const Joint& joint : skeleton.joints) {
-    message.add_joint_name(joint.name);
+    message.add_joint_name(clean(joint.name));
     message.add_parent(joint.parent);
     for (const double value : joint.offset_m) message.add_offset_m(static_cast<float>(value));
     message.add_humanoid_bone(joint.bone ? std::string(bone_name(*joint.bone)) : std::string());

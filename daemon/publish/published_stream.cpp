@@ -1,4 +1,5 @@
 #include "daemon/publish/published_stream.hpp"
+#include "proto/text/clean.hpp"
 
 #include <algorithm>
 #include <array>
@@ -23,7 +24,7 @@ void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t
 // Only of a glove, because the device info of a file is its whole header.
 void describe_device(const drivers::Description& device, v1::StreamStats& stats) {
   const drivers::Driver* driver = drivers::find_driver(device.driver);
-  stats.set_identity(device.identity);
+  stats.set_identity(clean(device.identity));
   if (driver != nullptr && driver->glove != nullptr) stats.set_device_info(device.text);
 }
 
@@ -112,16 +113,19 @@ void PublishedStream::set_model(std::string name) {
   now_.model = std::move(name);
 }
 
+// Before the reader has started, no device counts as absent.
+bool is_away(const pipeline::SourceCounters& source, bool comes_and_goes) noexcept {
+  return comes_and_goes && source.link_ns.load() != kNoTime_ns && !source.connected.load();
+}
+
 void PublishedStream::fill_device(v1::StreamStats& stats) const {
   const pipeline::SourceCounters& source = *info.source_counters;
   stats.clear_outcome();
   for (const auto& outcome : source.outcome) stats.add_outcome(outcome.load());
   const std::int64_t link_ns = source.link_ns.load();
-  // before the reader has started, no device counts as absent
-  const bool begun = link_ns != kNoTime_ns;
-  stats.set_away(info.comes_and_goes && begun && !source.connected.load());
+  stats.set_away(is_away(source, info.comes_and_goes));
   stats.set_connections(source.connections.load());
-  stats.set_link_ns(begun ? link_ns : 0);
+  stats.set_link_ns(link_ns != kNoTime_ns ? link_ns : 0);
   if (info.present) describe_device(*info.present->description(), stats);
 }
 
@@ -130,8 +134,8 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_stream(info.name);
   stats.set_driver(info.description.driver);
   stats.set_source_name(info.source);
-  stats.set_body(info.body);
-  stats.set_refusal(info.refusal);
+  stats.set_body(clean(info.body));
+  stats.set_refusal(clean(info.refusal));
   stats.set_state(info.refusal.empty()
                       ? kStateNames[static_cast<std::size_t>(pipeline.state.load())]
                       : "refused");

@@ -15,6 +15,9 @@
 
 namespace posed::publish {
 
+// Whether a device that may be unplugged is.
+[[nodiscard]] bool is_away(const pipeline::SourceCounters& source, bool comes_and_goes) noexcept;
+
 // The topics and the frame message of one published name; a stream with raw output has a second
 // one.
 struct Channel {

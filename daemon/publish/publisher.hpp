@@ -50,6 +50,15 @@ struct StreamInfo {
   std::string refusal{};  // why a stage cannot serve the body; then nothing is ever published
 };
 
+// A device with several bodies, for the stats.
+struct SourceInfo {
+  std::string name;
+  std::string driver;
+  bool comes_and_goes = false;  // the device may be unplugged
+  std::shared_ptr<const devices::PresentDevice> present{};
+  const pipeline::SourceCounters* counters = nullptr;  // outlive the publisher
+};
+
 struct PublisherOptions {
   void* context = nullptr;  // the ZeroMQ context; outlives the publisher
   std::string endpoint;
@@ -66,6 +75,7 @@ struct PublisherOptions {
   // How many streams there may be at once, with those that are there from the start. As many as
   // those: none will come.
   std::size_t slots = 0;
+  std::vector<SourceInfo> sources{};
   double more_messages_per_s = 0.0;  // of the streams that may come
 };
 
@@ -142,6 +152,7 @@ class Publisher {
   [[nodiscard]] bool hear_subscriptions(std::int64_t now_ns);
   [[nodiscard]] bool is_topic(std::string_view prefix) const;
   void every_second(std::int64_t now_ns);
+  void add_sources(v1::Stats& stats) const;
   // These and the functions for other threads: publisher_requests.cpp.
   [[nodiscard]] bool asked() const noexcept;
   void do_what_was_asked();

@@ -1,11 +1,13 @@
 // The publisher's functions for other threads, and what its own thread does about them.
 #include "daemon/publish/publisher_requests.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/published_slots.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::publish {
 
@@ -64,8 +66,26 @@ v1::Stats Publisher::stats() const {
   }
   slots_->look([&](const PublishedStream& published) { *stats.add_stream() = published.stats(); });
   stats.set_time_ns(options_.data_clock());
+  add_sources(stats);
   if (options_.more_stats) options_.more_stats(stats);
   return stats;
+}
+
+void Publisher::add_sources(v1::Stats& stats) const {
+  for (const SourceInfo& info : options_.sources) {
+    v1::SourceStats& source = *stats.add_source();
+    source.set_name(info.name);
+    source.set_driver(info.driver);
+    source.set_identity(clean(info.present->description()->identity));
+    source.set_away(is_away(*info.counters, info.comes_and_goes));
+    source.set_connections(info.counters->connections.load());
+    for (const auto& outcome : info.counters->outcome) source.add_outcome(outcome.load());
+    const auto of_source = [&](const v1::StreamStats& stream) {
+      return stream.source_name() == info.name;
+    };
+    source.set_streams(
+        static_cast<std::uint32_t>(std::ranges::count_if(stats.stream(), of_source)));
+  }
 }
 
 bool Publisher::asked() const noexcept { return requests_->asked.load(); }

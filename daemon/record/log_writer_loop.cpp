@@ -56,7 +56,8 @@ void LogWriterLoop::drain(std::int64_t now_ns) {
 
 void LogWriterLoop::take_streams() {
   for (RecordedStream& stream : rings_.take_streams()) {
-    add_stream(stream.id, stream.source, std::move(stream));
+    const std::uint32_t id = stream.id, source = stream.source;
+    add_stream(id, source, std::move(stream));
   }
 }
 

@@ -23,7 +23,7 @@ log::SourceRow row_of(const devices::OpenSource& source) {
 }  // namespace
 
 void RecordedSetup::add_device(log::SourceRow row, StreamSettings settings,
-                               std::vector<std::string> model_files) {
+                               std::vector<devices::ModelBytes> model_files) {
   const auto source = static_cast<std::uint32_t>(sources.size());
   row.id = source;
   streams.push_back({.id = static_cast<std::uint32_t>(streams.size()),
@@ -69,8 +69,8 @@ Result<> add_stream_row(log::Writer& writer, const RecordedStream& stream,
                         std::uint64_t first_item) {
   StreamSettings settings = stream.settings;
   for (std::size_t i = 0; i < settings.stages.size(); ++i) {
-    if (stream.model_files[i].empty()) continue;
-    auto hash = writer.add_blob(std::as_bytes(std::span(stream.model_files[i])));
+    if (!stream.model_files[i]) continue;
+    auto hash = writer.add_blob(std::as_bytes(std::span(*stream.model_files[i])));
     if (!hash) return std::unexpected(hash.error());
     settings.stages[i].model_sha256 = std::move(*hash);
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/devices/model_files.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
 #include "proto/frame/result.hpp"
@@ -34,8 +35,8 @@ struct RecordedStream {
   std::uint32_t source = 0;  // its number
   std::string body{};        // the device's name for it; empty if the source has only one body
   std::string name{};
-  StreamSettings settings{};               // without the hashes of its models
-  std::vector<std::string> model_files{};  // one for each stage, empty without a model
+  StreamSettings settings{};                       // without the hashes of its models
+  std::vector<devices::ModelBytes> model_files{};  // one for each stage, null without a model
 };
 
 // What the log begins with.
@@ -49,7 +50,7 @@ struct RecordedSetup {
 
   // Adds a device with one body: a source and a stream, both with the next number.
   void add_device(log::SourceRow row, StreamSettings settings,
-                  std::vector<std::string> model_files);
+                  std::vector<devices::ModelBytes> model_files);
   // Adds a device whose bodies come later, with the next number. `bodies` is how many at most.
   void add_bodies(log::SourceRow row, double rate_hz, std::size_t bodies);
 };

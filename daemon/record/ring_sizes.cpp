@@ -56,6 +56,8 @@ RingSizes ring_sizes(const RecordedSetup& setup, bool frames) {
   for (const RecordedSource& source : setup.sources) {
     sizes.chunk_bytes.push_back(bytes_of_source(source, per_source));
   }
+  // There may be many of them, and a decision is large.
+  constexpr auto kDecisionsToCome = static_cast<std::size_t>(kRing_s * kDecisionsPerSecond / 4);
   constexpr auto kDecisions = static_cast<std::size_t>(kRing_s * kDecisionsPerSecond);
   const std::size_t per_stream = kMinRings / std::max<std::size_t>(setup.streams.size(), 1);
   for (const RecordedStream& stream : setup.streams) {
@@ -67,7 +69,7 @@ RingSizes ring_sizes(const RecordedSetup& setup, bool frames) {
   const std::size_t to_come =
       frames ? std::min(bytes_of_frames(setup.rate_to_come_hz, 0), most) : 0;
   sizes.slots.resize(setup.streams.size() + setup.slots_to_come,
-                     {.frame_bytes = to_come, .decisions = kDecisions});
+                     {.frame_bytes = to_come, .decisions = kDecisionsToCome});
   return sizes;
 }
 

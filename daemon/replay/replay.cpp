@@ -8,13 +8,6 @@
 #include "proto/text/clean.hpp"
 
 namespace posed::replay {
-namespace {
-
-// Bodies that come and go for a day make less; a limit, because each stream costs some memory.
-constexpr std::size_t kMaxStreams = 4096;
-
-}  // namespace
-
 Replay::Replay(log::Reader& reader)
     : reader_(reader), models_(reader), schedule_(reader.streams().size(), reader.counts_items()) {}
 
@@ -31,9 +24,9 @@ Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
 
 Result<> Replay::open_contexts() {
   const auto& streams = reader_.streams();
-  if (streams.size() > kMaxStreams) {
+  if (streams.size() > log::kMaxStreams) {
     return fail("holds " + std::to_string(streams.size()) + " streams, and this posed replays " +
-                    std::to_string(kMaxStreams) + " at most",
+                    std::to_string(log::kMaxStreams) + " at most",
                 reader_.file());
   }
   for (const log::StreamRow& row : streams) {

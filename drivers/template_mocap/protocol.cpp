@@ -71,9 +71,8 @@ Result<std::string> read_name(ByteReader& reader) {
   const std::string_view name = reader.text(reader.u8());
   if (!reader.ok()) return wrong("ends too early");
   if (name.empty()) return wrong("has an empty name");
-  const bool control = std::ranges::any_of(
-      name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-  if (control) return wrong("has a name that is not text: " + in_quotes(name));
+  // Other programs get the names in messages that must be UTF-8.
+  if (clean(name) != name) return wrong("has a name that is not text: " + in_quotes(name));
   return std::string(name);
 }
 

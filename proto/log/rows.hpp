@@ -14,6 +14,9 @@
 
 namespace posed::log {
 
+// Of one log. Bodies that come and go all the time make many, two a second at most of each.
+inline constexpr std::size_t kMaxStreams = 65536;
+
 // Table source: a device that was open when recording began, with everything needed to decode its
 // chunks again.
 struct SourceRow {

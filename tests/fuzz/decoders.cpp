@@ -103,6 +103,48 @@ std::string mocap_bodies() {
          std::string("\4head\0", 6) + offset;
 }
 
+// What a device with several bodies says about them first.
+class FirstDescription final : public posed::Sink {
+ public:
+  void frame(std::size_t, posed::Frame&) noexcept override {}
+  void sample(std::size_t, posed::Sample&) noexcept override {}
+  void outcome(posed::Outcome) noexcept override {}
+  void description(std::span<const std::byte> described) noexcept override {
+    if (bytes.empty()) bytes.assign(described.begin(), described.end());
+  }
+  std::vector<std::byte> bytes;
+};
+
+// Any driver for several bodies: with the bodies of its own emulator, the bytes are one more packet
+// from it, and a description.
+void try_bodies(const posed::drivers::Driver& driver, std::span<const std::byte> bytes) {
+  const std::string name(driver.name);
+  const auto emulator = driver.emulate({});
+  const auto device = driver.expect({});
+  demand(emulator.has_value() && device.has_value());
+  const auto decoder = decoder_of(name.c_str(), device->text);
+  demand(decoder != nullptr);
+  FirstDescription first;
+  for (int i = 0; i < 100 && first.bytes.empty(); ++i) {
+    std::vector<std::byte> packet;
+    const std::int64_t due_ns = (*emulator)->next_due_ns();
+    (*emulator)->emit(due_ns, packet);
+    decoder->feed(packet, due_ns, first);
+  }
+  const auto layout = driver.make_layout(first.bytes);
+  demand(layout.has_value());
+  decoder->use(**layout);
+  CollectSink sink(0);
+  decoder->feed(bytes, 0, sink);
+  for (const std::size_t body : sink.bodies) demand(body < (*layout)->bodies.size());
+  for (const posed::Frame& frame : sink.frames) demand(posed::test::is_sound(frame));
+  const auto any = driver.make_layout(bytes);
+  if (!any) return;
+  demand((*any)->bodies.size() <= posed::kMaxBodies);
+  decoder->use(**any);
+  decoder->feed(bytes, 0, sink);
+}
+
 // The bytes are a datagram, a datagram's content with a right head and checksum, and a description.
 void try_mocap(std::span<const std::byte> bytes) {
   const posed::drivers::Driver* driver = posed::drivers::find_driver("template_mocap");
@@ -182,7 +224,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     case 9:
       try_mocap(bytes);
-      (void)decoder_of("template_mocap", text);
+      for (const posed::drivers::Driver& driver : posed::drivers::registry()) {
+        if (driver.make_layout == nullptr) continue;
+        try_bodies(driver, bytes);
+        (void)decoder_of(std::string(driver.name).c_str(), text);
+      }
       break;
     default:
       if (const auto decoder = decoder_of("file", text)) {

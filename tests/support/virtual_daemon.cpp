@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <random>
+#include <set>
 
 #include <catch2/catch.hpp>
 
@@ -10,65 +11,37 @@
 #include "daemon/devices/calibration.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/worker.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/record/recorder.hpp"
-#include "drivers/glove/calibrated_decoder.hpp"
+#include "posed/v1/posed.pb.h"
 #include "proto/log/digest.hpp"
+#include "tests/support/scripted_device.hpp"
 #include "tests/support/stage_commands.hpp"
+#include "tests/support/virtual_bodies.hpp"
 
 namespace posed::test {
 namespace {
 
-constexpr std::int64_t kBegin_ns = 1'000'000'000'000;
 constexpr std::int64_t kLogWriterEvery_ns = 50'000'000;
 constexpr std::int64_t kMaxHoldup_ns = 400'000'000;
-constexpr int kTurnsBetweenHoldups = 400;
+constexpr std::int64_t kMaxStep_ns = 8'000'000;  // while the builder is at work
 constexpr int kItemsPublishedATurn = 32;
 
-thread_local std::int64_t virtual_now_ns = kBegin_ns;
-std::int64_t virtual_clock() noexcept { return virtual_now_ns; }
-
-std::int64_t at_ns(double at_s) {
-  return at_s == kNever_s ? system::kForever_ns : kBegin_ns + nanoseconds(at_s);
-}
-
-std::span<const std::byte> bytes_of(const std::string& text) {
-  return std::as_bytes(std::span(text));
-}
-
-// Plays one link of the script.
-class ScriptedTransport final : public drivers::Transport {
- public:
-  explicit ScriptedTransport(const ScriptedLink& link) : link_(link) {}
-
-  [[nodiscard]] int poll_fd() const noexcept override { return -1; }
-  [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
-    if (!link_.flood.empty()) return at_ns(link_.from_s);
-    const std::int64_t chunk_ns =
-        next_ < link_.chunks.size() ? at_ns(link_.chunks[next_].at_s) : system::kForever_ns;
-    return std::min(chunk_ns, at_ns(link_.until_s));
+std::vector<devices::ModelBytes> shared(const std::vector<std::string>& files) {
+  std::vector<devices::ModelBytes> bytes;
+  for (const std::string& file : files) {
+    bytes.push_back(file.empty() ? nullptr : std::make_shared<const std::string>(file));
   }
-  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
-  [[nodiscard]] drivers::Chunk read(std::int64_t now_ns) noexcept override {
-    if (now_ns >= at_ns(link_.until_s))
-      return {.bytes = {}, .end = link_.ends, .lost = !link_.ends};
-    if (now_ns < next_due_ns()) return {};
-    const std::string& bytes = link_.flood.empty() ? link_.chunks[next_++].bytes : link_.flood;
-    return {.bytes = bytes_of(bytes)};
-  }
-
- private:
-  const ScriptedLink& link_;
-  std::size_t next_ = 0;
-};
+  return bytes;
+}
 
 }  // namespace
 
 // One stream of the running daemon, with everything that its parts borrow.
 struct VirtualStreamContext {
   VirtualStreamContext(VirtualStream script, std::uint32_t number)
-      : stream(std::move(script)), id(number), styled(stream.name), raw(stream.name + "-raw") {
-    slot.supervisor = system::EventFd::open().value();
+      : stream(std::move(script)),
+        device(stream.description, std::move(stream.links)),
+        published(number, stream.name, counters) {
     stream.settings.rate_hz = stream.description.rate_hz;
   }
 
@@ -89,36 +62,13 @@ struct VirtualStreamContext {
     return calibrations.back().get();
   }
 
-  // The device of the next link, if it is connected by now; otherwise null.
-  drivers::Device* next_device() {
-    if (device || next_link == stream.links.size()) return nullptr;
-    const ScriptedLink& link = stream.links[next_link];
-    if (at_ns(link.from_s) > virtual_now_ns) return nullptr;
-    ++next_link;
-    const drivers::Driver* driver = drivers::find_driver(stream.description.driver);
-    device = std::make_unique<drivers::Device>();
-    device->description = stream.description;
-    device->transport = std::make_unique<ScriptedTransport>(link);
-    device->decoder = driver->make_decoder(stream.description).value();
-    device->calibrated = drivers::glove::calibrated_decoder(*device->decoder);
-    return device.get();
-  }
-  [[nodiscard]] std::int64_t next_device_ns() const {
-    if (device || next_link == stream.links.size()) return system::kForever_ns;
-    return at_ns(stream.links[next_link].from_s);
-  }
-
   VirtualStream stream;
-  std::uint32_t id;
   pipeline::StreamCounters counters;
   pipeline::SourceCounters source_counters;
-  pipeline::DeviceSlot slot;
-  std::unique_ptr<drivers::Device> device;  // of the link in use
-  std::size_t next_link = 0;
+  ScriptedDevice device;
   std::vector<std::unique_ptr<const StageModel>> models;
   std::vector<std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
-  publish::FrameEncoder styled, raw;
-  VirtualDaemon::Published published;
+  PublishedStream published;
 };
 
 class VirtualDaemon::Parts {
@@ -129,8 +79,10 @@ class VirtualDaemon::Parts {
 
   VirtualOptions options;
   std::vector<std::unique_ptr<VirtualStreamContext>> contexts;
+  std::vector<VirtualSource> sources;
   std::vector<VirtualCommand> script;
   std::vector<pipeline::Ack> acks_taken;
+  std::unique_ptr<VirtualBodies> bodies;  // null without sources
 
  private:
   enum Part : std::uint8_t {
@@ -140,6 +92,7 @@ class VirtualDaemon::Parts {
     kLogWriter,
     kPerson,
     kSupervisor,
+    kBuilder,
     kParts
   };
 
@@ -149,9 +102,11 @@ class VirtualDaemon::Parts {
   void take_turn(Part part);
   [[nodiscard]] std::int64_t due_ns(Part part) const;
   void publish(int most);
-  void publish_frame(VirtualStreamContext& context, const pipeline::Item& item);
+  [[nodiscard]] PublishedStream& published_stream(std::uint32_t stream);
+  void publish_frame(PublishedStream& stream, const pipeline::Item& item);
   void speak(const VirtualCommand& command, std::uint64_t ticket);
   void keep_devices();
+  void run_beside_builder();
   void stop();
   std::int64_t draw_ns(std::int64_t most_ns) {
     return std::uniform_int_distribution<std::int64_t>(0, most_ns)(random);
@@ -168,6 +123,7 @@ class VirtualDaemon::Parts {
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
   std::size_t next_command = 0;
+  std::size_t unsent = 0;                            // commands for a body that had no stream
   std::array<std::int64_t, kParts> due{};            // as returned by the part's last turn
   std::array<std::int64_t, kParts> held_until_ns{};  // no turn before this time
 };
@@ -183,8 +139,9 @@ void VirtualDaemon::Parts::open_log() {
                       .text = stream.description.text,
                       .identity = stream.description.identity,
                       .config = "{}"},
-                     stream.settings, stream.model_files);
+                     stream.settings, shared(stream.model_files));
   }
+  if (bodies) bodies->add_to(setup);
   record::RecorderOptions recorder;
   recorder.file = options.log;
   recorder.clock = virtual_clock;
@@ -192,7 +149,8 @@ void VirtualDaemon::Parts::open_log() {
   REQUIRE(writer);
   record_sink = std::make_unique<record::RecordRings>(record::RingSizes{
       .chunk_bytes = std::vector<std::size_t>(setup.sources.size(), options.chunk_bytes),
-      .slots = std::vector<record::SlotSizes>(setup.streams.size(), options.record_slot)});
+      .slots = std::vector<record::SlotSizes>(setup.streams.size() + setup.slots_to_come,
+                                              options.record_slot)});
   log_writer =
       std::make_unique<record::LogWriterLoop>(*record_sink, std::move(*writer), options.log,
                                               setup.streams, [](const record::RecorderEvent&) {});
@@ -205,17 +163,22 @@ pipeline::EngineOptions VirtualDaemon::Parts::engine_of(VirtualStreamContext& co
     const std::string& file = stream.model_files[i];
     models.push_back(file.empty() ? nullptr : context.bind(i, file));
   }
-  auto engine =
-      pipeline::engine_options(context.id, stream.settings, stream.description.skeleton, models);
+  auto engine = pipeline::engine_options(context.published.id, stream.settings,
+                                         stream.description.skeleton, models);
   REQUIRE(engine);
   return std::move(*engine);
 }
 
 void VirtualDaemon::Parts::open() {
-  virtual_now_ns = kBegin_ns;
+  virtual_now_ns = kVirtualBegin_ns;
+  const auto count = static_cast<std::uint32_t>(contexts.size());
+  if (!sources.empty()) {
+    bodies = std::make_unique<VirtualBodies>(std::move(sources), count, options.bodies);
+  }
   open_log();
   std::size_t slots = pipeline::kEventSlots + contexts.size();
   for (const auto& context : contexts) slots += context->stream.slots;
+  if (bodies) slots += bodies->all_slots();
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
   finished = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
   commands = std::make_unique<pipeline::Ring<pipeline::Command>>(pipeline::kMaxUnderWay);
@@ -230,6 +193,7 @@ void VirtualDaemon::Parts::open() {
                                    .acks = acks.get(),
                                    .wake = pipeline_wake.get(),
                                    .publisher = publisher_wake.get(),
+                                   .streams = bodies ? &bodies->exchange() : nullptr,
                                    .record_sink = record_sink.get(),
                                    .clock = virtual_clock})
                .value();
@@ -243,17 +207,25 @@ void VirtualDaemon::Parts::open() {
     const VirtualStream& stream = context->stream;
     worker->add(engine_of(*context), stream.description.rate_hz, context->counters, stream.slots);
     reader->add(
-        {.device = context->next_device(),
+        {.device = context->device.next(),
          .counters = &context->source_counters,
-         .slot = &context->slot,
+         .slot = &context->device.slot(),
          .calibration = stream.calibration.empty() ? nullptr : context->compile(stream.calibration),
-         .body = pipeline::ReadBody{
-             .stream = context->id, .counters = &context->counters, .slots = stream.slots}});
+         .body = pipeline::ReadBody{.stream = context->published.id,
+                                    .counters = &context->counters,
+                                    .slots = stream.slots}});
+  }
+  if (bodies) {
+    std::set<std::string> names;
+    for (const auto& context : contexts) names.insert(context->stream.name);
+    bodies->add_to(*reader);
+    bodies->start(*worker, *reader, record_sink.get(), std::move(names),
+                  [this] { run_beside_builder(); });
   }
   std::ranges::stable_sort(script, {}, &VirtualCommand::at_s);
   reader->begin();
-  due.fill(kBegin_ns);
-  held_until_ns.fill(kBegin_ns);
+  due.fill(kVirtualBegin_ns);
+  held_until_ns.fill(kVirtualBegin_ns);
 }
 
 // Runs one turn of a part that is due, then of another, chosen at random; if none is due, time
@@ -278,7 +250,8 @@ void VirtualDaemon::Parts::run(double until_s) {
     const Part part = ready[static_cast<std::size_t>(draw_ns(static_cast<int>(count) - 1))];
     take_turn(part);
     virtual_now_ns += 1 + draw_ns(static_cast<std::int64_t>(options.turn_us * 1e3));
-    if (options.holdups && draw_ns(kTurnsBetweenHoldups) == 0) {
+    if (options.holdups && virtual_now_ns < at_ns(options.calm_from_s) &&
+        draw_ns(options.turns_between_holdups) == 0) {
       held_until_ns[part] = virtual_now_ns + draw_ns(kMaxHoldup_ns);
     }
   }
@@ -292,8 +265,9 @@ std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
     case kReader:
       if (!device_commands->empty()) at = virtual_now_ns;
       for (const auto& context : contexts) {
-        if (!context->slot.in.empty()) at = virtual_now_ns;
+        if (!context->device.slot().in.empty()) at = virtual_now_ns;
       }
+      if (bodies && bodies->reader_is_called()) at = virtual_now_ns;
       break;
     case kWorker:
       if (!decoded->empty() || !commands->empty()) at = virtual_now_ns;
@@ -305,10 +279,11 @@ std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
       at = next_command < script.size() ? at_ns(script[next_command].at_s) : system::kForever_ns;
       break;
     case kSupervisor:
-      at = system::kForever_ns;
-      for (const auto& context : contexts) {
-        at = std::min(at, context->slot.out.empty() ? context->next_device_ns() : virtual_now_ns);
-      }
+      at = bodies ? bodies->supervisor_due_ns() : system::kForever_ns;
+      for (const auto& context : contexts) at = std::min(at, context->device.due_ns());
+      break;
+    case kBuilder:
+      at = bodies ? bodies->due_ns() : system::kForever_ns;
       break;
     default:
       break;
@@ -333,10 +308,13 @@ void VirtualDaemon::Parts::take_turn(Part part) {
       break;
     case kPerson:
       // Control sends at most kMaxUnderWay commands.
-      if (next_command - acks_taken.size() < pipeline::kMaxUnderWay) {
+      if (next_command - unsent - acks_taken.size() < pipeline::kMaxUnderWay) {
         speak(script[next_command], next_command + 1);
         ++next_command;
       }
+      break;
+    case kBuilder:
+      bodies->turn();
       break;
     default:
       keep_devices();
@@ -344,18 +322,31 @@ void VirtualDaemon::Parts::take_turn(Part part) {
 }
 
 void VirtualDaemon::Parts::keep_devices() {
-  for (const auto& context : contexts) {
-    while (context->slot.out.consume([&](drivers::Device*) { context->device.reset(); })) {
-    }
-    if (drivers::Device* const device = context->next_device(); device != nullptr) {
-      REQUIRE(context->slot.in.push(device));
-      reader->call();
+  for (const auto& context : contexts) context->device.supervise(*reader);
+  if (bodies) bodies->supervise();
+}
+
+// A model takes its time to be read and bound, and the hot threads do not wait for it.
+void VirtualDaemon::Parts::run_beside_builder() {
+  for (std::int64_t i = draw_ns(3); i > 0; --i) {
+    virtual_now_ns += draw_ns(kMaxStep_ns);
+    for (const Part part : {kReader, kWorker, kPublisher}) {
+      if (std::max(due_ns(part), held_until_ns[part]) <= virtual_now_ns) take_turn(part);
     }
   }
 }
 
 void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t ticket) {
   using Kind = VirtualCommand::Kind;
+  if (!wanted.body.empty()) {
+    const auto stream = bodies->stream_of(wanted.body);
+    if (!stream) {
+      ++unsent;
+    } else {
+      REQUIRE(commands->push(alpha_command(*stream, wanted.alpha, ticket)));
+    }
+    return;
+  }
   VirtualStreamContext& context = *contexts[wanted.stream];
   if (wanted.kind == Kind::kCalibrate) {
     REQUIRE(device_commands->push({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
@@ -399,11 +390,21 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
 void VirtualDaemon::Parts::publish(int most) {
   const auto take = [this](const pipeline::Item& item) {
     using Kind = pipeline::Item::Kind;
-    const bool event = item.kind == Kind::kEvent;
-    VirtualStreamContext& context = *contexts[pipeline::stream_of(item)];
-    pipeline::count(context.counters.publisher.taken);
-    if (item.kind == Kind::kSample) ++context.published.samples;
-    if (!event && item.kind != Kind::kSample) publish_frame(context, item);
+    PublishedStream& stream = published_stream(pipeline::stream_of(item));
+    pipeline::count(stream.counters.publisher.taken);
+    switch (item.kind) {
+      case Kind::kSample:
+        ++stream.published.samples;
+        break;
+      case Kind::kEvent:
+        if (item.stream_event.kind == v1::Event::KIND_SHED) {
+          stream.published.missed += static_cast<std::uint64_t>(item.stream_event.value);
+        }
+        if (bodies && item.stream_event.kind == v1::Event::KIND_ENDED) bodies->publish_end(stream);
+        break;
+      default:
+        publish_frame(stream, item);
+    }
   };
   for (int i = 0; i < most && finished->consume(take); ++i) {
   }
@@ -411,15 +412,19 @@ void VirtualDaemon::Parts::publish(int most) {
   }
 }
 
-void VirtualDaemon::Parts::publish_frame(VirtualStreamContext& context,
-                                         const pipeline::Item& item) {
+PublishedStream& VirtualDaemon::Parts::published_stream(std::uint32_t stream) {
+  return stream < contexts.size() ? contexts[stream]->published : bodies->find(stream);
+}
+
+void VirtualDaemon::Parts::publish_frame(PublishedStream& stream, const pipeline::Item& item) {
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
-  ++(raw ? context.published.raw : context.published.frames);
-  if (!raw) context.published.sequences.push_back(item.frame.header.sequence);
+  VirtualDaemon::Published& published = stream.published;
+  ++(raw ? published.raw : published.frames);
+  if (!raw) published.sequences.push_back(item.frame.header.sequence);
   if (!record_sink) return;
   const std::string bytes =
-      (raw ? context.raw : context.styled).encode(item.frame).SerializeAsString();
-  record_sink->published(context.id, item.frame.header.sequence, raw, bytes_of(bytes));
+      (raw ? stream.raw : stream.styled).encode(item.frame).SerializeAsString();
+  record_sink->published(stream.id, item.frame.header.sequence, raw, bytes_of(bytes));
 }
 
 // In the order in which the daemon ends: from the devices to the log.
@@ -427,6 +432,7 @@ void VirtualDaemon::Parts::stop() {
   worker->finish();
   while (!finished->empty() || !acks->empty()) publish(kItemsPublishedATurn);
   if (log_writer) REQUIRE(log_writer->finish(virtual_now_ns));
+  if (bodies) bodies->finish();
 }
 
 VirtualDaemon::VirtualDaemon(VirtualOptions options)
@@ -437,16 +443,24 @@ void VirtualDaemon::add(VirtualStream stream) {
   const auto id = static_cast<std::uint32_t>(parts_->contexts.size());
   parts_->contexts.push_back(std::make_unique<VirtualStreamContext>(std::move(stream), id));
 }
+void VirtualDaemon::add(VirtualSource source) { parts_->sources.push_back(std::move(source)); }
 void VirtualDaemon::command(VirtualCommand command) {
   parts_->script.push_back(std::move(command));
 }
 void VirtualDaemon::run(double until_s) { parts_->run(until_s); }
 
 const VirtualDaemon::Published& VirtualDaemon::published(std::uint32_t stream) const {
-  return parts_->contexts[stream]->published;
+  return parts_->contexts[stream]->published.published;
 }
 const pipeline::StreamCounters& VirtualDaemon::counters(std::uint32_t stream) const {
   return parts_->contexts[stream]->counters;
+}
+const std::vector<VirtualBody>& VirtualDaemon::bodies() const {
+  static const std::vector<VirtualBody> none;
+  return parts_->bodies ? parts_->bodies->log() : none;
+}
+std::size_t VirtualDaemon::warnings() const {
+  return parts_->bodies ? parts_->bodies->warnings() : 0;
 }
 const std::vector<pipeline::Ack>& VirtualDaemon::acks() const { return parts_->acks_taken; }
 

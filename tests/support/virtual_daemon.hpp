@@ -21,11 +21,13 @@
 #include <string>
 #include <vector>
 
+#include "daemon/config/daemon_config.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/record/record_rings.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
 
@@ -59,6 +61,16 @@ struct VirtualStream {
   std::size_t slots = 64;  // how many slots of each ring the stream may fill
 };
 
+// A device with several bodies, whose streams come and go.
+struct VirtualSource {
+  config::SourceConfig config;
+  std::vector<ScriptedLink> links;
+  drivers::Poll poll{};
+  std::size_t slots = 64;                   // how many slots of each ring each body may fill
+  std::vector<std::string> bodies{};        // names of all that the script describes
+  std::shared_ptr<const TempFolder> files;  // of the config
+};
+
 // A command that a client sends during the run.
 struct VirtualCommand {
   enum class Kind : std::uint8_t { kAlpha, kModel, kPlay, kStopPlaying, kCalibrate };
@@ -68,19 +80,26 @@ struct VirtualCommand {
   float alpha = 0.0F;
   std::string bytes{};   // kModel: a model file, for the stage that takes it; kCalibrate: TOML
   std::string labels{};  // kPlay: names of labels
-  bool loop = false;     // kPlay
+  // kAlpha: for the stream of this body instead, if there is one at that time.
+  std::string body{};
+  bool loop = false;  // kPlay
 };
 
 struct VirtualOptions {
   std::uint64_t seed = 1;
-  std::filesystem::path log;   // empty: no recording
-  bool holdups = true;         // the parts are held up from time to time, for up to 0.4 s
-  double turn_us = 40.0;       // the longest duration of a turn
-  std::size_t ack_slots = 64;  // of the ring to control
+  std::filesystem::path log;  // empty: no recording
+  bool holdups = true;        // the parts are held up from time to time, for up to 0.4 s
+  int turns_between_holdups = 400;
+  double calm_from_s = kNever_s;  // no holdup begins after this
+  double turn_us = 40.0;          // the longest duration of a turn
+  std::size_t ack_slots = 64;     // of the ring to control
+  std::size_t bodies = 8;         // of all sources that may have a stream at once
   // Each device's and each stream's share of the recorder's rings.
   std::size_t chunk_bytes = 4 << 20;
   record::SlotSizes record_slot{.frame_bytes = 16 << 20, .decisions = 2048};
 };
+
+struct VirtualBody;
 
 class VirtualDaemon {
  public:
@@ -89,6 +108,7 @@ class VirtualDaemon {
 
   // Call before run(); streams are numbered in the order in which they are added.
   void add(VirtualStream stream);
+  void add(VirtualSource source);
   void command(VirtualCommand command);
 
   // Runs from time 0 to `until_s`, stops as the daemon does and closes the log. Call once. Fails
@@ -97,16 +117,34 @@ class VirtualDaemon {
 
   struct Published {
     std::uint64_t frames = 0, raw = 0, samples = 0;
+    std::uint64_t missed = 0;              // numbers of frames that never came, as events said
     std::vector<std::uint64_t> sequences;  // of the styled frames, as they came
   };
   [[nodiscard]] const Published& published(std::uint32_t stream) const;
   [[nodiscard]] const pipeline::StreamCounters& counters(std::uint32_t stream) const;
+  // After run(): all streams that bodies of sources ever had, those of one slot in order.
+  [[nodiscard]] const std::vector<VirtualBody>& bodies() const;
+  // How often people were told of a problem with a source.
+  [[nodiscard]] std::size_t warnings() const;
   // The Acks that control received; tickets count the commands from 1, by time.
   [[nodiscard]] const std::vector<pipeline::Ack>& acks() const;
 
  private:
   class Parts;
   std::unique_ptr<Parts> parts_;
+};
+
+// A stream that the body of a source had.
+struct VirtualBody {
+  std::uint32_t stream = 0;
+  std::string source, body, name{};
+  std::string refusal{};  // empty: it was streamed
+  VirtualDaemon::Published published{};
+  bool left = false;          // before the end of the run
+  std::uint64_t decoded = 0;  // sequence of the last frame of its name, decoded by its end
+  // Frames that were dropped or shed, and items for which there was no space on the way to the
+  // publisher; those of earlier streams of the same name in its slot are included.
+  std::uint64_t lost = 0, unpublished = 0;
 };
 
 // A body of five joints that walks at 60 Hz, with style, generate (a lag of one frame) and raw
@@ -117,9 +155,16 @@ class VirtualDaemon {
 // (a lag of two frames, with a gesture model) and constrain.
 [[nodiscard]] VirtualStream glove_stream(const std::string& name, double length_s);
 
+// A room with two to six people at 60 to 120 Hz who come and go and change their skeleton, and
+// whose system repeats, cuts, distorts or floods its descriptions. What happens, and the stages of
+// the bodies, are drawn from the seed.
+[[nodiscard]] VirtualSource mocap_source(const std::string& name, double length_s,
+                                         std::uint64_t seed);
+
 // Inserts silences, unplugs (on streams with a glove) and bursts into the stream's only link, at
 // random.
 void disturb(VirtualStream& stream, std::uint64_t seed);
+void disturb(VirtualSource& source, std::uint64_t seed);
 
 // A calibration for the glove of glove_stream(); each `variant` is different.
 [[nodiscard]] std::string glove_calibration(int variant);

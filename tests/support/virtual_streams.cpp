@@ -38,6 +38,35 @@ std::vector<ScriptedChunk> cut_from(ScriptedLink& link, double from_s) {
   return rest;
 }
 
+void disturb(std::vector<ScriptedLink>& links, bool comes_back, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto draw = [&](double most) {
+    return std::uniform_real_distribution<double>(0.0, most)(random);
+  };
+  REQUIRE(links.size() == 1);
+  const double length_s = links[0].chunks.back().at_s;
+  for (double at_s = 0.3 + draw(0.8); at_s < length_s; at_s += 0.2 + draw(1.0)) {
+    ScriptedLink& link = links.back();
+    std::vector<ScriptedChunk> rest = cut_from(link, at_s);
+    const double pause_s = draw(2.0) < 1.0 ? draw(0.3) : draw(1.2);
+    const double what = draw(3.0);
+    if (what < 1.0) {  // silent for a while: the following chunks are shifted
+      for (ScriptedChunk& chunk : rest) chunk.at_s += pause_s;
+      std::ranges::move(rest, std::back_inserter(link.chunks));
+    } else if (what < 2.0 || !comes_back) {  // delayed: all chunks of the pause come at once
+      for (ScriptedChunk& chunk : rest) chunk.at_s = std::max(chunk.at_s, at_s + pause_s);
+      std::ranges::move(rest, std::back_inserter(link.chunks));
+    } else {  // unplugged
+      link.until_s = at_s;
+      ScriptedLink next{.from_s = at_s + pause_s, .chunks = {}, .until_s = kNever_s, .flood = {}};
+      for (ScriptedChunk& chunk : rest) {
+        if (chunk.at_s >= next.from_s) next.chunks.push_back(std::move(chunk));
+      }
+      links.push_back(std::move(next));
+    }
+  }
+}
+
 }  // namespace
 
 VirtualStream walking_stream(const std::string& name, double length_s, unsigned style_seed) {
@@ -90,34 +119,10 @@ VirtualStream glove_stream(const std::string& name, double length_s) {
 }
 
 void disturb(VirtualStream& stream, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  const auto draw = [&](double most) {
-    return std::uniform_real_distribution<double>(0.0, most)(random);
-  };
-  REQUIRE(stream.links.size() == 1);
-  const bool comes_back = stream.description.driver != "file";
-  const double length_s = stream.links[0].chunks.back().at_s;
-  for (double at_s = 0.3 + draw(0.8); at_s < length_s; at_s += 0.2 + draw(1.0)) {
-    ScriptedLink& link = stream.links.back();
-    std::vector<ScriptedChunk> rest = cut_from(link, at_s);
-    const double pause_s = draw(2.0) < 1.0 ? draw(0.3) : draw(1.2);
-    const double what = draw(3.0);
-    if (what < 1.0) {  // silent for a while: the following chunks are shifted
-      for (ScriptedChunk& chunk : rest) chunk.at_s += pause_s;
-      std::ranges::move(rest, std::back_inserter(link.chunks));
-    } else if (what < 2.0 || !comes_back) {  // delayed: all chunks of the pause come at once
-      for (ScriptedChunk& chunk : rest) chunk.at_s = std::max(chunk.at_s, at_s + pause_s);
-      std::ranges::move(rest, std::back_inserter(link.chunks));
-    } else {  // unplugged
-      link.until_s = at_s;
-      ScriptedLink next{.from_s = at_s + pause_s, .chunks = {}, .until_s = kNever_s, .flood = {}};
-      for (ScriptedChunk& chunk : rest) {
-        if (chunk.at_s >= next.from_s) next.chunks.push_back(std::move(chunk));
-      }
-      stream.links.push_back(std::move(next));
-    }
-  }
+  disturb(stream.links, stream.description.driver != "file", seed);
 }
+
+void disturb(VirtualSource& source, std::uint64_t seed) { disturb(source.links, true, seed); }
 
 std::string glove_calibration(int variant) {
   drivers::glove::CalibrationFile file;

@@ -141,6 +141,10 @@ int check(const CheckOptions& options) {
       if (!summary) reading.errors.push_back(summary.error());
     }
     for (const config::SourceConfig& source : reading.config.sources) {
+      devices::ModelFiles models;
+      const auto opened = devices::open_source(source, models);
+      if (!opened)
+        reading.errors.push_back(devices::of_stream(source.name, opened.error()).error());
       sources.push_back(summary_of(source));
     }
   }

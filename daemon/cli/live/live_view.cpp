@@ -10,6 +10,7 @@
 #include "daemon/cli/paint.hpp"
 #include "models/stages/registry.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/frame/sink.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
 
@@ -160,10 +161,30 @@ std::string body_row(const v1::StreamStats& stream) {
   return text + (text.empty() ? "" : ": ") + clean(stream.refusal());
 }
 
+// Why nothing comes of a device with several bodies.
+std::string source_row(const v1::SourceStats& source) {
+  if (source.away()) return "the device is away";
+  std::string text = "no body is streamed";
+  const auto count = [&](Outcome outcome) {
+    const int i = static_cast<int>(outcome);
+    return i < source.outcome_size() ? source.outcome(i) : 0;
+  };
+  const std::uint64_t heard = count(Outcome::kOk), foreign = count(Outcome::kForeign);
+  const std::uint64_t damaged =
+      count(Outcome::kShort) + count(Outcome::kBadChecksum) + count(Outcome::kOutOfRange);
+  if (heard + foreign + damaged == 0) return text + ": nothing came from the device yet";
+  return text + fmt::format(": {} packets were right, {} damaged, {} of another device or sender",
+                            heard, damaged, foreign);
+}
+
 // The lines below the rows of the streams.
 std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths) {
   std::vector<std::string> rows;
   if (!stats.replay_file().empty()) rows.push_back("  " + replay_words(stats));
+  for (const v1::SourceStats& source : stats.source()) {
+    if (source.streams() > 0) continue;
+    rows.push_back("  " + fit(clean_name(source.name()), widths.name - 1) + source_row(source));
+  }
   for (const v1::StreamStats& stream : stats.stream()) {
     for (const std::string& text :
          {body_row(stream), device_row(stream, stats.time_ns()), stages_row(stream)}) {

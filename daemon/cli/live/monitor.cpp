@@ -125,19 +125,17 @@ class Monitor {
       std::fprintf(stderr, "posed: %s\n", replay_words(stats).c_str());
     }
     std::string names;
-    bool come_and_go = false;
     for (const auto& stream : stats.stream()) {
       const std::string& name = stream.stream();
       if (options_.stream.empty() || options_.stream == name || options_.stream == name + "-raw") {
         return {};
       }
       names += (names.empty() ? "" : ", ") + name;
-      come_and_go = come_and_go || !stream.source_name().empty();
     }
     const std::string sentence =
         fmt::format("the daemon at {} has no stream '{}'; it has: {}", options_.client.endpoint,
                     options_.stream, clean(names));
-    if (!come_and_go) return fail(sentence);
+    if (stats.source().empty()) return fail(sentence);
     quiet_topic_reported_ = true;
     std::fprintf(stderr, "posed: waiting for it to come: %s\n", sentence.c_str());
     return {};

@@ -99,7 +99,6 @@ Result<> check_out(const RecordOptions& options, const config::DaemonConfig& con
   return files.check();
 }
 
-// What the log says about the daemon's devices before the first chunk.
 Result<> record(const RecordOptions& options) {
   prepare_to_serve();
   auto config = config::load_config(options.serve.config, drivers::registry());
@@ -173,7 +172,7 @@ void add_record(CLI::App& app, int& exit_code) {
       "not streaming; recording continues when there is space. Examples:\n"
       "  posed record --config mine.toml --out take1.plog --frames\n"
       "  posed replay take1.plog --speed max --out FRAMES.bin --expect\n"
-      "  sqlite3 take1.plog 'SELECT name, driver FROM stream'");
+      "  sqlite3 take1.plog 'SELECT name, driver FROM source'");
   command->callback([options, &exit_code] {
     const auto done = record(*options);
     exit_code = done ? 0 : report(done.error());

@@ -1,5 +1,6 @@
 // What may include what, as the modules' CMakeLists.txt files say it.
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <regex>
@@ -34,8 +35,10 @@ std::set<std::string> linked(const std::vector<Target>& targets, const Target& t
 std::string folder_of(const std::string& path) { return path.substr(0, path.rfind('/')); }
 
 const Target* owner_of(const std::vector<Target>& targets, const std::string& folder) {
+  const std::string any = folder_of(folder) + "/*";  // every folder beside this one
   const auto owns = [&](const Target& target) {
-    return std::ranges::find(target.folders, folder) != target.folders.end();
+    return std::ranges::find_first_of(target.folders, std::array{folder, any}) !=
+           target.folders.end();
   };
   const auto found = std::ranges::find_if(targets, owns);
   return found == targets.end() ? nullptr : &*found;

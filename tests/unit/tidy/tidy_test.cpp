@@ -60,6 +60,12 @@ TEST_CASE("a folder includes only what its target links, and no targets form a c
   const auto through =
       posed::tidy::source_from_text("daemon/a/x.cpp", "#include \"daemon/d/y.hpp\"");
   CHECK(posed::tidy::check_links(through, bad).empty());
+  const auto any = posed::tidy::targets_from_text(
+      "posed_module(posed_e FOLDERS daemon/e daemon/e/* LINK)\n"
+      "posed_module(posed_f FOLDERS daemon/f LINK)\n");
+  const auto sideways =
+      posed::tidy::source_from_text("daemon/e/g/x.cpp", "#include \"daemon/f/y.hpp\"");
+  REQUIRE(listed(posed::tidy::check_links(sideways, any)).find("daemon/e/g/x.cpp:1") == 0);
   auto circle = bad;
   circle[2].links.push_back("posed_a");
   REQUIRE(posed::tidy::check_cycles(circle).size() == 3);

@@ -126,7 +126,7 @@ TEST_CASE("rows of streams that came while the disk was full are in the log late
   loop.rings.add_stream(body_stream(before, "Ann"));
   RecordedStream bob = body_stream(within, "Bob");
   bob.settings.stages.push_back(pipeline::stage_settings(style::style_type()));
-  bob.model_files = {"model"};
+  bob.model_files = {std::make_shared<const std::string>("model")};
   std::optional<FileLimit> limit(200'000);
   SECTION("the disk was full before the first commit") { limit.emplace(1000); }
   SECTION("the disk was full later") {}
@@ -148,7 +148,7 @@ TEST_CASE("rows of streams that came while the disk was full are in the log late
   CHECK(ids_of(*reader) == std::vector{before, within, next});
   CHECK(reader->streams()[1].first_item == 11);
   CHECK(reader->streams()[2].first_item == 51);
-  CHECK(reader->blob(log::sha256_hex(bytes_of(bob.model_files[0]))));
+  CHECK(reader->blob(log::sha256_hex(bytes_of(*bob.model_files[0]))));
   const auto rows = gaps(loop.path);
   std::map<std::uint32_t, std::uint64_t> kept;
   const auto decisions = reader->decisions();

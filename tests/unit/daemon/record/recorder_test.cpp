@@ -188,7 +188,7 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   pipeline::StreamSettings settings;
   settings.stages.push_back(pipeline::stage_settings(style::style_type()));
   RecordedSetup setup;
-  setup.add_device(toy_source("a"), settings, {"12"});
+  setup.add_device(toy_source("a"), settings, {std::make_shared<const std::string>("12")});
   RecorderOptions options;
   options.file = path;
   options.frames = true;

@@ -1,18 +1,16 @@
 // Whatever happens while a daemon records, the replay of its log gives what it published, bit for
 // bit. Each seed is another run on the virtual clock, with other stalls, unplugs, bursts and
-// commands, and another order of the parts' turns. POSED_SEEDS=10000 runs that many seeds instead
-// of 200; POSED_SEED=n runs only seed n.
+// commands, and another order of the parts' turns. tests/support/seeds.hpp says which seeds run.
 #include <catch2/catch.hpp>
 
 #include <cstdint>
-#include <cstdlib>
-#include <random>
 #include <string>
-#include <utility>
 
 #include "models/gesture/model_file.hpp"
 #include "models/style/style_model.hpp"
+#include "tests/support/dice.hpp"
 #include "tests/support/replayed.hpp"
+#include "tests/support/seeds.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/virtual_daemon.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
@@ -22,22 +20,6 @@ namespace posed::test {
 namespace {
 
 constexpr double kLength_s = 2.5;
-constexpr std::uint64_t kSeeds = 200;
-
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : random_(seed) {}
-  [[nodiscard]] int below(int count) {
-    return std::uniform_int_distribution<int>(0, count - 1)(random_);
-  }
-  [[nodiscard]] double within(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  [[nodiscard]] std::uint64_t seed() { return random_(); }
-
- private:
-  std::mt19937_64 random_;
-};
 
 enum class What : std::uint8_t { kBody, kHand };
 
@@ -129,18 +111,6 @@ std::uint64_t check_seed(std::uint64_t seed, const std::filesystem::path& path) 
   return result.counts.compared;
 }
 
-std::uint64_t number_of(const char* variable, std::uint64_t otherwise) {
-  const char* const text = std::getenv(variable);
-  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
-}
-
-// The seeds to run, first and last: POSED_SEED alone, or one of `part` of POSED_SEEDS.
-std::pair<std::uint64_t, std::uint64_t> seeds(std::uint64_t part) {
-  const std::uint64_t alone = number_of("POSED_SEED", 0);
-  if (alone != 0) return {alone, alone};
-  return {1, number_of("POSED_SEEDS", kSeeds) / part};
-}
-
 }  // namespace
 
 TEST_CASE("whatever happens while it is recorded, a log replays bit for bit", "[property]") {
@@ -176,8 +146,7 @@ TEST_CASE("a log with gaps replays what it contains and reports what is missing"
   }
   WARN(last - first + 1 << " runs: " << sum.compared << " frames compared, " << sum.lost
                         << " not in the log, " << sum.after_gap << " after a gap");
-  if (number_of("POSED_SEED", 0) == 0)
-    CHECK((sum.compared > 0 && sum.lost > 0 && sum.after_gap > 0));
+  if (!one_seed()) CHECK((sum.compared > 0 && sum.lost > 0 && sum.after_gap > 0));
 }
 
 // The decoder gives a sample before its frame. A replay that passes on the sample before the tick

@@ -59,7 +59,7 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
                       .text = description.text,
                       .identity = "toy.bvh",
                       .config = "{}"},
-                     settings_, {model_bytes_});
+                     settings_, {std::make_shared<const std::string>(model_bytes_)});
   }
 
   void set_record_sink(pipeline::RecordSink& record_sink) { record_sink_ = &record_sink; }

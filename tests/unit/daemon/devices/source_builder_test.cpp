@@ -1,0 +1,223 @@
+// The builder of streams from descriptions, with the test in the place of reader, worker and the
+// other users of streams.
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/devices/source_builder.hpp"
+#include "daemon/pipeline/description_row.hpp"
+#include "daemon/system/clock.hpp"
+#include "drivers/template_mocap/protocol.hpp"
+#include "models/stages/registry.hpp"
+
+namespace posed::devices {
+namespace {
+
+using drivers::mocap::BodyEntry;
+
+constexpr std::int64_t kStep_ns = SourceBuilder::kBetweenUpdates_ns;
+
+BodyEntry person(std::uint16_t id, const std::string& name, int joints = 2) {
+  BodyEntry body{.id = id, .name = name, .joints = {}};
+  for (int j = 0; j < joints; ++j) {
+    body.joints.push_back(
+        {.name = "j" + std::to_string(j), .parent = j - 1, .offset_m = {0.0F, 0.3F, 0.0F}});
+  }
+  return body;
+}
+
+// A builder for one source "room" with `slots` slots from slot 1 on.
+class Room final : private StreamHost {
+ public:
+  explicit Room(std::uint32_t slots, config::SourceConfig config = {}) {
+    auto source = std::make_unique<BodySource>();
+    source->config = std::move(config);
+    source->config.name = "room";
+    source->config.all = true;
+    source->source = std::make_unique<OpenSource>();
+    source->source->driver = drivers::find_driver("template_mocap");
+    source->exchange = std::make_unique<pipeline::BodyExchange>(*wake_);
+    const std::size_t named = source->config.named.size();
+    sources_.push_back(std::move(source));
+    builder_.emplace(sources_, StreamSlots(1, slots, named), std::set<std::string>{"walker"},
+                     models_, static_cast<StreamHost&>(*this));
+  }
+
+  // The device describes these bodies, and all that follows is done. What the reader is given is
+  // in `update`.
+  void describe(const std::vector<BodyEntry>& bodies) {
+    const auto datagram = drivers::mocap::encode_description(bodies);
+    describe_bytes(std::span(datagram).subspan(8, datagram.size() - 12));
+  }
+  void describe_bytes(std::span<const std::byte> bytes) {
+    sources_[0]->exchange->descriptions.put(bytes);
+    settle();
+  }
+
+  // Turns until nothing is due, with the reader and the worker doing their part at once.
+  void settle() {
+    for (int i = 0; i < 8; ++i) {
+      now_ns_ += kStep_ns;
+      static_cast<void>(builder_->turn(now_ns_));
+      pipeline::BodyExchange& exchange = *sources_[0]->exchange;
+      static_cast<void>(exchange.updates.consume([&](const pipeline::SourceUpdate* given) {
+        std::set<std::uint32_t> now;
+        for (const pipeline::ReadBody& body : given->bodies) now.insert(body.stream);
+        for (const auto& [id, name] : running) {
+          if (!now.contains(id)) gone_.push_back(id);
+        }
+        update = given;
+        CHECK(exchange.taken.push(given));
+      }));
+    }
+  }
+
+  [[nodiscard]] std::vector<std::string> names() const {
+    std::vector<std::string> all;
+    for (const pipeline::ReadBody& body : update->bodies) {
+      const auto stream = running.find(body.stream);
+      all.push_back(stream == running.end() ? "" : stream->second);
+    }
+    return all;
+  }
+
+  std::map<std::uint32_t, std::string> running;  // names by stream
+  std::map<std::uint32_t, std::string> refused;  // sentences by stream
+  const pipeline::SourceUpdate* update = nullptr;
+  std::vector<std::string> warnings;
+
+ private:
+  pipeline::StreamCounters& counters(std::uint32_t stream) override {
+    return counters_.at(pipeline::slot_of(stream));
+  }
+  [[nodiscard]] std::size_t decoded_slots() const override { return 64; }
+  void add(NewStream stream) override {
+    if (stream.engine) running[stream.id] = stream.config.name;
+    if (!stream.engine) refused[stream.id] = stream.refusal;
+  }
+  std::optional<std::uint32_t> take_gone() override {
+    if (gone_.empty()) return std::nullopt;
+    const std::uint32_t id = gone_.back();
+    gone_.pop_back();
+    return id;
+  }
+  void remove(std::uint32_t stream) override {
+    CHECK(running.erase(stream) + refused.erase(stream) == 1);
+  }
+  void call_reader() override {}
+  void warn(const BodySource&, const std::string& sentence) override {
+    warnings.push_back(sentence);
+  }
+
+  std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
+  std::vector<std::unique_ptr<BodySource>> sources_;
+  std::array<pipeline::StreamCounters, 16> counters_;
+  std::vector<std::uint32_t> gone_;
+  ModelFiles models_;
+  std::optional<SourceBuilder> builder_;
+  std::int64_t now_ns_ = 0;
+};
+
+using Names = std::vector<std::string>;
+
+}  // namespace
+
+TEST_CASE("bodies become streams with names, slots and generations of their own") {
+  Room room(8);
+  room.describe({person(1, "Ann"), person(2, "Bob"), person(3, "ann"), person(4, "bob")});
+  CHECK(room.names() == Names{"room-ann", "room-bob", "room-ann-2", "room-bob-2"});
+  const std::uint32_t bob = room.update->bodies[1].stream;
+
+  // Another skeleton: the same name and slot, the next generation. The others stay as they are.
+  const std::uint32_t ann = room.update->bodies[0].stream;
+  room.describe({person(1, "Ann"), person(2, "Bob", 5), person(3, "ann"), person(4, "bob")});
+  CHECK(room.names() == Names{"room-ann", "room-bob", "room-ann-2", "room-bob-2"});
+  CHECK(room.update->bodies[0].stream == ann);
+  CHECK(room.update->bodies[1].stream == StreamSlots::next(bob));
+
+  // Who returns has its name and goes on with its numbers.
+  room.describe({person(2, "Bob", 5)});
+  CHECK(room.running.size() == 1);
+  room.describe({person(2, "Bob", 5), person(3, "ann")});
+  CHECK(room.names() == Names{"room-bob", "room-ann-2"});
+  CHECK(room.warnings.empty());
+  const auto row = pipeline::unpack_description(room.update->log);
+  REQUIRE(row);
+  CHECK(row->streams == std::vector{room.update->bodies[0].stream, room.update->bodies[1].stream});
+}
+
+TEST_CASE("a description that cannot be used changes nothing and is told once") {
+  Room room(8);
+  room.describe({person(1, "Ann")});
+  const auto* const before = room.update;
+  const std::array<std::byte, 3> cut{std::byte{2}, std::byte{0}, std::byte{9}};
+  room.describe_bytes(cut);
+  room.describe_bytes(cut);
+  CHECK(room.update == before);
+  REQUIRE(room.warnings.size() == 1);
+  CHECK_THAT(room.warnings[0], Catch::Contains("describes its bodies in a way"));
+}
+
+TEST_CASE("a body without a free slot is told of, and streamed as soon as one is free") {
+  Room room(2);
+  room.describe({person(1, "Ann"), person(2, "Bob"), person(3, "Cleo")});
+  CHECK(room.names() == Names{"room-ann", "room-bob", ""});
+  REQUIRE(room.warnings.size() == 1);
+  CHECK_THAT(room.warnings[0], Catch::Contains("1 of its bodies are not streamed"));
+  // Bob's slot is free only after he has left, when Cleo was already refused one.
+  room.describe({person(1, "Ann"), person(3, "Cleo")});
+  CHECK(room.names() == Names{"room-ann", "room-cleo"});
+}
+
+TEST_CASE("a body that the config names always has a slot") {
+  config::SourceConfig config;
+  config.named.push_back({.body = "Ann", .stream = {}});
+  config.named[0].stream.name = "lead";
+  Room room(2, std::move(config));
+  room.describe({person(2, "Bob"), person(3, "Cleo")});
+  CHECK(room.names() == Names{"room-bob", ""});
+  room.describe({person(2, "Bob"), person(3, "Cleo"), person(1, "Ann")});
+  CHECK(room.names() == Names{"room-bob", "", "lead"});
+}
+
+TEST_CASE("a body that a stage cannot serve is refused with its sentence") {
+  config::SourceConfig config;
+  const StageType* const generate = [] {
+    for (const StageType* type : stage_types()) {
+      if (type->name == "generate") return type;
+    }
+    return static_cast<const StageType*>(nullptr);
+  }();
+  REQUIRE(generate != nullptr);
+  config.every.stages.push_back(
+      {.type = generate, .parameters = complete_parameters(generate->parameters, {}).value()});
+  Room room(2, std::move(config));
+  room.describe({person(1, "Ann")});
+  CHECK(room.running.empty());
+  REQUIRE(room.refused.size() == 1);
+  CHECK_THAT(room.refused.begin()->second, Catch::Contains("no joint angles"));
+  CHECK(room.update->bodies[0].stream == pipeline::kNoStream);
+  room.describe({});
+  CHECK(room.refused.empty());
+}
+
+TEST_CASE("names of bodies are plain, short and not those of other streams") {
+  CHECK(plain_stream_name("room", "Zoë Müller") == "room-zo--m-ller");
+  CHECK(plain_stream_name("room", std::string(60, 'x')).size() == 28);
+  BodyNames names({"room-ann"});
+  CHECK(*names.name_of("room", "Ann", 1) == "room-ann-2");
+  CHECK(*names.name_of("room", "Bob", 1) == "room-bob");
+  CHECK(*names.name_of("room", "Bob raw", 1) == "room-bob-raw-2");  // Bob's input may have the name
+  CHECK(*names.name_of("room", "Ann", 1) == "room-ann-2");
+  for (int i = 0; i < 5000; ++i) static_cast<void>(names.name_of("hall", std::to_string(i), 1));
+  CHECK(names.name_of("hall", "one more", 1) == nullptr);
+  CHECK(names.name_of("room", "one more", 1) != nullptr);
+}
+
+}  // namespace posed::devices
