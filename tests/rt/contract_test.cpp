@@ -18,6 +18,7 @@
 #include "models/gesture/synthetic_signer.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/hand_clip.hpp"
+#include "tests/rt/check_no_breach.hpp"
 #include "tests/rt/contract.hpp"
 #include "tests/rt/rig.hpp"
 #include "tests/support/stage_commands.hpp"
@@ -67,13 +68,6 @@ class BreakingDecoder final : public drivers::Decoder {
   std::function<void()> breach_;
   int chunks_ = 0;
 };
-
-void check_no_breach() {
-  for (int b = 0; b < static_cast<int>(Breach::kCount); ++b) {
-    INFO(kBreachNames[static_cast<std::size_t>(b)] << ", last system call " << last_system_call());
-    CHECK(breaches(static_cast<Breach>(b)) == 0);
-  }
-}
 
 }  // namespace
 

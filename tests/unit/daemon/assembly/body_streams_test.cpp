@@ -1,22 +1,13 @@
 // The whole daemon with a mocap system whose bodies come, go and change, with all its threads and a
 // real socket, recorded and replayed.
 //   POSED_STRESS_S: seconds of the run, 4 if it is not set.
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cmath>
 #include <cstdlib>
 #include <map>
-#include <random>
 #include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -24,10 +15,10 @@
 #include "daemon/config/config.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/system/clock.hpp"
-#include "drivers/template_mocap/protocol.hpp"
 #include "proto/clip/bvh.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/free_port.hpp"
+#include "tests/support/mocap_room.hpp"
 #include "tests/support/replayed.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -35,79 +26,9 @@
 namespace posed::assembly {
 namespace {
 
-using namespace drivers::mocap;
 using namespace std::chrono_literals;
 
 constexpr double kRate_hz = 100.0;
-constexpr std::size_t kPeople = 12;
-
-// A room full of people; the first two stay. It sends to one endpoint.
-class Room {
- public:
-  explicit Room(std::uint16_t port) : port_(port), fd_(::socket(AF_INET, SOCK_DGRAM, 0)) {
-    for (std::size_t i = 0; i < kPeople; ++i) joints_[i] = 3;
-  }
-  ~Room() { ::close(fd_); }
-  Room(const Room&) = delete;
-  Room& operator=(const Room&) = delete;
-
-  // Some people enter, leave, or return with another skeleton.
-  void change() {
-    for (std::size_t i = 2; i < kPeople; ++i) {
-      const auto die = random_() % 3;
-      if (die == 0) present_ ^= 1U << i;
-      if (die == 1) joints_[i] = 2 + static_cast<unsigned>(random_() % 5);
-    }
-    describe();
-  }
-
-  void describe() {
-    std::vector<BodyEntry> bodies;
-    for (std::size_t i = 0; i < kPeople; ++i) {
-      if ((present_ >> i & 1U) == 0) continue;
-      BodyEntry body{
-          .id = static_cast<std::uint16_t>(i), .name = "Person " + std::to_string(i), .joints = {}};
-      for (unsigned j = 0; j < joints_[i]; ++j) {
-        body.joints.push_back({.name = "joint" + std::to_string(j),
-                               .parent = static_cast<int>(j) - 1,
-                               .offset_m = {0.0F, 0.2F, 0.0F}});
-      }
-      bodies.push_back(std::move(body));
-    }
-    send(encode_description(bodies));
-  }
-
-  void frame() {
-    FramePacket packet{.number = number_, .time_us = number_ * 10'000, .bodies = {}};
-    ++number_;
-    const float half = 0.3F * std::sin(0.05F * static_cast<float>(number_));
-    for (std::size_t i = 0; i < kPeople; ++i) {
-      if ((present_ >> i & 1U) == 0) continue;
-      packet.bodies.push_back({.id = static_cast<std::uint16_t>(i),
-                               .root_m = {0.0F, 1.0F, 0.01F * static_cast<float>(number_)},
-                               .rotation_xyzw = std::vector<Quatf>(
-                                   joints_[i], Quatf{std::sin(half), 0.0F, 0.0F, std::cos(half)})});
-    }
-    send(encode_frame(packet));
-  }
-
- private:
-  void send(const std::vector<std::byte>& datagram) const {
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    to.sin_port = htons(port_);
-    static_cast<void>(::sendto(fd_, datagram.data(), datagram.size(), 0,
-                               reinterpret_cast<const sockaddr*>(&to), sizeof to));
-  }
-
-  std::uint16_t port_;
-  int fd_;
-  std::mt19937 random_{7};
-  unsigned present_ = 3;
-  std::array<unsigned, kPeople> joints_{};
-  std::uint32_t number_ = 1;
-};
 
 double stress_s() {
   const char* const text = std::getenv("POSED_STRESS_S");
@@ -182,7 +103,7 @@ TEST_CASE("bodies come, go and change while the daemon records", "[bodies]") {
   };
   REQUIRE(daemon.start(std::move(hooks)));
 
-  Room room(port);
+  test::MocapRoom room(port);
   const std::int64_t begin_ns = system::monotonic_ns();
   const std::int64_t until_ns = begin_ns + nanoseconds(stress_s());
   for (std::int64_t frame = 0; system::monotonic_ns() < until_ns; ++frame) {
