@@ -53,8 +53,8 @@ long last_of(const PublisherRig& rig, const std::string& topic) {
 }  // namespace
 
 TEST_CASE("a body's stream comes with its skeleton, is listed, and leaves") {
-  PublisherRig rig;
   Body ann;
+  PublisherRig rig;
   REQUIRE(rig.receive("skeleton/toy", 1));  // subscribed
   rig.publisher->add(ann.info(rig, kAnn));
   rig.put(toy_frame_item(1, kAnn));
@@ -91,8 +91,8 @@ TEST_CASE("a body's stream comes with its skeleton, is listed, and leaves") {
 }
 
 TEST_CASE("the next generation takes its slot at its first item, with its skeleton before it") {
-  PublisherRig rig;
   Body ann;
+  PublisherRig rig;
   REQUIRE(rig.receive("skeleton/toy", 1));
   rig.publisher->add(ann.info(rig, kAnn));
   rig.put(toy_frame_item(1, kAnn));
@@ -127,8 +127,8 @@ TEST_CASE("the next generation takes its slot at its first item, with its skelet
 }
 
 TEST_CASE("the next generation takes its slot when the earlier one is removed") {
-  PublisherRig rig;
   Body ann;
+  PublisherRig rig;
   REQUIRE(rig.receive("skeleton/toy", 1));
   rig.publisher->add(ann.info(rig, kAnn));
   rig.publisher->add(ann.info(rig, kAnnAgain));
@@ -144,8 +144,8 @@ TEST_CASE("the next generation takes its slot when the earlier one is removed") 
 }
 
 TEST_CASE("a body that a stage cannot serve is listed with the reason, and nothing else") {
-  PublisherRig rig;
   Body ann;
+  PublisherRig rig;
   REQUIRE(rig.receive("skeleton/toy", 1));
   StreamInfo info = ann.info(rig, kAnn);
   info.refusal = "the style model lacks the joint Hips; leave the body out";
@@ -179,8 +179,8 @@ TEST_CASE("a stream is removed after its items in the ring, and its counters are
 }
 
 TEST_CASE("without a publisher's thread the caller removes the stream itself") {
-  PublisherRig rig(false);
   Body ann;
+  PublisherRig rig(false);
   rig.publisher->add(ann.info(rig, kAnn));
   rig.put(toy_frame_item(1, kAnn));
   rig.publisher->remove(kAnn);
