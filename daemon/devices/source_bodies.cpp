@@ -8,7 +8,7 @@
 #include "daemon/devices/source_builder.hpp"
 #include "daemon/pipeline/description_row.hpp"
 #include "daemon/system/clock.hpp"
-#include "proto/text/clean.hpp"
+#include "proto/frame/same_skeleton.hpp"
 
 namespace posed::devices {
 namespace {
@@ -16,13 +16,6 @@ namespace {
 constexpr double kUsualRate_hz = 120.0;  // of mocap systems that do not say
 // Streams that one run of the daemon makes. A device log has no room for more.
 constexpr std::size_t kMaxMade = 60'000;
-
-// The id is only a checksum, and the stages have room for so many joints and channels.
-bool same_skeleton(const Skeleton* a, const Skeleton* b) {
-  if (a == nullptr || b == nullptr) return a == b;
-  return a->id == b->id && a->joints.size() == b->joints.size() &&
-         a->channels.size() == b->channels.size();
-}
 
 bool same_body(const drivers::Body& a, const drivers::Body& b) {
   return same_skeleton(a.skeleton.get(), b.skeleton.get()) && a.samples.names == b.samples.names &&
@@ -214,8 +207,7 @@ bool SourceBodies::choose_slot(Stream& stream, const Stream* earlier) {
   stream.id = *id;
   ++shared_.made;
   if (earlier == nullptr) {
-    const SharedBodies::Numbers first = shared_.numbers[stream.name];
-    pipeline::restart(shared_.host.counters(stream.id), first.frame, first.sample);
+    pipeline::restart(shared_.host.counters(stream.id), shared_.numbers[stream.name]);
   }
   return true;
 }
@@ -251,20 +243,14 @@ double SourceBodies::rate_of(const drivers::Body& body) const {
 }
 
 pipeline::ReadBody SourceBodies::read_body(const Stream& stream) const {
-  pipeline::StreamCounters& counters = shared_.host.counters(stream.id);
   return {.stream = stream.id,
-          .counters = &counters,
-          .slots = shared_.host.decoded_slots(),
-          .first = {.stream = stream.id,
-                    .frame = counters.reader.frames.load() + 1,
-                    .sample = counters.reader.samples.load() + 1}};
+          .counters = &shared_.host.counters(stream.id),
+          .slots = shared_.host.decoded_slots()};
 }
 
 void SourceBodies::forget(const Stream& stream) {
   shared_.host.remove(stream.id);
-  const pipeline::ReaderCounters& reader = shared_.host.counters(stream.id).reader;
-  shared_.numbers[stream.name] = {.frame = reader.frames.load() + 1,
-                                  .sample = reader.samples.load() + 1};
+  shared_.numbers[stream.name] = pipeline::next_numbers(shared_.host.counters(stream.id));
   const auto has_slot = [&](const Stream& other) {
     return pipeline::slot_of(other.id) == pipeline::slot_of(stream.id);
   };

@@ -22,17 +22,13 @@ namespace posed::devices {
 
 // What the bodies of all sources share.
 struct SharedBodies {
-  // The numbers with which a stream goes on that returns under its name.
-  struct Numbers {
-    std::uint64_t frame = 1, sample = 1;
-  };
-
   StreamHost& host;
   StreamSlots slots;
   BodyNames names;
   ModelFiles& models;
-  std::map<std::string, Numbers> numbers{};  // by the name of a stream that has left
-  std::size_t made = 0;                      // streams since the start
+  // With which a stream goes on that returns under its name; by the name of one that has left.
+  std::map<std::string, pipeline::NextNumbers> numbers{};
+  std::size_t made = 0;  // streams since the start
 };
 
 class SourceBodies {

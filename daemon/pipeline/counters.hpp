@@ -60,15 +60,24 @@ struct StreamCounters {
   PublisherCounters publisher;
 };
 
-// Prepares the counters of a slot for a stream of another name, whose next frame and sample get
-// these sequences. Call while no thread uses the slot. What the RingShares compare with goes on.
-inline void restart(StreamCounters& counters, std::uint64_t frame, std::uint64_t sample) noexcept {
-  counters.reader.newest = frame - 1;
-  counters.reader.frames = frame - 1;
-  counters.reader.samples = sample - 1;
-  counters.reader.newest_sample = sample - 1;
+// The sequences that the next frame and sample of a stream get.
+struct NextNumbers {
+  std::uint64_t frame = 1, sample = 1;
+};
+[[nodiscard]] inline NextNumbers next_numbers(const StreamCounters& counters) noexcept {
+  return {.frame = counters.reader.frames.load(std::memory_order_acquire) + 1,
+          .sample = counters.reader.samples.load(std::memory_order_acquire) + 1};
+}
+
+// Prepares the counters of a slot for a stream of another name, which begins with these numbers.
+// Call while no thread uses the slot. What the RingShares compare with goes on.
+inline void restart(StreamCounters& counters, const NextNumbers& first) noexcept {
+  counters.reader.newest = first.frame - 1;
+  counters.reader.frames = first.frame - 1;
+  counters.reader.samples = first.sample - 1;
+  counters.reader.newest_sample = first.sample - 1;
   counters.reader.dropped = 0;
-  counters.pipeline.consumed = frame - 1;
+  counters.pipeline.consumed = first.frame - 1;
   counters.pipeline.shed = 0;
   counters.pipeline.dropped = 0;
   counters.pipeline.state = StreamState::kWaiting;

@@ -22,13 +22,10 @@ namespace posed::pipeline {
 
 // A body of a source on its way to the pipeline.
 struct ReadBody {
-  std::uint32_t stream = kNoStream;  // kNoStream: frames of this body are left out
-  StreamCounters* counters = nullptr;
+  std::uint32_t stream = kNoStream;    // kNoStream: frames of this body are left out
+  StreamCounters* counters = nullptr;  // its numbers go on after those that are counted there
   // how many slots of `out` it may fill
   std::size_t slots = std::numeric_limits<std::size_t>::max();
-  // Where its numbers begin, unless the source already has a stream in this slot: its numbers go
-  // on.
-  StreamPosition first{};
 };
 
 // The bodies of a source from now on, built by cold code.

@@ -278,7 +278,6 @@ class Reader::Source final : private IntakeOut {
     bodies = bodies.first(std::min(bodies.size(), kMaxBodies));
     for (std::size_t body = 0; body < bodies.size(); ++body) {
       const ReadBody& one = bodies[body];
-      positions[body] = one.first;
       positions[body].stream = one.stream;
       if (one.stream == kNoStream) continue;
       const std::size_t before = place_in(slot_of(one.stream));
@@ -289,7 +288,10 @@ class Reader::Source final : private IntakeOut {
         positions[body].frame = now[before].frame;
         positions[body].sample = now[before].sample;
       } else {
+        const NextNumbers next = next_numbers(*one.counters);
         places[count].emplace(one);
+        positions[body].frame = next.frame;
+        positions[body].sample = next.sample;
       }
       ++count;
     }

@@ -36,7 +36,8 @@ StreamContext::StreamContext(EngineOptions options, double rate_hz, StreamCounte
       ports_(ports),
       next_item_(next_item),
       share_(slots, counters.publisher.taken) {
-  engine_.start_at(counters.reader.frames.load() + 1, counters.reader.samples.load() + 1);
+  const NextNumbers next = next_numbers(counters);
+  engine_.start_at(next.frame, next.sample);
 }
 
 void StreamContext::frame(const Frame& frame) noexcept {

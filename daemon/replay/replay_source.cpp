@@ -6,6 +6,7 @@
 #include "daemon/pipeline/description_row.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "drivers/glove/calibrated_decoder.hpp"
+#include "proto/frame/same_skeleton.hpp"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
@@ -19,15 +20,6 @@ constexpr std::size_t kKeptLayouts = 32;  // kept for another use
 
 std::string text_of(const log::ChunkRow& chunk) {
   return {reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()};
-}
-
-// The engine is built for the body as it was first described. The id is only a checksum, so a
-// forged log could bring more joints than the stages have room for.
-bool is_same(const drivers::Description& stream, const drivers::Body& body) {
-  if (!stream.skeleton || !body.skeleton) return !stream.skeleton && !body.skeleton;
-  return stream.skeleton->id == body.skeleton->id &&
-         stream.skeleton->joints.size() == body.skeleton->joints.size() &&
-         stream.skeleton->channels.size() == body.skeleton->channels.size();
 }
 
 }  // namespace
@@ -126,7 +118,9 @@ Result<ReplaySource::Bodies> ReplaySource::bodies_of(const log::ChunkRow& row) {
     if (known == nullptr) return damaged("describes " + stream + ", which its source lacks");
     if (std::ranges::count(named, id) > 0) return damaged("describes " + stream + " twice");
     const auto& body = described[bodies.streams.size() - 1];
-    if (known->stream().described && !is_same(known->stream().description, body)) {
+    // The engine is built for the body as it was first described.
+    if (known->stream().described &&
+        !same_skeleton(known->stream().description.skeleton.get(), body.skeleton.get())) {
       return damaged("describes " + stream + " with another skeleton than before");
     }
     named.push_back(id);

@@ -21,6 +21,7 @@
 #include "tests/rt/check_no_breach.hpp"
 #include "tests/rt/contract.hpp"
 #include "tests/rt/rig.hpp"
+#include "tests/support/quiet_record_sink.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
@@ -32,18 +33,13 @@ namespace {
 using pipeline::Command;
 
 // A record sink that keeps the contract itself; the recorder's own sink has its own tests.
-class CountingSink final : public pipeline::RecordSink {
+class CountingSink final : public test::QuietRecordSink {
  public:
   void chunk(std::uint32_t, std::uint8_t, pipeline::Direction, std::int64_t,
              const pipeline::Position&, std::span<const std::byte>) noexcept override {
     ++chunks;
   }
   void decision(const pipeline::Decision&) noexcept override { ++decisions; }
-  [[nodiscard]] bool wants_published() const noexcept override { return false; }
-  void published(std::uint32_t, std::uint64_t, bool, std::span<const std::byte>) noexcept override {
-  }
-  void unpublished(std::uint32_t) noexcept override {}
-  void keep_model(std::span<const std::byte>) override {}
   std::atomic<int> chunks{0}, decisions{0};
 };
 

@@ -9,8 +9,8 @@
 
 #include "daemon/control/request_handler.hpp"
 #include "posed/v1/control.pb.h"
-#include "proto/log/digest.hpp"
 #include "tests/support/stage_commands.hpp"
+#include "tests/unit/daemon/control/requests.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::control {
@@ -75,24 +75,11 @@ std::vector<ControlledStream> walker() {
   return streams;
 }
 
-v1::ControlRequest set_alpha(const std::string& stream) {
-  v1::ControlRequest request;
-  request.mutable_set_parameter()->set_stream(stream);
-  request.mutable_set_parameter()->set_name("alpha");
-  request.mutable_set_parameter()->set_number(0.5);
-  return request;
-}
+v1::ControlRequest set_alpha(const std::string& stream) { return alpha_request(stream, 0.5F); }
 
 v1::ControlRequest set_model(const std::string& stream) {
   static const std::string bytes = style::serialize_model(test::toy_model(1, 0.3));
-  v1::ControlRequest request;
-  auto& part = *request.mutable_model_part();
-  part.set_stream(stream);
-  part.set_sha256(log::sha256_hex(std::as_bytes(std::span(bytes))));
-  part.set_total(bytes.size());
-  part.set_bytes(bytes);
-  part.set_name("sway.style");
-  return request;
+  return model_request(stream, bytes);
 }
 
 struct Stage {

@@ -14,6 +14,7 @@
 #include "proto/log/digest.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/daemon/control/requests.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::control {
@@ -66,26 +67,6 @@ std::vector<ControlledStream> three_streams() {
   streams[2].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
   streams[2].models.resize(1);
   return streams;
-}
-
-v1::ControlRequest alpha_request(const std::string& stream, float alpha) {
-  v1::ControlRequest request;
-  request.mutable_set_parameter()->set_stream(stream);
-  request.mutable_set_parameter()->set_name("alpha");
-  request.mutable_set_parameter()->set_number(alpha);
-  return request;
-}
-
-// A model that fits into one piece.
-v1::ControlRequest model_request(const std::string& stream, const std::string& bytes) {
-  v1::ControlRequest request;
-  auto& part = *request.mutable_model_part();
-  part.set_stream(stream);
-  part.set_sha256(log::sha256_hex(std::as_bytes(std::span(bytes))));
-  part.set_total(bytes.size());
-  part.set_bytes(bytes);
-  part.set_name("sway.style");
-  return request;
 }
 
 v1::ControlReply reply_of(const std::optional<Reply>& answer) {

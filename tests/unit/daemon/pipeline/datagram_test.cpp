@@ -10,6 +10,7 @@
 #include "daemon/system/clock.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/support/free_port.hpp"
+#include "tests/support/quiet_record_sink.hpp"
 
 namespace posed::pipeline {
 namespace {
@@ -29,17 +30,11 @@ std::unique_ptr<const drivers::SourceLayout> described_bodies() {
   return mocap().make_layout(content.subspan(8, content.size() - 12)).value();
 }
 
-struct Recorder final : RecordSink {
+struct Recorder final : test::QuietRecordSink {
   void chunk(std::uint32_t, std::uint8_t, Direction direction, std::int64_t, const Position&,
              std::span<const std::byte>) noexcept override {
     ++(direction == Direction::kToDevice ? requests : chunks);
   }
-  void decision(const Decision&) noexcept override {}
-  [[nodiscard]] bool wants_published() const noexcept override { return false; }
-  void published(std::uint32_t, std::uint64_t, bool, std::span<const std::byte>) noexcept override {
-  }
-  void unpublished(std::uint32_t) noexcept override {}
-  void keep_model(std::span<const std::byte>) override {}
   std::atomic<int> requests{0}, chunks{0};
 };
 

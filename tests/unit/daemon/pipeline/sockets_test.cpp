@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/pipeline/reader.hpp"
+#include "tests/support/quiet_record_sink.hpp"
 
 namespace posed::pipeline {
 namespace {
@@ -45,18 +46,12 @@ struct SocketDecoder final : drivers::Decoder {
   int fed_by = -1;
 };
 
-struct SocketRecord final : RecordSink {
+struct SocketRecord final : test::QuietRecordSink {
   void chunk(std::uint32_t, std::uint8_t socket, Direction direction, std::int64_t, const Position&,
              std::span<const std::byte>) noexcept override {
     if (direction == Direction::kFromDevice) from = socket;
     if (direction == Direction::kToDevice) to = socket;
   }
-  void decision(const Decision&) noexcept override {}
-  [[nodiscard]] bool wants_published() const noexcept override { return false; }
-  void published(std::uint32_t, std::uint64_t, bool, std::span<const std::byte>) noexcept override {
-  }
-  void unpublished(std::uint32_t) noexcept override {}
-  void keep_model(std::span<const std::byte>) override {}
   int from = -1, to = -1;
 };
 

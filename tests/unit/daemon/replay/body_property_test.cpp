@@ -11,6 +11,7 @@
 #include <string>
 
 #include "tests/support/dice.hpp"
+#include "tests/support/gapped_logs.hpp"
 #include "tests/support/replayed.hpp"
 #include "tests/support/seeds.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -153,28 +154,13 @@ TEST_CASE("whatever bodies do while it is recorded, a log replays bit for bit", 
 // A log may lack chunks, decisions, frames and the rows that say which bodies there are.
 TEST_CASE("a log of bodies with gaps replays what it contains and reports what is missing",
           "[property]") {
-  const TempFolder folder;
-  const auto path = folder.path() / "gaps.plog";
-  const auto [first, last] = seeds(2);
-  replay::Expectation::Counts sum;
-  for (std::uint64_t seed = first; seed <= last; ++seed) {
-    INFO("seed " << seed << "; POSED_SEED=" << seed << " runs it alone");
-    Dice dice(~seed);
+  check_gapped_logs(2, [](Dice& dice, std::uint64_t seed, const std::filesystem::path& path) {
     VirtualOptions scarce;
     scarce.chunk_bytes = static_cast<std::size_t>(1000 * dice.below(60) + 2000);
     scarce.record_slot = {.frame_bytes = static_cast<std::size_t>(1000 * dice.below(60) + 2000),
                           .decisions = static_cast<std::size_t>(dice.below(12) + 1)};
     static_cast<void>(record_rooms(seed, path, scarce));
-    const Replayed result = replayed(path);
-    CHECK((result.difference ? result.difference->text() : "") == "");
-    sum.compared += result.counts.compared;
-    sum.lost += result.counts.lost;
-    sum.after_gap += result.counts.after_gap;
-    std::filesystem::remove(path);
-  }
-  WARN(last - first + 1 << " runs: " << sum.compared << " frames compared, " << sum.lost
-                        << " not in the log, " << sum.after_gap << " after a gap");
-  if (!one_seed()) CHECK((sum.compared > 0 && sum.lost > 0 && sum.after_gap > 0));
+  });
 }
 
 // Without holdups and with space in the rings, no stream has a reason to lose anything. Only a
