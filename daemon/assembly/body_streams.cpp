@@ -11,11 +11,6 @@
 namespace posed::assembly {
 namespace {
 
-std::unexpected<Error> of_source(const std::string& name, Error error) {
-  error.message = "source '" + name + "': " + error.message;
-  return std::unexpected(std::move(error));
-}
-
 bool publishes_raw(const config::SourceConfig& source) {
   const auto raw = [](const config::SourceConfig::NamedBody& named) {
     return named.stream.publish_raw;
@@ -39,7 +34,7 @@ Result<std::unique_ptr<BodyStreams>> BodyStreams::open(const config::DaemonConfi
   for (const config::SourceConfig& source : config.sources) {
     const auto number = first + static_cast<std::uint32_t>(self->sources_.size());
     if (auto opened = self->open_source(source, number); !opened) {
-      return of_source(source.name, opened.error());
+      return std::unexpected(opened.error());
     }
   }
   self->first_ = first;
@@ -91,7 +86,7 @@ Result<> BodyStreams::start(StreamUsers users, std::set<std::string> reserved) {
     drivers::Transport* const transport = source->source->device.transport.get();
     if (transport == nullptr) continue;
     if (auto started = transport->start(system::monotonic_ns()); !started) {
-      return of_source(source->config.name, started.error());
+      return devices::of_source(source->config.name, started.error());
     }
   }
   std::size_t named = 0;

@@ -98,8 +98,18 @@ Result<std::unique_ptr<OpenSource>> open_source(const SourceOptions& options) {
 
 Result<std::unique_ptr<OpenSource>> open_source(const config::SourceConfig& config,
                                                 ModelFiles& files) {
-  if (auto loaded = load_models(config, files); !loaded) return std::unexpected(loaded.error());
-  return open_source({.name = config.name, .driver = config.driver, .options = config.options});
+  if (auto loaded = load_models(config, files); !loaded) {
+    return of_source(config.name, loaded.error());
+  }
+  auto source =
+      open_source({.name = config.name, .driver = config.driver, .options = config.options});
+  if (!source) return of_source(config.name, source.error());
+  return source;
+}
+
+std::unexpected<Error> of_source(const std::string& name, Error error) {
+  error.message = "source '" + name + "': " + error.message;
+  return std::unexpected(std::move(error));
 }
 
 Result<std::string> try_kept_device(OpenSource& source) {

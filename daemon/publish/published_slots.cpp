@@ -57,8 +57,21 @@ void PublishedSlots::take_additions() {
 
 void PublishedSlots::advance(std::uint32_t slot) {
   const std::scoped_lock lock(mutex_);
+  count_left(*slots_[slot].front());
   slots_[slot].erase(slots_[slot].begin());
   changed_ = true;
+}
+
+void PublishedSlots::count_left(const PublishedStream& stream) {
+  const v1::StreamStats stats = stream.stats();
+  left_frames_ += stats.frames();
+  left_samples_ += stats.samples();
+}
+
+void PublishedSlots::add_left(v1::Stats& stats) const {
+  const std::scoped_lock lock(mutex_);
+  stats.set_left_frames(left_frames_);
+  stats.set_left_samples(left_samples_);
 }
 
 void PublishedSlots::remove(std::uint32_t stream) {
@@ -67,6 +80,7 @@ void PublishedSlots::remove(std::uint32_t stream) {
   const std::scoped_lock lock(mutex_);
   const auto found = with_id(slots_[slot], stream);
   if (found == slots_[slot].end()) return;
+  count_left(**found);
   slots_[slot].erase(found);
   changed_ = true;
 }

@@ -45,6 +45,9 @@ class PublishedSlots {
   // Does nothing if there is no such stream.
   void remove(std::uint32_t stream);
 
+  // Any thread: what was published of the streams that are gone.
+  void add_left(v1::Stats& stats) const;
+
   template <typename Use>
   void for_each(Use&& use) {
     for (Slot& slot : slots_) {
@@ -67,9 +70,12 @@ class PublishedSlots {
  private:
   using Slot = std::vector<std::unique_ptr<PublishedStream>>;  // the one that has it is the first
 
+  void count_left(const PublishedStream& stream);  // under mutex_
+
   mutable std::mutex mutex_;
   std::vector<Slot> slots_;                                  // changed under mutex_
   std::vector<std::unique_ptr<PublishedStream>> additions_;  // under mutex_
+  std::uint64_t left_frames_ = 0, left_samples_ = 0;         // under mutex_
   bool changed_ = false;  // a stream may have got its slot; publisher's thread
 };
 

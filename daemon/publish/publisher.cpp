@@ -382,7 +382,7 @@ void Publisher::every_second(std::int64_t now_ns) {
     *stats.add_stream() = published.report(since_s);
     report_shed(published, false);
   });
-  add_sources(stats);
+  fill_common(stats);
   if (options_.more_stats) options_.more_stats(stats);
   reported_ns_ = now_ns;
   reported_cpu_ns_ = cpu_ns;

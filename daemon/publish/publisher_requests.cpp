@@ -66,12 +66,13 @@ v1::Stats Publisher::stats() const {
   }
   slots_->look([&](const PublishedStream& published) { *stats.add_stream() = published.stats(); });
   stats.set_time_ns(options_.data_clock());
-  add_sources(stats);
+  fill_common(stats);
   if (options_.more_stats) options_.more_stats(stats);
   return stats;
 }
 
-void Publisher::add_sources(v1::Stats& stats) const {
+void Publisher::fill_common(v1::Stats& stats) const {
+  slots_->add_left(stats);
   for (const SourceInfo& info : options_.sources) {
     v1::SourceStats& source = *stats.add_source();
     source.set_name(info.name);

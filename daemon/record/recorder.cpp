@@ -8,6 +8,8 @@
 
 #include <unistd.h>
 
+#include <spdlog/spdlog.h>
+
 #include "daemon/record/ring_sizes.hpp"
 #include "models/gp/isa.hpp"
 
@@ -59,6 +61,11 @@ Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
                                                  const RecordedSetup& setup) {
   auto writer = begin_log(options, setup);
   if (!writer) return std::unexpected(writer.error());
+  if (setup.slots_to_come > 0) {
+    spdlog::info("{:.0f} MB for what is on its way into {}",
+                 static_cast<double>(total_bytes(ring_sizes(setup, options.frames))) / 1e6,
+                 options.file.string());
+  }
   return std::unique_ptr<Recorder>(new Recorder(std::move(options), setup, std::move(*writer)));
 }
 

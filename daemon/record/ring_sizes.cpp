@@ -73,4 +73,13 @@ RingSizes ring_sizes(const RecordedSetup& setup, bool frames) {
   return sizes;
 }
 
+std::size_t total_bytes(const RingSizes& sizes) {
+  std::size_t bytes = 0;
+  for (const std::size_t of_source : sizes.chunk_bytes) bytes += of_source;
+  for (const SlotSizes& slot : sizes.slots) {
+    bytes += slot.frame_bytes + slot.decisions * sizeof(DecisionRecord);
+  }
+  return bytes;
+}
+
 }  // namespace posed::record

@@ -21,4 +21,7 @@ struct RingSizes {
 // For a setup at its nominal rates; `frames`: the published frames are recorded, too.
 [[nodiscard]] RingSizes ring_sizes(const RecordedSetup& setup, bool frames);
 
+// The memory that rings of these sizes need.
+[[nodiscard]] std::size_t total_bytes(const RingSizes& sizes);
+
 }  // namespace posed::record

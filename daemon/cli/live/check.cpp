@@ -143,8 +143,7 @@ int check(const CheckOptions& options) {
     for (const config::SourceConfig& source : reading.config.sources) {
       devices::ModelFiles models;
       const auto opened = devices::open_source(source, models);
-      if (!opened)
-        reading.errors.push_back(devices::of_stream(source.name, opened.error()).error());
+      if (!opened) reading.errors.push_back(opened.error());
       sources.push_back(summary_of(source));
     }
   }

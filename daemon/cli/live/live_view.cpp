@@ -187,7 +187,8 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths
   }
   for (const v1::StreamStats& stream : stats.stream()) {
     for (const std::string& text :
-         {body_row(stream), device_row(stream, stats.time_ns()), stages_row(stream)}) {
+         {body_row(stream), device_row(stream, stats.time_ns()),
+          stream.refusal().empty() ? stages_row(stream) : std::string()}) {
       if (text.empty()) continue;
       rows.push_back("  " + fit(clean_name(stream.stream()), widths.name - 1) + text);
     }

@@ -44,7 +44,7 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
                   const record::Recorder& recorder, double took_s) {
   std::error_code ignored;
   const auto bytes = std::filesystem::file_size(options.out, ignored);
-  std::uint64_t frames = 0, samples = 0;
+  std::uint64_t frames = stats.left_frames(), samples = stats.left_samples();
   nlohmann::ordered_json streams = nlohmann::ordered_json::array();
   for (const v1::StreamStats& stream : stats.stream()) {
     frames += stream.frames();
