@@ -20,6 +20,7 @@ void read_share(TableReader& share, std::uint8_t sensor, Findings& findings,
   std::string channel;
   double gain = 1.0;
   double offset_deg = 0.0;
+  share.need("channel", "write channel = \"index1_x\", for example");
   share.read("channel", channel);
   share.read("gain", gain, {-kMaxGain, kMaxGain});
   share.read("offset_deg", offset_deg, {-kMaxOffset_deg, kMaxOffset_deg});

@@ -22,7 +22,7 @@ constexpr TomlLimits kLimits{
     .what = "calibration", .bytes = kMaxCalibrationFile, .depth = 4, .items = 2048};
 
 constexpr Range kNumbers{-1e6, 1e6};  // of raw values, calibrated values and parameters
-constexpr Range kCounts{0.0, 1e6};
+constexpr Range kAnyCount{0.0, 1e6};
 constexpr std::array<std::string_view, 2> kHands{"right", "left"};
 
 void read_sensor(TableReader& table, const std::string& name, CalibrationFile& file) {
@@ -63,7 +63,7 @@ Result<CalibrationFile> parse_calibration(const std::string& toml,
   Findings findings{.file = file};
   TableReader reader(*table, "", findings);
   int format = 0;
-  reader.read("format", format, kCounts);
+  reader.read("format", format, kAnyCount);
   if (format != kFormat) {
     return fail("is no calibration of a glove (it should say format = 1)", file);
   }
@@ -72,7 +72,7 @@ Result<CalibrationFile> parse_calibration(const std::string& toml,
   reader.read("driver", read.driver);
   reader.read("glove", read.glove);
   reader.read("user", read.user);
-  reader.read("sensor_count", sensor_count, kCounts);
+  reader.read("sensor_count", sensor_count, kAnyCount);
   read.hand = reader.choice("hand", kHands) == 0 ? Side::kRight : Side::kLeft;
   if (auto parameters = reader.table("parameters")) {
     for (const std::string& name : parameters->keys()) {

@@ -17,7 +17,6 @@ namespace posed {
 namespace {
 
 constexpr double kMillimetre = 1e-3;
-
 constexpr Range kPoint_mm{-1000.0, 1000.0};
 constexpr Range kLength_mm{0.1, 1000.0};
 constexpr Range kAngle_deg{-360.0, 360.0};

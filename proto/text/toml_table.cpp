@@ -234,7 +234,7 @@ std::optional<TableReader::Pairs> TableReader::pairs(std::string_view key, Range
   if (node == nullptr) return std::nullopt;
   const toml::array* list = node->as_array();
   if (list == nullptr) {
-    add_type_error(*node, key, "a list of pairs of numbers");
+    add_type_error(*node, key, "a list of pairs of numbers ([[0, 1], [2, 3]])");
     return std::nullopt;
   }
   Pairs pairs;

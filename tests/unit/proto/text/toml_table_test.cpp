@@ -100,7 +100,8 @@ TEST_CASE("the error for a wrong value says what it must be", "[toml_table]") {
   CHECK(error_of("v = [1, 2,\nnan]", three).starts_with("2: v = nan is out of range"));
   CHECK(error_of("v = [1, 2, '3']", three) == "1: v must be a number, not text");
   const auto pairs = [](TableReader& reader) { CHECK_FALSE(reader.pairs("v", {0, 9})); };
-  CHECK(error_of("v = 1", pairs) == "1: v must be a list of pairs of numbers, not an integer");
+  CHECK(error_of("v = 1", pairs) ==
+        "1: v must be a list of pairs of numbers ([[0, 1], [2, 3]]), not an integer");
   CHECK(error_of("v = [[1, 2],\n[3]]", pairs) ==
         "2: v must be a list of 2 numbers, not a list of 1");
   const auto hex = [](TableReader& reader) { CHECK(reader.hex("v", 2).empty()); };
