@@ -7,12 +7,12 @@
 
 #include "daemon/config/config_file.hpp"
 #include "daemon/config/stream_tables.hpp"
-#include "daemon/config/toml_reader.hpp"
 #include "daemon/net/keys.hpp"
 #include "models/stages/registry.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::config {
 namespace {
@@ -128,7 +128,7 @@ std::set<std::string> all_keys(Drivers drivers) {
       text += fmt::format("[{}.{}]\n", table, stage->name);
     }
   }
-  Findings findings{.file = {}, .errors = {}, .known = {}, .all_keys = {}};
+  Findings findings;
   DaemonConfig ignored;
   if (const auto root = parse_toml(text, {}, kLimits)) {
     read_tables(*root, {.folder = {}, .drivers = drivers, .findings = findings}, ignored);
@@ -145,8 +145,10 @@ bool is_stream_name(std::string_view name) {
 
 Reading read_config(const std::string& text, const std::filesystem::path& path, Drivers drivers) {
   Reading reading;
-  Findings findings{
-      .file = path.string(), .errors = {}, .known = {}, .all_keys = all_keys(drivers)};
+  Findings findings{.file = path.string(),
+                    .exit_code = ExitCode::kWrongUse,
+                    .all_keys = all_keys(drivers),
+                    .twins = {.original = "stream", .copy = "source"}};
   reading.config.text = text;
   const auto root = parse_toml(text, path.string(), kLimits);
   if (root) {

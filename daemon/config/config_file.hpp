@@ -5,8 +5,8 @@
 #include <string>
 
 #include "daemon/config/config.hpp"
-#include "daemon/config/toml_reader.hpp"
 #include "proto/text/parameter.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::config {
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "daemon/config/config_file.hpp"
-#include "daemon/config/toml_reader.hpp"
 #include "drivers/driver.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::config {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/config/toml_reader.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::config {
 

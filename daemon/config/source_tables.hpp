@@ -5,7 +5,7 @@
 
 #include "daemon/config/config_file.hpp"
 #include "daemon/config/daemon_config.hpp"
-#include "daemon/config/toml_reader.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::config {
 

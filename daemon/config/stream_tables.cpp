@@ -47,6 +47,7 @@ class StreamReader {
 
 void StreamReader::read(TableReader& root) {
   root.read("max_streams", config_.max_streams, {1, kMaxConfigStreams});
+  const std::size_t errors = file_.findings.errors.size();
   std::vector<TableReader> sources = root.tables("source", kMaxSources);
   for (TableReader& table : sources) {
     SourceConfig& source = config_.sources.emplace_back();
@@ -54,6 +55,12 @@ void StreamReader::read(TableReader& root) {
     names_.push_back({.name = source.name, .line = table.line(), .is_source = true});
   }
   std::vector<TableReader> streams = root.tables("stream", kMaxConfigStreams);
+  if (sources.empty() && streams.empty() && file_.findings.errors.size() == errors) {
+    file_.findings.add_error(0,
+                             "there is no stream and no source; add a [[stream]] table with a name"
+                             " and a driver, or a [[source]] table for a device with several"
+                             " bodies");
+  }
   const bool all = std::ranges::any_of(config_.sources, &SourceConfig::all);
   if (std::cmp_greater(streams.size(), config_.max_streams)) {
     root.add_error(root.has("max_streams") ? "max_streams" : "stream",
@@ -68,12 +75,6 @@ void StreamReader::read(TableReader& root) {
                                streams.size(), kMaxConfigStreams));
   }
   for (TableReader& table : streams) read_stream(table);
-  if (!root.has("stream") && !root.has("source")) {
-    file_.findings.add_error(0,
-                             "there is no stream and no source; add a [[stream]] table with a name"
-                             " and a driver, or a [[source]] table for a device with several"
-                             " bodies");
-  }
   check_sources(sources);
   check_names(std::move(names_), file_.findings);
 }

@@ -1,102 +1,80 @@
 #include "drivers/described/device_file.hpp"
 
 #include <array>
+#include <utility>
 
 #include "drivers/described/packet_reader.hpp"
-#include "drivers/described/toml_reader.hpp"
 #include "drivers/glove/angle_map.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
+#include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::drivers::described {
 namespace {
 
 constexpr std::string_view kWhat = "device description";
 constexpr std::array<std::string_view, 3> kLinks{"serial", "tcp", "hid"};
-constexpr std::array<std::string_view, 8> kDeviceKeys{"name",      "summary", "note",   "rate_hz",
-                                                      "delimiter", "link",    "packet", "angles"};
-constexpr std::array<std::string_view, 8> kLinkKeys{"kind",    "baud",   "vendor", "product",
-                                                    "usb_ids", "listen", "start",  "stop"};
+constexpr std::size_t kMaxPackets = 16;
 constexpr std::size_t kMaxCommand = 64;
 constexpr std::size_t kMaxDelimiter = 4;
 constexpr std::size_t kMaxUsbIds = 16;
-constexpr std::int64_t kMaxBaud = 4'000'000;
-constexpr double kMaxRate_hz = 1000.0;
+constexpr Range kUsbNumbers{0, 0xFFFF};
+constexpr Range kBauds{1, 4'000'000};
+constexpr Range kRates_hz{0.0, 1000.0};
 
-void read_usb_ids(TomlReader& toml, const toml::table& link, LinkRule& rule) {
-  const auto add_error = [&] {
-    toml.add_error(link,
+void read_usb_ids(TableReader& link, LinkRule& rule) {
+  int vendor = 0;
+  int product = 0;
+  link.read("usb_ids", rule.usb_ids);
+  link.read("vendor", vendor, kUsbNumbers);
+  link.read("product", product, kUsbNumbers);
+  if (link.has("vendor") != link.has("product") || rule.usb_ids.size() > kMaxUsbIds) {
+    link.add_error(link.has("product") ? "product" : "vendor",
                    "USB ids are written as vendor = 0x1234 and product = 0x5678, or for a serial "
                    "port as usb_ids = [0x12345678]: vendor and product in one number");
-  };
-  if (link.contains("vendor") != link.contains("product")) add_error();
-  if (link.contains("vendor")) {
-    const auto vendor = toml.whole(link, "vendor", 0, 0, 0xFFFF);
-    const auto product = toml.whole(link, "product", 0, 0, 0xFFFF);
-    rule.usb_ids.push_back(static_cast<std::uint32_t>(vendor << 16 | product));
   }
-  const toml::node* const more = link.get("usb_ids");
-  if (more == nullptr) return;
-  const toml::array* const list = more->as_array();
-  if (list == nullptr || list->size() > kMaxUsbIds) return add_error();
-  for (const toml::node& id : *list) {
-    const auto value = id.value<std::int64_t>();
-    if (!value || *value < 0 || *value > 0xFFFFFFFF) return add_error();
-    rule.usb_ids.push_back(static_cast<std::uint32_t>(*value));
-  }
+  if (!link.has("vendor")) return;
+  const auto id = static_cast<std::uint32_t>(vendor) << 16 | static_cast<std::uint32_t>(product);
+  rule.usb_ids.insert(rule.usb_ids.begin(), id);
 }
 
-void read_link(TomlReader& toml, const toml::table& device, LinkRule& rule) {
-  const toml::table* const link = toml.table(device, "link");
-  if (link == nullptr)
-    return toml.add_error(device, "a device needs its [link]: kind = \"serial\"");
-  toml.allow(*link, "[link]", kLinkKeys);
-  rule.kind = static_cast<LinkKind>(toml.word(*link, "kind", kLinks, 0));
-  rule.baud = static_cast<int>(toml.whole(*link, "baud", rule.baud, 1, kMaxBaud));
-  rule.listen = toml.text(*link, "listen", rule.listen);
-  rule.start = toml.hex(*link, "start", kMaxCommand);
-  rule.stop = toml.hex(*link, "stop", kMaxCommand);
-  read_usb_ids(toml, *link, rule);
+void read_link(TableReader& device, LinkRule& rule) {
+  auto link = device.table("link");
+  if (!link) return;
+  rule.kind = static_cast<LinkKind>(link->choice("kind", kLinks));
+  link->read("baud", rule.baud, kBauds);
+  link->read("listen", rule.listen);
+  rule.start = link->hex("start", kMaxCommand);
+  rule.stop = link->hex("stop", kMaxCommand);
+  read_usb_ids(*link, rule);
+  link->finish();
   const bool hid = rule.kind == LinkKind::kHid;
-  if (hid && (!link->contains("vendor") || link->contains("usb_ids"))) {
-    toml.add_error(*link, "a HID device is found by vendor = 0x1234 and product = 0x5678");
+  if (hid && (!link->has("vendor") || link->has("usb_ids"))) {
+    link->add_error("kind", "a HID device is found by vendor = 0x1234 and product = 0x5678");
   }
 }
 
-void read_packets(TomlReader& toml, const toml::table& device, Table& table) {
-  const toml::array* const packets = device["packet"].as_array();
-  if (packets == nullptr) return toml.add_error(device, "a device needs at least one [[packet]]");
-  PacketReader reader(toml, table);
-  for (const toml::node& packet : *packets) {
-    if (!packet.is_table()) return toml.add_error(packet, "packets are written as [[packet]]");
-    reader.read_packet(*packet.as_table());
-    if (toml.error()) return;
+void read_device(TableReader& device, Findings& findings, Table& table) {
+  device.read("name", table.name);
+  if (table.name.empty()) device.add_error("name", "a device needs a name");
+  device.read("summary", table.summary);
+  device.read("rate_hz", table.rate_hz, kRates_hz);
+  table.delimiter = device.hex("delimiter", kMaxDelimiter);
+  device.need("link", "write [link] with kind = \"serial\", \"tcp\" or \"hid\"");
+  read_link(device, table.link);
+  device.need("packet", "describe one or several with [[packet]]");
+  PacketReader reader(findings, table);
+  for (TableReader& packet : device.tables("packet", kMaxPackets)) {
+    if (findings.errors.empty()) reader.read_packet(packet);
   }
-  if (table.model.sensors.empty()) {
-    toml.add_error(device, "a glove needs at least one [[packet.field]] of kind \"sensor\"");
+  if (findings.errors.empty() && table.model.sensors.empty()) {
+    device.add_error("packet", "a glove needs at least one [[packet.field]] of kind \"sensor\"");
   }
-}
-
-Result<Table> read_device(const toml::table& device, const std::string& text,
-                          const std::string& file) {
-  TomlReader toml(file);
-  Table table;
-  toml.allow(device, "a device", kDeviceKeys);
-  table.name = toml.text(device, "name");
-  if (table.name.empty()) toml.add_error(device, "a device needs a name");
-  table.summary = toml.text(device, "summary");
-  table.rate_hz = toml.number(device, "rate_hz", 0.0, 0.0, kMaxRate_hz);
-  table.delimiter = toml.hex(device, "delimiter", kMaxDelimiter);
-  read_link(toml, device, table.link);
-  if (!toml.error()) read_packets(toml, device, table);
-  if (toml.error()) return std::unexpected(*toml.error());
-  table.model.driver = "described";
-  table.model.map_toml = text;
-  if (const auto rows = glove::parse_angle_map(text, file, table.model.sensors); !rows) {
-    return std::unexpected(rows.error());
-  }
-  return table;
+  device.skip("note");    // for people
+  device.skip("angles");  // parse_angle_map() reads them
+  device.finish();
 }
 
 bool describes_packets(std::string_view toml) { return toml.find("[[packet]]") != toml.npos; }
@@ -104,9 +82,19 @@ bool describes_packets(std::string_view toml) { return toml.find("[[packet]]") !
 }  // namespace
 
 Result<Table> parse_device(const std::string& toml, const std::string& file) {
-  const auto table = parse_toml(toml, file, {.what = kWhat, .bytes = kMaxDeviceFile});
-  if (!table) return std::unexpected(table.error());
-  return read_device(*table, toml, file);
+  const auto root = parse_toml(toml, file, {.what = kWhat, .bytes = kMaxDeviceFile});
+  if (!root) return std::unexpected(root.error());
+  Findings findings{.file = file};
+  TableReader device(*root, "", findings);
+  Table read;
+  read_device(device, findings, read);
+  auto table = findings.result(std::move(read));
+  if (!table) return table;
+  table->model.driver = "described";
+  table->model.map_toml = toml;
+  const auto rows = glove::parse_angle_map(toml, file, table->model.sensors);
+  if (!rows) return std::unexpected(rows.error());
+  return table;
 }
 
 std::vector<std::string> shipped_devices() {

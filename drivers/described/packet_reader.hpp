@@ -1,34 +1,44 @@
 // PacketReader: reads the [[packet]] tables of a device description into a Table.
 #pragma once
 
+#include <array>
 #include <set>
 #include <string>
 
 #include "drivers/described/table.hpp"
-#include "drivers/described/toml_reader.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::drivers::described {
 
 class PacketReader {
  public:
-  // Adds to `table`, whose link and delimiter have been read already.
-  PacketReader(TomlReader& toml, Table& table) : toml_(toml), table_(table) {}
+  // Adds to `table`, whose link and delimiter have been read already. After an error it may leave
+  // the rest of a packet unread: only one is reported.
+  PacketReader(Findings& findings, Table& table) : findings_(findings), table_(table) {}
 
-  void read_packet(const toml::table& from);
+  void read_packet(TableReader& from);
 
  private:
-  void read_length(const toml::table& from, PacketRule& packet);
-  void read_checksum(const toml::table& from, PacketRule& packet);
-  void read_fields(const toml::table& from, PacketRule& packet);
-  // Reads one [[packet.field]]: one value, or several consecutive ones of one kind.
-  void read_field(const toml::table& from, PacketRule& packet);
-  void read_range(const toml::table& from, Field& field);
-  void add_field(const toml::table& from, const std::string& name, Field field, PacketRule& packet);
-  void add_sensor(const toml::table& from, const std::string& name, const Field& field);
-  [[nodiscard]] BitPlace place(const toml::node& blamed, std::int64_t bit, std::int64_t bits,
-                               bool big, const PacketRule& packet);
+  // One [[packet.field]]: one value, or several consecutive ones of one kind.
+  struct FieldGroup {
+    Field field;                            // without its place and index
+    std::array<double, 2> value{0.0, 1.0};  // of a sensor, at the ends of its range
+    std::string unit = "1";                 // of a sensor or an extra
+    double tick_s = 0.0;                    // of a time
+  };
 
-  TomlReader& toml_;
+  void read_length(TableReader& from, PacketRule& packet);
+  void read_checksum(TableReader& from, PacketRule& packet);
+  void read_field(TableReader& from, PacketRule& packet);
+  void read_range(TableReader& from, int bits, Field& field);
+  void read_meaning(TableReader& from, FieldGroup& group);
+  void add_field(TableReader& from, const std::string& name, FieldGroup group, PacketRule& packet);
+  void add_sensor(TableReader& from, const std::string& name, const FieldGroup& group);
+  [[nodiscard]] BitPlace place(TableReader& from, int bit, int bits, bool big,
+                               const PacketRule& packet);
+  [[nodiscard]] bool good() const { return findings_.errors.empty(); }
+
+  Findings& findings_;
   Table& table_;
   std::set<std::string> names_;
 };

@@ -1,12 +1,13 @@
 #include "drivers/glove/angle_map.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 #include "proto/frame/degree.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -14,67 +15,39 @@ namespace {
 constexpr double kMaxGain = 1000.0;
 constexpr double kMaxOffset_deg = 360.0;
 
-class MapReader : private FirstError {
- public:
-  MapReader(const std::string& file, const std::vector<Sensor>& sensors)
-      : FirstError(file), sensors_(sensors) {}
+void read_share(TableReader& share, std::uint8_t sensor, Findings& findings,
+                std::vector<MapRow>& rows) {
+  std::string channel;
+  double gain = 1.0;
+  double offset_deg = 0.0;
+  share.need("channel", "write channel = \"index1_x\", for example");
+  share.read("channel", channel);
+  share.read("gain", gain, {-kMaxGain, kMaxGain});
+  share.read("offset_deg", offset_deg, {-kMaxOffset_deg, kMaxOffset_deg});
+  share.finish();
+  const int index = hand_channel(channel);
+  if (index < 0) share.add_error("channel", "the hand has no channel " + in_quotes(channel));
+  if (rows.size() == kMaxMapRows) share.add_error("channel", "too many angles in one table");
+  if (!findings.errors.empty()) return;
+  rows.push_back({.sensor = sensor,
+                  .channel = static_cast<std::uint8_t>(index),
+                  .gain = static_cast<float>(gain),
+                  .offset_rad = static_cast<float>(offset_deg * kDegree)});
+}
 
-  Result<std::vector<MapRow>> read(const toml::table& table) {
-    const toml::table* const angles = table["angles"].as_table();
-    if (angles == nullptr) add_error(table, "the device's table lacks [angles]");
-    if (angles != nullptr) {
-      for (const auto& [key, node] : *angles) read_value(key.str(), node);
+void read_angles(TableReader& angles, const std::vector<Sensor>& sensors, Findings& findings,
+                 std::vector<MapRow>& rows) {
+  for (const std::string& name : angles.keys()) {
+    const auto sensor = std::ranges::find(sensors, name, &Sensor::name);
+    if (sensor == sensors.end()) {
+      angles.add_error(name, "the glove has no value " + in_quotes(name));
+      continue;
     }
-    if (error()) return std::unexpected(*error());
-    return std::move(rows_);
-  }
-
- private:
-  void read_value(std::string_view name, const toml::node& node) {
-    const auto sensor = std::ranges::find(sensors_, name, &Sensor::name);
-    if (sensor == sensors_.end()) {
-      return add_error(node, "the glove has no value " + in_quotes(name));
-    }
-    const toml::array* const shares = node.as_array();
-    if (shares == nullptr)
-      return add_error(node, "a list of {channel, gain, offset_deg} is wanted");
-    for (const toml::node& share : *shares) {
-      if (!share.is_table())
-        return add_error(share, "{channel = \"index1_x\", gain = 1} is wanted");
-      read_share(static_cast<std::uint8_t>(sensor - sensors_.begin()), *share.as_table());
+    for (TableReader& share : angles.tables(name, kMaxMapRows)) {
+      read_share(share, static_cast<std::uint8_t>(sensor - sensors.begin()), findings, rows);
     }
   }
-
-  void read_share(std::uint8_t sensor, const toml::table& share) {
-    for (const auto& [key, node] : share) {
-      if (key != "channel" && key != "gain" && key != "offset_deg") {
-        add_error(node, in_quotes(key.str()) + " is not known in an angle");
-      }
-    }
-    const std::string channel = share["channel"].value_or(std::string());
-    const int index = hand_channel(channel);
-    if (index < 0) add_error(share, "the hand has no channel " + in_quotes(channel));
-    if (rows_.size() == kMaxMapRows) add_error(share, "too many angles in one table");
-    if (error()) return;
-    rows_.push_back({.sensor = sensor,
-                     .channel = static_cast<std::uint8_t>(index),
-                     .gain = static_cast<float>(number(share, "gain", 1.0, kMaxGain)),
-                     .offset_rad = static_cast<float>(
-                         number(share, "offset_deg", 0.0, kMaxOffset_deg) * kDegree)});
-  }
-
-  double number(const toml::table& share, std::string_view key, double without, double most) {
-    const toml::node* const node = share.get(key);
-    if (node == nullptr) return without;
-    const auto value = node->is_number() ? node->value<double>() : std::nullopt;
-    if (value && std::abs(*value) <= most) return *value;
-    add_error(*node, std::string(key) + " is a number of a size that fits a hand");
-    return without;
-  }
-
-  const std::vector<Sensor>& sensors_;
-  std::vector<MapRow> rows_;
-};
+}
 
 }  // namespace
 
@@ -90,7 +63,12 @@ Result<std::vector<MapRow>> parse_angle_map(const std::string& toml, const std::
                                             const std::vector<Sensor>& sensors) {
   const auto table = parse_toml(toml, file, {.what = "device description"});
   if (!table) return std::unexpected(table.error());
-  return MapReader(file, sensors).read(*table);
+  Findings findings{.file = file};
+  TableReader reader(*table, "", findings);
+  std::vector<MapRow> rows;
+  reader.need("angles", "it says which joints of the hand each value moves");
+  if (auto angles = reader.table("angles")) read_angles(*angles, sensors, findings, rows);
+  return findings.result(std::move(rows));
 }
 
 int hand_channel(std::string_view name) {

@@ -1,15 +1,17 @@
 #include "drivers/glove/calibration_file.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
+#include <functional>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 #include "drivers/glove/load_calibration.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -18,90 +20,38 @@ constexpr int kFormat = 1;
 // Large enough for 32 sensors of 8 points, the most that a glove has.
 constexpr TomlLimits kLimits{
     .what = "calibration", .bytes = kMaxCalibrationFile, .depth = 4, .items = 2048};
-constexpr double kMaxNumber = 1e6;  // limit for raw values, calibrated values and parameters
 
-class FileReader : private FirstError {
- public:
-  using FirstError::FirstError;
+constexpr Range kNumbers{-1e6, 1e6};  // of raw values, calibrated values and parameters
+constexpr Range kAnyCount{0.0, 1e6};
+constexpr std::array<std::string_view, 2> kHands{"right", "left"};
 
-  Result<CalibrationFile> read(const toml::table& table) {
-    if (table["format"].value_or(0) != kFormat) {
-      return fail("is no calibration of a glove (it should say format = 1)", file());
-    }
-    for (const auto& [key, node] : table) entry(key.str(), node);
-    if (read_.driver.empty()) add_error(table, "the calibration does not say its driver");
-    if (hand_.empty()) add_error(table, "the calibration does not say its hand, right or left");
-    if (read_.sensors.empty() && read_.parameters.empty()) {
-      add_error(table, "the calibration names no sensor; was the file cut off?");
-    }
-    if (count_ && *count_ != static_cast<std::int64_t>(read_.sensors.size())) {
-      add_error(table, "the calibration should have " + std::to_string(*count_) +
-                           " sensors and has " + std::to_string(read_.sensors.size()) +
-                           "; was the file cut off?");
-    }
-    if (error()) return std::unexpected(*error());
-    return std::move(read_);
+void read_sensor(TableReader& table, const std::string& name, CalibrationFile& file) {
+  auto points = table.pairs(name, kNumbers);
+  if (!points) return;
+  if (points->size() < 2 || points->size() > kMaxCurvePoints) {
+    table.add_error(name, "sensor " + in_quotes(name) + " needs 2 to " +
+                              std::to_string(kMaxCurvePoints) + " points [raw, calibrated]");
   }
-
- private:
-  void entry(std::string_view key, const toml::node& node) {
-    if (key == "format") return;
-    if (key == "driver") return text(node, read_.driver);
-    if (key == "glove") return text(node, read_.glove);
-    if (key == "user") return text(node, read_.user);
-    if (key == "sensor_count" && node.is_integer()) {
-      count_ = node.value<std::int64_t>();
-    } else if (key == "hand") {
-      text(node, hand_);
-      if (hand_ != "right" && hand_ != "left") add_error(node, "hand should be right or left");
-      read_.hand = hand_ == "left" ? Side::kLeft : Side::kRight;
-    } else if (key == "parameters" && node.is_table()) {
-      for (const auto& [name, value] : *node.as_table()) {
-        read_.parameters.emplace(name.str(), number(&value));
-      }
-    } else if (key == "sensors" && node.is_table()) {
-      for (const auto& [name, points] : *node.as_table()) read_sensor(name.str(), points);
-    } else {
-      add_error(node, in_quotes(key) + " is not known in a calibration, or of another type");
-    }
+  const auto ascends = [](const auto& a, const auto& b) { return a[0] < b[0]; };
+  if (std::ranges::adjacent_find(*points, std::not_fn(ascends)) != points->end()) {
+    table.add_error(name, "the raw values of sensor " + in_quotes(name) + " should ascend");
   }
+  file.sensors.emplace(name, std::move(*points));
+}
 
-  void text(const toml::node& node, std::string& into) {
-    const auto value = node.value_exact<std::string>();
-    if (!value) return add_error(node, "a text is wanted here");
-    into = *value;
+// What a file lacks that was cut off at the end of a line.
+void check_complete(TableReader& reader, int sensor_count, const CalibrationFile& file) {
+  if (file.driver.empty()) reader.add_error("driver", "the calibration does not say its driver");
+  reader.need("hand", "write \"right\" or \"left\"");
+  if (file.sensors.empty() && file.parameters.empty()) {
+    reader.add_error("sensors", "the calibration names no sensor; was the file cut off?");
   }
-
-  double number(const toml::node* node) {
-    const auto value = node->is_number() ? node->value<double>() : std::nullopt;
-    if (value && std::abs(*value) <= kMaxNumber) return *value;
-    add_error(*node, "a finite number of at most a million is wanted here");
-    return 0.0;
+  if (sensor_count >= 0 && std::cmp_not_equal(sensor_count, file.sensors.size())) {
+    reader.add_error("sensor_count", "the calibration should have " + std::to_string(sensor_count) +
+                                         " sensors and has " + std::to_string(file.sensors.size()) +
+                                         "; was the file cut off?");
   }
-
-  void read_sensor(std::string_view name, const toml::node& node) {
-    const toml::array* const points = node.as_array();
-    if (points == nullptr || points->size() < 2 || points->size() > kMaxCurvePoints) {
-      return add_error(node, "sensor " + in_quotes(name) + " needs 2 to " +
-                                 std::to_string(kMaxCurvePoints) + " points [raw, calibrated]");
-    }
-    auto& read = read_.sensors[std::string(name)];
-    for (const toml::node& point : *points) {
-      const toml::array* const pair = point.as_array();
-      if (pair == nullptr || pair->size() != 2) {
-        return add_error(point, "a point of sensor " + in_quotes(name) + " is [raw, calibrated]");
-      }
-      read.push_back({number(pair->get(0)), number(pair->get(1))});
-      if (read.size() > 1 && !(read.back()[0] > read[read.size() - 2][0])) {
-        return add_error(point, "the raw values of sensor " + in_quotes(name) + " should ascend");
-      }
-    }
-  }
-
-  CalibrationFile read_;
-  std::string hand_;
-  std::optional<std::int64_t> count_;
-};
+}
 
 }  // namespace
 
@@ -110,7 +60,31 @@ Result<CalibrationFile> parse_calibration(const std::string& toml,
   const std::string file = path.string();
   const auto table = parse_toml(toml, file, kLimits);
   if (!table) return std::unexpected(table.error());
-  return FileReader(file).read(*table);
+  Findings findings{.file = file};
+  TableReader reader(*table, "", findings);
+  int format = 0;
+  reader.read("format", format, kAnyCount);
+  if (format != kFormat) {
+    return fail("is no calibration of a glove (it should say format = 1)", file);
+  }
+  CalibrationFile read;
+  int sensor_count = -1;
+  reader.read("driver", read.driver);
+  reader.read("glove", read.glove);
+  reader.read("user", read.user);
+  reader.read("sensor_count", sensor_count, kAnyCount);
+  read.hand = reader.choice("hand", kHands) == 0 ? Side::kRight : Side::kLeft;
+  if (auto parameters = reader.table("parameters")) {
+    for (const std::string& name : parameters->keys()) {
+      parameters->read(name, read.parameters[name], kNumbers);
+    }
+  }
+  if (auto sensors = reader.table("sensors")) {
+    for (const std::string& name : sensors->keys()) read_sensor(*sensors, name, read);
+  }
+  reader.finish();
+  if (findings.errors.empty()) check_complete(reader, sensor_count, read);
+  return findings.result(std::move(read));
 }
 
 Result<std::string> load_calibration_text(const std::filesystem::path& path) {

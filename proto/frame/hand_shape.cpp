@@ -1,10 +1,9 @@
 #include "proto/frame/hand_shape.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
-#include <optional>
+#include <utility>
 #include <vector>
 
 #include "proto/frame/degree.hpp"
@@ -12,119 +11,70 @@
 #include "proto/frame/rotation.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed {
 namespace {
 
 constexpr double kMillimetre = 1e-3;
-constexpr double kLongest_m = 1.0;  // largest length anywhere in a hand
+constexpr Range kPoint_mm{-1000.0, 1000.0};
+constexpr Range kLength_mm{0.1, 1000.0};
+constexpr Range kAngle_deg{-360.0, 360.0};
+constexpr Range kLimit_deg{-180.0, 180.0};
 
-class HandReader : private FirstError {
- public:
-  using FirstError::FirstError;
-
-  Result<HandShape> read(const toml::table& table) {
-    for (const auto& [key, node] : table) entry(key.str(), node);
-    if (shape_.name.empty()) add_error(table, "a hand needs a name");
-    for (std::size_t f = 0; f < kFingers; ++f) {
-      if (!seen_[f]) add_error(table, "the hand lacks its [" + std::string(kFingerNames[f]) + "]");
-    }
-    if (error()) return std::unexpected(*error());
-    return std::move(shape_);
+void read_limits(TableReader& table, std::string_view key, std::size_t axis, FingerShape& finger) {
+  const auto joints = table.pairs(key, kLimit_deg);
+  if (!joints) return;
+  if (joints->size() != kFingerJoints) {
+    return table.add_error(key, "limits are three pairs, [least, most] of joints 1 to 3");
   }
-
- private:
-  void entry(std::string_view key, const toml::node& node) {
-    const auto finger = std::ranges::find(kFingerNames, key);
-    if (key == "name") {
-      shape_.name = node.value_or("");
-    } else if (finger != kFingerNames.end() && node.is_table()) {
-      const auto f = static_cast<std::size_t>(finger - kFingerNames.begin());
-      seen_[f] = true;
-      read_finger(*node.as_table(), shape_.fingers[f]);
-    } else {
-      add_error(node, in_quotes(key) + " is not known in a hand, or of another type");
+  for (std::size_t j = 0; j < kFingerJoints; ++j) {
+    const auto [low, high] = (*joints)[j];
+    if (low > 0.0 || high < 0.0) {
+      return table.add_error(key, "a limit is [least, most] in degrees, with 0 between them");
     }
+    finger.range[j][axis] = {low * kDegree, high * kDegree};
   }
+}
 
-  void read_finger(const toml::table& table, FingerShape& finger) {
-    for (const std::string_view needed :
-         {"base_mm", "length_mm", "radius_mm", "x_deg", "y_deg", "z_deg"}) {
-      if (!table.contains(needed)) add_error(table, "a finger needs " + std::string(needed));
-    }
-    for (const auto& [toml_key, node] : table) {
-      const std::string_view key = toml_key.str();
-      if (key == "base_mm") {
-        finger.base_m = point(node);
-      } else if (key == "frame_deg") {
-        const Eigen::Vector3d angle = numbers(node, 360.0) * kDegree;
-        finger.frame = axis_rotation(Axis::kY, angle.y()) * axis_rotation(Axis::kX, angle.x()) *
-                       axis_rotation(Axis::kZ, angle.z());
-      } else if (key == "length_mm") {
-        for (int j = 0; j < kFingerJoints; ++j) finger.length_m[j] = lengths(node)[j];
-      } else if (key == "radius_mm") {
-        for (int j = 0; j < kFingerJoints; ++j) finger.radius_m[j] = lengths(node)[j];
-      } else if (key.size() == 5 && key.ends_with("_deg") && key[0] >= 'x' && key[0] <= 'z') {
-        read_ranges(node, static_cast<std::size_t>(key[0] - 'x'), finger);
-      } else {
-        add_error(node, in_quotes(key) + " is not known in a finger");
-      }
-    }
+void read_finger(TableReader& table, FingerShape& finger) {
+  for (const char* key : {"base_mm", "length_mm", "radius_mm", "x_deg", "y_deg", "z_deg"}) {
+    table.need(key, "every finger has it");
   }
-
-  void read_ranges(const toml::node& node, std::size_t axis, FingerShape& finger) {
-    const toml::array* const joints = node.as_array();
-    if (joints == nullptr || joints->size() != kFingerJoints) {
-      return add_error(node, "limits are three pairs, [least, most] of joints 1 to 3");
-    }
-    for (std::size_t j = 0; j < kFingerJoints; ++j) {
-      const toml::array* const pair = joints->get(j)->as_array();
-      const bool is_pair = pair != nullptr && pair->size() == 2;
-      const auto low = is_pair ? pair->get(0)->value<double>() : std::nullopt;
-      const auto high = is_pair ? pair->get(1)->value<double>() : std::nullopt;
-      if (!low || !high || !(*low <= 0.0) || !(*high >= 0.0) || *low < -180 || *high > 180) {
-        return add_error(node, "a limit is [least, most] in degrees, with 0 between them");
-      }
-      finger.range[j][axis] = {*low * kDegree, *high * kDegree};
-    }
+  const auto in_metres = [&](std::string_view key, Range range) {
+    auto values = table.numbers<3>(key, range).value_or(std::array<double, 3>{});
+    for (double& value : values) value *= kMillimetre;
+    return values;
+  };
+  finger.base_m = Eigen::Vector3d(in_metres("base_mm", kPoint_mm).data());
+  finger.length_m = in_metres("length_mm", kLength_mm);
+  finger.radius_m = in_metres("radius_mm", kLength_mm);
+  if (const auto angle_deg = table.numbers<3>("frame_deg", kAngle_deg)) {
+    const auto [x, y, z] = *angle_deg;
+    finger.frame = axis_rotation(Axis::kY, y * kDegree) * axis_rotation(Axis::kX, x * kDegree) *
+                   axis_rotation(Axis::kZ, z * kDegree);
   }
-
-  // Reads three numbers of at most `most` in size; returns zeros after a mistake.
-  Eigen::Vector3d numbers(const toml::node& node, double most) {
-    const toml::array* const array = node.as_array();
-    Eigen::Vector3d read = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto value =
-          array != nullptr && array->size() == 3 ? array->get(i)->value<double>() : std::nullopt;
-      if (!value || !(std::abs(*value) <= most)) {
-        add_error(node, "three numbers are wanted here, of a size that fits a hand");
-        return Eigen::Vector3d::Zero();
-      }
-      read[static_cast<int>(i)] = *value;
-    }
-    return read;
-  }
-
-  Eigen::Vector3d point(const toml::node& node) {
-    return numbers(node, kLongest_m / kMillimetre) * kMillimetre;
-  }
-
-  Eigen::Vector3d lengths(const toml::node& node) {
-    const Eigen::Vector3d read = point(node);
-    if (!(read.minCoeff() > 0)) add_error(node, "lengths are above zero");
-    return read;
-  }
-
-  HandShape shape_;
-  std::array<bool, kFingers> seen_{};
-};
+  read_limits(table, "x_deg", 0, finger);
+  read_limits(table, "y_deg", 1, finger);
+  read_limits(table, "z_deg", 2, finger);
+  table.finish();
+}
 
 }  // namespace
 
 Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file) {
   const auto table = parse_toml(text, file, {.what = "hand"});
   if (!table) return std::unexpected(table.error());
-  return HandReader(file).read(*table);
+  Findings findings{.file = file};
+  TableReader reader(*table, "", findings);
+  HandShape shape;
+  reader.require("name", shape.name);
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    reader.need(kFingerNames[f], "a hand has five fingers");
+    if (auto finger = reader.table(kFingerNames[f])) read_finger(*finger, shape.fingers[f]);
+  }
+  reader.finish();
+  return findings.result(std::move(shape));
 }
 
 std::span<const HandShape> hand_shapes() {

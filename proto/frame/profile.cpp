@@ -1,89 +1,47 @@
 #include "proto/frame/profile.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include "proto/frame/degree.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed {
 namespace {
 
-class ProfileReader : private FirstError {
- public:
-  using FirstError::FirstError;
-
-  Result<Profile> read(const toml::table& table) {
-    for (const auto& [key, node] : table) entry(key.str(), node);
-    if (profile_.name.empty()) add_error(table, "a profile needs a name");
-    if (profile_.bones.empty()) add_error(table, "a profile needs its [bones]");
-    if (error()) return std::unexpected(*error());
-    return std::move(profile_);
-  }
-
- private:
-  void entry(std::string_view key, const toml::node& node) {
-    if (key == "name") {
-      profile_.name = node.value_or("");
-    } else if (key == "note") {
-      if (!node.is_string()) add_error(node, "note is a text");
-    } else if (key == "metres_per_unit") {
-      profile_.metres_per_unit = node.value<double>();
-      if (!profile_.metres_per_unit || !(*profile_.metres_per_unit > 0)) {
-        add_error(node, "metres_per_unit is a length in metres");
-      }
-    } else if (key == "person" && node.is_boolean()) {
-      profile_.person = node.value_or(true);
-    } else if (key == "match" && node.is_array()) {
-      for (const toml::node& joint : *node.as_array()) {
-        profile_.match.push_back(joint.value_or(""));
-      }
-    } else if ((key == "along" || key == "bones" || key == "T") && node.is_table()) {
-      for (const auto& [joint, value] : *node.as_table()) pair(key, joint.str(), value);
-    } else {
-      add_error(node, in_quotes(key) + " is not known in a profile, or of another type");
+void read_bones(TableReader& table, Profile& profile) {
+  for (const std::string& key : table.keys()) {  // canonical bone = "joint"
+    std::string joint;
+    table.read(key, joint);
+    const auto bone = bone_from_name(key);
+    if (!bone) {
+      table.add_error(key, in_quotes(key) + " is no canonical bone");
+    } else if (!profile.bones.emplace(joint, *bone).second) {
+      table.add_error(key, "joint " + in_quotes(joint) + " is given to two bones");
     }
   }
+}
 
-  void pair(std::string_view table, std::string_view key, const toml::node& value) {
-    const std::string text = value.value_or("");
-    if (table == "along") {
-      profile_.along.emplace(key, text);
-    } else if (table == "bones") {  // canonical bone = "joint"
-      const auto bone = bone_from_name(key);
-      if (!bone) return add_error(value, in_quotes(key) + " is no canonical bone");
-      if (!profile_.bones.emplace(text, *bone).second) {
-        add_error(value, "joint " + in_quotes(text) + " is given to two bones");
-      }
-    } else if (value.is_array()) {
-      const auto T = from_angles(*value.as_array());
-      if (!T)
-        return add_error(value, "T as angles is three numbers [deg]: x, y, z, as Acclaim's axis");
-      profile_.T.emplace(key, *T);
-    } else {
-      const auto T = axes_from_text(text);
-      if (!T) return add_error(value, "T says where x, y and z point, for example \"+y-x+z\"");
-      profile_.T.emplace(key, *T);
-    }
+// T of a joint as three angles [deg] or as text.
+std::optional<Eigen::Quaterniond> read_t(TableReader& table, const std::string& joint) {
+  if (!table.has_text(joint)) {
+    const auto angle_deg = table.numbers<3>(joint, {-360.0, 360.0});  // as Acclaim's axis
+    if (!angle_deg) return std::nullopt;
+    const auto [x, y, z] = *angle_deg;  // x is innermost
+    return axis_rotation(Axis::kZ, z * kDegree) *
+           (axis_rotation(Axis::kY, y * kDegree) * axis_rotation(Axis::kX, x * kDegree));
   }
-
-  static std::optional<Eigen::Quaterniond> from_angles(const toml::array& angles) {
-    Eigen::Quaterniond T = Eigen::Quaterniond::Identity();
-    if (angles.size() != 3) return std::nullopt;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto angle_deg = angles[i].value<double>();
-      if (!angle_deg || !std::isfinite(*angle_deg)) return std::nullopt;
-      T = axis_rotation(static_cast<Axis>(i), *angle_deg * kDegree) * T;  // x is innermost
-    }
-    return T;
-  }
-
-  Profile profile_;
-};
+  std::string axes;
+  table.read(joint, axes);
+  auto T = axes_from_text(axes);
+  if (!T) table.add_error(joint, "T says where x, y and z point, for example \"+y-x+z\"");
+  return T;
+}
 
 bool points_along(const Joint& joint, std::string_view axis) {
   if (axis.size() != 2 || axis[1] < 'x' || axis[1] > 'z') return false;
@@ -107,7 +65,29 @@ bool matches(const Profile& profile, const Skeleton& skeleton) {
 Result<Profile> parse_profile(std::string_view text, const std::string& name) {
   const auto table = parse_toml(text, name, {.what = "skeleton profile"});
   if (!table) return std::unexpected(table.error());
-  return ProfileReader(name).read(*table);
+  Findings findings{.file = name};
+  TableReader reader(*table, "", findings);
+  Profile profile;
+  std::string note;
+  reader.require("name", profile.name);
+  reader.read("note", note);
+  if (reader.has("metres_per_unit")) {
+    reader.read("metres_per_unit", profile.metres_per_unit.emplace(), {1e-6, 1e6});
+  }
+  reader.read("person", profile.person);
+  reader.read("match", profile.match);
+  if (auto along = reader.table("along")) {
+    for (const std::string& joint : along->keys()) along->read(joint, profile.along[joint]);
+  }
+  reader.need("bones", "a profile names the joints of canonical bones");
+  if (auto bones = reader.table("bones")) read_bones(*bones, profile);
+  if (auto angles = reader.table("T")) {
+    for (const std::string& joint : angles->keys()) {
+      if (const auto T = read_t(*angles, joint)) profile.T.emplace(joint, *T);
+    }
+  }
+  reader.finish();
+  return findings.result(std::move(profile));
 }
 
 std::span<const Profile> profiles() {

@@ -8,8 +8,6 @@ namespace {
 
 constexpr std::size_t kMaxDescription = 300;  // bytes; toml++ can repeat a whole key in its message
 
-int line_of(const toml::source_region& source) { return static_cast<int>(source.begin.line); }
-
 }  // namespace
 
 Result<toml::table> parse_toml(std::string_view text, const std::string& file,
@@ -20,7 +18,7 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file,
   } catch (const toml::parse_error& error) {
     return fail("not TOML: " + clean(error.description(), kMaxDescription) +
                     "; was the file cut off, or mistyped here?",
-                file, line_of(error.source()));
+                file, static_cast<int>(error.source().begin.line));
   }
 }
 
@@ -28,10 +26,6 @@ Result<toml::table> load_toml(const std::filesystem::path& path, const TomlLimit
   const auto text = load_file(path, {.what = limits.what, .max_bytes = limits.bytes});
   if (!text) return std::unexpected(text.error());
   return parse_toml(*text, path.string(), limits);
-}
-
-void FirstError::add_error(const toml::node& node, std::string_view message) {
-  if (!error_) error_ = Error{clean(message), file_, line_of(node.source())};
 }
 
 }  // namespace posed

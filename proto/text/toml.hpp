@@ -3,7 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -22,19 +21,5 @@ namespace posed {
 // The same for a file, whose size is limited by limits.bytes.
 [[nodiscard]] Result<toml::table> load_toml(const std::filesystem::path& path,
                                             const TomlLimits& limits);
-
-// Base class for code that reads such a table: remembers the first error, with its line.
-class FirstError {
- public:
-  explicit FirstError(std::string file) : file_(std::move(file)) {}
-
-  void add_error(const toml::node& node, std::string_view message);
-  [[nodiscard]] const std::optional<Error>& error() const noexcept { return error_; }
-  [[nodiscard]] const std::string& file() const noexcept { return file_; }
-
- private:
-  std::string file_;
-  std::optional<Error> error_;
-};
 
 }  // namespace posed

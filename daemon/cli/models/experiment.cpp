@@ -1,11 +1,10 @@
 #include "daemon/cli/models/experiment.hpp"
 
-#include <algorithm>
 #include <utility>
 
-#include "daemon/config/toml_reader.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::cli {
 namespace {
@@ -16,7 +15,7 @@ constexpr std::size_t kMaxClips = 4000;
 
 // A value that must be one of a few words.
 template <typename T>
-void read_choice(config::TableReader& reader, const char* key, T& value,
+void read_choice(TableReader& reader, const char* key, T& value,
                  Result<T> (*parse)(std::string_view)) {
   std::string word;
   reader.read(key, word);
@@ -29,7 +28,7 @@ void read_choice(config::TableReader& reader, const char* key, T& value,
   }
 }
 
-void read_clip_table(config::TableReader& table, const std::filesystem::path& folder,
+void read_clip_table(TableReader& table, const std::filesystem::path& folder,
                      Experiment& experiment) {
   ExperimentClip clip;
   clip.line = table.line();
@@ -43,9 +42,9 @@ void read_clip_table(config::TableReader& table, const std::filesystem::path& fo
   experiment.clips.push_back(std::move(clip));
 }
 
-void read_tables(const toml::table& root, const std::filesystem::path& folder,
-                 config::Findings& findings, Experiment& experiment) {
-  config::TableReader reader(root, "", findings);
+void read_tables(const toml::table& root, const std::filesystem::path& folder, Findings& findings,
+                 Experiment& experiment) {
+  TableReader reader(root, "", findings);
   reader.require("target", experiment.target);
   reader.read("rate_hz", experiment.rate_hz, {10.0, 1000.0});
   read_choice(reader, "pose_space", experiment.space, motion::space_from_name);
@@ -54,7 +53,7 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder,
   reader.read("skeleton", asf);
   if (!asf.empty()) experiment.asf = folder / asf;
   auto clips = reader.tables("clip", kMaxClips);
-  for (config::TableReader& clip : clips) {
+  for (TableReader& clip : clips) {
     read_clip_table(clip, folder, experiment);
     clip.finish();
   }
@@ -69,11 +68,10 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder,
 Result<Experiment> read_experiment(const std::filesystem::path& path) {
   const auto root = load_toml(path, kExperimentLimits);
   if (!root) return misuse(root.error().message, root.error().file, root.error().line);
-  config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
+  Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
   Experiment experiment;
   read_tables(*root, path.parent_path(), findings, experiment);
-  if (findings.errors.empty()) return experiment;
-  return std::unexpected(*std::ranges::min_element(findings.errors, {}, &Error::line));
+  return findings.result(std::move(experiment));
 }
 
 Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment) {

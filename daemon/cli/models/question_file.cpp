@@ -1,13 +1,12 @@
 #include "daemon/cli/models/question_file.hpp"
 
-#include <algorithm>
 #include <array>
 #include <ostream>
 #include <utility>
 
-#include "daemon/config/toml_reader.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/toml.hpp"
+#include "proto/text/toml_table.hpp"
 
 namespace posed::cli {
 namespace {
@@ -16,8 +15,8 @@ constexpr TomlLimits kQuestionLimits{
     .what = "questions file", .bytes = std::size_t{256} * 1024, .depth = 4, .items = 16384};
 constexpr std::array<const char*, gesture::kClasses> kClassNames{"A", "B", "C"};
 
-void read_fingers(const toml::table& root, config::Findings& findings, gesture::ClassLists& lists) {
-  config::TableReader reader(root, "", findings);
+void read_fingers(const toml::table& root, Findings& findings, gesture::ClassLists& lists) {
+  TableReader reader(root, "", findings);
   for (int finger = 0; finger < kFingers; ++finger) {
     const std::string name(kFingerNames[finger]);
     auto table = reader.table(name);
@@ -47,13 +46,12 @@ std::string quoted(const std::string& name) {
 Result<std::vector<gesture::Label>> read_questions(const std::filesystem::path& path) {
   const auto root = load_toml(path, kQuestionLimits);
   if (!root) return misuse(root.error().message, root.error().file, root.error().line);
-  config::Findings findings{.file = path.string(), .errors = {}, .known = {}};
-  gesture::ClassLists lists;
-  read_fingers(*root, findings, lists);
-  if (!findings.errors.empty()) {
-    return std::unexpected(*std::ranges::min_element(findings.errors, {}, &Error::line));
-  }
-  auto labels = gesture::labels_of(lists);
+  Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
+  gesture::ClassLists given;
+  read_fingers(*root, findings, given);
+  const auto lists = findings.result(std::move(given));
+  if (!lists) return std::unexpected(lists.error());
+  auto labels = gesture::labels_of(*lists);
   if (!labels) return misuse(labels.error().message, path.string());
   if (labels->empty()) return misuse("no gesture is in any class", path.string());
   return labels;

@@ -339,17 +339,18 @@ TEST_CASE("a mistake in a description is reported with its line and what is allo
     CHECK(table.error().message.find('\n') == std::string::npos);
     return table.error().text();
   };
-  CHECK(mistake("bits = 6", "bitz = 6")
-            .starts_with("own.toml:16: 'bitz' is not known in a field; "
-                         "allowed: name, names, kind"));
+  CHECK(mistake("order = ", "ordr = ") ==
+        "own.toml:18: unknown key 'packet.field.ordr'; the nearest known one here is 'order'");
   CHECK(mistake("kind = \"tcp\"", "kind = \"bluetooth\"") ==
-        "own.toml:7: 'kind' is one of: serial, tcp, hid");
-  CHECK(mistake("bits = 6", "bits = 60") == "own.toml:16: 'bits' is a whole number from 1 to 32");
+        "own.toml:7: link.kind must be one of these words in quotes: serial, tcp, hid");
+  CHECK(mistake("bits = 6", "bits = 60") ==
+        "own.toml:16: packet.field.bits = 60 is out of range: it takes an integer from 1 to 32");
   CHECK(mistake("header = \"01\"", "header = \"1g\"").find("hexadecimal") != std::string::npos);
   CHECK(mistake("byte = 5", "byte = 8").find("byte 9 is not in the packet: it has 9 bytes") !=
         std::string::npos);
   CHECK(mistake("\"index\"", "\"thumb\"").find("'thumb' is described twice") != std::string::npos);
-  CHECK(mistake("bytes = 9", "").find("a packet needs its length") != std::string::npos);
+  CHECK(mistake("bytes = 9", "").find("packet.bytes is missing; it is the length of the packet") !=
+        std::string::npos);
   CHECK(mistake("tick_s = 0.02", "").find("tick_s") != std::string::npos);
   CHECK(mistake("index2_x", "index4_x").find("no channel 'index4_x'") != std::string::npos);
   CHECK(mistake("rate_hz = 50", "rate_hz = inf").find("from 0 to 1000") != std::string::npos);

@@ -221,17 +221,22 @@ TEST_CASE("every built-in hand is valid, and an invalid one is refused with its 
     return shape.error().text();
   };
   CHECK(error("name = 1 2").starts_with("h.toml:1: "));
-  CHECK(error("name = \"h\"\n") == "h.toml:1: the hand lacks its [thumb]");
-  CHECK(error("name = \"h\"\nclaw = 3\n") ==
-        "h.toml:2: 'claw' is not known in a hand, or of another type");
-  CHECK(error("[thumb]\nlength_mm = [1, 2]\n").starts_with("h.toml:1: a finger needs base_mm"));
-  CHECK(
-      error("[index]\nbase_mm = [0, 0, nan]\n").starts_with("h.toml:1: a finger needs length_mm"));
-  std::string long_bone(hand_texts()[0].toml);
-  const std::size_t at = long_bone.find("length_mm = [44, 33, 27]");
-  REQUIRE(at != std::string::npos);
-  long_bone.replace(at, 24, "length_mm = [44, -3, 27]");
-  CHECK(error(long_bone) == "h.toml:9: lengths are above zero");
+  CHECK(error("").starts_with("h.toml:1: name is missing"));
+  CHECK(error("name = \"h\"\n") == "h.toml:1: thumb is missing; a hand has five fingers");
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text(hand_texts()[0].toml);
+    const std::size_t at = text.find(from);
+    REQUIRE(at != std::string::npos);
+    return error(text.replace(at, from.size(), to));
+  };
+  CHECK(changed("name =", "claw = 3\nname =") ==
+        "h.toml:4: unknown key 'claw'; known here: index, little, middle, name, ring, thumb");
+  CHECK(changed("base_mm", "bass_mm").starts_with("h.toml:6: thumb.base_mm is missing"));
+  CHECK(changed("length_mm = [44, 33, 27]", "length_mm = [44, -3, 27]") ==
+        "h.toml:9: thumb.length_mm = -3 is out of range: it takes a number from 0.1 to 1000");
+  CHECK(changed("[-60, 90], ", "")
+            .ends_with("limits are three pairs, [least, most] of joints 1 to 3"));
+  CHECK(changed("[-60, 90]", "[10, 90]").ends_with("with 0 between them"));
 }
 
 }  // namespace posed

@@ -77,7 +77,9 @@ TEST_CASE("every built-in profile is valid, and an invalid one is refused with i
     return profile.error().text();
   };
   CHECK(error("name = 1 2").starts_with("p.toml:1: "));
-  CHECK(error("name = \"p\"\nsize = 3\n").starts_with("p.toml:2: 'size' is not known"));
+  CHECK(error("name = \"p\"\n[bones]\n[size]\n").starts_with("p.toml:3: unknown key 'size'"));
+  CHECK(error("name = \"p\"\n") ==
+        "p.toml:1: bones is missing; a profile names the joints of canonical bones");
   CHECK(
       error("name = \"p\"\n[bones]\nhip = \"a\"\n").starts_with("p.toml:3: 'hip' is no canonical"));
   CHECK(error("name = \"p\"\n[bones]\nhips = \"a\"\n[T]\na = \"+x+x+z\"\n")
