@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
+#include "models/motion/symmetric_eigen.hpp"
 
 namespace posed::motion {
 namespace {
@@ -54,9 +54,9 @@ Rows windows_of(const Rows& rows) {
 }
 
 Eigen::MatrixXd square_root(const Eigen::MatrixXd& symmetric) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
-  const Eigen::VectorXd roots = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  return solver.eigenvectors() * roots.asDiagonal() * solver.eigenvectors().transpose();
+  const SymmetricEigen eigen = symmetric_eigen(symmetric);
+  const Eigen::VectorXd roots = eigen.values.cwiseMax(0.0).cwiseSqrt();
+  return eigen.vectors * roots.asDiagonal() * eigen.vectors.transpose();
 }
 
 }  // namespace
@@ -143,8 +143,7 @@ Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions) {
   both << one, other;
   const auto pooled = gaussian_of(both);
   if (!pooled) return std::unexpected(pooled.error());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(pooled->covariance);
-  const Eigen::MatrixXd axes = solver.eigenvectors().rightCols(kept);
+  const Eigen::MatrixXd axes = symmetric_eigen(pooled->covariance).vectors.rightCols(kept);
   const auto first = gaussian_of(one * axes);
   const auto second = gaussian_of(other * axes);
   if (!first) return std::unexpected(first.error());

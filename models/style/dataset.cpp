@@ -5,9 +5,8 @@
 #include <numbers>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "models/motion/motion.hpp"
+#include "models/motion/symmetric_eigen.hpp"
 #include "models/style/harmonics.hpp"
 #include "proto/text/clean.hpp"
 
@@ -141,9 +140,9 @@ void use_principal_component(Dataset& dataset, const std::string& motion) {
     const MatrixXd centred = q.rowwise() - Eigen::RowVectorXd(q.colwise().mean());
     scatter += centred.transpose() * centred / static_cast<double>(q.rows());
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scatter);
+  const MatrixXd axes = motion::symmetric_eigen(scatter).vectors;
   for (const int c : members) {
-    dataset.clips[c].leg = dataset.clips[c].q * solver.eigenvectors().rightCols(1);
+    dataset.clips[c].leg = dataset.clips[c].q * axes.rightCols(1);
     dataset.clips[c].has_legs = false;
   }
 }

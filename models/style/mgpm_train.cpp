@@ -8,9 +8,9 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 
 #include "models/gp/lbfgs.hpp"
+#include "models/motion/symmetric_eigen.hpp"
 #include "models/style/harmonics.hpp"
 
 namespace posed::style {
@@ -167,8 +167,11 @@ MatrixXd svd_styles(const MgpmData& data, const VectorXd& theta0, const VectorXd
                            .matrix();
     stacked.row(s) = c.reshaped().transpose();
   }
-  const Eigen::BDCSVD<MatrixXd> svd(stacked, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const MatrixXd xi = svd.matrixU().leftCols(q) * svd.singularValues().head(q).asDiagonal();
+  // The left singular vectors by their singular values, from the small matrix of inner products.
+  const motion::SymmetricEigen eigen = motion::symmetric_eigen(stacked * stacked.transpose());
+  const VectorXd singular_values = eigen.values.tail(q).cwiseMax(0.0).cwiseSqrt();
+  const MatrixXd xi =
+      (eigen.vectors.rightCols(q) * singular_values.asDiagonal()).rowwise().reverse();
   return xi / std::max(1e-9, std::sqrt(xi.squaredNorm() / static_cast<double>(xi.size())));
 }
 
