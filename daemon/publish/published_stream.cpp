@@ -94,7 +94,7 @@ void PublishedStream::measure(const Frame& frame, const StageStamps& stamps) noe
 void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
   measure(frame, stamps);
   const std::scoped_lock lock(mutex_);
-  ++now_.frames;
+  ++now_.published.frames;
   now_.lag_frames = frame.lag_frames;
   now_.lag_ms = frame.lag_ms;
   now_.label = frame.label;
@@ -105,7 +105,7 @@ void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
 
 void PublishedStream::count_sample() {
   const std::scoped_lock lock(mutex_);
-  ++now_.samples;
+  ++now_.published.samples;
 }
 
 void PublishedStream::set_model(std::string name) {
@@ -144,8 +144,8 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   fill_stages(info.stages, pipeline, stats);
   fill_device(stats);
   const std::scoped_lock lock(mutex_);
-  stats.set_frames(now_.frames);
-  stats.set_samples(now_.samples);
+  stats.set_frames(now_.published.frames);
+  stats.set_samples(now_.published.samples);
   stats.set_model(now_.model);
   stats.set_lag_frames(now_.lag_frames);
   stats.set_lag_ms(now_.lag_ms);
@@ -159,6 +159,11 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
 v1::StreamStats PublishedStream::stats() const {
   v1::StreamStats stats;
   {
+PublishedStream::Counts PublishedStream::counts() const {
+  const std::scoped_lock lock(mutex_);
+  return now_.published;
+}
+
     const std::scoped_lock lock(mutex_);
     stats = reported_;
   }

@@ -64,15 +64,14 @@ v1::Stats Publisher::stats() const {
     const std::scoped_lock lock(requests_->mutex);
     stats = requests_->stats;
   }
-  slots_->look([&](const PublishedStream& published) { *stats.add_stream() = published.stats(); });
+  slots_->fill(stats);
   stats.set_time_ns(options_.data_clock());
-  fill_common(stats);
+  add_sources(stats);
   if (options_.more_stats) options_.more_stats(stats);
   return stats;
 }
 
-void Publisher::fill_common(v1::Stats& stats) const {
-  slots_->add_left(stats);
+void Publisher::add_sources(v1::Stats& stats) const {
   for (const SourceInfo& info : options_.sources) {
     v1::SourceStats& source = *stats.add_source();
     source.set_name(info.name);

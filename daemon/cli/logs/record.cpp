@@ -47,6 +47,7 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
   std::uint64_t frames = stats.left_frames(), samples = stats.left_samples();
   nlohmann::ordered_json streams = nlohmann::ordered_json::array();
   for (const v1::StreamStats& stream : stats.stream()) {
+  const bool some_left = frames + samples > 0;
     frames += stream.frames();
     samples += stream.samples();
     streams.push_back(
@@ -54,17 +55,24 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
   }
   const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
   if (options.json) {
-    const nlohmann::ordered_json line{{"file", options.out},    {"seconds", took_s},
-                                      {"bytes", bytes},         {"frames", frames},
-                                      {"samples", samples},     {"streams", streams},
-                                      {"missing_chunks", lost}, {"write_errors", errors}};
+    const nlohmann::ordered_json line{{"file", options.out},
+                                      {"seconds", took_s},
+                                      {"bytes", bytes},
+                                      {"frames", frames},
+                                      {"samples", samples},
+                                      {"streams", streams},
+                                      {"left_frames", stats.left_frames()},
+                                      {"left_samples", stats.left_samples()},
+                                      {"missing_chunks", lost},
+                                      {"write_errors", errors}};
     std::printf("%s\n", json_text(line).c_str());
     std::fflush(stdout);
   }
   spdlog::log(lost + errors > 0 ? spdlog::level::warn : spdlog::level::info,
-              "{}: {:.1f} s of {} stream{}, {} frames and {} samples published, {:.1f} MB; {}",
-              options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s", frames,
-              samples, static_cast<double>(bytes) / 1e6,
+              "{}: {:.1f} s of {} stream{}{}, {} frames and {} samples published, {:.1f} MB; {}",
+              options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
+              some_left ? " and those that have left" : "", frames, samples,
+              static_cast<double>(bytes) / 1e6,
               lost + errors == 0
                   ? "nothing is missing"
                   : fmt::format("{} chunks are missing after {} write errors; `posed replay` says "

@@ -110,6 +110,7 @@ TEST_CASE("the live view says whose body a stream is, and why one is refused") {
   bob.set_body("Bob");
   bob.set_state("refused");
   bob.set_refusal("walk.style needs a joint Hips; leave the body out");
+  for (const char* stage : {"style", "constrain"}) bob.add_stage()->set_name(stage);  // never run
   LiveViewOptions options{.title = "posed", .width = 0, .height = 0};
   const auto lines = live_view(stats, options);
   REQUIRE(lines.size() == 8);
