@@ -124,6 +124,7 @@ void PublishedStream::fill_device(v1::StreamStats& stats) const {
   for (const auto& outcome : source.outcome) stats.add_outcome(outcome.load());
   const std::int64_t link_ns = source.link_ns.load();
   stats.set_away(is_away(source, info.comes_and_goes));
+  stats.set_kernel_dropped(source.kernel_dropped.load());
   stats.set_connections(source.connections.load());
   stats.set_link_ns(link_ns != kNoTime_ns ? link_ns : 0);
   if (info.present) describe_device(*info.present->description(), stats);

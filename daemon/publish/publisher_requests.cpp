@@ -80,6 +80,7 @@ void Publisher::add_sources(v1::Stats& stats) const {
     source.set_away(is_away(*info.counters, info.comes_and_goes));
     source.set_connections(info.counters->connections.load());
     for (const auto& outcome : info.counters->outcome) source.add_outcome(outcome.load());
+    source.set_kernel_dropped(info.counters->kernel_dropped.load());
     const auto of_source = [&](const v1::StreamStats& stream) {
       return stream.source_name() == info.name;
     };

@@ -123,6 +123,29 @@ TEST_CASE("the live view says whose body a stream is, and why one is refused") {
   CHECK(monitor_line(stats).ends_with("shed: walk.style needs a joint Hips; leave the body out"));
 }
 
+TEST_CASE("the live view shows what the kernel dropped of a device's datagrams") {
+  v1::Stats stats = stats_of(2);
+  stats.mutable_stream(0)->set_kernel_dropped(7);
+  stats.mutable_stream(1)->set_kernel_dropped(12);
+  stats.mutable_stream(1)->set_source_name("optitrack");
+  stats.mutable_stream(1)->set_body("Ann");
+  v1::SourceStats& busy = *stats.add_source();
+  busy.set_name("optitrack");
+  busy.set_streams(1);
+  busy.set_kernel_dropped(12);
+  v1::SourceStats& empty = *stats.add_source();
+  empty.set_name("vicon");
+  empty.set_away(true);
+  empty.set_kernel_dropped(3);
+  const auto lines = live_view(stats, {.title = "posed", .width = 0, .height = 0});
+  REQUIRE(lines.size() == 9);
+  CHECK(lines[4] == "  optitrack the kernel dropped 12 datagrams (machine too slow)");
+  CHECK(lines[5] ==
+        "  vicon     the device is away, the kernel dropped 3 datagrams (machine too slow)");
+  CHECK(lines[6] == "  walker0   the kernel dropped 7 datagrams (machine too slow)");
+  CHECK(lines[7] == "  walker1   body 'Ann' of optitrack");
+}
+
 TEST_CASE("a daemon that does not answer is not shown as live") {
   v1::Stats stats = stats_of(2);
   stats.mutable_stream(0)->set_label("g");
