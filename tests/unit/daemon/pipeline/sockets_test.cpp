@@ -1,12 +1,15 @@
-// A device that speaks on two sockets, through the reader and into the record.
+// A device that speaks on two sockets, through the reader and into the record, and from a log.
 #include <array>
 #include <cstring>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
+#include "daemon/emulate/log_emulator.hpp"
 #include "daemon/pipeline/reader.hpp"
+#include "proto/log/writer.hpp"
 #include "tests/support/quiet_record_sink.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace posed::pipeline {
 namespace {
@@ -83,9 +86,6 @@ TEST_CASE("chunks and requests keep their socket, to the decoder and into the lo
   CHECK(record.from == 1);
   CHECK(sockets.sent_to == 2);
   CHECK(record.to == 2);
-}
-
-}  // namespace posed::pipeline
   CHECK(counters.kernel_dropped == 3);
 }
 
@@ -123,3 +123,6 @@ TEST_CASE("a log's device sends each datagram to the socket that it came to") {
         "its device speaks to 2 sockets of the host; name one address for each with --udp, in"
         " their order"));
   }
+}
+
+}  // namespace posed::pipeline
