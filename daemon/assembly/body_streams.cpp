@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "daemon/devices/about_stream.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
 

@@ -1,8 +1,10 @@
 #include "daemon/publish/published_stream.hpp"
-#include "proto/text/clean.hpp"
 
 #include <algorithm>
 #include <array>
+
+#include "proto/text/clean.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::publish {
 namespace {
@@ -72,7 +74,7 @@ Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
 
 PublishedStream::PublishedStream(StreamInfo stream_info)
     : info(std::move(stream_info)), styled(info.name, info, false) {
-  if (info.raw) raw.emplace(info.name + "-raw", info, true);
+  if (info.raw) raw.emplace(raw_name(info.name), info, true);
   now_.model = info.model;
   if (!info.refusal.empty()) styled.skeleton.reset();  // no pose will ever need it
 }
@@ -122,9 +124,9 @@ void PublishedStream::fill_device(v1::StreamStats& stats) const {
   const pipeline::SourceCounters& source = *info.source_counters;
   stats.clear_outcome();
   for (const auto& outcome : source.outcome) stats.add_outcome(outcome.load());
+  stats.set_kernel_dropped(source.kernel_dropped.load());
   const std::int64_t link_ns = source.link_ns.load();
   stats.set_away(is_away(source, info.comes_and_goes));
-  stats.set_kernel_dropped(source.kernel_dropped.load());
   stats.set_connections(source.connections.load());
   stats.set_link_ns(link_ns != kNoTime_ns ? link_ns : 0);
   if (info.present) describe_device(*info.present->description(), stats);
@@ -157,14 +159,14 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_clock_drift_ppm(now_.clock.drift_ppm);
 }
 
-v1::StreamStats PublishedStream::stats() const {
-  v1::StreamStats stats;
-  {
 PublishedStream::Counts PublishedStream::counts() const {
   const std::scoped_lock lock(mutex_);
   return now_.published;
 }
 
+v1::StreamStats PublishedStream::stats() const {
+  v1::StreamStats stats;
+  {
     const std::scoped_lock lock(mutex_);
     stats = reported_;
   }

@@ -30,6 +30,7 @@
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
+#include "proto/text/stream_name.hpp"
 namespace posed::cli {
 namespace {
 
@@ -106,7 +107,7 @@ class Outputs {
   explicit Outputs(const replay::Replay& replay) : replay_(replay) {
     for (std::uint32_t id = 0; id < replay.streams(); ++id) {
       const std::string& name = replay.stream(id).name;
-      encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(name + "-raw")});
+      encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(raw_name(name))});
     }
   }
 
