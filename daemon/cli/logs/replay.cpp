@@ -17,6 +17,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/live/client.hpp"
+#include "daemon/cli/logs/no_body.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/publish/encode.hpp"
@@ -29,8 +30,8 @@
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
-
 #include "proto/text/stream_name.hpp"
+
 namespace posed::cli {
 namespace {
 
@@ -199,6 +200,15 @@ void warn_of_undescribed(const replay::Replay& replay) {
   }
 }
 
+void warn_of_sources_without_body(const log::Reader& reader) {
+  for (const log::SourceRow& source : reader.sources()) {
+    const auto& streams = reader.streams();
+    if (std::ranges::find(streams, source.id, &log::StreamRow::source) == streams.end()) {
+      warn_of_no_body(source.name);
+    }
+  }
+}
+
 // Each once: a body that comes back is another stream of the same name.
 std::vector<std::string> stream_names(const log::Reader& reader) {
   std::vector<std::string> names;
@@ -291,6 +301,7 @@ Result<> replay(const ReplayOptions& options) {
   replay::Replay& replay = **opened;
   warn_of_gaps(*reader);
   warn_of_undescribed(replay);
+  warn_of_sources_without_body(*reader);
   Outputs outputs(replay);
   if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
   const auto extent = reader->extent();
