@@ -41,6 +41,9 @@ struct Chunk {
   // not among the peers, and empty or too long ones.
   std::uint32_t foreign = 0;
   std::uint32_t damaged = 0;
+  // Datagrams that the kernel dropped, because nobody read in time and its buffer was full. The
+  // kernel tells them with the next datagram that it keeps.
+  std::uint32_t kernel_dropped = 0;
 };
 
 // The source of bytes. After open(), one reader thread uses it.

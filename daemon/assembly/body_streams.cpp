@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "daemon/devices/about_stream.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
 
@@ -112,7 +113,7 @@ void BodyStreams::run() {
   system::name_thread("posed-bodies");
   while (true) {
     wake_->going_to_sleep();  // before the turn, so that what comes during it ends the wait
-    if (stop_.load(std::memory_order_acquire)) break;
+    if (builder_->stopped()) break;
     const std::int64_t due_ns = builder_->turn(system::monotonic_ns());
     static_cast<void>(poller_->wait(system::time_left_ns(due_ns, system::monotonic_ns)));
     wake_->awake();
@@ -125,9 +126,10 @@ void BodyStreams::stop_supervisors() noexcept {
 
 void BodyStreams::stop() noexcept {
   supervisors_.clear();
-  stop_.store(true, std::memory_order_release);
+  if (!thread_.joinable()) return;
+  builder_->stop();
   wake_->notify();
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
 }
 
 pipeline::StreamCounters& BodyStreams::counters(std::uint32_t stream) {

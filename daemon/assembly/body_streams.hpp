@@ -3,7 +3,6 @@
 // owns the thread of the builder.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -95,7 +94,6 @@ class BodyStreams final : public devices::StreamHost {
   std::mutex mutex_;                                                            // guards source_of_
   std::map<std::uint32_t, const devices::BodySource*> source_of_;               // by stream
   std::vector<std::unique_ptr<devices::DeviceSupervisor>> supervisors_;
-  std::atomic<bool> stop_{false};
   std::thread thread_;
 };
 

@@ -10,6 +10,7 @@
 
 #include "daemon/assembly/body_streams.hpp"
 #include "daemon/control/control_server.hpp"
+#include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/device_supervisor.hpp"
 #include "daemon/net/keys.hpp"
 #include "daemon/net/peer_guard.hpp"
@@ -19,6 +20,7 @@
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::assembly {
 namespace {
@@ -326,7 +328,7 @@ std::set<std::string> Daemon::Parts::stream_names() const {
   std::set<std::string> names;
   const auto add = [&](const config::StreamConfig& stream) {
     names.insert(stream.name);
-    if (stream.publish_raw) names.insert(stream.name + "-raw");
+    if (stream.publish_raw) names.insert(raw_name(stream.name));
   };
   for (const config::StreamConfig& stream : config.streams) add(stream);
   for (const config::SourceConfig& source : config.sources) {

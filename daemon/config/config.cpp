@@ -11,6 +11,7 @@
 #include "models/stages/registry.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
+#include "proto/text/stream_name.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
 
@@ -139,7 +140,7 @@ std::set<std::string> all_keys(Drivers drivers) {
 }  // namespace
 
 bool is_stream_name(std::string_view name) {
-  return !name.empty() && name.size() <= 32 &&
+  return !name.empty() && name.size() <= kMaxStreamName &&
          name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string_view::npos;
 }
 

@@ -1,6 +1,6 @@
 // The settings of the daemon, checked and complete. They are filled from TOML by the config reader,
-// by hand in tests and benchmarks, and from the log in replay. Every default is defined here and
-// nowhere else.
+// by hand in tests and benchmarks, and from the log in replay. Every default is defined here, or in
+// a lower folder that has a use for it, too.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/net/security.hpp"
+#include "daemon/system/stale.hpp"
 #include "drivers/driver.hpp"
 #include "models/stage_type.hpp"
 
@@ -26,7 +27,7 @@ struct StreamConfig {
   drivers::Options options;           // of the driver, complete with its defaults
   std::filesystem::path calibration;  // of a glove; empty: use the device's default
   bool publish_raw = false;           // publish the unstyled input too, as <name>-raw
-  double stale_after_s = 0.5;         // after this long without data the stream is stale
+  double stale_after_s = system::kStaleAfter_s;
   // In the order in which they run. Some stages are there without a table (StageType::is_default);
   // they are not in this list, because only the opened device says what its skeleton is.
   std::vector<StageConfig> stages;

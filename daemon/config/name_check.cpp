@@ -7,11 +7,10 @@
 
 #include "daemon/config/config.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::config {
 namespace {
-
-constexpr std::string_view kRawSuffix = "-raw";
 
 const char* kind_of_table(const NamedTable& table) { return table.is_source ? "source" : "stream"; }
 
@@ -40,11 +39,11 @@ void check_names(std::vector<NamedTable> tables, Findings& findings) {
   }
   for (const NamedTable& stream : tables) {
     if (!stream.publish_raw) continue;
-    const std::string raw = stream.name + std::string(kRawSuffix);
+    const std::string raw = raw_name(stream.name);
     if (is_stream_name(stream.name) && !is_stream_name(raw)) {
-      findings.add_error(stream.line, fmt::format("{} is longer than 32 letters; shorten the name"
+      findings.add_error(stream.line, fmt::format("{} is longer than {} letters; shorten the name"
                                                   " or leave out publish_raw",
-                                                  in_quotes(raw)));
+                                                  in_quotes(raw), kMaxStreamName));
     }
     const auto taken = first.find(raw);
     if (taken != first.end() && !taken->second->is_source) {

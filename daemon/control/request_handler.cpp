@@ -6,23 +6,21 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/control/stage_requests.hpp"
+#include "daemon/devices/about_stream.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::control {
 namespace {
 
+using devices::of_stream;
 using pipeline::Command;
 using pipeline::StageChange;
 
 Reply make_reply(Requester to, const v1::ControlReply& reply) {
   return {std::move(to), reply.SerializeAsString()};
-}
-
-std::unexpected<Error> of_stream(const std::string& name, Error error) {
-  error.message = "stream " + name + ": " + error.message;
-  return std::unexpected(std::move(error));
 }
 
 Reply refusal(Requester to, const std::string& sentence) {
@@ -101,7 +99,7 @@ Result<ControlledStream*> RequestHandler::find_stream(const std::string& name) {
     if (is_earlier(it)) continue;
     ControlledStream& stream = it->second;
     if (stream.name == name) return &stream;
-    if (stream.publishes_raw && stream.name + "-raw" == name) {
+    if (stream.publishes_raw && raw_name(stream.name) == name) {
       return fail(
           fmt::format("{} is the input of {} before its stages and cannot be changed; name"
                       " {}",
@@ -217,7 +215,7 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     std::string_view why = done.refusal.empty() ? "the stage refused this" : done.refusal;
     if (ack.gone) why = "its body changes just now; try again";
     if (gone || is_earlier(stream)) why = "it has left before this took effect";
-    return refusal(std::move(done.requester), fmt::format("stream {}: {}", done.name, why));
+    return refusal(std::move(done.requester), devices::about_stream(done.name, why));
   }
   if (!gone) apply(stream->second, done);
   v1::ControlReply reply;

@@ -2,10 +2,12 @@
 
 #include <string_view>
 
+#include "proto/text/stream_name.hpp"
+
 namespace posed::devices {
 namespace {
 
-constexpr std::size_t kMaxName = 28;
+constexpr std::size_t kMaxName = kMaxStreamName - kRawSuffix.size();
 
 char plain(char c) {
   if (c >= 'A' && c <= 'Z') return static_cast<char>(c - 'A' + 'a');
@@ -36,14 +38,14 @@ const std::string* BodyNames::name_of(const std::string& source, const std::stri
   const std::string plain = plain_stream_name(source, body);
   std::string name = plain;
   const auto taken = [this](const std::string& one) {
-    return taken_.contains(one) || taken_.contains(one + "-raw");
+    return taken_.contains(one) || taken_.contains(raw_name(one));
   };
   for (int i = 2; taken(name); ++i) {
     const std::string suffix = "-" + std::to_string(i);
     name = plain.substr(0, kMaxName - suffix.size()) + suffix;
   }
   taken_.insert(name);
-  taken_.insert(name + "-raw");
+  taken_.insert(raw_name(name));
   return &names_.emplace(key, std::move(name)).first->second;
 }
 

@@ -9,7 +9,7 @@
 namespace posed::devices {
 
 // "<source>-<body>" in lower case; every other character than a-z, 0-9, '-' and '_' becomes '-';
-// at most 28 characters, so that "-raw" fits behind it.
+// cut so that the suffix of raw input fits behind it.
 [[nodiscard]] std::string plain_stream_name(const std::string& source, const std::string& body);
 
 // Gives each body a name of its own, which it keeps when it leaves and returns.
@@ -31,7 +31,7 @@ class BodyNames {
     int number;
     auto operator<=>(const Body&) const = default;
   };
-  std::set<std::string> taken_;  // also NAME-raw of each name, under which its input is published
+  std::set<std::string> taken_;  // also the raw_name() of each
   std::map<Body, std::string> names_;
   std::map<std::string, std::size_t> kept_;  // by source
 };

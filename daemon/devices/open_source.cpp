@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/calibration.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "drivers/transport/file.hpp"
@@ -105,11 +106,6 @@ Result<std::unique_ptr<OpenSource>> open_source(const config::SourceConfig& conf
       open_source({.name = config.name, .driver = config.driver, .options = config.options});
   if (!source) return of_source(config.name, source.error());
   return source;
-}
-
-std::unexpected<Error> of_source(const std::string& name, Error error) {
-  error.message = "source '" + name + "': " + error.message;
-  return std::unexpected(std::move(error));
 }
 
 Result<std::string> try_kept_device(OpenSource& source) {

@@ -45,12 +45,9 @@ struct SourceOptions {
 [[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(const SourceOptions& options);
 
 // The same for a device with several bodies. Reads the model files of its streams, too; they are
-// bound when a body is there.
+// bound when a body is there. Errors name the source.
 [[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(const config::SourceConfig& config,
                                                               ModelFiles& files);
-
-// Adds the source's name to an error.
-[[nodiscard]] std::unexpected<Error> of_source(const std::string& name, Error error);
 
 // For a command that needs the result now (`check`): opens the device that a supervisor would open,
 // and tries the calibration on it. Returns an empty string, or one sentence that says why the

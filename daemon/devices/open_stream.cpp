@@ -2,12 +2,9 @@
 
 #include <utility>
 
-namespace posed::devices {
+#include "daemon/devices/about_stream.hpp"
 
-std::unexpected<Error> of_stream(const std::string& name, Error error) {
-  error.message = "stream '" + name + "': " + error.message;
-  return std::unexpected(std::move(error));
-}
+namespace posed::devices {
 
 Result<std::unique_ptr<OpenStream>> open_stream(const config::StreamConfig& config) {
   auto source = open_source({.name = config.name,

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/devices/open_source.hpp"
@@ -22,8 +21,5 @@ struct OpenStream {
 
 // Opens the source and loads the stages. Errors name the stream. Cold.
 [[nodiscard]] Result<std::unique_ptr<OpenStream>> open_stream(const config::StreamConfig& config);
-
-// Adds the stream's name to an error.
-[[nodiscard]] std::unexpected<Error> of_stream(const std::string& name, Error error);
 
 }  // namespace posed::devices

@@ -52,7 +52,7 @@ bool SourceBodies::may_have_slot() const {
 
 void SourceBodies::turn(std::int64_t now_ns) {
   take_back();
-  if (due_ns(now_ns) > now_ns) return;
+  if (shared_.is_stopped() || due_ns(now_ns) > now_ns) return;
   next_ns_ = now_ns + SourceBuilder::kBetweenUpdates_ns;
   static_cast<void>(source_.exchange->descriptions.take(description_));
   build();
@@ -93,8 +93,9 @@ void SourceBodies::build() {
   without_slot_ = without_name_ = 0;
   freed_ = shared_.slots.freed();
   auto update = std::make_unique<pipeline::SourceUpdate>();
-  const std::vector<Stream> before =
-      std::exchange(streams_, streams_of((*layout)->bodies, *update));
+  std::vector<Stream> now = streams_of((*layout)->bodies, *update);
+  if (shared_.is_stopped()) return;  // perhaps not all of them, so the reader must not have them
+  const std::vector<Stream> before = std::exchange(streams_, std::move(now));
   for (const Stream& stream : before) {
     if (std::ranges::find(streams_, stream.id, &Stream::id) != streams_.end()) continue;
     // The worker has to end a stream that runs; a refused one goes at once.
@@ -152,6 +153,7 @@ std::vector<SourceBodies::Stream> SourceBodies::streams_of(const std::vector<dri
   std::vector<Stream> streams;
   std::map<std::string, int> called;
   for (const drivers::Body& body : bodies) {
+    if (shared_.is_stopped()) break;
     pipeline::ReadBody& read = update.bodies.emplace_back();
     const int number = ++called[body.name];
     const config::StreamConfig* config = wanted(body.name, number);

@@ -3,6 +3,7 @@
 // reader the new bodies in one piece. Cold; for the builder's thread.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -29,6 +30,9 @@ struct SharedBodies {
   // With which a stream goes on that returns under its name; by the name of one that has left.
   std::map<std::string, pipeline::NextNumbers> numbers{};
   std::size_t made = 0;  // streams since the start
+  std::atomic<bool> stopped{false};
+
+  [[nodiscard]] bool is_stopped() const noexcept { return stopped.load(std::memory_order_acquire); }
 };
 
 class SourceBodies {

@@ -26,6 +26,10 @@ class SourceBuilder {
   // Does what is due. Returns when to call it next at the latest; call earlier if the EventFd of
   // the sources' BodyExchange is notified.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
+  // Any thread: no more streams are wanted. A turn under way ends before the next body, because
+  // many bodies with large models take seconds.
+  void stop() noexcept { shared_.stopped.store(true, std::memory_order_release); }
+  [[nodiscard]] bool stopped() const noexcept { return shared_.is_stopped(); }
 
  private:
   SharedBodies shared_;

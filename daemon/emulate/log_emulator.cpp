@@ -1,5 +1,9 @@
 #include "daemon/emulate/log_emulator.hpp"
 
+#include <algorithm>
+
+#include <spdlog/fmt/fmt.h>
+
 #include "daemon/pipeline/record_sink.hpp"
 #include "proto/log/reader.hpp"
 
@@ -8,10 +12,11 @@ namespace posed::emulate {
 LogEmulator::LogEmulator(drivers::Recording recording, std::unique_ptr<drivers::Emulator> speaker)
     : recording_(std::move(recording)), speaker_(std::move(speaker)) {}
 
-void LogEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) {
+void LogEmulator::receive_socket(std::uint8_t socket, std::span<const std::byte> bytes,
+                                 std::int64_t now_ns, Bytes& answer) {
   if (!speaker_) return;
   const bool streamed = streams();
-  speaker_->receive(bytes, now_ns, answer);
+  speaker_->receive_socket(socket, bytes, now_ns, answer);
   if (!streamed && streams() && next_ == 0) start_ns_ = now_ns;
 }
 
@@ -25,7 +30,8 @@ void LogEmulator::emit(std::int64_t, Bytes& out) {
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
-Result<LoggedDevice> read_logged_device(const std::string& log, const std::string& stream) {
+Result<LoggedDevice> read_logged_device(const std::string& log, const std::string& stream,
+                                        std::size_t addresses) {
   auto reader = log::Reader::open(log);
   if (!reader) return std::unexpected(reader.error());
   const log::StreamRow* wanted = nullptr;
@@ -40,18 +46,24 @@ Result<LoggedDevice> read_logged_device(const std::string& log, const std::strin
   const log::SourceRow& source = reader->source_of(*wanted);
   LoggedDevice device{
       .stream = wanted->name, .driver = source.driver, .text = source.text, .recording = {}};
+  std::size_t sockets = 1;
   for (;;) {
     const auto chunk = reader->next_chunk();
     if (!chunk) return std::unexpected(chunk.error());
     if (!chunk->has_value()) break;
     const log::ChunkRow& row = **chunk;
-    if (row.source != source.id ||
-        row.direction != static_cast<std::uint8_t>(pipeline::Direction::kFromDevice)) {
-      continue;
-    }
-    device.recording.add(row.arrival_ns, row.bytes);
+    if (row.source != source.id) continue;
+    sockets = std::max<std::size_t>(sockets, row.socket + std::size_t{1});
+    if (row.direction != static_cast<std::uint8_t>(pipeline::Direction::kFromDevice)) continue;
+    device.recording.add(row.arrival_ns, row.bytes, static_cast<std::uint8_t>(row.socket));
   }
   if (device.recording.count() == 0) return fail("nothing came from this stream's device", log);
+  if (sockets != addresses) {
+    return misuse(fmt::format("its device speaks to {} socket{} of the host; name one address for"
+                              " each with --udp, in their order",
+                              sockets, sockets == 1 ? "" : "s"),
+                  log);
+  }
   return device;
 }
 

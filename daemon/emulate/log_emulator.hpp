@@ -17,8 +17,16 @@ class LogEmulator final : public drivers::Emulator {
   LogEmulator(drivers::Recording recording, std::unique_ptr<drivers::Emulator> speaker);
 
   void pose(std::size_t /*body*/, const Frame& /*frame*/) override {}
-  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override {
+    receive_socket(0, bytes, now_ns, answer);
+  }
+  void receive_socket(std::uint8_t socket, std::span<const std::byte> bytes, std::int64_t now_ns,
+                      Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override;
+  // That which the datagram came to when it was recorded.
+  [[nodiscard]] std::uint8_t next_socket() const override {
+    return done() ? std::uint8_t{0} : recording_.socket(next_);
+  }
   void emit(std::int64_t now_ns, Bytes& out) override;
 
   [[nodiscard]] bool done() const noexcept { return next_ == recording_.count(); }
@@ -35,11 +43,13 @@ class LogEmulator final : public drivers::Emulator {
 };
 
 // The chunks that a stream of the log received. Without a name the log must have only one stream.
+// `addresses`: how many sockets of a host they are to be sent to; as many as the device knew.
 struct LoggedDevice {
   std::string stream, driver, text;
   drivers::Recording recording;
 };
 [[nodiscard]] Result<LoggedDevice> read_logged_device(const std::string& log,
-                                                      const std::string& stream);
+                                                      const std::string& stream,
+                                                      std::size_t addresses);
 
 }  // namespace posed::emulate

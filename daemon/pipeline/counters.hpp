@@ -16,6 +16,7 @@ enum class StreamState : std::uint8_t { kWaiting, kLive, kStale, kEnded };
 // Of one source. The streams of its bodies share it.
 struct alignas(64) SourceCounters {
   std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
+  std::atomic<std::uint64_t> kernel_dropped{0};    // as in drivers::Chunk
   std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
   std::atomic<bool> connected{false};              // a link to the device is open
   std::atomic<std::uint64_t> connections{0};       // links opened since the start

@@ -162,6 +162,7 @@ class Reader::Source final : private IntakeOut {
     arrived(chunk.arrival_ns != kNoTime_ns ? chunk.arrival_ns : ports_.clock());
     count(counters_.outcome[static_cast<std::size_t>(Outcome::kForeign)], chunk.foreign);
     count(counters_.outcome[static_cast<std::size_t>(Outcome::kShort)], chunk.damaged);
+    count(counters_.kernel_dropped, chunk.kernel_dropped);
     if (!chunk.bytes.empty()) {
       record_sink(pipeline::Direction::kFromDevice, chunk.bytes, chunk.socket);
       device_->decoder->feed_socket(chunk.socket, chunk.bytes, arrival_ns_, intake_);

@@ -90,10 +90,10 @@ void StreamContext::flush() noexcept {
 }
 
 void StreamContext::item(const Item& item) noexcept {
-  outgoing_ = item;
-  if ((within_share(outgoing_) && !share_.has_room()) || !ports_.out->push(outgoing_)) {
-    if (ports_.record_sink != nullptr && is_pose(outgoing_))
-      ports_.record_sink->unpublished(outgoing_.frame.header.stream);
+  if ((within_share(item) && !share_.has_room()) || !ports_.out->push(item)) {
+    if (ports_.record_sink != nullptr && is_pose(item)) {
+      ports_.record_sink->unpublished(item.frame.header.stream);
+    }
     return count(counters_.pipeline.dropped);
   }
   share_.add();

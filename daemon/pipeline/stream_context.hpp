@@ -72,7 +72,6 @@ class StreamContext final : private EngineOut {
   std::vector<Command> first_commands_;
   std::size_t begun_ = 0;  // how many of them were applied
   RingShare share_;        // of ports_.out
-  Item outgoing_;          // kept here because it is large
   Decision placed_;        // the same
 };
 

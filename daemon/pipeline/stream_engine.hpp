@@ -9,6 +9,7 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/system/stale.hpp"
 #include "models/stage_type.hpp"
 
 namespace posed::pipeline {
@@ -33,7 +34,7 @@ struct EngineStage {
 
 struct EngineOptions {
   std::uint32_t stream = 0;
-  std::int64_t stale_after_ns = kNanosPerSecond / 2;
+  std::int64_t stale_after_ns = nanoseconds(system::kStaleAfter_s);
   bool publish_raw = false;
   std::vector<EngineStage> stages{};  // in the order in which they run
   Clock clock = nullptr;              // to time the stages; null: they are not timed

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/pipeline/stream_engine.hpp"
+#include "daemon/system/stale.hpp"
 #include "models/stage_type.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
@@ -25,7 +26,7 @@ struct StageSettings {
 
 struct StreamSettings {
   bool publish_raw = false;
-  double stale_after_s = 0.5;
+  double stale_after_s = system::kStaleAfter_s;
   double rate_hz = 0.0;                 // the device's nominal rate; 0: unknown
   std::vector<StageSettings> stages{};  // in the order in which they run
 };

@@ -63,15 +63,22 @@ void PublishedSlots::advance(std::uint32_t slot) {
 }
 
 void PublishedSlots::count_left(const PublishedStream& stream) {
-  const v1::StreamStats stats = stream.stats();
-  left_frames_ += stats.frames();
-  left_samples_ += stats.samples();
+  const PublishedStream::Counts counts = stream.counts();
+  left_.frames += counts.frames;
+  left_.samples += counts.samples;
 }
 
-void PublishedSlots::add_left(v1::Stats& stats) const {
+void PublishedSlots::fill(v1::Stats& stats) const {
   const std::scoped_lock lock(mutex_);
-  stats.set_left_frames(left_frames_);
-  stats.set_left_samples(left_samples_);
+  for (const Slot& slot : slots_) {
+    if (!slot.empty()) *stats.add_stream() = slot.front()->stats();
+  }
+  fill_left(stats);
+}
+
+void PublishedSlots::fill_left(v1::Stats& stats) const {
+  stats.set_left_frames(left_.frames);
+  stats.set_left_samples(left_.samples);
 }
 
 void PublishedSlots::remove(std::uint32_t stream) {

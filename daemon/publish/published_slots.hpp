@@ -21,15 +21,9 @@ class PublishedSlots {
   void add(std::unique_ptr<PublishedStream> stream);
   // Any thread, cold. Does nothing if there is no such stream.
   void set_model(std::uint32_t stream, std::string name);
-  // Any thread, cold: calls `use(const PublishedStream&)` for each stream that has its slot. None
-  // of them goes away meanwhile.
-  template <typename Use>
-  void look(Use&& use) const {
-    const std::scoped_lock lock(mutex_);
-    for (const Slot& slot : slots_) {
-      if (!slot.empty()) use(*slot.front());
-    }
-  }
+  // Any thread, cold: adds the streams that have their slots, and what was published of those that
+  // are gone. Both are of one moment, so that no frame counts twice or not at all.
+  void fill(v1::Stats& stats) const;
 
   // All below: the publisher's thread, or another one while that does not run.
 
@@ -45,8 +39,8 @@ class PublishedSlots {
   // Does nothing if there is no such stream.
   void remove(std::uint32_t stream);
 
-  // Any thread: what was published of the streams that are gone.
-  void add_left(v1::Stats& stats) const;
+  // What was published of the streams that are gone.
+  void fill_left(v1::Stats& stats) const;
 
   template <typename Use>
   void for_each(Use&& use) {
@@ -75,7 +69,7 @@ class PublishedSlots {
   mutable std::mutex mutex_;
   std::vector<Slot> slots_;                                  // changed under mutex_
   std::vector<std::unique_ptr<PublishedStream>> additions_;  // under mutex_
-  std::uint64_t left_frames_ = 0, left_samples_ = 0;         // under mutex_
+  PublishedStream::Counts left_;                             // of the gone ones; under mutex_
   bool changed_ = false;  // a stream may have got its slot; publisher's thread
 };
 

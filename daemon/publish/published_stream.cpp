@@ -1,8 +1,10 @@
 #include "daemon/publish/published_stream.hpp"
-#include "proto/text/clean.hpp"
 
 #include <algorithm>
 #include <array>
+
+#include "proto/text/clean.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::publish {
 namespace {
@@ -72,7 +74,7 @@ Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
 
 PublishedStream::PublishedStream(StreamInfo stream_info)
     : info(std::move(stream_info)), styled(info.name, info, false) {
-  if (info.raw) raw.emplace(info.name + "-raw", info, true);
+  if (info.raw) raw.emplace(raw_name(info.name), info, true);
   now_.model = info.model;
   if (!info.refusal.empty()) styled.skeleton.reset();  // no pose will ever need it
 }
@@ -94,7 +96,7 @@ void PublishedStream::measure(const Frame& frame, const StageStamps& stamps) noe
 void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
   measure(frame, stamps);
   const std::scoped_lock lock(mutex_);
-  ++now_.frames;
+  ++now_.published.frames;
   now_.lag_frames = frame.lag_frames;
   now_.lag_ms = frame.lag_ms;
   now_.label = frame.label;
@@ -105,7 +107,7 @@ void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
 
 void PublishedStream::count_sample() {
   const std::scoped_lock lock(mutex_);
-  ++now_.samples;
+  ++now_.published.samples;
 }
 
 void PublishedStream::set_model(std::string name) {
@@ -122,6 +124,7 @@ void PublishedStream::fill_device(v1::StreamStats& stats) const {
   const pipeline::SourceCounters& source = *info.source_counters;
   stats.clear_outcome();
   for (const auto& outcome : source.outcome) stats.add_outcome(outcome.load());
+  stats.set_kernel_dropped(source.kernel_dropped.load());
   const std::int64_t link_ns = source.link_ns.load();
   stats.set_away(is_away(source, info.comes_and_goes));
   stats.set_connections(source.connections.load());
@@ -144,8 +147,8 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   fill_stages(info.stages, pipeline, stats);
   fill_device(stats);
   const std::scoped_lock lock(mutex_);
-  stats.set_frames(now_.frames);
-  stats.set_samples(now_.samples);
+  stats.set_frames(now_.published.frames);
+  stats.set_samples(now_.published.samples);
   stats.set_model(now_.model);
   stats.set_lag_frames(now_.lag_frames);
   stats.set_lag_ms(now_.lag_ms);
@@ -154,6 +157,11 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_source(static_cast<v1::Source>(now_.source));
   if (now_.clock.valid) stats.set_clock_offset_ns(now_.clock.offset_ns);
   stats.set_clock_drift_ppm(now_.clock.drift_ppm);
+}
+
+PublishedStream::Counts PublishedStream::counts() const {
+  const std::scoped_lock lock(mutex_);
+  return now_.published;
 }
 
 v1::StreamStats PublishedStream::stats() const {

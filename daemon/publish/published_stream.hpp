@@ -33,7 +33,7 @@ struct Channel {
   std::int64_t skeleton_due_ns = 0;
 };
 
-// Publisher thread, except for set_model() and stats(): any thread.
+// Publisher thread, except for set_model(), counts() and stats(): any thread.
 class PublishedStream {
  public:
   explicit PublishedStream(StreamInfo stream_info);
@@ -43,6 +43,12 @@ class PublishedStream {
   void count(const Frame& frame, const StageStamps& stamps);
   void count_sample();
   void set_model(std::string name);
+
+  // Published so far.
+  struct Counts {
+    std::uint64_t frames = 0, samples = 0;
+  };
+  [[nodiscard]] Counts counts() const;
 
   // The state at this moment, with the rates and percentiles of the last whole second.
   [[nodiscard]] v1::StreamStats stats() const;
@@ -58,8 +64,7 @@ class PublishedStream {
  private:
   // What stats() reads while the publisher continues.
   struct Now {
-    std::uint64_t frames = 0;
-    std::uint64_t samples = 0;
+    Counts published;
     std::string model;
     // Of the last frame.
     std::uint16_t lag_frames = 0;

@@ -382,7 +382,8 @@ void Publisher::every_second(std::int64_t now_ns) {
     *stats.add_stream() = published.report(since_s);
     report_shed(published, false);
   });
-  fill_common(stats);
+  slots_->fill_left(stats);
+  add_sources(stats);
   if (options_.more_stats) options_.more_stats(stats);
   reported_ns_ = now_ns;
   reported_cpu_ns_ = cpu_ns;

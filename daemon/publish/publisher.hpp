@@ -152,8 +152,8 @@ class Publisher {
   [[nodiscard]] bool hear_subscriptions(std::int64_t now_ns);
   [[nodiscard]] bool is_topic(std::string_view prefix) const;
   void every_second(std::int64_t now_ns);
-  // What does not belong to a single stream; call after the streams were added.
-  void fill_common(v1::Stats& stats) const;
+  // Call after the streams were added, because a source says how many it has.
+  void add_sources(v1::Stats& stats) const;
   // These and the functions for other threads: publisher_requests.cpp.
   [[nodiscard]] bool asked() const noexcept;
   void do_what_was_asked();

@@ -64,15 +64,14 @@ v1::Stats Publisher::stats() const {
     const std::scoped_lock lock(requests_->mutex);
     stats = requests_->stats;
   }
-  slots_->look([&](const PublishedStream& published) { *stats.add_stream() = published.stats(); });
+  slots_->fill(stats);
   stats.set_time_ns(options_.data_clock());
-  fill_common(stats);
+  add_sources(stats);
   if (options_.more_stats) options_.more_stats(stats);
   return stats;
 }
 
-void Publisher::fill_common(v1::Stats& stats) const {
-  slots_->add_left(stats);
+void Publisher::add_sources(v1::Stats& stats) const {
   for (const SourceInfo& info : options_.sources) {
     v1::SourceStats& source = *stats.add_source();
     source.set_name(info.name);
@@ -81,6 +80,7 @@ void Publisher::fill_common(v1::Stats& stats) const {
     source.set_away(is_away(*info.counters, info.comes_and_goes));
     source.set_connections(info.counters->connections.load());
     for (const auto& outcome : info.counters->outcome) source.add_outcome(outcome.load());
+    source.set_kernel_dropped(info.counters->kernel_dropped.load());
     const auto of_source = [&](const v1::StreamStats& stream) {
       return stream.source_name() == info.name;
     };

@@ -4,11 +4,12 @@
 #include <array>
 
 #include "proto/frame/time.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::publish {
 namespace {
 
-constexpr std::size_t kMaxName = 32 + 4;  // a stream's name and "-raw"
+constexpr std::size_t kMaxName = kMaxStreamName + kRawSuffix.size();
 constexpr std::array<std::string_view, 4> kTopicKinds{"pose/", "skeleton/", "sensor/", "event/"};
 
 bool is_name_sign(char sign) {

@@ -17,6 +17,7 @@ namespace posed::record {
 namespace {
 
 constexpr auto kWakeEvery = std::chrono::milliseconds(50);
+
 std::string utc_text(std::time_t seconds) {
   std::tm parts{};
   gmtime_r(&seconds, &parts);
@@ -61,17 +62,20 @@ Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
                                                  const RecordedSetup& setup) {
   auto writer = begin_log(options, setup);
   if (!writer) return std::unexpected(writer.error());
+  const RingSizes sizes = ring_sizes(setup, options.frames);
+  // Without bodies to come it is little.
   if (setup.slots_to_come > 0) {
-    spdlog::info("{:.0f} MB for what is on its way into {}",
-                 static_cast<double>(total_bytes(ring_sizes(setup, options.frames))) / 1e6,
-                 options.file.string());
+    spdlog::info("{}: {:.0f} MB of memory are set aside for what is on its way into the log",
+                 options.file.string(), static_cast<double>(total_bytes(sizes)) / 1e6);
   }
-  return std::unique_ptr<Recorder>(new Recorder(std::move(options), setup, std::move(*writer)));
+  return std::unique_ptr<Recorder>(
+      new Recorder(std::move(options), setup, sizes, std::move(*writer)));
 }
 
-Recorder::Recorder(RecorderOptions options, const RecordedSetup& setup, log::Writer writer)
+Recorder::Recorder(RecorderOptions options, const RecordedSetup& setup, const RingSizes& sizes,
+                   log::Writer writer)
     : options_(std::move(options)),
-      rings_(ring_sizes(setup, options_.frames)),
+      rings_(sizes),
       log_writer_(rings_, std::move(writer), options_.file, setup.streams, options_.report),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 

@@ -62,7 +62,8 @@ class Recorder {
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }
 
  private:
-  Recorder(RecorderOptions options, const RecordedSetup& setup, log::Writer writer);
+  Recorder(RecorderOptions options, const RecordedSetup& setup, const RingSizes& sizes,
+           log::Writer writer);
   void run(const std::stop_token& stop);
 
   RecorderOptions options_;

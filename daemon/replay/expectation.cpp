@@ -8,6 +8,8 @@
 #include <google/protobuf/text_format.h>
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/text/stream_name.hpp"
+
 namespace posed::replay {
 namespace {
 
@@ -181,9 +183,9 @@ Result<> Expectation::finish(std::uint32_t id, std::optional<std::uint64_t> brok
 
 Result<> Expectation::differs(const Stream& stream, bool raw, std::uint64_t sequence,
                               const std::string& how) const {
-  return fail(
-      fmt::format("stream {}{}, sequence {}, {}", stream.name, raw ? "-raw" : "", sequence, how),
-      file_);
+  return fail(fmt::format("stream {}, sequence {}, {}", raw ? raw_name(stream.name) : stream.name,
+                          sequence, how),
+              file_);
 }
 
 }  // namespace posed::replay

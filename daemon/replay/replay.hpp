@@ -25,8 +25,9 @@ namespace posed::replay {
 // body that comes back or changes its skeleton is another stream, of the same name.
 class Replay final : private ReplayHost {
  public:
-  // Builds decoders, models and engines of all streams; those of bodies that come and go are built
-  // again when they come, so that only they are in memory. The reader outlives the replay.
+  // Builds decoders, models and engines of all streams. Those of bodies that come later than the
+  // first ones of their source are built again when they come, so that few are in memory. The
+  // reader outlives the replay.
   [[nodiscard]] static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
   ~Replay() override = default;
 
@@ -35,7 +36,7 @@ class Replay final : private ReplayHost {
   }
   [[nodiscard]] const ReplayStream& stream(std::uint32_t stream) const;
 
-  // Null while there is none: the body has left, or not come yet.
+  // Null while there is none: the body has left, or does not come soon.
   [[nodiscard]] const pipeline::StreamEngine* engine(std::uint32_t stream) const;
 
   // Items in pipeline order.

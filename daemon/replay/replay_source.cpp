@@ -136,6 +136,7 @@ Result<ReplaySource::Bodies> ReplaySource::bodies_of(const log::ChunkRow& row) {
 Result<> ReplaySource::expect(const log::ChunkRow& row) {
   const auto bodies = bodies_of(row);
   if (!bodies) return std::unexpected(bodies.error());
+  const bool at_once = !std::exchange(described_, true);
   for (std::size_t i = 0; i < bodies->streams.size(); ++i) {
     ReplayStreamContext* const stream = bodies->streams[i];
     if (stream == nullptr || stream->stream().described) continue;
@@ -145,7 +146,9 @@ Result<> ReplaySource::expect(const log::ChunkRow& row) {
     description.samples = body.samples;
     description.rate_hz = stream->stream().settings.rate_hz;
     if (auto done = stream->describe(std::move(description)); !done) return done;
-    stream->set_aside();
+    // The bodies of the first description come at once; the engine of a later one would wait long,
+    // and there may be thousands.
+    if (!at_once) stream->set_aside();
   }
   return {};
 }

@@ -85,6 +85,7 @@ class ReplaySource final : private pipeline::IntakeOut {
   std::vector<pipeline::StreamPosition> positions_;  // scratch
   std::int64_t arrival_ns_ = 0;
   std::optional<std::int64_t> gap_after_;
+  bool described_ = false;  // expect() was called
 };
 
 }  // namespace posed::replay

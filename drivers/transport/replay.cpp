@@ -42,7 +42,8 @@ std::int64_t ReplayTransport::next_due_ns() const noexcept {
 Chunk ReplayTransport::read(std::int64_t now_ns) noexcept {
   if (next_ == recording_.count()) return {.bytes = {}, .end = true};
   if (now_ns < next_due_ns()) return {};
-  return {.bytes = recording_.bytes(next_++), .end = false};
+  const std::size_t chunk = next_++;
+  return {.bytes = recording_.bytes(chunk), .socket = recording_.socket(chunk)};
 }
 
 }  // namespace posed::drivers

@@ -14,19 +14,22 @@ namespace posed::drivers {
 // The chunks of one stream in log order.
 class Recording {
  public:
-  void add(std::int64_t arrival_ns, std::span<const std::byte> bytes) {
+  void add(std::int64_t arrival_ns, std::span<const std::byte> bytes, std::uint8_t socket = 0) {
     chunks_.add(bytes);
     arrival_ns_.push_back(arrival_ns);
+    socket_.push_back(socket);
   }
   [[nodiscard]] std::size_t count() const noexcept { return chunks_.count(); }
   [[nodiscard]] std::span<const std::byte> bytes(std::size_t i) const noexcept {
     return chunks_[i];
   }
   [[nodiscard]] std::int64_t arrival_ns(std::size_t i) const noexcept { return arrival_ns_[i]; }
+  [[nodiscard]] std::uint8_t socket(std::size_t i) const noexcept { return socket_[i]; }
 
  private:
   Chunks chunks_;
   std::vector<std::int64_t> arrival_ns_;  // [chunk]
+  std::vector<std::uint8_t> socket_;      // [chunk], as Chunk::socket
 };
 
 // A chunk is due (arrival - origin) / speed after start(). Streams of one log share an origin, the

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "drivers/transport/multicast.hpp"
 
@@ -17,7 +18,9 @@ namespace {
 
 constexpr std::size_t kBatch = 16;            // datagrams per system call
 constexpr std::size_t kMaxDatagram = 65'507;  // bytes; the most that IPv4 carries
-constexpr std::size_t kControlBytes = 64;     // room for the kernel's time stamp
+// Room for the kernel's time stamp and its count of drops.
+constexpr std::size_t kControlBytes =
+    CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t));
 // Bytes, about a tenth of a second of a large system; the kernel grants at most net.core.rmem_max.
 constexpr int kReceiveBuffer = 1024 * 1024;
 // A datagram counts as at most this old: an older stamp means that the wall clock was set.
@@ -28,15 +31,16 @@ std::int64_t to_ns(const timespec& time) noexcept {
   return std::int64_t{time.tv_sec} * kNanosPerSecond + time.tv_nsec;
 }
 
-// The stamp that the kernel put beside a datagram, by the wall clock. RT-safe.
-std::int64_t stamp_ns(msghdr& header) noexcept {
+// What the kernel put beside a datagram under this type, if it did. RT-safe.
+template <typename Value>
+std::optional<Value> control_value(msghdr& header, int type) noexcept {
   for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
-    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_TIMESTAMPNS) continue;
-    timespec stamp{};
-    std::memcpy(&stamp, CMSG_DATA(part), sizeof stamp);
-    return to_ns(stamp);
+    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != type) continue;
+    Value value{};
+    std::memcpy(&value, CMSG_DATA(part), sizeof value);
+    return value;
   }
-  return kNoTime_ns;
+  return std::nullopt;
 }
 
 // Never waits. Returns whether the kernel took the datagram.
@@ -148,6 +152,7 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
   const int yes = 1;
   if (socket.fd >= 0) {
     ::setsockopt(socket.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
+    ::setsockopt(socket.fd, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
     ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof kReceiveBuffer);
     // Several programs may receive a group; a single address belongs to one.
     if (wanted->group) ::setsockopt(socket.fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -193,6 +198,19 @@ bool UdpTransport::receive(std::int64_t now_ns) noexcept {
   return received_ > 0;
 }
 
+// The kernel counts its drops from the socket's beginning and says nothing while there are none.
+// RT-safe.
+void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
+  msghdr& header = batch_->message[i].msg_hdr;
+  if (const auto stamp = control_value<timespec>(header, SCM_TIMESTAMPNS)) {
+    const std::int64_t age_ns = wall_ns_ - to_ns(*stamp);
+    chunk.arrival_ns = batch_ns_ - std::clamp<std::int64_t>(age_ns, 0, kMaxAge_ns);
+  }
+  if (const auto dropped = control_value<std::uint32_t>(header, SO_RXQ_OVFL)) {
+    chunk.kernel_dropped += *dropped - std::exchange(sockets_[socket_].dropped, *dropped);
+  }
+}
+
 // RT-safe except for its reads. A flood of datagrams to be dropped ends the call after one batch.
 Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
   Chunk chunk;
@@ -202,6 +220,7 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
     mmsghdr& message = batch_->message[i];
     Address& sender = batch_->sender[i];
     sender.size = message.msg_hdr.msg_namelen;
+    read_control(i, chunk);
     if (!may_send(host_of(sender))) {
       ++chunk.foreign;
       continue;
@@ -214,10 +233,6 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
     if (!socket.keeps_to) socket.to = sender;
     chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
     chunk.socket = static_cast<std::uint8_t>(socket_);
-    const std::int64_t stamp = stamp_ns(message.msg_hdr);
-    if (stamp != kNoTime_ns) {
-      chunk.arrival_ns = batch_ns_ - std::clamp<std::int64_t>(wall_ns_ - stamp, 0, kMaxAge_ns);
-    }
     break;
   }
   return chunk;

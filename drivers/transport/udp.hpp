@@ -58,6 +58,7 @@ class UdpTransport final : public Transport {
     int fd = -1;
     std::optional<Address> to;  // a configured one, or the last sender
     bool keeps_to = false;      // `to` is configured
+    std::uint32_t dropped = 0;  // by the kernel, of all so far; begins again after 2^32
   };
   struct Batch;  // the buffers of one recvmmsg
 
@@ -66,6 +67,8 @@ class UdpTransport final : public Transport {
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool may_send(const Host& host) const noexcept;
+  // What the kernel says beside a datagram.
+  void read_control(std::size_t i, Chunk& chunk) noexcept;
 
   int epoll_ = -1;
   std::vector<Socket> sockets_;

@@ -15,6 +15,8 @@
 #include "proto/clip/clip.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/stage.hpp"
+#include "tests/support/free_port.hpp"
+#include "tests/support/mocap_room.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
@@ -165,6 +167,53 @@ TEST_CASE("record and replay refuse wrong use with one error message") {
                              stage.path("one.style"), "--overwrite"});
   CHECK(own.code == 2);
   CHECK(style::load_model(stage.path("one.style")));
+}
+
+TEST_CASE("record counts people who have left, and names a source that no body came from") {
+  Stage stage;
+  const std::uint16_t port = free_port();
+  std::string config = Stage::kEndpoints;
+  for (const auto& [name, its] : {std::pair{"room", port}, std::pair{"empty", free_port()}}) {
+    config += "[[source]]\nname = \"" + std::string(name) +
+              "\"\ndriver = \"template_mocap\"\nstreams = \"all\"\n"
+              "[source.template_mocap]\nlisten = \"127.0.0.1:" +
+              std::to_string(its) + "\"\n";
+  }
+  stage.folder.write("posed.toml", config);
+  stage.launch("record", {"--out", stage.path("take.plog"), "--frames", "--json"});
+  MocapRoom room(port);
+  for (int frame = 0; frame < 300; ++frame) {
+    if (frame % 60 == 0) room.change();
+    room.frame();
+    std::this_thread::sleep_for(10ms);
+  }
+  stage.daemon->send(SIGTERM);
+  const json summary = json::parse(stage.daemon->line().value());
+  REQUIRE(stage.daemon->exit_code() == 0);
+  const std::string errors = stage.daemon->errors();
+  INFO(errors);
+  std::uint64_t there = 0, recorded = 0;
+  for (const json& stream : summary.at("streams")) there += stream.at("frames").get<int>();
+  CHECK(summary.at("left_frames") > 0);
+  CHECK(summary.at("frames") == there + summary.at("left_frames").get<std::uint64_t>());
+  const auto log = log::Reader::open(stage.path("take.plog"));
+  REQUIRE(log);
+  for (const log::StreamRow& stream : log->streams()) {
+    auto frames = log->frames(stream.id, false);
+    REQUIRE(frames);
+    for (auto row = frames->next(); row && *row; row = frames->next()) ++recorded;
+  }
+  CHECK(summary.at("frames") == recorded);
+  CHECK(errors.find("streams and those that have left, ") != std::string::npos);
+  CHECK(errors.find("MB of memory are set aside") != std::string::npos);
+
+  const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
+  CHECK(replay.code == 0);
+  for (const std::string& text : {errors, replay.err}) {
+    INFO(text);
+    CHECK(text.find("source 'empty' named no body that became a stream") != std::string::npos);
+    CHECK(text.find("source 'room' named no body") == std::string::npos);
+  }
 }
 
 TEST_CASE("a log is replaced only once its replacement is being written") {

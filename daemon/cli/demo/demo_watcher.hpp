@@ -11,6 +11,7 @@
 #include "daemon/cli/demo/demo_hand.hpp"
 #include "models/motion/turn_sum.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::cli {
 
@@ -22,7 +23,7 @@ class Watcher {
   void take(const std::string& topic, const void* body, std::size_t size) {
     if (!frame_.ParseFromArray(body, static_cast<int>(size))) return;
     if (frame_.stream() == kDemoHandStream) return hand_.take(frame_);
-    if (topic.ends_with("-raw")) {
+    if (topic.ends_with(kRawSuffix)) {
       raw_[frame_.sequence()].assign(frame_.rotation_xyzw().begin(), frame_.rotation_xyzw().end());
       while (raw_.size() > kKept) raw_.erase(raw_.begin());
       return;

@@ -1,4 +1,5 @@
 // `posed emulate`: emulates a device for any program that expects one.
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -82,7 +83,8 @@ Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& o
     return make_emulator(options.what, options.set);
   }
   if (!options.clip.empty()) return misuse("a log has its own motion: leave out --clip");
-  auto device = emulate::read_logged_device(options.what, options.stream);
+  const std::size_t addresses = std::max<std::size_t>(options.udp.size(), 1);
+  auto device = emulate::read_logged_device(options.what, options.stream, addresses);
   if (!device) return std::unexpected(device.error());
   std::unique_ptr<drivers::Emulator> speaker;
   if (const auto* driver = drivers::find_driver(device->driver);

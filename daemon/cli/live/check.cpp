@@ -10,6 +10,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/open_stream.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"

@@ -126,7 +126,14 @@ std::string for_people(double time_s) {
   return fmt::format("{:.1f} h", time_s / 3600.0);
 }
 
-// Whether a glove is connected and how its clock runs; empty for a stream without either.
+// What the kernel dropped of a device's datagrams; empty if it dropped none.
+std::string kernel_words(std::uint64_t dropped) {
+  if (dropped == 0) return {};
+  return fmt::format("the kernel dropped {} datagrams (machine too slow)", dropped);
+}
+
+// Whether a glove is connected, how its clock runs and what the kernel dropped; empty for a stream
+// without any of it. The drops of a body's device are in the row of its source.
 std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
   const std::string since = for_people(seconds(now_ns - stream.link_ns()));
   const std::uint64_t links = stream.connections();
@@ -148,6 +155,8 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
                     drift_ppm));
   }
   if (!stream.device_info().empty()) add(clean(stream.identity()));
+  const std::uint64_t dropped = stream.source_name().empty() ? stream.kernel_dropped() : 0;
+  if (dropped > 0) add(kernel_words(dropped));
   return text;
 }
 
@@ -162,7 +171,7 @@ std::string body_row(const v1::StreamStats& stream) {
 }
 
 // Why nothing comes of a device with several bodies.
-std::string source_row(const v1::SourceStats& source) {
+std::string without_body(const v1::SourceStats& source) {
   if (source.away()) return "the device is away";
   std::string text = "no body is streamed";
   const auto count = [&](Outcome outcome) {
@@ -177,13 +186,23 @@ std::string source_row(const v1::SourceStats& source) {
                             heard, damaged, foreign);
 }
 
+// A line below the streams' rows about a device with several bodies; empty if there is nothing to
+// report.
+std::string source_row(const v1::SourceStats& source) {
+  std::string text = source.streams() == 0 ? without_body(source) : "";
+  const std::string dropped = kernel_words(source.kernel_dropped());
+  if (!text.empty() && !dropped.empty()) text += ", ";
+  return text + dropped;
+}
+
 // The lines below the rows of the streams.
 std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths) {
   std::vector<std::string> rows;
   if (!stats.replay_file().empty()) rows.push_back("  " + replay_words(stats));
   for (const v1::SourceStats& source : stats.source()) {
-    if (source.streams() > 0) continue;
-    rows.push_back("  " + fit(clean_name(source.name()), widths.name - 1) + source_row(source));
+    const std::string text = source_row(source);
+    if (text.empty()) continue;
+    rows.push_back("  " + fit(clean_name(source.name()), widths.name - 1) + text);
   }
   for (const v1::StreamStats& stream : stats.stream()) {
     for (const std::string& text :

@@ -16,6 +16,7 @@
 #include "daemon/cli/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::cli {
 namespace {
@@ -127,7 +128,7 @@ class Monitor {
     std::string names;
     for (const auto& stream : stats.stream()) {
       const std::string& name = stream.stream();
-      if (options_.stream.empty() || options_.stream == name || options_.stream == name + "-raw") {
+      if (options_.stream.empty() || options_.stream == name || options_.stream == raw_name(name)) {
         return {};
       }
       names += (names.empty() ? "" : ", ") + name;

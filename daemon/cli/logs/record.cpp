@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <variant>
 
@@ -13,6 +14,7 @@
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/live/serve.hpp"
+#include "daemon/cli/logs/no_body.hpp"
 #include "daemon/cli/logs/set_aside.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/config/config.hpp"
@@ -45,6 +47,7 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
   std::error_code ignored;
   const auto bytes = std::filesystem::file_size(options.out, ignored);
   std::uint64_t frames = stats.left_frames(), samples = stats.left_samples();
+  const bool some_left = frames + samples > 0;
   nlohmann::ordered_json streams = nlohmann::ordered_json::array();
   for (const v1::StreamStats& stream : stats.stream()) {
     frames += stream.frames();
@@ -54,17 +57,24 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
   }
   const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
   if (options.json) {
-    const nlohmann::ordered_json line{{"file", options.out},    {"seconds", took_s},
-                                      {"bytes", bytes},         {"frames", frames},
-                                      {"samples", samples},     {"streams", streams},
-                                      {"missing_chunks", lost}, {"write_errors", errors}};
+    const nlohmann::ordered_json line{{"file", options.out},
+                                      {"seconds", took_s},
+                                      {"bytes", bytes},
+                                      {"frames", frames},
+                                      {"samples", samples},
+                                      {"streams", streams},
+                                      {"left_frames", stats.left_frames()},
+                                      {"left_samples", stats.left_samples()},
+                                      {"missing_chunks", lost},
+                                      {"write_errors", errors}};
     std::printf("%s\n", json_text(line).c_str());
     std::fflush(stdout);
   }
   spdlog::log(lost + errors > 0 ? spdlog::level::warn : spdlog::level::info,
-              "{}: {:.1f} s of {} stream{}, {} frames and {} samples published, {:.1f} MB; {}",
-              options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s", frames,
-              samples, static_cast<double>(bytes) / 1e6,
+              "{}: {:.1f} s of {} stream{}{}, {} frames and {} samples published, {:.1f} MB; {}",
+              options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
+              some_left ? " and those that have left" : "", frames, samples,
+              static_cast<double>(bytes) / 1e6,
               lost + errors == 0
                   ? "nothing is missing"
                   : fmt::format("{} chunks are missing after {} write errors; `posed replay` says "
@@ -121,13 +131,15 @@ Result<> record(const RecordOptions& options) {
       }};
   auto replaced = SetAside::move(options.out);
   if (!replaced) return std::unexpected(replaced.error());
+  std::set<std::string> with_body;
   auto recorder = record::Recorder::open(
       std::move(recorder_options),
       record::recorded_setup(daemon.streams(), daemon.sources(), daemon.slots_to_come()));
   if (!recorder) return std::unexpected(recorder.error());
   assembly::DaemonHooks hooks;
   hooks.record_sink = &(*recorder)->record_sink();
-  hooks.record_stream = [&recorder](const devices::NewStream& stream) {
+  hooks.record_stream = [&recorder, &with_body](const devices::NewStream& stream) {
+    with_body.insert(stream.source.config.name);
     (*recorder)->add_stream(record::recorded_stream(stream));
   };
   hooks.more_stats = [&recorder](v1::Stats& stats) {
@@ -149,6 +161,9 @@ Result<> record(const RecordOptions& options) {
   serve(daemon, options.serve);
   const double took_s = seconds(system::monotonic_ns() - start_ns);
   auto finished = (*recorder)->finish();
+  for (const auto& source : daemon.sources()) {
+    if (!with_body.contains(source->config.name)) warn_of_no_body(source->config.name);
+  }
   print_result(options, daemon.stats(), **recorder, took_s);
   return finished;
 }

@@ -17,6 +17,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/live/client.hpp"
+#include "daemon/cli/logs/no_body.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/publish/encode.hpp"
@@ -29,6 +30,7 @@
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::cli {
 namespace {
@@ -106,7 +108,7 @@ class Outputs {
   explicit Outputs(const replay::Replay& replay) : replay_(replay) {
     for (std::uint32_t id = 0; id < replay.streams(); ++id) {
       const std::string& name = replay.stream(id).name;
-      encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(name + "-raw")});
+      encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(raw_name(name))});
     }
   }
 
@@ -195,6 +197,15 @@ void warn_of_undescribed(const replay::Replay& replay) {
         "stream {}: the log lacks the description of {}'s body {}, so nothing of it is"
         " replayed",
         clean_name(stream.name), clean_name(stream.source), clean_name(stream.body));
+  }
+}
+
+void warn_of_sources_without_body(const log::Reader& reader) {
+  for (const log::SourceRow& source : reader.sources()) {
+    const auto& streams = reader.streams();
+    if (std::ranges::find(streams, source.id, &log::StreamRow::source) == streams.end()) {
+      warn_of_no_body(source.name);
+    }
   }
 }
 
@@ -290,6 +301,7 @@ Result<> replay(const ReplayOptions& options) {
   replay::Replay& replay = **opened;
   warn_of_gaps(*reader);
   warn_of_undescribed(replay);
+  warn_of_sources_without_body(*reader);
   Outputs outputs(replay);
   if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
   const auto extent = reader->extent();

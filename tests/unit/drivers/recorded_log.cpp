@@ -184,4 +184,14 @@ std::string first_difference(const std::string& got, const std::string& expected
   }
 }
 
+std::string expected_lines(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void update_expected(const std::filesystem::path& path, const std::string& got) {
+  if (first_difference(got, expected_lines(path)).empty()) return;
+  std::ofstream(path) << got;
+}
+
 }  // namespace posed::test

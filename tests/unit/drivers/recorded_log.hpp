@@ -40,4 +40,11 @@ struct RecordedLog {
 // empty when they agree.
 [[nodiscard]] std::string first_difference(const std::string& got, const std::string& expected);
 
+// Writes the expected output of a log, unless the file agrees already: other rounding is no reason
+// to change it.
+void update_expected(const std::filesystem::path& path, const std::string& got);
+
+// The whole file; empty if there is none.
+[[nodiscard]] std::string expected_lines(const std::filesystem::path& path);
+
 }  // namespace posed::test

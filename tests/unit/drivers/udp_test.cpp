@@ -172,6 +172,31 @@ TEST_CASE("empty and too long datagrams are dropped and counted") {
   CHECK(chunk.damaged == (sent ? 2 : 1));
 }
 
+TEST_CASE("what the kernel drops because nobody reads is counted with the next datagram") {
+  const auto transport = listen_on("127.0.0.1:0");
+  const Peer peer("127.0.0.1:0");
+  // More than the largest buffer that the transport asks for.
+  const std::string large(60'000, 'x');
+  std::uint32_t sent = 0, received = 0, dropped = 0;
+  const auto read_all = [&] {
+    while (transport->next_due_ns() != kNoTime_ns || is_ready(*transport, 100)) {
+      const Chunk chunk = transport->read(now_ns());
+      if (!chunk.bytes.empty()) ++received;
+      dropped += chunk.kernel_dropped;
+    }
+  };
+  for (int flood = 0; flood < 2; ++flood) {
+    for (int i = 0; i < 100; ++i) sent += peer.send(transport->endpoint(0), large) ? 1 : 0;
+    read_all();
+    CHECK(received < sent);
+    REQUIRE(peer.send(transport->endpoint(0), "the next"));
+    ++sent;
+    read_all();
+    CHECK(dropped > 0);
+    CHECK(received + dropped == sent);
+  }
+}
+
 TEST_CASE("several sockets have one descriptor, and every datagram says where it came from") {
   const auto transport =
       open_udp({.sockets = {{.listen = "127.0.0.1:0"}, {.listen = "127.0.0.1:0"}}});

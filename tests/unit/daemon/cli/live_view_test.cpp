@@ -110,6 +110,7 @@ TEST_CASE("the live view says whose body a stream is, and why one is refused") {
   bob.set_body("Bob");
   bob.set_state("refused");
   bob.set_refusal("walk.style needs a joint Hips; leave the body out");
+  for (const char* stage : {"style", "constrain"}) bob.add_stage()->set_name(stage);  // never run
   LiveViewOptions options{.title = "posed", .width = 0, .height = 0};
   const auto lines = live_view(stats, options);
   REQUIRE(lines.size() == 8);
@@ -120,6 +121,29 @@ TEST_CASE("the live view says whose body a stream is, and why one is refused") {
   options.colour = true;
   CHECK(live_view(stats, options)[4].starts_with("\x1b[31m"));
   CHECK(monitor_line(stats).ends_with("shed: walk.style needs a joint Hips; leave the body out"));
+}
+
+TEST_CASE("the live view shows what the kernel dropped of a device's datagrams") {
+  v1::Stats stats = stats_of(2);
+  stats.mutable_stream(0)->set_kernel_dropped(7);
+  stats.mutable_stream(1)->set_kernel_dropped(12);
+  stats.mutable_stream(1)->set_source_name("optitrack");
+  stats.mutable_stream(1)->set_body("Ann");
+  v1::SourceStats& busy = *stats.add_source();
+  busy.set_name("optitrack");
+  busy.set_streams(1);
+  busy.set_kernel_dropped(12);
+  v1::SourceStats& empty = *stats.add_source();
+  empty.set_name("vicon");
+  empty.set_away(true);
+  empty.set_kernel_dropped(3);
+  const auto lines = live_view(stats, {.title = "posed", .width = 0, .height = 0});
+  REQUIRE(lines.size() == 9);
+  CHECK(lines[4] == "  optitrack the kernel dropped 12 datagrams (machine too slow)");
+  CHECK(lines[5] ==
+        "  vicon     the device is away, the kernel dropped 3 datagrams (machine too slow)");
+  CHECK(lines[6] == "  walker0   the kernel dropped 7 datagrams (machine too slow)");
+  CHECK(lines[7] == "  walker1   body 'Ann' of optitrack");
 }
 
 TEST_CASE("a daemon that does not answer is not shown as live") {

@@ -145,7 +145,7 @@ TEST_CASE("requests reach the newest generation; the earlier one keeps its model
   CHECK(stage.pipeline.next()->stream == kAnnAgain);
   CHECK(first->model->name == "sway.style");  // under ASan: not freed
   CHECK(stage.ask(set_alpha("x")) == "there is no stream 'x'; there is: walker, ann");
-  CHECK(stage.acknowledge(*late, true) == "stream ann: it has left before this took effect");
+  CHECK(stage.acknowledge(*late, true) == "stream 'ann': it has left before this took effect");
   stage.handler.remove_stream(kAnn);
   CHECK(stage.ask(set_alpha("ann")).empty());
 }
@@ -160,7 +160,7 @@ TEST_CASE("a command under way to a stream that leaves is answered, and counts u
   const auto model = stage.pipeline.next();
   REQUIRE(model);
   CHECK(model->model->name == "sway.style");  // under ASan: the pipeline may still look at it
-  CHECK(stage.acknowledge(*model, true) == "stream ann: it has left before this took effect");
+  CHECK(stage.acknowledge(*model, true) == "stream 'ann': it has left before this took effect");
   CHECK(stage.ask(set_alpha("walker")).empty());
   CHECK(stage.ask(set_alpha("walker")).starts_with("too many changes"));
   // It took effect just before the stream left.
@@ -174,7 +174,7 @@ TEST_CASE("a command that meets a changing body is answered so") {
   // before it is still there.
   CHECK(stage.ask(set_alpha("ann")).empty());
   CHECK(stage.acknowledge(*stage.pipeline.next(), true, true) ==
-        "stream ann: its body changes just now; try again");
+        "stream 'ann': its body changes just now; try again");
 }
 
 TEST_CASE("calibrations and haptics are not for bodies of a device with several") {

@@ -170,8 +170,9 @@ TEST_CASE("each refusal is a single sentence") {
   CHECK(has(fixture.refused(alpha_request("nobody", 0.0F)),
             "there is no stream 'nobody'; there is: walker, plain, runner"));
   CHECK(has(fixture.refused(alpha_request("walker-raw", 0.0F)), "before its stages"));
-  CHECK(has(fixture.refused(alpha_request("plain", 0.0F)),
-            "stream plain: 'alpha' is a parameter of stage style, which the stream does not have"));
+  CHECK(
+      has(fixture.refused(alpha_request("plain", 0.0F)),
+          "stream 'plain': 'alpha' is a parameter of stage style, which the stream does not have"));
   for (const float alpha : {2.1F, -3.0F, NAN, INFINITY}) {
     CHECK(has(fixture.refused(alpha_request("walker", alpha)), "out of range"));
   }

@@ -91,6 +91,7 @@ class Room final : private StreamHost {
   std::map<std::uint32_t, std::string> refused;  // sentences by stream
   const pipeline::SourceUpdate* update = nullptr;
   std::vector<std::string> warnings;
+  std::size_t stop_at = 0;  // the builder is stopped when it adds this stream, from 1; 0: never
 
  private:
   pipeline::StreamCounters& counters(std::uint32_t stream) override {
@@ -100,6 +101,7 @@ class Room final : private StreamHost {
   void add(NewStream stream) override {
     if (stream.engine) running[stream.id] = stream.config.name;
     if (!stream.engine) refused[stream.id] = stream.refusal;
+    if (stop_at > 0 && running.size() == stop_at) builder_->stop();
   }
   std::optional<std::uint32_t> take_gone() override {
     if (gone_.empty()) return std::nullopt;
@@ -127,6 +129,18 @@ class Room final : private StreamHost {
 using Names = std::vector<std::string>;
 
 }  // namespace
+
+TEST_CASE("a stop takes effect between two bodies, and the reader gets no half description") {
+  Room room(8);
+  room.describe({person(1, "Ann")});
+  const pipeline::SourceUpdate* const before = room.update;
+  room.stop_at = 3;
+  room.describe({person(1, "Ann"), person(2, "Bob"), person(3, "Cay"), person(4, "Dee")});
+  CHECK(room.running.size() == 3);
+  CHECK(room.update == before);
+  room.describe({person(1, "Ann")});
+  CHECK(room.running.size() == 3);
+}
 
 TEST_CASE("bodies become streams with names, slots and generations of their own") {
   Room room(8);

@@ -1,12 +1,15 @@
-// A device that speaks on two sockets, through the reader and into the record.
+// A device that speaks on two sockets, through the reader and into the record, and from a log.
 #include <array>
 #include <cstring>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
+#include "daemon/emulate/log_emulator.hpp"
 #include "daemon/pipeline/reader.hpp"
+#include "proto/log/writer.hpp"
 #include "tests/support/quiet_record_sink.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace posed::pipeline {
 namespace {
@@ -23,7 +26,7 @@ class TwoSockets final : public drivers::Transport {
   [[nodiscard]] drivers::Chunk read(std::int64_t) noexcept override {
     if (given_) return {};
     given_ = true;
-    return {.bytes = bytes_, .socket = 1};
+    return {.bytes = bytes_, .socket = 1, .kernel_dropped = 3};
   }
   [[nodiscard]] bool send(std::span<const std::byte>, std::uint8_t socket) noexcept override {
     sent_to = socket;
@@ -83,6 +86,43 @@ TEST_CASE("chunks and requests keep their socket, to the decoder and into the lo
   CHECK(record.from == 1);
   CHECK(sockets.sent_to == 2);
   CHECK(record.to == 2);
+  CHECK(counters.kernel_dropped == 3);
+}
+
+TEST_CASE("a log's device sends each datagram to the socket that it came to") {
+  const test::TempFolder folder;
+  const std::string file = (folder.path() / "take.plog").string();
+  {
+    auto log = log::Writer::create(file, {}, false).value();
+    REQUIRE(log.add(log::SourceRow{0, "room", "template_mocap", "", "", "{}"}));
+    REQUIRE(log.add(log::StreamRow{0, 0, "Ann", "room-ann", "{}", 1}));
+    const std::array<std::byte, 1> byte{};
+    for (const std::uint32_t socket : {1U, 0U, 1U}) {
+      REQUIRE(log.add(log::ChunkRow{.socket = socket,
+                                    .direction = static_cast<std::uint8_t>(Direction::kFromDevice),
+                                    .arrival_ns = 1'000,
+                                    .bytes = byte}));
+    }
+    REQUIRE(log.close());
+  }
+  auto device = emulate::read_logged_device(file, "", 2);
+  REQUIRE(device);
+  emulate::LogEmulator emulator(std::move(device->recording), nullptr);
+  std::vector<int> sockets;
+  while (!emulator.done()) {
+    sockets.push_back(emulator.next_socket());
+    std::vector<std::byte> datagram;
+    emulator.emit(0, datagram);
+    CHECK(datagram.size() == 1);
+  }
+  CHECK(sockets == std::vector<int>{1, 0, 1});
+  for (const std::size_t addresses : {1U, 3U}) {
+    const auto refused = emulate::read_logged_device(file, "", addresses);
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().text().ends_with(
+        "its device speaks to 2 sockets of the host; name one address for each with --udp, in"
+        " their order"));
+  }
 }
 
 }  // namespace posed::pipeline

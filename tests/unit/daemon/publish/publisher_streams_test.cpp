@@ -178,6 +178,33 @@ TEST_CASE("a stream is removed after its items in the ring, and its counters are
   CHECK(rig.publisher->stats().stream_size() == 1);
 }
 
+TEST_CASE("what was published of streams that have left still counts") {
+  Body ann, bob;
+  PublisherRig rig;
+  REQUIRE(rig.receive("skeleton/toy", 1));
+  rig.publisher->add(ann.info(rig, kAnn));
+  rig.put(toy_frame_item(1, kAnn));
+  rig.put(toy_frame_item(2, kAnn));
+  Item sample;
+  sample.kind = Item::Kind::kSample;
+  sample.sample.header.stream = kAnn;
+  sample.sample.value_count = 1;
+  rig.put(sample);
+  REQUIRE(rig.receive("sensor/optitrack-ann", 1));
+  CHECK(rig.publisher->stats().left_frames() == 0);
+  rig.publisher->add(ann.info(rig, kAnnAgain));
+  rig.put(toy_frame_item(3, kAnnAgain));  // takes the slot
+  REQUIRE(rig.receive("pose/optitrack-ann", 3));
+  CHECK(rig.publisher->stats().left_frames() == 2);
+  rig.publisher->remove(kAnn);
+  CHECK(rig.publisher->stats().left_frames() == 2);
+  rig.publisher->remove(kAnnAgain);
+  CHECK(rig.publisher->stats().left_frames() == 3);
+  CHECK(rig.publisher->stats().left_samples() == 1);
+  REQUIRE(rig.receive("stats", rig.seen["stats"] + 2));
+  CHECK(rig.last<v1::Stats>("stats").left_frames() == 3);
+}
+
 TEST_CASE("without a publisher's thread the caller removes the stream itself") {
   Body ann;
   PublisherRig rig(false);
