@@ -37,7 +37,7 @@ bool reader_of_stdout_has_gone() {
 int with_stdout_written(int exit_code) {
   errno = 0;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
-  const std::string why = errno == 0 ? "" : std::string(" (") + std::strerror(errno) + ")";
+  const std::string why = errno == 0 ? "" : " (" + errno_text() + ")";
   if (exit_code != 0 || reader_of_stdout_has_gone()) return exit_code;
   return report(
       fail("the output cannot be written to stdout" + why + "; it is not complete").error());

@@ -23,8 +23,6 @@
 namespace posed::emulate {
 namespace {
 
-std::string reason() { return std::error_code(errno, std::generic_category()).message(); }
-
 // Replaces a link that an earlier emulated glove left behind, but no other file.
 Result<> make_link(const std::filesystem::path& link, const std::string& target) {
   std::error_code failed;
@@ -47,7 +45,7 @@ Result<EmulatedPort> EmulatedPort::open_pty(const std::filesystem::path& link) {
   std::array<char, 64> name{};
   if (master < 0 || grantpt(master) != 0 || unlockpt(master) != 0 ||
       ptsname_r(master, name.data(), name.size()) != 0) {
-    const std::string why = reason();
+    const std::string why = errno_text();
     if (master >= 0) ::close(master);
     return fail("cannot make a pseudo-terminal: " + why);
   }
@@ -56,7 +54,7 @@ Result<EmulatedPort> EmulatedPort::open_pty(const std::filesystem::path& link) {
   port.other_side_ = slave;
   termios mode{};
   if (slave < 0 || tcgetattr(slave, &mode) != 0) {
-    return fail("cannot open the pseudo-terminal's other side: " + reason());
+    return fail("cannot open the pseudo-terminal's other side: " + errno_text());
   }
   cfmakeraw(&mode);
   tcsetattr(slave, TCSANOW, &mode);
@@ -71,7 +69,7 @@ Result<EmulatedPort> EmulatedPort::connect_tcp(const std::string& endpoint) {
   if (!address) return std::unexpected(address.error());
   const int fd = ::socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (fd < 0 || ::connect(fd, address->get(), address->size) != 0) {
-    const std::string why = reason();
+    const std::string why = errno_text();
     if (fd >= 0) ::close(fd);
     return fail("nothing listens at " + endpoint + " (" + why +
                 "); start posed first, its stream with link = \"tcp\"");
@@ -91,7 +89,7 @@ Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endp
         ::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd >= 0) port.fds_.push_back(fd);
     if (fd < 0 || ::connect(fd, address->get(), address->size) != 0) {
-      return fail("cannot send to " + endpoint + " (" + reason() +
+      return fail("cannot send to " + endpoint + " (" + errno_text() +
                   "); name an address that this machine reaches");
     }
     port.name_ += (port.name_.empty() ? "" : ", ") + endpoint;

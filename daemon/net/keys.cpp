@@ -31,13 +31,11 @@ class File {
   int fd_;
 };
 
-std::string reason() { return std::strerror(errno); }
-
 Result<std::string> read_key(const File& file, const std::filesystem::path& path) {
-  if (!file.ok()) return fail("cannot read the key: " + reason(), path);
+  if (!file.ok()) return fail("cannot read the key: " + errno_text(), path);
   std::array<char, kMaxKeyFile> buffer{};
   const ssize_t size = read(file.get(), buffer.data(), buffer.size());
-  if (size < 0) return fail("cannot read the key: " + reason(), path);
+  if (size < 0) return fail("cannot read the key: " + errno_text(), path);
   std::string text(buffer.data(), static_cast<std::size_t>(size));
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
   if (!is_key(text)) {
@@ -54,12 +52,12 @@ Result<> write_key(const std::filesystem::path& path, const std::string& key, mo
       return fail("exists already and is not overwritten; choose another name or move it away",
                   path);
     }
-    return fail("cannot write the key: " + reason(), path);
+    return fail("cannot write the key: " + errno_text(), path);
   }
   const std::string line = key + "\n";
   const bool written = write(file.get(), line.data(), line.size()) == ssize_t(line.size());
   if (written && fsync(file.get()) == 0) return {};
-  const std::string why = reason();
+  const std::string why = errno_text();
   unlink(path.c_str());
   return fail("cannot write the key: " + why, path);
 }

@@ -9,7 +9,7 @@ namespace posed::replay {
 
 Result<FrameFile> FrameFile::create(const std::filesystem::path& path) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  if (!file) return fail(std::string("cannot be written: ") + std::strerror(errno), path.string());
+  if (!file) return fail("cannot be written: " + errno_text(), path.string());
   return FrameFile(std::move(file), path);
 }
 

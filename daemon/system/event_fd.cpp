@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t kWakeKey = std::numeric_limits<std::uint32_t>::max();
 
 std::unexpected<Error> system_error(const char* what) {
-  return fail(std::string(what) + ": " + std::strerror(errno) +
+  return fail(std::string(what) + ": " + errno_text() +
               "; raise the limit of open files (ulimit -n)");
 }
 

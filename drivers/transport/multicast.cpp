@@ -70,7 +70,7 @@ Result<> join_group(int fd, const Address& group, const std::string& interface) 
   const bool joined =
       group.storage.ss_family == AF_INET6 ? join6(fd, group, *index) : join4(fd, group, *index);
   if (joined) return {};
-  return fail("cannot join the multicast group " + host_text(group) + " (" + std::strerror(errno) +
+  return fail("cannot join the multicast group " + host_text(group) + " (" + errno_text() +
               "); name the network interface that the device is on");
 }
 

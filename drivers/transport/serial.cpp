@@ -44,7 +44,7 @@ Result<> set_raw(int fd, const std::string& port, int baud) {
   mode.c_cc[VTIME] = 0;
   mode.c_ispeed = mode.c_ospeed = static_cast<speed_t>(baud);
   if (::ioctl(fd, TCSETS2, &mode) != 0 || ::ioctl(fd, TCGETS2, &mode) != 0) {
-    return fail(port + " refuses " + std::to_string(baud) + " baud (" + std::strerror(errno) + ")");
+    return fail(port + " refuses " + std::to_string(baud) + " baud (" + errno_text() + ")");
   }
   serial_struct uart{};  // a port without one (the gadget side of a USB cable) has no rate at all
   if (::ioctl(fd, TIOCGSERIAL, &uart) == 0 &&

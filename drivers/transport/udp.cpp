@@ -161,7 +161,7 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
   event.events = EPOLLIN;
   if (socket.fd < 0 || ::bind(socket.fd, wanted->listen.get(), wanted->listen.size) != 0 ||
       ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket.fd, &event) != 0) {
-    return fail("cannot listen on " + settings.listen + " (" + std::strerror(errno) +
+    return fail("cannot listen on " + settings.listen + " (" + errno_text() +
                 "); use an address of this machine and a port that is free");
   }
   if (!wanted->group) return {};

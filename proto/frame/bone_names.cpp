@@ -7,11 +7,11 @@
 namespace posed {
 namespace {
 
-enum class Side : std::uint8_t { kNone, kLeft, kRight };
+enum class NamedSide : std::uint8_t { kNone, kLeft, kRight };
 
 // "mixamorig:LeftUpLeg" splits into side left, part "upleg".
 struct Name {
-  Side side = Side::kNone;
+  NamedSide side = NamedSide::kNone;
   std::string part;  // lower-case letters and digits only
 };
 
@@ -41,30 +41,31 @@ Name split_name(std::string_view joint_name) {
   }
   if (joint_name.starts_with("mixamorig")) joint_name.remove_prefix(9);
   std::string part = plain(joint_name);
-  for (const auto& [word, side] : {std::pair("left", Side::kLeft), {"right", Side::kRight}}) {
+  for (const auto& [word, side] :
+       {std::pair("left", NamedSide::kLeft), {"right", NamedSide::kRight}}) {
     const std::string_view text(word);
     if (part.starts_with(text)) return {side, part.substr(text.size())};
     if (part.ends_with(text)) return {side, part.substr(0, part.size() - text.size())};
   }
   if (joint_name.size() > 2 && part.size() > 1) {
     const auto side_of = [](char letter) {
-      return letter == 'L' || letter == 'l'   ? Side::kLeft
-             : letter == 'R' || letter == 'r' ? Side::kRight
-                                              : Side::kNone;
+      return letter == 'L' || letter == 'l'   ? NamedSide::kLeft
+             : letter == 'R' || letter == 'r' ? NamedSide::kRight
+                                              : NamedSide::kNone;
     };
-    const Side last = side_of(joint_name.back());
-    if (last != Side::kNone && !is_letter(joint_name[joint_name.size() - 2])) {
+    const NamedSide last = side_of(joint_name.back());
+    if (last != NamedSide::kNone && !is_letter(joint_name[joint_name.size() - 2])) {
       return {last, part.substr(0, part.size() - 1)};  // UpperArm_L, thigh.R
     }
-    const Side first = side_of(joint_name.front());
+    const NamedSide first = side_of(joint_name.front());
     const std::string rest = part.substr(1);
-    if (first != Side::kNone &&
+    if (first != NamedSide::kNone &&
         (!is_letter(joint_name[1]) ||
          std::ranges::find(kOneLetterParts, rest) != kOneLetterParts.end())) {
       return {first, rest};  // L_Hand, lfemur
     }
   }
-  return {Side::kNone, part};
+  return {NamedSide::kNone, part};
 }
 
 struct Part {
@@ -118,8 +119,8 @@ constexpr std::array<std::string_view, 10> kTrunk{
     "spine",  "chest",   "upperchest", "lowerback",  "upperback",
     "thorax", "abdomen", "torso",      "spineupper", "spinelower"};
 
-Bone mirrored(Bone left, Side side) {
-  if (side == Side::kLeft) return left;
+Bone mirrored(Bone left, NamedSide side) {
+  if (side == NamedSide::kLeft) return left;
   const std::string right = "right" + std::string(bone_name(left).substr(4));
   return *bone_from_name(right);
 }
@@ -149,7 +150,7 @@ std::optional<Bone> finger(std::string_view part) {
 }
 
 std::optional<Bone> bone_of(const Name& name, bool has_collars) {
-  if (name.side == Side::kNone) {
+  if (name.side == NamedSide::kNone) {
     const auto at = std::ranges::find(kMiddle, name.part, &Part::name);
     return at == kMiddle.end() ? std::nullopt : std::optional(at->left);
   }
@@ -181,7 +182,7 @@ void name_bones(Skeleton& skeleton) {
   for (std::size_t j = 0; j < names.size(); ++j) {
     std::string stem = names[j].part;
     while (!stem.empty() && stem.back() >= '0' && stem.back() <= '9') stem.pop_back();
-    if (names[j].side == Side::kNone && std::ranges::find(kTrunk, stem) != kTrunk.end()) {
+    if (names[j].side == NamedSide::kNone && std::ranges::find(kTrunk, stem) != kTrunk.end()) {
       trunk.push_back(static_cast<int>(j));
     }
     const auto bone = bone_of(names[j], has_collars);

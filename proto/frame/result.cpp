@@ -1,5 +1,8 @@
 #include "proto/frame/result.hpp"
 
+#include <cerrno>
+#include <system_error>
+
 #include "proto/text/clean.hpp"
 
 namespace posed {
@@ -16,5 +19,8 @@ std::string Error::text() const {
   if (line == 0) return place + ": " + sentence;
   return place + ":" + std::to_string(line) + ": " + sentence;
 }
+
+// std::strerror() may not be called by two threads at once.
+std::string errno_text() { return std::error_code(errno, std::generic_category()).message(); }
 
 }  // namespace posed

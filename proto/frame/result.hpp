@@ -24,6 +24,9 @@ struct Error {
 template <typename T = void>
 using Result = std::expected<T, Error>;
 
+// What the system says of `errno`. Any thread.
+[[nodiscard]] std::string errno_text();
+
 // return fail("..."), return fail("...", path, line)
 [[nodiscard]] inline std::unexpected<Error> fail(std::string message, std::string file = {},
                                                  int line = 0) {

@@ -10,34 +10,34 @@ namespace {
 
 constexpr double kShort_m = 1e-6;
 
-enum class Part : std::uint8_t { kTrunk, kLimb, kFoot, kThumb };
+enum class BodyPart : std::uint8_t { kTorso, kLimb, kFoot, kThumb };
 
-Part part_of(Bone bone) {
-  if (bone <= Bone::kHead) return Part::kTrunk;
+BodyPart part_of(Bone bone) {
+  if (bone <= Bone::kHead) return BodyPart::kTorso;
   switch (bone) {
     case Bone::kLeftFoot:
     case Bone::kRightFoot:
     case Bone::kLeftToes:
     case Bone::kRightToes:
-      return Part::kFoot;
+      return BodyPart::kFoot;
     case Bone::kLeftThumbMetacarpal:
     case Bone::kLeftThumbProximal:
     case Bone::kLeftThumbDistal:
     case Bone::kRightThumbMetacarpal:
     case Bone::kRightThumbProximal:
     case Bone::kRightThumbDistal:
-      return Part::kThumb;
+      return BodyPart::kThumb;
     default:
-      return Part::kLimb;
+      return BodyPart::kLimb;
   }
 }
 
 // The direction of the bone in T-pose.
 Eigen::Vector3d t_direction(Bone bone) {
   switch (part_of(bone)) {
-    case Part::kTrunk:
+    case BodyPart::kTorso:
       return Eigen::Vector3d::UnitY();
-    case Part::kFoot:
+    case BodyPart::kFoot:
       return Eigen::Vector3d::UnitZ();
     default:
       break;
@@ -77,7 +77,7 @@ Eigen::Vector3d rest_direction(const Skeleton& skeleton, int joint) {
   // Consecutive bones of the shoulders, arms, legs, fingers and trunk are consecutive in the enum.
   const auto after = [](Bone b) { return static_cast<Bone>(static_cast<int>(b) + 1); };
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  if (part_of(bone) == Part::kTrunk) {
+  if (part_of(bone) == BodyPart::kTorso) {
     for (Bone next = after(bone); next <= Bone::kHead; next = after(next)) {
       direction = to_bone(skeleton, joint, next);
       if (direction.norm() > kShort_m) return direction;
@@ -146,11 +146,11 @@ void set_t_frames(Skeleton& skeleton, const KnownT& known) {
       joint.T_world_joint = *known[j];
       continue;
     }
-    if (!joint.bone || part_of(*joint.bone) == Part::kThumb) continue;
+    if (!joint.bone || part_of(*joint.bone) == BodyPart::kThumb) continue;
     const Eigen::Vector3d direction = T_parent * rest_direction(skeleton, j);
     const Eigen::Vector3d axis = t_direction(*joint.bone);
     const bool upright = angle_rad(direction, axis) < 45 * kDegree;
-    if (part_of(*joint.bone) == Part::kTrunk && upright) continue;
+    if (part_of(*joint.bone) == BodyPart::kTorso && upright) continue;
     joint.T_world_joint = (minimal_rotation(direction, axis) * T_parent).normalized();
   }
 }
@@ -158,9 +158,9 @@ void set_t_frames(Skeleton& skeleton, const KnownT& known) {
 bool zero_pose_is_t(const Skeleton& skeleton) {
   for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
     const auto& bone = skeleton.joints[j].bone;
-    if (!bone || part_of(*bone) == Part::kThumb) continue;
+    if (!bone || part_of(*bone) == BodyPart::kThumb) continue;
     const Eigen::Vector3d direction = rest_direction(skeleton, j);
-    const double limit_rad = (part_of(*bone) == Part::kFoot ? 80 : 45) * kDegree;
+    const double limit_rad = (part_of(*bone) == BodyPart::kFoot ? 80 : 45) * kDegree;
     if (direction.norm() > kShort_m && angle_rad(direction, t_direction(*bone)) > limit_rad) {
       return false;
     }
@@ -176,7 +176,7 @@ KnownT t_frames_from_mean_pose(const Skeleton& skeleton,
     const Joint& joint = skeleton.joints[j];
     T_parent = joint.parent < 0 ? Eigen::Quaterniond::Identity() : *known[joint.parent];
     known[j] = T_parent;
-    if (!joint.bone || part_of(*joint.bone) == Part::kThumb) continue;
+    if (!joint.bone || part_of(*joint.bone) == BodyPart::kThumb) continue;
     const Eigen::Vector3d direction = rest_direction(skeleton, j);
     const Eigen::Vector3d axis = t_direction(*joint.bone);
     if (direction.norm() < kShort_m) continue;

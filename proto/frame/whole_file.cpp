@@ -35,8 +35,6 @@ std::filesystem::path target_of(const std::filesystem::path& path) {
   return error ? path : target;
 }
 
-std::string reason() { return std::error_code(errno, std::generic_category()).message(); }
-
 }  // namespace
 
 Result<> write_whole_file(const std::filesystem::path& path,
@@ -45,12 +43,12 @@ Result<> write_whole_file(const std::filesystem::path& path,
   const std::filesystem::path target = target_of(path);
   const std::filesystem::path part = target.string() + "." + std::to_string(::getpid()) + ".part";
   std::ofstream file(part, std::ios::binary | std::ios::trunc);
-  if (!file) return fail("cannot be written: " + reason(), path.string());
+  if (!file) return fail("cannot be written: " + errno_text(), path.string());
   write(file);
   file.close();
   std::error_code error;
   if (!file) {
-    const std::string why = reason();
+    const std::string why = errno_text();
     std::filesystem::remove(part, error);
     return fail("could not be written to its end: " + why, path.string());
   }

@@ -30,8 +30,6 @@ class Descriptor {
   int fd_;
 };
 
-std::string reason() { return std::strerror(errno); }
-
 }  // namespace
 
 Result<std::string> load_file(const std::filesystem::path& path, const FileRule& rule) {
@@ -42,10 +40,11 @@ Result<std::string> load_file(const std::filesystem::path& path, const FileRule&
   // Without O_NONBLOCK, opening a pipe would wait until another process writes into it.
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   if (file.get() < 0) {
-    return refused("cannot read the " + what + ": " + reason() + "; check the path");
+    return refused("cannot read the " + what + ": " + errno_text() + "; check the path");
   }
   struct stat about{};
-  if (fstat(file.get(), &about) != 0) return refused("cannot read the " + what + ": " + reason());
+  if (fstat(file.get(), &about) != 0)
+    return refused("cannot read the " + what + ": " + errno_text());
   if (S_ISDIR(about.st_mode)) return refused("this is a folder; name a " + what + " in it");
   if (!S_ISREG(about.st_mode)) {
     return refused("this is a device or a pipe; name a " + what + " that is a regular file");
@@ -63,7 +62,7 @@ Result<std::string> load_file(const std::filesystem::path& path, const FileRule&
     }
     const ssize_t got = read(file.get(), bytes.data() + size, bytes.size() - size);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return refused("cannot read the " + what + " to its end: " + reason());
+    if (got < 0) return refused("cannot read the " + what + " to its end: " + errno_text());
     if (got == 0) break;
     size += static_cast<std::size_t>(got);
     if (size > rule.max_bytes) return refused(too_large);

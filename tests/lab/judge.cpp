@@ -77,7 +77,7 @@ class Judge {
 
   static std::string number(std::size_t n) { return std::to_string(n); }
   void say(const std::string& what) {
-    verdict_.trouble += (verdict_.trouble.empty() ? "" : ", ") + what;
+    verdict_.problems += (verdict_.problems.empty() ? "" : ", ") + what;
   }
 
   const Heard& heard_;
@@ -93,7 +93,7 @@ class Judge {
 }  // namespace
 
 bool Verdict::good() const {
-  return trouble.empty() && mixed == 0 && skipped == 0 && gaps == 0 && ours == 0 &&
+  return problems.empty() && mixed == 0 && skipped == 0 && gaps == 0 && ours == 0 &&
          cut_early == 0 && back < kMaxOpening && since_plug < kMaxReturn && silence < kMaxSilence;
 }
 
@@ -108,7 +108,7 @@ std::string Verdict::text() const {
          count(gaps, "gaps") + count(ours, "late starts") + count(cut_early, "early ends") +
          count(lost_a_replug, "reports lost a replug at most") + "back " + ms(back) +
          " ms after the node and " + ms(since_plug) + " ms after the plug, silent for " +
-         ms(silence) + " ms at most" + (trouble.empty() ? "" : ": " + trouble);
+         ms(silence) + " ms at most" + (problems.empty() ? "" : ": " + problems);
 }
 
 Verdict judge(const Heard& heard, const std::vector<Moment>& said, std::uint32_t modulus,

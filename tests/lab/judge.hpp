@@ -32,7 +32,7 @@ struct Verdict {
   std::chrono::steady_clock::duration back{};        // node to the client's first sample, at most
   std::chrono::steady_clock::duration since_plug{};  // plug to the same
   std::chrono::steady_clock::duration silence{};     // the longest between two samples of a session
-  std::string trouble;
+  std::string problems;
 
   [[nodiscard]] bool good() const;
   [[nodiscard]] std::string text() const;

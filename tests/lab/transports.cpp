@@ -93,7 +93,7 @@ struct Outcome {
   std::size_t right = 0, wrong = 0;
   Clock::duration enumerated{}, back{},
       lost{};  // time until the kernel lists it; until our first report; until its loss is noticed
-  std::string trouble;
+  std::string problems;
 };
 
 // Opens a device that is just being plugged in as the daemon's supervisor does: it waits for a
@@ -139,14 +139,14 @@ Outcome one_round(LabDevice& device, drivers::HotplugMonitor& arrivals) {
   auto transport = open_soon(device, arrivals);
   const auto there_since = device.there_since();
   if (!transport) {
-    outcome.trouble = transport.error().message;
+    outcome.problems = transport.error().message;
   } else if (!there_since) {
-    outcome.trouble = "what was opened has no node";
+    outcome.problems = "what was opened has no node";
   } else if (auto ok = (*transport)->start(0); !ok) {
-    outcome.trouble = ok.error().message;
+    outcome.problems = ok.error().message;
   }
   Judge judge;
-  if (outcome.trouble.empty()) {
+  if (outcome.problems.empty()) {
     (void)read_until(**transport, judge, device.serial, [&] { return judge.right() > 0; });
     outcome.enumerated = *there_since - plugged_at;
     outcome.back = Clock::now() - *there_since;
@@ -155,9 +155,9 @@ Outcome one_round(LabDevice& device, drivers::HotplugMonitor& arrivals) {
   }
   const auto unplugged_at = Clock::now();
   device.unplug();  // while the feeder still sends
-  if (outcome.trouble.empty() &&
+  if (outcome.problems.empty() &&
       read_until(**transport, judge, device.serial, [] { return false; })) {
-    outcome.trouble = "it is unplugged and nobody noticed";
+    outcome.problems = "it is unplugged and nobody noticed";
   }
   outcome.lost = Clock::now() - unplugged_at;
   outcome.right = judge.right();
@@ -173,21 +173,22 @@ bool check(LabDevice& device) {
   drivers::HotplugMonitor arrivals;
   Outcome sum;
   Resources after_first, after_last;
-  for (int round = 0; round < kRounds && sum.trouble.empty(); ++round) {
+  for (int round = 0; round < kRounds && sum.problems.empty(); ++round) {
     const Outcome outcome = one_round(device, arrivals);
     sum.right += outcome.right;
     sum.wrong += outcome.wrong;
     sum.enumerated = std::max(sum.enumerated, outcome.enumerated);
     sum.back = std::max(sum.back, outcome.back);
     sum.lost = std::max(sum.lost, outcome.lost);
-    sum.trouble = outcome.trouble;
-    if (outcome.right < kReportsARound && sum.trouble.empty()) sum.trouble = "reports are missing";
+    sum.problems = outcome.problems;
+    if (outcome.right < kReportsARound && sum.problems.empty())
+      sum.problems = "reports are missing";
     after_last = Resources::now();
     if (round == 0) after_first = after_last;
   }
   const bool lean = after_last.descriptors == after_first.descriptors &&
                     after_last.memory_kb <= after_first.memory_kb + kMemorySlack_kb;
-  const bool good = sum.trouble.empty() && sum.wrong == 0 && sum.back < kMaxReturn &&
+  const bool good = sum.problems.empty() && sum.wrong == 0 && sum.back < kMaxReturn &&
                     sum.lost < kMaxReturn && lean;
   std::printf("%s transport %s: %d replugs, %zu reports right, %zu wrong or out of order",
               good ? "ok  " : "FAIL", device.name.c_str(), kRounds, sum.right, sum.wrong);
@@ -195,7 +196,7 @@ bool check(LabDevice& device) {
               ms(sum.enumerated), ms(sum.back), ms(sum.lost));
   std::printf(", descriptors %ld -> %ld, memory %ld -> %ld KB%s%s\n", after_first.descriptors,
               after_last.descriptors, after_first.memory_kb, after_last.memory_kb,
-              sum.trouble.empty() ? "" : ": ", sum.trouble.c_str());
+              sum.problems.empty() ? "" : ": ", sum.problems.c_str());
   return good;
 }
 

@@ -8,15 +8,14 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/stage_requests.hpp"
-#include "daemon/devices/calibration.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/record/recorder.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/digest.hpp"
-#include "tests/support/scripted_device.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/virtual_bodies.hpp"
+#include "tests/support/virtual_stream_context.hpp"
 
 namespace posed::test {
 namespace {
@@ -35,41 +34,6 @@ std::vector<devices::ModelBytes> shared(const std::vector<std::string>& files) {
 }
 
 }  // namespace
-
-// One stream of the running daemon, with everything that its parts borrow.
-struct VirtualStreamContext {
-  VirtualStreamContext(VirtualStream script, std::uint32_t number)
-      : stream(std::move(script)),
-        device(stream.description, std::move(stream.links)),
-        published(number, stream.name, counters) {
-    stream.settings.rate_hz = stream.description.rate_hz;
-  }
-
-  // The file, bound to stage number `stage`.
-  const StageModel* bind(std::size_t stage, const std::string& bytes) {
-    const StageType& type = *stream.settings.stages[stage].type;
-    auto bound = type.bind_model(
-        bytes_of(bytes),
-        pipeline::stage_context(stream.settings, stage, stream.description.skeleton), "virtual");
-    REQUIRE(bound);
-    models.push_back(std::move(*bound));
-    return models.back().get();
-  }
-  const drivers::glove::OwnedCalibration* compile(const std::string& toml) {
-    auto compiled = devices::compile_calibration(stream.description, toml, "virtual.toml");
-    REQUIRE(compiled);
-    calibrations.push_back(std::move(*compiled));
-    return calibrations.back().get();
-  }
-
-  VirtualStream stream;
-  pipeline::StreamCounters counters;
-  pipeline::SourceCounters source_counters;
-  ScriptedDevice device;
-  std::vector<std::unique_ptr<const StageModel>> models;
-  std::vector<std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
-  PublishedStream published;
-};
 
 class VirtualDaemon::Parts {
  public:

@@ -113,10 +113,10 @@ Result<std::unique_ptr<HopSubscriber>> HopSubscriber::fork() {
   std::array<int, 2> down{};
   std::array<int, 2> up{};
   if (pipe2(down.data(), O_CLOEXEC) != 0 || pipe2(up.data(), O_CLOEXEC) != 0) {
-    return fail(std::string("cannot make a pipe: ") + std::strerror(errno));
+    return fail("cannot make a pipe: " + errno_text());
   }
   const int process = ::fork();
-  if (process < 0) return fail(std::string("cannot fork: ") + std::strerror(errno));
+  if (process < 0) return fail("cannot fork: " + errno_text());
   if (process == 0) {
     close(down[1]);
     close(up[0]);

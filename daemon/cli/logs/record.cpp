@@ -41,6 +41,29 @@ void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
   for (const std::uint32_t stream : event.streams) daemon.post_event(stream, kind, event.text);
 }
 
+// Datagrams that never came to posed. Those of a body's device count once, with its source.
+std::uint64_t kernel_dropped(const v1::Stats& stats) {
+  std::uint64_t dropped = 0;
+  for (const v1::SourceStats& source : stats.source()) dropped += source.kernel_dropped();
+  for (const v1::StreamStats& stream : stats.stream()) {
+    if (stream.source_name().empty()) dropped += stream.kernel_dropped();
+  }
+  return dropped;
+}
+
+std::string missing_words(std::uint64_t lost, std::uint64_t errors, std::uint64_t dropped) {
+  std::string words;
+  if (lost + errors > 0) {
+    words = fmt::format("{} chunks are missing after {} write errors; `posed replay` says where",
+                        lost, errors);
+  }
+  if (dropped > 0) {
+    words += fmt::format("{}the kernel dropped {} datagrams before posed could read them",
+                         words.empty() ? "" : "; ", dropped);
+  }
+  return words.empty() ? "nothing is missing" : words;
+}
+
 // Prints a summary. Gaps were already reported when they happened.
 void print_result(const RecordOptions& options, const v1::Stats& stats,
                   const record::Recorder& recorder, double took_s) {
@@ -56,6 +79,7 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
         {{"stream", stream.stream()}, {"frames", stream.frames()}, {"samples", stream.samples()}});
   }
   const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
+  const std::uint64_t dropped = kernel_dropped(stats);
   if (options.json) {
     const nlohmann::ordered_json line{{"file", options.out},
                                       {"seconds", took_s},
@@ -66,20 +90,16 @@ void print_result(const RecordOptions& options, const v1::Stats& stats,
                                       {"left_frames", stats.left_frames()},
                                       {"left_samples", stats.left_samples()},
                                       {"missing_chunks", lost},
+                                      {"kernel_dropped", dropped},
                                       {"write_errors", errors}};
     std::printf("%s\n", json_text(line).c_str());
     std::fflush(stdout);
   }
-  spdlog::log(lost + errors > 0 ? spdlog::level::warn : spdlog::level::info,
+  spdlog::log(lost + errors + dropped > 0 ? spdlog::level::warn : spdlog::level::info,
               "{}: {:.1f} s of {} stream{}{}, {} frames and {} samples published, {:.1f} MB; {}",
               options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
               some_left ? " and those that have left" : "", frames, samples,
-              static_cast<double>(bytes) / 1e6,
-              lost + errors == 0
-                  ? "nothing is missing"
-                  : fmt::format("{} chunks are missing after {} write errors; `posed replay` says "
-                                "where",
-                                lost, errors));
+              static_cast<double>(bytes) / 1e6, missing_words(lost, errors, dropped));
 }
 
 void add_models(OutputFiles& files, const config::StreamConfig& stream) {

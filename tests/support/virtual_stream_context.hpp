@@ -1,0 +1,51 @@
+// One stream of the running virtual daemon, with everything that its parts borrow.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/devices/calibration.hpp"
+#include "tests/support/scripted_device.hpp"
+#include "tests/support/virtual_daemon.hpp"
+
+namespace posed::test {
+
+struct VirtualStreamContext {
+  VirtualStreamContext(VirtualStream script, std::uint32_t number)
+      : stream(std::move(script)),
+        device(stream.description, std::move(stream.links)),
+        published(number, stream.name, counters) {
+    stream.settings.rate_hz = stream.description.rate_hz;
+  }
+
+  // The file, bound to stage number `stage`.
+  const StageModel* bind(std::size_t stage, const std::string& bytes) {
+    const StageType& type = *stream.settings.stages[stage].type;
+    auto bound = type.bind_model(
+        bytes_of(bytes),
+        pipeline::stage_context(stream.settings, stage, stream.description.skeleton), "virtual");
+    REQUIRE(bound);
+    models.push_back(std::move(*bound));
+    return models.back().get();
+  }
+  const drivers::glove::OwnedCalibration* compile(const std::string& toml) {
+    auto compiled = devices::compile_calibration(stream.description, toml, "virtual.toml");
+    REQUIRE(compiled);
+    calibrations.push_back(std::move(*compiled));
+    return calibrations.back().get();
+  }
+
+  VirtualStream stream;
+  pipeline::StreamCounters counters;
+  pipeline::SourceCounters source_counters;
+  ScriptedDevice device;
+  std::vector<std::unique_ptr<const StageModel>> models;
+  std::vector<std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
+  PublishedStream published;
+};
+
+}  // namespace posed::test
