@@ -58,10 +58,10 @@ Result<LoggedDevice> read_logged_device(const std::string& log, const std::strin
     device.recording.add(row.arrival_ns, row.bytes, static_cast<std::uint8_t>(row.socket));
   }
   if (device.recording.count() == 0) return fail("nothing came from this stream's device", log);
-  if (sockets != addresses) {
-    return misuse(fmt::format("its device speaks to {} socket{} of the host; name one address for"
+  if (sockets > addresses) {
+    return misuse(fmt::format("it has datagrams of {} sockets of the host; name one address for"
                               " each with --udp, in their order",
-                              sockets, sockets == 1 ? "" : "s"),
+                              sockets),
                   log);
   }
   return device;

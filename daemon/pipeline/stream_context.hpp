@@ -72,7 +72,7 @@ class StreamContext final : private EngineOut {
   std::vector<Command> first_commands_;
   std::size_t begun_ = 0;  // how many of them were applied
   RingShare share_;        // of ports_.out
-  Decision placed_;        // the same
+  Decision placed_;        // kept here because it is large
 };
 
 }  // namespace posed::pipeline

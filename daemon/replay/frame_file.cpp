@@ -1,9 +1,7 @@
 #include "daemon/replay/frame_file.hpp"
 
 #include <array>
-#include <cerrno>
 #include <cstdint>
-#include <cstring>
 
 namespace posed::replay {
 

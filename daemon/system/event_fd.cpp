@@ -1,7 +1,6 @@
 #include "daemon/system/event_fd.hpp"
 
 #include <cerrno>
-#include <cstring>
 
 #include <sys/epoll.h>
 #include <sys/eventfd.h>

@@ -167,8 +167,9 @@ void PacketReader::read_range(TableReader& from, int bits, Field& field) {
 }
 
 void PacketReader::read_meaning(TableReader& from, FieldGroup& group) {
-  // A key of another kind has an error of its own, or does nothing to a time.
-  for (const char* key : {"value", "scale", "offset", "unit"}) from.skip(key);
+  if (group.field.kind != FieldKind::kTime) {  // a key of another kind has an error of its own
+    for (const char* key : {"value", "scale", "offset", "unit"}) from.skip(key);
+  }
   switch (group.field.kind) {
     case FieldKind::kTime:
       return from.read("tick_s", group.tick_s, {1e-9, 1.0});

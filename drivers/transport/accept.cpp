@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <optional>
 
 #include "drivers/transport/address.hpp"
@@ -36,7 +35,7 @@ Result<int> listen_at(const ListenSettings& settings) {
   if (fd < 0 || ::bind(fd, address->get(), address->size) != 0 || ::listen(fd, kBacklog) != 0) {
     const int error = errno;
     if (fd >= 0) ::close(fd);
-    return fail("cannot listen on " + settings.endpoint + " (" + std::strerror(error) +
+    return fail("cannot listen on " + settings.endpoint + " (" + errno_text(error) +
                 "); use an address of this machine and a port that is free");
   }
   return fd;

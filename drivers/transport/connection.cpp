@@ -37,7 +37,7 @@ milliseconds left_until(Clock::time_point deadline) {
 }
 
 std::string gone(const std::string& name, int error) {
-  return name + " has gone (" + (error == 0 ? "hung up" : std::strerror(error)) +
+  return name + " has gone (" + (error == 0 ? "hung up" : errno_text(error)) +
          "); plug it in again or switch it on";
 }
 

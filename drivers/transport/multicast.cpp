@@ -4,7 +4,6 @@
 #include <net/if.h>
 #include <netinet/in.h>
 
-#include <cerrno>
 #include <cstring>
 
 namespace posed::drivers {

@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -75,7 +74,7 @@ std::string node_open_error(const std::string& path, int error) {
              "; end that first";
     }
     default:
-      return path + " does not open (" + std::strerror(error) + ")";
+      return path + " does not open (" + errno_text(error) + ")";
   }
 }
 

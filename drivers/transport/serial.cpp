@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 
 #include "drivers/transport/enumerate.hpp"
 #include "drivers/transport/node.hpp"

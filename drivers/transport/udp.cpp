@@ -24,6 +24,7 @@ constexpr std::size_t kControlBytes =
 // Bytes, about a tenth of a second of a large system; the kernel grants at most net.core.rmem_max.
 constexpr int kReceiveBuffer = 1024 * 1024;
 // A datagram counts as at most this old: an older stamp means that the wall clock was set.
+constexpr int kMaxOldBatches = 1000;  // more than a socket's buffer holds
 constexpr std::int64_t kMaxAge_ns = 50'000'000;
 static_assert(kMaxDatagram <= kMaxChunk);
 
@@ -209,6 +210,16 @@ void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
   if (const auto dropped = control_value<std::uint32_t>(header, SO_RXQ_OVFL)) {
     chunk.kernel_dropped += *dropped - std::exchange(sockets_[socket_].dropped, *dropped);
   }
+}
+
+// What the kernel dropped before is no loss either: it is counted into a Chunk that nobody gets.
+Result<> UdpTransport::start(std::int64_t now_ns) {
+  Chunk old;
+  for (int batch = 0; batch < kMaxOldBatches && receive(now_ns); ++batch) {
+    for (std::size_t i = 0; i < received_; ++i) read_control(i, old);
+  }
+  next_ = received_;
+  return {};
 }
 
 // RT-safe except for its reads. A flood of datagrams to be dropped ends the call after one batch.

@@ -48,7 +48,8 @@ class UdpTransport final : public Transport {
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
     return next_ < received_ ? batch_ns_ : kNoTime_ns;
   }
-  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  // Discards what came since open(): it is old by now.
+  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   using Transport::send;
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;

@@ -1,6 +1,5 @@
 #include "proto/frame/result.hpp"
 
-#include <cerrno>
 #include <system_error>
 
 #include "proto/text/clean.hpp"
@@ -20,7 +19,8 @@ std::string Error::text() const {
   return place + ":" + std::to_string(line) + ": " + sentence;
 }
 
-// std::strerror() may not be called by two threads at once.
-std::string errno_text() { return std::error_code(errno, std::generic_category()).message(); }
+std::string errno_text(int error) {
+  return std::error_code(error, std::generic_category()).message();
+}
 
 }  // namespace posed

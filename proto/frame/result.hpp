@@ -2,6 +2,7 @@
 // the file and line if there is one. Hot code never uses it (see Outcome in sink.hpp).
 #pragma once
 
+#include <cerrno>
 #include <expected>
 #include <string>
 #include <utility>
@@ -24,8 +25,8 @@ struct Error {
 template <typename T = void>
 using Result = std::expected<T, Error>;
 
-// What the system says of `errno`. Any thread.
-[[nodiscard]] std::string errno_text();
+// What the system says of an error number. Any thread.
+[[nodiscard]] std::string errno_text(int error = errno);
 
 // return fail("..."), return fail("...", path, line)
 [[nodiscard]] inline std::unexpected<Error> fail(std::string message, std::string file = {},

@@ -1,7 +1,5 @@
 #include "proto/log/database.hpp"
 
-#include <cstring>
-
 #include <sqlite3.h>
 
 namespace posed::log {
@@ -13,7 +11,7 @@ constexpr int kMaxValue = 256 * 1024 * 1024;  // bytes; a log's largest value is
 std::unexpected<Error> failure(sqlite3* handle, const std::string& file) {
   const int code = handle == nullptr ? SQLITE_NOMEM : sqlite3_errcode(handle);
   const int place = handle == nullptr ? 0 : sqlite3_system_errno(handle);
-  const std::string why = place != 0 ? std::strerror(place) : sqlite3_errstr(code);
+  const std::string why = place != 0 ? errno_text(place) : sqlite3_errstr(code);
   switch (code) {
     case SQLITE_NOTADB:
       return fail("not a device log (not an SQLite file)", file);

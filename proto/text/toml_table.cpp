@@ -102,7 +102,9 @@ std::optional<double> TableReader::number(const toml::node& node, std::string_vi
     add_type_error(node, key, whole ? "an integer" : "a number" + unit_words(key));
     return std::nullopt;
   }
-  const double number = *node.value<double>();
+  // Not value<double>(), which gives nothing for an integer that a double cannot hold exactly.
+  const double number = node.is_integer() ? static_cast<double>(node.as_integer()->get())
+                                          : node.as_floating_point()->get();
   if (number >= range.min && number <= range.max) return number;
   findings_.add_error(line_of_node(node),
                       out_of_range(shown(key), number, range.min, range.max, whole));
@@ -207,7 +209,12 @@ bool TableReader::need(std::string_view key, std::string_view remedy) {
 }
 
 void TableReader::require(std::string_view key, std::string& value) {
-  if (need(key, "give it a text in quotes")) read(key, value);
+  constexpr std::string_view kRemedy = "give it a text in quotes";
+  if (!need(key, kRemedy)) return;
+  read(key, value);
+  if (has_text(key) && value.empty()) {
+    add_error(key, shown(key) + " is empty; " + std::string(kRemedy));
+  }
 }
 
 std::size_t TableReader::choice(std::string_view key, std::span<const std::string_view> words) {

@@ -1,6 +1,5 @@
 // A device that speaks on two sockets, through the reader and into the record, and from a log.
 #include <array>
-#include <cstring>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -116,13 +115,13 @@ TEST_CASE("a log's device sends each datagram to the socket that it came to") {
     CHECK(datagram.size() == 1);
   }
   CHECK(sockets == std::vector<int>{1, 0, 1});
-  for (const std::size_t addresses : {1U, 3U}) {
-    const auto refused = emulate::read_logged_device(file, "", addresses);
-    REQUIRE_FALSE(refused);
-    CHECK(refused.error().text().ends_with(
-        "its device speaks to 2 sockets of the host; name one address for each with --udp, in"
-        " their order"));
-  }
+  // The log does not say whether the device had more sockets, so more addresses do no harm.
+  CHECK(emulate::read_logged_device(file, "", 3));
+  const auto refused = emulate::read_logged_device(file, "", 1);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().text().ends_with(
+      "it has datagrams of 2 sockets of the host; name one address for each with --udp, in their"
+      " order"));
 }
 
 }  // namespace posed::pipeline

@@ -92,12 +92,24 @@ TEST_CASE("without a key the default stays and nothing is an error", "[toml_tabl
         }).empty());
 }
 
+TEST_CASE("a text that is required is there and not empty", "[toml_table]") {
+  const auto name = [](TableReader& reader) {
+    std::string value;
+    reader.require("name", value);
+  };
+  CHECK(errors_of("name = 'a'", name).empty());
+  CHECK(error_of("", name) == "1: name is missing; give it a text in quotes");
+  CHECK(error_of("name = ''", name) == "1: name is empty; give it a text in quotes");
+}
+
 TEST_CASE("the error for a wrong value says what it must be", "[toml_table]") {
   const auto three = [](TableReader& reader) { CHECK_FALSE(reader.numbers<3>("v", {0, 9})); };
   CHECK(error_of("v = [1, 2]", three) == "1: v must be a list of 3 numbers, not a list of 2");
   CHECK(error_of("v = [1, 2, 10]", three) ==
         "1: v = 10 is out of range: it takes a number from 0 to 9");
   CHECK(error_of("v = [1, 2,\nnan]", three).starts_with("2: v = nan is out of range"));
+  // 2^53 + 1: a double cannot hold it exactly
+  CHECK(error_of("v = [1, 2, 9007199254740993]", three).starts_with("1: v = 9"));
   CHECK(error_of("v = [1, 2, '3']", three) == "1: v must be a number, not text");
   const auto pairs = [](TableReader& reader) { CHECK_FALSE(reader.pairs("v", {0, 9})); };
   CHECK(error_of("v = 1", pairs) ==
