@@ -209,12 +209,7 @@ bool TableReader::need(std::string_view key, std::string_view remedy) {
 }
 
 void TableReader::require(std::string_view key, std::string& value) {
-  constexpr std::string_view kRemedy = "give it a text in quotes";
-  if (!need(key, kRemedy)) return;
-  read(key, value);
-  if (has_text(key) && value.empty()) {
-    add_error(key, shown(key) + " is empty; " + std::string(kRemedy));
-  }
+  if (need(key, "give it a text in quotes")) read(key, value);
 }
 
 std::size_t TableReader::choice(std::string_view key, std::span<const std::string_view> words) {

@@ -48,8 +48,7 @@ class TableReader {
   void read(std::string_view key, std::vector<std::uint32_t>& value);
   // Adds an error if the key is absent, with what to write, and returns whether it is there.
   bool need(std::string_view key, std::string_view remedy);
-  // need() and read(); adds an error also for an empty text.
-  void require(std::string_view key, std::string& value);
+  void require(std::string_view key, std::string& value);  // need() and read()
 
   // The place of the text among `words`; 0, that of the default, if it is absent or wrong.
   [[nodiscard]] std::size_t choice(std::string_view key, std::span<const std::string_view> words);

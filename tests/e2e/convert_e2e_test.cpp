@@ -46,9 +46,10 @@ class Take : public Stage {
   // A log may be read while it is written.
   [[nodiscard]] json convert_all(const std::string& out, const std::string& stream) const {
     Outcome outcome = convert(out, {"--stream", stream});
-    for (int i = 0; i < 100; ++i, outcome = convert(out, {"--stream", stream})) {
+    for (int i = 0; i < 100; ++i) {
       if (outcome.code == 0 && json::parse(outcome.out).at("frames") == kFrames) break;
       std::this_thread::sleep_for(100ms);
+      outcome = convert(out, {"--stream", stream, "--overwrite"});
     }
     INFO(outcome.err);
     REQUIRE(outcome.code == 0);
