@@ -179,7 +179,7 @@ TEST_CASE("a stream is removed after its items in the ring, and its counters are
 }
 
 TEST_CASE("what was published of streams that have left still counts") {
-  Body ann, bob;
+  Body ann;
   PublisherRig rig;
   REQUIRE(rig.receive("skeleton/toy", 1));
   rig.publisher->add(ann.info(rig, kAnn));
