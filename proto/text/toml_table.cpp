@@ -86,6 +86,13 @@ const toml::node* TableReader::find(std::string_view key) {
   return table_.get(key);
 }
 
+const toml::array* TableReader::find_list(std::string_view key, const std::string& wanted) {
+  const toml::node* node = find(key);
+  if (node == nullptr) return nullptr;
+  if (!node->is_array()) add_type_error(*node, key, wanted);
+  return node->as_array();
+}
+
 void TableReader::add_error(std::string_view key, std::string_view message) {
   findings_.add_error(line_of(key), message);
 }
@@ -176,10 +183,8 @@ void TableReader::read(std::string_view key, std::string& value) {
 }
 
 void TableReader::read(std::string_view key, std::vector<std::string>& value) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return;
-  const toml::array* list = node->as_array();
-  if (list == nullptr) return add_type_error(*node, key, "a list of texts");
+  const toml::array* list = find_list(key, "a list of texts");
+  if (list == nullptr) return;
   value.clear();
   for (const toml::node& element : *list) {
     if (const auto* text = element.as_string()) {
@@ -191,10 +196,8 @@ void TableReader::read(std::string_view key, std::vector<std::string>& value) {
 }
 
 void TableReader::read(std::string_view key, std::vector<std::uint32_t>& value) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return;
-  const toml::array* list = node->as_array();
-  if (list == nullptr) return add_type_error(*node, key, "a list of integers");
+  const toml::array* list = find_list(key, "a list of integers");
+  if (list == nullptr) return;
   value.clear();
   for (const toml::node& element : *list) {
     const auto read = number(element, key, {0, std::numeric_limits<std::uint32_t>::max()}, true);
@@ -232,13 +235,8 @@ std::vector<std::byte> TableReader::hex(std::string_view key, std::size_t most) 
 }
 
 std::optional<TableReader::Pairs> TableReader::pairs(std::string_view key, Range range) {
-  const toml::node* node = find(key);
-  if (node == nullptr) return std::nullopt;
-  const toml::array* list = node->as_array();
-  if (list == nullptr) {
-    add_type_error(*node, key, "a list of pairs of numbers ([[0, 1], [2, 3]])");
-    return std::nullopt;
-  }
+  const toml::array* list = find_list(key, "a list of pairs of numbers ([[0, 1], [2, 3]])");
+  if (list == nullptr) return std::nullopt;
   Pairs pairs;
   for (const toml::node& element : *list) {
     if (!read_numbers(element, key, pairs.emplace_back(), range)) return std::nullopt;

@@ -85,6 +85,8 @@ class TableReader {
  private:
   // The node of a key, which becomes known; null if absent.
   const toml::node* find(std::string_view key);
+  // The same for a list; null also if it is none, which is an error.
+  const toml::array* find_list(std::string_view key, const std::string& wanted);
   // The number, or nothing and an error.
   std::optional<double> number(const toml::node& node, std::string_view key, Range range,
                                bool whole = false);
