@@ -111,6 +111,12 @@ class SourceLayout {
   std::vector<Body> bodies;  // [body of Sink::frame], at most kMaxBodies
 };
 
+// Bytes for the device.
+struct Request {
+  std::span<const std::byte> bytes{};
+  std::uint8_t socket = 0;  // where it goes, for a device with several sockets
+};
+
 // Turns bytes into frames. Pure: no clock, no I/O, no allocation after construction.
 class Decoder {
  public:
@@ -134,6 +140,11 @@ class Decoder {
   // From the next packet on these are the bodies. The layout comes from the same driver's
   // make_layout and outlives its use. A device with one body ignores the call. RT-safe.
   virtual void use(const SourceLayout& /*layout*/) noexcept {}
+
+  // What to ask the device now, for a device with a Poll without a fixed request; empty: nothing.
+  // The bytes are valid until the next call. It may depend on what was fed before, but feed() may
+  // not depend on it: a replay does not call it. RT-safe.
+  [[nodiscard]] virtual Request next_request(std::int64_t /*now_ns*/) noexcept { return {}; }
 };
 
 // What is known about a device before it streams. Stored in the log; enough to decode its bytes
@@ -152,9 +163,9 @@ struct Description {
 
 // The request for a device that answers instead of streaming.
 struct Poll {
-  std::vector<std::byte> request;  // empty: the device streams on its own
-  std::int64_t period_ns = 0;
-  std::uint8_t socket = 0;  // where it goes, for a device with several sockets
+  std::vector<std::byte> request;  // empty: the decoder says what to ask (Decoder::next_request)
+  std::int64_t period_ns = 0;      // 0: the device streams on its own
+  std::uint8_t socket = 0;         // where it goes, for a device with several sockets
 };
 
 // One opened device.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/frame/frame.hpp"
+#include "proto/frame/skeleton.hpp"
 
 namespace posed::drivers {
 
@@ -21,7 +22,12 @@ class Emulator {
   Emulator& operator=(const Emulator&) = delete;
   virtual ~Emulator() = default;
 
-  // Sets the pose of one of its bodies from now on. A body that it does not have is ignored.
+  // Of one of its bodies, as the host will learn it; null for a hand and for a body that it does
+  // not have. It never changes.
+  [[nodiscard]] virtual const Skeleton* skeleton(std::size_t /*body*/) const { return nullptr; }
+
+  // Sets the pose of one of its bodies from now on: a frame of that skeleton, or of a hand
+  // (proto/frame/hand_skeleton.hpp). A body that it does not have is ignored.
   virtual void pose(std::size_t body, const Frame& frame) = 0;
 
   // Takes bytes from the host: of a byte stream cut at any position, of UDP one datagram. Immediate
@@ -40,6 +46,10 @@ class Emulator {
 
   // The socket of the host that this record goes to.
   [[nodiscard]] virtual std::uint8_t next_socket() const { return 0; }
+
+  // [socket of the host] The device's port that it sends to; 0: that which the records come from,
+  // whatever it is.
+  [[nodiscard]] virtual std::vector<std::uint16_t> ports() const { return {0}; }
 
   // Adds the record that is due now to `out`: one packet of the device.
   virtual void emit(std::int64_t now_ns, Bytes& out) = 0;

@@ -63,6 +63,12 @@ struct StageType {
   // Checks what the range of a single parameter cannot, before the stage is made; live parameters
   // must be sound in any combination. Null: nothing.
   std::optional<ParameterFault> (*check)(const Parameters& parameters, bool has_model) = nullptr;
+  // Replaces the names of files by what the stage needs of them, so that the device log holds all
+  // that a replay needs. Null: no parameter names a file.
+  Result<> (*read_files)(Parameters& parameters) = nullptr;
+  // The skeleton of the frames that leave the stage. The same context gives the same skeleton.
+  // Null: that of the frames that enter.
+  Result<std::shared_ptr<const Skeleton>> (*leaves)(const StageContext& context) = nullptr;
   // Returns an error for a skeleton that the stage cannot serve. `model` is one that bind_model
   // made for the same context; null: none. It outlives the stage, or its successor does.
   Result<std::unique_ptr<Stage>> (*make)(const StageContext& context, const StageModel* model);

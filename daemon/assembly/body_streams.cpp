@@ -151,6 +151,7 @@ void BodyStreams::add(devices::NewStream stream) {
   users_.publisher->add({.stream = id,
                          .name = stream.config.name,
                          .description = std::move(description),
+                         .skeleton = stream.stages.published,
                          .rate_hz = stream.rate_hz,
                          .stages = pipeline::stage_types_of(stream.stages.settings),
                          .raw = stream.config.publish_raw,

@@ -179,10 +179,12 @@ Result<> Daemon::Parts::open_sockets() {
   if (!started) return std::unexpected(started.error());
   authenticator = std::move(*started);
   std::vector<publish::StreamInfo> infos;
+  infos.reserve(streams.size());
   for (const auto& stream : streams) {
     infos.push_back({.stream = static_cast<std::uint32_t>(infos.size()),
                      .name = stream->config.name,
                      .description = stream->source->device.description,
+                     .skeleton = stream->stages.published,
                      .rate_hz = rate_of(*stream),
                      .stages = pipeline::stage_types_of(stream->stages.settings),
                      .raw = stream->config.publish_raw,

@@ -6,7 +6,9 @@ void ConfigFile::read_parameter(TableReader& table, const ParameterSpec& spec,
                                 ParameterValue& value) const {
   table.read(spec, value);
   auto* text = std::get_if<std::string>(&value);
-  if (spec.is_path && text != nullptr) *text = resolve(*text).string();
+  // A default is a word that stands for no file, if it is not empty.
+  const bool names_file = spec.is_path && value != spec.default_value;
+  if (names_file && text != nullptr) *text = resolve(*text).string();
 }
 
 }  // namespace posed::config

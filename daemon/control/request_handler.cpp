@@ -167,8 +167,9 @@ Result<> RequestHandler::set_model(const std::string& stream_name, std::span<con
   if (!stage) return of_stream(stream.name, stage.error());
   if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
   const StageType& type = *stream.settings.stages[*stage].type;
-  auto bound = type.bind_model(
-      bytes, pipeline::stage_context(stream.settings, *stage, stream.skeleton), name);
+  const auto context = pipeline::stage_context(stream.settings, *stage, stream.skeleton);
+  if (!context) return std::unexpected(context.error());
+  auto bound = type.bind_model(bytes, *context, name);
   if (!bound) return std::unexpected(bound.error());
   Command command{.change = {.kind = StageChange::Kind::kModel, .type = &type},
                   .model = bound->get()};

@@ -39,6 +39,11 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
   if (!stages) return std::unexpected(stages.error());
   loaded.skeleton = std::move(skeleton);
   for (config::StageConfig& stage : *stages) {
+    if (stage.type->read_files != nullptr) {
+      if (auto read = stage.type->read_files(stage.parameters); !read) {
+        return std::unexpected(read.error());
+      }
+    }
     loaded.settings.stages.push_back({.type = stage.type,
                                       .parameters = std::move(stage.parameters),
                                       .model_name = stage.model.filename().string()});
@@ -48,6 +53,9 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
     if (!bytes) return std::unexpected(bytes.error());
     file = std::move(*bytes);
   }
+  auto published = pipeline::published_skeleton(loaded.settings, loaded.skeleton);
+  if (!published) return std::unexpected(published.error());
+  loaded.published = std::move(*published);
   return loaded;
 }
 
@@ -63,9 +71,10 @@ Result<BoundStages> bind_stages(const LoadedStages& stages) {
     const pipeline::StageSettings& stage = stages.settings.stages[i];
     auto& model = bound.models.emplace_back();
     if (stages.skeleton && stages.model_files[i]) {
-      auto ready = stage.type->bind_model(
-          std::as_bytes(std::span(*stages.model_files[i])),
-          pipeline::stage_context(stages.settings, i, stages.skeleton), stage.model_name);
+      const auto context = pipeline::stage_context(stages.settings, i, stages.skeleton);
+      if (!context) return std::unexpected(context.error());
+      auto ready = stage.type->bind_model(std::as_bytes(std::span(*stages.model_files[i])),
+                                          *context, stage.model_name);
       if (!ready) return std::unexpected(ready.error());
       model = std::move(*ready);
     }

@@ -19,7 +19,8 @@
 namespace posed::devices {
 
 struct LoadedStages {
-  std::shared_ptr<const Skeleton> skeleton;  // of the frames that enter; null: samples only
+  std::shared_ptr<const Skeleton> skeleton;   // of the frames that enter; null: samples only
+  std::shared_ptr<const Skeleton> published;  // of the frames that leave the last stage
   // For the engine; without the hashes of the models, which only the recorder knows.
   pipeline::StreamSettings settings;
   std::vector<ModelBytes> model_files;  // the bytes of each stage's model file; null without one

@@ -37,6 +37,16 @@ Result<> make_link(const std::filesystem::path& link, const std::string& target)
   return misuse("cannot link to the port: " + failed.message(), link.string());
 }
 
+// This port of the machine, as the host at `host` reaches it: on the loopback only if the host is
+// there.
+drivers::Address own_address(const drivers::Address& host, std::uint16_t port) {
+  const bool v6 = host.storage.ss_family == AF_INET6;
+  const bool here = drivers::is_loopback(drivers::host_of(host));
+  const std::string any = v6 ? "[::]:" : "0.0.0.0:";
+  const std::string loopback = v6 ? "[::1]:" : "127.0.0.1:";
+  return drivers::parse_endpoint((here ? loopback : any) + std::to_string(port)).value();
+}
+
 }  // namespace
 
 Result<EmulatedPort> EmulatedPort::open_pty(const std::filesystem::path& link) {
@@ -79,14 +89,42 @@ Result<EmulatedPort> EmulatedPort::connect_tcp(const std::string& endpoint) {
   return EmulatedPort(Kind::kTcp, {fd}, endpoint);
 }
 
-Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endpoints) {
+Result<EmulatedPort> EmulatedPort::listen_tcp(const std::string& endpoint) {
+  const auto address = drivers::parse_endpoint(endpoint);
+  if (!address) return std::unexpected(address.error());
+  EmulatedPort port(Kind::kTcpServer, {}, "");
+  port.listener_ =
+      ::socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int yes = 1;
+  setsockopt(port.listener_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  if (port.listener_ < 0 || ::bind(port.listener_, address->get(), address->size) != 0 ||
+      ::listen(port.listener_, 1) != 0) {
+    return fail("cannot listen on " + endpoint + " (" + errno_text() +
+                "); use an address of this machine and a port that is free");
+  }
+  drivers::Address bound;
+  ::getsockname(port.listener_, bound.get(), &bound.size);
+  port.name_ = drivers::endpoint_text(bound);
+  return port;
+}
+
+Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endpoints,
+                                            const std::vector<std::uint16_t>& ports) {
   EmulatedPort port(Kind::kUdp, {}, "");
-  for (const std::string& endpoint : endpoints) {
+  for (std::size_t i = 0; i < endpoints.size(); ++i) {
+    const std::string& endpoint = endpoints[i];
     const auto address = drivers::parse_endpoint(endpoint);
     if (!address) return std::unexpected(address.error());
     const int fd =
         ::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd >= 0) port.fds_.push_back(fd);
+    if (fd >= 0 && i < ports.size() && ports[i] != 0) {
+      const auto own = own_address(*address, ports[i]);
+      if (::bind(fd, own.get(), own.size) != 0) {
+        return fail("cannot use the device's port " + std::to_string(ports[i]) + " (" +
+                    errno_text() + "); end the program that has it");
+      }
+    }
     if (fd < 0 || ::connect(fd, address->get(), address->size) != 0) {
       return fail("cannot send to " + endpoint + " (" + errno_text() +
                   "); name an address that this machine reaches");
@@ -100,6 +138,7 @@ EmulatedPort::EmulatedPort(EmulatedPort&& other) noexcept
     : kind_(other.kind_),
       fds_(std::exchange(other.fds_, {})),
       other_side_(std::exchange(other.other_side_, -1)),
+      listener_(std::exchange(other.listener_, -1)),
       name_(std::move(other.name_)),
       link_(std::exchange(other.link_, {})) {}
 
@@ -110,22 +149,42 @@ EmulatedPort::~EmulatedPort() {
     std::filesystem::remove(link_, ignored);
   }
   if (other_side_ >= 0) ::close(other_side_);
+  if (listener_ >= 0) ::close(listener_);
   for (const int fd : fds_) ::close(fd);
+}
+
+void EmulatedPort::accept() noexcept {
+  const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (fd < 0) return;
+  const int on = 1;
+  setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  for (const int before : fds_) ::close(before);
+  fds_.assign(1, fd);
 }
 
 std::optional<EmulatedPort::Heard> EmulatedPort::receive(std::chrono::nanoseconds patience) {
   std::vector<pollfd> wait;
   for (const int fd : fds_) wait.push_back({.fd = fd, .events = POLLIN, .revents = 0});
+  if (listener_ >= 0) wait.push_back({.fd = listener_, .events = POLLIN, .revents = 0});
   const auto whole_s = std::chrono::duration_cast<std::chrono::seconds>(patience);
   const timespec timeout{.tv_sec = whole_s.count(), .tv_nsec = (patience - whole_s).count()};
   if (ppoll(wait.data(), wait.size(), &timeout, nullptr) <= 0) return Heard{};
   const auto ready = std::ranges::find_if(wait, [](const pollfd& fd) { return fd.revents != 0; });
+  if (ready->fd == listener_) {
+    accept();
+    return Heard{};
+  }
   Heard heard{.socket = static_cast<std::uint8_t>(ready - wait.begin()),
               .bytes = std::vector<std::byte>(drivers::kMaxChunk)};
   const ssize_t size = ::read(ready->fd, heard.bytes.data(), heard.bytes.size());
   // A UDP host that is not there yet answers with an error.
   const bool later = kind_ == Kind::kUdp || errno == EAGAIN || errno == EINTR;
   if (size < 0 && later) return Heard{};
+  if (size <= 0 && kind_ == Kind::kTcpServer) {  // the next host may come
+    ::close(ready->fd);
+    fds_.clear();
+    return Heard{};
+  }
   if (size <= 0 && kind_ != Kind::kUdp) return std::nullopt;
   heard.bytes.resize(static_cast<std::size_t>(size));
   return heard;

@@ -1,6 +1,5 @@
 // EmulatedPort connects an emulator with a program that expects a device: through a pseudo-terminal
-// for serial gloves, through a TCP connection to the host for gloves that connect to it, or through
-// UDP for mocap systems. Cold.
+// for serial gloves, through a TCP connection to the host or from it, or through UDP. Cold.
 #pragma once
 
 #include <chrono>
@@ -24,8 +23,14 @@ class EmulatedPort {
   // Connects to HOST:PORT, numbers only; fails if nothing listens there.
   [[nodiscard]] static Result<EmulatedPort> connect_tcp(const std::string& endpoint);
 
+  // Waits at IP:PORT for the host to connect, for systems that serve their data. The newest
+  // connection counts; port 0 means any that is free, and name() says which.
+  [[nodiscard]] static Result<EmulatedPort> listen_tcp(const std::string& endpoint);
+
   // Sends datagrams to these sockets of the host, "IP:PORT", whether or not it is there already.
-  [[nodiscard]] static Result<EmulatedPort> open_udp(const std::vector<std::string>& endpoints);
+  // `ports`: those of this machine that they come from; 0 or left out: any.
+  [[nodiscard]] static Result<EmulatedPort> open_udp(const std::vector<std::string>& endpoints,
+                                                     const std::vector<std::uint16_t>& ports = {});
 
   ~EmulatedPort();
   EmulatedPort(EmulatedPort&& other) noexcept;
@@ -47,15 +52,19 @@ class EmulatedPort {
   void send(std::uint8_t socket, std::span<const std::byte> bytes) noexcept;
 
  private:
-  enum class Kind : std::uint8_t { kTerminal, kTcp, kUdp };
+  enum class Kind : std::uint8_t { kTerminal, kTcp, kTcpServer, kUdp };
   EmulatedPort(Kind kind, std::vector<int> fds, std::string name) noexcept
       : kind_(kind), fds_(std::move(fds)), name_(std::move(name)) {}
+
+  // Replaces the connection by one that waits, if any.
+  void accept() noexcept;
 
   Kind kind_;
   std::vector<int> fds_;  // [socket of the host]
   // the host's end of a pseudo-terminal, kept open so that the terminal survives a host that closes
   // its own
   int other_side_ = -1;
+  int listener_ = -1;  // of a server
   std::string name_;
   std::filesystem::path link_;
 };

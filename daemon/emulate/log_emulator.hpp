@@ -27,6 +27,9 @@ class LogEmulator final : public drivers::Emulator {
   [[nodiscard]] std::uint8_t next_socket() const override {
     return done() ? std::uint8_t{0} : recording_.socket(next_);
   }
+  [[nodiscard]] std::vector<std::uint16_t> ports() const override {
+    return speaker_ == nullptr ? Emulator::ports() : speaker_->ports();
+  }
   void emit(std::int64_t now_ns, Bytes& out) override;
 
   [[nodiscard]] bool done() const noexcept { return next_ == recording_.count(); }

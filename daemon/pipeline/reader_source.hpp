@@ -21,9 +21,9 @@ namespace posed::pipeline {
 // One source: its device, if one is connected, and the handling of what the device sends.
 class Reader::Source final : private IntakeOut {
   // The most that one source may deliver in one turn; the rest waits for the next turn. A source
-  // that always has data then costs each of the others only a fraction of a millisecond. No real
-  // device comes near the limit: USB full speed is 64 bytes a millisecond, a serial line 11.5 KB a
-  // second.
+  // that always has data then costs each of the others only a fraction of a millisecond. No glove
+  // comes near the limit: USB full speed is 64 bytes a millisecond, a serial line 11.5 KB a second.
+  // A mocap system's datagram is often larger: then one is a turn.
   static constexpr int kChunksATurn = 64;
   static constexpr std::size_t kBytesATurn = 4096;
   // Frames of a lossless source on their way through the pipeline; below what the pipeline sheds.
@@ -186,7 +186,11 @@ class Reader::Source final : private IntakeOut {
     if (poll_due_ns_ == kNoTime_ns) return;
     const std::int64_t now_ns = ports_.clock();
     if (now_ns < poll_due_ns_) return;
-    send(device_->poll.request, device_->poll.socket);
+    if (!device_->poll.request.empty()) {
+      send(device_->poll.request, device_->poll.socket);
+    } else if (const auto next = device_->decoder->next_request(now_ns); !next.bytes.empty()) {
+      send(next.bytes, next.socket);
+    }
     poll_due_ns_ += device_->poll.period_ns;
     if (poll_due_ns_ < now_ns) poll_due_ns_ = now_ns + device_->poll.period_ns;
   }
@@ -198,7 +202,7 @@ class Reader::Source final : private IntakeOut {
   void use(drivers::Device& device) noexcept {
     if (calibration_ != nullptr) use_calibration(device);
     if (used_ != nullptr) device.decoder->use(*used_->layout);
-    poll_due_ns_ = device.poll.request.empty() ? kNoTime_ns : ports_.clock();
+    poll_due_ns_ = device.poll.period_ns == 0 ? kNoTime_ns : ports_.clock();
     const std::int64_t now_ns = ports_.clock();
     counters_.heard_ns.store(now_ns, std::memory_order_relaxed);
     counters_.link_ns.store(now_ns, std::memory_order_relaxed);

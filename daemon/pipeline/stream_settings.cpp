@@ -6,6 +6,29 @@
 #include "daemon/pipeline/counters.hpp"
 
 namespace posed::pipeline {
+namespace {
+
+StageContext context_of(const StreamSettings& settings, std::size_t stage,
+                        std::shared_ptr<const Skeleton> skeleton) {
+  return {.skeleton = std::move(skeleton),
+          .rate_hz = settings.rate_hz,
+          .parameters = settings.stages[stage].parameters};
+}
+
+// The skeleton of the frames that leave the first `stages` stages.
+Result<std::shared_ptr<const Skeleton>> skeleton_before(const StreamSettings& settings,
+                                                        std::size_t stages,
+                                                        std::shared_ptr<const Skeleton> skeleton) {
+  for (std::size_t i = 0; i < stages && skeleton; ++i) {
+    if (settings.stages[i].type->leaves == nullptr) continue;
+    auto next = settings.stages[i].type->leaves(context_of(settings, i, std::move(skeleton)));
+    if (!next) return next;
+    skeleton = std::move(*next);
+  }
+  return skeleton;
+}
+
+}  // namespace
 
 StageSettings stage_settings(const StageType& type, const Parameters& changed) {
   return {.type = &type, .parameters = complete_parameters(type.parameters, changed).value()};
@@ -23,11 +46,16 @@ std::string first_model(const StreamSettings& settings) {
   return found == settings.stages.end() ? std::string() : found->model_name;
 }
 
-StageContext stage_context(const StreamSettings& settings, std::size_t stage,
-                           std::shared_ptr<const Skeleton> skeleton) {
-  return {.skeleton = std::move(skeleton),
-          .rate_hz = settings.rate_hz,
-          .parameters = settings.stages[stage].parameters};
+Result<StageContext> stage_context(const StreamSettings& settings, std::size_t stage,
+                                   const std::shared_ptr<const Skeleton>& source) {
+  auto skeleton = skeleton_before(settings, stage, source);
+  if (!skeleton) return std::unexpected(skeleton.error());
+  return context_of(settings, stage, std::move(*skeleton));
+}
+
+Result<std::shared_ptr<const Skeleton>> published_skeleton(
+    const StreamSettings& settings, const std::shared_ptr<const Skeleton>& source) {
+  return skeleton_before(settings, settings.stages.size(), source);
 }
 
 Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings& settings,
@@ -47,7 +75,9 @@ Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings&
       const auto fault = type.check(settings.stages[i].parameters, models[i] != nullptr);
       if (fault) return misuse(fault->sentence);
     }
-    auto stage = type.make(stage_context(settings, i, skeleton), models[i]);
+    const auto context = stage_context(settings, i, skeleton);
+    if (!context) return std::unexpected(context.error());
+    auto stage = type.make(*context, models[i]);
     if (!stage) return std::unexpected(stage.error());
     options.stages.push_back({&type, std::move(*stage)});
     live +=

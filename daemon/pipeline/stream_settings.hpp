@@ -40,9 +40,15 @@ struct StreamSettings {
 // The name of the first model, as far as there is one. For people.
 [[nodiscard]] std::string first_model(const StreamSettings& settings);
 
-// A stage's view of the stream.
-[[nodiscard]] StageContext stage_context(const StreamSettings& settings, std::size_t stage,
-                                         std::shared_ptr<const Skeleton> skeleton);
+// A stage's view of the stream. `source` is the skeleton of the source's frames: the stages before
+// this one may change it. The error says which of them cannot serve it. Cold.
+[[nodiscard]] Result<StageContext> stage_context(const StreamSettings& settings, std::size_t stage,
+                                                 const std::shared_ptr<const Skeleton>& source);
+
+// The skeleton of the frames that leave the last stage; null for a stream that has samples only.
+// Cold.
+[[nodiscard]] Result<std::shared_ptr<const Skeleton>> published_skeleton(
+    const StreamSettings& settings, const std::shared_ptr<const Skeleton>& source);
 
 // The options of the engine of stream number `stream`, with its stages. `models` has one entry for
 // each stage, null where it starts without one; they outlive the engine or are replaced. `skeleton`

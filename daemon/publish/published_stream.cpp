@@ -64,8 +64,8 @@ Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
       event_topic("event/" + name),
       frames(name),
       samples(name, info.description.samples) {
-  if (info.description.skeleton) {
-    skeleton = skeleton_message(name, *info.description.skeleton, info.rate_hz);
+  if (const auto& of = unstyled ? info.description.skeleton : info.skeleton) {
+    skeleton = skeleton_message(name, *of, info.rate_hz);
     if (!unstyled) {
       for (const StageType* stage : info.stages) skeleton->add_stage(std::string(stage->name));
     }

@@ -35,6 +35,8 @@ struct StreamInfo {
   std::uint32_t stream = 0;  // id; its slot is below PublisherOptions::slots
   std::string name;
   drivers::Description description;
+  // Of the frames as published; Description::skeleton is the source's own.
+  std::shared_ptr<const Skeleton> skeleton;
   double rate_hz = 0.0;                  // expected frame rate; 0: unknown
   std::vector<const StageType*> stages;  // in the order in which they run
   bool raw = false;                      // the unstyled input is published as <name>-raw

@@ -125,6 +125,7 @@ publish::StreamInfo Broadcast::info_of(std::uint32_t id) {
   return {.stream = id,
           .name = stream.name,
           .description = stream.description,
+          .skeleton = stream.published,
           .rate_hz = stream.settings.rate_hz,
           .stages = pipeline::stage_types_of(stream.settings),
           .raw = stream.settings.publish_raw,

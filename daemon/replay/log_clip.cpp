@@ -25,7 +25,7 @@ std::map<std::string, Parts> parts_by_name(const Replay& replay) {
   std::map<std::string, Parts> parts;
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     const ReplayStream& stream = replay.stream(id);
-    if (stream.description.skeleton != nullptr) parts[stream.name].push_back(id);
+    if (stream.published != nullptr) parts[stream.name].push_back(id);
   }
   const auto first_item = [&](std::uint32_t id) { return replay.stream(id).first_item; };
   for (auto& [name, ids] : parts) std::ranges::stable_sort(ids, {}, first_item);
@@ -33,7 +33,7 @@ std::map<std::string, Parts> parts_by_name(const Replay& replay) {
 }
 
 const Skeleton& skeleton_of(const Replay& replay, std::uint32_t id) {
-  return *replay.stream(id).description.skeleton;
+  return *replay.stream(id).published;
 }
 
 // The part that "walker#2" names; empty if there is none.
@@ -147,8 +147,8 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   Replay& replay = **opened;
   const auto ids = choose(replay, stream, path.string());
   if (!ids) return std::unexpected(ids.error());
-  const drivers::Description& description = replay.stream(ids->front()).description;
-  Collector collector(description.skeleton);
+  const ReplayStream& first = replay.stream(ids->front());
+  Collector collector(first.published);
   const auto take = [&](const pipeline::Item& item) {
     if (item.kind == pipeline::Item::Kind::kFrame &&
         std::ranges::find(*ids, item.frame.header.stream) != ids->end()) {
@@ -157,7 +157,7 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   };
   const auto done = replay.run(take, [](const log::ChunkRow&) { return true; });
   if (!done) return std::unexpected(done.error());
-  auto clip = collector.finish(path.string(), description.rate_hz);
+  auto clip = collector.finish(path.string(), first.description.rate_hz);
   if (!clip) return clip;
   for (const std::uint32_t id : *ids) {
     const auto broken = replay.broken_at(id);

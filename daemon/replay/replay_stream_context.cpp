@@ -36,6 +36,9 @@ Result<> ReplayStreamContext::describe(drivers::Description description) {
     return fail("stream " + in_quotes(stream_.name) + " has stages but no skeleton", file_);
   }
   settings.rate_hz = description.rate_hz;  // the models are bound to this rate
+  auto published = pipeline::published_skeleton(settings, description.skeleton);
+  if (!published) return std::unexpected(published.error());
+  stream_.published = std::move(*published);
   stream_.description = std::move(description);
   stream_.described = true;
   return make_engine();
@@ -85,8 +88,9 @@ Result<std::unique_ptr<const StageModel>> ReplayStreamContext::bind(std::size_t 
   const record::StreamSettings& settings = stream_.settings;
   const StageType& type = *settings.stages[stage].type;
   if (!type.has_model()) return fail("stage " + std::string(type.name) + " has no model", file_);
-  return models_.bind(hash, type,
-                      pipeline::stage_context(settings, stage, stream_.description.skeleton));
+  const auto context = pipeline::stage_context(settings, stage, stream_.description.skeleton);
+  if (!context) return std::unexpected(context.error());
+  return models_.bind(hash, type, *context);
 }
 
 // Index of the stage; empty if the stream does not have it: then the live run ignored the change,

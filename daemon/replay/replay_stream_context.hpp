@@ -35,6 +35,7 @@ struct ReplayStream {
   // False if the log lacks the description of its body: then nothing is replayed of it.
   bool described = false;
   drivers::Description description{};
+  std::shared_ptr<const Skeleton> published{};  // of the frames that leave the last stage
   record::StreamSettings settings{};
 };
 

@@ -220,8 +220,9 @@ void PacketReader::add_field(TableReader& from, const std::string& name, FieldGr
     table_.extra_names.push_back(name);
     table_.extra_units.push_back(group.unit);
   }
-  if (2 * table_.model.sensors.size() + table_.extra_names.size() > kMaxSampleValues) {
-    from.add_error(key, "a sample holds 64 values: two for each sensor and one for each extra");
+  if (2 * table_.model.sensors.size() + table_.extra_names.size() > glove::kMaxGloveValues) {
+    from.add_error(
+        key, "a sample of a glove holds 64 values: two for each sensor and one for each extra");
   }
   packet.fields.push_back(field);
 }

@@ -16,6 +16,8 @@ namespace posed::drivers::glove {
 
 // Per glove: raw and calibrated values must fit a Sample.
 inline constexpr std::size_t kMaxSensors = 32;
+// In the sample of a glove: calibrated and raw values of its sensors, and extras.
+inline constexpr std::size_t kMaxGloveValues = 64;
 inline constexpr std::size_t kMaxCurvePoints = 8;
 inline constexpr std::size_t kMaxMapRows = 96;
 inline constexpr std::size_t kMaxParameters = 8;

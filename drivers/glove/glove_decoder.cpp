@@ -48,7 +48,7 @@ class SampleWriter {
   }
 
  private:
-  static_assert(kMaxSampleValues <= 64);
+  static_assert(kMaxGloveValues <= 64 && kMaxGloveValues <= kMaxSampleValues);
 
   Sample& sample_;
   std::uint64_t valid_ = 0;
@@ -103,8 +103,8 @@ void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
   for (std::size_t i = 0; i < sensors; ++i) {
     writer.add(raw[i], i < packet.raw.size() && packet.valid[i]);
   }
-  for (const float extra : packet.extra.first(
-           std::min<std::size_t>(packet.extra.size(), kMaxSampleValues - 2 * sensors))) {
+  for (const float extra :
+       packet.extra.first(std::min(packet.extra.size(), kMaxGloveValues - 2 * sensors))) {
     writer.add(extra, true);
   }
   writer.finish();

@@ -1,44 +1,19 @@
 #include "drivers/template_mocap/decoder.hpp"
 
-#include <algorithm>
-#include <cmath>
-
+#include "drivers/pose_values.hpp"
 #include "drivers/template_mocap/protocol.hpp"
-#include "proto/frame/plausible.hpp"
 
 namespace posed::drivers::mocap {
 namespace {
 
-// The network delivers a frame at most this late; one that is further behind, or many in a row, are
-// those of a restarted device.
-constexpr std::uint32_t kMaxLate = 15;  // frames
-constexpr int kMaxLateInARow = 3;
-// Deviation of a rotation's squared length from 1 that rounding explains.
-constexpr double kTolerance = 1e-3;
-
 bool read_position(ByteReader& reader, Vec3f& position_m) noexcept {
-  bool near = true;
-  for (float& x_m : position_m) {
-    x_m = reader.f32();
-    near = near && std::abs(static_cast<double>(x_m)) <= kMaxPosition_m;  // false for NaN
-  }
-  return near;
+  for (float& x_m : position_m) x_m = reader.f32();
+  return is_plausible(position_m);
 }
 
-// Returns false for what is no rotation; all zero means that the joint was not seen.
 bool read_rotation(ByteReader& reader, Quatf& rotation, bool& seen) noexcept {
-  double squared = 0.0;
-  for (float& x : rotation) {
-    x = reader.f32();
-    squared += static_cast<double>(x) * static_cast<double>(x);
-  }
-  seen = squared != 0.0;
-  if (!seen) rotation = kIdentity;
-  if (!seen) return true;
-  if (!(std::abs(squared - 1.0) <= kTolerance)) return false;
-  const double length = std::sqrt(squared);
-  for (float& x : rotation) x = static_cast<float>(static_cast<double>(x) / length);
-  return true;
+  for (float& x : rotation) x = reader.f32();
+  return take_rotation(rotation, seen);
 }
 
 }  // namespace
@@ -65,16 +40,6 @@ void MocapDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival
 }
 
 // RT-safe.
-bool MocapDecoder::is_new(std::uint32_t number) noexcept {
-  const bool late = has_number_ && number_ - number <= kMaxLate;  // numbers wrap
-  if (late && ++late_ <= kMaxLateInARow) return false;
-  late_ = 0;
-  has_number_ = true;
-  number_ = number;
-  return true;
-}
-
-// RT-safe.
 Outcome MocapDecoder::take_frame(std::span<const std::byte> content, Sink& sink) noexcept {
   ByteReader reader(content);
   const std::uint32_t number = reader.u32();
@@ -82,7 +47,7 @@ Outcome MocapDecoder::take_frame(std::span<const std::byte> content, Sink& sink)
   const std::size_t bodies = reader.u8();
   if (!reader.ok()) return Outcome::kShort;
   if (layout_ == nullptr) return Outcome::kForeign;  // the poll asks for a description
-  if (!is_new(number)) return Outcome::kOutOfRange;
+  if (const Outcome order = order_.take(number); order != Outcome::kOk) return order;
   const std::int64_t device_ns = clock_.to(time_us).ticks * 1000;
   taken_.reset();
   Outcome worst = Outcome::kOk;

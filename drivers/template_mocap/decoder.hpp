@@ -8,6 +8,7 @@
 #include <span>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/datagram_order.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/template_mocap/layout.hpp"
 #include "drivers/unrolled_counter.hpp"
@@ -29,15 +30,11 @@ class MocapDecoder final : public Decoder {
   [[nodiscard]] Outcome take_frame(std::span<const std::byte> content, Sink& sink) noexcept;
   // Reads one body; emits it if it fits the layout.
   [[nodiscard]] Outcome take_body(ByteReader& reader, std::int64_t device_ns, Sink& sink) noexcept;
-  // False for a datagram that the network delivered late or twice. The clock never sees it.
-  [[nodiscard]] bool is_new(std::uint32_t number) noexcept;
 
   const MocapLayout* layout_ = nullptr;  // null until the device has described itself
   UnrolledCounter clock_{32};            // [us]
   std::bitset<kMaxBodies> taken_;        // bodies of the frame so far
-  bool has_number_ = false;
-  std::uint32_t number_ = 0;  // of the last frame
-  int late_ = 0;              // frames in a row with an earlier number
+  DatagramOrder order_{32};              // the clock sees only frames that are new
 };
 
 }  // namespace posed::drivers::mocap

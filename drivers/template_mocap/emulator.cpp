@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/template_mocap/layout.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::mocap {
@@ -62,14 +63,20 @@ void wave(double time_s, BodyPose& pose) {
 
 MocapEmulator::MocapEmulator(double rate_hz)
     : frames_(nanoseconds(1.0 / rate_hz)), descriptions_(kDescribeEvery_ns) {
-  people_.push_back({.entry = {.id = 1, .name = "Walker", .joints = whole_body()}, .pose = {}});
-  people_.push_back({.entry = {.id = 7, .name = "Waver", .joints = upper_body()}, .pose = {}});
+  people_.resize(2);
+  people_[0].entry = {.id = 1, .name = "Walker", .joints = whole_body()};
+  people_[1].entry = {.id = 7, .name = "Waver", .joints = upper_body()};
   for (Person& person : people_) {
+    person.skeleton = skeleton_of(person.entry).value();
     person.pose.id = person.entry.id;
     person.pose.rotation_xyzw.assign(person.entry.joints.size(), kIdentity);
   }
   frames_.start(0);
   descriptions_.start(0);
+}
+
+const Skeleton* MocapEmulator::skeleton(std::size_t body) const {
+  return body < people_.size() ? people_[body].skeleton.get() : nullptr;
 }
 
 void MocapEmulator::pose(std::size_t body, const Frame& frame) {

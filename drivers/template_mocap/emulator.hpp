@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "drivers/emulate/pace.hpp"
@@ -15,6 +16,7 @@ class MocapEmulator final : public Emulator {
  public:
   explicit MocapEmulator(double rate_hz);
 
+  [[nodiscard]] const Skeleton* skeleton(std::size_t body) const override;
   // Body 0 is the walker, 1 the waver. A posed body no longer moves by itself.
   void pose(std::size_t body, const Frame& frame) override;
   // Takes a request: the description is due at once.
@@ -29,6 +31,7 @@ class MocapEmulator final : public Emulator {
  private:
   struct Person {
     BodyEntry entry;
+    std::shared_ptr<const Skeleton> skeleton;
     BodyPose pose;
     bool present = true;
     bool posed = false;  // by pose()

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/template_mocap/protocol.hpp"
-
 namespace posed::drivers::mocap {
-namespace {
 
 Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyEntry& body) {
   auto skeleton = std::make_shared<Skeleton>();
@@ -19,8 +16,6 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyEntry& body) {
   if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
   return skeleton;
 }
-
-}  // namespace
 
 // RT-safe.
 std::size_t MocapLayout::body_of(std::uint16_t wanted) const noexcept {

@@ -3,13 +3,13 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
 #include <cmath>
 #include <set>
 #include <string_view>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/byte_writer.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
@@ -29,38 +29,10 @@ std::uint32_t checksum(std::span<const std::byte> bytes) noexcept {
       ::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-// Builds one datagram.
-class Writer {
- public:
-  explicit Writer(Kind kind) {
-    text(kMagic);
-    number(static_cast<std::uint32_t>(kind), 2);
-    number(0, 2);
-  }
-  void number(std::uint32_t value, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i) {
-      bytes_.push_back(static_cast<std::byte>(value >> 8 * i & 0xFF));
-    }
-  }
-  void real(float value) { number(std::bit_cast<std::uint32_t>(value), 4); }
-  void text(std::string_view value) {
-    for (const char c : value) bytes_.push_back(static_cast<std::byte>(c));
-  }
-  void name(const std::string& value) {
-    number(static_cast<std::uint32_t>(value.size()), 1);
-    text(value);
-  }
-  [[nodiscard]] std::vector<std::byte> finish() {
-    const std::size_t length = bytes_.size() - kHeadBytes;
-    bytes_[6] = static_cast<std::byte>(length & 0xFF);
-    bytes_[7] = static_cast<std::byte>(length >> 8 & 0xFF);
-    number(checksum(bytes_), kChecksumBytes);
-    return std::move(bytes_);
-  }
-
- private:
-  std::vector<std::byte> bytes_;
-};
+void write_name(ByteWriter& writer, const std::string& name) {
+  writer.u8(static_cast<std::uint8_t>(name.size()));
+  writer.text(name);
+}
 
 std::unexpected<Error> wrong(const std::string& what) {
   return fail("the mocap system's description " + what +
@@ -155,43 +127,48 @@ Result<std::vector<BodyEntry>> parse_description(std::span<const std::byte> cont
 }
 
 std::vector<std::byte> encode_datagram(Kind kind, std::span<const std::byte> content) {
-  Writer writer(kind);
-  writer.text({reinterpret_cast<const char*>(content.data()), content.size()});
+  ByteWriter writer;
+  writer.text(kMagic);
+  writer.u8(static_cast<std::uint8_t>(kind));
+  writer.u8(0);
+  writer.u16(static_cast<std::uint16_t>(content.size()));
+  writer.bytes(content);
+  writer.u32(checksum(writer.written()));
   return writer.finish();
 }
 
 std::vector<std::byte> encode_request() { return encode_datagram(Kind::kRequest, {}); }
 
 std::vector<std::byte> encode_description(std::span<const BodyEntry> bodies) {
-  Writer writer(Kind::kDescription);
-  writer.number(static_cast<std::uint32_t>(bodies.size()), 1);
+  ByteWriter writer;
+  writer.u8(static_cast<std::uint8_t>(bodies.size()));
   for (const BodyEntry& body : bodies) {
-    writer.number(body.id, 2);
-    writer.name(body.name);
-    writer.number(static_cast<std::uint32_t>(body.joints.size()), 1);
+    writer.u16(body.id);
+    write_name(writer, body.name);
+    writer.u8(static_cast<std::uint8_t>(body.joints.size()));
     for (const JointEntry& joint : body.joints) {
-      writer.name(joint.name);
-      writer.number(static_cast<std::uint32_t>(joint.parent), 1);
-      for (const float x_m : joint.offset_m) writer.real(x_m);
+      write_name(writer, joint.name);
+      writer.u8(static_cast<std::uint8_t>(joint.parent));
+      for (const float x_m : joint.offset_m) writer.f32(x_m);
     }
   }
-  return writer.finish();
+  return encode_datagram(Kind::kDescription, writer.finish());
 }
 
 std::vector<std::byte> encode_frame(const FramePacket& frame) {
-  Writer writer(Kind::kFrame);
-  writer.number(frame.number, 4);
-  writer.number(frame.time_us, 4);
-  writer.number(static_cast<std::uint32_t>(frame.bodies.size()), 1);
+  ByteWriter writer;
+  writer.u32(frame.number);
+  writer.u32(frame.time_us);
+  writer.u8(static_cast<std::uint8_t>(frame.bodies.size()));
   for (const BodyPose& body : frame.bodies) {
-    writer.number(body.id, 2);
-    writer.number(static_cast<std::uint32_t>(body.rotation_xyzw.size()), 1);
-    for (const float x_m : body.root_m) writer.real(x_m);
+    writer.u16(body.id);
+    writer.u8(static_cast<std::uint8_t>(body.rotation_xyzw.size()));
+    for (const float x_m : body.root_m) writer.f32(x_m);
     for (const Quatf& rotation : body.rotation_xyzw) {
-      for (const float x : rotation) writer.real(x);
+      for (const float x : rotation) writer.f32(x);
     }
   }
-  return writer.finish();
+  return encode_datagram(Kind::kFrame, writer.finish());
 }
 
 std::string device_info_text(double rate_hz) {

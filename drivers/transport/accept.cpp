@@ -1,6 +1,5 @@
-// Accepts gloves that connect over TCP. TCP is not encrypted here, so without a list of peers posed
-// listens on loopback only.
-#include <netinet/tcp.h>
+// Accepts devices that connect over TCP. TCP is not encrypted here, so without a list of peers
+// posed listens on loopback only.
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,6 +10,7 @@
 #include <optional>
 
 #include "drivers/transport/address.hpp"
+#include "drivers/transport/keep_alive.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers {
@@ -22,7 +22,8 @@ constexpr int kBacklog = 8;
 constexpr int kMaxAtOnce = 64;
 
 Result<Address> address_of(const ListenSettings& settings) {
-  return listen_address(settings.endpoint, settings.peers, "the gloves'");
+  return listen_address(settings.endpoint, settings.peers,
+                        "the " + std::string(settings.device) + "s'");
 }
 
 Result<int> listen_at(const ListenSettings& settings) {
@@ -41,19 +42,9 @@ Result<int> listen_at(const ListenSettings& settings) {
   return fd;
 }
 
-// A glove that loses its radio link sends nothing; keep-alive detects that within five seconds.
-void make_prompt(int fd) {
-  const int yes = 1, idle_s = 2, interval_s = 1, tries = 3;
-  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof(yes));
-  ::setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &yes, sizeof(yes));
-  ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle_s, sizeof(idle_s));
-  ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval_s, sizeof(interval_s));
-  ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &tries, sizeof(tries));
-}
-
-// Meanwhile the glove waits in the listener's queue and is accepted once a descriptor is free.
+// Meanwhile the device waits in the listener's queue and is accepted once a descriptor is free.
 std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
-  return fail("a glove has connected to " + settings.endpoint +
+  return fail("a " + std::string(settings.device) + " has connected to " + settings.endpoint +
               ", but posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
 }
 
@@ -81,7 +72,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
                                 {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
   ::poll(wanted.data(), wanted.size(), kPatience_ms);
   if (cancel_->fired()) return Cancel::error();
-  // If several are waiting, the newest is used: a glove that restarts leaves its old connection
+  // If several are waiting, the newest is used: a device that restarts leaves its old connection
   // behind.
   std::optional<Connection> newest;
   for (int i = 0; i < kMaxAtOnce; ++i) {
@@ -98,11 +89,11 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
       ++refused_;
       continue;
     }
-    make_prompt(fd);
+    keep_alive(fd);
     newest = std::move(link);
   }
   if (newest) return std::move(*newest);
-  return fail("no glove has connected to " + settings.endpoint +
+  return fail("no " + std::string(settings.device) + " has connected to " + settings.endpoint +
               " yet; give it this machine's address and switch it on");
 }
 

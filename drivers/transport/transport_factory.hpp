@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "drivers/transport/connection.hpp"
@@ -24,10 +25,11 @@ struct SerialSettings {
   std::vector<std::uint32_t> usb_ids{};  // vendor << 16 | product
 };
 
-// For gloves that connect to posed.
+// For devices that connect to posed.
 struct ListenSettings {
-  std::string endpoint{};            // "127.0.0.1:5200"
-  std::vector<std::string> peers{};  // addresses that may connect; empty: loopback only
+  std::string endpoint{};             // "127.0.0.1:5200"
+  std::vector<std::string> peers{};   // addresses that may connect; empty: loopback only
+  std::string_view device = "glove";  // what connects, for sentences
 };
 
 // For gloves on hidraw nodes.
@@ -41,6 +43,9 @@ struct HidSettings {
 // Checks these settings without listening. Cold.
 [[nodiscard]] Result<> check_listen(const ListenSettings& settings);
 
+// Checks an address to connect to, "192.168.1.5:7001". Cold.
+[[nodiscard]] Result<> check_connect(const std::string& endpoint);
+
 class TransportFactory {
  public:
   TransportFactory() = default;
@@ -52,10 +57,13 @@ class TransportFactory {
   // (with the udev rule or group that fixes it), in use (by whom, if known). Cold.
   [[nodiscard]] Result<Connection> serial(const SerialSettings& settings);
 
-  // Waits up to half a second for a glove to connect. Listens from the first call on, so that a
-  // glove that connects between two calls is kept. Connections from addresses not in `peers` are
+  // Waits up to half a second for a device to connect. Listens from the first call on, so that one
+  // that connects between two calls is kept. Connections from addresses not in `peers` are
   // dropped and counted. Cold.
   [[nodiscard]] Result<Connection> accept(const ListenSettings& settings);
+
+  // Connects to a system that serves its data over TCP. Waits for it up to a second. Cold.
+  [[nodiscard]] Result<Connection> connect(const std::string& endpoint);
 
   // Opens a hidraw node: one report per read and per write. Cold.
   [[nodiscard]] Result<Connection> hid(const HidSettings& settings);

@@ -6,6 +6,7 @@
 
 #include "models/generate/generate_type.hpp"
 #include "models/hand/constrain_type.hpp"
+#include "models/retarget/retarget_type.hpp"
 #include "models/style/style_type.hpp"
 
 namespace posed {
@@ -15,6 +16,7 @@ std::span<const StageType* const> stage_types() {
       &style::style_type(),
       &generate::generate_type(),
       &hand::constrain_type(),
+      &retarget::retarget_type(),
   };
   return types;
 }

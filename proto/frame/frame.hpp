@@ -15,7 +15,7 @@ namespace posed {
 
 inline constexpr int kMaxJoints = 96;
 inline constexpr int kMaxChannels = 288;  // three per joint
-inline constexpr int kMaxSampleValues = 64;
+inline constexpr int kMaxSampleValues = 512;
 inline constexpr int kMaxLabel = 16;  // bytes, including the closing zero
 
 using Vec3f = std::array<float, 3>;
@@ -54,7 +54,9 @@ struct Frame {
   Vec3f root_position_m{};  // the skeleton's root_joint in the world
   StageStamps stamps;
   std::array<float, 8> stage_us{};  // spent in each stage of the stream, in their order
-  std::bitset<kMaxJoints> valid;    // joint was measured; otherwise its rotation is identity
+  // The joint was measured; otherwise its rotation is identity, or that of the T-pose after
+  // retargeting.
+  std::bitset<kMaxJoints> valid;
   std::array<Quatf, kMaxJoints> rotation_xyzw{};  // [joint], parent-relative
   std::array<float, kMaxChannels> angle_rad{};    // [rotation channel], in Skeleton::channels order
 };

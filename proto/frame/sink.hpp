@@ -1,17 +1,30 @@
 // Sink: receives what a decoder makes of the bytes; Outcome: the possible results of decoding.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "proto/frame/frame.hpp"
 
 namespace posed {
 
 // The result of decoding a piece of input. Each is counted per stream and published in `stats`.
-enum class Outcome : std::uint8_t { kOk, kShort, kBadChecksum, kOutOfRange, kForeign, kCount };
+enum class Outcome : std::uint8_t {
+  kOk,
+  kShort,
+  kBadChecksum,
+  kOutOfRange,
+  kForeign,
+  kLate,       // a newer datagram overtook it on the network
+  kDuplicate,  // the network delivered it twice
+  kCount
+};
 inline constexpr int kOutcomes = static_cast<int>(Outcome::kCount);
+inline constexpr std::array<std::string_view, kOutcomes> kOutcomeNames{
+    "ok", "short", "bad_checksum", "out_of_range", "foreign", "late", "duplicate"};
 
 inline constexpr std::size_t kMaxBodies = 64;  // of one source
 inline constexpr std::size_t kMaxDescription =

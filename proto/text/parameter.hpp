@@ -22,7 +22,7 @@ struct ParameterSpec {
   std::string_view name;         // its unit last: "lag_s"
   ParameterValue default_value;  // also fixes the type
   bool required = false;
-  bool is_path = false;  // relative to the config file
+  bool is_path = false;  // relative to the config file; the default is none
   std::string_view help;
   // The range of a number, both ends included.
   double min = std::numeric_limits<double>::lowest();

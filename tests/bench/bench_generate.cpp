@@ -60,7 +60,7 @@ Result<json> bench_strings(const trajectory::StateInformation& information, int 
   const auto letters = static_cast<int>(alphabet->size());
   const int all = static_cast<int>(std::pow(letters, kLength));
   const int asked = count < 0 ? all : std::min(count, all);
-  ProgressBar bar;
+  cli::ProgressBar bar;
   double smallest_m = INFINITY;
   double before_m = INFINITY;
   double changed_rad = 0.0;
@@ -167,7 +167,7 @@ void add_bench_generate(CLI::App& bench_app, int& exit_code) {
   command->callback([options, &exit_code] {
     const auto made = bench(*options);
     if (!made) {
-      exit_code = report(made.error());
+      exit_code = cli::report(made.error());
       return;
     }
     if (options->json) {

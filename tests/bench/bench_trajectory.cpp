@@ -134,7 +134,7 @@ Streamed stream(const InformationForm& information, const trajectory::SlidingWin
     }
   }
   result.error_deg =
-      kDegrees * std::sqrt(squares / (information.frames() - delay) / information.channels());
+      cli::kDegrees * std::sqrt(squares / (information.frames() - delay) / information.channels());
   solver = trajectory::FixedLag(information.channels(), delay);
   feed([&](auto&& work) {
     const auto begin = Steady::now();
@@ -153,7 +153,7 @@ double sptk_error_deg(const SptkRun& run, const trajectory::SlidingWindow& full,
           std::pow(run.trajectory[static_cast<std::size_t>(t * channels + c)] - full.x(t)[c], 2);
     }
   }
-  return kDegrees * std::sqrt(squares / (frames - delay) / channels);
+  return cli::kDegrees * std::sqrt(squares / (frames - delay) / channels);
 }
 
 }  // namespace
@@ -225,7 +225,7 @@ json bench_batch(const trajectory::StateInformation& model, int samples) {
     }
     report["dpbsv"] = quantiles(theirs);
     report["times_faster"] = quantile(theirs, 0.5) / quantile(ours, 0.5);
-    report["max_difference_deg"] = worst_rad * kDegrees;
+    report["max_difference_deg"] = worst_rad * cli::kDegrees;
   } else {
     report["missing"].push_back(lapack.error().text());
   }

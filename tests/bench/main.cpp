@@ -10,11 +10,12 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = 0;
   posed::bench::add_bench_generate(app, exit_code);
+  posed::bench::add_bench_json(app);
   posed::bench::add_bench_smooth(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(posed::cli::ExitCode::kWrongUse);
+    return app.exit(error) == 0 ? 0 : static_cast<int>(posed::ExitCode::kWrongUse);
   }
   return exit_code;
 }

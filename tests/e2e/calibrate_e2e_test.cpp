@@ -50,7 +50,7 @@ class CalibrationStage : public Stage {
   [[nodiscard]] std::string endpoint() const { return "127.0.0.1:" + std::to_string(port_); }
 
   // `posed calibrate --connect`; the emulated hand takes each requested pose.
-  Outcome calibrate(const std::vector<std::string>& options) {
+  ProgramOutcome calibrate(const std::vector<std::string>& options) {
     std::vector<std::string> arguments{"calibrate", "--connect", publish,         "--user",
                                        "ann",       "--out",     path("ann.toml")};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -78,8 +78,8 @@ class CalibrationStage : public Stage {
 
   // The present calibrated value of a sensor.
   [[nodiscard]] double value_of(const std::string& sensor) const {
-    const Outcome seen = posed({"monitor", "--connect", publish, "--topic", "sensor", "--stream",
-                                "right", "--json", "--count", "1"});
+    const ProgramOutcome seen = posed({"monitor", "--connect", publish, "--topic", "sensor",
+                                       "--stream", "right", "--json", "--count", "1"});
     REQUIRE(seen.code == 0);
     const auto sample = json::parse(seen.out);
     const auto names = sample.at("name").get<std::vector<std::string>>();
@@ -106,13 +106,13 @@ std::string of_another_glove(std::string calibration) {
 TEST_CASE("a glove is calibrated through the daemon, and the file is for this glove only") {
   CalibrationStage stage;
   stage.record();
-  const Outcome away = stage.calibrate({"--stream", "right"});
+  const ProgramOutcome away = stage.calibrate({"--stream", "right"});
   CHECK(away.code == 1);
   CHECK(has(away.err, "the glove of stream 'right' is away: plug it in"));
   stage.put_on();
   stage.wait_for_frame();
 
-  const Outcome done = stage.calibrate(
+  const ProgramOutcome done = stage.calibrate(
       {"--stream", "right", "--seconds", "0.5", "--ready", "0.5", "--pose", "spread=0"});
   INFO(done.err);
   REQUIRE(done.code == 0);
@@ -125,14 +125,14 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
   stage.glove->hold(Pose::kFist);
   const double before = stage.value_of("index_joint1");
   CHECK(before == Approx(80.0 / 90.0).margin(0.01));  // the default: a full curl is 90 degrees
-  const Outcome applied = stage.ctl({"calibrate", "right", stage.path("ann.toml")});
+  const ProgramOutcome applied = stage.ctl({"calibrate", "right", stage.path("ann.toml")});
   INFO(applied.err);
   CHECK(applied.code == 0);
   CHECK(stage.value_of("index_joint1") ==
         Approx(1.0).margin(0.01));  // ann's fist is the full range
 
   const auto other = stage.folder.write("other.toml", of_another_glove(mine));
-  const Outcome refused = stage.ctl({"calibrate", "right", other.string()});
+  const ProgramOutcome refused = stage.ctl({"calibrate", "right", other.string()});
   CHECK(refused.code == 1);
   CHECK(has(refused.err,
             "this calibration is for glove 'tcp 10.0.0.7', this one is"
@@ -141,8 +141,8 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
 
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
-  const Outcome replayed = posed({"replay", stage.path("take.plog"), "--speed", "max", "--out",
-                                  stage.path("frames.bin"), "--expect"});
+  const ProgramOutcome replayed = posed({"replay", stage.path("take.plog"), "--speed", "max",
+                                         "--out", stage.path("frames.bin"), "--expect"});
   INFO(replayed.err);
   CHECK(replayed.code == 0);
 }
@@ -161,7 +161,7 @@ TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
         std::this_thread::sleep_for(100ms);
       }
     });
-    const Outcome moved = stage.calibrate(quick);
+    const ProgramOutcome moved = stage.calibrate(quick);
     CHECK(moved.code == 1);
     CHECK(has(moved.err, "fist failed: "));
     CHECK(has(moved.err, "moved while it was held"));
@@ -176,7 +176,7 @@ TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
         stage.glove->hold(Pose::kFlat);
       }
     });
-    const Outcome flat = stage.calibrate(quick);
+    const ProgramOutcome flat = stage.calibrate(quick);
     CHECK(flat.code == 1);
     CHECK(has(flat.err, "hardly moved from the flat hand"));
   }
@@ -184,11 +184,12 @@ TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
 
   // An existing file is not replaced without --overwrite, and an option without effect is reported.
   stage.folder.write("ann.toml", "mine");
-  const Outcome there = stage.calibrate(quick);
+  const ProgramOutcome there = stage.calibrate(quick);
   CHECK(there.code == 2);
   CHECK(has(there.err, "add --overwrite"));
   CHECK(stage.read("ann.toml") == "mine");
-  const Outcome useless = stage.calibrate({"--stream", "right", "--ready", "1", "--overwrite"});
+  const ProgramOutcome useless =
+      stage.calibrate({"--stream", "right", "--ready", "1", "--overwrite"});
   CHECK(useless.code == 2);
   CHECK(has(useless.err, "add --seconds"));
 }
@@ -197,7 +198,7 @@ TEST_CASE("calibrate --connect reports what is wrong with a request") {
   CalibrationStage stage;
   stage.launch("run");
   const auto refused = [&](const std::vector<std::string>& options, const std::string& sentence) {
-    const Outcome done = stage.calibrate(options);
+    const ProgramOutcome done = stage.calibrate(options);
     CHECK(done.code == 2);
     CHECK(has(done.err, sentence));
   };

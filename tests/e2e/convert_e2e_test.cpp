@@ -5,6 +5,7 @@
 #include <csignal>
 #include <thread>
 
+#include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -15,16 +16,16 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-constexpr int kFrames = 240;
+constexpr int kTakeFrames = 240;
 
 // A walker and a hand, each played once from its file as fast as possible, so that nothing is
 // skipped.
 class Take : public Stage {
  public:
   Take() {
-    REQUIRE(clip::write_bvh(toy_walk(kFrames, 120.0), folder.path() / "walk.bvh"));
+    REQUIRE(clip::write_bvh(toy_walk(kTakeFrames, 120.0), folder.path() / "walk.bvh"));
     clip::HandClip hand;
-    for (int i = 0; i < kFrames; ++i) {
+    for (int i = 0; i < kTakeFrames; ++i) {
       hand.time_s.push_back(i / 100.0);
       hand.angles.emplace_back().fill(0.001 * i);
     }
@@ -38,16 +39,17 @@ class Take : public Stage {
     folder.write("posed.toml", config + "[stream.constrain]\nenabled = false\n");
   }
 
-  [[nodiscard]] Outcome convert(const std::string& out, std::vector<std::string> more = {}) const {
+  [[nodiscard]] ProgramOutcome convert(const std::string& out,
+                                       std::vector<std::string> more = {}) const {
     more.insert(more.begin(), {"convert", path("take.plog"), "--out", path(out), "--json"});
     return posed(std::move(more));
   }
 
   // A log may be read while it is written.
   [[nodiscard]] json convert_all(const std::string& out, const std::string& stream) const {
-    Outcome outcome = convert(out, {"--stream", stream});
+    ProgramOutcome outcome = convert(out, {"--stream", stream});
     for (int i = 0; i < 100; ++i) {
-      if (outcome.code == 0 && json::parse(outcome.out).at("frames") == kFrames) break;
+      if (outcome.code == 0 && json::parse(outcome.out).at("frames") == kTakeFrames) break;
       std::this_thread::sleep_for(100ms);
       outcome = convert(out, {"--stream", stream, "--overwrite"});
     }
@@ -66,9 +68,9 @@ TEST_CASE("convert writes what a log's streams published") {
   const json hand = stage.convert_all("hand-out.csv", "hand");
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
-  CHECK(walk.at("frames") == kFrames);
+  CHECK(walk.at("frames") == kTakeFrames);
   CHECK(walk.at("warnings").empty());
-  CHECK(hand.at("frames") == kFrames);
+  CHECK(hand.at("frames") == kTakeFrames);
 
   const auto made = clip::read_clip(stage.path("walk-out.bvh"));
   const auto given = clip::read_clip(stage.path("walk.bvh"));
@@ -81,12 +83,48 @@ TEST_CASE("convert writes what a log's streams published") {
   const auto given_hand = clip::read_hand_clip(stage.path("hand.csv"));
   REQUIRE(made_hand);
   REQUIRE(given_hand);
-  for (std::size_t i = 0; i < kFrames; ++i) {
+  for (std::size_t i = 0; i < kTakeFrames; ++i) {
     CHECK(made_hand->time_s[i] == Approx(given_hand->time_s[i]).margin(1e-6));
     for (std::size_t a = 0; a < kHandChannels; ++a) {
       CHECK(made_hand->angles[i][a] == Approx(given_hand->angles[i][a]).margin(1e-6));
     }
   }
+}
+
+TEST_CASE("a retargeted stream is published, replayed and converted on its new skeleton") {
+  Stage stage;
+  const auto walk = motion::make_walker({.seconds = 2.0, .rate_hz = 60.0}).value();
+  REQUIRE(clip::write_bvh(walk, stage.folder.path() / "walk.bvh"));
+  REQUIRE(clip::write_bvh(toy_walk(2, 60.0), stage.folder.path() / "toy.bvh"));
+  std::string config = Stage::kEndpoints;
+  for (const std::string to : {"humanoid", "toy.bvh"}) {
+    config += "[[stream]]\nname = \"" + to.substr(0, 3) + "\"\ndriver = \"file\"\n[stream.file]\n" +
+              "path = \"walk.bvh\"\nloop = false\npace = 0.0\n[stream.retarget]\nto = \"" + to +
+              "\"\n";
+  }
+  stage.folder.write("posed.toml", config);
+  stage.record();
+  for (int i = 0; i < 50 && !has(stage.ctl({"status"}).out, "ended"); ++i) {
+    std::this_thread::sleep_for(50ms);
+  }
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 0);
+  std::filesystem::remove(stage.folder.path() / "toy.bvh");  // the log has what it needs
+  const ProgramOutcome replayed =
+      posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
+  INFO(replayed.err);
+  CHECK(replayed.code == 0);
+  const auto converted = [&](const std::string& stream) {
+    const ProgramOutcome outcome = posed({"convert", stage.path("take.plog"), "--stream", stream,
+                                          "--out", stage.path(stream + ".bvh")});
+    INFO(outcome.err);
+    REQUIRE(outcome.code == 0);
+    return clip::read_clip(stage.path(stream + ".bvh")).value();
+  };
+  const clip::Clip humanoid = converted("hum");
+  CHECK(humanoid.frames() == walk.frames());
+  CHECK(humanoid.skeleton->joint_index("leftUpperArm") > 0);
+  CHECK(converted("toy").skeleton->joints.size() == toy_walk(2, 60.0).skeleton->joints.size());
 }
 
 TEST_CASE("convert reports what a log lacks and wrong use") {
@@ -95,16 +133,16 @@ TEST_CASE("convert reports what a log lacks and wrong use") {
   (void)stage.convert_all("walk.out.bvh", "walk");
   stage.daemon->send(SIGKILL);  // the log of a killed daemon works, too
   REQUIRE(stage.daemon->exit_code());
-  const Outcome unclear = stage.convert("out.bvh");
+  const ProgramOutcome unclear = stage.convert("out.bvh");
   CHECK(unclear.code == 2);
   CHECK(has(unclear.err, "hand, walk"));
   CHECK(has(unclear.err, "--stream"));
   CHECK(stage.convert("out.bvh", {"--stream", "nobody"}).code == 2);
   CHECK(stage.convert("out.plog", {"--stream", "walk"}).code == 2);
-  const Outcome no_hand = stage.convert("out.csv", {"--stream", "walk"});
+  const ProgramOutcome no_hand = stage.convert("out.csv", {"--stream", "walk"});
   CHECK(no_hand.code == 1);
   CHECK(has(no_hand.err, "hand"));
-  const Outcome no_log =
+  const ProgramOutcome no_log =
       posed({"convert", stage.path("walk.bvh"), "--stream", "walk", "--out", stage.path("o.bvh")});
   CHECK(no_log.code == 2);
   CHECK(has(no_log.err, "not a device log"));

@@ -2,19 +2,14 @@
 // they differ from what this version creates.
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include "tests/e2e/outcome.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
 namespace {
-
-std::string text_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // The demo's config with free ports.
 std::string on_free_ports(std::string toml) {
@@ -32,20 +27,20 @@ TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   const TempFolder folder;
   const auto kept = folder.path() / "kept";
   const auto prepare = [&] { return posed({"demo", "--prepare", kept.string()}); };
-  const Outcome first = prepare();
+  const ProgramOutcome first = prepare();
   INFO(first.err);
   REQUIRE(first.code == 0);
   CHECK(first.err.contains("learning the style"));
-  const std::string model = text_of(kept / "march-to-sway.style");
+  const std::string model = file_text(kept / "march-to-sway.style");
 
-  const Outcome again = prepare();
+  const ProgramOutcome again = prepare();
   CHECK(again.code == 0);
   CHECK(again.err.contains("using what was made and learnt before"));
   CHECK_FALSE(again.err.contains("learning the style"));
 
   const auto config = folder.path() / "kept" / "free.toml";
-  std::ofstream(config) << on_free_ports(text_of(kept / "demo.toml"));
-  const Outcome streamed = posed({"demo", "--config", config.string(), "--seconds", "1"});
+  std::ofstream(config) << on_free_ports(file_text(kept / "demo.toml"));
+  const ProgramOutcome streamed = posed({"demo", "--config", config.string(), "--seconds", "1"});
   INFO(streamed.err);
   CHECK(streamed.code == 0);
   CHECK_FALSE(streamed.err.contains("learning the style"));
@@ -54,21 +49,21 @@ TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   // A model that was modified is trained again, with the same bits.
   std::ofstream(kept / "march-to-sway.style") << "not a model";
   CHECK(prepare().code == 0);
-  CHECK(text_of(kept / "march-to-sway.style") == model);
+  CHECK(file_text(kept / "march-to-sway.style") == model);
 }
 
 TEST_CASE("the demo does not touch a folder that is not its own", "[demo]") {
   const TempFolder folder;
   const auto mine = folder.write("march_1.bvh", "mine");
-  const Outcome refused = posed({"demo", "--prepare", folder.path().string()});
+  const ProgramOutcome refused = posed({"demo", "--prepare", folder.path().string()});
   CHECK(refused.code == 2);
   CHECK(refused.err.contains("no demo wrote it"));
-  CHECK(text_of(mine) == "mine");
+  CHECK(file_text(mine) == "mine");
   CHECK(posed({"demo", "--prepare", folder.path().string(), "--seconds", "1"}).code == 2);
   const auto other = folder.write("other.toml",
                                   "[[stream]]\nname = \"a\"\ndriver = \"file\"\n"
                                   "[stream.file]\npath = \"march_1.bvh\"\n");
-  const Outcome not_demo = posed({"demo", "--config", other.string()});
+  const ProgramOutcome not_demo = posed({"demo", "--config", other.string()});
   CHECK(not_demo.code == 2);
   CHECK(not_demo.err.contains("no stream has the demo's model"));
 }

@@ -134,7 +134,7 @@ TEST_CASE("a glove that floods a recording daemon loses nothing of its neighbour
     INFO("kind " << static_cast<int>(gap.kind) << ", lost " << gap.lost);
     CHECK(gap.owner == 1);
   }
-  const Outcome replay = posed({"replay", file, "--speed", "max", "--expect", "--json"});
+  const ProgramOutcome replay = posed({"replay", file, "--speed", "max", "--expect", "--json"});
   INFO(replay.err);
   WARN("the glove sent " << sent / 1'000'000 << " MB; replay says " << replay.out);
   REQUIRE(replay.code == 0);

@@ -108,18 +108,18 @@ TEST_CASE("a live calibration and haptics reach the glove, and the log repeats t
                          "format = 1\ndriver = \"lucidgloves\"\n"
                          "hand = \"right\"\nuser = \"ann\"\n"
                          "[sensors]\nindex_joint1 = [[0, 0.0], [2000, 1.0]]\n");
-  const Outcome fitted = stage.ctl({"calibrate", "right", calibration.string()});
+  const ProgramOutcome fitted = stage.ctl({"calibrate", "right", calibration.string()});
   INFO(fitted.err);
   CHECK(fitted.code == 0);
   CHECK(has(fitted.out, "in effect from frame"));
-  const Outcome felt = stage.ctl({"haptics", "right", "--force", "0", "0.5", "1"});
+  const ProgramOutcome felt = stage.ctl({"haptics", "right", "--force", "0", "0.5", "1"});
   INFO(felt.err);
   CHECK(felt.code == 0);
 
-  const Outcome other_hand = stage.ctl({"calibrate", "left", calibration.string()});
+  const ProgramOutcome other_hand = stage.ctl({"calibrate", "left", calibration.string()});
   CHECK(other_hand.code == 1);
   CHECK(has(other_hand.err, "hand"));
-  const Outcome no_glove = stage.ctl({"calibrate", "walker", calibration.string()});
+  const ProgramOutcome no_glove = stage.ctl({"calibrate", "walker", calibration.string()});
   CHECK(no_glove.code == 1);
   CHECK(has(no_glove.err, "no sensors that can be calibrated"));
   const auto half = stage.folder.write("half.toml", "format = 1\ndriver = \"lucidgl");

@@ -87,8 +87,8 @@ TEST_CASE(
   CHECK(others == 0);
   CHECK(fists > 3 * 10);
   CHECK(flats > 3 * 10);
-  const Outcome replayed = posed({"replay", stage.path("take.plog"), "--speed", "max", "--out",
-                                  stage.path("frames.bin"), "--expect"});
+  const ProgramOutcome replayed = posed({"replay", stage.path("take.plog"), "--speed", "max",
+                                         "--out", stage.path("frames.bin"), "--expect"});
   INFO(replayed.err);
   CHECK(replayed.code == 0);
 

@@ -17,7 +17,7 @@ namespace {
 
 // Checks for one error message on stderr, and that no signal ended the process.
 void check_refused(const std::vector<std::string>& arguments, const std::string& part) {
-  const Outcome outcome = posed(arguments);
+  const ProgramOutcome outcome = posed(arguments);
   INFO(arguments[0] << " " << arguments[1] << ": " << outcome.err.substr(0, 500));
   CHECK((outcome.code == 1 || outcome.code == 2));
   CHECK(has(outcome.err, part));
@@ -94,7 +94,7 @@ TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its l
                                                stage.path("glove") + "\"\nhand = \"right\"\n"));
   stage.record();
   for (const std::string& bomb : toml_bombs()) {
-    const Outcome refused =
+    const ProgramOutcome refused =
         stage.ctl({"calibrate", "hand", stage.folder.write("deep.toml", bomb).string()});
     CHECK(refused.code == 1);
     CHECK(has(refused.err, "nests deeper"));
@@ -108,7 +108,7 @@ TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its l
 
   // The same in a log from an untrusted source.
   CHECK(forge(stage.path("take.plog"), "chunk", "bytes", toml_bombs()[0], "direction=3") == 1);
-  const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
+  const ProgramOutcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
   INFO(replay.err.substr(0, 1000));
   CHECK(replay.code == 1);
   CHECK(has(replay.err, "nests deeper"));
@@ -149,7 +149,7 @@ TEST_CASE("a log with escape sequences in its driver's name is refused without p
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"replay", stage.path("take.plog"), "--speed", "max"},
         {"convert", stage.path("take.plog"), "--out", stage.path("out.bvh")}}) {
-    const Outcome outcome = posed(arguments);
+    const ProgramOutcome outcome = posed(arguments);
     INFO(outcome.err.substr(0, 1000));
     CHECK(outcome.code == 1);
     CHECK(outcome.err.size() < 2000);
@@ -160,14 +160,14 @@ TEST_CASE("a log with escape sequences in its driver's name is refused without p
 TEST_CASE("check reports that a glove is not connected, and that the daemon would wait for it") {
   const Served served;
   served.folder.write("posed.toml", stream_with("driver = \"cyberglove\"\nport = \"/dev/none\"\n"));
-  const Outcome text = posed({"check", "--config", served.path("posed.toml")});
+  const ProgramOutcome text = posed({"check", "--config", served.path("posed.toml")});
   INFO(text.err);
   CHECK(text.code == 0);
   CHECK(has(text.out, "hand: cyberglove (away), 100 Hz"));
   CHECK(has(text.out,
             "the device is not here now, and `posed run` waits for it (/dev/none is not there"));
-  const Outcome json = posed({"check", "--config", served.path("posed.toml"), "--json"});
-  CHECK(nlohmann::json::parse(json.out).at("streams")[0].at("present") == false);
+  const ProgramOutcome as_json = posed({"check", "--config", served.path("posed.toml"), "--json"});
+  CHECK(nlohmann::json::parse(as_json.out).at("streams")[0].at("present") == false);
 }
 
 }  // namespace

@@ -101,12 +101,12 @@ TEST_CASE("commands that wait for a daemon report what they wait for") {
     CHECK(comes_to_say(waits, "posed: waiting: nothing answers at tcp://127.0.0.1:9"));
     waits.send(SIGINT);
     CHECK(waits.exit_code() == 0);
-    const Outcome gives_up =
+    const ProgramOutcome gives_up =
         posed({command, "--connect", kNobody, "--count", "1", "--timeout", "2"});
     CHECK(gives_up.code == 1);
     CHECK(has(gives_up.err, "gave up after 2 s"));
   }
-  const Outcome ctl = posed({"ctl", "--connect", kNobody, "--timeout", "0.3", "status"});
+  const ProgramOutcome ctl = posed({"ctl", "--connect", kNobody, "--timeout", "0.3", "status"});
   CHECK(ctl.code == 1);
   CHECK(has(ctl.err, "waited 0.3 s"));
   CHECK(has(ctl.err, "a replay publishes, but takes no control"));
@@ -122,7 +122,7 @@ TEST_CASE("a status is as new as the acknowledgement before it, and events say w
     return json::parse(served.ctl({"--json", "status"}).out).at("status").at("stream").at(0);
   };
   for (const double alpha : {0.5, -0.25, 1.5, 0.0}) {
-    const Outcome set = served.ctl({"set", "walker", "alpha", std::to_string(alpha)});
+    const ProgramOutcome set = served.ctl({"set", "walker", "alpha", std::to_string(alpha)});
     REQUIRE(set.code == 0);
     CHECK(has(set.out, ": alpha "));
     CHECK(stream().at("alphaTarget") == alpha);
@@ -151,7 +151,8 @@ TEST_CASE("a published replay is marked as one, and its times are consistent") {
   const std::string endpoint = ready.at("publish");
 
   Process stats({"monitor", "--connect", endpoint, "--topic", "stats", "--json"});
-  const Outcome frames = posed({"monitor", "--connect", endpoint, "--json", "--count", "10"});
+  const ProgramOutcome frames =
+      posed({"monitor", "--connect", endpoint, "--json", "--count", "10"});
   REQUIRE(frames.code == 0);
   const json frame = json::parse(frames.out.substr(0, frames.out.find('\n')));
   const auto ns = [](const json& value) { return std::stoll(value.get<std::string>()); };
@@ -175,7 +176,7 @@ TEST_CASE("a published replay is marked as one, and its times are consistent") {
   replay.send(SIGINT);
   CHECK(replay.exit_code() == 0);
 
-  const Outcome unheard = posed({"replay", log, "--endpoint", "tcp://127.0.0.1:*"});
+  const ProgramOutcome unheard = posed({"replay", log, "--endpoint", "tcp://127.0.0.1:*"});
   CHECK(unheard.code == 2);
   CHECK(has(unheard.err, "--publish"));
   Process cut({"replay", log, "--speed", "0.05", "--out", (folder.path() / "cut").string()});
@@ -212,18 +213,18 @@ TEST_CASE("ctl checks a file before it sends it") {
       served.folder.write("ann.toml",
                           "format = 1\ndriver = \"lucidgloves\"\nhand = \"right\"\n[sensors]\n"
                           "index_joint1 = [[0, 0.0], [2000, 1.0]]\n");
-  const Outcome style = served.ctl({"calibrate", "walker", served.path("one.style")});
+  const ProgramOutcome style = served.ctl({"calibrate", "walker", served.path("one.style")});
   CHECK(style.code == 1);
   CHECK(has(style.err,
             "one.style: is a model, not a glove's calibration; send it with `posed ctl "
             "model walker "));
-  const Outcome toml = served.ctl({"model", "walker", fit.string()});
+  const ProgramOutcome toml = served.ctl({"model", "walker", fit.string()});
   CHECK(toml.code == 1);
   CHECK(has(toml.err,
             "ann.toml: is a glove's calibration, not a model; send it with `posed ctl "
             "calibrate walker "));
   CHECK(has(served.ctl({"model", "walker", served.path("walk.bvh")}).err, "is a clip"));
-  const Outcome broken = served.ctl(
+  const ProgramOutcome broken = served.ctl(
       {"calibrate", "walker", served.folder.write("half.toml", "format = 1\ndriver = ").string()});
   CHECK(broken.code != 0);
   CHECK(has(broken.err, "half.toml:2"));
@@ -236,13 +237,13 @@ TEST_CASE("a piped status has complete names, and no line ends in blanks") {
   std::filesystem::copy_file(served.path("one.style"), served.path(name));
   served.start();
   REQUIRE(served.ctl({"model", "walker", served.path(name)}).code == 0);
-  const Outcome status = served.ctl({"status"});
+  const ProgramOutcome status = served.ctl({"status"});
   CHECK(has(status.out, name + "\n"));
   CHECK_FALSE(status.out.contains(" \n"));
 }
 
 TEST_CASE("each command explains its own options, and refuses those without an effect") {
-  const Outcome set = posed({"ctl", "set", "--help"});
+  const ProgramOutcome set = posed({"ctl", "set", "--help"});
   CHECK(set.code == 0);
   CHECK(has(set.out, "posed ctl set walker alpha 0.5"));
   CHECK_FALSE(set.out.contains("posed ctl haptics"));
@@ -258,14 +259,15 @@ TEST_CASE("each command explains its own options, and refuses those without an e
   const auto mine = folder.write("mine", "precious");
   const auto link = folder.path() / "link";
   std::filesystem::create_symlink(mine, link);
-  const Outcome taken = posed({"emulate", "lucidgloves", "--link", link.string()});
+  const ProgramOutcome taken = posed({"emulate", "lucidgloves", "--link", link.string()});
   CHECK(taken.code == 2);
   CHECK(has(taken.err, "choose another name for --link"));
   CHECK(std::filesystem::read_symlink(link) == mine);
 
   Served served;
   served.start();
-  const Outcome misnamed = posed({"monitor", "--connect", served.publish, "--stream", "walkr"});
+  const ProgramOutcome misnamed =
+      posed({"monitor", "--connect", served.publish, "--stream", "walkr"});
   CHECK(misnamed.code == 1);
   CHECK(has(misnamed.err, "has no stream 'walkr'; it has: walker"));
   Process counting({"monitor", "--connect", served.publish, "--count", "100000"});

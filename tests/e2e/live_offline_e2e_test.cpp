@@ -20,7 +20,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr int kFrames = 240;
+constexpr int kClipFrames = 240;
 constexpr double kSame_rad = 1e-5;  // nine digits of a degree, and floats on the way
 
 // A config of one stream. `stream` and `file` are lines of its tables.
@@ -123,23 +123,24 @@ std::uint64_t first_shed(const log::Reader& reader) {
     REQUIRE(decision);
     if (decision->kind == pipeline::Decision::Kind::kShed) return decision->sequence;
   }
-  return kFrames + 1;
+  return kClipFrames + 1;
 }
 
 clip::Clip applied_cold(const Served& served) {
-  const Outcome apply = posed({"apply", "--cold", "--model", served.path("one.style"),
-                               served.path("walk.bvh"), "--out", served.path("offline.bvh")});
+  const ProgramOutcome apply =
+      posed({"apply", "--cold", "--model", served.path("one.style"), served.path("walk.bvh"),
+             "--out", served.path("offline.bvh")});
   INFO(apply.err);
   REQUIRE(apply.code == 0);
   auto offline = clip::read_clip(served.path("offline.bvh"));
   REQUIRE(offline);
-  REQUIRE(offline->frames() == kFrames);
+  REQUIRE(offline->frames() == kClipFrames);
   return std::move(*offline);
 }
 
 // The same body with other names for its limbs.
 clip::Clip renamed_walk() {
-  clip::Clip walk = toy_walk(kFrames, 120.0);
+  clip::Clip walk = toy_walk(kClipFrames, 120.0);
   Skeleton skeleton = toy_skeleton();
   skeleton.joints[3].name = "Wheel";
   skeleton.joints[4].name = "Wing";
@@ -179,14 +180,15 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
     INFO("pace " << pace);
     const std::string file = std::string("path = \"walk.bvh\"\nloop = false\npace = ") + pace;
     served.folder.write("once.toml", config_of("", file));
-    const Outcome record = posed({"record", "--config", served.path("once.toml"), "--out",
-                                  served.path("take.plog"), "--frames", "--force", "--until-end"});
+    const ProgramOutcome record =
+        posed({"record", "--config", served.path("once.toml"), "--out", served.path("take.plog"),
+               "--frames", "--force", "--until-end"});
     INFO(record.err);
     REQUIRE(record.code == 0);
     const auto reader = log::Reader::open(served.path("take.plog"));
     REQUIRE(reader);
     const std::uint64_t end = first_shed(*reader);
-    if (*pace == '0') CHECK(end == kFrames + 1);  // a lossless source is never shed
+    if (*pace == '0') CHECK(end == kClipFrames + 1);  // a lossless source is never shed
     std::vector<v1::Frame> live = published(*reader);
     std::erase_if(live, [end](const v1::Frame& frame) { return frame.sequence() >= end; });
     REQUIRE(live.size() == end - 1);
@@ -194,7 +196,7 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
     WARN("pace " << pace << ": " << live.size() << " frames, at most "
                  << largest_distance_rad(live, offline) << " rad from apply --cold");
     CHECK(largest_distance_rad(live, offline) <= kSame_rad);
-    if (end > kFrames / 2)
+    if (end > kClipFrames / 2)
       CHECK(largest_distance_rad(live, *input) > 0.1);  // the style had an effect
   }
 }
@@ -210,9 +212,9 @@ TEST_CASE("run --until-end ends with 0, and a client receives the last frame and
   CHECK(has(served.daemon->errors(), "ended"));
   CHECK(listener.count(v1::Event::KIND_ENDED) == 1);
   REQUIRE(!listener.events.empty());
-  CHECK(listener.events.back().sequence() == kFrames);
+  CHECK(listener.events.back().sequence() == kClipFrames);
   REQUIRE(!listener.frames.empty());
-  CHECK(listener.frames.back().sequence() == kFrames);
+  CHECK(listener.frames.back().sequence() == kClipFrames);
   // Frames that an overloaded machine sheds are reported; without them live and offline had the
   // same input.
   if (listener.count(v1::Event::KIND_SHED) == 0) {
@@ -280,7 +282,7 @@ TEST_CASE("bad input gives one error message that states what to do, and a match
   };
   for (const Row& row : rows) {
     served.folder.write("bad.toml", row.config);
-    const Outcome outcome =
+    const ProgramOutcome outcome =
         posed({"record", "--config", served.path("bad.toml"), "--out",
                served.path(&row == &rows.back() ? "take.plog" : "new.plog"), "--seconds", "1"});
     INFO(row.config << outcome.err);

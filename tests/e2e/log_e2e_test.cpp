@@ -29,7 +29,7 @@ constexpr auto kStopsWithin = 5s;
 
 // Sends changes of alpha as fast as the daemon replies, a few at a time. Returns the number of
 // replies.
-int flood(const std::string& endpoint, int count) {
+int flood_alpha(const std::string& endpoint, int count) {
   const auto context = net::open_context().value();
   const auto socket = net::open_socket(context.get(), ZMQ_DEALER).value();
   REQUIRE(net::connect_socket(socket.get(), endpoint));
@@ -108,7 +108,7 @@ TEST_CASE("a stderr that nobody reads costs no frame, and SIGTERM still ends the
   served.launch("run", {}, {err.write_end()});
   Watched watched(served.publish, 240);
   // On another thread, because a monitor that nobody reads would itself lose frames.
-  auto answered = std::async(std::launch::async, flood, served.control, flood_size());
+  auto answered = std::async(std::launch::async, flood_alpha, served.control, flood_size());
   check_nothing_lost(served, watched);
   CHECK(answered.get() == flood_size());
   stop(served);
@@ -119,7 +119,7 @@ TEST_CASE("log lines that nobody read are written once somebody reads") {
   Pipe err;
   const std::size_t held = err.fill();
   served.launch("run", {}, {err.write_end()});
-  CHECK(flood(served.control, 50) == 50);
+  CHECK(flood_alpha(served.control, 50) == 50);
   std::string log = err.take();
   CHECK(log.size() >= held);
   stop(served);
@@ -137,12 +137,12 @@ TEST_CASE("a closed stderr ends neither run nor record") {
                   {err.write_end()});
     err.close_writer();
     err.close_reader();
-    CHECK(flood(served.control, 50) == 50);
+    CHECK(flood_alpha(served.control, 50) == 50);
     Watched watched(served.publish, 60);
     check_nothing_lost(served, watched);
     stop(served);
     if (!recording) continue;
-    const Outcome replay =
+    const ProgramOutcome replay =
         posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
     INFO(replay.err);
     CHECK(replay.code == 0);
@@ -152,11 +152,12 @@ TEST_CASE("a closed stderr ends neither run nor record") {
 TEST_CASE("started without a stderr, the log of the program does not go into the device log") {
   Served served;
   served.launch("record", {"--out", served.path("take.plog"), "--frames"}, {ChildStderr::kClosed});
-  CHECK(flood(served.control, 50) == 50);
+  CHECK(flood_alpha(served.control, 50) == 50);
   Watched watched(served.publish, 60);
   check_nothing_lost(served, watched);
   stop(served);
-  const Outcome replay = posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
+  const ProgramOutcome replay =
+      posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
   INFO(replay.err);
   CHECK(replay.code == 0);
 }
@@ -165,7 +166,7 @@ TEST_CASE("a flood of control messages gives a few lines a second, with their co
   Served served;
   served.start();
   const auto begin = std::chrono::steady_clock::now();
-  CHECK(flood(served.control, flood_size()) == flood_size());
+  CHECK(flood_alpha(served.control, flood_size()) == flood_size());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   stop(served);
   const std::string log = served.daemon->errors();

@@ -11,12 +11,12 @@
 
 namespace posed::test {
 
-struct Outcome {
+struct ProgramOutcome {
   int code;
   std::string out, err;
 };
 
-inline Outcome posed(std::vector<std::string> arguments) {
+inline ProgramOutcome posed(std::vector<std::string> arguments) {
   Process process(std::move(arguments));
   const std::string out = process.rest();
   const auto code = process.exit_code();

@@ -15,6 +15,7 @@
 #include "proto/clip/clip.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/stage.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/mocap_room.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -42,7 +43,7 @@ class Walkers : public Stage {
   }
 
   void tell(std::vector<std::string> what) const {
-    const Outcome outcome = ctl(std::move(what));
+    const ProgramOutcome outcome = ctl(std::move(what));
     INFO(outcome.err);
     CHECK(outcome.code == 0);
   }
@@ -78,11 +79,6 @@ class Walkers : public Stage {
   }
 };
 
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 }  // namespace
 
 TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.bin as published") {
@@ -106,7 +102,7 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
 
   const std::string log = stage.path("take.plog");
   for (const char* name : {"one.bin", "two.bin"}) {
-    const Outcome replay =
+    const ProgramOutcome replay =
         posed({"replay", log, "--speed", "max", "--out", stage.path(name), "--expect", "--json"});
     INFO(replay.err);
     REQUIRE(replay.code == 0);
@@ -115,8 +111,8 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
     // The number depends on how much a busy machine sheds; a recording of seconds has hundreds.
     CHECK(counts.at("compared") > 100);
   }
-  CHECK(!bytes_of(stage.path("one.bin")).empty());
-  CHECK(bytes_of(stage.path("one.bin")) == bytes_of(stage.path("two.bin")));
+  CHECK(!file_text(stage.path("one.bin")).empty());
+  CHECK(file_text(stage.path("one.bin")) == file_text(stage.path("two.bin")));
 }
 
 TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
@@ -129,7 +125,7 @@ TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
     clock_gettime(CLOCK_MONOTONIC, &now);
     stage.daemon->send(SIGKILL);
     CHECK(stage.daemon->exit_code() == 128 + SIGKILL);
-    const Outcome replay =
+    const ProgramOutcome replay =
         posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect", "--json"});
     INFO(replay.err);
     REQUIRE(replay.code == 0);
@@ -150,21 +146,21 @@ TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
 TEST_CASE("record and replay refuse wrong use with one error message") {
   Walkers stage;
   stage.folder.write("take.plog", "not a log, but somebody's");
-  const Outcome kept =
+  const ProgramOutcome kept =
       posed({"record", "--config", stage.path("posed.toml"), "--out", stage.path("take.plog")});
   CHECK(kept.code == 2);
   CHECK(kept.err.find("take.plog: exists already") != std::string::npos);
-  const Outcome foreign = posed({"replay", stage.path("take.plog")});
+  const ProgramOutcome foreign = posed({"replay", stage.path("take.plog")});
   CHECK(foreign.code == 1);
   CHECK(foreign.err.find("take.plog: not a device log") != std::string::npos);
   CHECK(posed({"replay", stage.path("none.plog")}).code == 1);
   CHECK(posed({"replay", stage.path("take.plog"), "--speed", "fast"}).code == 2);
-  const Outcome nowhere =
+  const ProgramOutcome nowhere =
       posed({"record", "--config", stage.path("posed.toml"), "--out", stage.path("no/take.plog")});
   CHECK(nowhere.code == 2);
   CHECK(nowhere.err.find("its folder is not there") != std::string::npos);
-  const Outcome own = posed({"record", "--config", stage.path("posed.toml"), "--out",
-                             stage.path("one.style"), "--overwrite"});
+  const ProgramOutcome own = posed({"record", "--config", stage.path("posed.toml"), "--out",
+                                    stage.path("one.style"), "--overwrite"});
   CHECK(own.code == 2);
   CHECK(style::load_model(stage.path("one.style")));
 }
@@ -207,7 +203,8 @@ TEST_CASE("record counts people who have left, and names a source that no body c
   CHECK(errors.find("streams and those that have left, ") != std::string::npos);
   CHECK(errors.find("MB of memory are set aside") != std::string::npos);
 
-  const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
+  const ProgramOutcome replay =
+      posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
   CHECK(replay.code == 0);
   for (const std::string& text : {errors, replay.err}) {
     INFO(text);
@@ -223,18 +220,18 @@ TEST_CASE("a log is replaced only once its replacement is being written") {
   stage.record();
   stage.daemon->send(SIGTERM);
   REQUIRE(stage.daemon->exit_code() == 0);
-  const std::string before = bytes_of(stage.path("take.plog"));
+  const std::string before = file_text(stage.path("take.plog"));
   std::ifstream config(stage.path("posed.toml"));
   std::string text{std::istreambuf_iterator<char>(config), {}};
   stage.folder.write("taken.toml", text.replace(text.find("tcp://127.0.0.1:*"), 17, busy.publish));
-  const Outcome refused = posed({"record", "--config", stage.path("taken.toml"), "--out",
-                                 stage.path("take.plog"), "--overwrite"});
+  const ProgramOutcome refused = posed({"record", "--config", stage.path("taken.toml"), "--out",
+                                        stage.path("take.plog"), "--overwrite"});
   CHECK(refused.code == 1);
-  CHECK(bytes_of(stage.path("take.plog")) == before);
+  CHECK(file_text(stage.path("take.plog")) == before);
   stage.launch("record", {"--out", stage.path("take.plog"), "--overwrite"});
   stage.daemon->send(SIGTERM);
   REQUIRE(stage.daemon->exit_code() == 0);
-  CHECK(bytes_of(stage.path("take.plog")) != before);
+  CHECK(file_text(stage.path("take.plog")) != before);
   CHECK_FALSE(std::filesystem::exists(stage.path("take.plog.replaced")));
 }
 

@@ -54,7 +54,7 @@ TEST_CASE("a replay keeps the recording's own timing and publishes as the run di
   INFO(replay.errors());
   REQUIRE(line);
   const std::string endpoint = json::parse(*line).at("publish");
-  const Outcome seen = posed({"monitor", "--connect", endpoint, "--json", "--count", "5"});
+  const ProgramOutcome seen = posed({"monitor", "--connect", endpoint, "--json", "--count", "5"});
   INFO(seen.err);
   REQUIRE(seen.code == 0);
   const json frame = json::parse(seen.out.substr(0, seen.out.find('\n')));
@@ -75,11 +75,12 @@ TEST_CASE("one wrong time in a log does not stop a timed replay: it is skipped a
   const TempFolder folder;
   const std::string log = staged_log(folder);
   run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 86400000000000 WHERE id = 20");
-  const Outcome paced = posed({"replay", log, "--out", (folder.path() / "paced.bin").string()});
+  const ProgramOutcome paced =
+      posed({"replay", log, "--out", (folder.path() / "paced.bin").string()});
   INFO(paced.err);
   CHECK(paced.code == 0);
   CHECK(has(paced.err, "staged.plog: nothing came for 86400 s before chunk 20"));
-  const Outcome fast =
+  const ProgramOutcome fast =
       posed({"replay", log, "--speed", "max", "--out", (folder.path() / "fast.bin").string()});
   CHECK(fast.code == 0);
   CHECK_FALSE(has(fast.err, "nothing came"));
@@ -92,7 +93,7 @@ TEST_CASE("a row that does not match its checksum ends a replay, with log, table
   const auto log = folder.path() / "staged.plog";
   std::filesystem::copy_file(golden("replay/staged-3.plog"), log);
   run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 1 WHERE id = 20");
-  const Outcome replay = posed({"replay", log.string(), "--speed", "max"});
+  const ProgramOutcome replay = posed({"replay", log.string(), "--speed", "max"});
   CHECK(replay.code == 1);
   CHECK(has(replay.err, "staged.plog: the log is damaged: row 20 of table chunk does not match"));
 }
@@ -104,12 +105,12 @@ TEST_CASE("a replay on another instruction set differs in the last bits at most"
     return posed({"replay", log, "--speed", "max", "--isa", isa, "--out",
                   (folder.path() / out).string(), "--json"});
   };
-  const Outcome portable = replay("portable", "portable.bin");
+  const ProgramOutcome portable = replay("portable", "portable.bin");
   INFO(portable.err);
   REQUIRE(portable.code == 0);
   CHECK(json::parse(portable.out).at("isa") == "portable");
   CHECK(replay("sparc", "no.bin").code == 2);
-  const Outcome other = posed(
+  const ProgramOutcome other = posed(
       {"replay", log, "--speed", "max", "--out", (folder.path() / "own.bin").string(), "--json"});
   REQUIRE(other.code == 0);
   const auto a = frames_of(folder.path() / "portable.bin");
@@ -142,7 +143,7 @@ TEST_CASE("a full disk stops the recording and not the stream, and is counted an
   std::uint64_t errors = 0;
   for (int i = 0; i < 50 && errors == 0; ++i) {
     std::this_thread::sleep_for(200ms);
-    const Outcome status = posed({"ctl", "--connect", control, "status", "--json"});
+    const ProgramOutcome status = posed({"ctl", "--connect", control, "status", "--json"});
     INFO(status.err);
     REQUIRE(status.code == 0);
     const json stats = json::parse(status.out).at("status");
@@ -150,7 +151,7 @@ TEST_CASE("a full disk stops the recording and not the stream, and is counted an
   }
   CHECK(errors > 0);
   CHECK(has(served.daemon->errors(), "recording stopped, streaming continues"));
-  const Outcome seen = posed({"monitor", "--connect", publish, "--json", "--count", "30"});
+  const ProgramOutcome seen = posed({"monitor", "--connect", publish, "--json", "--count", "30"});
   INFO(seen.err);
   CHECK(seen.code == 0);
   served.daemon->send(SIGTERM);

@@ -9,6 +9,7 @@
 #include "models/style/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/e2e/stage.hpp"
+#include "tests/support/has.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
@@ -39,10 +40,5 @@ model = "one.style"
 
   void start(const std::vector<std::string>& options = {}) { launch("run", options); }
 };
-
-inline bool has(const std::string& text, const std::string& part) {
-  INFO(text);
-  return text.find(part) != std::string::npos;
-}
 
 }  // namespace posed::test

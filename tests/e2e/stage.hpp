@@ -43,7 +43,7 @@ class Stage {
 
   void record() { launch("record", {"--out", path("take.plog"), "--frames"}); }
 
-  [[nodiscard]] Outcome ctl(std::vector<std::string> what) const {
+  [[nodiscard]] ProgramOutcome ctl(std::vector<std::string> what) const {
     what.insert(what.begin(), {"ctl", "--connect", control});
     return posed(std::move(what));
   }

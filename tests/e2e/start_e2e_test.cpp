@@ -114,7 +114,7 @@ TEST_CASE("a signal that comes while posed starts ends it cleanly") {
       stage.start_and_catch(command, command == "record" ? options : std::vector<std::string>{});
       stage.expect_end(signal);
       if (command == "run") continue;
-      const Outcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
+      const ProgramOutcome replay = posed({"replay", stage.path("take.plog"), "--speed", "max"});
       INFO(replay.err);
       CHECK(replay.code == 0);  // short, but complete
     }
@@ -142,7 +142,7 @@ TEST_CASE("invalid options of a glove are refused at the start, with or without 
                                          "[stream.cyberglove]\n" +
                                          options);
     for (const char* command : {"run", "check"}) {
-      const Outcome refused = posed({command, "--config", stage.path("posed.toml")});
+      const ProgramOutcome refused = posed({command, "--config", stage.path("posed.toml")});
       CHECK(refused.code == 2);
       CHECK(has(refused.err, sentence));
     }
@@ -151,18 +151,19 @@ TEST_CASE("invalid options of a glove are refused at the start, with or without 
 
 TEST_CASE("--until-end waits for streams that can end, and is refused where none can") {
   SilentGloves stage;
-  const Outcome refused = posed({"run", "--config", stage.path("posed.toml"), "--until-end"});
+  const ProgramOutcome refused =
+      posed({"run", "--config", stage.path("posed.toml"), "--until-end"});
   CHECK(refused.code == 2);
   CHECK(has(refused.err, "--until-end: no source of this config ever ends"));
   std::ifstream file(stage.path("posed.toml"));
   std::string config{std::istreambuf_iterator<char>(file), {}};
   config.replace(config.find("loop = true"), 11, "loop = false");
   stage.folder.write("posed.toml", config);
-  const Outcome ended = posed({"record", "--config", stage.path("posed.toml"), "--out",
-                               stage.path("take.plog"), "--frames", "--until-end"});
+  const ProgramOutcome ended = posed({"record", "--config", stage.path("posed.toml"), "--out",
+                                      stage.path("take.plog"), "--frames", "--until-end"});
   INFO(ended.err);
   CHECK(ended.code == 0);
-  const Outcome replay =
+  const ProgramOutcome replay =
       posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect", "--json"});
   INFO(replay.err);
   CHECK(replay.code == 0);

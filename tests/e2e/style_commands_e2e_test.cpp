@@ -10,6 +10,7 @@
 
 #include "models/motion/synthetic_walker.hpp"
 #include "tests/e2e/outcome.hpp"
+#include "tests/support/has.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
@@ -18,16 +19,11 @@ namespace {
 using motion::WalkerFamily;
 using nlohmann::json;
 
-bool has(const std::string& text, const std::string& what) {
-  UNSCOPED_INFO(text);
-  return text.contains(what);
-}
-
 // Two synthetic walkers of each family, and an experiment file with the first of each.
-struct Studio {
+struct WalkerStudio {
   TempFolder folder;
 
-  Studio() {
+  WalkerStudio() {
     for (const std::uint32_t person : {1U, 2U}) {
       write("march_" + std::to_string(person), WalkerFamily::kMarch, person);
       write("sway_" + std::to_string(person), WalkerFamily::kSway, person);
@@ -54,16 +50,17 @@ struct Studio {
   }
 
   // Runs `train style` with the arguments `what` and writes `out`.
-  [[nodiscard]] Outcome train(std::vector<std::string> what, const std::string& out) const {
+  [[nodiscard]] ProgramOutcome train(std::vector<std::string> what, const std::string& out) const {
     what.insert(what.begin(), {"train", "style"});
     what.insert(what.end(), {"--out", path(out), "--json"});
     return posed(std::move(what));
   }
-  [[nodiscard]] Outcome experiment(std::vector<std::string> more, const std::string& out) const {
+  [[nodiscard]] ProgramOutcome experiment(std::vector<std::string> more,
+                                          const std::string& out) const {
     more.insert(more.begin(), {"--experiment", path("exp.toml")});
     return train(std::move(more), out);
   }
-  [[nodiscard]] Outcome eval(const std::string& source, const std::string& target) const {
+  [[nodiscard]] ProgramOutcome eval(const std::string& source, const std::string& target) const {
     return posed({"eval", "style", "--model", path("m.style"), "--source", path(source), "--target",
                   path(target), "--json"});
   }
@@ -73,7 +70,7 @@ struct Studio {
 
 TEST_CASE("command line options beside an experiment file override it or are refused",
           "[train_style]") {
-  const Studio studio;
+  const WalkerStudio studio;
   const auto usual = studio.experiment({}, "default.style");
   REQUIRE(usual.code == 0);
   CHECK(json::parse(usual.out)["mode"] == "default");
@@ -102,7 +99,7 @@ TEST_CASE("command line options beside an experiment file override it or are ref
 }
 
 TEST_CASE("no model is trained from useless data", "[train_style]") {
-  const Studio studio;
+  const WalkerStudio studio;
   const auto refused = [&](const std::string& from, const std::string& to, const std::string& why) {
     const auto done =
         studio.train({"--from", studio.path(from), "--to", studio.path(to)}, "x.style");
@@ -124,7 +121,7 @@ TEST_CASE("no model is trained from useless data", "[train_style]") {
 
 TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figure",
           "[train_style][apply][eval_style]") {
-  const Studio studio;
+  const WalkerStudio studio;
   const auto trained = studio.train(
       {"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")}, "m.style");
   REQUIRE(trained.code == 0);
@@ -157,7 +154,7 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
 }
 
 TEST_CASE("apply says that a walker is far from the training", "[apply]") {
-  const Studio studio;
+  const WalkerStudio studio;
   REQUIRE(studio
               .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
                      "m.style")
@@ -174,7 +171,7 @@ TEST_CASE("apply says that a walker is far from the training", "[apply]") {
 
 TEST_CASE("no command destroys a file: wrong names, inputs and files that exist are refused",
           "[output]") {
-  const Studio studio;
+  const WalkerStudio studio;
   REQUIRE(studio
               .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
                      "m.style")
@@ -186,7 +183,7 @@ TEST_CASE("no command destroys a file: wrong names, inputs and files that exist 
                                studio.path("march_1.bvh"), "--out", studio.path(out)});
     return posed(std::move(more));
   };
-  const auto refused = [&](const Outcome& done, const std::string& why) {
+  const auto refused = [&](const ProgramOutcome& done, const std::string& why) {
     return done.code == 2 && has(done.err, why);
   };
   CHECK(refused(apply("out.csv"), "does not end in .bvh"));

@@ -21,16 +21,16 @@ namespace {
 constexpr const char* kString = "g 1 c 3 4 p";
 
 // A folder with a model.
-struct Studio {
+struct ModelFolder {
   TempFolder folder;
   std::string model = (folder.path() / "toy.gesture").string();
 
-  Studio() { REQUIRE(gesture::save_model(toy_gesture_model(), model).has_value()); }
+  ModelFolder() { REQUIRE(gesture::save_model(toy_gesture_model(), model).has_value()); }
   [[nodiscard]] std::string path(const std::string& name) const {
     return (folder.path() / name).string();
   }
-  Outcome synth(const std::string& labels, const std::string& out,
-                std::vector<std::string> more = {}) const {
+  ProgramOutcome synth(const std::string& labels, const std::string& out,
+                       std::vector<std::string> more = {}) const {
     std::vector<std::string> arguments{"synth", "--model", model,     "--labels",
                                        labels,  "--out",   path(out), "--json"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -47,9 +47,9 @@ std::string output_of(const std::string& command) {
 }
 
 TEST_CASE("synth reports its states and keeps fingers apart, as CSV and as BVH") {
-  const Studio studio;
+  const ModelFolder studio;
   for (const std::string out : {"hand.csv", "hand.bvh"}) {
-    const Outcome made = studio.synth(kString, out, {"--hand", "left"});
+    const ProgramOutcome made = studio.synth(kString, out, {"--hand", "left"});
     REQUIRE(made.code == 0);
     const auto report = nlohmann::json::parse(made.out);
     REQUIRE(report["states"].size() == 30);
@@ -70,7 +70,7 @@ TEST_CASE("synth reports its states and keeps fingers apart, as CSV and as BVH")
 }
 
 TEST_CASE("an independent program solves the model file to the same trajectory") {
-  const Studio studio;
+  const ModelFolder studio;
   REQUIRE(studio.synth(kString, "hand.csv", {"--unconstrained"}).code == 0);
   const auto ours = clip::read_hand_clip(studio.path("hand.csv"));
   REQUIRE(ours.has_value());
@@ -93,8 +93,8 @@ TEST_CASE("an independent program solves the model file to the same trajectory")
 }
 
 TEST_CASE("synth refuses what it cannot perform with one error message and exit code 2") {
-  const Studio studio;
-  const Outcome unknown = studio.synth("g 7", "hand.csv");
+  const ModelFolder studio;
+  const ProgramOutcome unknown = studio.synth("g 7", "hand.csv");
   CHECK(unknown.code == 2);
   CHECK(unknown.err.find("unknown label(s) 7") != std::string::npos);
   CHECK(studio.synth("", "hand.csv").code == 2);

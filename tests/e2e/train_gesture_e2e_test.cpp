@@ -1,8 +1,6 @@
 // `posed train gesture` with the real binary: a glove recording and its labels give a model, with
 // the same bytes each time; labels are proposed; every mistake gives one error message and an exit
 // code.
-#include <fstream>
-#include <iterator>
 
 #include <nlohmann/json.hpp>
 
@@ -10,16 +8,12 @@
 #include "models/gesture/synthetic_signer.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "tests/e2e/outcome.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
 namespace {
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 // A synthetic signer's recording with its labels, and a file with only the first labels.
 struct Glove {
@@ -41,8 +35,8 @@ struct Glove {
   }
 
   // Runs `train gesture` with the recording, its labels and the arguments `more`.
-  [[nodiscard]] Outcome train(const std::string& out, std::vector<std::string> more = {},
-                              const std::string& with = {}) const {
+  [[nodiscard]] ProgramOutcome train(const std::string& out, std::vector<std::string> more = {},
+                                     const std::string& with = {}) const {
     std::vector<std::string> arguments{"train", "gesture",  "--clip",
                                        clip,    "--labels", with.empty() ? labels : with,
                                        "--out", file(out)};
@@ -51,7 +45,7 @@ struct Glove {
   }
 };
 
-bool one_sentence(const Outcome& outcome, int code, const std::string& what) {
+bool one_sentence(const ProgramOutcome& outcome, int code, const std::string& what) {
   UNSCOPED_INFO(outcome.code << ": " << outcome.err);
   return outcome.code == code && outcome.out.empty() && outcome.err.find(what) != std::string::npos;
 }
@@ -67,9 +61,9 @@ TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") 
   CHECK(printed["gestures"] == 40);
   CHECK(printed["leaves"] > 25);
   CHECK(printed["leaves_by_state"].size() == 5);
-  CHECK(bytes_of(glove.file("t.svg")).find("state 4, middle") != std::string::npos);
+  CHECK(file_text(glove.file("t.svg")).find("state 4, middle") != std::string::npos);
   REQUIRE(glove.train("b.gesture").code == 0);
-  CHECK(bytes_of(glove.file("a.gesture")) == bytes_of(glove.file("b.gesture")));
+  CHECK(file_text(glove.file("a.gesture")) == file_text(glove.file("b.gesture")));
   const auto model = gesture::load_model(glove.file("a.gesture"));
   REQUIRE(model.has_value());
   CHECK(model->label_index("3") >= 0);
@@ -101,8 +95,8 @@ TEST_CASE("A model is judged and drawn", "[eval_gesture]") {
   const auto& curve = printed["curve"];
   REQUIRE(curve.size() > 5);
   CHECK(curve.back()["channel_rms_deg"] < curve.front()["channel_rms_deg"]);
-  CHECK(bytes_of(glove.file("lag.svg")).find("<svg") == 0);
-  CHECK(bytes_of(glove.file("t.dot")).find("digraph") != std::string::npos);
+  CHECK(file_text(glove.file("lag.svg")).find("<svg") == 0);
+  CHECK(file_text(glove.file("t.dot")).find("digraph") != std::string::npos);
   CHECK(one_sentence(eval({"--labels", "wave"}), 2, "wave"));
   CHECK(one_sentence(eval({"--trees", "toe:9", "--tree-text", "-"}), 2, "toe:9"));
 }
@@ -118,7 +112,7 @@ TEST_CASE("Classes are proposed, and a pose shown once becomes a label", "[train
   const auto labels = nlohmann::json::parse(trained.out)["labels"];
   CHECK(labels.size() == 4);
   CHECK(labels.back()["name"] == "drei");
-  CHECK(bytes_of(glove.file("q.toml")).find("[middle]") != std::string::npos);
+  CHECK(file_text(glove.file("q.toml")).find("[middle]") != std::string::npos);
 }
 
 TEST_CASE("Labels are proposed from a few", "[train_gesture]") {

@@ -39,7 +39,7 @@ Function* behind(const char* name) noexcept {
   return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
 }
 
-class CountingSink final : public spdlog::sinks::sink {
+class CountingLogSink final : public spdlog::sinks::sink {
  public:
   void log(const spdlog::details::log_msg& /*message*/) override { note(Breach::kLog); }
   void flush() override {}
@@ -81,7 +81,7 @@ void forget_breaches() noexcept {
 }
 
 void watch_log() {
-  auto logger = std::make_shared<spdlog::logger>("rt", std::make_shared<CountingSink>());
+  auto logger = std::make_shared<spdlog::logger>("rt", std::make_shared<CountingLogSink>());
   logger->set_level(spdlog::level::trace);
   spdlog::set_default_logger(std::move(logger));
 }

@@ -33,7 +33,7 @@ namespace {
 using pipeline::Command;
 
 // A record sink that keeps the contract itself; the recorder's own sink has its own tests.
-class CountingSink final : public test::QuietRecordSink {
+class CountingRecordSink final : public test::QuietRecordSink {
  public:
   void chunk(std::uint32_t, std::uint8_t, pipeline::Direction, std::int64_t,
              const pipeline::Position&, std::span<const std::byte>) noexcept override {
@@ -72,7 +72,7 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   const test::TempFolder folder;
   const auto path = folder.path() / "toy.bvh";
   REQUIRE(clip::write_bvh(test::toy_walk(120, 120.0), path));
-  CountingSink record_sink;
+  CountingRecordSink record_sink;
   const auto device = open_device("file", {{"path", path.string()}});
   const Skeleton& skeleton = *device.description.skeleton;
   const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
@@ -106,7 +106,7 @@ TEST_CASE("hands keep the real-time contract: smoothed, constrained, performing,
   const auto path = folder.path() / "hand.csv";
   const auto signer = gesture::make_performance({.person = 3, .gestures = 6}).value();
   REQUIRE(clip::write_hand_csv(signer.clip, path));
-  CountingSink record_sink;
+  CountingRecordSink record_sink;
   std::vector<RigStream> streams;
   streams.push_back({.device = open_device("file", {{"path", path.string()}, {"pace", 4.0}})});
   streams.push_back({.device = open_device("labels", {{"rate_hz", 120.0}})});
@@ -143,7 +143,7 @@ TEST_CASE("hands keep the real-time contract: smoothed, constrained, performing,
 TEST_CASE("a glove keeps the real-time contract: read, calibrated, vibrated, unplugged and back",
           "[rt]") {
   watch_log();
-  CountingSink record_sink;
+  CountingRecordSink record_sink;
   const auto plug_in = [] {
     auto emulator =
         drivers::find_driver("lucidgloves")

@@ -9,6 +9,10 @@
 
 namespace posed::test {
 
+inline smooth::LiveOptions live_options(int lag, double noise_deg) {
+  return {.lag = {.frames = lag}, .noise_rad = noise_deg * kDegree};
+}
+
 // A skeleton with `channels` rotation channels, three per joint; the last joint may have fewer.
 inline Skeleton body_with_channels(int channels) {
   Skeleton skeleton;

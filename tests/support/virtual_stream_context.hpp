@@ -25,9 +25,10 @@ struct VirtualStreamContext {
   // The file, bound to stage number `stage`.
   const StageModel* bind(std::size_t stage, const std::string& bytes) {
     const StageType& type = *stream.settings.stages[stage].type;
-    auto bound = type.bind_model(
-        bytes_of(bytes),
-        pipeline::stage_context(stream.settings, stage, stream.description.skeleton), "virtual");
+    const auto context =
+        pipeline::stage_context(stream.settings, stage, stream.description.skeleton);
+    REQUIRE(context);
+    auto bound = type.bind_model(bytes_of(bytes), *context, "virtual");
     REQUIRE(bound);
     models.push_back(std::move(*bound));
     return models.back().get();

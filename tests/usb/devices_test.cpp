@@ -15,7 +15,7 @@ namespace {
 using nlohmann::json;
 
 json listed() {
-  const Outcome outcome = posed({"devices", "--json"});
+  const ProgramOutcome outcome = posed({"devices", "--json"});
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
   return json::parse(outcome.out).at("devices");

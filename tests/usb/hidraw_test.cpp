@@ -26,7 +26,7 @@ using drivers::TransportFactory;
 constexpr int kPatience_ms = 5000;
 
 // Like the reader thread: waits for the descriptor, then reads.
-Chunk next(drivers::Transport& transport) {
+Chunk next_report(drivers::Transport& transport) {
   pollfd wanted{.fd = transport.poll_fd(), .events = POLLIN, .revents = 0};
   REQUIRE(::poll(&wanted, 1, kPatience_ms) == 1);
   return transport.read(0);
@@ -45,7 +45,7 @@ void check_stream(Device& device, const Driver& driver, const Speaker& speaker, 
   CollectSink live, again;
   std::vector<Speaker::Report> got;
   while (got.size() < count) {
-    const Chunk chunk = next(*device.transport);
+    const Chunk chunk = next_report(*device.transport);
     REQUIRE_FALSE(chunk.lost);
     got.emplace_back(chunk.bytes.begin(), chunk.bytes.end());
     device.decoder->feed(chunk.bytes, 0, live);
@@ -81,7 +81,7 @@ void check_driver(const std::string& name, const Options& options, HidGlove& glo
     CHECK(device->description.identity == identity);
     check_stream(*device, *driver, speaker, 40);
     glove.unplug();
-    while (!next(*device->transport).lost) continue;
+    while (!next_report(*device->transport).lost) continue;
     CHECK_FALSE(driver->open(options, ports));
   }
 }
@@ -104,13 +104,13 @@ TEST_CASE("a hidraw node gives one report per read, until the glove is unplugged
   for (int n = 0; n < 256; ++n) {
     const auto report = report_of(static_cast<std::uint8_t>(n));
     REQUIRE(glove.say(report));
-    REQUIRE(std::ranges::equal(next(*transport).bytes, report));
+    REQUIRE(std::ranges::equal(next_report(*transport).bytes, report));
   }
   const auto told = report_of(7);
   CHECK(transport->send(told));
   CHECK(glove.heard() == told);
   glove.unplug();
-  CHECK(next(*transport).lost);
+  CHECK(next_report(*transport).lost);
   const auto gone = ports.hid({.vendor = kUltra.vendor});
   REQUIRE_FALSE(gone);
   CHECK(gone.error().message.find("no HID node") != std::string::npos);

@@ -21,7 +21,7 @@ using drivers::Chunk;
 using drivers::Transport;
 using drivers::TransportFactory;
 
-constexpr int kInterface = 1;
+constexpr int kGloveInterface = 1;
 constexpr std::chrono::seconds kPatience{5};
 
 template <std::size_t kSize>
@@ -37,7 +37,7 @@ std::map<std::uint8_t, P5Glove::Bytes> p5_features() {
 }
 
 // umockdev's usbfs node is a file, which epoll cannot wait for, so this polls.
-Chunk next(Transport& transport) {
+Chunk next_polled(Transport& transport) {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   while (std::chrono::steady_clock::now() < deadline) {
     const Chunk chunk = transport.read(0);
@@ -49,7 +49,7 @@ Chunk next(Transport& transport) {
 }
 
 drivers::UsbSettings p5_settings() {
-  return {.vendor = kP5.vendor, .product = kP5.product, .interface = kInterface};
+  return {.vendor = kP5.vendor, .product = kP5.product, .interface = kGloveInterface};
 }
 
 bool mentions(const Error& error, const std::string& text) {
@@ -106,12 +106,12 @@ TEST_CASE("reports of a USB device come in order, one per read, until it is unpl
         glove.say(P5Glove::Bytes(24, static_cast<std::byte>(n + i)));
       }
       for (int i = 0; i < burst; ++i) {
-        const Chunk chunk = next(*transport);
+        const Chunk chunk = next_polled(*transport);
         REQUIRE(std::ranges::equal(chunk.bytes, P5Glove::Bytes(24, static_cast<std::byte>(n + i))));
       }
     }
     glove.unplug();
-    CHECK(next(*transport).lost);
+    CHECK(next_polled(*transport).lost);
     const auto gone = ports.usb(p5_settings());
     REQUIRE_FALSE(gone);
     CHECK(mentions(gone.error(), "no USB device"));
@@ -139,7 +139,7 @@ TEST_CASE("the P5 driver reads heads, LEDs and reports from libusb") {
     P5Glove::Bytes report;
     emulator.emit(emulator.next_due_ns(), report);
     glove.say(report);
-    device->decoder->feed(next(*device->transport).bytes, 0, live);
+    device->decoder->feed(next_polled(*device->transport).bytes, 0, live);
     (*decoder)->feed(report, 0, again);
   }
   CHECK(live.count(Outcome::kOk) == 50);

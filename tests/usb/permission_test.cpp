@@ -54,7 +54,7 @@ TEST_CASE("a glove without permission names the udev rule that gives access") {
   check_sentence(usb_trouble, p5.node());
 
   if (::access(posed_binary().c_str(), X_OK) == 0) {  // user nobody may not enter every home folder
-    const Outcome listed = posed({"devices"});
+    const ProgramOutcome listed = posed({"devices"});
     CHECK(listed.out.find(nodes[0].open_error + "\n") != std::string::npos);
     CHECK(listed.out.find(usb_trouble + "\n") != std::string::npos);
   }
@@ -122,7 +122,7 @@ TEST_CASE("a daemon without permission for a glove reports it, runs, and opens i
   }
   check_sentence(stage->daemon->errors(), ultra.node());
   std::filesystem::permissions(bench.file_of(ultra.node()), std::filesystem::perms(0666));
-  const Outcome frames = posed(
+  const ProgramOutcome frames = posed(
       {"monitor", "--connect", stage->publish, "--stream", "ultra", "--json", "--count", "10"});
   CHECK(frames.code == 0);
 }

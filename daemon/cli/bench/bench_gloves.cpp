@@ -4,6 +4,8 @@
 #include <numbers>
 #include <thread>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "daemon/emulate/emulated_device.hpp"
 #include "drivers/described/device_file.hpp"
 #include "drivers/glove/glove_emulator.hpp"
@@ -75,7 +77,7 @@ std::vector<std::pair<std::string, Options>> glove_kinds(const Driver& driver) {
   }
   if (name != "described") return found;
   for (const std::string& device : drivers::described::shipped_devices()) {
-    found.push_back({name + " " + device, {{"device", device}}});
+    found.push_back({fmt::format("{} {}", name, device), {{"device", device}}});
   }
   return found;
 }

@@ -156,7 +156,7 @@ json accuracy(const Subject& subject) {
     report["max_gate_error"] = gate;
   }
   report["avx2_avx512_same_bits"] = all.size() == 2 ? json(all[0] == all[1]) : json(nullptr);
-  static_cast<void>(gp::set_isa(isa_before));
+  if (const auto back = gp::set_isa(isa_before); !back) report["error"] = back.error().message;
   return report;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 
 #include "proto/frame/time.hpp"
@@ -14,7 +15,7 @@ using Ages = std::vector<double>;  // us
 double quantile(const Ages& sorted, double p) {
   if (sorted.empty()) return 0.0;
   const auto last = static_cast<double>(sorted.size() - 1);
-  return sorted[static_cast<std::size_t>(p * last + 0.5)];
+  return sorted[static_cast<std::size_t>(std::lround(p * last))];
 }
 
 HopFigures figures(Ages ages) {

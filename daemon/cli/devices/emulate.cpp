@@ -15,6 +15,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/devices/driver_options.hpp"
 #include "daemon/cli/live/client.hpp"
+#include "daemon/emulate/clip_motion.hpp"
 #include "daemon/emulate/emulated_device.hpp"
 #include "daemon/emulate/log_emulator.hpp"
 #include "models/gesture/synthetic_signer.hpp"
@@ -26,7 +27,7 @@ namespace {
 struct EmulateOptions {
   std::string what;  // a log's path or a driver's name
   std::string stream;
-  std::string tcp;
+  std::string tcp, listen;
   std::vector<std::string> udp;
   std::filesystem::path link, clip;
   std::vector<std::string> set;     // KEY=VALUE
@@ -37,13 +38,13 @@ struct EmulateOptions {
   std::optional<double> seconds;
 };
 
-// The motion of an emulated hand: a clip, or gestures of a synthetic person. Other devices move by
-// themselves.
-Result<emulate::Motion> motion(const EmulateOptions& options) {
+// The motion of an emulated hand: a clip, or gestures of a synthetic person. Bodies perform a clip
+// or move by themselves.
+Result<emulate::Motion> motion(const EmulateOptions& options, const drivers::Emulator& emulator) {
   const drivers::Driver* driver = drivers::find_driver(options.what);
   if (driver != nullptr && driver->glove == nullptr) {
     if (options.clip.empty()) return emulate::Motion();
-    return misuse("'" + options.what + "' is not a glove: leave out --clip");
+    return emulate::clip_motion(options.clip, emulator);
   }
   auto clip = std::make_shared<clip::HandClip>();
   if (!options.clip.empty()) {
@@ -110,9 +111,16 @@ std::optional<std::string> default_udp(const EmulateOptions& options) {
   return std::get<std::string>(listen->second);
 }
 
-Result<emulate::EmulatedPort> open_port(const EmulateOptions& options) {
-  if (!options.udp.empty()) return emulate::EmulatedPort::open_udp(options.udp);
+Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
+                                        const drivers::Emulator& emulator) {
+  const auto ports = emulator.ports();
+  if (ports.size() > std::max<std::size_t>(options.udp.size(), 1)) {
+    return misuse("this device sends to " + std::to_string(ports.size()) +
+                  " sockets of the host; name one address for each with --udp, in their order");
+  }
+  if (!options.udp.empty()) return emulate::EmulatedPort::open_udp(options.udp, ports);
   if (!options.tcp.empty()) return emulate::EmulatedPort::connect_tcp(options.tcp);
+  if (!options.listen.empty()) return emulate::EmulatedPort::listen_tcp(options.listen);
   if (const auto to = default_udp(options); to && !options.pty && options.link.empty()) {
     return emulate::EmulatedPort::open_udp({*to});
   }
@@ -129,9 +137,9 @@ Result<> emulate(const EmulateOptions& options) {
     if (!fault) return std::unexpected(fault.error());
     settings.faults.emplace_back(*fault, options.seed + settings.faults.size());
   }
-  auto moves = motion(options);
+  auto moves = motion(options, **emulator);
   if (!moves) return std::unexpected(moves.error());
-  auto port = open_port(options);
+  auto port = open_port(options, **emulator);
   if (!port) return std::unexpected(port.error());
   const nlohmann::ordered_json ready{
       {"port", options.link.empty() ? port->name() : options.link.string()}};
@@ -168,19 +176,24 @@ void add_emulate(CLI::App& app, int& exit_code) {
   auto* pty = command->add_flag("--pty", options->pty, "Behind a pseudo-terminal (the default)");
   auto* tcp = command->add_option("--tcp", options->tcp, "Connect to a host that waits for gloves");
   tcp->type_name("HOST:PORT")->excludes(pty);
+  auto* listen = command->add_option("--listen", options->listen,
+                                     "Wait for a host that connects, as systems with a server do");
+  listen->type_name("IP:PORT")->excludes(pty)->excludes(tcp);
   auto* udp = command->add_option("--udp", options->udp,
                                   "Send datagrams to a host; several: one for each of its sockets");
-  udp->type_name("IP:PORT")->excludes(pty)->excludes(tcp);
+  udp->type_name("IP:PORT")->excludes(pty)->excludes(tcp)->excludes(listen);
   command->add_option("--link", options->link, "Also a link to the pseudo-terminal, by this name")
       ->type_name("PATH")
       ->excludes(tcp)
+      ->excludes(listen)
       ->excludes(udp);
   command->add_option("--speed", options->speed, "Times the device's own pace, 0.01 to 1000")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
   command
       ->add_option("--clip", options->clip,
-                   "The hand's motion, a hand CSV; default: synthetic gestures")
+                   "The motion: a hand CSV for a glove (default: synthetic gestures), a BVH or AMC "
+                   "for bodies (default: their own)")
       ->type_name("FILE");
   command->add_option("--set", options->set, "An option of the driver, like hand=left")
       ->type_name("KEY=VALUE");

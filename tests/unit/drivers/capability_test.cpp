@@ -141,8 +141,11 @@ TEST_CASE("frames and samples match the description") {
       CHECK(sink.frames[i].skeleton == skeleton->id);
       CHECK(sink.frames[i].joint_count == skeleton->joints.size());
     }
-    for (const Sample& sample : sink.samples) {
-      CHECK(sample.value_count == description.samples.names.size());
+    for (std::size_t i = 0; i < sink.samples.size(); ++i) {
+      const SampleLayout& samples =
+          layout != nullptr ? layout->bodies[sink.sample_bodies[i]].samples : description.samples;
+      CHECK(sink.samples[i].value_count == samples.names.size());
+      CHECK(samples.names.size() == samples.units.size());
     }
   }
 }

@@ -17,12 +17,16 @@ class CollectSink final : public Sink {
     bodies.reserve(room);
     described.reserve(kMaxDescription);
     samples.reserve(room);
+    sample_bodies.reserve(room);
   }
   void frame(std::size_t body, Frame& frame) noexcept override {
     frames.push_back(frame);
     bodies.push_back(body);
   }
-  void sample(std::size_t /*body*/, Sample& sample) noexcept override { samples.push_back(sample); }
+  void sample(std::size_t body, Sample& sample) noexcept override {
+    samples.push_back(sample);
+    sample_bodies.push_back(body);
+  }
   void description(std::span<const std::byte> bytes) noexcept override {
     ++descriptions;
     described.assign(bytes.begin(), bytes.end());
@@ -36,12 +40,14 @@ class CollectSink final : public Sink {
     frames.clear();
     bodies.clear();
     samples.clear();
+    sample_bodies.clear();
     outcomes.fill(0);
   }
 
   std::vector<Frame> frames;
   std::vector<std::size_t> bodies;  // [frame]
   std::vector<Sample> samples;
+  std::vector<std::size_t> sample_bodies;  // [sample]
   int descriptions = 0;
   std::vector<std::byte> described;  // the newest description
   std::array<int, kOutcomes> outcomes{};

@@ -13,6 +13,7 @@
 
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/support/free_port.hpp"
+#include "tests/unit/drivers/chunk_text.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
 
 namespace posed::drivers {
@@ -21,12 +22,9 @@ namespace {
 using std::chrono::milliseconds;
 using test::free_port;
 using test::PseudoTerminal;
+using test::text_of;
 
 constexpr milliseconds kPatience{2000};
-
-std::string text_of(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
 
 Connection open_port(const PseudoTerminal& terminal, int baud = 115200) {
   TransportFactory ports;

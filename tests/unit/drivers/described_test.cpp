@@ -8,12 +8,14 @@
 #include <numeric>
 #include <sstream>
 
+#include "drivers/described/described.hpp"
 #include "drivers/described/device_file.hpp"
 #include "drivers/described/emulator.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/glove_emulator.hpp"
 #include "tests/support/shared.hpp"
+#include "tests/unit/drivers/chunk_text.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/device_fixtures.hpp"
 
@@ -23,8 +25,7 @@ namespace {
 using described::DescribedEmulator;
 using described::Table;
 using test::Bytes;
-
-const Driver& driver() { return *find_driver("described"); }
+using test::bytes_of_hex;
 
 Table must_parse(const std::string& toml) {
   auto table = described::parse_device(toml, "test.toml");
@@ -39,9 +40,9 @@ Table shipped(const std::string& name) {
 }
 
 std::unique_ptr<Decoder> decoder_for(const std::string& toml) {
-  const auto description = driver().describe("described hand=right\n" + toml, "test");
+  const auto description = described_driver().describe("described hand=right\n" + toml, "test");
   if (!description) FAIL(description.error().text());
-  auto decoder = driver().make_decoder(*description);
+  auto decoder = described_driver().make_decoder(*description);
   if (!decoder) FAIL(decoder.error().text());
   return std::move(*decoder);
 }
@@ -57,15 +58,6 @@ void turn_on(const Table& table, Emulator& emulator) {
   emulator.receive(table.link.start, 0, answer);
   CHECK(answer.empty());
   REQUIRE(emulator.next_due_ns() == 0);
-}
-
-Bytes hex(const std::string& digits) {
-  Bytes bytes;
-  std::istringstream words(digits);
-  for (unsigned value = 0; words >> std::hex >> value;) {
-    bytes.push_back(static_cast<std::byte>(value));
-  }
-  return bytes;
 }
 
 std::size_t place_of(const SampleLayout& layout, const std::string& name) {
@@ -198,10 +190,10 @@ TEST_CASE("a recorded VMG30, turned back into bytes, comes back equal") {
   const Table table = shipped("vmg30");
   const auto rows = vmg30_rows(*log);
   REQUIRE(rows.size() == 300);
-  const auto description =
-      driver().describe("described hand=right\n" + *described::device_text("vmg30"), "log");
+  const auto description = described_driver().describe(
+      "described hand=right\n" + *described::device_text("vmg30"), "log");
   REQUIRE(description);
-  const auto decoder = driver().make_decoder(*description);
+  const auto decoder = described_driver().make_decoder(*description);
   REQUIRE(decoder);
   DescribedEmulator glove = emulator_of(table);
   turn_on(table, glove);
@@ -250,7 +242,7 @@ TEST_CASE("an unknown glove works from its description alone") {
   const auto decoder = decoder_for(kOwnGlove);
   test::CollectSink sink;
   // Bits 10-15: 63, bits 28-33 (big): 21, counter 0x123, then the delimiter.
-  decoder->feed(hex("01 3f 00 05 40 23 01 ff fe"), 0, sink);
+  decoder->feed(bytes_of_hex("01 3f 00 05 40 23 01 ff fe"), 0, sink);
   REQUIRE(sink.samples.size() == 1);
   REQUIRE(sink.frames.size() == 1);
   CHECK(sink.samples[0].value[2] == 63.0F);  // raw_thumb
@@ -259,9 +251,9 @@ TEST_CASE("an unknown glove works from its description alone") {
   CHECK(sink.samples[0].value[1] == Approx(std::numbers::pi / 6));
   CHECK_FALSE(sink.samples[0].valid[4]);  // the battery level is not known yet
   CHECK(sink.samples[0].header.device_ns == 0);
-  decoder->feed(hex("02 00 05 ff fe"), 0, sink);
+  decoder->feed(bytes_of_hex("02 00 05 ff fe"), 0, sink);
   CHECK(sink.samples.size() == 1);
-  decoder->feed(hex("01 3f 00 05 40 25 01 ff fe"), 0, sink);
+  decoder->feed(bytes_of_hex("01 3f 00 05 40 25 01 ff fe"), 0, sink);
   REQUIRE(sink.samples.size() == 2);
   CHECK(sink.samples[1].valid[4]);
   CHECK(sink.samples[1].value[4] == Approx(0.80));
@@ -272,14 +264,15 @@ TEST_CASE("an unknown glove works from its description alone") {
 TEST_CASE("the bytes between two delimiters are a packet, or are counted once") {
   const auto decoder = decoder_for(kOwnGlove);
   test::CollectSink sink(16);
-  decoder->feed(hex("01 3f 00 05 40 23 ff fe 01 3f 00 05 40 23 01 ff fe 03 ff fe"), 0, sink);
+  decoder->feed(bytes_of_hex("01 3f 00 05 40 23 ff fe 01 3f 00 05 40 23 01 ff fe 03 ff fe"), 0,
+                sink);
   CHECK(sink.count(Outcome::kShort) == 1);
   CHECK(sink.count(Outcome::kForeign) == 1);
   CHECK(sink.count(Outcome::kOk) == 1);
   sink.clear();
   const Bytes endless(5000, std::byte{1});
   decoder->feed(endless, 0, sink);
-  decoder->feed(hex("ff fe 01 3f 00 05 40 24 01 ff fe"), 0, sink);
+  decoder->feed(bytes_of_hex("ff fe 01 3f 00 05 40 24 01 ff fe"), 0, sink);
   CHECK(sink.count(Outcome::kShort) == 1);
   CHECK(sink.count(Outcome::kOk) == 1);
 }
@@ -301,9 +294,9 @@ byte = 1
 a = [{channel = "index1_x"}]
 )");
   test::CollectSink sink;
-  decoder->feed(hex("07 01 02"), 0, sink);        // cut short
-  decoder->feed(hex("07 04 05 06"), 0, sink);     // whole
-  decoder->feed(hex("08 07 01 02 03"), 0, sink);  // another report that contains a seven
+  decoder->feed(bytes_of_hex("07 01 02"), 0, sink);        // cut short
+  decoder->feed(bytes_of_hex("07 04 05 06"), 0, sink);     // whole
+  decoder->feed(bytes_of_hex("08 07 01 02 03"), 0, sink);  // another report that contains a seven
   REQUIRE(sink.samples.size() == 1);
   CHECK(sink.samples[0].value[3] == 4.0F);
   CHECK(sink.samples[0].value[5] == 6.0F);
@@ -358,18 +351,19 @@ TEST_CASE("a mistake in a description is reported with its line and what is allo
 }
 
 TEST_CASE("an unknown device is refused with the known ones, a missing file by its path") {
-  const auto unknown = driver().expect({{"device", std::string("/somewhere/vmg31")}});
+  const auto unknown = described_driver().expect({{"device", std::string("/somewhere/vmg31")}});
   REQUIRE_FALSE(unknown);
   CHECK(unknown.error().message.find("'vmg31', only bebop_forte opencyberglove vmg30") !=
         std::string::npos);
-  const auto missing = driver().expect({{"device", std::string("/nowhere/own.toml")}});
+  const auto missing = described_driver().expect({{"device", std::string("/nowhere/own.toml")}});
   REQUIRE_FALSE(missing);
   CHECK(missing.error().text().starts_with(
       "/nowhere/own.toml: cannot read the device description: No such file or directory"));
   const auto path = test::scratch_file("own.toml", kOwnGlove);
-  const auto expected = driver().expect({{"device", path.string()}, {"hand", std::string("left")}});
+  const auto expected =
+      described_driver().expect({{"device", path.string()}, {"hand", std::string("left")}});
   REQUIRE(expected);
-  const auto again = driver().describe(expected->text, expected->identity);
+  const auto again = described_driver().describe(expected->text, expected->identity);
   REQUIRE(again);
   CHECK(again->samples.names == expected->samples.names);
   CHECK(again->samples.units == expected->samples.units);

@@ -6,6 +6,7 @@
 
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/clip/clip.hpp"
+#include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/device_fixtures.hpp"
@@ -14,6 +15,7 @@ namespace posed::drivers {
 namespace {
 
 using test::CollectSink;
+using test::replaced;
 
 Result<Device> open_file(const std::filesystem::path& path, Options options = {}) {
   options["path"] = path.string();
@@ -31,10 +33,6 @@ Device must_open(const std::filesystem::path& path, const Options& options = {})
 Device small_amc_device() {
   return must_open(test::scratch_file("small.amc", test::small_amc()),
                    {{"skeleton", test::scratch_file("small.asf", test::small_asf()).string()}});
-}
-
-std::string swap(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
 }
 
 void feed(Device& device, const std::string& text, Sink& sink) {
@@ -86,7 +84,7 @@ TEST_CASE("a clip played live is the clip read offline, to the last bit") {
 TEST_CASE("a hand CSV is played by its own uneven times, round after round") {
   std::string text = test::small_hand_csv();
   for (const auto& [from, to] : {std::pair("0.020000", "0.013"), {"0.060000", "0.07"}}) {
-    text = swap(text, std::string("\n") + from, std::string("\n") + to);
+    text = replaced(text, std::string("\n") + from, std::string("\n") + to);
   }
   const auto path = test::scratch_file("uneven.csv", text);
   const auto clip = clip::read_clip(path);
@@ -153,11 +151,11 @@ TEST_CASE("a clip that cannot be played is refused with one error message and it
       {"cut_header.bvh", bvh.substr(0, 200), ":"},
       {"no_frames.bvh", bvh.substr(0, bvh.find("0 0 0 0 0 0 1 95")), ": has no frames"},
       {"cut_frame.bvh", bvh.substr(0, bvh.size() - 12), ":28: frame 5: the frame has 12 values"},
-      {"nan.bvh", swap(bvh, last, swap(last, "-24", "nan")),
+      {"nan.bvh", replaced(bvh, last, replaced(last, "-24", "nan")),
        ":28: frame 5: 'nan' is not a number a pose can have"},
-      {"infinite.bvh", swap(bvh, last, swap(last, "-24", "inf")),
+      {"infinite.bvh", replaced(bvh, last, replaced(last, "-24", "inf")),
        ":28: frame 5: 'inf' is not a number a pose can have"},
-      {"letters.bvh", swap(bvh, last, "hello\n"), ":28: frame 5: 'hello'"},
+      {"letters.bvh", replaced(bvh, last, "hello\n"), ":28: frame 5: 'hello'"},
       {"clip.fbx", bvh, ": is no clip posed can read"},
   };
   for (const Case& bad : cases) {
@@ -182,7 +180,7 @@ TEST_CASE("an AMC without its skeleton, or with another's, is refused by name") 
   const auto lonely = open_file(test::scratch_file("77_01.amc", test::small_amc()));
   REQUIRE_FALSE(lonely);
   CHECK(lonely.error().text().find("77.asf") != std::string::npos);
-  const auto foreign = test::scratch_file("x.amc", swap(test::small_amc(), "ltibia", "tail"));
+  const auto foreign = test::scratch_file("x.amc", replaced(test::small_amc(), "ltibia", "tail"));
   const auto device = open_file(foreign, {{"skeleton", asf.string()}});
   REQUIRE_FALSE(device);
   CHECK(device.error().text().starts_with(foreign.string() + ":7: "));
@@ -197,8 +195,9 @@ TEST_CASE("an invalid frame is counted, and the clip's clock continues") {
   const std::string good = "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
   CollectSink sink;
   for (const std::string& line :
-       {good, swap(good, "-24", "nan"), swap(good, "-24", "-inf"), swap(good, "-24", "1e300"),
-        std::string("1 2 3\n"), swap(good, "3.1", "3.1 4.1"), swap(good, "-24", "x"), good}) {
+       {good, replaced(good, "-24", "nan"), replaced(good, "-24", "-inf"),
+        replaced(good, "-24", "1e300"), std::string("1 2 3\n"), replaced(good, "3.1", "3.1 4.1"),
+        replaced(good, "-24", "x"), good}) {
     feed(device, line, sink);
   }
   CHECK(sink.count(Outcome::kOk) == 2);
@@ -215,12 +214,12 @@ TEST_CASE("values beyond what a pose can have are counted as out of range and ne
   const std::string good = "0 0 0 0 0 0 1 95 8 14 -24 34 1.9 2.1 3.1\n";
   CollectSink sink;
   // A position of 1,000,000 units and angles of 1e9 and 36,001 degrees; 36,000 are 100 turns.
-  feed(device, swap(good, "1 95 8", "1 1000000 8"), sink);
-  feed(device, swap(good, "-24", "1e9"), sink);
-  feed(device, swap(good, "-24", "-36001"), sink);
+  feed(device, replaced(good, "1 95 8", "1 1000000 8"), sink);
+  feed(device, replaced(good, "-24", "1e9"), sink);
+  feed(device, replaced(good, "-24", "-36001"), sink);
   CHECK(sink.count(Outcome::kOutOfRange) == 3);
   CHECK(sink.frames.empty());
-  feed(device, swap(good, "-24", "-36000"), sink);
+  feed(device, replaced(good, "-24", "-36000"), sink);
   CHECK(sink.count(Outcome::kOk) == 1);
   CHECK(sink.frames.size() == 1);
 
@@ -229,8 +228,8 @@ TEST_CASE("values beyond what a pose can have are counted as out of range and ne
   CHECK(sink.count(Outcome::kOutOfRange) == 4);
   CHECK(sink.frames.size() == 1);
 
-  const auto refused =
-      open_file(test::scratch_file("far.bvh", swap(test::small_bvh(), "1 95 8", "1 9500000 8")));
+  const auto refused = open_file(
+      test::scratch_file("far.bvh", replaced(test::small_bvh(), "1 95 8", "1 9500000 8")));
   REQUIRE_FALSE(refused);
   CHECK(refused.error().text().find("'9500000' is beyond what a pose can have") !=
         std::string::npos);
@@ -279,7 +278,7 @@ TEST_CASE("an AMC frame with a bone missing is short, and the next one is good")
 
 TEST_CASE("what a clip leaves undetermined is reported as a warning") {
   const Device device = must_open(
-      test::scratch_file("warn.bvh", swap(test::small_bvh(), "Frames: 5", "Frames: 500")));
+      test::scratch_file("warn.bvh", replaced(test::small_bvh(), "Frames: 5", "Frames: 500")));
   REQUIRE_FALSE(device.warnings.empty());
   bool told = false;
   for (const std::string& warning : device.warnings) {

@@ -11,6 +11,7 @@
 #include "drivers/glove/glove_decoder.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/allocations.hpp"
+#include "tests/support/replaced.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::drivers::glove {
@@ -45,12 +46,6 @@ std::shared_ptr<const Calibration> must_make(const Model& model) {
   const auto made = default_calibration(model);
   if (!made) FAIL(made.error().text());
   return *made;
-}
-
-std::string swap(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 class SmallDecoder final : public GloveDecoder {
@@ -176,7 +171,7 @@ TEST_CASE("a wrong calibration file is refused with an error message") {
                                                         {"hand", "hands"},
                                                         {"bias = 0.25", "bias = true"}}) {
     INFO(from << " -> " << to);
-    const auto file = parse_calibration(swap(kSmallFile, from, to), "c.toml");
+    const auto file = parse_calibration(test::replaced(kSmallFile, from, to), "c.toml");
     REQUIRE_FALSE(file);
     CHECK(file.error().file == "c.toml");
     CHECK(file.error().message.find('\n') == std::string::npos);

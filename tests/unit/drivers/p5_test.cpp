@@ -4,13 +4,13 @@
 
 #include <cmath>
 #include <fstream>
-#include <sstream>
 
 #include "drivers/p5/decoder.hpp"
 #include "drivers/p5/device_info.hpp"
 #include "drivers/p5/emulator.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
+#include "tests/unit/drivers/chunk_text.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/device_fixtures.hpp"
 
@@ -22,15 +22,7 @@ using p5::LedObservation;
 using p5::Report;
 using p5::RigidPose;
 using test::Bytes;
-
-Bytes hex(const std::string& text) {
-  std::istringstream words(text);
-  Bytes bytes;
-  for (unsigned value = 0; words >> std::hex >> value;) {
-    bytes.push_back(static_cast<std::byte>(value));
-  }
-  return bytes;
-}
+using test::bytes_of_hex;
 
 bool same(const LedObservation& a, const LedObservation& b) {
   return a.led == b.led && a.v2 == b.v2 && a.v1 == b.v1 && a.h == b.h;
@@ -46,7 +38,7 @@ Bytes dumped(const std::filesystem::path& path, const std::string& start, std::s
     const std::size_t open = line.find("[ " + start + " ");
     const std::size_t close = line.find(']', open == std::string::npos ? 0 : open);
     if (open == std::string::npos || close == std::string::npos) continue;
-    const Bytes bytes = hex(line.substr(open + 1, close - open - 1));
+    const Bytes bytes = bytes_of_hex(line.substr(open + 1, close - open - 1));
     if (bytes.size() == size) found = bytes;
   }
   return found;
@@ -56,7 +48,7 @@ Bytes dumped(const std::filesystem::path& path, const std::string& start, std::s
 
 TEST_CASE("a P5's report gives bends, buttons and LED observations") {
   const Bytes bytes =
-      hex("01 29 47 a8 c8 50 24 81 93 ce 06 40 10 08 03 80 5f ff fc 00 00 00 00 00");
+      bytes_of_hex("01 29 47 a8 c8 50 24 81 93 ce 06 40 10 08 03 80 5f ff fc 00 00 00 00 00");
   Report report;
   REQUIRE(bytes.size() == p5::kReportBytes);
   REQUIRE(p5::decode_report(bytes, report) == Outcome::kOk);
@@ -166,7 +158,7 @@ TEST_CASE("a real P5's feature reports give a camera rig of plausible size") {
   glove.leds = dumped(*dump, "c", p5::kLedsBytes);
   const auto again = p5::read_device_info(p5::device_info_of(glove), "x");
   if (!again) FAIL(again.error().text());
-  CHECK(glove.firmware == hex("09 04 03"));
+  CHECK(glove.firmware == bytes_of_hex("09 04 03"));
   const auto rig = again->rig();
   REQUIRE(rig);
   CHECK(rig->distance_m == Approx(7.9 * 0.0254));

@@ -160,12 +160,11 @@ std::string decoded_lines(const RecordedLog& log) {
     sink.bodies.clear();
     sink.samples.clear();
   }
-  lines += "outcomes ok " + std::to_string(sink.count(Outcome::kOk)) + " short " +
-           std::to_string(sink.count(Outcome::kShort)) + " bad_checksum " +
-           std::to_string(sink.count(Outcome::kBadChecksum)) + " out_of_range " +
-           std::to_string(sink.count(Outcome::kOutOfRange)) + " foreign " +
-           std::to_string(sink.count(Outcome::kForeign)) + '\n';
-  return lines;
+  lines += "outcomes";
+  for (std::size_t i = 0; i < sink.outcomes.size(); ++i) {
+    lines += ' ' + std::string(kOutcomeNames[i]) + ' ' + std::to_string(sink.outcomes[i]);
+  }
+  return lines + '\n';
 }
 
 std::string first_difference(const std::string& got, const std::string& expected) {

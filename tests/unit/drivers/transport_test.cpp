@@ -7,15 +7,12 @@
 
 #include "drivers/transport/file.hpp"
 #include "drivers/transport/replay.hpp"
+#include "tests/unit/drivers/chunk_text.hpp"
 
 namespace posed::drivers {
 namespace {
 
 constexpr std::int64_t kStart_ns = 5'000'000'000;
-
-std::string text_of(const Chunk& chunk) {
-  return {reinterpret_cast<const char*>(chunk.bytes.data()), chunk.bytes.size()};
-}
 
 Chunks letters(const std::string& all) {
   Chunks chunks;
@@ -40,7 +37,7 @@ Played play(Transport& transport, std::size_t most, std::int64_t late_ns = 0) {
       const Chunk chunk = transport.read(now_ns);
       played.ended = chunk.end;
       if (chunk.bytes.empty()) break;
-      played.text += text_of(chunk);
+      played.text += test::text_of(chunk.bytes);
       played.at_ns.push_back(now_ns);
     }
   }

@@ -3,14 +3,12 @@
 #include <catch2/catch.hpp>
 
 #include "posed/v1/posed.pb.h"
+#include "tests/support/has.hpp"
 
 namespace posed::cli {
 namespace {
 
-bool has(const std::string& text, const std::string& part) {
-  INFO(text);
-  return text.find(part) != std::string::npos;
-}
+using test::has;
 
 TEST_CASE("every kind of event has a line with its name, also one from a newer posed") {
   v1::Event event;

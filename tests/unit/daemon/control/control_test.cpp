@@ -12,6 +12,7 @@
 #include "daemon/net/keys.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "tests/support/has.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/daemon/control/requests.hpp"
@@ -24,6 +25,7 @@ using namespace std::chrono_literals;
 using namespace net;
 using pipeline::Ack;
 using pipeline::Command;
+using test::has;
 
 class FakeDaemonControl final : public DaemonControl {
  public:
@@ -113,11 +115,6 @@ struct Fixture {
         {.ticket = command.ticket, .stream = command.stream, .sequence = sequence}));
   }
 };
-
-bool has(const std::string& text, const std::string& part) {
-  INFO(text);
-  return text.find(part) != std::string::npos;
-}
 
 TEST_CASE("an alpha goes to its stream, and the reply comes when it took effect") {
   Fixture fixture;

@@ -9,12 +9,13 @@
 
 #include "daemon/logging/line_limiter.hpp"
 #include "daemon/logging/log_output.hpp"
+#include "tests/support/ms.hpp"
 #include "tests/support/pipe.hpp"
 
 namespace posed::logging {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 // spdlog's default logger is global; restores that of other tests.
 class RestoreDefaultLogger {

@@ -8,16 +8,17 @@
 #include "daemon/pipeline/stream_engine.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/ms.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 
 namespace posed::pipeline {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr std::int64_t kPeriod_ns = 20 * kMs;
 
-class Collected final : public EngineOut {
+class CollectedFrames final : public EngineOut {
  public:
   void item(const Item& item) noexcept override {
     if (item.kind == Item::Kind::kFrame) frames.push_back(item.frame);
@@ -76,7 +77,7 @@ class Hand {
   std::unique_ptr<const generate::BoundModel> model =
       generate::bind_model(test::toy_gesture_model(), *skeleton_, 50.0, "toy").value();
   std::optional<StreamEngine> engine;
-  Collected out;
+  CollectedFrames out;
   std::uint64_t sequence = 0;
   std::int64_t now_ns = 0;
 };

@@ -48,6 +48,19 @@ struct SocketDecoder final : drivers::Decoder {
   int fed_by = -1;
 };
 
+// Asks for one thing after the other, and now and then for nothing.
+struct AskingDecoder final : drivers::Decoder {
+  void feed(std::span<const std::byte>, std::int64_t, Sink&) noexcept override {}
+  drivers::Request next_request(std::int64_t) noexcept override {
+    ++asked;
+    if (asked % 2 == 0) return {};
+    question[0] = std::byte{static_cast<std::uint8_t>(asked)};
+    return {.bytes = question, .socket = 1};
+  }
+  std::array<std::byte, 1> question{};
+  int asked = 0;
+};
+
 struct SocketRecord final : test::QuietRecordSink {
   void chunk(std::uint32_t, std::uint8_t socket, Direction direction, std::int64_t, const Position&,
              std::span<const std::byte>) noexcept override {
@@ -86,6 +99,45 @@ TEST_CASE("chunks and requests keep their socket, to the decoder and into the lo
   CHECK(sockets.sent_to == 2);
   CHECK(record.to == 2);
   CHECK(counters.kernel_dropped == 3);
+}
+
+TEST_CASE("a decoder says what to ask next, and the log keeps what was asked") {
+  struct Record final : test::QuietRecordSink {
+    void chunk(std::uint32_t, std::uint8_t socket, Direction direction, std::int64_t,
+               const Position&, std::span<const std::byte> bytes) noexcept override {
+      if (direction != Direction::kToDevice) return;
+      asked.push_back(std::to_integer<int>(bytes[0]));
+      sockets.push_back(socket);
+    }
+    std::vector<int> asked, sockets;
+  } record;
+  drivers::Device device;
+  device.transport = std::make_unique<TwoSockets>();
+  auto decoder = std::make_unique<AskingDecoder>();
+  const AskingDecoder& asking = *decoder;
+  device.decoder = std::move(decoder);
+  device.poll.period_ns = kNanosPerSecond;
+  Ring<Item> decoded(64);
+  SourceCounters counters;
+  const auto wake = system::EventFd::open().value();
+  const auto reader = Reader::open({.out = &decoded,
+                                    .pipeline = wake.get(),
+                                    .record_sink = &record,
+                                    .clock = test_clock,
+                                    .commands = nullptr})
+                          .value();
+  reader->add({.device = &device, .counters = &counters});
+  reader->begin();
+  const std::int64_t start_ns = now_ns;
+  for (int turn = 0; turn < 5; ++turn) {
+    static_cast<void>(reader->turn(now_ns));
+    static_cast<void>(reader->turn(now_ns));  // not due again yet
+    now_ns += kNanosPerSecond;
+  }
+  now_ns = start_ns;
+  CHECK(asking.asked == 5);
+  CHECK(record.asked == std::vector<int>{1, 3, 5});
+  CHECK(record.sockets == std::vector<int>{1, 1, 1});
 }
 
 TEST_CASE("a log's device sends each datagram to the socket that it came to") {

@@ -4,15 +4,16 @@
 
 #include "daemon/pipeline/stream_engine.hpp"
 #include "posed/v1/posed.pb.h"
+#include "tests/support/ms.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::pipeline {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
-class Collected final : public EngineOut {
+class CollectedItems final : public EngineOut {
  public:
   void item(const Item& item) noexcept override { items.push_back(item); }
   void decision(const Decision& decision) noexcept override { decisions.push_back(decision); }
@@ -56,7 +57,7 @@ EngineOptions plain() {
 
 TEST_CASE("without a style stage frames pass unchanged") {
   StreamEngine engine(plain());
-  Collected out;
+  CollectedItems out;
   CHECK(engine.state() == StreamState::kWaiting);
   CHECK(engine.next_tick_ns() == kNoTime_ns);
   engine.on_frame(frame_at(1, 10 * kMs), out);
@@ -71,7 +72,7 @@ TEST_CASE("the raw input goes out before the styled frame") {
   EngineOptions options = plain();
   options.publish_raw = true;
   StreamEngine engine(std::move(options));
-  Collected out;
+  CollectedItems out;
   engine.on_frame(frame_at(1, 0), out);
   REQUIRE(out.items.size() == 3);
   CHECK(out.items[1].kind == Item::Kind::kRawFrame);
@@ -86,7 +87,7 @@ TEST_CASE("the event of a change names the old and the new value") {
   const auto two = style::bind_model(model, *skeleton, {}, "two.style").value();
   options.stages.push_back(test::style_stage(one.get()));
   StreamEngine engine(std::move(options));
-  Collected out;
+  CollectedItems out;
   static_cast<void>(engine.apply(test::alpha_command(3, 0.5), out));
   REQUIRE(out.items.size() == 1);
   StreamEvent change = out.items[0].stream_event;
@@ -105,7 +106,7 @@ TEST_CASE("the event of a change names the old and the new value") {
 
 TEST_CASE("a gap in the sequence is recorded as shed, before the frame after it") {
   StreamEngine engine(plain());
-  Collected out;
+  CollectedItems out;
   engine.on_frame(frame_at(1, 0), out);
   engine.on_frame(frame_at(5, 40 * kMs), out);
   REQUIRE(out.decisions.size() == 1);
@@ -119,7 +120,7 @@ TEST_CASE("a gap in the sequence is recorded as shed, before the frame after it"
 
 TEST_CASE("a silent stream turns stale, repeats its pose once a second, and recovers by itself") {
   StreamEngine engine(plain());
-  Collected out;
+  CollectedItems out;
   engine.on_frame(frame_at(7, 0), out);
   out.decisions.clear();
   CHECK(engine.next_tick_ns() == 100 * kMs);
@@ -148,7 +149,7 @@ TEST_CASE("a silent stream turns stale, repeats its pose once a second, and reco
 
 TEST_CASE("a source that has ended is not stale") {
   StreamEngine engine(plain());
-  Collected out;
+  CollectedItems out;
   engine.on_frame(frame_at(1, 0), out);
   engine.end(10 * kMs, out);
   CHECK(engine.state() == StreamState::kEnded);
@@ -159,7 +160,7 @@ TEST_CASE("a source that has ended is not stale") {
 
 TEST_CASE("samples keep a stream alive and pass through") {
   StreamEngine engine(plain());
-  Collected out;
+  CollectedItems out;
   Sample sample;
   sample.header.arrival_ns = 5 * kMs;
   sample.value_count = 2;
@@ -180,7 +181,7 @@ TEST_CASE("alpha and model take effect at the next frame; the old model comes ba
   options.stages.push_back(test::style_stage(first.get()));
   StreamEngine engine(std::move(options));
   const clip::Clip walk = test::toy_walk(10);
-  Collected out;
+  CollectedItems out;
   for (int i = 0; i < 5; ++i) {
     Frame frame = walk.frame(i);
     frame.header.sequence = static_cast<std::uint64_t>(i) + 1;

@@ -51,6 +51,7 @@ class PublisherRig {
     info.name = name;
     info.description.driver = "file";
     info.description.skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
+    info.skeleton = info.description.skeleton;
     info.description.samples = {.names = {"bend"}, .units = {"rad"}};
     info.rate_hz = 100.0;
     info.stages = {&style::style_type()};

@@ -101,7 +101,7 @@ TEST_CASE("the next generation takes its slot at its first item, with its skelet
   StreamInfo next = ann.info(rig, kAnnAgain);
   Skeleton taller = test::toy_skeleton();
   taller.joints[1].offset_m.y() += 0.1;
-  next.description.skeleton = std::make_shared<const Skeleton>(taller);
+  next.skeleton = std::make_shared<const Skeleton>(taller);
   next.model = "next.style";
   rig.publisher->add(std::move(next));
   REQUIRE(rig.receive("stats", rig.seen["stats"] + 1));

@@ -8,6 +8,7 @@
 #include "daemon/replay/frame_file.hpp"
 #include "daemon/replay/replay.hpp"
 #include "posed/v1/log.pb.h"
+#include "tests/support/has.hpp"
 #include "tests/support/log_surgery.hpp"
 #include "tests/support/replayed.hpp"
 #include "tests/support/shared.hpp"
@@ -40,11 +41,6 @@ std::string number_value(double number) {
     sql += "0123456789abcdef"[byte & 15];
   }
   return sql + "'";
-}
-
-bool has(const std::string& text, const std::string& part) {
-  INFO(text);
-  return text.find(part) != std::string::npos;
 }
 
 double furthest(const google::protobuf::RepeatedField<float>& a,

@@ -94,10 +94,9 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
  private:
   using Model = std::unique_ptr<const StageModel>;
   [[nodiscard]] Model bind(const std::string& bytes) const {
-    return style::style_type()
-        .bind_model(std::as_bytes(std::span(bytes)),
-                    pipeline::stage_context(settings_, 0, device_.description.skeleton), "toy")
-        .value();
+    const auto context =
+        pipeline::stage_context(settings_, 0, device_.description.skeleton).value();
+    return style::style_type().bind_model(std::as_bytes(std::span(bytes)), context, "toy").value();
   }
 
   bool item(std::size_t /*place*/, pipeline::Item& item) noexcept override {

@@ -14,9 +14,9 @@ using nlohmann::json;
 
 namespace {
 
-constexpr double kTolerance = 1e-6;
+constexpr double kTreeTolerance = 1e-6;
 
-struct Fixture {
+struct TreeFixture {
   json golden = test::golden_json("mdl.json");
   ContextSums sums;
   Answers answers;
@@ -24,7 +24,7 @@ struct Fixture {
   GrowOptions options{
       .mdl_factor = 1.0, .min_occupancy = 0, .min_examples = 0, .counted = {0, 1, 2}};
 
-  Fixture() {
+  TreeFixture() {
     sums = {test::vector(golden["occ"]), Eigen::VectorXd::Ones(12), test::matrix(golden["s1"]),
             test::matrix(golden["s2"])};
     for (const json& question : golden["questions"]) {
@@ -44,14 +44,14 @@ struct Fixture {
       REQUIRE(got.leaf >= 0);
       CHECK(tree.members[got.leaf] == expected["members"].get<std::vector<int>>());
       CHECK((tree.mean.row(got.leaf).transpose() - test::vector(expected["mean"])).norm() <
-            kTolerance);
+            kTreeTolerance);
       CHECK((tree.variance.row(got.leaf).transpose() - test::vector(expected["var"])).norm() <
-            kTolerance);
+            kTreeTolerance);
       CHECK(tree.occupancy[got.leaf] == Approx(expected["occ"].get<double>()).epsilon(1e-12));
       return;
     }
     REQUIRE(got.question == expected["q"].get<int>());
-    CHECK(std::abs(tree.gain[node] - expected["gain"].get<double>()) < kTolerance);
+    CHECK(std::abs(tree.gain[node] - expected["gain"].get<double>()) < kTreeTolerance);
     compare(tree, got.yes, expected["yes"]);
     compare(tree, got.no, expected["no"]);
   }
@@ -59,21 +59,21 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE_METHOD(Fixture, "The tree is the fixture's", "[tree]") {
+TEST_CASE_METHOD(TreeFixture, "The tree is the fixture's", "[tree]") {
   const GrownTree tree = grow_tree(sums, answers, floor, options);
-  CHECK(std::abs(tree.threshold - golden["threshold"].get<double>()) < kTolerance);
-  CHECK(std::abs(tree.gain[0] - golden["gain_cur_fist_like"].get<double>()) < kTolerance);
+  CHECK(std::abs(tree.threshold - golden["threshold"].get<double>()) < kTreeTolerance);
+  CHECK(std::abs(tree.gain[0] - golden["gain_cur_fist_like"].get<double>()) < kTreeTolerance);
   compare(tree, 0, golden["tree"]);
 }
 
-TEST_CASE_METHOD(Fixture, "A dearer split gives the fixture's smaller tree", "[tree]") {
+TEST_CASE_METHOD(TreeFixture, "A dearer split gives the fixture's smaller tree", "[tree]") {
   options.mdl_factor = 4.0;
   const GrownTree tree = grow_tree(sums, answers, floor, options);
-  CHECK(std::abs(tree.threshold - golden["alpha4"]["threshold"].get<double>()) < kTolerance);
+  CHECK(std::abs(tree.threshold - golden["alpha4"]["threshold"].get<double>()) < kTreeTolerance);
   compare(tree, 0, golden["alpha4"]["tree"]);
 }
 
-TEST_CASE_METHOD(Fixture, "Contexts that were never seen find their leaf", "[tree]") {
+TEST_CASE_METHOD(TreeFixture, "Contexts that were never seen find their leaf", "[tree]") {
   const GrownTree tree = grow_tree(sums, answers, floor, options);
   for (const json& unseen : golden["unseen"]) {
     int node = 0;
@@ -85,7 +85,7 @@ TEST_CASE_METHOD(Fixture, "Contexts that were never seen find their leaf", "[tre
   }
 }
 
-TEST_CASE_METHOD(Fixture, "No leaf sees less than the minimum", "[tree]") {
+TEST_CASE_METHOD(TreeFixture, "No leaf sees less than the minimum", "[tree]") {
   options.mdl_factor = 0.0;
   options.min_occupancy = 200.0;
   options.min_examples = 3.0;
@@ -95,7 +95,7 @@ TEST_CASE_METHOD(Fixture, "No leaf sees less than the minimum", "[tree]") {
   for (const auto& members : tree.members) CHECK(members.size() >= 3);
 }
 
-TEST_CASE_METHOD(Fixture, "A finger that never moves is one leaf", "[tree]") {
+TEST_CASE_METHOD(TreeFixture, "A finger that never moves is one leaf", "[tree]") {
   options.counted.clear();
   const GrownTree tree = grow_tree(sums, answers, floor, options);
   CHECK(tree.nodes.size() == 1);

@@ -14,20 +14,20 @@ using test::vector;
 
 namespace {
 
-constexpr double kTolerance = 1e-6;
+constexpr double kHmmTolerance = 1e-6;
 
 double off(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return (a - b).cwiseAbs().maxCoeff();
 }
 
-struct Fixture {
+struct HmmFixture {
   nlohmann::json golden = test::golden_json("hmm.json");
   std::vector<FeatureMatrix> sequences;
   std::vector<Frames> examples;
   Eigen::VectorXd floor = vector(golden["var_floor"]);
   StateModel start;
 
-  Fixture() {
+  HmmFixture() {
     for (const auto& rows : golden["seqs"]) sequences.emplace_back(matrix(rows));
     for (const FeatureMatrix& sequence : sequences) examples.emplace_back(sequence);
     start = estimate(flat_start(examples, 5), floor, {});
@@ -36,34 +36,34 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE_METHOD(Fixture, "Delta features replicate the edges", "[hmm]") {
+TEST_CASE_METHOD(HmmFixture, "Delta features replicate the edges", "[hmm]") {
   const FeatureMatrix features = features_of(sequences[0]);
   REQUIRE(features.cols() == 6);
   CHECK(off(features.leftCols(2), sequences[0]) == 0.0);
-  CHECK(off(features.middleCols(2, 2), matrix(golden["delta_first"])) < kTolerance);
-  CHECK(off(features.rightCols(2), matrix(golden["delta2_first"])) < kTolerance);
+  CHECK(off(features.middleCols(2, 2), matrix(golden["delta_first"])) < kHmmTolerance);
+  CHECK(off(features.rightCols(2), matrix(golden["delta2_first"])) < kHmmTolerance);
 }
 
-TEST_CASE_METHOD(Fixture, "Flat start cuts every example into equal parts", "[hmm]") {
-  CHECK(off(start.mean, matrix(golden["init"]["mu"])) < kTolerance);
-  CHECK(off(start.variance, matrix(golden["init"]["var"])) < kTolerance);
-  CHECK(off(start.stay, vector(golden["init"]["aself"])) < kTolerance);
+TEST_CASE_METHOD(HmmFixture, "Flat start cuts every example into equal parts", "[hmm]") {
+  CHECK(off(start.mean, matrix(golden["init"]["mu"])) < kHmmTolerance);
+  CHECK(off(start.variance, matrix(golden["init"]["var"])) < kHmmTolerance);
+  CHECK(off(start.stay, vector(golden["init"]["aself"])) < kHmmTolerance);
 }
 
-TEST_CASE_METHOD(Fixture, "Forward-backward gives the fixture's posteriors", "[hmm]") {
+TEST_CASE_METHOD(HmmFixture, "Forward-backward gives the fixture's posteriors", "[hmm]") {
   const auto posterior = forward_backward(log_density(examples[0], start), start.stay,
                                           whole_band(examples[0].rows(), 5));
   CHECK(std::abs(posterior.log_likelihood - golden["first_seq"]["loglik"].get<double>()) <
-        kTolerance);
-  CHECK(off(posterior.gamma, matrix(golden["first_seq"]["gamma"])) < kTolerance);
-  CHECK(off(posterior.stays, vector(golden["first_seq"]["self_counts"])) < kTolerance);
+        kHmmTolerance);
+  CHECK(off(posterior.gamma, matrix(golden["first_seq"]["gamma"])) < kHmmTolerance);
+  CHECK(off(posterior.stays, vector(golden["first_seq"]["self_counts"])) < kHmmTolerance);
   // The fixture sums over every path.
   const auto brief =
       forward_backward(log_density(sequences[0].topRows(7), start), start.stay, whole_band(7, 5));
-  CHECK(std::abs(brief.log_likelihood - golden["short7_loglik"].get<double>()) < kTolerance);
+  CHECK(std::abs(brief.log_likelihood - golden["short7_loglik"].get<double>()) < kHmmTolerance);
 }
 
-TEST_CASE_METHOD(Fixture, "A band as wide as the truth changes nothing", "[hmm]") {
+TEST_CASE_METHOD(HmmFixture, "A band as wide as the truth changes nothing", "[hmm]") {
   const auto density = log_density(examples[0], start);
   const auto whole = forward_backward(density, start.stay, whole_band(density.rows(), 5));
   // A band of three states that follows the states with probability.
@@ -81,29 +81,29 @@ TEST_CASE_METHOD(Fixture, "A band as wide as the truth changes nothing", "[hmm]"
   CHECK(std::abs(banded.gamma.sum() - static_cast<double>(density.rows())) < 1e-9);
 }
 
-TEST_CASE_METHOD(Fixture, "Eight rounds of Baum-Welch with durations", "[hmm]") {
+TEST_CASE_METHOD(HmmFixture, "Eight rounds of Baum-Welch with durations", "[hmm]") {
   const Fit fit = baum_welch(examples, start, 8, floor);
   const auto& after = golden["after8"];
-  CHECK(off(fit.model.mean, matrix(after["mu"])) < kTolerance);
-  CHECK(off(fit.model.variance, matrix(after["var"])) < kTolerance);
-  CHECK(off(fit.model.stay, vector(after["aself"])) < kTolerance);
-  CHECK(off(fit.sums.occupancy, vector(after["occ"])) < kTolerance);
+  CHECK(off(fit.model.mean, matrix(after["mu"])) < kHmmTolerance);
+  CHECK(off(fit.model.variance, matrix(after["var"])) < kHmmTolerance);
+  CHECK(off(fit.model.stay, vector(after["aself"])) < kHmmTolerance);
+  CHECK(off(fit.sums.occupancy, vector(after["occ"])) < kHmmTolerance);
   REQUIRE(fit.log_likelihood.size() == 9);
   for (std::size_t i = 0; i < 9; ++i) {
-    CHECK(std::abs(fit.log_likelihood[i] - after["loglik"][i].get<double>()) < kTolerance);
-    if (i > 0) CHECK(fit.log_likelihood[i] >= fit.log_likelihood[i - 1] - kTolerance);
+    CHECK(std::abs(fit.log_likelihood[i] - after["loglik"][i].get<double>()) < kHmmTolerance);
+    if (i > 0) CHECK(fit.log_likelihood[i] >= fit.log_likelihood[i - 1] - kHmmTolerance);
   }
   const Durations durations = durations_of(fit.sums);
-  CHECK(off(durations.mean, vector(after["dur_mean"])) < kTolerance);
-  CHECK(off(durations.variance, vector(after["dur_var"])) < kTolerance);
+  CHECK(off(durations.mean, vector(after["dur_mean"])) < kHmmTolerance);
+  CHECK(off(durations.variance, vector(after["dur_var"])) < kHmmTolerance);
 }
 
-TEST_CASE_METHOD(Fixture, "Viterbi finds the fixture's paths", "[hmm]") {
+TEST_CASE_METHOD(HmmFixture, "Viterbi finds the fixture's paths", "[hmm]") {
   const Fit fit = baum_welch(examples, start, 8, floor);
   for (std::size_t i = 0; i < examples.size(); ++i) {
     const Path path = viterbi(log_density(examples[i], fit.model), fit.model.stay);
     CHECK(path.state == golden["viterbi"][i]["states"].get<std::vector<int>>());
-    CHECK(std::abs(path.score - golden["viterbi"][i]["score"].get<double>()) < kTolerance);
+    CHECK(std::abs(path.score - golden["viterbi"][i]["score"].get<double>()) < kHmmTolerance);
   }
 }
 

@@ -21,37 +21,37 @@ struct Pair {
   const char* asf;
   bool dropped_above;  // the BVH omits the bone that leads to this joint
 };
-constexpr std::array<Pair, 31> kJoints{{{"Hips", "root", false},
-                                        {"LHipJoint", "lhipjoint", false},
-                                        {"LeftUpLeg", "lfemur", false},
-                                        {"LeftLeg", "ltibia", false},
-                                        {"LeftFoot", "lfoot", false},
-                                        {"LeftToeBase", "ltoes", false},
-                                        {"RHipJoint", "rhipjoint", false},
-                                        {"RightUpLeg", "rfemur", false},
-                                        {"RightLeg", "rtibia", false},
-                                        {"RightFoot", "rfoot", false},
-                                        {"RightToeBase", "rtoes", false},
-                                        {"LowerBack", "lowerback", false},
-                                        {"Spine", "upperback", false},
-                                        {"Spine1", "thorax", false},
-                                        {"Neck", "lowerneck", true},
-                                        {"Neck1", "upperneck", false},
-                                        {"Head", "head", false},
-                                        {"LeftShoulder", "lclavicle", true},
-                                        {"LeftArm", "lhumerus", false},
-                                        {"LeftForeArm", "lradius", false},
-                                        {"LeftHand", "lwrist", false},
-                                        {"LeftFingerBase", "lhand", true},
-                                        {"LeftHandIndex1", "lfingers", false},
-                                        {"LThumb", "lthumb", true},
-                                        {"RightShoulder", "rclavicle", true},
-                                        {"RightArm", "rhumerus", false},
-                                        {"RightForeArm", "rradius", false},
-                                        {"RightHand", "rwrist", false},
-                                        {"RightFingerBase", "rhand", true},
-                                        {"RightHandIndex1", "rfingers", false},
-                                        {"RThumb", "rthumb", true}}};
+constexpr std::array<Pair, 31> kJointPairs{{{"Hips", "root", false},
+                                            {"LHipJoint", "lhipjoint", false},
+                                            {"LeftUpLeg", "lfemur", false},
+                                            {"LeftLeg", "ltibia", false},
+                                            {"LeftFoot", "lfoot", false},
+                                            {"LeftToeBase", "ltoes", false},
+                                            {"RHipJoint", "rhipjoint", false},
+                                            {"RightUpLeg", "rfemur", false},
+                                            {"RightLeg", "rtibia", false},
+                                            {"RightFoot", "rfoot", false},
+                                            {"RightToeBase", "rtoes", false},
+                                            {"LowerBack", "lowerback", false},
+                                            {"Spine", "upperback", false},
+                                            {"Spine1", "thorax", false},
+                                            {"Neck", "lowerneck", true},
+                                            {"Neck1", "upperneck", false},
+                                            {"Head", "head", false},
+                                            {"LeftShoulder", "lclavicle", true},
+                                            {"LeftArm", "lhumerus", false},
+                                            {"LeftForeArm", "lradius", false},
+                                            {"LeftHand", "lwrist", false},
+                                            {"LeftFingerBase", "lhand", true},
+                                            {"LeftHandIndex1", "lfingers", false},
+                                            {"LThumb", "lthumb", true},
+                                            {"RightShoulder", "rclavicle", true},
+                                            {"RightArm", "rhumerus", false},
+                                            {"RightForeArm", "rradius", false},
+                                            {"RightHand", "rwrist", false},
+                                            {"RightFingerBase", "rhand", true},
+                                            {"RightHandIndex1", "rfingers", false},
+                                            {"RThumb", "rthumb", true}}};
 
 double degrees(double angle_rad) { return angle_rad * 180.0 / std::numbers::pi; }
 
@@ -105,7 +105,7 @@ TEST_CASE("07_01 is the same motion as AMC and as BVH") {
   REQUIRE(bvh.frames() == amc.frames() + 1);  // an added T-pose in front
   const Skeleton& asf = *amc.skeleton;
   Skeleton restored = *bvh.skeleton;
-  for (const Pair& pair : kJoints) {
+  for (const Pair& pair : kJointPairs) {
     if (!pair.dropped_above) continue;
     Joint& joint = restored.joints[restored.joint_index(pair.bvh)];
     CHECK(joint.offset_m.norm() == 0.0);
@@ -119,7 +119,7 @@ TEST_CASE("07_01 is the same motion as AMC and as BVH") {
     const Frame b = bvh.frame(i + 1);
     const WorldPose world_a = world_pose(asf, a);
     const WorldPose world_b = world_pose(restored, b);
-    for (const Pair& pair : kJoints) {
+    for (const Pair& pair : kJointPairs) {
       const int joint_a = asf.joint_index(pair.asf);
       const int joint_b = restored.joint_index(pair.bvh);
       worst_turn_deg = std::max(worst_turn_deg,

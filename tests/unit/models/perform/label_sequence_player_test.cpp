@@ -2,12 +2,12 @@
 #include "models/perform/label_sequence_player.hpp"
 
 #include <cmath>
-#include <numbers>
 
 #include <catch2/catch.hpp>
 
 #include "models/perform/state_duration.hpp"
 #include "models/trajectory/sliding_window.hpp"
+#include "proto/frame/degree.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/golden_json.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
@@ -19,8 +19,6 @@ using perform::PlayerOptions;
 using trajectory::StateInformation;
 
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 StateInformation toy(double rate_hz = 30.0) {
   return {std::make_shared<const gesture::GestureModel>(test::toy_gesture_model()), rate_hz};
@@ -59,7 +57,7 @@ double fastest_deg(const std::vector<HandAngles>& poses, int order) {
       most = std::max(most, std::abs(order == 1 ? now : now - before));
     }
   }
-  return most * kDegrees;
+  return most / kDegree;
 }
 
 }  // namespace
@@ -114,7 +112,7 @@ TEST_CASE("a played sequence equals the full solve except for the look-ahead", "
       worst_rad = std::max(worst_rad, std::abs(full.x(t)[c] - frames[t].angle[c]));
     }
   }
-  CHECK(worst_rad * kDegrees < 0.05);
+  CHECK(worst_rad / kDegree < 0.05);
   CHECK(frames.front().label == 0);
   CHECK(frames.front().state == 0);
   CHECK(frames.back().label == information.model().label_index("p"));

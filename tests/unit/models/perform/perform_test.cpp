@@ -4,12 +4,12 @@
 
 #include <cmath>
 #include <iostream>
-#include <numbers>
 
 #include <catch2/catch.hpp>
 
 #include "models/gesture/train.hpp"
 #include "models/perform/constrain.hpp"
+#include "proto/frame/degree.hpp"
 #include "tests/support/real_pose_corpus.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
@@ -20,8 +20,6 @@ using perform::Performance;
 using trajectory::StateInformation;
 
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 StateInformation information_of(gesture::GestureModel model) {
   const double rate_hz = model.rate_hz;
@@ -41,7 +39,7 @@ double rms_apart_deg(const Performance& a, const Performance& b) {
   for (std::size_t t = 0; t < a.angles.size(); ++t) {
     for (int c = 0; c < kHandChannels; ++c) sum += std::pow(a.angles[t][c] - b.angles[t][c], 2);
   }
-  return kDegrees * std::sqrt(sum / static_cast<double>(a.angles.size() * kHandChannels));
+  return std::sqrt(sum / static_cast<double>(a.angles.size() * kHandChannels)) / kDegree;
 }
 
 double jerk_deg(const Performance& p) {
@@ -53,7 +51,7 @@ double jerk_deg(const Performance& p) {
           2);
     }
   }
-  return kDegrees * std::sqrt(sum / static_cast<double>((p.angles.size() - 3) * kHandChannels));
+  return std::sqrt(sum / static_cast<double>((p.angles.size() - 3) * kHandChannels)) / kDegree;
 }
 
 // Mean over states 3 and 4 of a label against real poses: rms over the flexion angles without the
@@ -76,7 +74,7 @@ double held_off_deg(const Performance& p, int label, const Eigen::VectorXd& real
       sum += std::pow(held[c] - real[c], 2);
     }
   }
-  return kDegrees * std::sqrt(sum / 12.0);
+  return std::sqrt(sum / 12.0) / kDegree;
 }
 
 }  // namespace

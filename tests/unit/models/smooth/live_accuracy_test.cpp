@@ -17,17 +17,13 @@ using smooth::LiveOptions;
 
 namespace {
 
-LiveOptions with(int lag, double noise_deg) {
-  return {.lag = {.frames = lag}, .noise_rad = noise_deg * kDegree};
-}
-
 constexpr double kNotGiven = 0.0;
-constexpr std::array kGrasps{"10_ex01-rad-003-grasp-su04.txt", "01_ex01-rad-002-grasp-su01.txt",
-                             "04_ex01-rad-045-grasp-su03.txt"};
+constexpr std::array kGraspFiles{"10_ex01-rad-003-grasp-su04.txt", "01_ex01-rad-002-grasp-su01.txt",
+                                 "04_ex01-rad-045-grasp-su03.txt"};
 
 std::vector<bench::Trial> grasps(const std::filesystem::path& folder, double noise_deg) {
   std::vector<bench::Trial> trials;
-  for (const char* name : kGrasps) {
+  for (const char* name : kGraspFiles) {
     const Motion truth = grasp_reference(folder / name);
     trials.push_back({.truth = truth, .measured = noisy(truth, noise_deg, 11)});
   }
@@ -65,8 +61,10 @@ TEST_CASE("a synthetic hand is followed closely at any noise", "[live]") {
   const SyntheticHand hand = synthetic_hand(18, 123);
   for (const auto& [noise_deg, most_deg] : {std::pair{1.0, 0.56}, {3.0, 1.10}, {6.0, 1.85}}) {
     const Motion measured = noisy(hand.angles, noise_deg, 5);
-    const double given = bench::rms_deg(smoothed(measured, 30.0, with(1, noise_deg)), hand.angles);
-    const double found = bench::rms_deg(smoothed(measured, 30.0, with(1, kNotGiven)), hand.angles);
+    const double given =
+        bench::rms_deg(smoothed(measured, 30.0, live_options(1, noise_deg)), hand.angles);
+    const double found =
+        bench::rms_deg(smoothed(measured, 30.0, live_options(1, kNotGiven)), hand.angles);
     CHECK(given <= most_deg);
     if (noise_deg > 1.0) CHECK(found <= 1.05 * most_deg);
   }
@@ -79,10 +77,10 @@ TEST_CASE("real grasps are followed closer than by any baseline tuned on them", 
   }
   for (const auto& [noise_deg, most_deg] : {std::pair{1.0, 0.46}, {3.0, 1.25}}) {
     const auto trials = grasps(*folder, noise_deg);
-    CHECK(ours(trials, with(1, noise_deg)) <= most_deg);
-    CHECK(ours(trials, with(1, kNotGiven)) <= 1.05 * most_deg);
+    CHECK(ours(trials, live_options(1, noise_deg)) <= most_deg);
+    CHECK(ours(trials, live_options(1, kNotGiven)) <= 1.05 * most_deg);
     for (const int lag : {0, 1, 3}) {
-      const double error = ours(trials, with(lag, noise_deg));
+      const double error = ours(trials, live_options(lag, noise_deg));
       for (const bench::Tuned& baseline : bench::tuned_baselines(trials, lag, noise_deg)) {
         INFO(baseline.name << " (" << baseline.setting << ") at lag " << lag);
         CHECK(error < baseline.rms_deg);
@@ -101,11 +99,11 @@ TEST_CASE("the same grasps at a higher rate are followed no worse", "[live]") {
       double before = std::numeric_limits<double>::infinity();
       for (const double rate_hz : {30.0, 60.0, 120.0, 240.0}) {
         std::vector<bench::Trial> trials;
-        for (const char* name : kGrasps) {
+        for (const char* name : kGraspFiles) {
           const Motion truth = at_rate(grasp_reference(*folder / name), 60.0, rate_hz);
           trials.push_back({truth, noisy(truth, noise_deg, 11), rate_hz});
         }
-        LiveOptions options = with(0, noise_deg);
+        LiveOptions options = live_options(0, noise_deg);
         options.lag.seconds = lag_s;
         const double error = ours(trials, options);
         INFO(rate_hz << " Hz, lag " << lag_s << " s");
@@ -127,7 +125,8 @@ TEST_CASE("dropouts of an unknown hand are bridged no worse than by holding", "[
       GapError error;
       for (const bench::Trial& trial : trials) {
         const Gaps gaps = with_gaps(trial.measured, 8, 3);
-        error.add(trial.truth, smoothed(gaps.measured, trial.rate_hz, with(lag, noise_deg)), gaps);
+        error.add(trial.truth, smoothed(gaps.measured, trial.rate_hz, live_options(lag, noise_deg)),
+                  gaps);
       }
       CHECK(error.ours_deg() <= error.held_deg());
     }

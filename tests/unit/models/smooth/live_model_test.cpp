@@ -21,11 +21,7 @@ using smooth::LiveOptions;
 namespace {
 
 constexpr const char* kLibras = "data/gloves/libras_cyberglove";
-constexpr const char* kGrasps = "data/gloves/graspdb14_cyberglove";
-
-LiveOptions with(int lag, double noise_deg) {
-  return {.lag = {.frames = lag}, .noise_rad = noise_deg * kDegree};
-}
+constexpr const char* kGraspFolder = "data/gloves/graspdb14_cyberglove";
 
 std::unique_ptr<const smooth::LiveModel> model_of(const gesture::Recording& recording) {
   const auto model = gesture::train_gesture({recording}, {}).value();
@@ -49,8 +45,8 @@ TEST_CASE("a live hand's gestures are recognised", "[live][labels]") {
     LabelScore score;
     for (const unsigned seed : {123U, 5U, 77U}) {
       const SyntheticHand hand = synthetic_hand(40, seed);
-      const auto told =
-          followed(noisy(hand.angles, noise_deg, 5), 30.0, with(1, noise_deg), &synthetic_model());
+      const auto told = followed(noisy(hand.angles, noise_deg, 5), 30.0, live_options(1, noise_deg),
+                                 &synthetic_model());
       score.add(told, recording_of(hand), 1);
     }
     std::cout << "labels, synthetic hand, " << noise_deg << " deg, lag 1: " << score.accuracy()
@@ -67,7 +63,7 @@ TEST_CASE("gestures of real poses are recognised", "[live][labels]") {
   for (const double noise_deg : {1.0, 3.0, 6.0}) {
     LabelScore score;
     const Motion measured = noisy(truth.angles_rad / kDegree, noise_deg, 5);
-    score.add(followed(measured, 30.0, with(1, noise_deg), &real_pose_model()), truth, 1);
+    score.add(followed(measured, 30.0, live_options(1, noise_deg), &real_pose_model()), truth, 1);
     std::cout << "labels, real poses, " << noise_deg << " deg, lag 1: " << score.accuracy()
               << " of frames right, p > 0.8 after " << score.median_delay() << " frames\n";
     CHECK(score.accuracy() >= 0.9);
@@ -78,8 +74,8 @@ TEST_CASE("poses that the model knows are steadied", "[live]") {
   const SyntheticHand hand = synthetic_hand(18, 123);
   for (const double noise_deg : {1.0, 3.0, 6.0}) {
     const Motion measured = noisy(hand.angles, noise_deg, 5);
-    const auto without = followed(measured, 30.0, with(1, noise_deg), nullptr);
-    const auto known = followed(measured, 30.0, with(1, noise_deg), &synthetic_model());
+    const auto without = followed(measured, 30.0, live_options(1, noise_deg), nullptr);
+    const auto known = followed(measured, 30.0, live_options(1, noise_deg), &synthetic_model());
     CHECK(bench::rms_deg(known.angles, hand.angles) < bench::rms_deg(without.angles, hand.angles));
     CHECK(without.label[500].empty());
   }
@@ -93,7 +89,8 @@ TEST_CASE("dropouts within the model's vocabulary are bridged", "[live]") {
   for (const unsigned seed : {8U, 9U, 10U, 11U}) {
     const Motion truth = real_pose_corpus(*shared(kLibras), seed).angles_rad / kDegree;
     const Gaps gaps = with_gaps(noisy(truth, 1.0, 5), 8, 3);
-    error.add(truth, followed(gaps.measured, 30.0, with(1, 1.0), &real_pose_model()).angles, gaps);
+    error.add(truth, followed(gaps.measured, 30.0, live_options(1, 1.0), &real_pose_model()).angles,
+              gaps);
   }
   std::cout << "dropouts of 8 frames, own vocabulary, lag 1: " << error.ours_deg() << " deg, held "
             << error.held_deg() << "\n";
@@ -101,20 +98,20 @@ TEST_CASE("dropouts within the model's vocabulary are bridged", "[live]") {
 }
 
 TEST_CASE("an unknown hand is not disturbed", "[live]") {
-  if (!shared(kGrasps) || !shared(kLibras)) {
+  if (!shared(kGraspFolder) || !shared(kLibras)) {
     SKIP_WITHOUT_SHARED();
   }
   const int step = GENERATE(1, 2);  // 60 and 30 Hz
   const double rate_hz = 60.0 / step;
   for (const smooth::LiveModel* model : {&real_pose_model(), &synthetic_model()}) {
     for (const auto& [noise_deg, lag] : {std::pair{1.0, 1}, {3.0, 1}}) {
-      const LiveOptions options = with(lag, noise_deg);
+      const LiveOptions options = live_options(lag, noise_deg);
       GapError gap_error;
       double square = 0.0;
       double square_without = 0.0;
       for (const char* name : {"10_ex01-rad-003-grasp-su04.txt", "01_ex01-rad-002-grasp-su01.txt",
                                "04_ex01-rad-045-grasp-su03.txt"}) {
-        const Motion truth = unknown_hand(*shared(kGrasps) / name, step);
+        const Motion truth = unknown_hand(*shared(kGraspFolder) / name, step);
         const Motion measured = noisy(truth, noise_deg, 11);
         const Motion known = followed(measured, rate_hz, options, model).angles;
         const Motion without = followed(measured, rate_hz, options, nullptr).angles;
@@ -132,7 +129,7 @@ TEST_CASE("an unknown hand is not disturbed", "[live]") {
 
 TEST_CASE("a model is set and removed while the hand moves, without allocation", "[live]") {
   const Skeleton skeleton = hand_skeleton(Side::kRight);
-  smooth::LiveSmoother smoother(skeleton, with(1, 1.0));
+  smooth::LiveSmoother smoother(skeleton, live_options(1, 1.0));
   const SyntheticHand hand = synthetic_hand(6, 3);
   LastFrame last;
   const smooth::LiveModel* const model = &synthetic_model();
@@ -163,7 +160,8 @@ TEST_CASE("a model that is set while frames wait neither labels nor changes them
   const SyntheticHand hand = synthetic_hand(6, 3);
   for (const int lag : {2, 3, 8}) {
     INFO("lag " << lag);
-    smooth::LiveSmoother plain(skeleton, with(lag, 1.0)), swapped(skeleton, with(lag, 1.0));
+    smooth::LiveSmoother plain(skeleton, live_options(lag, 1.0)),
+        swapped(skeleton, live_options(lag, 1.0));
     LastFrame without, with_model;
     const auto step = [&](int t) {
       HandAngles angles{};

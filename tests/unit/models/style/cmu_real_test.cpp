@@ -25,7 +25,7 @@ constexpr std::array kWalks{"02_02", "08_01", "16_15", "35_01", "39_01", "07_01"
 constexpr std::array kPeriods{29.5, 30.1, 35.0, 33.7, 31.1, 32.4};  // frames at 30 Hz
 constexpr double kPersonNoise = 0.1;  // of the signal variance, as in training with several people
 
-bool recorded() { return test::shared("data/cmu/02_02.amc").has_value(); }
+bool cmu_recorded() { return test::shared("data/cmu/02_02.amc").has_value(); }
 
 // The six walks, each with the phase from its own legs only.
 style::Dataset walks() {
@@ -134,7 +134,7 @@ Errors left_out_errors(const style::Dataset& dataset) {
 
 TEST_CASE("on six real walks four random starts of the MGPM end at one optimum, with the strides",
           "[mgpm][real]") {
-  if (!recorded()) SKIP_WITHOUT_SHARED();
+  if (!cmu_recorded()) SKIP_WITHOUT_SHARED();
   double first = 0.0;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
     const auto dataset = aligned(style::MgpmStart::kRandom, seed);
@@ -155,7 +155,7 @@ TEST_CASE("on six real walks four random starts of the MGPM end at one optimum, 
 // figure is printed, too.
 TEST_CASE("the difference of two people is valid for a third who is not in the training",
           "[style][real]") {
-  if (!recorded()) SKIP_WITHOUT_SHARED();
+  if (!cmu_recorded()) SKIP_WITHOUT_SHARED();
   auto dataset = aligned(style::MgpmStart::kSvd, 0);
   const Errors by_legs = left_out_errors(dataset);
   for (std::size_t c = 0; c < dataset.clips.size(); ++c) {

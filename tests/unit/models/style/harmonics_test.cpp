@@ -9,28 +9,24 @@
 using namespace posed::style;
 using Eigen::VectorXd;
 
-namespace {
-constexpr double kPi = std::numbers::pi;
-}
-
 TEST_CASE("The stride is found at any rate and phase", "[stride]") {
   for (const double rate_hz : {30.0, 60.0, 120.0}) {
     for (const double period_s : {0.75, 1.0, 1.6}) {
-      const double dtheta = 2.0 * kPi / (period_s * rate_hz);
+      const double dtheta = 2.0 * std::numbers::pi / (period_s * rate_hz);
       const VectorXd theta = clip_phase(0.7, dtheta, static_cast<int>(3.3 * rate_hz));
       const VectorXd signal = 0.3 + 0.5 * theta.array().cos() + 0.1 * (2.0 * theta.array()).sin();
       const Stride stride = find_stride(signal, rate_hz);
       CHECK(stride.dtheta == Approx(dtheta).epsilon(0.01));
-      CHECK(std::abs(std::remainder(stride.theta0 - 0.7, 2.0 * kPi)) < 0.15);
+      CHECK(std::abs(std::remainder(stride.theta0 - 0.7, 2.0 * std::numbers::pi)) < 0.15);
     }
   }
 }
 
 TEST_CASE("Two strides are not taken for one", "[stride]") {
   // 0.7 s runs with an uneven second stride: the double period fits slightly better.
-  const VectorXd theta = clip_phase(0.0, 2.0 * kPi / 21.0, 84);
+  const VectorXd theta = clip_phase(0.0, 2.0 * std::numbers::pi / 21.0, 84);
   const VectorXd signal = theta.array().cos() + 0.08 * (0.5 * theta.array()).sin();
-  CHECK(2.0 * kPi / find_stride(signal, 30.0).dtheta == Approx(21.0).epsilon(0.02));
+  CHECK(2.0 * std::numbers::pi / find_stride(signal, 30.0).dtheta == Approx(21.0).epsilon(0.02));
 }
 
 TEST_CASE("A clip shorter than the shortest stride is refused", "[stride]") {

@@ -24,7 +24,7 @@ std::optional<std::filesystem::path> recording(const std::string& name) {
   return test::shared("data/styles/dataset-2_" + name + ".bvh");
 }
 
-bool recorded() { return recording("walk_masculine_001").has_value(); }
+bool styles_recorded() { return recording("walk_masculine_001").has_value(); }
 
 clip::Clip take(const std::string& name) {
   const auto path = recording(name);
@@ -99,7 +99,7 @@ clip::Clip upsampled(const clip::Clip& clip, double rate_hz) {
 }  // namespace
 
 TEST_CASE("a walk trained on one take each comes near the style's held-out take", "[style][real]") {
-  if (!recorded()) SKIP_WITHOUT_SHARED();
+  if (!styles_recorded()) SKIP_WITHOUT_SHARED();
   const auto result = score(trained_walk(), take("walk_masculine_002"), take("walk_feminine_002"));
   CHECK(result.cycle_ratio <= 0.15);
   CHECK(result.jerk_ratio >= 0.90);
@@ -107,7 +107,7 @@ TEST_CASE("a walk trained on one take each comes near the style's held-out take"
 }
 
 TEST_CASE("walk and run in one model: the run is styled, the walk is not hurt", "[style][real]") {
-  if (!recorded()) SKIP_WITHOUT_SHARED();
+  if (!styles_recorded()) SKIP_WITHOUT_SHARED();
   const auto both = train_on_takes(
       {{"walk", "masculine"}, {"walk", "feminine"}, {"run", "masculine"}, {"run", "feminine"}});
   const auto run = score(both, take("run_masculine_002"), take("run_feminine_002"));
@@ -121,7 +121,7 @@ TEST_CASE("walk and run in one model: the run is styled, the walk is not hurt", 
 TEST_CASE(
     "a normal walk among the sources is styled; a walk already in the style is hardly changed",
     "[style][real]") {
-  if (!recorded()) SKIP_WITHOUT_SHARED();
+  if (!styles_recorded()) SKIP_WITHOUT_SHARED();
   const auto model =
       train_on_takes({{"walk", "masculine"}, {"walk", "normal"}, {"walk", "feminine"}});
   const auto target = take("walk_feminine_002");
@@ -134,7 +134,7 @@ TEST_CASE(
 
 TEST_CASE("a model trained at 30 Hz works on the same walk at 120 Hz, frame by frame",
           "[style][real]") {
-  if (!recorded()) SKIP_WITHOUT_SHARED();
+  if (!styles_recorded()) SKIP_WITHOUT_SHARED();
   const auto model = trained_walk();
   const auto walk = take("walk_masculine_002");
   const auto target = take("walk_feminine_002");

@@ -13,14 +13,14 @@ using motion::WalkerFamily;
 
 namespace {
 
-clip::Clip walker(WalkerFamily family, double noise_deg) {
+clip::Clip noisy_walker(WalkerFamily family, double noise_deg) {
   return motion::make_walker({.family = family, .person = 1, .noise_deg = noise_deg}).value();
 }
 
 style::StyleModel trained(style::TrainMode mode, double noise_deg) {
   const std::vector<style::TrainingClip> clips{
-      {walker(WalkerFamily::kMarch, noise_deg), "march", "march", "walk"},
-      {walker(WalkerFamily::kSway, noise_deg), "sway", "sway", "walk"}};
+      {noisy_walker(WalkerFamily::kMarch, noise_deg), "march", "march", "walk"},
+      {noisy_walker(WalkerFamily::kSway, noise_deg), "sway", "sway", "walk"}};
   style::TrainOptions options;
   options.target = "sway";
   options.mode = mode;
@@ -43,10 +43,10 @@ TEST_CASE("paper mode keeps a noise that floats can hold and brings a walk near 
           "[style][train]") {
   const style::StyleModel model = trained(style::TrainMode::kPaper, 0.3);
   CHECK(model.process.noise >= 3e-7);
-  const clip::Clip march = walker(WalkerFamily::kMarch, 0.2);
+  const clip::Clip march = noisy_walker(WalkerFamily::kMarch, 0.2);
   const auto styled = style::apply_to_clip(model, "paper.style", march, {}).value();
   const auto score =
-      style::evaluate_style(march, styled.clip, walker(WalkerFamily::kSway, 0.2)).value();
+      style::evaluate_style(march, styled.clip, noisy_walker(WalkerFamily::kSway, 0.2)).value();
   CHECK(score.cycle_ratio < 0.4);
   CHECK(score.jerk_ratio < 2.0);
 }

@@ -16,7 +16,7 @@ using nlohmann::json;
 
 namespace {
 
-clip::Clip walker(WalkerFamily family, std::uint32_t person) {
+clip::Clip walker_file(WalkerFamily family, std::uint32_t person) {
   auto clip = motion::make_walker({.family = family, .person = person}).value();
   clip.path = (family == WalkerFamily::kMarch ? "march_" : "sway_") + std::to_string(person);
   return clip;
@@ -60,9 +60,9 @@ json real_report(const std::string& from, const std::string& to, const std::stri
 
 TEST_CASE("two styles are learnt, and the verdict states how much of the distance is closed",
           "[style][check]") {
-  const json report = report_of({lesson(walker(WalkerFamily::kMarch, 1), "from"),
-                                 lesson(walker(WalkerFamily::kMarch, 2), "from"),
-                                 lesson(walker(WalkerFamily::kSway, 3), "to")});
+  const json report = report_of({lesson(walker_file(WalkerFamily::kMarch, 1), "from"),
+                                 lesson(walker_file(WalkerFamily::kMarch, 2), "from"),
+                                 lesson(walker_file(WalkerFamily::kSway, 3), "to")});
   CHECK(report["usable"] == true);
   CHECK(report["closes"] > 0.5);
   CHECK(report["closes"] > report["constant_closes"]);
@@ -74,7 +74,7 @@ TEST_CASE("two styles are learnt, and the verdict states how much of the distanc
 }
 
 TEST_CASE("one recording in two groups is refused by name", "[style][check]") {
-  const auto march = walker(WalkerFamily::kMarch, 1);
+  const auto march = walker_file(WalkerFamily::kMarch, 1);
   const auto model = trained({lesson(march, "from"), lesson(march, "to")});
   REQUIRE_FALSE(model);
   CHECK(model.error().message.contains("is the same recording as march_1"));
@@ -82,21 +82,21 @@ TEST_CASE("one recording in two groups is refused by name", "[style][check]") {
 
 TEST_CASE("two takes of one style give no difference to learn", "[style][check]") {
   auto again = motion::make_walker({.family = WalkerFamily::kMarch, .person = 1, .seconds = 7.0});
-  CHECK(has_problem(
-      report_of({lesson(walker(WalkerFamily::kMarch, 1), "from"), lesson(std::move(*again), "to")}),
-      "no difference to learn"));
+  CHECK(has_problem(report_of({lesson(walker_file(WalkerFamily::kMarch, 1), "from"),
+                               lesson(std::move(*again), "to")}),
+                    "no difference to learn"));
 }
 
 TEST_CASE("a clip whose legs stand still is not a walk; for another motion name that is a warning",
           "[style][check]") {
-  auto standing = walker(WalkerFamily::kSway, 2);
+  auto standing = walker_file(WalkerFamily::kSway, 2);
   for (std::size_t c = 0; c < standing.skeleton->channels.size(); ++c) {
     const auto& name = standing.skeleton->joints[standing.skeleton->channels[c].joint].name;
     const auto column = static_cast<Eigen::Index>(c);
     if (!name.contains("Leg") && !name.contains("Hips")) continue;
     standing.channels.col(column).setConstant(standing.channels(0, column));
   }
-  const auto march = walker(WalkerFamily::kMarch, 1);
+  const auto march = walker_file(WalkerFamily::kMarch, 1);
   CHECK(has_problem(report_of({lesson(march, "from"), lesson(standing, "to")}),
                     "sway_2 is no walk: the legs swing by"));
   const json other = report_of({lesson(march, "from", "wave"), lesson(standing, "to", "wave")});
@@ -109,12 +109,12 @@ TEST_CASE("gaits are walks and runs of all kinds", "[style][check]") {
 }
 
 TEST_CASE("a walker with another posture is far from the training", "[style][check]") {
-  const auto model = trained({lesson(walker(WalkerFamily::kMarch, 1), "from"),
-                              lesson(walker(WalkerFamily::kSway, 1), "to")})
+  const auto model = trained({lesson(walker_file(WalkerFamily::kMarch, 1), "from"),
+                              lesson(walker_file(WalkerFamily::kSway, 1), "to")})
                          .value();
-  const auto own = style::fit_of_walker(model, "m", walker(WalkerFamily::kMarch, 1)).value();
+  const auto own = style::fit_of_walker(model, "m", walker_file(WalkerFamily::kMarch, 1)).value();
   CHECK_FALSE(own.is_far());
-  auto bent = walker(WalkerFamily::kMarch, 1);
+  auto bent = walker_file(WalkerFamily::kMarch, 1);
   bent.channels.rightCols(bent.channels.cols() - 6).array() += 0.4;
   const auto far = style::fit_of_walker(model, "m", bent).value();
   CHECK(far.is_far());

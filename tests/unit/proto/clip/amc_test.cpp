@@ -9,10 +9,13 @@
 #include "proto/clip/text_clip.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
+#include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
 
 namespace posed::clip {
 namespace {
+
+using test::replaced;
 
 const std::string kAsf =
     "# comment\n"
@@ -62,10 +65,6 @@ const std::string kAmc =
     "thigh 41 -1.5e1\n"
     "root 1 17 -25 10 20 30\n";
 
-std::string swap(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
-}
-
 void check_error(const std::string& asf, const std::string& amc, const std::string& expected) {
   const auto clip = parse_amc(amc, "x.amc", asf, "x.asf");
   REQUIRE_FALSE(clip.has_value());
@@ -73,10 +72,10 @@ void check_error(const std::string& asf, const std::string& amc, const std::stri
   CHECK(clip.error().text().starts_with(expected));
 }
 void check_amc(const std::string& from, const std::string& to, const std::string& expected) {
-  check_error(kAsf, swap(kAmc, from, to), expected);
+  check_error(kAsf, replaced(kAmc, from, to), expected);
 }
 void check_asf(const std::string& from, const std::string& to, const std::string& expected) {
-  check_error(swap(kAsf, from, to), kAmc, expected);
+  check_error(replaced(kAsf, from, to), kAmc, expected);
 }
 
 }  // namespace
@@ -107,7 +106,7 @@ TEST_CASE("an AMC and its ASF give joints at bone starts and L = C M C^-1") {
 }
 
 TEST_CASE("radians and other line ends are understood") {
-  std::string amc = swap(kAmc, ":DEGREES", ":RADIANS");
+  std::string amc = replaced(kAmc, ":DEGREES", ":RADIANS");
   std::string crlf;
   for (const char c : amc) crlf += c == '\n' ? std::string("\r\n") : std::string(1, c);
   const auto clip = parse_amc(crlf, "x.amc", kAsf, "x.asf");

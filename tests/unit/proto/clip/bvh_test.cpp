@@ -7,10 +7,13 @@
 
 #include "proto/clip/bvh.hpp"
 #include "proto/clip/clip.hpp"
+#include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
 
 namespace posed::clip {
 namespace {
+
+using test::replaced;
 
 const std::string kHeader =
     "HIERARCHY\n"
@@ -33,10 +36,6 @@ const std::string kTwoFrames =
     "Frames: 2\nFrame Time: .0083333\n"
     "0 100 0 0 0 0 90 0 0\n"
     "1 100 2e1 0 90 0 0 0 90";
-
-std::string swap(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
-}
 
 void check_error(const std::string& text, const std::string& expected) {
   const auto clip = parse_bvh(text, "x.bvh");
@@ -67,12 +66,12 @@ TEST_CASE("a BVH gives names, offsets, channels, rate and values") {
 }
 
 TEST_CASE("a BVH is read leniently where the pose is not in doubt") {
-  std::string text = "\xEF\xBB\xBF" + swap(kHeader, "Left Arm:upper\n  {", "Left Arm:upper {");
-  text += "\n\n  " + swap(kTwoFrames, "Frames: 2", "Frames : 4000000000") + "  \n\n";
+  std::string text = "\xEF\xBB\xBF" + replaced(kHeader, "Left Arm:upper\n  {", "Left Arm:upper {");
+  text += "\n\n  " + replaced(kTwoFrames, "Frames: 2", "Frames : 4000000000") + "  \n\n";
   std::string crlf;
   for (const char c : text)
     crlf += c == '\n' ? std::string("\r\n") : std::string(1, c == ' ' ? '\t' : c);
-  crlf = swap(crlf, "Left\tArm", "Left Arm");
+  crlf = replaced(crlf, "Left\tArm", "Left Arm");
   const auto clip = parse_bvh(crlf, "x.bvh");
   if (!clip) FAIL(clip.error().text());
   CHECK(clip->frames() == 2);
@@ -91,30 +90,33 @@ TEST_CASE("a BVH that would give a wrong pose is refused with its line") {
   check_error(kHeader.substr(0, kHeader.size() - 7), "x.bvh:16: has no MOTION");
   check_error(kHeader, "x.bvh:17: 'Frames: <count>'");
   check_error(kHeader + "Frames: 0\nFrame Time: 0.01\n", "x.bvh: has no frames");
-  check_error(swap(good, ".0083333", "0"), "x.bvh:18: Frame Time '0'");
-  check_error(swap(good, ".0083333", "-1"), "x.bvh:18: Frame Time '-1'");
-  check_error(swap(good, ".0083333", "11"), "x.bvh:18: Frame Time '11'");
-  check_error(swap(good, ".0083333", "nan"), "x.bvh:18: Frame Time 'nan'");
-  check_error(swap(good, "0 100 0 0", "0 nan 0 0"), "x.bvh:19: frame 1: 'nan' is not a number");
-  check_error(swap(good, "2e1", "inf"), "x.bvh:20: frame 2: 'inf' is not a number");
-  check_error(swap(good, "2e1", "2,1"), "x.bvh:20: frame 2: '2,1' is not a number");
-  check_error(swap(good, "2e1", "2e300"), "x.bvh:20: frame 2: '2e300' is not a number");
-  check_error(swap(good, "2e1 ", ""), "x.bvh:20: frame 2: the frame has 8 values");
-  check_error(swap(good, "2e1", "2 1"), "x.bvh:20: frame 2: the frame has 10 values or more");
-  check_error(swap(good, "Xposition", "Wposition"), "x.bvh:5: unknown channel 'Wposition'");
-  check_error(swap(good, "Xposition", "Yposition"), "x.bvh:5: channel 'Yposition' twice");
-  check_error(swap(good, "CHANNELS 6", "CHANNELS 5"), "x.bvh:5: joint 'Hips' lists more channels");
-  check_error(swap(good, "CHANNELS 6", "CHANNELS 7"), "x.bvh:5: CHANNELS of joint 'Hips'");
-  check_error(swap(good, "Left Arm:upper", "Hips"), "x.bvh:6: a second joint is named 'Hips'");
-  check_error(swap(good, "    OFFSET 0 80 0\n", ""),
+  check_error(replaced(good, ".0083333", "0"), "x.bvh:18: Frame Time '0'");
+  check_error(replaced(good, ".0083333", "-1"), "x.bvh:18: Frame Time '-1'");
+  check_error(replaced(good, ".0083333", "11"), "x.bvh:18: Frame Time '11'");
+  check_error(replaced(good, ".0083333", "nan"), "x.bvh:18: Frame Time 'nan'");
+  check_error(replaced(good, "0 100 0 0", "0 nan 0 0"), "x.bvh:19: frame 1: 'nan' is not a number");
+  check_error(replaced(good, "2e1", "inf"), "x.bvh:20: frame 2: 'inf' is not a number");
+  check_error(replaced(good, "2e1", "2,1"), "x.bvh:20: frame 2: '2,1' is not a number");
+  check_error(replaced(good, "2e1", "2e300"), "x.bvh:20: frame 2: '2e300' is not a number");
+  check_error(replaced(good, "2e1 ", ""), "x.bvh:20: frame 2: the frame has 8 values");
+  check_error(replaced(good, "2e1", "2 1"), "x.bvh:20: frame 2: the frame has 10 values or more");
+  check_error(replaced(good, "Xposition", "Wposition"), "x.bvh:5: unknown channel 'Wposition'");
+  check_error(replaced(good, "Xposition", "Yposition"), "x.bvh:5: channel 'Yposition' twice");
+  check_error(replaced(good, "CHANNELS 6", "CHANNELS 5"),
+              "x.bvh:5: joint 'Hips' lists more channels");
+  check_error(replaced(good, "CHANNELS 6", "CHANNELS 7"), "x.bvh:5: CHANNELS of joint 'Hips'");
+  check_error(replaced(good, "Left Arm:upper", "Hips"), "x.bvh:6: a second joint is named 'Hips'");
+  check_error(replaced(good, "    OFFSET 0 80 0\n", ""),
               "x.bvh:13: joint 'Left Arm:upper' has no OFFSET");
-  check_error(swap(good, "OFFSET 0 80 0", "OFFSET 0 nan 0"), "x.bvh:8: OFFSET of joint 'Left Arm");
-  check_error(swap(good, "    CHANNELS 3 Zrotation Xrotation Yrotation\n", ""),
+  check_error(replaced(good, "OFFSET 0 80 0", "OFFSET 0 nan 0"),
+              "x.bvh:8: OFFSET of joint 'Left Arm");
+  check_error(replaced(good, "    CHANNELS 3 Zrotation Xrotation Yrotation\n", ""),
               "x.bvh:13: joint 'Left Arm:upper' has no CHANNELS");
-  check_error(swap(good, "  }\n}\nMOTION", "  }\nMOTION"),
+  check_error(replaced(good, "  }\n}\nMOTION", "  }\nMOTION"),
               "x.bvh:15: the file ends, or its MOTION");
-  check_error(swap(good, "}\nMOTION", "}\n}\nMOTION"), "x.bvh:16: has a closing brace too many");
-  check_error(swap(good, "}\nMOTION", "}\nROOT b {}\nMOTION"), "x.bvh:16: has a second ROOT");
+  check_error(replaced(good, "}\nMOTION", "}\n}\nMOTION"),
+              "x.bvh:16: has a closing brace too many");
+  check_error(replaced(good, "}\nMOTION", "}\nROOT b {}\nMOTION"), "x.bvh:16: has a second ROOT");
 }
 
 TEST_CASE("joints nested too deep or too many are refused") {

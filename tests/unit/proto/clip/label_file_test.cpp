@@ -9,7 +9,7 @@ using namespace posed::clip;
 
 namespace {
 
-Error refusal(const std::string& text, double recording_s = 1e9) {
+Error label_refusal(const std::string& text, double recording_s = 1e9) {
   const auto labels = parse_labels(text, "take.lab", recording_s);
   INFO(text);
   REQUIRE_FALSE(labels.has_value());
@@ -61,19 +61,19 @@ TEST_CASE("Labels that were written read back as the same", "[lab]") {
 }
 
 TEST_CASE("Label files with mistakes are refused with the line", "[lab]") {
-  CHECK(has(refusal(""), "no label in this file", 0));
-  CHECK(has(refusal(" \n\n"), "no label in this file", 0));
-  CHECK(has(refusal("0 1 g\n1 x c"), "is no time", 2));
-  CHECK(has(refusal("0 1 g\n1 nan c"), "is no time", 2));
-  CHECK(has(refusal("-1 1 g"), "below zero", 1));
-  CHECK(has(refusal("0 1"), "no name", 1));
-  CHECK(has(refusal("0"), "ends early", 1));
-  CHECK(has(refusal("0 1 two words"), "more after the name", 1));
-  CHECK(has(refusal("0 1 sixteen-letters-"), "is no label", 1));
-  CHECK(has(refusal("0 1 na\x01me"), "is no label", 1));
-  CHECK(has(refusal("0 1 g\n2 2 c"), "ends where it starts", 2));
-  CHECK(has(refusal("0 1 g\n3 2 c"), "ends where it starts", 2));
-  CHECK(has(refusal("0 1 g\n\n0.9 2 c"), "overlaps", 3));
-  CHECK(has(refusal("2 3 g\n0 1 c"), "time order", 2));
-  CHECK(has(refusal("0 1 g\n1 2.5 c", 2.0), "is this the right recording", 2));
+  CHECK(has(label_refusal(""), "no label in this file", 0));
+  CHECK(has(label_refusal(" \n\n"), "no label in this file", 0));
+  CHECK(has(label_refusal("0 1 g\n1 x c"), "is no time", 2));
+  CHECK(has(label_refusal("0 1 g\n1 nan c"), "is no time", 2));
+  CHECK(has(label_refusal("-1 1 g"), "below zero", 1));
+  CHECK(has(label_refusal("0 1"), "no name", 1));
+  CHECK(has(label_refusal("0"), "ends early", 1));
+  CHECK(has(label_refusal("0 1 two words"), "more after the name", 1));
+  CHECK(has(label_refusal("0 1 sixteen-letters-"), "is no label", 1));
+  CHECK(has(label_refusal("0 1 na\x01me"), "is no label", 1));
+  CHECK(has(label_refusal("0 1 g\n2 2 c"), "ends where it starts", 2));
+  CHECK(has(label_refusal("0 1 g\n3 2 c"), "ends where it starts", 2));
+  CHECK(has(label_refusal("0 1 g\n\n0.9 2 c"), "overlaps", 3));
+  CHECK(has(label_refusal("2 3 g\n0 1 c"), "time order", 2));
+  CHECK(has(label_refusal("0 1 g\n1 2.5 c", 2.0), "is this the right recording", 2));
 }

@@ -3,19 +3,14 @@
 
 #include <catch2/catch.hpp>
 
-#include <fstream>
 #include <iterator>
 #include <ostream>
 
+#include "tests/support/file_text.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed {
 namespace {
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::size_t files_in(const std::filesystem::path& folder) {
   const std::filesystem::directory_iterator entries(folder);
@@ -32,10 +27,10 @@ TEST_CASE("a file that cannot be written to its end leaves what was there, and n
     out.setstate(std::ios::badbit);
   });
   CHECK_FALSE(failed);
-  CHECK(bytes_of(path) == "before");
+  CHECK(test::file_text(path) == "before");
   CHECK(files_in(folder.path()) == 1);
   REQUIRE(write_whole_file(path, [](std::ostream& out) { out << "after"; }));
-  CHECK(bytes_of(path) == "after");
+  CHECK(test::file_text(path) == "after");
   CHECK(files_in(folder.path()) == 1);
 }
 
@@ -46,7 +41,7 @@ TEST_CASE("a symbolic link is kept: the file that it names is replaced") {
   std::filesystem::create_symlink(path, link);
   REQUIRE(write_whole_file(link, [](std::ostream& out) { out << "after"; }));
   CHECK(std::filesystem::is_symlink(link));
-  CHECK(bytes_of(path) == "after");
+  CHECK(test::file_text(path) == "after");
 }
 
 TEST_CASE("a file in a folder that does not exist is an error that names it") {

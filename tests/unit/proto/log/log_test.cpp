@@ -50,7 +50,7 @@ std::size_t count_chunks(Reader& reader) {
   }
 }
 
-std::string refusal(const std::filesystem::path& path) {
+std::string log_refusal(const std::filesystem::path& path) {
   const auto reader = Reader::open(path);
   REQUIRE(!reader);
   CHECK(reader.error().file == path.string());
@@ -261,32 +261,32 @@ TEST_CASE("a log can be read while it is being recorded, and recording goes on")
 TEST_CASE("a file that is not a complete log is refused with one error message") {
   const test::TempFolder dir;
   const auto path = dir.path() / "x.plog";
-  SECTION("missing") { CHECK(refusal(path).find("No such file") != std::string::npos); }
+  SECTION("missing") { CHECK(log_refusal(path).find("No such file") != std::string::npos); }
   SECTION("a folder") {
     std::filesystem::create_directory(path);
-    CHECK(refusal(path) == "is a folder, not a log");
+    CHECK(log_refusal(path) == "is a folder, not a log");
   }
   SECTION("empty") {
     std::ofstream{path};
-    CHECK(refusal(path).find("not a device log") != std::string::npos);
+    CHECK(log_refusal(path).find("not a device log") != std::string::npos);
   }
   SECTION("text") {
     std::ofstream{path} << std::string(5000, 'x');
-    CHECK(refusal(path) == "not a device log (not an SQLite file)");
+    CHECK(log_refusal(path) == "not a device log (not an SQLite file)");
   }
   SECTION("another database") {
     run_sql(path, "CREATE TABLE chunk(id); INSERT INTO chunk VALUES(1);");
-    CHECK(refusal(path).find("not posed's") != std::string::npos);
+    CHECK(log_refusal(path).find("not posed's") != std::string::npos);
   }
   SECTION("another table") {
     write_whole_log(path, 3);
     run_sql(path, "DROP TABLE chunk; CREATE TABLE chunk(id, other);");
-    CHECK(refusal(path).find("no such column") != std::string::npos);
+    CHECK(log_refusal(path).find("no such column") != std::string::npos);
   }
   SECTION("a newer format") {
     write_whole_log(path, 3);
     run_sql(path, "PRAGMA user_version=4;");
-    CHECK(refusal(path).find("update posed") != std::string::npos);
+    CHECK(log_refusal(path).find("update posed") != std::string::npos);
   }
   SECTION("a source that is not described") {
     write_whole_log(path, 3);
@@ -302,12 +302,12 @@ TEST_CASE("a file that is not a complete log is refused with one error message")
     write_whole_log(path, 60);
     const auto size = std::filesystem::file_size(path);
     std::filesystem::resize_file(path, size / 2);
-    CHECK(refusal(path).find("damaged") != std::string::npos);
+    CHECK(log_refusal(path).find("damaged") != std::string::npos);
     for (std::uintmax_t keep = 0; keep < size; keep += size / 37) {
       const auto cut = dir.path() / ("cut" + std::to_string(keep));
       write_whole_log(cut, 60);
       std::filesystem::resize_file(cut, keep);
-      CHECK(!refusal(cut).empty());
+      CHECK(!log_refusal(cut).empty());
       const auto scribbled = dir.path() / ("scribbled" + std::to_string(keep));
       write_whole_log(scribbled, 60);
       std::fstream(scribbled, std::ios::in | std::ios::out | std::ios::binary)

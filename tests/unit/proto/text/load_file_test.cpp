@@ -16,7 +16,7 @@ namespace {
 
 constexpr FileRule kRule{.what = "calibration", .max_bytes = 1000};
 
-std::string refusal(const std::filesystem::path& path) {
+std::string load_refusal(const std::filesystem::path& path) {
   const auto read = load_file(path, kRule);
   REQUIRE_FALSE(read);
   CHECK(read.error().file == path.string());
@@ -29,7 +29,8 @@ TEST_CASE("a whole file is read, up to its limit", "[load_file]") {
     const std::string text(size, 'x');
     CHECK(load_file(folder.write("file", text), kRule).value() == text);
   }
-  CHECK(refusal(folder.write("large", std::string(1001, 'x'))).contains("that is no calibration"));
+  CHECK(load_refusal(folder.write("large", std::string(1001, 'x')))
+            .contains("that is no calibration"));
   const std::string large(300'000, 'y');
   CHECK(load_file(folder.write("large", large), {.what = "clip", .max_bytes = 300'000}) == large);
 }
@@ -41,14 +42,14 @@ TEST_CASE("a file in /proc, which states no size, is read and bounded, too", "[l
 
 TEST_CASE("anything but a regular file is refused at once, with an error message", "[load_file]") {
   const test::TempFolder folder;
-  CHECK(refusal(folder.path()) == "this is a folder; name a calibration in it");
-  CHECK(refusal("/dev/zero").contains("device or a pipe"));
+  CHECK(load_refusal(folder.path()) == "this is a folder; name a calibration in it");
+  CHECK(load_refusal("/dev/zero").contains("device or a pipe"));
   const auto pipe = folder.path() / "pipe";
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK(refusal(pipe).contains(
+  CHECK(load_refusal(pipe).contains(
       "device or a pipe"));  // nobody writes to it, so a plain open would block
-  CHECK(refusal(folder.path() / "none").contains("cannot read the calibration: No such file"));
-  CHECK(refusal({}).contains("cannot read the calibration"));
+  CHECK(load_refusal(folder.path() / "none").contains("cannot read the calibration: No such file"));
+  CHECK(load_refusal({}).contains("cannot read the calibration"));
 }
 
 TEST_CASE("a file without permission is refused with the system's reason", "[load_file]") {
@@ -59,7 +60,7 @@ TEST_CASE("a file without permission is refused with the system's reason", "[loa
     WARN("SKIPPED: root may read every file");
     return;
   }
-  CHECK(refusal(path).contains("Permission denied"));
+  CHECK(load_refusal(path).contains("Permission denied"));
 }
 
 TEST_CASE("clips, labels and models are read through it", "[load_file]") {

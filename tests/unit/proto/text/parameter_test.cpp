@@ -23,22 +23,24 @@ const std::array<ParameterSpec, 4> kTable{{
     {.name = "on", .default_value = false, .help = ""},
 }};
 
-std::string refusal(const ParameterSpec& spec, const ParameterValue& value) {
+std::string parameter_refusal(const ParameterSpec& spec, const ParameterValue& value) {
   const auto checked = from_people(spec, value, spec.shown_name());
   return checked ? std::string() : checked.error().message;
 }
 
 TEST_CASE("a value is checked against its type and its range, in the units of people") {
   CHECK(from_people(kTable[0], std::int64_t{2}, "gain") == ParameterValue(2.0));
-  CHECK(refusal(kTable[0], 2.5) == "gain = 2.5 is out of range: it takes a number from -2 to 2");
-  CHECK(refusal(kTable[0], std::numeric_limits<double>::quiet_NaN()).contains("out of range"));
-  CHECK(refusal(kTable[0], true) == "gain must be a number, not true or false");
+  CHECK(parameter_refusal(kTable[0], 2.5) ==
+        "gain = 2.5 is out of range: it takes a number from -2 to 2");
+  CHECK(parameter_refusal(kTable[0], std::numeric_limits<double>::quiet_NaN())
+            .contains("out of range"));
+  CHECK(parameter_refusal(kTable[0], true) == "gain must be a number, not true or false");
   CHECK(std::get<double>(from_people(kTable[1], 90.0, "").value()) == Approx(1.5707963268));
-  CHECK(refusal(kTable[1], 91.0) ==
+  CHECK(parameter_refusal(kTable[1], 91.0) ==
         "noise_deg = 91 is out of range: it takes a number of degrees from 0 to 90");
-  CHECK(refusal(kTable[2], 0.5) == "count must be an integer, not a number");
-  CHECK(refusal(kTable[2], std::int64_t{10}).contains("an integer from 0 to 9"));
-  CHECK(refusal(kTable[3], std::string("on")) == "on must be true or false, not text");
+  CHECK(parameter_refusal(kTable[2], 0.5) == "count must be an integer, not a number");
+  CHECK(parameter_refusal(kTable[2], std::int64_t{10}).contains("an integer from 0 to 9"));
+  CHECK(parameter_refusal(kTable[3], std::string("on")) == "on must be true or false, not text");
 }
 
 TEST_CASE("a complete table has every default, in our units, and nothing unknown") {

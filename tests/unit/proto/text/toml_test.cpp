@@ -12,7 +12,7 @@ namespace {
 
 constexpr TomlLimits kSmall{.what = "note", .bytes = 200'000, .depth = 4, .items = 100};
 
-std::string refusal(const std::string& text) {
+std::string toml_refusal(const std::string& text) {
   const auto parsed = parse_toml(text, "a.toml", kSmall);
   INFO(text.substr(0, 80));
   REQUIRE_FALSE(parsed);
@@ -46,24 +46,25 @@ TEST_CASE("dots, brackets and quotes inside strings and comments do not count", 
 
 TEST_CASE("TOML that nests too deep is refused before it is parsed", "[toml]") {
   for (const std::string& bomb : test::toml_bombs()) {
-    CHECK_THAT(refusal(bomb), Catch::Contains("nests deeper"));
+    CHECK_THAT(toml_refusal(bomb), Catch::Contains("nests deeper"));
     // Preceded by text that could mislead the scan into taking the rest for a string or a comment.
     for (const char* before :
          {"a = \"\\\\\"\n", "a = '\\'\n", "a = \"\"\"x\"\"\"\"\"\n", "a = ''''x'''\n", "# \"\"\"\n",
           "# '''\n", "a = ['''\n''', \"\"] # '\n", "'#' = '#'\n", "\"#\\\"\" = {b = '#'}\n",
           "a = \"\"\n", "a = \"\"\"\\\n\\\"\"\"\"\n", "[\"a\"]\r\n"}) {
       INFO(before);
-      CHECK_THAT(refusal(before + bomb), Catch::Contains("nests deeper"));
+      CHECK_THAT(toml_refusal(before + bomb), Catch::Contains("nests deeper"));
     }
   }
 }
 
 TEST_CASE("the error message names the line, the limit and the kind of file", "[toml]") {
-  CHECK(refusal("a = 1\n\"\"\"\n\n\n\"\"\" = 2\nb.c.d.e.f = 1\n") ==
+  CHECK(toml_refusal("a = 1\n\"\"\"\n\n\n\"\"\" = 2\nb.c.d.e.f = 1\n") ==
         "a.toml:6: nests deeper here than the 4 levels of a note (each part of a dotted key is "
         "one)");
-  CHECK(refusal("[a.b.c]\n[a.b.c.d.e]\n").starts_with("a.toml:2: nests deeper"));
-  CHECK(refusal(std::string(200'001, '#')) == "a.toml: is larger than 195 KB: that is no note");
+  CHECK(toml_refusal("[a.b.c]\n[a.b.c.d.e]\n").starts_with("a.toml:2: nests deeper"));
+  CHECK(toml_refusal(std::string(200'001, '#')) ==
+        "a.toml: is larger than 195 KB: that is no note");
 }
 
 TEST_CASE("too many keys, tables or values are refused before they are parsed", "[toml]") {
@@ -72,15 +73,15 @@ TEST_CASE("too many keys, tables or values are refused before they are parsed", 
     for (int i = 0; i < times; ++i) all += text;
     return all;
   };
-  CHECK(refusal(repeated("[[a]]\n", 101)).contains("a.toml:101: has more than 100 keys"));
-  CHECK(refusal("a = [" + repeated("1,", 101) + "]").contains("has more than 100 keys"));
+  CHECK(toml_refusal(repeated("[[a]]\n", 101)).contains("a.toml:101: has more than 100 keys"));
+  CHECK(toml_refusal("a = [" + repeated("1,", 101) + "]").contains("has more than 100 keys"));
   CHECK(passes(repeated("[[a]]\n", 100)));
 }
 
 TEST_CASE("a mistake in TOML gives one error message with its line", "[toml]") {
-  CHECK(refusal("a = 1\nb = \x1b[2J\n").starts_with("a.toml:2: not TOML: "));
-  CHECK(refusal(std::string(100'000, 'k')).size() < 600);  // toml++ would repeat the whole key
-  CHECK_FALSE(refusal("\x1b\n").contains('\x1b'));
+  CHECK(toml_refusal("a = 1\nb = \x1b[2J\n").starts_with("a.toml:2: not TOML: "));
+  CHECK(toml_refusal(std::string(100'000, 'k')).size() < 600);  // toml++ would repeat the whole key
+  CHECK_FALSE(toml_refusal("\x1b\n").contains('\x1b'));
 }
 
 TEST_CASE("profiles and hands refuse TOML that is nested too deep", "[toml]") {

@@ -1,0 +1,40 @@
+// The figure of Axis Neuron and Axis Studio: 59 bones in the order in which every stream and BVH of
+// theirs lists them, and the proportions that posed assumes when a stream does not carry them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+
+#include "proto/frame/frame.hpp"
+
+namespace posed::drivers::axis {
+
+inline constexpr std::size_t kBones = 59;
+inline constexpr std::size_t kHips = 0;
+inline constexpr double kCentimetre_m = 0.01;
+
+// Offsets [cm] of the bones from their parents while the figure stands in T-pose; those of the hips
+// are their height.
+using Proportions = std::array<Vec3f, kBones>;
+
+// "RightHandThumb1" as the vendor spells it. Cold.
+[[nodiscard]] std::string bone_name(std::size_t bone);
+
+// An earlier bone; -1 for the hips. RT-safe.
+[[nodiscard]] int bone_parent(std::size_t bone) noexcept;
+
+// Where a bone without children ends [cm], in its own frame; zero for other bones. Streams never
+// carry it. RT-safe.
+[[nodiscard]] Vec3f bone_end_cm(std::size_t bone) noexcept;
+
+// A person of 1.73 m. RT-safe.
+[[nodiscard]] const Proportions& default_proportions() noexcept;
+
+// The offset of a bone from the displacement that a stream carries for it. The applications shift
+// bones a little (up to 4 cm at the feet) so that feet and hands stay where they touch something,
+// although bones have no joints that could slide. A bone that points along an axis in T-pose
+// therefore keeps its direction and takes only its length from the stream. RT-safe.
+[[nodiscard]] Vec3f offset_from(std::size_t bone, const Vec3f& displacement_cm) noexcept;
+
+}  // namespace posed::drivers::axis

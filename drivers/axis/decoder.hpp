@@ -1,0 +1,56 @@
+// Decodes an Axis stream: one Frame for each message of an avatar that the layout names. The
+// streams do not describe their avatars, so the decoder does, whenever they change.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "drivers/axis/layout.hpp"
+#include "drivers/axis/message_reader.hpp"
+#include "drivers/axis/roster.hpp"
+#include "drivers/driver.hpp"
+
+namespace posed::drivers::axis {
+
+// What the options say, because the streams do not.
+struct StreamSettings {
+  std::uint8_t order = 0;  // of the rotations, an index of kOrderNames
+  bool datagrams = false;  // over UDP, where messages come late or twice
+  double rate_hz = 0.0;    // of the frame numbers; 0: unknown
+};
+
+class AxisDecoder final : public Decoder, private Messages {
+ public:
+  explicit AxisDecoder(const StreamSettings& settings) noexcept
+      : settings_(settings), roster_(settings.order) {}
+
+  // Takes bytes cut at any position. RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+  // Takes what make_layout made. RT-safe.
+  void use(const SourceLayout& layout) noexcept override {
+    layout_ = static_cast<const AxisLayout*>(&layout);
+  }
+
+ private:
+  bool binary(std::span<const std::byte> bytes, bool in_damage) noexcept override;
+  void text(std::string_view text, bool in_damage) noexcept override;
+  void damage(Outcome outcome) noexcept override { sink_->outcome(outcome); }
+
+  // Emits the frame of `message_`.
+  [[nodiscard]] Outcome take_message() noexcept;
+  void emit_frame(std::size_t body, const Present& present) noexcept;
+
+  StreamSettings settings_;
+  MessageReader reader_;
+  Roster roster_;
+  Message message_;                     // the current one
+  const AxisLayout* layout_ = nullptr;  // null until the first description is in use
+  Sink* sink_ = nullptr;                // of the current call of feed()
+  std::int64_t now_ns_ = 0;
+};
+
+}  // namespace posed::drivers::axis

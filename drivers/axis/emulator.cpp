@@ -1,0 +1,177 @@
+#include "drivers/axis/emulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "drivers/axis/layout.hpp"
+#include "proto/frame/degree.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::drivers::axis {
+namespace {
+
+constexpr double kStep_hz = 0.9;  // double steps and waves a second
+constexpr double kPath_m = 1.0;   // radius of the circle that the walker follows
+constexpr double kLap_s = 12.0;
+constexpr float kSmaller = 0.9F;  // the waver
+
+// Bones by their place in the list.
+constexpr std::size_t kRightUpLeg = 1, kRightLeg = 2, kLeftUpLeg = 4, kLeftLeg = 5, kRightArm = 14,
+                      kRightForeArm = 15, kLeftArm = 37;
+
+Quatf about(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
+
+double phase_rad(double time_s) { return 2.0 * std::numbers::pi * kStep_hz * time_s; }
+
+// Arms hang down and swing against the legs; the path is a circle, so the motion has no end.
+void walk(double time_s, Vec3f& root_m, std::span<Quatf> bones) {
+  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
+  const double swing = 0.5 * std::sin(phase_rad(time_s));
+  root_m = {static_cast<float>(-kPath_m * std::cos(lap)), root_m[1],
+            static_cast<float>(kPath_m * std::sin(lap))};
+  bones[kHips] = about(Axis::kY, lap);
+  bones[kLeftArm] = from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3));
+  bones[kRightArm] = from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3));
+  bones[kLeftUpLeg] = about(Axis::kX, -swing);
+  bones[kLeftLeg] = about(Axis::kX, std::max(0.0, swing));
+  bones[kRightUpLeg] = about(Axis::kX, swing);
+  bones[kRightLeg] = about(Axis::kX, std::max(0.0, -swing));
+}
+
+void wave(double time_s, Vec3f& root_m, std::span<Quatf> bones) {
+  root_m = {0.0F, root_m[1], 2.5F};
+  bones[kLeftArm] = about(Axis::kZ, -1.3);
+  bones[kRightArm] = about(Axis::kZ, -0.6);
+  bones[kRightForeArm] = about(Axis::kZ, -0.9 + 0.4 * std::sin(phase_rad(time_s)));
+}
+
+}  // namespace
+
+AxisEmulator::AxisEmulator(const EmulatorSettings& settings)
+    : settings_(settings), people_(2), frames_(nanoseconds(1.0 / settings.rate_hz)) {
+  for (std::size_t body = 0; body < people_.size(); ++body) {
+    Person& person = people_[body];
+    person.entry.avatar =
+        make_avatar(static_cast<std::uint32_t>(body), body == 0 ? "Walker" : "Waver");
+    person.entry.reference = settings.content.reference;
+    person.entry.measured = settings.content.displacement;
+    person.message.avatar = person.entry.avatar;
+    person.message.content = settings.content;
+    person.rotation_xyzw.fill(kIdentity);
+    set_scale(body, body == 0 ? 1.0F : kSmaller);
+    // Without displacement the host assumes its own proportions.
+    const AvatarEntry as_sent =
+        person.entry.measured
+            ? person.entry
+            : AvatarEntry{.avatar = person.entry.avatar, .reference = person.entry.reference};
+    person.skeleton = skeleton_of(as_sent, settings.order).value();
+  }
+  frames_.start(0);
+}
+
+void AxisEmulator::set_scale(std::size_t body, float scale) {
+  Person& person = people_[body];
+  person.entry.offset_cm = default_proportions();
+  for (Vec3f& offset : person.entry.offset_cm) {
+    for (float& x_cm : offset) x_cm *= scale;
+  }
+  person.root_m[1] = person.entry.offset_cm[kHips][1] * static_cast<float>(kCentimetre_m);
+}
+
+const Skeleton* AxisEmulator::skeleton(std::size_t body) const {
+  return body < people_.size() ? people_[body].skeleton.get() : nullptr;
+}
+
+// The format has no place for a joint that is not known: it stays as it was.
+void AxisEmulator::pose(std::size_t body, const Frame& frame) {
+  if (body >= people_.size()) return;
+  Person& person = people_[body];
+  person.posed = true;
+  person.root_m = frame.root_position_m;
+  const std::size_t joints =
+      std::min<std::size_t>(person.skeleton->joints.size(), frame.joint_count);
+  for (std::size_t j = 0; j < joints; ++j) {
+    if (frame.valid[j]) person.rotation_xyzw[j] = frame.rotation_xyzw[j];
+  }
+}
+
+void AxisEmulator::move(double time_s) {
+  for (std::size_t body = 0; body < people_.size(); ++body) {
+    Person& person = people_[body];
+    if (person.posed) continue;
+    const std::span bones = std::span(person.rotation_xyzw).subspan(person.entry.reference ? 1 : 0);
+    (body == 0 ? walk : wave)(time_s, person.root_m, bones);
+  }
+}
+
+void AxisEmulator::fill_message(Person& person) {
+  Message& message = person.message;
+  message.frame_number = number_;
+  const Skeleton& skeleton = *person.skeleton;
+  // Adding zero makes a negative zero positive: the same pose gives the same bytes.
+  const auto angles_at = [&](std::size_t joint, std::size_t at) {
+    auto& near_rad = person.near_rad[joint];
+    near_rad = channels_from_rotation(skeleton, static_cast<int>(joint),
+                                      to_eigen_double(person.rotation_xyzw[joint]), near_rad);
+    for (std::size_t i = 0; i < 3; ++i) message.values[at + i] = near_rad[i] / kDegree + 0.0;
+  };
+  const auto root = static_cast<std::size_t>(skeleton.root_joint);
+  Eigen::Vector3d root_m(person.root_m[0], person.root_m[1], person.root_m[2]);
+  if (root == 1) {  // the reference stays at the origin
+    angles_at(0, 3);
+    root_m = to_eigen_double(person.rotation_xyzw[0]).conjugate() * root_m;
+  }
+  for (std::size_t b = 0; b < kBones; ++b) {
+    const std::size_t at = rotations_at(message.content, b);
+    angles_at(root + b, at);
+    if (b != kHips && !message.content.displacement) continue;
+    for (std::size_t i = 0; i < 3; ++i) {
+      message.values[at - 3 + i] = b == kHips ? root_m[static_cast<int>(i)] / kCentimetre_m
+                                              : static_cast<double>(person.entry.offset_cm[b][i]);
+    }
+  }
+}
+
+void AxisEmulator::encode(const Person& person, Bytes& out) const {
+  const std::size_t before = out.size();
+  out.resize(before + kMaxText);
+  const std::span room = std::span(out).subspan(before);
+  std::size_t size = 0;
+  if (settings_.form == Form::kText) {
+    size = encode_text(person.message, {reinterpret_cast<char*>(room.data()), room.size() - 1});
+    room[size++] = std::byte{'\n'};
+  } else {
+    size = encode_binary(person.message, settings_.form, room);
+  }
+  out.resize(before + size);
+}
+
+void AxisEmulator::emit(std::int64_t now_ns, Bytes& out) {
+  if (piece_.empty()) {
+    move(seconds(frames_.due_ns()));
+    ++number_;
+    waiting_.clear();
+    for (Person& person : people_) {
+      if (!person.present) continue;
+      const std::size_t before = waiting_.size();
+      fill_message(person);
+      encode(person, waiting_);
+      for (std::size_t left = waiting_.size() - before; settings_.split_bytes != 0 && left != 0;) {
+        piece_.push_back(std::min(left, settings_.split_bytes));
+        left -= piece_.back();
+      }
+    }
+    if (settings_.split_bytes == 0) piece_.push_back(waiting_.size());
+    std::ranges::reverse(piece_);
+  }
+  if (!piece_.empty()) {
+    const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(piece_.back());
+    out.insert(out.end(), waiting_.begin(), end);
+    waiting_.erase(waiting_.begin(), end);
+    piece_.pop_back();
+  }
+  if (piece_.empty()) frames_.step(now_ns);
+}
+
+}  // namespace posed::drivers::axis

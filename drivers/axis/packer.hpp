@@ -1,0 +1,33 @@
+// Packer writes little-endian values into a buffer of the caller, without allocating. (ByteWriter
+// makes the same bytes in memory of its own.) All of it is RT-safe.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace posed::drivers::axis {
+
+class Packer {
+ public:
+  // `out` must have room for all that is written.
+  explicit Packer(std::span<std::byte> out) noexcept : out_(out) {}
+
+  void number(std::uint32_t value, std::size_t bytes) noexcept {
+    for (std::size_t i = 0; i < bytes; ++i) {
+      out_[size_++] = static_cast<std::byte>(value >> 8 * i & 0xFF);
+    }
+  }
+  void f32(float value) noexcept { number(std::bit_cast<std::uint32_t>(value), 4); }
+  void text(std::span<const char> value) noexcept {
+    for (const char c : value) out_[size_++] = static_cast<std::byte>(c);
+  }
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+
+ private:
+  std::span<std::byte> out_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace posed::drivers::axis

@@ -1,0 +1,34 @@
+// Decodes each datagram of a mocopi app: a skeleton is passed on, a frame becomes one Frame.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "drivers/datagram_order.hpp"
+#include "drivers/driver.hpp"
+#include "drivers/mocopi/layout.hpp"
+#include "drivers/timestamp_clock.hpp"
+
+namespace posed::drivers::mocopi {
+
+class MocopiDecoder final : public Decoder {
+ public:
+  // Takes one datagram per call. RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+  // Takes what make_layout made. RT-safe.
+  void use(const SourceLayout& layout) noexcept override {
+    layout_ = static_cast<const MocopiLayout*>(&layout);
+  }
+
+ private:
+  [[nodiscard]] Outcome take_frame(std::span<const std::byte> content, Sink& sink) noexcept;
+
+  const MocopiLayout* layout_ = nullptr;  // null until the app has sent its skeleton
+  DatagramOrder order_{32};
+  TimestampClock clock_;
+};
+
+}  // namespace posed::drivers::mocopi

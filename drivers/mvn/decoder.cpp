@@ -1,0 +1,221 @@
+#include "drivers/mvn/decoder.hpp"
+
+#include <algorithm>
+
+#include "proto/frame/rotation.hpp"
+
+namespace posed::drivers::mvn {
+namespace {
+
+// MVN may pause: time in which nothing comes at all makes nobody leave.
+constexpr std::int64_t kSilence_ns = kNanosPerSecond / 2;
+constexpr std::int64_t kBetweenDescriptions_ns = 300'000'000;
+
+// The joints of a skeleton with or without fingers from the segments of a pose. A segment that was
+// not seen moves with its parent. RT-safe.
+void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept {
+  const JointTable& table = joint_table(fingers);
+  std::array<Eigen::Quaterniond, kSegments> turned;  // [joint], in the room
+  frame.joint_count = static_cast<std::uint16_t>(table.count);
+  frame.root_position_m = pose.segments[0].position_m;
+  for (std::size_t j = 0; j < table.count; ++j) {
+    const std::size_t s = table.segment[j];
+    const bool seen = pose.segments[s].seen && (s < kBodySegments || pose.fingers);
+    const Eigen::Quaterniond above =
+        j == 0 ? Eigen::Quaterniond::Identity() : turned[static_cast<std::size_t>(table.parent[j])];
+    frame.valid[j] = seen;
+    frame.rotation_xyzw[j] = kIdentity;
+    turned[j] = above;
+    if (!seen) continue;
+    const Quatf& rotation = pose.segments[s].rotation_xyzw;
+    frame.rotation_xyzw[j] = rotation;
+    if (pose.local) continue;
+    turned[j] = to_eigen_double(rotation);
+    frame.rotation_xyzw[j] = from_eigen((above.conjugate() * turned[j]).normalized());
+  }
+}
+
+}  // namespace
+
+// RT-safe.
+void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                      Sink& sink) noexcept {
+  now_ns_ = arrival_ns;
+  skip_silence();
+  if (stream_) {
+    framer_.feed(bytes, [&](std::span<const std::byte> datagram) noexcept {
+      sink.outcome(datagram.empty() ? Outcome::kForeign : take(datagram, sink));
+      describe(sink);
+    });
+  } else {
+    sink.outcome(take(bytes, sink));
+    describe(sink);
+  }
+}
+
+// RT-safe.
+Outcome MvnDecoder::take(std::span<const std::byte> bytes, Sink& sink) noexcept {
+  Datagram datagram;
+  const Outcome outcome = decode_datagram(bytes, datagram);
+  if (outcome != Outcome::kOk) return outcome;
+  switch (datagram.head.type) {
+    case Type::kMeta:
+      return take_meta(datagram);
+    case Type::kScale:
+      return take_scale(datagram);
+    case Type::kCentreOfMass:
+      return take_mass(datagram, sink);
+    default:
+      return is_pose(datagram.head.type) ? take_pose(datagram, sink) : Outcome::kOk;
+  }
+}
+
+// RT-safe.
+Outcome MvnDecoder::take_pose(const Datagram& datagram, Sink& sink) noexcept {
+  Tracked* tracked = find_or_add(datagram.head.character);
+  if (tracked == nullptr) return Outcome::kOutOfRange;
+  if (!tracked->prefers(datagram.head, now_ns_)) return Outcome::kOk;
+  const Tracked::Part part = tracked->take_part(datagram, gathered_);
+  if (part.lost) sink.outcome(Outcome::kShort);  // stands for the part that did not come
+  return part.whole ? take_sample(*tracked, datagram.head, part.items, sink) : part.outcome;
+}
+
+// RT-safe.
+Outcome MvnDecoder::take_sample(Tracked& tracked, const Head& head,
+                                std::span<const std::byte> items, Sink& sink) noexcept {
+  const Outcome outcome = decode_pose(head, items, pose_);
+  if (outcome != Outcome::kOk) return outcome;
+  tracked.heard_ns = now_ns_;
+  tracked.look_at(pose_, now_ns_);
+  const std::int64_t device_ns = device_time_ns(tracked, head);
+  const std::size_t body = layout_ == nullptr ? 0 : layout_->body_of(head.character);
+  if (layout_ == nullptr || body == layout_->bodies.size()) return Outcome::kForeign;
+  Frame frame;
+  fill_frame(pose_, layout_->entries[body].fingers, frame);
+  frame.header.device_ns = device_ns;
+  frame.skeleton = layout_->bodies[body].skeleton->id;
+  sink.frame(body, frame);
+  return Outcome::kOk;
+}
+
+// RT-safe.
+Outcome MvnDecoder::take_mass(const Datagram& datagram, Sink& sink) noexcept {
+  Tracked* tracked = find(datagram.head.character);
+  if (tracked == nullptr) return Outcome::kForeign;  // nobody with a pose
+  Vec3f position_m;
+  const Outcome outcome = decode_centre_of_mass(datagram.payload, position_m);
+  if (outcome != Outcome::kOk) return outcome;
+  const Outcome order = tracked->mass_order.take(datagram.head.sample);
+  if (order != Outcome::kOk) return order;
+  tracked->changed = tracked->changed || !tracked->character.mass;
+  tracked->character.mass = true;
+  const std::int64_t device_ns = device_time_ns(*tracked, datagram.head);
+  const std::size_t body = layout_ == nullptr ? 0 : layout_->body_of(datagram.head.character);
+  if (layout_ == nullptr || body == layout_->bodies.size() || !layout_->entries[body].mass) {
+    return Outcome::kForeign;
+  }
+  Sample sample;
+  sample.header.device_ns = device_ns;
+  sample.value_count = kMassValues;
+  for (std::size_t i = 0; i < kMassValues; ++i) {
+    sample.value[i] = position_m[i];
+    sample.valid.set(i);
+  }
+  sink.sample(body, sample);
+  return Outcome::kOk;
+}
+
+// RT-safe.
+Outcome MvnDecoder::take_meta(const Datagram& datagram) noexcept {
+  std::string_view name;
+  const Outcome outcome = decode_meta(datagram.payload, name);
+  if (outcome != Outcome::kOk || name.empty()) return outcome;
+  Tracked* tracked = find_or_add(datagram.head.character);
+  if (tracked == nullptr) return Outcome::kOutOfRange;
+  tracked->set_name(name);
+  return Outcome::kOk;
+}
+
+// RT-safe.
+Outcome MvnDecoder::take_scale(const Datagram& datagram) noexcept {
+  std::array<Vec3f, kBodySegments> position_m{};
+  bool told = false;
+  const Outcome outcome = decode_scale(datagram.payload, position_m, told);
+  if (outcome != Outcome::kOk || !told) return outcome;
+  Tracked* tracked = find_or_add(datagram.head.character);
+  if (tracked == nullptr) return Outcome::kOutOfRange;
+  tracked->set_scale(position_m);
+  return Outcome::kOk;
+}
+
+// RT-safe.
+Tracked* MvnDecoder::find(std::uint8_t character) noexcept {
+  for (Tracked& tracked : characters_) {
+    if (tracked.known && tracked.character.id == character) return &tracked;
+  }
+  return nullptr;
+}
+
+// Characters that are gone keep their slot, and so their name, until another one needs it. RT-safe.
+Tracked* MvnDecoder::find_or_add(std::uint8_t character) noexcept {
+  if (Tracked* known = find(character); known != nullptr) return known;
+  Tracked* room = nullptr;
+  for (Tracked& tracked : characters_) {
+    if (tracked.described) continue;
+    const bool better = room == nullptr || (room->known && tracked.heard_ns < room->heard_ns);
+    if (!tracked.known || better) room = &tracked;
+    if (!tracked.known) break;
+  }
+  if (room != nullptr) room->begin(character, now_ns_);
+  return room;
+}
+
+// RT-safe.
+std::int64_t MvnDecoder::device_time_ns(Tracked& tracked, const Head& head) noexcept {
+  if (!tracked.clock.has_begun()) {
+    const TimeCode* other = nullptr;
+    for (const Tracked& each : characters_) {
+      if (each.known && each.clock.has_begun()) other = &each.clock;
+    }
+    tracked.clock.begin(head.time_ms, other);
+  }
+  return tracked.clock.to_ns(head.time_ms);
+}
+
+// RT-safe.
+void MvnDecoder::skip_silence() noexcept {
+  const std::int64_t silent_ns = heard_ns_ == kNoTime_ns ? 0 : now_ns_ - heard_ns_;
+  heard_ns_ = now_ns_;
+  if (silent_ns < kSilence_ns) return;
+  for (Tracked& tracked : characters_) {
+    tracked.first_ns += silent_ns;
+    tracked.heard_ns += silent_ns;
+  }
+}
+
+// Describes the characters if they are others than before. RT-safe.
+void MvnDecoder::describe(Sink& sink) noexcept {
+  if (described_ns_ != kNoTime_ns && now_ns_ - described_ns_ < kBetweenDescriptions_ns) return;
+  bool due = false;
+  std::size_t count = 0;
+  for (Tracked& tracked : characters_) {
+    if (!tracked.known) continue;
+    const bool belongs = tracked.belongs(now_ns_);
+    due = due || belongs != tracked.described || (belongs && tracked.changed);
+    count += belongs ? 1 : 0;
+    tracked.described = belongs;
+  }
+  if (!due) return;
+  described_ns_ = now_ns_;
+  std::size_t used = write_description_head(count, description_);
+  // In the order of their numbers, so that who comes first changes nothing.
+  for (std::size_t id = 0; id < 256; ++id) {
+    Tracked* tracked = find(static_cast<std::uint8_t>(id));
+    if (tracked == nullptr || !tracked->described) continue;
+    tracked->changed = false;
+    used += write_character(tracked->character, std::span(description_).subspan(used));
+  }
+  sink.description(std::span(description_).first(used));
+}
+
+}  // namespace posed::drivers::mvn

@@ -1,0 +1,60 @@
+// Decodes MVN's datagrams, over UDP or out of a TCP stream: each sample of a character becomes one
+// Frame. The decoder also keeps the list of the characters that it hears, and describes it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "drivers/driver.hpp"
+#include "drivers/mvn/framer.hpp"
+#include "drivers/mvn/layout.hpp"
+#include "drivers/mvn/protocol.hpp"
+#include "drivers/mvn/tracked.hpp"
+
+namespace posed::drivers::mvn {
+
+class MvnDecoder final : public Decoder {
+ public:
+  // `stream`: the bytes come over TCP, cut anywhere; otherwise each call gets one datagram.
+  explicit MvnDecoder(bool stream) noexcept : stream_(stream) {}
+
+  // RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+  // Takes what make_layout made. RT-safe.
+  void use(const SourceLayout& layout) noexcept override {
+    layout_ = static_cast<const MvnLayout*>(&layout);
+  }
+
+ private:
+  [[nodiscard]] Outcome take(std::span<const std::byte> bytes, Sink& sink) noexcept;
+  [[nodiscard]] Outcome take_pose(const Datagram& datagram, Sink& sink) noexcept;
+  [[nodiscard]] Outcome take_sample(Tracked& tracked, const Head& head,
+                                    std::span<const std::byte> items, Sink& sink) noexcept;
+  [[nodiscard]] Outcome take_mass(const Datagram& datagram, Sink& sink) noexcept;
+  [[nodiscard]] Outcome take_meta(const Datagram& datagram) noexcept;
+  [[nodiscard]] Outcome take_scale(const Datagram& datagram) noexcept;
+  [[nodiscard]] Tracked* find(std::uint8_t character) noexcept;
+  // The character, now known if there is room; null otherwise.
+  [[nodiscard]] Tracked* find_or_add(std::uint8_t character) noexcept;
+  [[nodiscard]] std::int64_t device_time_ns(Tracked& tracked, const Head& head) noexcept;
+  void skip_silence() noexcept;
+  void describe(Sink& sink) noexcept;
+
+  bool stream_;
+  const MvnLayout* layout_ = nullptr;  // null until the first description is in use
+  std::int64_t now_ns_ = kNoTime_ns;   // arrival of the bytes
+  std::int64_t heard_ns_ = kNoTime_ns;
+  std::int64_t described_ns_ = kNoTime_ns;
+  std::array<Tracked, kMaxCharacters> characters_;
+  CharacterPose pose_;
+  Assembly::Buffer gathered_{};
+  std::array<std::byte, kMaxMvnDescription> description_{};
+  Framer framer_;
+};
+
+}  // namespace posed::drivers::mvn

@@ -1,0 +1,204 @@
+#include "drivers/mvn/emulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <utility>
+
+#include "drivers/mvn/encode.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::drivers::mvn {
+namespace {
+
+constexpr double kStep_hz = 0.9;  // double steps and waves a second
+constexpr double kPath_m = 1.0;   // radius of the circle that the walker follows
+constexpr double kLap_s = 12.0;
+constexpr std::uint8_t kJoints = 22;    // items of type 20
+constexpr std::uint8_t kTrackers = 17;  // items of type 23
+
+using Rotations = std::array<Quatf, kSegments>;
+
+Quatf turned(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
+
+// Arms hang down and swing against the legs, the fingers open and close; the path is a circle, so
+// the motion has no end.
+void walk(double time_s, Vec3f& root_m, Rotations& q) {
+  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
+  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
+  root_m = {static_cast<float>(-kPath_m * std::cos(lap)), 0.98F,
+            static_cast<float>(kPath_m * std::sin(lap))};
+  q[0] = turned(Axis::kY, lap);
+  q[4] = turned(Axis::kY, 0.1 * swing);
+  q[12] = from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3));
+  q[8] = from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3));
+  q[19] = turned(Axis::kX, -swing);
+  q[20] = turned(Axis::kX, std::max(0.0, swing));
+  q[15] = turned(Axis::kX, swing);
+  q[16] = turned(Axis::kX, std::max(0.0, -swing));
+  for (std::size_t i = 5; i < kHandSegments; ++i) {
+    if (i % 4 == 0) continue;  // metacarpals
+    q[kLeftFingers + i] = turned(Axis::kZ, -0.5 + swing);
+    q[kRightFingers + i] = turned(Axis::kZ, 0.5 - swing);
+  }
+}
+
+void wave(double time_s, Vec3f& root_m, Rotations& q) {
+  const double swing = 0.4 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
+  root_m = {0.0F, 0.88F, 2.5F};
+  q[12] = turned(Axis::kZ, -1.3);
+  q[8] = turned(Axis::kZ, -0.6);
+  q[9] = turned(Axis::kZ, -0.9 + swing);
+}
+
+// All segments in the room, or each from its parent.
+CharacterPose pose_of(const Character& character, const Vec3f& root_m, const Rotations& rotations,
+                      bool local) {
+  CharacterPose pose;
+  pose.fingers = character.fingers;
+  pose.local = local;
+  std::array<Eigen::Quaterniond, kSegments> global;
+  for (std::size_t i = 0; i < character.segments(); ++i) {
+    SegmentPose& segment = pose.segments[i];
+    const int parent = parent_segment(i);
+    const Quatf& q = rotations[i];
+    segment.seen = q != Quatf{};
+    const Eigen::Quaterniond turn =
+        segment.seen ? to_eigen_double(q) : Eigen::Quaterniond::Identity();
+    segment.position_m = parent < 0 ? root_m : character.offset_m[i];
+    segment.rotation_xyzw = from_eigen(turn);
+    global[i] = turn;
+    if (parent < 0 || local) continue;
+    const auto above = static_cast<std::size_t>(parent);
+    global[i] = (global[above] * turn).normalized();
+    segment.rotation_xyzw = from_eigen(global[i]);
+    const Vec3f& o = character.offset_m[i];
+    const Eigen::Vector3d offset = global[above] * Eigen::Vector3d(o[0], o[1], o[2]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      segment.position_m[k] =
+          pose.segments[above].position_m[k] + static_cast<float>(offset[static_cast<int>(k)]);
+    }
+  }
+  return pose;
+}
+
+std::array<Vec3f, kBodySegments> t_pose_of(const Character& character) {
+  Rotations straight;
+  straight.fill(kIdentity);
+  const CharacterPose pose = pose_of(character, character.offset_m[0], straight, false);
+  std::array<Vec3f, kBodySegments> position_m{};
+  for (std::size_t i = 0; i < kBodySegments; ++i) position_m[i] = pose.segments[i].position_m;
+  return position_m;
+}
+
+std::vector<std::byte> time_text(std::int64_t time_ns) {
+  const std::int64_t ms = time_ns / 1'000'000;
+  std::array<char, 40> text{};
+  (void)std::snprintf(text.data(), text.size(), "%02d:%02d:%02d.%03d",
+                      static_cast<int>(ms / 3'600'000 % 24), static_cast<int>(ms / 60'000 % 60),
+                      static_cast<int>(ms / 1000 % 60), static_cast<int>(ms % 1000));
+  const auto bytes = std::as_bytes(std::span(text)).first(12);
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace
+
+MvnEmulator::MvnEmulator(Settings settings)
+    : settings_(std::move(settings)), samples_(nanoseconds(1.0 / settings_.rate_hz)) {
+  for (const Character& character : {emulated_walker(), emulated_waver()}) {
+    if (people_.size() == settings_.characters) break;
+    Person& person = people_.emplace_back();
+    person.character = character;
+    person.skeleton = skeleton_of(character).value();
+    person.rotation_xyzw.fill(kIdentity);
+  }
+  samples_.start(0);
+}
+
+const Skeleton* MvnEmulator::skeleton(std::size_t body) const {
+  return body < people_.size() ? people_[body].skeleton.get() : nullptr;
+}
+
+void MvnEmulator::pose(std::size_t body, const Frame& frame) {
+  if (body >= people_.size()) return;
+  Person& person = people_[body];
+  person.posed = true;
+  person.root_m = frame.root_position_m;
+  const JointTable& table = joint_table(person.character.fingers);
+  for (std::size_t j = 0; j < std::min<std::size_t>(table.count, frame.joint_count); ++j) {
+    person.rotation_xyzw[table.segment[j]] = frame.valid[j] ? frame.rotation_xyzw[j] : Quatf{};
+  }
+}
+
+std::int64_t MvnEmulator::next_due_ns() const {
+  return queue_.empty() ? samples_.due_ns() : queued_ns_;
+}
+
+void MvnEmulator::emit(std::int64_t now_ns, Bytes& out) {
+  if (queue_.empty()) fill_queue(now_ns);
+  if (queue_.empty()) return;  // nobody is present
+  out.insert(out.end(), queue_.front().begin(), queue_.front().end());
+  queue_.pop_front();
+}
+
+void MvnEmulator::fill_queue(std::int64_t now_ns) {
+  queued_ns_ = samples_.due_ns();
+  samples_.step(now_ns);
+  const double time_s = seconds(queued_ns_);
+  if (!people_[0].posed) walk(time_s, people_[0].root_m, people_[0].rotation_xyzw);
+  if (people_.size() > 1 && !people_[1].posed) {
+    wave(time_s, people_[1].root_m, people_[1].rotation_xyzw);
+  }
+  const bool tell = told_ns_ == kNoTime_ns || queued_ns_ - told_ns_ >= kNanosPerSecond;
+  if (tell) told_ns_ = queued_ns_;
+  for (const Person& person : people_) {
+    for (const Type type : settings_.types) {
+      const bool told_once = type == Type::kMeta || type == Type::kScale;
+      if (person.present && (tell || !told_once)) add_sample(person, type, queued_ns_);
+    }
+  }
+  ++sample_;
+}
+
+void MvnEmulator::add_sample(const Person& person, Type type, std::int64_t time_ns) {
+  const Character& character = person.character;
+  Head head{.type = type,
+            .sample = sample_,
+            .items = 1,
+            .time_ms = static_cast<std::uint32_t>(time_ns / 1'000'000),
+            .character = character.id,
+            .body = kBodySegments,
+            .fingers = static_cast<std::uint8_t>(character.segments() - kBodySegments)};
+  const auto add = [&](std::span<const std::byte> payload) {
+    queue_.push_back(encode_datagram(head, payload));
+  };
+  const auto add_items = [&](std::span<const std::byte> payload) {
+    head.items = static_cast<std::uint8_t>(payload.size() / item_bytes(type));
+    for (auto& part : encode_sample(head, payload, settings_.longest)) {
+      queue_.push_back(std::move(part));
+    }
+  };
+  switch (type) {
+    case Type::kMeta:
+      return add(encode_meta({character.name.data(), character.name_bytes}));
+    case Type::kScale:
+      return add(encode_scale(t_pose_of(character)));
+    case Type::kCentreOfMass:
+      return add(encode_centre_of_mass(person.root_m));
+    case Type::kTimeCode:
+      return add(time_text(time_ns));
+    case Type::kJointAngles:
+      return add_items(encode_ignored(type, kJoints));
+    case Type::kTrackers:
+      return add_items(encode_ignored(type, kTrackers));
+    case Type::kLinear:
+    case Type::kAngular:
+      return add_items(encode_ignored(type, kBodySegments));
+    default:
+      return add_items(encode_pose(
+          type, pose_of(character, person.root_m, person.rotation_xyzw, type == Type::kUnity)));
+  }
+}
+
+}  // namespace posed::drivers::mvn

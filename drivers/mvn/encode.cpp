@@ -1,0 +1,138 @@
+#include "drivers/mvn/encode.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "drivers/byte_writer.hpp"
+#include "proto/frame/degree.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::drivers::mvn {
+namespace {
+
+constexpr int kTextDigits = 10;
+
+void write_vector(BigEndianWriter& writer, const Vec3f& v) {
+  for (const float x : v) writer.f32(x);
+}
+
+Vec3f to_z_up(const Vec3f& v) { return {v[2], v[0], v[1]}; }
+
+// Angles about the fixed axes X, Y, Z, in this order of turning [degrees].
+Vec3f to_euler(const Quatf& rotation) {
+  const Eigen::Matrix3d m = to_eigen_double(rotation).toRotationMatrix();
+  const double y = std::asin(std::clamp(-m(2, 0), -1.0, 1.0));
+  const double x = std::atan2(m(2, 1), m(2, 2));
+  const double z = std::atan2(m(1, 0), m(0, 0));
+  return {static_cast<float>(x / kDegree), static_cast<float>(y / kDegree),
+          static_cast<float>(z / kDegree)};
+}
+
+void write_segment(BigEndianWriter& writer, Type type, const SegmentPose& segment) {
+  const Vec3f& p = segment.position_m;
+  const Quatf q = segment.seen ? segment.rotation_xyzw : Quatf{};
+  switch (type) {
+    case Type::kEuler:
+      write_vector(writer, {p[0] * 100.0F, p[1] * 100.0F, p[2] * 100.0F});
+      write_vector(writer, to_euler(segment.rotation_xyzw));
+      break;
+    case Type::kUnity:
+      write_vector(writer, {-p[0], p[1], p[2]});
+      writer.f32(q[3]);
+      write_vector(writer, {q[0], -q[1], -q[2]});
+      break;
+    default:
+      write_vector(writer, to_z_up(p));
+      writer.f32(q[3]);
+      write_vector(writer, to_z_up({q[0], q[1], q[2]}));
+  }
+}
+
+void write_text(BigEndianWriter& writer, std::string_view text) {
+  writer.i32(static_cast<std::int32_t>(text.size()));
+  writer.text(text);
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_datagram(const Head& head, std::span<const std::byte> payload) {
+  const int type = static_cast<int>(head.type);
+  BigEndianWriter writer;
+  writer.text("MXTP");
+  writer.u8(static_cast<std::uint8_t>('0' + type / kTextDigits));
+  writer.u8(static_cast<std::uint8_t>('0' + type % kTextDigits));
+  writer.u32(head.sample);
+  writer.u8(static_cast<std::uint8_t>(head.part | (head.last ? 0x80 : 0)));
+  writer.u8(head.items);
+  writer.u32(head.time_ms);
+  writer.u8(head.character);
+  writer.u8(head.body);
+  writer.u8(head.props);
+  writer.u8(head.fingers);
+  writer.u16(0);
+  writer.u16(static_cast<std::uint16_t>(head.old ? 0 : payload.size()));
+  writer.bytes(payload);
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_pose(Type type, const CharacterPose& pose) {
+  const bool unity = type == Type::kUnity;
+  const std::size_t count = pose.fingers && !unity ? kSegments : kBodySegments;
+  BigEndianWriter writer;
+  for (std::size_t i = 0; i < count; ++i) {
+    writer.i32(static_cast<std::int32_t>(i + 1));
+    write_segment(writer, type, pose.segments.at(unity ? kUnitySegments.at(i) : i));
+  }
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_meta(std::string_view name) {
+  BigEndianWriter writer;
+  write_text(writer, "color:3070d0\nname:" + std::string(name) + "\nxmid:00000000\n");
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_scale(std::span<const Vec3f, kBodySegments> position_m) {
+  BigEndianWriter writer;
+  writer.i32(static_cast<std::int32_t>(kBodySegments));
+  for (std::size_t i = 0; i < kBodySegments; ++i) {
+    write_text(writer, segment_name(i));
+    write_vector(writer, to_z_up(position_m[i]));
+  }
+  writer.i32(0);
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_ignored(Type type, std::size_t items) {
+  BigEndianWriter writer;
+  for (std::size_t i = 0; i < items; ++i) {
+    writer.i32(static_cast<std::int32_t>(i + 1));
+    writer.bytes(std::vector<std::byte>(item_bytes(type) - sizeof(std::int32_t)));
+  }
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_centre_of_mass(const Vec3f& position_m) {
+  BigEndianWriter writer;
+  write_vector(writer, to_z_up(position_m));
+  return writer.finish();
+}
+
+std::vector<std::vector<std::byte>> encode_sample(const Head& head,
+                                                  std::span<const std::byte> payload,
+                                                  std::size_t longest) {
+  const std::size_t item = item_bytes(head.type);
+  const std::size_t per_part = std::max<std::size_t>(1, (longest - kHeadBytes) / item) * item;
+  std::vector<std::vector<std::byte>> datagrams;
+  for (std::size_t at = 0; at < payload.size(); at += per_part) {
+    const auto piece = payload.subspan(at, std::min(per_part, payload.size() - at));
+    Head part = head;
+    part.part = static_cast<std::uint8_t>(datagrams.size());
+    part.items = static_cast<std::uint8_t>(piece.size() / item);
+    part.last = at + piece.size() == payload.size();
+    datagrams.push_back(encode_datagram(part, piece));
+  }
+  return datagrams;
+}
+
+}  // namespace posed::drivers::mvn

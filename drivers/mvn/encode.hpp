@@ -1,0 +1,38 @@
+// Builds MVN's datagrams, for the emulator and for tests. Cold: allocates.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "drivers/mvn/protocol.hpp"
+
+namespace posed::drivers::mvn {
+
+// The head with `payload`, whose size it tells.
+[[nodiscard]] std::vector<std::byte> encode_datagram(const Head& head,
+                                                     std::span<const std::byte> payload);
+
+// The payload of a pose of type 01, 02 or 05 without props. The pose is global, in posed's axes;
+// for 05 it is local. A segment that was not seen has no rotation: all zero in 02 and 05.
+[[nodiscard]] std::vector<std::byte> encode_pose(Type type, const CharacterPose& pose);
+
+[[nodiscard]] std::vector<std::byte> encode_meta(std::string_view name);
+
+// Where the body's segments are in T-pose, in posed's axes.
+[[nodiscard]] std::vector<std::byte> encode_scale(std::span<const Vec3f, kBodySegments> position_m);
+
+// As many items of a type that posed ignores, all zero but their numbers.
+[[nodiscard]] std::vector<std::byte> encode_ignored(Type type, std::size_t items);
+
+[[nodiscard]] std::vector<std::byte> encode_centre_of_mass(const Vec3f& position_m);
+
+// Cuts a pose's payload into datagrams of at most `longest` bytes, each with whole items.
+[[nodiscard]] std::vector<std::vector<std::byte>> encode_sample(const Head& head,
+                                                                std::span<const std::byte> payload,
+                                                                std::size_t longest);
+
+}  // namespace posed::drivers::mvn

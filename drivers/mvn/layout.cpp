@@ -1,0 +1,157 @@
+#include "drivers/mvn/layout.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <bitset>
+#include <cstring>
+
+#include "drivers/byte_reader.hpp"
+#include "drivers/pose_values.hpp"
+#include "proto/frame/t_pose.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::drivers::mvn {
+namespace {
+
+constexpr std::uint8_t kDescriptionVersion = 1;
+constexpr std::uint8_t kWithFingers = 1;
+constexpr std::uint8_t kWithMass = 2;
+
+// RT-safe.
+class FixedWriter {
+ public:
+  explicit FixedWriter(std::span<std::byte> to) noexcept : to_(to) {}
+  void u8(std::size_t value) noexcept {
+    if (used_ < to_.size()) to_[used_++] = static_cast<std::byte>(value);
+  }
+  void f32(float value) noexcept {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    for (unsigned shift = 0; shift < 32; shift += 8) u8(bits >> shift & 0xFFU);
+  }
+  [[nodiscard]] std::size_t used() const noexcept { return used_; }
+
+ private:
+  std::span<std::byte> to_;
+  std::size_t used_ = 0;
+};
+
+std::unexpected<Error> mvn_wrong(const std::string& what) {
+  return fail("the description of the MVN characters " + what +
+              "; it was written by posed, so its log or its copy is damaged");
+}
+
+Result<Character> read_character(ByteReader& reader) {
+  Character character;
+  character.id = reader.u8();
+  const std::uint8_t flags = reader.u8();
+  character.fingers = (flags & kWithFingers) != 0;
+  character.mass = (flags & kWithMass) != 0;
+  character.name_bytes = reader.u8();
+  if (flags > (kWithFingers | kWithMass) || character.name_bytes > kMvnNameBytes) {
+    return mvn_wrong("has a character that makes no sense");
+  }
+  const std::string_view name = reader.text(character.name_bytes);
+  std::ranges::copy(name, character.name.begin());
+  for (std::size_t i = 0; i < character.segments(); ++i) {
+    for (float& x_m : character.offset_m[i]) x_m = reader.f32();
+    if (!is_plausible(character.offset_m[i])) return mvn_wrong("has a segment out of the room");
+  }
+  if (!reader.ok()) return mvn_wrong("ends too early");
+  return character;
+}
+
+bool is_foot(Bone bone) { return bone == Bone::kLeftFoot || bone == Bone::kRightFoot; }
+
+// In T-pose all segments are unturned; the sole is flat then, so the line from ankle to toes
+// slopes. It is laid on its axis as for every other figure, and the toes follow it.
+void set_mvn_t_frames(Skeleton& skeleton) {
+  KnownT known(skeleton.joints.size());
+  for (std::size_t j = 0; j < known.size(); ++j) {
+    const auto& bone = skeleton.joints[j].bone;
+    const bool toes = bone == Bone::kLeftToes || bone == Bone::kRightToes;
+    if (!toes && !(bone && is_foot(*bone))) known[j] = Eigen::Quaterniond::Identity();
+  }
+  set_t_frames(skeleton, known);
+}
+
+}  // namespace
+
+std::size_t write_description_head(std::size_t characters, std::span<std::byte> to) noexcept {
+  FixedWriter writer(to);
+  writer.u8(kDescriptionVersion);
+  writer.u8(characters);
+  return writer.used();
+}
+
+std::size_t write_character(const Character& character, std::span<std::byte> to) noexcept {
+  FixedWriter writer(to);
+  writer.u8(character.id);
+  writer.u8((character.fingers ? kWithFingers : 0U) | (character.mass ? kWithMass : 0U));
+  writer.u8(character.name_bytes);
+  for (std::size_t i = 0; i < character.name_bytes; ++i) {
+    writer.u8(static_cast<unsigned char>(character.name[i]));
+  }
+  for (std::size_t i = 0; i < character.segments(); ++i) {
+    for (const float x_m : character.offset_m[i]) writer.f32(x_m);
+  }
+  return writer.used();
+}
+
+std::size_t MvnLayout::body_of(std::uint8_t character) const noexcept {
+  return static_cast<std::size_t>(std::ranges::find(entries, character, &Entry::character) -
+                                  entries.begin());
+}
+
+std::string body_name(const Character& character) {
+  const std::string name = clean_name({character.name.data(), character.name_bytes});
+  return name.empty() ? "character-" + std::to_string(character.id) : name;
+}
+
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const Character& character) {
+  auto skeleton = std::make_shared<Skeleton>();
+  skeleton->name = body_name(character);
+  const JointTable& table = joint_table(character.fingers);
+  for (std::size_t j = 0; j < table.count; ++j) {
+    const std::size_t segment = table.segment[j];
+    const Vec3f& offset_m = character.offset_m[segment];
+    Joint& joint = skeleton->joints.emplace_back();
+    joint.name = segment_name(segment);
+    joint.parent = table.parent[j];
+    joint.offset_m = {offset_m[0], offset_m[1], offset_m[2]};
+    joint.bone = segment_bone(segment);
+  }
+  set_mvn_t_frames(*skeleton);
+  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  return skeleton;
+}
+
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+  ByteReader reader(description);
+  const std::uint8_t version = reader.u8();
+  const std::size_t count = reader.u8();
+  if (!reader.ok()) return mvn_wrong("is empty");
+  if (version != kDescriptionVersion) return mvn_wrong("is not of this version of posed");
+  if (count > kMaxCharacters) return mvn_wrong("has too many characters");
+  auto layout = std::make_unique<MvnLayout>();
+  std::bitset<256> seen;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto character = read_character(reader);
+    if (!character) return std::unexpected(character.error());
+    if (seen[character->id]) return mvn_wrong("has the same character twice");
+    seen.set(character->id);
+    auto skeleton = skeleton_of(*character);
+    if (!skeleton) return std::unexpected(skeleton.error());
+    Body& body = layout->bodies.emplace_back();
+    body.name = body_name(*character);
+    body.skeleton = std::move(*skeleton);
+    if (character->mass) {
+      body.samples = {.names = {"centre_of_mass_x", "centre_of_mass_y", "centre_of_mass_z"},
+                      .units = {"m", "m", "m"}};
+    }
+    layout->entries.push_back({character->id, character->fingers, character->mass});
+  }
+  if (reader.left() != 0) return mvn_wrong("goes on after its last character");
+  return layout;
+}
+
+}  // namespace posed::drivers::mvn

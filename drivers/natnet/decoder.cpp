@@ -1,0 +1,244 @@
+#include "drivers/natnet/decoder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/byte_reader.hpp"
+#include "drivers/natnet/axes.hpp"
+#include "drivers/natnet/skeleton_pose.hpp"
+#include "drivers/pose_values.hpp"
+
+namespace posed::drivers::natnet {
+namespace {
+
+constexpr float kLeastRate_hz = 1.0F;
+constexpr float kMostRate_hz = 10'000.0F;
+
+bool is_from_server(MessageId id) noexcept {
+  switch (id) {
+    case MessageId::kServerInfo:
+    case MessageId::kResponse:
+    case MessageId::kModelDef:
+    case MessageId::kFrame:
+    case MessageId::kMessageText:
+    case MessageId::kEchoResponse:
+    case MessageId::kUnrecognized:
+      return true;
+    default:
+      return false;
+  }
+}
+
+Outcome worse(Outcome a, Outcome b) noexcept { return b == Outcome::kOk ? a : b; }
+
+}  // namespace
+
+NatNetDecoder::NatNetDecoder(const Settings& settings)
+    : settings_(settings), version_(settings.version), requests_(settings.unicast) {}
+
+// RT-safe.
+void NatNetDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                         Sink& sink) noexcept {
+  Message message;
+  Outcome outcome = decode_message(bytes, message);
+  if (outcome == Outcome::kOk) {
+    if (is_from_server(message.id)) requests_.heard(arrival_ns);
+    outcome = take(message, sink);
+  }
+  sink.outcome(outcome);
+}
+
+// RT-safe.
+Outcome NatNetDecoder::take(const Message& message, Sink& sink) noexcept {
+  switch (message.id) {
+    case MessageId::kServerInfo:
+      return take_server_info(message.payload);
+    case MessageId::kResponse:
+      return take_response(message.payload);
+    case MessageId::kModelDef:
+      return take_model_def(message.payload, sink);
+    case MessageId::kFrame:
+      return take_frame(message.payload, sink);
+    default:  // of no use here, or of another client
+      return is_from_server(message.id) ? Outcome::kOk : Outcome::kForeign;
+  }
+}
+
+// The version of the options counts more: somebody has set it. RT-safe.
+Outcome NatNetDecoder::take_server_info(std::span<const std::byte> payload) noexcept {
+  ServerInfo info;
+  if (!decode_server_info(payload, info)) return Outcome::kShort;
+  const Version said = settings_.version.known() ? settings_.version : info.version;
+  if (said != version_) has_reading_ = false;
+  version_ = said;
+  clock_hz_ = info.clock_hz;
+  requests_.take_server_info();
+  return Outcome::kOk;
+}
+
+// The only request is that for the rate. RT-safe.
+Outcome NatNetDecoder::take_response(std::span<const std::byte> payload) noexcept {
+  const float rate_hz = ByteReader(payload).f32();
+  if (!(rate_hz >= kLeastRate_hz && rate_hz <= kMostRate_hz)) return Outcome::kOutOfRange;
+  rate_hz_ = rate_hz;
+  requests_.take_rate();
+  return Outcome::kOk;
+}
+
+// RT-safe.
+Outcome NatNetDecoder::take_model_def(std::span<const std::byte> payload, Sink& sink) noexcept {
+  const DescriptionHead head{.version = version_, .z_up = settings_.z_up, .rate_hz = rate_hz_};
+  write_description_head(head, std::span(description_).first<kDescriptionHeadBytes>());
+  const std::size_t size = std::min(payload.size(), description_.size() - kDescriptionHeadBytes);
+  std::ranges::copy(payload.first(size), description_.begin() + kDescriptionHeadBytes);
+  sink.description(std::span(description_).first(kDescriptionHeadBytes + size));
+  requests_.take_bodies();
+  return Outcome::kOk;
+}
+
+// RT-safe.
+bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) noexcept {
+  if (has_reading_) {
+    if (read_frame(payload, reading_, view)) {
+      misfits_ = 0;
+      return true;
+    }
+    if (misfits_ < kMaxMisfits) ++misfits_;
+    if (misfits_ < kMaxMisfits) return false;  // the packet is damaged, not the reading
+  }
+  for (const Reading& reading : Readings(version_)) {
+    if (!read_frame(payload, reading, view)) continue;
+    reading_ = reading;
+    has_reading_ = true;
+    misfits_ = 0;
+    return true;
+  }
+  return false;
+}
+
+// RT-safe.
+Outcome NatNetDecoder::take_frame(std::span<const std::byte> payload, Sink& sink) noexcept {
+  FrameView view;
+  if (!read(payload, view)) return Outcome::kOutOfRange;
+  if (view.bodies_changed) requests_.bodies_changed();
+  if (layout_ == nullptr) return Outcome::kForeign;
+  if (const Outcome order = order_.take(view.number); order != Outcome::kOk) return order;
+  device_ns_ = time_.of(view, clock_hz_);
+  taken_.reset();
+  const Outcome bodies = take_bodies(view, sink);
+  return worse(bodies, take_markers(view, sink));
+}
+
+// RT-safe.
+Outcome NatNetDecoder::take_bodies(const FrameView& view, Sink& sink) noexcept {
+  Outcome worst = Outcome::kOk;
+  ByteReader rigid_bodies(view.rigid_bodies.bytes);
+  for (std::size_t i = 0; i < view.rigid_bodies.count; ++i) {
+    worst = worse(worst, take_rigid_body(rigid_bodies, sink));
+  }
+  ByteReader skeletons(view.skeletons.bytes);
+  for (std::size_t i = 0; i < view.skeletons.count; ++i) {
+    worst = worse(worst, take_skeleton(skeletons, sink));
+  }
+  return worst;
+}
+
+// RT-safe.
+Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept {
+  if (taken_[body]) return Outcome::kOutOfRange;
+  taken_.set(body);
+  frame.header.device_ns = device_ns_;
+  frame.skeleton = layout_->bodies[body].skeleton->id;
+  sink.frame(body, frame);
+  return Outcome::kOk;
+}
+
+// A body that the description does not have came after it. RT-safe.
+Outcome NatNetDecoder::take_rigid_body(ByteReader& reader, Sink& sink) noexcept {
+  RigidBody rigid;
+  if (!read_rigid_body(reader, reading_, false, rigid)) return Outcome::kShort;
+  const std::size_t body = layout_->body_of(false, rigid.id);
+  if (body == layout_->bodies.size()) {
+    requests_.bodies_changed();
+    return Outcome::kOutOfRange;
+  }
+  Frame frame;
+  bool has_rotation = false;
+  frame.joint_count = 1;
+  frame.root_position_m = from_motive(rigid.position_m, settings_.z_up);
+  frame.rotation_xyzw[0] = from_motive(rigid.rotation_xyzw, settings_.z_up);
+  const bool sound =
+      is_plausible(frame.root_position_m) && take_rotation(frame.rotation_xyzw[0], has_rotation);
+  if (!sound) return Outcome::kOutOfRange;
+  frame.valid[0] = rigid.tracked && has_rotation;
+  if (!frame.valid[0]) {
+    frame.rotation_xyzw[0] = kIdentity;
+    frame.quality = Quality::kHeld;
+  }
+  return emit(body, frame, sink);
+}
+
+// RT-safe.
+Outcome NatNetDecoder::take_skeleton(ByteReader& reader, Sink& sink) noexcept {
+  const std::int32_t id = reader.i32();
+  const auto bones = static_cast<std::size_t>(reader.i32());  // checked by read_frame
+  const std::size_t body = layout_->body_of(true, id);
+  const bool known = body < layout_->bodies.size();
+  SkeletonPose pose(known ? layout_->tables[body] : nobody_);
+  bool sound = known;
+  for (std::size_t i = 0; i < bones; ++i) {
+    RigidBody bone;
+    if (!read_rigid_body(reader, reading_, true, bone)) return Outcome::kShort;
+    bone.position_m = from_motive(bone.position_m, settings_.z_up);
+    bone.rotation_xyzw = from_motive(bone.rotation_xyzw, settings_.z_up);
+    sound = sound && pose.add(bone);
+  }
+  if (!known) requests_.bodies_changed();
+  Frame frame;
+  if (!sound || !pose.fill(settings_.coordinates, frame)) return Outcome::kOutOfRange;
+  return emit(body, frame, sink);
+}
+
+// RT-safe.
+Outcome NatNetDecoder::take_markers(const FrameView& view, Sink& sink) noexcept {
+  Outcome worst = Outcome::kOk;
+  for (std::size_t body = 0; body < layout_->tables.size(); ++body) {
+    if (layout_->tables[body].markers == 0) continue;
+    worst = worse(worst, take_markers_of(body, view.labelled, sink));
+  }
+  return worst;
+}
+
+// A marker that the cameras do not see is filled in by Motive: it is not valid. RT-safe.
+Outcome NatNetDecoder::take_markers_of(std::size_t body, const Entries& labelled,
+                                       Sink& sink) noexcept {
+  const BodyTable& table = layout_->tables[body];
+  Sample sample;
+  bool any = false;
+  Outcome worst = Outcome::kOk;
+  ByteReader reader(labelled.bytes);
+  for (std::size_t i = 0; i < labelled.count; ++i) {
+    LabelledMarker marker;
+    if (!read_labelled(reader, reading_, marker)) return Outcome::kShort;
+    const bool ours = marker.model != 0 && std::int32_t{marker.model} == table.id;
+    if (!ours || marker.number == 0 || marker.number > table.markers) continue;
+    const Vec3f position_m = from_motive(marker.position_m, settings_.z_up);
+    if (!is_plausible(position_m)) {
+      worst = Outcome::kOutOfRange;
+      continue;
+    }
+    any = true;
+    for (std::size_t axis = 0; axis < position_m.size(); ++axis) {
+      const std::size_t value = 3 * (marker.number - std::size_t{1}) + axis;
+      sample.value[value] = position_m[axis];
+      sample.valid[value] = !marker.occluded;
+    }
+  }
+  if (!any) return worst;
+  sample.header.device_ns = device_ns_;
+  sample.value_count = static_cast<std::uint16_t>(3 * table.markers);
+  sink.sample(body, sample);
+  return worst;
+}
+
+}  // namespace posed::drivers::natnet

@@ -1,0 +1,186 @@
+#include "drivers/natnet/layout.hpp"
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "drivers/natnet/axes.hpp"
+#include "drivers/natnet/bones.hpp"
+#include "drivers/natnet/model_def.hpp"
+#include "drivers/pose_values.hpp"
+#include "proto/frame/bone_names.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::drivers::natnet {
+namespace {
+
+constexpr float kMaxNatNetRate_hz = 10'000.0F;
+
+std::unexpected<Error> wrong(const BodyDef& body, const std::string& what) {
+  return fail("the NatNet server's body " + in_quotes(body.name) + " " + what +
+              "; change it in Motive, or stop streaming it");
+}
+
+// Other programs get names in messages that must be UTF-8.
+std::string shown_name(const BodyDef& body) {
+  if (!body.name.empty()) return clean(body.name);
+  return (body.is_skeleton ? "skeleton " : "rigid body ") + std::to_string(body.id);
+}
+
+// "Emma_Hip" of the skeleton Emma is Hip.
+std::string bone_name_of(const BodyDef& body, const BoneDef& bone) {
+  std::string_view name = bone.name;
+  if (name.size() > body.name.size() + 1 && name.starts_with(body.name) &&
+      name[body.name.size()] == '_') {
+    name.remove_prefix(body.name.size() + 1);
+  }
+  return name.empty() ? "bone " + std::to_string(bone.id) : clean(name);
+}
+
+// Adds the bone `at` and all below it: depth first, as skeletons need it.
+void add_with_children(const BodyDef& body, std::size_t at, std::vector<std::size_t>& order) {
+  order.push_back(at);
+  for (std::size_t child = 0; child < body.bones.size() && std::ssize(order) <= kMaxJoints;
+       ++child) {
+    if (child != at && body.bones[child].parent == body.bones[at].id) {
+      add_with_children(body, child, order);
+    }
+  }
+}
+
+// The indices of the bones, parents first.
+Result<std::vector<std::size_t>> order_of(const BodyDef& body) {
+  const std::size_t count = body.bones.size();
+  if (count == 0 || count > static_cast<std::size_t>(kMaxJoints)) {
+    return wrong(body, "has " + std::to_string(count) + " bones instead of 1 to " +
+                           std::to_string(kMaxJoints));
+  }
+  std::set<std::int32_t> ids;
+  for (const BoneDef& bone : body.bones) {
+    if (!ids.insert(bone.id).second) return wrong(body, "has two bones with the same number");
+  }
+  const auto is_first = [&](const BoneDef& bone) { return !ids.contains(bone.parent); };
+  if (std::ranges::count_if(body.bones, is_first) != 1) {
+    return wrong(body, "does not have exactly one bone without a parent");
+  }
+  std::vector<std::size_t> order;
+  const auto first = std::ranges::find_if(body.bones, is_first);
+  add_with_children(body, static_cast<std::size_t>(first - body.bones.begin()), order);
+  if (order.size() != count) return wrong(body, "has bones that are each other's parents");
+  return order;
+}
+
+// In T-pose all bones of Motive's skeletons have the rotation identity, whatever their names.
+void name_joints(Skeleton& skeleton) {
+  for (Joint& joint : skeleton.joints) {
+    const auto bone = motive_bone(joint.name);
+    if (bone && skeleton.joint_of(*bone) < 0) joint.bone = bone;
+  }
+  if (skeleton.joint_of(Bone::kHips) >= 0) return;
+  for (Joint& joint : skeleton.joints) joint.bone.reset();
+  name_bones(skeleton);  // the conventions FBX and BVH
+}
+
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyDef& body, bool z_up,
+                                                    BodyTable& table) {
+  const auto order = order_of(body);
+  if (!order) return std::unexpected(order.error());
+  auto skeleton = std::make_shared<Skeleton>();
+  skeleton->name = shown_name(body);
+  for (const std::size_t at : *order) {
+    const BoneDef& bone = body.bones[at];
+    const Vec3f offset_m = from_motive(bone.offset_m, z_up);
+    if (!is_plausible(offset_m)) {
+      return wrong(body, "puts bone " + in_quotes(bone.name) + " out of the room");
+    }
+    Joint& joint = skeleton->joints.emplace_back();
+    // A prop may have any name, and none of them makes it a person's bone.
+    joint.name = body.is_skeleton ? bone_name_of(body, bone) : "rigid body";
+    joint.offset_m = {offset_m[0], offset_m[1], offset_m[2]};
+    for (std::size_t j = 0; j < table.bone_ids.size(); ++j) {
+      if (body.bones[(*order)[j]].id == bone.parent) joint.parent = static_cast<int>(j);
+    }
+    table.bone_ids.push_back(static_cast<std::uint16_t>(bone.id));
+    table.parents.push_back(joint.parent);
+    table.offsets_m.push_back(offset_m);
+  }
+  if (body.is_skeleton) name_joints(*skeleton);
+  if (auto ok = skeleton->finish(); !ok) return wrong(body, "is not usable: " + ok.error().message);
+  return skeleton;
+}
+
+// Motive numbers the markers of a body from 1.
+std::size_t marker_count(const BodyDef& body, const ModelDef& model) {
+  std::size_t count = 0;
+  for (const BoneDef& bone : body.bones) count += bone.markers;
+  const auto set = model.markers.find(body.name);
+  if (set != model.markers.end()) count = std::max(count, set->second);
+  return std::min<std::size_t>(count, kMaxSampleValues / 3);
+}
+
+SampleLayout sample_layout_of(std::size_t markers) {
+  SampleLayout layout;
+  for (std::size_t number = 1; number <= markers; ++number) {
+    for (const char axis : {'x', 'y', 'z'}) {
+      layout.names.push_back("marker_" + std::to_string(number) + '_' + axis);
+      layout.units.emplace_back("m");
+    }
+  }
+  return layout;
+}
+
+Result<> add_body(const BodyDef& body, const ModelDef& model, const DescriptionHead& head,
+                  NatNetLayout& layout) {
+  if (layout.body_of(body.is_skeleton, body.id) < layout.bodies.size()) {
+    return wrong(body, "has the number of another one, " + std::to_string(body.id));
+  }
+  BodyTable table{.id = body.id, .is_skeleton = body.is_skeleton};
+  table.markers = marker_count(body, model);
+  auto skeleton = skeleton_of(body, head.z_up, table);
+  if (!skeleton) return std::unexpected(skeleton.error());
+  const bool has_rate = head.rate_hz > 0.0F && head.rate_hz <= kMaxNatNetRate_hz;
+  layout.bodies.push_back({.name = shown_name(body),
+                           .skeleton = std::move(*skeleton),
+                           .samples = sample_layout_of(table.markers),
+                           .rate_hz = has_rate ? static_cast<double>(head.rate_hz) : 0.0});
+  layout.tables.push_back(std::move(table));
+  return {};
+}
+
+}  // namespace
+
+// RT-safe.
+std::size_t BodyTable::joint_of(std::uint16_t bone_id, std::size_t guess) const noexcept {
+  if (guess < bone_ids.size() && bone_ids[guess] == bone_id) return guess;
+  return static_cast<std::size_t>(std::ranges::find(bone_ids, bone_id) - bone_ids.begin());
+}
+
+// RT-safe.
+std::size_t NatNetLayout::body_of(bool is_skeleton, std::int32_t id) const noexcept {
+  const auto at = std::ranges::find_if(tables, [&](const BodyTable& table) noexcept {
+    return table.is_skeleton == is_skeleton && table.id == id;
+  });
+  return static_cast<std::size_t>(at - tables.begin());
+}
+
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+  if (description.size() < kDescriptionHeadBytes) {
+    return fail("the description of the NatNet server's bodies is cut; record the log again");
+  }
+  const DescriptionHead head = read_description_head(description);
+  const auto model = parse_model_def(description.subspan(kDescriptionHeadBytes), head.version);
+  if (!model) return std::unexpected(model.error());
+  if (model->bodies.size() > kMaxBodies) {
+    return fail("the NatNet server streams " + std::to_string(model->bodies.size()) +
+                " bodies, and posed follows at most " + std::to_string(kMaxBodies) +
+                "; disable some in Motive");
+  }
+  auto layout = std::make_unique<NatNetLayout>();
+  for (const BodyDef& body : model->bodies) {
+    if (auto ok = add_body(body, *model, head, *layout); !ok) return std::unexpected(ok.error());
+  }
+  return layout;
+}
+
+}  // namespace posed::drivers::natnet

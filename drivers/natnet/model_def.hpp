@@ -1,0 +1,54 @@
+// Reads the payload of a ModelDef: what the server calls its rigid bodies and skeletons.
+//
+//   i32 count, then each: i32 type, from 4.1 an i32 with the bytes that follow, and
+//   0 marker set   text name, i32 count, count texts
+//   1 rigid body   text name, i32 id, i32 parent, f32[3] offset [m],
+//                  from 3.0: i32 count, count f32[3], count i32 labels, from 4.0: count texts
+//   2 skeleton     text name, i32 id, i32 count, count rigid bodies (with 3.0 the sources do not
+//                  agree whether these bones carry markers)
+//   3 force plate  i32 id, text serial number, 173 words (size, origin, calibration, corners,
+//                  type, kind of data), i32 count, count texts
+//   4 device       i32 id, text name, text serial number, i32 type, i32 kind of data, i32 count,
+//                  count texts
+//   5 camera       text name, f32[3], f32[4]
+//   others         from 4.1, skipped by their size
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/natnet/protocol.hpp"
+#include "proto/frame/frame.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::drivers::natnet {
+
+struct BoneDef {
+  std::string name{};
+  std::int32_t id = 0;
+  std::int32_t parent = -1;  // the id of another bone; anything else for the first one
+  Vec3f offset_m{};          // in the server's axes
+  std::size_t markers = 0;
+};
+
+struct BodyDef {
+  std::string name{};
+  std::int32_t id = 0;
+  bool is_skeleton = false;
+  std::vector<BoneDef> bones{};  // one for a rigid body
+};
+
+struct ModelDef {
+  std::vector<BodyDef> bodies;
+  std::map<std::string, std::size_t, std::less<>> markers;  // of each marker set, by its name
+};
+
+// Reads it as this version, and if that does not use up the payload exactly, as each other one; the
+// version may be unknown. The bytes are untrusted. Cold.
+[[nodiscard]] Result<ModelDef> parse_model_def(std::span<const std::byte> payload, Version version);
+
+}  // namespace posed::drivers::natnet

@@ -1,0 +1,172 @@
+#include "drivers/natnet/natnet.hpp"
+
+#include "drivers/make_device.hpp"
+#include "drivers/natnet/decoder.hpp"
+#include "drivers/natnet/emulator.hpp"
+#include "drivers/natnet/layout.hpp"
+#include "drivers/natnet/settings.hpp"
+#include "drivers/options.hpp"
+#include "drivers/transport/transport_factory.hpp"
+
+namespace posed::drivers {
+namespace natnet {
+namespace {
+
+constexpr std::int64_t kDefaultNatNetRate_hz = 120;
+
+Result<Description> describe(const std::string& text, const std::string& identity) {
+  const auto settings = parse_settings(text, identity);
+  if (!settings) return std::unexpected(settings.error());
+  return Description{.driver = "natnet",
+                     .text = text,
+                     .identity = identity,
+                     .skeleton = nullptr,
+                     .samples = {},
+                     .rate_hz = static_cast<double>(settings->rate_hz)};
+}
+
+Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
+  const auto settings = parse_settings(description.text, description.identity);
+  if (!settings) return std::unexpected(settings.error());
+  return std::make_unique<NatNetDecoder>(*settings);
+}
+
+Result<Settings> settings_of(const Options& options) {
+  Settings settings;
+  if (const auto& version = option<std::string>(options, "version"); !version.empty()) {
+    const auto parsed = parse_version(version);
+    if (!parsed) return std::unexpected(parsed.error());
+    settings.version = *parsed;
+  }
+  const auto z_up = parse_up(option<std::string>(options, "up"));
+  if (!z_up) return std::unexpected(z_up.error());
+  const auto coordinates = parse_coordinates(option<std::string>(options, "coordinates"));
+  if (!coordinates) return std::unexpected(coordinates.error());
+  settings.z_up = *z_up;
+  settings.coordinates = *coordinates;
+  settings.unicast = option<bool>(options, "unicast");
+  settings.rate_hz = static_cast<int>(option<std::int64_t>(options, "rate_hz"));
+  return settings;
+}
+
+// The server's address, with the command port if none is given.
+Result<Address> server_of(const Options& options) {
+  const auto& server = option<std::string>(options, "server");
+  if (const auto endpoint = parse_endpoint(server)) return *endpoint;
+  if (const auto host = parse_host(server)) {
+    return parse_endpoint((server.find(':') == std::string::npos ? server : '[' + server + ']') +
+                          ':' + std::to_string(kCommandPort));
+  }
+  return misuse(
+      "server should be the address in numbers of the computer with Motive, like "
+      "192.168.1.20, or with its command port, 192.168.1.20:1510");
+}
+
+// The command socket and the data socket. Only the server may send to them.
+Result<UdpSettings> sockets_of(const Options& options) {
+  const auto server = server_of(options);
+  if (!server) return std::unexpected(server.error());
+  const bool here = is_loopback(host_of(*server));
+  const auto& listen = option<std::string>(options, "listen");
+  auto command_listen = option<std::string>(options, "command_listen");
+  if (command_listen.empty()) {
+    const bool v6 = server->storage.ss_family == AF_INET6;
+    command_listen = here ? (v6 ? "[::1]:0" : "127.0.0.1:0") : (v6 ? "[::]:0" : "0.0.0.0:0");
+  }
+  UdpSettings settings{
+      .sockets = {{.listen = command_listen, .to = endpoint_text(*server)}, {.listen = listen}},
+      .interface = option<std::string>(options, "interface"),
+      .peers = {host_text(*server)}};
+  if (here && settings.interface.empty()) settings.interface = host_text(*server);
+  if (!option<bool>(options, "unicast")) {
+    settings.sockets[1].group = option<std::string>(options, "group");
+  }
+  return settings;
+}
+
+Result<Description> expect(const Options& given) {
+  const auto options = complete_options(natnet_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const auto settings = settings_of(*options);
+  if (!settings) return std::unexpected(settings.error());
+  const auto sockets = sockets_of(*options);
+  if (!sockets) return std::unexpected(sockets.error());
+  if (const auto ok = check_udp(*sockets); !ok) return std::unexpected(ok.error());
+  return describe(settings_text(*settings), "udp " + sockets->sockets[0].to);
+}
+
+// UDP has no connection: the sockets open whether or not the server is there.
+Result<Device> open(const Options& given, TransportFactory& ports) {
+  const auto expected = expect(given);
+  if (!expected) return std::unexpected(expected.error());
+  const auto options = complete_options(natnet_driver(), given);
+  auto transport = ports.udp(*sockets_of(*options));
+  if (!transport) return std::unexpected(transport.error());
+  auto device = make_device(natnet_driver(), expected->text, expected->identity);
+  if (!device) return device;
+  device->transport = std::move(*transport);
+  device->poll.period_ns = Requests::kPeriod_ns;
+  return device;
+}
+
+Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
+  const auto options = complete_options(natnet_driver(), given);
+  if (!options) return std::unexpected(options.error());
+  const auto settings = settings_of(*options);
+  if (!settings) return std::unexpected(settings.error());
+  return std::make_unique<NatNetEmulator>(*settings);
+}
+
+std::vector<OptionSpec> options() {
+  return {
+      {.name = "server",
+       .default_value = std::string("127.0.0.1"),
+       .help = "address of the computer with Motive; the command port is 1510 unless it says "
+               "another"},
+      {.name = "listen",
+       .default_value = std::string("0.0.0.0:1511"),
+       .help = "address and port that the frames are sent to"},
+      {.name = "command_listen",
+       .default_value = std::string(),
+       .help = "address and port for the server's answers; left out: any port"},
+      {.name = "group",
+       .default_value = std::string("239.255.42.99"),
+       .help = "multicast group of the frames; empty: none"},
+      {.name = "interface",
+       .default_value = std::string(),
+       .help = "network interface of the group, by name or address; left out: the system's "
+               "choice"},
+      {.name = "unicast", .default_value = false, .help = "Motive's transmission type is unicast"},
+      {.name = "up", .default_value = std::string("y"), .help = "Motive's up axis, y or z"},
+      {.name = "coordinates",
+       .default_value = std::string("auto"),
+       .help = "Motive's skeleton coordinates, local or global; auto: found out by the lengths of "
+               "the bones"},
+      {.name = "version",
+       .default_value = std::string(),
+       .help = "the NatNet version, like 3.0; left out: as the server says"},
+      {.name = "rate_hz",
+       .default_value = kDefaultNatNetRate_hz,
+       .help = "frames a second, until the server says it",
+       .min = 1,
+       .max = 2000}};
+}
+
+}  // namespace
+}  // namespace natnet
+
+const Driver& natnet_driver() {
+  static const Driver driver{
+      .name = "natnet",
+      .summary = "OptiTrack: skeletons, rigid bodies and markers from Motive over NatNet 2.5 to 4",
+      .options = natnet::options(),
+      .open = natnet::open,
+      .make_decoder = natnet::make_decoder,
+      .describe = natnet::describe,
+      .expect = natnet::expect,
+      .make_layout = natnet::make_layout,
+      .emulate = natnet::emulate};
+  return driver;
+}
+
+}  // namespace posed::drivers

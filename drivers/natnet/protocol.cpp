@@ -1,0 +1,127 @@
+#include "drivers/natnet/protocol.hpp"
+
+#include <array>
+#include <bit>
+#include <charconv>
+#include <string>
+
+#include "drivers/byte_reader.hpp"
+#include "drivers/byte_writer.hpp"
+
+namespace posed::drivers::natnet {
+namespace {
+
+constexpr std::size_t kNameBytes = 256;
+constexpr std::size_t kVersionBytes = 4;
+constexpr std::string_view kClientName = "posed";
+constexpr std::string_view kServerName = "posed emulator";
+
+bool is_known(std::uint16_t id) noexcept { return id <= 14 || id == 100; }
+
+// A name in its field of 256 bytes, and two versions of four bytes each.
+void write_program(ByteWriter& writer, std::string_view name, Version natnet) {
+  writer.text(name);
+  for (std::size_t i = name.size(); i < kNameBytes; ++i) writer.u8(0);
+  writer.u32(1);  // version 1.0.0.0 of the program
+  writer.u8(natnet.major);
+  writer.u8(natnet.minor);
+  writer.u16(0);
+}
+
+}  // namespace
+
+Result<Version> parse_version(std::string_view text) {
+  Version version;
+  const char* const end = text.data() + text.size();
+  const auto [point, bad_major] = std::from_chars(text.data(), end, version.major);
+  if (bad_major == std::errc() && point != end && *point == '.') {
+    const auto [stop, bad_minor] = std::from_chars(point + 1, end, version.minor);
+    const bool in_range = version >= Version{2, 5} && version.major <= 4;
+    if (bad_minor == std::errc() && stop == end && in_range) return version;
+  }
+  return misuse("version should be a NatNet version from 2.5 to 4.x, like \"3.0\"");
+}
+
+// RT-safe.
+Outcome decode_message(std::span<const std::byte> bytes, Message& message) noexcept {
+  ByteReader reader(bytes);
+  const std::uint16_t id = reader.u16();
+  const std::size_t length = reader.u16();
+  if (!reader.ok()) return Outcome::kShort;
+  if (!is_known(id)) return Outcome::kForeign;
+  if (reader.left() != length) return Outcome::kShort;
+  message = {.id = static_cast<MessageId>(id), .payload = reader.bytes(length)};
+  return Outcome::kOk;
+}
+
+// RT-safe.
+bool decode_server_info(std::span<const std::byte> payload, ServerInfo& info) noexcept {
+  ByteReader reader(payload);
+  static_cast<void>(reader.bytes(kNameBytes + kVersionBytes));
+  info.version.major = reader.u8();
+  info.version.minor = reader.u8();
+  static_cast<void>(reader.u16());
+  if (!reader.ok()) return false;
+  info.clock_hz = reader.u64();
+  return true;
+}
+
+// RT-safe.
+void write_description_head(const DescriptionHead& head,
+                            std::span<std::byte, kDescriptionHeadBytes> bytes) noexcept {
+  const auto rate = std::bit_cast<std::array<std::byte, 4>>(head.rate_hz);
+  static_assert(std::endian::native == std::endian::little);
+  bytes[0] = std::byte{head.version.major};
+  bytes[1] = std::byte{head.version.minor};
+  bytes[2] = std::byte{head.z_up};
+  bytes[3] = std::byte{0};
+  for (std::size_t i = 0; i < rate.size(); ++i) bytes[4 + i] = rate[i];
+}
+
+// RT-safe.
+DescriptionHead read_description_head(std::span<const std::byte> bytes) noexcept {
+  ByteReader reader(bytes);
+  DescriptionHead head;
+  head.version.major = reader.u8();
+  head.version.minor = reader.u8();
+  head.z_up = reader.u8() != 0;
+  static_cast<void>(reader.u8());
+  head.rate_hz = reader.f32();
+  return head;
+}
+
+std::vector<std::byte> encode_message(MessageId id, std::span<const std::byte> payload) {
+  ByteWriter writer;
+  writer.u16(static_cast<std::uint16_t>(id));
+  writer.u16(static_cast<std::uint16_t>(payload.size()));
+  writer.bytes(payload);
+  return writer.finish();
+}
+
+std::vector<std::byte> encode_text(MessageId id, std::string_view text) {
+  ByteWriter writer;
+  writer.text(text);
+  writer.u8(0);
+  return encode_message(id, writer.finish());
+}
+
+// The version is what the vendor's own client of the recording sent.
+std::vector<std::byte> encode_connect() {
+  ByteWriter writer;
+  write_program(writer, kClientName, {3, 0});
+  return encode_message(MessageId::kConnect, writer.finish());
+}
+
+std::vector<std::byte> encode_server_info(const ServerInfo& info) {
+  ByteWriter writer;
+  write_program(writer, kServerName, info.version);
+  if (info.version >= Version{3, 0}) {
+    writer.u64(info.clock_hz);
+    writer.u16(1511);
+    writer.u8(1);
+    for (const int part : {239, 255, 42, 99}) writer.u8(static_cast<std::uint8_t>(part));
+  }
+  return encode_message(MessageId::kServerInfo, writer.finish());
+}
+
+}  // namespace posed::drivers::natnet

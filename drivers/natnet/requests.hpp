@@ -1,0 +1,48 @@
+// Requests: what to ask a NatNet server next. It is asked who it is until it answers and again when
+// it was silent, for its frame rate, for its bodies whenever they may have changed, and over
+// unicast it is told every second that somebody listens. One datagram per call.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "proto/frame/time.hpp"
+
+namespace posed::drivers::natnet {
+
+class Requests {
+ public:
+  // How often next() should be called.
+  static constexpr std::int64_t kPeriod_ns = 100'000'000;
+
+  explicit Requests(bool unicast);  // cold
+
+  // What came from the server. RT-safe.
+  void heard(std::int64_t arrival_ns) noexcept { heard_ns_ = arrival_ns; }
+  void take_server_info() noexcept;
+  void take_rate() noexcept { rate_.wanted = false; }
+  void take_bodies() noexcept { bodies_.wanted = false; }
+  void bodies_changed() noexcept { bodies_.wanted = true; }
+
+  // The datagram to send now; empty: none. RT-safe.
+  [[nodiscard]] std::span<const std::byte> next(std::int64_t now_ns) noexcept;
+
+ private:
+  static constexpr std::int64_t kAgain_ns = kNanosPerSecond;
+  static constexpr std::int64_t kSilence_ns = 2 * kNanosPerSecond;
+
+  struct Question {
+    std::vector<std::byte> datagram;
+    bool wanted = true;
+    std::int64_t next_ns = kNoTime_ns;  // not before
+  };
+  // Whether it is to be asked now; if so, not again for a while.
+  [[nodiscard]] static bool is_due(Question& question, std::int64_t now_ns) noexcept;
+
+  Question connect_, rate_, bodies_, alive_;
+  std::int64_t heard_ns_ = kNoTime_ns;
+};
+
+}  // namespace posed::drivers::natnet

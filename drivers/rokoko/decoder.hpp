@@ -1,0 +1,49 @@
+// Decodes each datagram of Rokoko Studio: one frame for each body that the layout names, a sample
+// for each face. Bodies that come, go or change are described before their frames.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "drivers/driver.hpp"
+#include "drivers/heard_time.hpp"
+#include "drivers/rokoko/layout.hpp"
+#include "drivers/rokoko/roster.hpp"
+#include "drivers/rokoko/studio_frame.hpp"
+#include "drivers/timestamp_clock.hpp"
+
+namespace posed::drivers::rokoko {
+
+class StudioDecoder final : public Decoder {
+ public:
+  // Takes one datagram per call. RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+  // Takes what make_layout made. RT-safe.
+  void use(const SourceLayout& layout) noexcept override {
+    layout_ = static_cast<const StudioLayout*>(&layout);
+  }
+
+ private:
+  static constexpr std::size_t kMaxJson = 256 * 1024;  // bytes that a datagram may unpack to
+
+  [[nodiscard]] Outcome read(std::span<const std::byte> bytes) noexcept;
+  [[nodiscard]] Outcome take_frame(std::int64_t heard_ns, Sink& sink) noexcept;
+  // Emits one body if it fits the layout.
+  [[nodiscard]] Outcome emit(const SeenBody& seen, Sink& sink) noexcept;
+  void emit_face(std::size_t body, const Subject& subject, Sink& sink) noexcept;
+
+  const StudioLayout* layout_ = nullptr;  // null until the first description is in use
+  HeardTime heard_;
+  TimestampClock clock_;
+  StudioFrame frame_;
+  Roster roster_;
+  std::bitset<kMaxBodies> taken_;  // bodies of the frame so far
+  std::array<std::byte, kMaxJson> json_{};
+};
+
+}  // namespace posed::drivers::rokoko

@@ -1,0 +1,239 @@
+#include "drivers/rokoko/emulator.hpp"
+
+#include <lz4frame.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+
+#include "drivers/rokoko/layout.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::drivers::rokoko {
+namespace {
+
+constexpr std::size_t kAnna = 0, kBen = 1, kSword = 2;
+constexpr double kHipHeight_m = 0.96;
+constexpr double kStep_hz = 0.9;  // double steps, waves and words a second
+constexpr double kLap_s = 12.0;   // of the circle that Anna walks
+constexpr std::array<std::string_view, 3> kVersionNumbers{"2", "3", "3"};
+
+JointSet without_fingers() {
+  JointSet joints;
+  joints.set();
+  return joints & ~fingers_of(kLeftHandJoint) & ~fingers_of(kRightHandJoint);
+}
+
+DescribedBody emulated_sword() {
+  DescribedBody body;
+  body.key.part = Part::kProp;
+  body.key.name.keep("Sword");
+  body.joints.set(0);
+  return body;
+}
+
+std::string shortest(float value) {
+  std::array<char, 32> text{};
+  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end};
+}
+
+// In Unity's axes, as members of a joint or prop.
+std::string transform_json(const Vec3f& position_m, const Quatf& rotation_xyzw) {
+  const Vec3f p = mirrored(position_m);
+  const Quatf q = mirrored(rotation_xyzw);
+  return "\"position\":{\"x\":" + shortest(p[0]) + ",\"y\":" + shortest(p[1]) +
+         ",\"z\":" + shortest(p[2]) + "},\"rotation\":{\"x\":" + shortest(q[0]) +
+         ",\"y\":" + shortest(q[1]) + ",\"z\":" + shortest(q[2]) + ",\"w\":" + shortest(q[3]) + "}";
+}
+
+std::string quoted_name(const DescribedBody& body) {
+  return '"' + std::string(body.key.name.text()) + '"';
+}
+
+Emulator::Bytes compressed(const std::string& json) {
+  Emulator::Bytes bytes(LZ4F_compressFrameBound(json.size(), nullptr));
+  const std::size_t size =
+      LZ4F_compressFrame(bytes.data(), bytes.size(), json.data(), json.size(), nullptr);
+  bytes.resize(LZ4F_isError(size) != 0 ? 0 : size);
+  return bytes;
+}
+
+}  // namespace
+
+StudioEmulator::StudioEmulator(const StudioEmulatorSettings& settings)
+    : settings_(settings), pace_(nanoseconds(1.0 / settings.rate_hz)) {
+  bodies_[kAnna].described = emulated_person("Anna", JointSet().set());
+  bodies_[kBen].described = emulated_person("Ben", without_fingers());
+  bodies_[kSword].described = emulated_sword();
+  for (EmulatedBody& body : bodies_) {
+    body.skeleton =
+        skeleton_of(body.described, std::string(body.described.key.name.text())).value();
+    const auto& joints = body.skeleton->joints;
+    body.frame.joint_count = static_cast<std::uint16_t>(joints.size());
+    body.frame.valid.set();
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      const auto& T = joints[j].T_world_joint;
+      const int parent = joints[j].parent;
+      body.frame.rotation_xyzw[j] =
+          from_eigen(parent < 0 ? T : joints[parent].T_world_joint.conjugate() * T);
+    }
+  }
+  pace_.start(0);
+}
+
+const Skeleton* StudioEmulator::skeleton(std::size_t body) const {
+  return body < bodies_.size() && bodies_[body].present ? bodies_[body].skeleton.get() : nullptr;
+}
+
+void StudioEmulator::pose(std::size_t body, const Frame& frame) {
+  if (body >= bodies_.size()) return;
+  EmulatedBody& posed = bodies_[body];
+  posed.posed = true;
+  posed.frame = frame;
+  posed.frame.joint_count = static_cast<std::uint16_t>(posed.skeleton->joints.size());
+  for (std::size_t j = frame.joint_count; j < posed.frame.joint_count; ++j) {
+    posed.frame.valid[j] = false;
+  }
+}
+
+// Turns a joint away from T-pose by a rotation in the axes of the canonical humanoid.
+void StudioEmulator::turn(std::size_t body, std::string_view joint,
+                          const Eigen::Quaterniond& canonical) {
+  const Skeleton& skeleton = *bodies_[body].skeleton;
+  const int j = skeleton.joint_index(joint);
+  const int parent = skeleton.joints[j].parent;
+  const Eigen::Quaterniond T_parent =
+      parent < 0 ? Eigen::Quaterniond::Identity() : skeleton.joints[parent].T_world_joint;
+  bodies_[body].frame.rotation_xyzw[static_cast<std::size_t>(j)] =
+      from_eigen(T_parent.conjugate() * canonical * skeleton.joints[j].T_world_joint);
+}
+
+void StudioEmulator::move(double time_s) {
+  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
+  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
+  const auto about = [](Axis axis, double angle_rad) { return axis_rotation(axis, angle_rad); };
+  if (!bodies_[kAnna].posed) {
+    bodies_[kAnna].frame.root_position_m = {static_cast<float>(-std::cos(lap)),
+                                            static_cast<float>(kHipHeight_m),
+                                            static_cast<float>(std::sin(lap))};
+    turn(kAnna, "hip", about(Axis::kY, lap));
+    turn(kAnna, "leftUpperArm", about(Axis::kX, swing) * about(Axis::kZ, -1.3));
+    turn(kAnna, "rightUpperArm", about(Axis::kX, -swing) * about(Axis::kZ, 1.3));
+    turn(kAnna, "leftUpLeg", about(Axis::kX, -swing));
+    turn(kAnna, "leftLeg", about(Axis::kX, std::max(0.0, swing)));
+    turn(kAnna, "rightUpLeg", about(Axis::kX, swing));
+    turn(kAnna, "rightLeg", about(Axis::kX, std::max(0.0, -swing)));
+    for (const char* finger : {"Index", "Middle", "Ring", "Little"}) {
+      turn(kAnna, std::string("left") + finger + "Proximal", about(Axis::kZ, -0.5 - swing));
+      turn(kAnna, std::string("right") + finger + "Proximal", about(Axis::kZ, 0.5 + swing));
+    }
+    jaw_ = 50.0 + 100.0 * swing;
+  }
+  if (!bodies_[kBen].posed) {
+    bodies_[kBen].frame.root_position_m = {0.0F, static_cast<float>(kHipHeight_m), 2.5F};
+    turn(kBen, "leftUpperArm", about(Axis::kZ, -1.3));
+    turn(kBen, "rightUpperArm", about(Axis::kZ, -0.6));
+    turn(kBen, "rightLowerArm", about(Axis::kZ, -0.9 + swing));
+  }
+  if (!bodies_[kSword].posed) {
+    bodies_[kSword].frame.root_position_m = {0.8F, static_cast<float>(1.0 + swing), 2.5F};
+    bodies_[kSword].frame.rotation_xyzw[0] = from_eigen(about(Axis::kX, swing));
+  }
+}
+
+void StudioEmulator::emit(std::int64_t now_ns, Bytes& out) {
+  const std::int64_t time_ns = pace_.due_ns();
+  pace_.step(now_ns);
+  move(seconds(time_ns));
+  const std::string json = frame_json(seconds(time_ns - began_ns_));
+  if (settings_.lz4) {
+    const Bytes bytes = compressed(json);
+    out.insert(out.end(), bytes.begin(), bytes.end());
+  } else {
+    const auto bytes = std::as_bytes(std::span(json));
+    out.insert(out.end(), bytes.begin(), bytes.end());
+  }
+}
+
+std::string StudioEmulator::frame_json(double time_s) const {
+  std::string actors, props;
+  for (const EmulatedBody& body : bodies_) {
+    if (!body.present) continue;
+    if (body.described.key.part == Part::kProp) {
+      props += "{\"name\":" + quoted_name(body.described) + ",\"color\":[128,128,128],\"type\":0," +
+               transform_json(body.frame.root_position_m, body.frame.rotation_xyzw[0]) + '}';
+    } else {
+      actors += (actors.empty() ? "" : ",") + actor_json(body);
+    }
+  }
+  std::string json =
+      "{\"version\":" + std::string(kVersionNumbers[static_cast<std::size_t>(settings_.version)]);
+  const std::string content = "\"timestamp\":" + clip::number_text(time_s) + ",\"actors\":[" +
+                              actors + "],\"props\":[" + props + "]";
+  if (settings_.version == StudioVersion::k3) {
+    return json + ",\"fps\":" + clip::number_text(settings_.rate_hz) + ",\"scene\":{" + content +
+           "}}";
+  }
+  json += "," + content + ",\"trackers\":[],\"faces\":[";
+  if (bodies_[kAnna].present) json += face_json();
+  return json + "]}";
+}
+
+std::string StudioEmulator::actor_json(const EmulatedBody& body) const {
+  const std::string name = quoted_name(body.described);
+  const bool anna = &body == &bodies_[kAnna];
+  const std::string head = "{\"name\":" + name + ",\"color\":[50,100,200],";
+  if (settings_.version != StudioVersion::k3) {
+    return head + "\"profileName\":" + name + "," + joints_json(body) + '}';
+  }
+  const std::string gloves = anna ? "true" : "false";
+  const std::string has_body = anna && gloves_only_ ? "false" : "true";
+  return head + "\"meta\":{\"hasGloves\":" + gloves + ",\"hasLeftGlove\":" + gloves +
+         ",\"hasRightGlove\":" + gloves + ",\"hasBody\":" + has_body + ",\"hasFace\":" + gloves +
+         "},\"dimensions\":{\"totalHeight\":1.75,\"hipHeight\":" + clip::number_text(kHipHeight_m) +
+         "},\"body\":{" + joints_json(body) + "}" + (anna ? ",\"face\":" + face_json() : "") + '}';
+}
+
+// The global pose from the one relative to the parents.
+std::string StudioEmulator::joints_json(const EmulatedBody& body) const {
+  std::string json;
+  std::array<Eigen::Quaternionf, kStudioJoints> rotation;
+  std::array<Eigen::Vector3f, kStudioJoints> place;
+  std::size_t j = 0;
+  for (const Joint& joint : body.skeleton->joints) {
+    const Quatf& local = body.frame.rotation_xyzw[j];
+    const Eigen::Quaternionf turned =
+        body.frame.valid[j] ? to_eigen(local) : Eigen::Quaternionf::Identity();
+    if (joint.parent < 0) {
+      rotation[j] = turned;
+      place[j] = Eigen::Map<const Eigen::Vector3f>(body.frame.root_position_m.data());
+    } else {
+      const auto parent = static_cast<std::size_t>(joint.parent);
+      rotation[j] = rotation[parent] * turned;
+      place[j] = place[parent] + rotation[parent] * joint.offset_m.cast<float>();
+    }
+    if (j > 0) json += ',';
+    json += '"' + joint.name + "\":{" +
+            transform_json({place[j].x(), place[j].y(), place[j].z()},
+                           body.frame.valid[j] ? from_eigen(rotation[j]) : Quatf{}) +
+            '}';
+    ++j;
+  }
+  return json;
+}
+
+std::string StudioEmulator::face_json() const {
+  const std::string name = quoted_name(bodies_[kAnna].described);
+  std::string json = "{\"faceId\":" + name + ",\"profileName\":" + name;
+  for (std::size_t i = 0; i < kFaceValues; ++i) {
+    const std::string_view value = face_value_name(i);
+    json += ",\"" + std::string(value) + "\":";
+    json += value == "jawOpen" ? shortest(static_cast<float>(jaw_)) : "0";
+  }
+  return json + '}';
+}
+
+}  // namespace posed::drivers::rokoko

@@ -1,0 +1,244 @@
+#include "drivers/vmc/decoder.hpp"
+
+#include <cmath>
+
+#include "drivers/pose_values.hpp"
+#include "drivers/vmc/axes.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::drivers::vmc {
+namespace {
+
+constexpr std::string_view kBoneAddress = "/VMC/Ext/Bone/Pos";
+constexpr std::string_view kRootAddress = "/VMC/Ext/Root/Pos";
+constexpr std::string_view kApplyAddress = "/VMC/Ext/Blend/Apply";
+constexpr std::string_view kStatusAddress = "/VMC/Ext/OK";
+constexpr std::string_view kTimeAddress = "/VMC/Ext/T";
+constexpr std::string_view kAvatarAddress = "/VMC/Ext/VRM";
+constexpr std::string_view kNoBone = "LastBone";  // the end of Unity's list, which some send, too
+
+// Of the squared length: some senders round the components.
+constexpr double kLengthTolerance = 0.01;
+
+struct Transform {
+  std::string_view name;
+  Vec3f position_m{};
+  Quatf rotation_xyzw{};
+  bool seen = false;  // the rotation is not all zero
+};
+
+// In posed's axes; false for missing or mistyped arguments and for what is no position or no
+// rotation. RT-safe.
+bool read_transform(OscArguments& arguments, Transform& transform) noexcept {
+  transform.name = arguments.text();
+  for (float& x_m : transform.position_m) x_m = arguments.f32();
+  for (float& x : transform.rotation_xyzw) x = arguments.f32();
+  if (!arguments.ok() || !is_plausible(transform.position_m)) return false;
+  if (!take_rotation(transform.rotation_xyzw, transform.seen, kLengthTolerance)) return false;
+  transform.position_m = mirrored(transform.position_m);
+  transform.rotation_xyzw = mirrored(transform.rotation_xyzw);
+  return true;
+}
+
+}  // namespace
+
+// RT-safe.
+void VmcDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                      Sink& sink) noexcept {
+  arrival_ns_ = heard_.to(arrival_ns);
+  Outcome outcome = check_packet(bytes);
+  if (outcome == Outcome::kOk) outcome = take_packet(bytes, sink);
+  sink.outcome(outcome);
+}
+
+// RT-safe.
+Outcome VmcDecoder::take_packet(std::span<const std::byte> packet, Sink& sink) noexcept {
+  worst_ = Outcome::kOk;
+  ended_ = false;
+  taken_.reset();
+  const std::int64_t before_ns = clock_.device_ns();
+  const Survey found = survey(packet);
+  if (found.any && !found.of_vmc) return Outcome::kForeign;
+  if (found.time == Outcome::kLate) return Outcome::kLate;
+  note(found.time);
+  std::bitset<kBoneCount> bones;
+  for (std::size_t bone = 0; bone < kBoneCount; ++bone) bones[bone] = found.heard.messages[bone];
+  if ((bones & set_).any()) {
+    end_.missed();
+    end_frame(before_ns, sink);
+  }
+  each_message(packet, [this](const OscMessage& message) noexcept {
+    if (!take_message(message)) note(Outcome::kOutOfRange);
+  });
+  if (end_.ends(found.heard, arrival_ns_, set_.any())) end_frame(clock_.device_ns(), sink);
+  const bool batch_is_over = set_.none() && (applied_ || ended_);
+  if (batch_is_over && values_.fresh()) emit_sample(sink);
+  if (batch_is_over || describer_.is_gone(values_, arrival_ns_)) {
+    describer_.update(values_, arrival_ns_, sink);
+  }
+  if (batch_is_over) applied_ = false;
+  return worst_;
+}
+
+// RT-safe.
+VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet) noexcept {
+  Survey found;
+  each_message(packet, [&](const OscMessage& message) noexcept {
+    found.any = true;
+    found.of_vmc = found.of_vmc || message.address.starts_with(kAddressPrefix);
+    OscArguments arguments(message);
+    if (message.address == kBoneAddress) {
+      const std::size_t bone = find_bone(arguments.text());
+      if (bone < kBoneCount) found.heard.add(bone);
+    } else if (message.address == kStatusAddress) {
+      found.heard.add(kOkMessage);
+    } else if (message.address == kTimeAddress) {
+      found.heard.add(kTimeMessage);
+      const float time_s = arguments.f32();
+      found.time = arguments.ok() ? clock_.take(time_s) : Outcome::kOutOfRange;
+    }
+  });
+  return found;
+}
+
+// RT-safe.
+bool VmcDecoder::take_message(const OscMessage& message) noexcept {
+  OscArguments arguments(message);
+  if (message.address == kBoneAddress) return take_bone(arguments);
+  if (message.address == kRootAddress) return take_root(arguments);
+  if (message.address == address_of(ValueKind::kBlend)) return take_blend(arguments);
+  if (message.address == kStatusAddress) return take_status(arguments);
+  if (message.address == kAvatarAddress) return take_avatar(arguments);
+  for (const ValueKind kind : {ValueKind::kHeadSet, ValueKind::kController, ValueKind::kTracker}) {
+    if (message.address == address_of(kind)) return take_device(kind, arguments);
+  }
+  if (message.address == kApplyAddress) applied_ = true;
+  return true;  // all others mean nothing to posed
+}
+
+// RT-safe.
+bool VmcDecoder::take_bone(OscArguments& arguments) noexcept {
+  Transform transform;
+  const bool sound = read_transform(arguments, transform);
+  if (transform.name == kNoBone) return true;
+  const std::size_t bone = find_bone(transform.name);
+  if (!sound || bone == kBoneCount || taken_[bone]) return false;
+  taken_.set(bone);
+  set_.set(bone);
+  seen_[bone] = transform.seen;
+  position_m_[bone] = transform.position_m;
+  rotation_xyzw_[bone] = transform.rotation_xyzw;
+  return true;
+}
+
+// RT-safe.
+bool VmcDecoder::take_root(OscArguments& arguments) noexcept {
+  Transform transform;
+  if (!read_transform(arguments, transform)) return false;
+  root_m_ = transform.position_m;
+  root_xyzw_ = transform.rotation_xyzw;
+  root_seen_ = transform.seen;
+  return true;
+}
+
+// RT-safe.
+bool VmcDecoder::take_blend(OscArguments& arguments) noexcept {
+  const std::string_view name = arguments.text();
+  const float value = arguments.f32();
+  if (!arguments.ok() || !std::isfinite(value)) return false;
+  values_.set(ValueKind::kBlend, name, std::span(&value, 1), arrival_ns_);
+  return true;
+}
+
+// RT-safe.
+bool VmcDecoder::take_device(ValueKind kind, OscArguments& arguments) noexcept {
+  Transform transform;
+  if (!read_transform(arguments, transform)) return false;
+  if (!transform.seen) return true;  // it is not tracked
+  const Vec3f& at = transform.position_m;
+  const Quatf& q = transform.rotation_xyzw;
+  const std::array<float, 7> values{at[0], at[1], at[2], q[0], q[1], q[2], q[3]};
+  values_.set(kind, transform.name, values, arrival_ns_);
+  return true;
+}
+
+// RT-safe.
+bool VmcDecoder::take_status(OscArguments& arguments) noexcept {
+  constexpr std::size_t kWithTracking = 4;
+  const bool with_tracking = arguments.left() >= kWithTracking;
+  const bool loaded = arguments.i32() != 0;
+  bool tracking = true;
+  for (std::size_t i = 1; i < kWithTracking && with_tracking; ++i) tracking = arguments.i32() != 0;
+  if (!arguments.ok()) return false;
+  loaded_ = loaded;
+  tracking_ = tracking;
+  return true;
+}
+
+// RT-safe.
+bool VmcDecoder::take_avatar(OscArguments& arguments) noexcept {
+  (void)arguments.text();  // the path of its file
+  const std::string_view title = arguments.text();
+  if (!arguments.ok()) return false;
+  describer_.title(title);
+  return true;
+}
+
+// RT-safe.
+void VmcDecoder::end_frame(std::int64_t device_ns, Sink& sink) noexcept {
+  ended_ = true;
+  // A model that is not loaded has no pose; what is sent for it describes nobody.
+  if (loaded_) describer_.frame(set_, position_m_, arrival_ns_);
+  if (!loaded_ || layout_ == nullptr || layout_->skeleton() == nullptr) {
+    note(Outcome::kForeign);
+  } else if (!emit_frame(device_ns, sink)) {
+    note(Outcome::kOutOfRange);
+  }
+  set_.reset();
+  seen_.reset();
+}
+
+// False if the body would be out of the room. RT-safe.
+bool VmcDecoder::emit_frame(std::int64_t device_ns, Sink& sink) noexcept {
+  const Skeleton& skeleton = *layout_->skeleton();
+  Frame frame;
+  frame.header.device_ns = device_ns;
+  frame.skeleton = skeleton.id;
+  frame.joint_count = static_cast<std::uint16_t>(skeleton.joints.size());
+  frame.quality = tracking_ ? Quality::kMeasured : Quality::kHeld;
+  for (std::size_t j = 0; j < frame.joint_count; ++j) frame.rotation_xyzw[j] = kIdentity;
+  for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
+    const int joint = layout_->joint_of[bone];
+    if (joint == VmcLayout::kNone || !seen_[bone]) continue;
+    frame.rotation_xyzw[static_cast<std::size_t>(joint)] = rotation_xyzw_[bone];
+    frame.valid.set(static_cast<std::size_t>(joint));
+  }
+  // The room's transform, then the hips. A sender without hips moves the body by its root alone.
+  const bool placed = layout_->hips_sent ? frame.valid[kHips] : root_seen_;
+  frame.valid[kHips] = placed;
+  const Eigen::Quaternionf root = to_eigen(root_xyzw_);
+  if (placed) {
+    const Eigen::Quaternionf hips = to_eigen(frame.rotation_xyzw[kHips]);
+    frame.rotation_xyzw[kHips] = from_eigen((root * hips).normalized());
+  }
+  const Vec3f& hips_m = position_m_[kHips];
+  const Eigen::Vector3f at_m = root * Eigen::Vector3f(hips_m[0], hips_m[1], hips_m[2]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    frame.root_position_m[i] = root_m_[i] + at_m[static_cast<Eigen::Index>(i)];
+  }
+  if (!is_plausible(frame.root_position_m)) return false;
+  sink.frame(0, frame);
+  return true;
+}
+
+// RT-safe.
+void VmcDecoder::emit_sample(Sink& sink) noexcept {
+  if (!loaded_ || layout_ == nullptr || layout_->value_count == 0) return;
+  Sample sample;
+  sample.header.device_ns = clock_.device_ns();
+  sample.quality = tracking_ ? Quality::kMeasured : Quality::kHeld;
+  values_.fill(sample);
+  sink.sample(0, sample);
+}
+
+}  // namespace posed::drivers::vmc

@@ -1,0 +1,83 @@
+// Decodes the datagrams of a VMC performer: collects the bones of a frame until FrameEnd says that
+// it is complete, and describes the performer itself.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "drivers/driver.hpp"
+#include "drivers/heard_time.hpp"
+#include "drivers/vmc/describer.hpp"
+#include "drivers/vmc/frame_end.hpp"
+#include "drivers/vmc/layout.hpp"
+#include "drivers/vmc/osc.hpp"
+#include "drivers/vmc/sender_clock.hpp"
+#include "drivers/vmc/values.hpp"
+
+namespace posed::drivers::vmc {
+
+class VmcDecoder final : public Decoder {
+ public:
+  VmcDecoder() noexcept { rotation_xyzw_.fill(kIdentity); }
+
+  // Takes one datagram per call. RT-safe.
+  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+            Sink& sink) noexcept override;
+
+  // Takes what make_layout made. RT-safe.
+  void use(const SourceLayout& layout) noexcept override {
+    layout_ = static_cast<const VmcLayout*>(&layout);
+    values_.use(*layout_);
+  }
+
+ private:
+  // What a datagram carries, before any of it is used.
+  struct Survey {
+    bool any = false;     // message
+    bool of_vmc = false;  // at least one
+    FrameEnd::Heard heard;
+    Outcome time = Outcome::kOk;
+  };
+  [[nodiscard]] Survey survey(std::span<const std::byte> packet) noexcept;
+  [[nodiscard]] Outcome take_packet(std::span<const std::byte> packet, Sink& sink) noexcept;
+  // Each takes the arguments of one message; false if they are wrong.
+  [[nodiscard]] bool take_message(const OscMessage& message) noexcept;
+  [[nodiscard]] bool take_bone(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool take_root(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool take_blend(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool take_device(ValueKind kind, OscArguments& arguments) noexcept;
+  [[nodiscard]] bool take_status(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool take_avatar(OscArguments& arguments) noexcept;
+  void end_frame(std::int64_t device_ns, Sink& sink) noexcept;
+  [[nodiscard]] bool emit_frame(std::int64_t device_ns, Sink& sink) noexcept;
+  void emit_sample(Sink& sink) noexcept;
+  void note(Outcome outcome) noexcept {
+    if (outcome != Outcome::kOk) worst_ = outcome;
+  }
+
+  const VmcLayout* layout_ = nullptr;  // null until the performer was described
+  FrameEnd end_;
+  SenderClock clock_;
+  Values values_;
+  Describer describer_;
+  HeardTime heard_;
+  std::int64_t arrival_ns_ = 0;    // of the datagram in hand, without pauses
+  Outcome worst_ = Outcome::kOk;   // in it
+  bool ended_ = false;             // a frame did in it
+  std::bitset<kBoneCount> taken_;  // bones of it
+  std::bitset<kBoneCount> set_;    // bones of the frame so far
+  std::bitset<kBoneCount> seen_;   // those of them that have a rotation
+  bool applied_ = false;           // /VMC/Ext/Blend/Apply came since the last sample
+  // What came last, in posed's axes.
+  std::array<Vec3f, kBoneCount> position_m_{};     // [bone], relative to the parent
+  std::array<Quatf, kBoneCount> rotation_xyzw_{};  // [bone], relative to the parent
+  Vec3f root_m_{};
+  Quatf root_xyzw_ = kIdentity;
+  bool root_seen_ = false;
+  bool loaded_ = true, tracking_ = true;  // until the sender says something else
+};
+
+}  // namespace posed::drivers::vmc

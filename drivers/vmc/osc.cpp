@@ -1,0 +1,123 @@
+#include "drivers/vmc/osc.hpp"
+
+#include <algorithm>
+
+namespace posed::drivers::vmc {
+namespace {
+
+constexpr std::string_view kOscBundle{"#bundle\0", 8};  // with its zero
+
+std::size_t padded(std::size_t bytes) noexcept { return (bytes + 3) / 4 * 4; }
+
+// The text up to its zero; false when there is none, or when the padding is cut or is not zeros.
+// RT-safe.
+bool read_text(BigEndianReader& reader, std::span<const std::byte>& rest,
+               std::string_view& text) noexcept {
+  const auto end = std::ranges::find(rest, std::byte{0});
+  const auto length = static_cast<std::size_t>(end - rest.begin());
+  if (end == rest.end() || padded(length + 1) > rest.size()) return false;
+  text = reader.text(padded(length + 1));
+  rest = rest.subspan(padded(length + 1));
+  const bool zeros = text.find_first_not_of('\0', length) == std::string_view::npos;
+  text = text.substr(0, length);
+  return zeros;
+}
+
+// True when the arguments hold what the types say. RT-safe.
+bool holds(std::span<const std::byte> arguments, std::string_view types) noexcept {
+  BigEndianReader reader(arguments);
+  for (const char type : types) {
+    switch (type) {
+      case 'i':
+      case 'f':
+      case 'c':
+      case 'r':
+      case 'm':
+        (void)reader.bytes(4);
+        break;
+      case 'h':
+      case 'd':
+      case 't':
+        (void)reader.bytes(8);
+        break;
+      case 's':
+      case 'S': {
+        auto rest = arguments.last(reader.left());
+        std::string_view text;
+        if (!read_text(reader, rest, text)) return false;
+        break;
+      }
+      case 'b': {
+        const std::size_t size = reader.u32();
+        if (size > reader.left()) return false;
+        (void)reader.bytes(padded(size));
+        break;
+      }
+      case 'T':
+      case 'F':
+      case 'N':
+      case 'I':
+        break;
+      default:
+        return false;
+    }
+    if (!reader.ok()) return false;
+  }
+  return true;
+}
+
+// RT-safe.
+bool is_sound_packet(std::span<const std::byte> packet, int depth) noexcept {
+  if (packet.empty() || packet.size() % 4 != 0) return false;
+  if (!is_bundle(packet)) {
+    OscMessage message;
+    return read_message(packet, message) && holds(message.arguments, message.types);
+  }
+  if (depth >= kMaxBundleDepth || packet.size() < kBundleHeadBytes) return false;
+  BigEndianReader reader(packet.subspan(kBundleHeadBytes));
+  while (reader.left() != 0) {
+    const std::size_t size = reader.u32();
+    if (!reader.ok() || size > reader.left()) return false;
+    if (!is_sound_packet(reader.bytes(size), depth + 1)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+// RT-safe.
+std::string_view OscArguments::text() noexcept {
+  if (!take('s')) return {};
+  BigEndianReader ahead = reader_;
+  const std::string_view all = ahead.text(reader_.left());
+  const std::string_view text = all.substr(0, all.find('\0'));
+  (void)reader_.bytes(padded(text.size() + 1));
+  return text;
+}
+
+// RT-safe.
+bool is_bundle(std::span<const std::byte> packet) noexcept {
+  return BigEndianReader(packet).text(kOscBundle.size()) == kOscBundle;
+}
+
+// RT-safe.
+bool read_message(std::span<const std::byte> bytes, OscMessage& message) noexcept {
+  BigEndianReader reader(bytes);
+  if (!read_text(reader, bytes, message.address) || !message.address.starts_with('/')) return false;
+  message.types = {};
+  message.arguments = {};
+  if (bytes.empty()) return true;
+  if (!read_text(reader, bytes, message.types) || !message.types.starts_with(',')) return false;
+  message.types.remove_prefix(1);
+  message.arguments = bytes;
+  return true;
+}
+
+// RT-safe.
+Outcome check_packet(std::span<const std::byte> packet) noexcept {
+  const bool is_message = !packet.empty() && packet.front() == std::byte{'/'};
+  if (!is_message && !is_bundle(packet)) return Outcome::kForeign;
+  return is_sound_packet(packet, 0) ? Outcome::kOk : Outcome::kShort;
+}
+
+}  // namespace posed::drivers::vmc

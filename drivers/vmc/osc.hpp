@@ -1,0 +1,81 @@
+// Reads OSC 1.0 packets: messages and bundles of them. All numbers are big-endian, and everything
+// is padded with zeros to a multiple of 4 bytes (opensoundcontrol.stanford.edu/spec-1_0.html):
+//
+//   message   "/address" 0.. | ",types" 0.. | the arguments that the types name, one after the
+//   other bundle    "#bundle" 0 | time (u64) | then each element: size (i32) | message or bundle
+//
+//   types     i i32, f f32, s S text 0.., b i32 size and bytes, h d t 8 bytes, c r m 4 bytes,
+//             T F N I nothing
+//
+// A packet is checked as a whole before anything of it is used; reading it cannot fail afterwards,
+// except that an argument is missing or has another type. RT-safe.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "drivers/byte_reader.hpp"
+#include "proto/frame/sink.hpp"
+
+namespace posed::drivers::vmc {
+
+inline constexpr int kMaxBundleDepth = 8;  // of bundles in bundles
+
+// Views of the packet.
+struct OscMessage {
+  std::string_view address;
+  std::string_view types;  // without the comma
+  std::span<const std::byte> arguments;
+};
+
+// Takes the arguments in order. One that is missing or has another type gives zero or empty text
+// and clears ok().
+class OscArguments {
+ public:
+  explicit OscArguments(const OscMessage& message) noexcept
+      : types_(message.types), reader_(message.arguments) {}
+
+  [[nodiscard]] bool ok() const noexcept { return ok_; }
+  [[nodiscard]] std::size_t left() const noexcept { return types_.size(); }
+  [[nodiscard]] std::int32_t i32() noexcept { return take('i') ? reader_.i32() : 0; }
+  [[nodiscard]] float f32() noexcept { return take('f') ? reader_.f32() : 0.0F; }
+  [[nodiscard]] std::string_view text() noexcept;
+
+ private:
+  [[nodiscard]] bool take(char type) noexcept {
+    ok_ = ok_ && !types_.empty() && types_.front() == type;
+    if (ok_) types_.remove_prefix(1);
+    return ok_;
+  }
+
+  std::string_view types_;
+  BigEndianReader reader_;
+  bool ok_ = true;
+};
+
+// kForeign: neither a message nor a bundle; kShort: cut, a size that is wrong, an unknown type, or
+// too many bundles in bundles.
+[[nodiscard]] Outcome check_packet(std::span<const std::byte> packet) noexcept;
+
+// Reads a message of a checked packet; false for one that is broken. A message without types has
+// no arguments.
+[[nodiscard]] bool read_message(std::span<const std::byte> bytes, OscMessage& message) noexcept;
+
+[[nodiscard]] bool is_bundle(std::span<const std::byte> packet) noexcept;
+inline constexpr std::size_t kBundleHeadBytes = 16;
+
+// Calls take(message) for each message of a checked packet, in their order.
+template <typename Take>
+void each_message(std::span<const std::byte> packet, Take&& take) noexcept {
+  if (!is_bundle(packet)) {
+    OscMessage message;
+    if (read_message(packet, message)) take(message);
+    return;
+  }
+  BigEndianReader reader(packet.subspan(kBundleHeadBytes));
+  while (reader.left() != 0) each_message(reader.bytes(reader.u32()), take);
+}
+
+}  // namespace posed::drivers::vmc

@@ -1,0 +1,131 @@
+#include "drivers/vmc/protocol.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+
+#include "drivers/byte_reader.hpp"
+#include "drivers/pose_values.hpp"
+#include "proto/clip/text.hpp"
+
+namespace posed::drivers::vmc {
+namespace {
+
+constexpr std::uint8_t kVersion = 1;
+constexpr std::string_view kVmcInfoPrefix = "vmc rate=";
+constexpr double kVmcMaxRate_hz = 1000.0;
+
+// Little-endian values into memory that is large enough.
+class RoomWriter {
+ public:
+  explicit RoomWriter(std::span<std::byte> room) noexcept : room_(room) {}
+  void u8(std::size_t value) noexcept { room_[size_++] = static_cast<std::byte>(value); }
+  void f32(float value) noexcept {
+    const auto bits = std::bit_cast<std::uint32_t>(value);
+    for (int shift = 0; shift < 32; shift += 8) u8(bits >> shift & 0xFF);
+  }
+  void name(std::string_view text) noexcept {
+    u8(text.size());
+    for (const char c : text) u8(static_cast<unsigned char>(c));
+  }
+  [[nodiscard]] std::span<const std::byte> written() const noexcept { return room_.first(size_); }
+
+ private:
+  std::span<std::byte> room_;
+  std::size_t size_ = 0;
+};
+
+std::unexpected<Error> wrong(const std::string& what) {
+  return fail("the description of the VMC performer " + what +
+              "; the log that it comes from is damaged");
+}
+
+Result<> read_bones(ByteReader& reader, Described& described) {
+  const std::size_t bones = reader.u8();
+  std::size_t least = 0;
+  for (std::size_t i = 0; i < bones; ++i) {
+    const std::size_t bone = reader.u8();
+    Vec3f offset_m{};
+    for (float& x_m : offset_m) x_m = reader.f32();
+    if (!reader.ok()) return wrong("ends too early");
+    if (bone < least || bone >= kBoneCount) {
+      return wrong("has a wrong bone " + std::to_string(bone));
+    }
+    least = bone + 1;
+    if (!is_plausible(offset_m)) return wrong("puts a bone out of the room");
+    described.bones.set(bone);
+    described.offset_m[bone] = offset_m;
+  }
+  return {};
+}
+
+Result<> read_values(ByteReader& reader, Described& described) {
+  const std::size_t entries = reader.u8();
+  std::size_t values = 0;
+  for (std::size_t i = 0; i < entries; ++i) {
+    const std::size_t kind = reader.u8();
+    const std::string_view name = reader.text(reader.u8());
+    if (!reader.ok()) return wrong("ends too early");
+    if (kind >= kValueKinds) return wrong("has a value of unknown kind");
+    if (name.empty() || name.size() > kMaxVmcName) return wrong("has a name of wrong length");
+    const Described::Value value{static_cast<ValueKind>(kind), name};
+    values += values_of(value.kind);
+    if (values > kMaxVmcValues) return wrong("has too many values");
+    described.values[described.value_count++] = value;
+  }
+  return {};
+}
+
+}  // namespace
+
+// RT-safe.
+std::span<const std::byte> write_description(const Described& described,
+                                             std::array<std::byte, kMaxDescribed>& room) noexcept {
+  RoomWriter writer(room);
+  writer.u8(kVersion);
+  writer.name(described.title);
+  writer.u8(described.bones.count());
+  for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
+    if (!described.bones[bone]) continue;
+    writer.u8(bone);
+    for (const float x_m : described.offset_m[bone]) writer.f32(x_m);
+  }
+  writer.u8(described.value_count);
+  for (const Described::Value& value : std::span(described.values).first(described.value_count)) {
+    writer.u8(static_cast<std::size_t>(value.kind));
+    writer.name(value.name);
+  }
+  return writer.written();
+}
+
+Result<Described> parse_description(std::span<const std::byte> bytes) {
+  ByteReader reader(bytes);
+  Described described;
+  if (reader.u8() != kVersion) return wrong("is of another version");
+  described.title = reader.text(reader.u8());
+  if (!reader.ok() || described.title.size() > kMaxVmcName) return wrong("has a wrong title");
+  if (auto ok = read_bones(reader, described); !ok) return std::unexpected(ok.error());
+  if (auto ok = read_values(reader, described); !ok) return std::unexpected(ok.error());
+  if (!reader.ok()) return wrong("ends too early");
+  if (reader.left() != 0) return wrong("goes on after its end");
+  return described;
+}
+
+std::string device_info_text(double rate_hz) {
+  return std::string(kVmcInfoPrefix) + clip::number_text(rate_hz);
+}
+
+Result<double> parse_device_info(const std::string& text, const std::string& identity) {
+  double rate_hz = 0.0;
+  if (text.starts_with(kVmcInfoPrefix)) {
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data() + kVmcInfoPrefix.size(), end, rate_hz);
+    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= kVmcMaxRate_hz) {
+      return rate_hz;
+    }
+  }
+  return fail("is not described as a VMC performer ('vmc rate=60'); is it another device?",
+              identity);
+}
+
+}  // namespace posed::drivers::vmc

@@ -1,0 +1,49 @@
+#include "models/motion/canonical_skeleton.hpp"
+
+#include <string>
+#include <vector>
+
+#include "proto/frame/humanoid.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::motion {
+
+Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skeleton) {
+  const int hips = skeleton.joint_of(Bone::kHips);
+  if (hips < 0) {
+    return fail("skeleton " + in_quotes(skeleton.name) +
+                " has no hips, so it is no person's; name its joints as VRM does");
+  }
+  auto canonical = std::make_shared<Skeleton>();
+  canonical->name = "humanoid of " + skeleton.name;
+  const std::size_t count = skeleton.joints.size();
+  std::vector<Eigen::Vector3d> position_m(count, Eigen::Vector3d::Zero());  // in T-pose
+  std::vector<int> place(count, -1);  // the joint of `canonical` that is this one or above it
+  for (std::size_t j = 0; j < count; ++j) {
+    const Joint& from = skeleton.joints[j];
+    if (from.parent >= 0) {
+      const auto parent = static_cast<std::size_t>(from.parent);
+      position_m[j] = position_m[parent] + skeleton.joints[parent].T_world_joint * from.offset_m;
+      place[j] = place[parent];
+    }
+    // Joints above the hips have no bone and are left out; so is a bone that hangs beside the hips.
+    const bool is_hips = static_cast<int>(j) == hips;
+    if (!from.bone || (!is_hips && place[j] < 0)) continue;
+    Joint joint;
+    joint.name = bone_name(*from.bone);
+    joint.parent = place[j];
+    joint.bone = from.bone;
+    if (joint.parent >= 0) {
+      const Bone above = *canonical->joints[static_cast<std::size_t>(joint.parent)].bone;
+      joint.offset_m =
+          position_m[j] - position_m[static_cast<std::size_t>(skeleton.joint_of(above))];
+    }
+    if (from.end_site_m) joint.end_site_m = from.T_world_joint * *from.end_site_m;
+    place[j] = static_cast<int>(canonical->joints.size());
+    canonical->joints.push_back(std::move(joint));
+  }
+  if (auto ok = canonical->finish(); !ok) return std::unexpected(ok.error());
+  return canonical;
+}
+
+}  // namespace posed::motion
