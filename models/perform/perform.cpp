@@ -12,7 +12,6 @@
 namespace posed::perform {
 namespace {
 
-constexpr int kStride = trajectory::padded(kHandChannels);
 
 std::vector<PerformedState> plan(const trajectory::StateInformation& information,
                                  std::span<const int> labels, double tempo) {
@@ -45,6 +44,7 @@ void solve_all(const std::vector<const double*>& frames, Performance& performanc
   const auto count = static_cast<int>(frames.size());
   trajectory::SlidingWindow window(kHandChannels, count);
   window.solve(frames);
+  constexpr int kStride = trajectory::padded(kHandChannels);
   const auto variances = hwy::AllocateAligned<double>(frames.size() * kStride);
   window.variances(variances.get());
   for (int t = 0; t < count; ++t) {

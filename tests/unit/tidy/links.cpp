@@ -35,19 +35,21 @@ std::set<std::string> linked(const std::vector<Target>& targets, const Target& t
 std::string folder_of(const std::string& path) { return path.substr(0, path.rfind('/')); }
 
 const Target* owner_of(const std::vector<Target>& targets, const std::string& folder) {
-  const std::string any = folder_of(folder) + "/*";  // every folder beside this one
-  const auto owns = [&](const Target& target) {
-    return std::ranges::find_first_of(target.folders, std::array{folder, any}) !=
-           target.folders.end();
-  };
-  const auto found = std::ranges::find_if(targets, owns);
+  const auto found = std::ranges::find_if(
+      targets, [&](const Target& target) { return has_folder(target, folder); });
   return found == targets.end() ? nullptr : &*found;
 }
 
 }  // namespace
 
-std::vector<Target> targets_from_text(const std::string& text) {
-  static const std::regex call(R"(posed_module\(([^)]*)\))");
+bool has_folder(const Target& target, const std::string& folder) {
+  const std::string any = folder_of(folder) + "/*";  // every folder beside this one
+  return std::ranges::find_first_of(target.folders, std::array{folder, any}) !=
+         target.folders.end();
+}
+
+std::vector<Target> targets_from_text(const std::string& text, const std::string& command) {
+  const std::regex call(command + R"(\(([^)]*)\))");
   std::vector<Target> targets;
   for (std::sregex_iterator at(text.begin(), text.end(), call), end; at != end; ++at) {
     std::istringstream words((*at)[1].str());
@@ -76,6 +78,16 @@ std::vector<Target> read_targets(const std::filesystem::path& root) {
     for (Target& target : targets_from_text(text)) targets.push_back(std::move(target));
   }
   return targets;
+}
+
+std::vector<Target> read_test_programs(const std::filesystem::path& root) {
+  std::ifstream stream(root / "tests/CMakeLists.txt");
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::vector<Target> programs = targets_from_text(text, "posed_test");
+  for (Target& program : programs) {
+    for (std::string& folder : program.folders) folder.insert(0, "tests/");
+  }
+  return programs;
 }
 
 std::vector<Finding> check_cycles(const std::vector<Target>& targets) {

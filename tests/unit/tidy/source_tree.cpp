@@ -21,7 +21,9 @@ class Blanker {
   std::string line(const std::string& text) {
     std::string code = text;
     for (std::size_t i = 0; i < code.size(); ++i) {
-      if (in_block_comment_) {
+      if (!raw_end_.empty()) {
+        i = blank_raw(code, i);
+      } else if (in_block_comment_) {
         if (code.compare(i, 2, "*/") == 0) {
           in_block_comment_ = false;
           code[i + 1] = ' ';
@@ -32,6 +34,9 @@ class Blanker {
         code[i] = ' ';
       } else if (code.compare(i, 2, "//") == 0) {
         std::fill(code.begin() + static_cast<std::ptrdiff_t>(i), code.end(), ' ');
+      } else if (code.compare(i, 2, "R\"") == 0 && code.find('(', i) != std::string::npos) {
+        raw_end_ = ")" + code.substr(i + 2, code.find('(', i) - i - 2) + "\"";
+        i = blank_raw(code, i);
       } else if (code[i] == '"' || (code[i] == '\'' && !is_digit_separator(code, i))) {
         i = blank_literal(code, i);
       }
@@ -52,8 +57,18 @@ class Blanker {
     }
     return i;
   }
+  // To the end of the raw string, or of the line. Returns the last place that is blank.
+  std::size_t blank_raw(std::string& code, std::size_t start) {
+    const std::size_t end = code.find(raw_end_, start);
+    const std::size_t stop = end == std::string::npos ? code.size() : end + raw_end_.size();
+    std::fill(code.begin() + static_cast<std::ptrdiff_t>(start),
+              code.begin() + static_cast<std::ptrdiff_t>(stop), ' ');
+    if (end != std::string::npos) raw_end_.clear();
+    return stop - 1;
+  }
 
   bool in_block_comment_ = false;
+  std::string raw_end_;  // what closes the raw string; empty: in none
 };
 
 std::string first_folder(const std::string& path) { return path.substr(0, path.find('/')); }

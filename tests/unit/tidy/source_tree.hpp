@@ -31,13 +31,21 @@ struct Target {
   std::string name;
   std::vector<std::string> folders, links;
 };
+[[nodiscard]] bool has_folder(const Target& target, const std::string& folder);
 [[nodiscard]] std::vector<Target> read_targets(const std::filesystem::path& root);
-[[nodiscard]] std::vector<Target> targets_from_text(const std::string& text);
+[[nodiscard]] std::vector<Target> targets_from_text(const std::string& text,
+                                                    const std::string& command = "posed_module");
+// The same for posed_test(...) of tests/CMakeLists.txt.
+[[nodiscard]] std::vector<Target> read_test_programs(const std::filesystem::path& root);
 // The targets form no cycle, and a file of a target's folder includes only folders of that target
 // and of those that it links, directly or through others: linking is the permission.
 [[nodiscard]] std::vector<Finding> check_cycles(const std::vector<Target>& targets);
 [[nodiscard]] std::vector<Finding> check_links(const SourceFile& file,
                                                const std::vector<Target>& targets);
+// Builds join the files of a target, in batches that change when a file is added. So two files of a
+// target have no name twice in their anonymous namespaces, but for overloads and equal aliases.
+[[nodiscard]] std::vector<Finding> check_joined_names(const std::vector<SourceFile>& files,
+                                                      const std::vector<Target>& targets);
 // A reader of the repository has only the repository: no file names a page outside of it. `text` is
 // any file's.
 [[nodiscard]] std::vector<Finding> check_references(const std::string& path,

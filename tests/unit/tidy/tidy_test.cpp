@@ -77,6 +77,31 @@ TEST_CASE("a folder includes only what its target links, and no targets form a c
             [&](const SourceFile& file) { return posed::tidy::check_links(file, targets); }) == "");
 }
 
+TEST_CASE("files of a target can be joined: names in anonymous namespaces are unique", "[tidy]") {
+  const auto a = posed::tidy::source_from_text(
+      "daemon/a/a.cpp",
+      "namespace posed {\nnamespace {\nusing A = int;\nint twice(\n    int a) {\n  return a;\n}\n"
+      "struct Rig {\n  int once = 0;\n};\nconstexpr int kMost = 2;\n}  // namespace\n"
+      "int open() { return 1; }\n}  // namespace posed\n");
+  const auto b = posed::tidy::source_from_text(
+      "daemon/b/b.cpp",
+      "namespace posed {\nnamespace {\nusing A = int;\nint twice(\n    double b) {\n}\n"
+      "template <typename T>\nclass Rig {\n};\nconst double kMost = 2;\nvoid once();\n}\n}\n"
+      "namespace posed::other {\nnamespace {\nstruct Rig {};\n}\n}\n");
+  const auto targets = posed::tidy::targets_from_text(
+      "posed_module(a FOLDERS daemon/a daemon/b LINK)\nposed_module(c FOLDERS daemon/c LINK)\n");
+  const std::string found = listed(posed::tidy::check_joined_names({a, b}, targets));
+  CHECK(found ==
+        "daemon/b/b.cpp:8: Rig is in daemon/a/a.cpp:8, too\n"
+        "daemon/b/b.cpp:10: kMost is in daemon/a/a.cpp:11, too\n");
+
+  auto all = posed::tidy::read_targets(posed::test::source_dir());
+  const auto programs = posed::tidy::read_test_programs(posed::test::source_dir());
+  REQUIRE(programs.size() > 8);
+  all.insert(all.end(), programs.begin(), programs.end());
+  CHECK(listed(posed::tidy::check_joined_names(tree(), all)) == "");
+}
+
 TEST_CASE("every folder of unit tests is built into a program", "[tidy]") {
   std::ifstream file(posed::test::source_dir() / "tests/CMakeLists.txt");
   const std::string programs{std::istreambuf_iterator<char>(file), {}};
