@@ -12,7 +12,6 @@
 namespace posed::perform {
 namespace {
 
-
 std::vector<PerformedState> plan(const trajectory::StateInformation& information,
                                  std::span<const int> labels, double tempo) {
   LabelSequence script(static_cast<int>(labels.size()));

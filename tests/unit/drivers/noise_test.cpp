@@ -20,7 +20,7 @@ using test::Bytes;
 using test::DeviceFixture;
 
 constexpr std::size_t kPackets = 150 * 60 * 10;
-constexpr double kNoise = 0.01;   // of bytes
+constexpr double kNoise = 0.01;       // of bytes
 constexpr std::size_t kMostLate = 8;  // most packets by which a decoder's output may be late
 
 // The largest share of damaged packets that are accepted as good, for gloves whose framing cannot
