@@ -74,7 +74,9 @@ Result<Options> complete(const Options& given) {
   if (!options) return options;
   const bool waits = option<std::string>(*options, "link") != "tcp" ||
                      option<std::string>(*options, "listen") != kListen;
-  if (waits && !given.contains("connect")) (*options)["connect"] = std::string();
+  if (waits && option<std::string>(*options, "connect") == kConnect) {
+    (*options)["connect"] = std::string();  // the default; a config gives that, too
+  }
   return options;
 }
 

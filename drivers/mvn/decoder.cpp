@@ -7,8 +7,6 @@
 namespace posed::drivers::mvn {
 namespace {
 
-// MVN may pause: time in which nothing comes at all makes nobody leave.
-constexpr std::int64_t kSilence_ns = kNanosPerSecond / 2;
 constexpr std::int64_t kBetweenDescriptions_ns = 300'000'000;
 
 // The joints of a skeleton with or without fingers from the segments of a pose. A segment that was
@@ -40,8 +38,7 @@ void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept 
 // RT-safe.
 void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                       Sink& sink) noexcept {
-  now_ns_ = arrival_ns;
-  skip_silence();
+  now_ns_ = heard_time_.to(arrival_ns);
   if (stream_) {
     framer_.feed(bytes, [&](std::span<const std::byte> datagram) noexcept {
       sink.outcome(datagram.empty() ? Outcome::kForeign : take(datagram, sink));
@@ -180,17 +177,6 @@ std::int64_t MvnDecoder::device_time_ns(Tracked& tracked, const Head& head) noex
     tracked.clock.begin(head.time_ms, other);
   }
   return tracked.clock.to_ns(head.time_ms);
-}
-
-// RT-safe.
-void MvnDecoder::skip_silence() noexcept {
-  const std::int64_t silent_ns = heard_ns_ == kNoTime_ns ? 0 : now_ns_ - heard_ns_;
-  heard_ns_ = now_ns_;
-  if (silent_ns < kSilence_ns) return;
-  for (Tracked& tracked : characters_) {
-    tracked.first_ns += silent_ns;
-    tracked.heard_ns += silent_ns;
-  }
 }
 
 // Describes the characters if they are others than before. RT-safe.

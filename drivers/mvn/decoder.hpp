@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "drivers/driver.hpp"
+#include "drivers/heard_time.hpp"
 #include "drivers/mvn/framer.hpp"
 #include "drivers/mvn/layout.hpp"
 #include "drivers/mvn/protocol.hpp"
@@ -42,13 +43,12 @@ class MvnDecoder final : public Decoder {
   // The character, now known if there is room; null otherwise.
   [[nodiscard]] Tracked* find_or_add(std::uint8_t character) noexcept;
   [[nodiscard]] std::int64_t device_time_ns(Tracked& tracked, const Head& head) noexcept;
-  void skip_silence() noexcept;
   void describe(Sink& sink) noexcept;
 
   bool stream_;
   const MvnLayout* layout_ = nullptr;  // null until the first description is in use
-  std::int64_t now_ns_ = kNoTime_ns;   // arrival of the bytes
-  std::int64_t heard_ns_ = kNoTime_ns;
+  HeardTime heard_time_;               // MVN may pause: that makes nobody leave
+  std::int64_t now_ns_ = kNoTime_ns;   // arrival of the bytes, in that time
   std::int64_t described_ns_ = kNoTime_ns;
   std::array<Tracked, kMaxCharacters> characters_;
   CharacterPose pose_;

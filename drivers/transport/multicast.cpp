@@ -39,38 +39,59 @@ Result<unsigned> interface_index(const std::string& interface) {
               "'; name one that `ip address` lists, or one of its addresses");
 }
 
-bool join4(int fd, const Address& group, unsigned index) {
+// Joins or leaves. RT-safe except for its system call.
+bool change(int fd, const Address& group, unsigned index, bool join) noexcept {
+  if (group.storage.ss_family == AF_INET6) {
+    sockaddr_in6 address{};
+    std::memcpy(&address, &group.storage, sizeof address);
+    ipv6_mreq wish{};
+    wish.ipv6mr_multiaddr = address.sin6_addr;
+    wish.ipv6mr_interface = index;
+    const int option = join ? IPV6_ADD_MEMBERSHIP : IPV6_DROP_MEMBERSHIP;
+    return ::setsockopt(fd, IPPROTO_IPV6, option, &wish, sizeof wish) == 0;
+  }
   sockaddr_in address{};
   std::memcpy(&address, &group.storage, sizeof address);
   ip_mreqn wish{};
   wish.imr_multiaddr = address.sin_addr;
   wish.imr_ifindex = static_cast<int>(index);
-  const int no = 0;
-  ::setsockopt(fd, IPPROTO_IP, IP_MULTICAST_ALL, &no, sizeof no);
-  return ::setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &wish, sizeof wish) == 0;
+  const int option = join ? IP_ADD_MEMBERSHIP : IP_DROP_MEMBERSHIP;
+  return ::setsockopt(fd, IPPROTO_IP, option, &wish, sizeof wish) == 0;
 }
 
-bool join6(int fd, const Address& group, unsigned index) {
-  sockaddr_in6 address{};
-  std::memcpy(&address, &group.storage, sizeof address);
-  ipv6_mreq wish{};
-  wish.ipv6mr_multiaddr = address.sin6_addr;
-  wish.ipv6mr_interface = index;
+// Without it a socket receives every group that any program of this machine has joined.
+void only_own_groups(int fd, sa_family_t family) {
   const int no = 0;
-  ::setsockopt(fd, IPPROTO_IPV6, IPV6_MULTICAST_ALL, &no, sizeof no);
-  return ::setsockopt(fd, IPPROTO_IPV6, IPV6_ADD_MEMBERSHIP, &wish, sizeof wish) == 0;
+  if (family == AF_INET6) {
+    ::setsockopt(fd, IPPROTO_IPV6, IPV6_MULTICAST_ALL, &no, sizeof no);
+  } else {
+    ::setsockopt(fd, IPPROTO_IP, IP_MULTICAST_ALL, &no, sizeof no);
+  }
 }
 
 }  // namespace
 
-Result<> join_group(int fd, const Address& group, const std::string& interface) {
+Result<Membership> Membership::join(int fd, const Address& group, const std::string& interface) {
   const auto index = interface_index(interface);
   if (!index) return std::unexpected(index.error());
-  const bool joined =
-      group.storage.ss_family == AF_INET6 ? join6(fd, group, *index) : join4(fd, group, *index);
-  if (joined) return {};
-  return fail("cannot join the multicast group " + host_text(group) + " (" + errno_text() +
-              "); name the network interface that the device is on");
+  only_own_groups(fd, group.storage.ss_family);
+  if (!change(fd, group, *index, true)) {
+    return fail("cannot join the multicast group " + host_text(group) + " (" + errno_text() +
+                "); name the network interface that the device is on");
+  }
+  Membership joined;
+  joined.group_ = group;
+  joined.index_ = *index;
+  if (*index != 0) ::if_indextoname(*index, joined.name_.data());
+  return joined;
+}
+
+void Membership::renew(int fd) noexcept {
+  const unsigned now = name_[0] == '\0' ? 0 : ::if_nametoindex(name_.data());
+  if (name_[0] != '\0' && now == 0) return;
+  static_cast<void>(change(fd, group_, index_, false));
+  static_cast<void>(change(fd, group_, now, true));
+  index_ = now;
 }
 
 }  // namespace posed::drivers

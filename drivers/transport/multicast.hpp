@@ -1,6 +1,9 @@
-// Joins a socket to a multicast group on one network interface.
+// A socket's membership of a multicast group on one network interface.
 #pragma once
 
+#include <net/if.h>
+
+#include <array>
 #include <string>
 
 #include "drivers/transport/address.hpp"
@@ -8,8 +11,22 @@
 
 namespace posed::drivers {
 
-// `interface` is its name ("eth0") or one of its addresses; empty: the system's choice. From other
-// groups that this machine has joined the socket then receives nothing. Cold.
-[[nodiscard]] Result<> join_group(int fd, const Address& group, const std::string& interface);
+class Membership {
+ public:
+  // Joins. `interface` is its name ("eth0") or one of its addresses; empty: the system's choice.
+  // From other groups that this machine has joined the socket then receives nothing. Cold.
+  [[nodiscard]] static Result<Membership> join(int fd, const Address& group,
+                                               const std::string& interface);
+
+  // Leaves and joins again, because an interface that goes away takes the membership with it, and
+  // one that returns has another number. While it is away, nothing happens. Three or four system
+  // calls, and RT-safe otherwise.
+  void renew(int fd) noexcept;
+
+ private:
+  Address group_;
+  std::array<char, IF_NAMESIZE> name_{};  // of the interface; empty: the system's choice
+  unsigned index_ = 0;                    // its number when the socket joined
+};
 
 }  // namespace posed::drivers

@@ -11,8 +11,6 @@
 #include <cstring>
 #include <utility>
 
-#include "drivers/transport/multicast.hpp"
-
 namespace posed::drivers {
 namespace {
 
@@ -26,6 +24,10 @@ constexpr int kReceiveBuffer = 1024 * 1024;
 // A datagram counts as at most this old: an older stamp means that the wall clock was set.
 constexpr int kMaxOldBatches = 1000;  // more than a socket's buffer holds
 constexpr std::int64_t kMaxAge_ns = 50'000'000;
+// While nothing comes of a group, it is joined again this often.
+constexpr std::int64_t kRejoin_ns = 2 * kNanosPerSecond;
+// A sender that says nothing for so long loses its socket to another one.
+constexpr std::int64_t kSilence_ns = kNanosPerSecond;
 static_assert(kMaxDatagram <= kMaxChunk);
 
 std::int64_t to_ns(const timespec& time) noexcept {
@@ -166,7 +168,10 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
                 "); use an address of this machine and a port that is free");
   }
   if (!wanted->group) return {};
-  return join_group(socket.fd, *wanted->group, all.interface);
+  auto joined = Membership::join(socket.fd, *wanted->group, all.interface);
+  if (!joined) return std::unexpected(joined.error());
+  socket.membership = *joined;
+  return {};
 }
 
 std::string UdpTransport::endpoint(std::size_t socket) const {
@@ -219,20 +224,46 @@ Result<> UdpTransport::start(std::int64_t now_ns) {
     for (std::size_t i = 0; i < received_; ++i) read_control(i, old);
   }
   next_ = received_;
+  const auto has_group = [](const Socket& socket) { return socket.membership.has_value(); };
+  if (std::ranges::any_of(sockets_, has_group)) rejoin_ns_ = now_ns + kRejoin_ns;
   return {};
+}
+
+// RT-safe except for its system calls, which are made only while nothing comes.
+void UdpTransport::rejoin(std::int64_t now_ns) noexcept {
+  if (rejoin_ns_ == kNoTime_ns || now_ns < rejoin_ns_) return;
+  rejoin_ns_ = now_ns + kRejoin_ns;
+  for (Socket& socket : sockets_) {
+    if (socket.membership) socket.membership->renew(socket.fd);
+  }
+}
+
+// RT-safe.
+bool UdpTransport::owns(Socket& socket, const Host& sender) const noexcept {
+  const bool owner = socket.heard_ns != kNoTime_ns && sender == socket.sender;
+  const bool free = socket.heard_ns == kNoTime_ns || batch_ns_ - socket.heard_ns >= kSilence_ns;
+  if (!owner && !free) return false;
+  socket.sender = sender;
+  socket.heard_ns = batch_ns_;
+  return true;
 }
 
 // RT-safe except for its reads. A flood of datagrams to be dropped ends the call after one batch.
 Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
   Chunk chunk;
-  if (next_ >= received_ && !receive(now_ns)) return chunk;
+  if (next_ >= received_ && !receive(now_ns)) {
+    rejoin(now_ns);
+    return chunk;
+  }
   while (next_ < received_) {
     const std::size_t i = next_++;
     mmsghdr& message = batch_->message[i];
     Address& sender = batch_->sender[i];
     sender.size = message.msg_hdr.msg_namelen;
     read_control(i, chunk);
-    if (!may_send(host_of(sender))) {
+    Socket& socket = sockets_[socket_];
+    const Host host = host_of(sender);
+    if (!may_send(host) || !owns(socket, host)) {
       ++chunk.foreign;
       continue;
     }
@@ -240,8 +271,8 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
       ++chunk.damaged;
       continue;
     }
-    Socket& socket = sockets_[socket_];
     if (!socket.keeps_to) socket.to = sender;
+    if (socket.membership) rejoin_ns_ = now_ns + kRejoin_ns;
     chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
     chunk.socket = static_cast<std::uint8_t>(socket_);
     break;

@@ -14,6 +14,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/address.hpp"
+#include "drivers/transport/multicast.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::drivers {
@@ -27,7 +28,7 @@ struct UdpSocketSettings {
 struct UdpSettings {
   std::vector<UdpSocketSettings> sockets{};  // [Chunk::socket]
   // On which the groups are joined: its name or one of its addresses; empty: the system's choice.
-  std::string interface{};
+  std::string interface {};
   std::vector<std::string> peers{};  // addresses that may send; empty: loopback only
 };
 
@@ -44,9 +45,10 @@ class UdpTransport final : public Transport {
   [[nodiscard]] std::string endpoint(std::size_t socket) const;
 
   [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
-  // In the past while datagrams wait in this object, where poll_fd does not show them.
+  // In the past while datagrams wait in this object, where poll_fd does not show them; otherwise
+  // when a group is to be joined again, if nothing comes until then.
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
-    return next_ < received_ ? batch_ns_ : kNoTime_ns;
+    return next_ < received_ ? batch_ns_ : rejoin_ns_;
   }
   // Discards what came since open(): it is old by now.
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
@@ -60,6 +62,9 @@ class UdpTransport final : public Transport {
     std::optional<Address> to;  // a configured one, or the last sender
     bool keeps_to = false;      // `to` is configured
     std::uint32_t dropped = 0;  // by the kernel, of all so far; begins again after 2^32
+    std::optional<Membership> membership{};
+    Host sender{};                       // whose datagrams are taken
+    std::int64_t heard_ns = kNoTime_ns;  // when it sent the last; kNoTime_ns: nobody has yet
   };
   struct Batch;  // the buffers of one recvmmsg
 
@@ -68,6 +73,9 @@ class UdpTransport final : public Transport {
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool may_send(const Host& host) const noexcept;
+  // Whether the socket takes datagrams of this sender. From then on it does.
+  [[nodiscard]] bool owns(Socket& socket, const Host& sender) const noexcept;
+  void rejoin(std::int64_t now_ns) noexcept;
   // What the kernel says beside a datagram.
   void read_control(std::size_t i, Chunk& chunk) noexcept;
 
@@ -79,6 +87,7 @@ class UdpTransport final : public Transport {
   std::size_t socket_ = 0;               // that the batch came from
   std::int64_t batch_ns_ = 0;            // host time and wall clock, taken before the batch
   std::int64_t wall_ns_ = 0;
+  std::int64_t rejoin_ns_ = kNoTime_ns;  // kNoTime_ns: there is no group
 };
 
 }  // namespace posed::drivers

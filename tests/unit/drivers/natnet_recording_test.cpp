@@ -6,19 +6,22 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <fstream>
 #include <map>
 
 #include "drivers/natnet/model_def.hpp"
+#include "tests/support/pcapng.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/natnet_rig.hpp"
 
 namespace posed::drivers {
 namespace {
 
+using test::datagrams_of;
+using test::file_bytes;
 using test::NatNetBytes;
 using test::NatNetRig;
+using test::value_at;
 
 constexpr const char* kSession = "data/streams/natnet_python_natnet";
 constexpr const char* kOldFrames = "data/streams/natnet_motive_frames";
@@ -26,57 +29,15 @@ constexpr int kSessionFrames = 518;
 constexpr int kPrintedFrames = 251;  // the client printed only part of the session
 constexpr std::size_t kSessionFrameBytes = 336;
 
-NatNetBytes file_bytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  const auto bytes = std::as_bytes(std::span(text));
-  REQUIRE_FALSE(bytes.empty());
-  return {bytes.begin(), bytes.end()};
-}
-
-template <typename T>
-T at(std::span<const std::byte> bytes, std::size_t place) {
-  REQUIRE(place + sizeof(T) <= bytes.size());
-  T value{};
-  std::memcpy(&value, bytes.data() + place, sizeof value);
-  return value;
-}
-
 Vec3f vector_at(std::span<const std::byte> bytes, std::size_t place) {
-  return {at<float>(bytes, place), at<float>(bytes, place + 4), at<float>(bytes, place + 8)};
-}
-
-// The UDP payloads of a pcapng file with Ethernet and IPv4, in their order.
-std::vector<NatNetBytes> datagrams_of(const NatNetBytes& pcapng) {
-  constexpr std::uint32_t kEnhancedPacket = 6;
-  constexpr std::size_t kPacketHead = 28;
-  constexpr std::size_t kEthernet = 14;
-  std::vector<NatNetBytes> datagrams;
-  for (std::size_t block = 0; block + 12 <= pcapng.size();) {
-    const auto length = at<std::uint32_t>(pcapng, block + 4);
-    REQUIRE(length >= 12);
-    if (at<std::uint32_t>(pcapng, block) == kEnhancedPacket) {
-      const auto packet =
-          std::span(pcapng).subspan(block + kPacketHead, at<std::uint32_t>(pcapng, block + 20));
-      const bool udp = packet[12] == std::byte{8} && packet[kEthernet + 9] == std::byte{17};
-      const std::size_t head =
-          kEthernet + 4 * (std::to_integer<std::size_t>(packet[kEthernet]) & 15) + 8;
-      const auto size = std::to_integer<std::size_t>(packet[head - 4]) << 8 |
-                        std::to_integer<std::size_t>(packet[head - 3]);
-      if (udp) {
-        const auto payload = packet.subspan(head, size - 8);
-        datagrams.emplace_back(payload.begin(), payload.end());
-      }
-    }
-    block += length;
-  }
-  return datagrams;
+  return {value_at<float>(bytes, place), value_at<float>(bytes, place + 4),
+          value_at<float>(bytes, place + 8)};
 }
 
 std::vector<NatNetBytes> with_id(const std::vector<NatNetBytes>& datagrams, std::uint16_t id) {
   std::vector<NatNetBytes> found;
   for (const NatNetBytes& datagram : datagrams) {
-    if (at<std::uint16_t>(datagram, 0) == id) found.push_back(datagram);
+    if (value_at<std::uint16_t>(datagram, 0) == id) found.push_back(datagram);
   }
   return found;
 }
@@ -137,15 +98,15 @@ TEST_CASE("every frame of the recorded NatNet session, with the values that stan
     const Frame& frame = rig.sink.frames.back();
     CHECK(frame.root_position_m == vector_at(bytes, 84));
     Quatf rotation{};
-    for (std::size_t i = 0; i < 4; ++i) rotation[i] = at<float>(bytes, 96 + 4 * i);
+    for (std::size_t i = 0; i < 4; ++i) rotation[i] = value_at<float>(bytes, 96 + 4 * i);
     CHECK(distance(frame.rotation_xyzw[0], rotation) < 1e-6);
-    CHECK(frame.valid[0] == ((at<std::int16_t>(bytes, 116) & 1) != 0));
+    CHECK(frame.valid[0] == ((value_at<std::int16_t>(bytes, 116) & 1) != 0));
     const Sample& sample = rig.sink.samples.back();
     for (std::size_t marker = 0; marker < 5; ++marker) {
       const std::size_t entry = 126 + 26 * marker;
-      REQUIRE(at<std::uint32_t>(bytes, entry) == (2U << 16 | (marker + 1)));
+      REQUIRE(value_at<std::uint32_t>(bytes, entry) == (2U << 16 | (marker + 1)));
       const Vec3f position_m = vector_at(bytes, entry + 4);
-      const bool occluded = (at<std::int16_t>(bytes, entry + 20) & 1) != 0;
+      const bool occluded = (value_at<std::int16_t>(bytes, entry + 20) & 1) != 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         CHECK(sample.value[3 * marker + axis] == position_m[axis]);
         CHECK(sample.valid[3 * marker + axis] != occluded);
@@ -155,7 +116,7 @@ TEST_CASE("every frame of the recorded NatNet session, with the values that stan
   CHECK(rig.sink.frames.size() == kSessionFrames);
   CHECK(rig.sink.samples.size() == kSessionFrames);
   // The server counts 3 312 787 ticks a second; 120 frames a second were asked of the cameras.
-  const auto ticks = [&](const NatNetBytes& bytes) { return at<std::uint64_t>(bytes, 306); };
+  const auto ticks = [&](const NatNetBytes& bytes) { return value_at<std::uint64_t>(bytes, 306); };
   const auto step_ns =
       rig.sink.frames.back().header.device_ns - rig.sink.frames[0].header.device_ns;
   const double expected_s =
@@ -240,7 +201,7 @@ TEST_CASE("the recorded NatNet session as the vendor's own client printed it") {
   int compared = 0;
   for (const NatNetBytes& bytes : session.frames) {
     REQUIRE(rig.feed(bytes) == Outcome::kOk);
-    const auto same = printed.find(at<std::uint32_t>(bytes, 4));
+    const auto same = printed.find(value_at<std::uint32_t>(bytes, 4));
     if (same == printed.end() || same->second.marker.size() != 5) continue;
     ++compared;
     const Frame& frame = rig.sink.frames.back();
@@ -321,7 +282,7 @@ TEST_CASE("recorded NatNet packets of Motive 1.5, 1.7 and 1.9") {
         const Frame& frame = rig.sink.frames.back();
         CHECK(frame.root_position_m == vector_at(bytes, old.position));
         CHECK(static_cast<double>(frame.rotation_xyzw[0][3]) ==
-              Approx(static_cast<double>(at<float>(bytes, old.position + 24))).margin(1e-6));
+              Approx(static_cast<double>(value_at<float>(bytes, old.position + 24))).margin(1e-6));
         CHECK(frame.header.device_ns > 0);
       }
       // Only 1.9 says whose a labelled marker is; its first one also leads the marker set.

@@ -69,7 +69,9 @@ bool is_ready(const Transport& transport, int patience_ms = 1000) {
 
 // The next datagram, waiting for it as the reader does.
 std::string next(Transport& transport) {
-  if (transport.next_due_ns() == kNoTime_ns && !is_ready(transport)) return "nothing";
+  const std::int64_t due_ns = transport.next_due_ns();
+  const bool waits = due_ns == kNoTime_ns || due_ns > now_ns();
+  if (waits && !is_ready(transport)) return "nothing";
   return text_of(transport.read(now_ns()).bytes);
 }
 
@@ -161,6 +163,32 @@ TEST_CASE("senders that are not among the peers are dropped and counted") {
   const std::string answer = "e";
   REQUIRE(transport->send(std::as_bytes(std::span(answer))));
   CHECK(friendly.receive() == "e");  // not to the stranger, who spoke last
+}
+
+TEST_CASE("a socket has one sender at a time; after a second of silence another one may send") {
+  const auto transport = listen_on("127.0.0.1:0");
+  const Peer first("127.0.0.2:0");
+  const Peer second("127.0.0.3:0");
+  const Peer program("127.0.0.2:0");  // another one on the first sender's computer
+  std::int64_t time_ns = 10 * kNanosPerSecond;
+  const auto heard = [&](const Peer& from) {
+    REQUIRE(from.send(transport->endpoint(0), "x"));
+    REQUIRE(is_ready(*transport));
+    const Chunk chunk = transport->read(time_ns);
+    CHECK(chunk.foreign == (chunk.bytes.empty() ? 1 : 0));
+    return !chunk.bytes.empty();
+  };
+  CHECK(heard(first));
+  CHECK_FALSE(heard(second));
+  time_ns += kNanosPerSecond * 9 / 10;
+  CHECK_FALSE(heard(second));  // to be refused keeps nothing
+  CHECK(heard(program));
+  time_ns += kNanosPerSecond * 9 / 10;
+  CHECK_FALSE(heard(second));
+  CHECK(heard(first));
+  time_ns += kNanosPerSecond;
+  CHECK(heard(second));
+  CHECK_FALSE(heard(first));
 }
 
 TEST_CASE("empty and too long datagrams are dropped and counted") {

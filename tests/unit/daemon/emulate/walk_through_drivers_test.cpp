@@ -1,50 +1,29 @@
 // A walk goes out of the emulator of each mocap system and in through its driver: every bone that
-// the format carries comes back as it was.
+// the format carries comes back as it was, and is styled as the same walk from a file.
 #include <catch2/catch.hpp>
 
 #include <array>
 #include <bitset>
-#include <memory>
-#include <utility>
+#include <cmath>
 #include <vector>
 
-#include "daemon/emulate/clip_motion.hpp"
-#include "drivers/driver.hpp"
-#include "models/motion/interpolate.hpp"
 #include "models/motion/kinematics.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "proto/clip/clip.hpp"
+#include "models/style/style_filter.hpp"
+#include "models/style/train.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/temp_folder.hpp"
-#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/daemon/emulate/heard_walk.hpp"
 
 namespace posed::emulate {
 namespace {
 
+using motion::WalkerFamily;
+using test::HeardPose;
+
 constexpr double kWithin_rad = 0.1 * kDegree;
 constexpr std::int64_t kLength_ns = 2 * kNanosPerSecond;
-
-// What a host sees of an emulated system.
-struct Host {
-  explicit Host(const drivers::Driver& of)
-      : driver(of), decoder(of.make_decoder(of.expect({}).value()).value()) {}
-
-  void hear(std::uint8_t socket, const std::vector<std::byte>& bytes, std::int64_t now_ns) {
-    const int before = sink.descriptions;
-    decoder->feed_socket(socket, bytes, now_ns, sink);
-    if (sink.descriptions == before) return;
-    auto layout = driver.make_layout(sink.described);
-    if (!layout) FAIL(layout.error().text());
-    layouts.push_back(std::move(*layout));
-    decoder->use(*layouts.back());
-  }
-
-  const drivers::Driver& driver;
-  std::unique_ptr<drivers::Decoder> decoder;
-  std::vector<std::unique_ptr<const drivers::SourceLayout>> layouts;
-  test::CollectSink sink;
-};
 
 // Rotation of each bone in the world relative to its T-pose.
 struct Turns {
@@ -62,66 +41,126 @@ struct Turns {
   std::bitset<kBones> there;
 };
 
-// The largest difference of a bone that both have [rad].
-double difference_rad(const Turns& a, const Turns& b) {
-  double worst_rad = 0.0;
-  for (std::size_t bone = 0; bone < kBones; ++bone) {
-    if (!a.there[bone] || !b.there[bone]) continue;
-    worst_rad = std::max(worst_rad, angle_between_rad(a.turn[bone], b.turn[bone]));
+// Of the bones that both have.
+struct Difference {
+  void add(const Turns& a, const Turns& b) {
+    for (std::size_t bone = 0; bone < kBones; ++bone) {
+      if (!a.there[bone] || !b.there[bone]) continue;
+      const double off_rad = angle_between_rad(a.turn[bone], b.turn[bone]);
+      most_rad = std::max(most_rad, off_rad);
+      squares += off_rad * off_rad;
+      ++count;
+    }
   }
-  return worst_rad;
+  [[nodiscard]] double rms_rad() const { return std::sqrt(squares / count); }
+  double most_rad = 0.0, squares = 0.0;
+  int count = 0;
+};
+
+// A walk in a file of its own, and the walker that the drivers deliver.
+class Walk {
+ public:
+  Walk() {
+    const auto made =
+        motion::make_walker({.seconds = 3.0, .rate_hz = 120.0, .noise_deg = 0.0}).value();
+    REQUIRE(clip::write_bvh(made, path()));
+    clip_ = clip::read_clip(path()).value();
+  }
+
+  // The walker's frames, without props, and with a time for the filter.
+  [[nodiscard]] std::vector<HeardPose> through(const drivers::Driver& driver) const {
+    std::vector<HeardPose> walker = test::hear_walk(driver, path(), kLength_ns);
+    std::erase_if(walker, [](const HeardPose& heard) {
+      return Turns(*heard.skeleton, heard.frame).there.count() < 5;
+    });
+    for (HeardPose& heard : walker) {
+      heard.frame.header.device_ns = kNoTime_ns;
+      heard.frame.header.arrival_ns = heard.posed_ns;
+    }
+    return walker;
+  }
+  // The same frames from the file. All are as the emulator was posed last, or all as before that.
+  [[nodiscard]] std::vector<HeardPose> from_file(const std::vector<HeardPose>& walker) const {
+    const auto at = [&](std::int64_t HeardPose::*time) {
+      std::vector<HeardPose> same = walker;
+      for (HeardPose& heard : same) {
+        const Header header = heard.frame.header;
+        heard.frame = test::pose_at(clip_, heard.*time);
+        heard.frame.header = header;
+        heard.skeleton = clip_.skeleton;
+      }
+      return same;
+    };
+    auto last = at(&HeardPose::posed_ns), before = at(&HeardPose::posed_before_ns);
+    return difference(walker, last).rms_rad() < difference(walker, before).rms_rad() ? last
+                                                                                     : before;
+  }
+  [[nodiscard]] static Difference difference(const std::vector<HeardPose>& a,
+                                             const std::vector<HeardPose>& b) {
+    Difference all;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      all.add(Turns(*a[i].skeleton, a[i].frame), Turns(*b[i].skeleton, b[i].frame));
+    }
+    return all;
+  }
+
+ private:
+  [[nodiscard]] std::filesystem::path path() const { return folder_.path() / "walk.bvh"; }
+
+  test::TempFolder folder_;
+  clip::Clip clip_;
+};
+
+style::StyleModel humanoid_model() {
+  const auto lesson = [](WalkerFamily family, std::uint32_t person, const std::string& group) {
+    auto clip = motion::make_walker({.family = family, .person = person}).value();
+    clip.path = "walker_" + std::to_string(person);
+    const std::string subject = clip.path;
+    return style::TrainingClip{std::move(clip), group, subject, "walk"};
+  };
+  style::TrainOptions options;
+  options.target = "sway";
+  options.dataset.space = motion::Space::kHumanoid;
+  return style::train_style(
+             {lesson(WalkerFamily::kMarch, 1, "march"), lesson(WalkerFamily::kMarch, 2, "march"),
+              lesson(WalkerFamily::kSway, 3, "sway")},
+             options)
+      .value();
+}
+
+// As the live stage and `apply --cold` do it.
+std::vector<HeardPose> styled(const style::StyleModel& model, std::vector<HeardPose> walker) {
+  struct Last final : StageOut {
+    void frame(const StageFrame& styled) noexcept override { now = styled.frame; }
+    Frame now;
+  } last;
+  const style::FilterOptions options;
+  const auto bound = style::bind_model(model, *walker[0].skeleton, options, "sway").value();
+  style::StyleFilter filter(bound.get(), options);
+  for (HeardPose& heard : walker) {
+    filter.process({.frame = heard.frame}, last);
+    heard.frame = last.now;
+  }
+  return walker;
 }
 
 }  // namespace
 
-TEST_CASE("a walk passes through every mocap system as it was") {
-  const test::TempFolder dir;
-  const clip::Clip walk =
-      motion::make_walker({.seconds = 3.0, .rate_hz = 120.0, .noise_deg = 0.0}).value();
-  REQUIRE(clip::write_bvh(walk, dir.path() / "walk.bvh"));
-  const clip::Clip read = clip::read_clip(dir.path() / "walk.bvh").value();
+TEST_CASE("a walk passes through every mocap system as it was, and takes the same style") {
+  const Walk walk;
+  const style::StyleModel model = humanoid_model();
   for (const drivers::Driver& driver : drivers::registry()) {
     if (driver.make_layout == nullptr || driver.emulate == nullptr) continue;
     INFO(driver.name);
-    const auto emulator = driver.emulate({}).value();
-    const Motion motion = clip_motion(dir.path() / "walk.bvh", *emulator).value();
-    Host host(driver);
-    std::size_t compared = 0;
-    // A driver may learn only from the next frame that one was complete.
-    std::int64_t posed_ns = 0, posed_before_ns = 0;
-    const auto turns_at = [&](std::int64_t at_ns) {
-      const double at = seconds(at_ns) * read.frame_rate_hz;
-      const int index = static_cast<int>(at);
-      Frame pose = read.frame(index);
-      motion::interpolate(*read.skeleton, read.frame(index), read.frame(index + 1), at - index,
-                          pose);
-      return Turns(*read.skeleton, pose);
-    };
-    while (posed_ns < kLength_ns) {
-      const std::int64_t due_ns = emulator->next_due_ns();
-      REQUIRE(due_ns != kNoTime_ns);
-      if (due_ns > posed_ns) posed_before_ns = std::exchange(posed_ns, due_ns);
-      motion(seconds(due_ns), *emulator);
-      std::vector<std::byte> bytes;
-      const std::uint8_t socket = emulator->next_socket();
-      emulator->emit(due_ns, bytes);
-      host.hear(socket, bytes, due_ns);
-      for (std::size_t i = 0; i < host.sink.frames.size(); ++i) {
-        const drivers::Body& body = host.layouts.back()->bodies[host.sink.bodies[i]];
-        const Turns got(*body.skeleton, host.sink.frames[i]);
-        const double off_rad = std::min(difference_rad(got, turns_at(posed_ns)),
-                                        difference_rad(got, turns_at(posed_before_ns)));
-        if (got.there.count() < 5) continue;  // a prop
-        CHECK(off_rad < kWithin_rad);
-        ++compared;
-      }
-      for (const Outcome wrong : {Outcome::kShort, Outcome::kBadChecksum, Outcome::kOutOfRange,
-                                  Outcome::kLate, Outcome::kDuplicate}) {
-        CHECK(host.sink.count(wrong) == 0);  // foreign is a frame before its layout
-      }
-      host.sink.clear();
-    }
-    CHECK(compared > 100);
+    const auto walker = walk.through(driver);
+    REQUIRE(walker.size() > 100);
+    const auto file = walk.from_file(walker);
+    CHECK(Walk::difference(walker, file).most_rad < kWithin_rad);
+    const auto styled_walker = styled(model, walker), styled_file = styled(model, file);
+    CHECK(Walk::difference(styled_walker, walker).rms_rad() > 5 * kDegree);
+    const Difference off = Walk::difference(styled_walker, styled_file);
+    INFO(off.rms_rad() / kDegree << " deg rms, at most " << off.most_rad / kDegree);
+    CHECK(off.rms_rad() < kWithin_rad);
   }
 }
 
