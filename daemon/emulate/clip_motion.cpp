@@ -36,6 +36,8 @@ void pose_bodies(Performance& performance, double time_s, drivers::Emulator& emu
                       performance.pose);
   for (Performer& performer : performance.performers) {
     performer.retarget.apply(performance.pose, performer.pose);
+    // A suit measures all of its bones: those that the clip does not have rest on their parents.
+    for (std::size_t j = 0; j < performer.pose.joint_count; ++j) performer.pose.valid.set(j);
     emulator.pose(performer.body, performer.pose);
   }
 }

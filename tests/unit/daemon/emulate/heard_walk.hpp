@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,7 @@ inline Frame pose_at(const clip::Clip& clip, std::int64_t at_ns) {
 }
 
 struct HeardPose {
+  std::string body;
   std::shared_ptr<const Skeleton> skeleton;
   Frame frame;
   // When the emulator was posed last, and before that: a driver may learn only from the next frame
@@ -78,8 +80,8 @@ inline std::vector<HeardPose> hear_walk(const drivers::Driver& driver,
     emulator->emit(due_ns, bytes);
     host.hear(socket, bytes, due_ns);
     for (std::size_t i = 0; i < host.sink.frames.size(); ++i) {
-      all.push_back({host.body(host.sink.bodies[i]).skeleton, host.sink.frames[i], posed_ns,
-                     posed_before_ns});
+      const drivers::Body& body = host.body(host.sink.bodies[i]);
+      all.push_back({body.name, body.skeleton, host.sink.frames[i], posed_ns, posed_before_ns});
     }
     for (const Outcome wrong : {Outcome::kShort, Outcome::kBadChecksum, Outcome::kOutOfRange,
                                 Outcome::kLate, Outcome::kDuplicate}) {
