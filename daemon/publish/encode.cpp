@@ -2,6 +2,7 @@
 #include "proto/text/clean.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <span>
 
 namespace posed::publish {
@@ -83,6 +84,8 @@ const v1::Sample& SampleEncoder::encode(const Sample& sample) {
 }
 
 v1::Skeleton skeleton_message(const std::string& stream, const Skeleton& skeleton, double rate_hz) {
+  const Eigen::Vector3d no_tip_m =
+      Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   v1::Skeleton message;
   message.set_stream(stream);
   message.set_id(skeleton.id);
@@ -93,6 +96,8 @@ v1::Skeleton skeleton_message(const std::string& stream, const Skeleton& skeleto
     message.add_joint_name(clean(joint.name));
     message.add_parent(joint.parent);
     for (const double value : joint.offset_m) message.add_offset_m(static_cast<float>(value));
+    const Eigen::Vector3d tip_m = joint.end_site_m.value_or(no_tip_m);
+    for (const double value : tip_m) message.add_end_site_m(static_cast<float>(value));
     message.add_humanoid_bone(joint.bone ? std::string(bone_name(*joint.bone)) : std::string());
     for (const float value : from_eigen(joint.T_world_joint)) message.add_t_world_joint_xyzw(value);
   }

@@ -1,0 +1,118 @@
+"""Receives what the daemon publishes."""
+import time
+
+import zmq
+
+from .connection import PosedError, open_socket
+from .skeleton import Skeleton
+from .v1 import posed_pb2
+
+DEFAULT_ENDPOINT = "tcp://127.0.0.1:5570"
+_MESSAGES = {
+    "pose": posed_pb2.Frame,
+    "skeleton": posed_pb2.Skeleton,
+    "sensor": posed_pb2.Sample,
+    "event": posed_pb2.Event,
+    "stats": posed_pb2.Stats,
+}
+
+
+class Frame:
+    """One pose, with the skeleton that it belongs to."""
+
+    def __init__(self, message, skeleton, age_s):
+        self.message = message  # posed.v1.Frame, with everything else that the wire carries
+        self.skeleton = skeleton
+        # Since the daemon received the measurement; None until the daemon's clock is known, at most
+        # a second. Between two machines it is as exact as their clocks agree.
+        self.age_s = age_s
+        self.stream = message.stream
+        self.sequence = message.sequence
+        self.root_m = tuple(message.root_position_m)
+        values = message.rotation_xyzw
+        self.rotations = [tuple(values[i:i + 4]) for i in range(0, len(values), 4)]
+        self.valid = [byte != 0 for byte in message.validity]
+
+    def positions_m(self):
+        """World positions of the joints by name."""
+        _, places = self.skeleton.world(self.rotations, self.root_m)
+        return dict(zip(self.skeleton.names, places))
+
+    def tips_m(self):
+        """World positions of the end sites (fingertips, ...) by the names of their joints."""
+        return self.skeleton.tips_m(*self.skeleton.world(self.rotations, self.root_m))
+
+    def vrm_locals(self):
+        """Rotations of the VRM bones, x y z w, as a VRM avatar takes them (right-handed)."""
+        return self.skeleton.vrm_locals(self.rotations)
+
+
+class Client:
+    """Subscribes to streams. Not for several threads at once.
+
+    streams: their names. Nothing: all of them, with those that come later.
+    topics: what else to receive by messages(): "sensor", "event".
+    key, server_key: paths of your own NAME.key and of the daemon's NAME.pub, where it asks for keys.
+    queue: messages that may wait here; beyond it, newer ones are lost. Keep it short.
+    """
+
+    def __init__(self, endpoint=DEFAULT_ENDPOINT, streams=None, *, topics=(), key=None,
+                 server_key=None, queue=16):
+        self._context = zmq.Context()
+        self._socket = open_socket(self._context, zmq.SUB, endpoint, key, server_key)
+        self._socket.setsockopt(zmq.RCVHWM, queue)
+        self._names = set(streams or ())
+        for name in streams or [""]:
+            for topic in ("pose", "skeleton", *topics):
+                self._socket.subscribe(f"{topic}/{name}")
+        self._socket.subscribe("stats")
+        self.skeletons = {}  # Skeleton by stream
+        self.stats = None  # the last posed.v1.Stats
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self._socket.close()
+        self._context.term()
+
+    def messages(self, timeout_s=None):
+        """Everything as (topic, message): ("pose/walker", posed_pb2.Frame) and so on.
+
+        Raises PosedError when nothing comes for `timeout_s`.
+        """
+        while True:
+            wait_ms = None if timeout_s is None else int(timeout_s * 1000)
+            if self._socket.poll(wait_ms) == 0:
+                raise PosedError(f"nothing came for {timeout_s} s; is the daemon running, and is the "
+                                 "stream's name right?")
+            topic, body = self._socket.recv_multipart()
+            topic = topic.decode()
+            kind, _, stream = topic.partition("/")
+            # A subscription is a prefix: "walker" also brings "walker-raw".
+            if stream and self._names and stream not in self._names:
+                continue
+            message = _MESSAGES[kind].FromString(body)
+            if kind == "skeleton":
+                self.skeletons[stream] = Skeleton(message)
+            elif kind == "stats":
+                self.stats = message
+            yield topic, message
+
+    def frames(self, timeout_s=None):
+        """The poses, as Frames; without those that came before their skeleton."""
+        for topic, message in self.messages(timeout_s):
+            if not topic.startswith("pose/"):
+                continue
+            skeleton = self.skeletons.get(message.stream)
+            if skeleton is not None and skeleton.id == message.skeleton_id:
+                yield Frame(message, skeleton, self._age_s(message))
+
+    def _age_s(self, message):
+        if self.stats is None:
+            return None
+        utc_ns = message.arrival_ns + self.stats.monotonic_to_utc_ns
+        return (time.time_ns() - utc_ns) / 1e9
