@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "posed_client.hpp"
+#include "proto/clients/cpp/posed_client.hpp"
 
 int main(int argc, char** argv) {
   if (argc != 3 && argc != 4 && argc != 6) {
