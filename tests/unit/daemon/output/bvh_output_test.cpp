@@ -1,8 +1,9 @@
 // The BVH output from frames to lines on real sockets, on a virtual clock.
 #include "daemon/output/bvh_output.hpp"
 
-#include <map>
+#include <iterator>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -175,6 +176,44 @@ TEST_CASE("a client that does not read misses whole lines, is disconnected, and 
     if (end == std::string::npos) break;
     at = end + 1;
   }
+}
+
+TEST_CASE("a client that pauses finds whole lines before and after the gap") {
+  BvhRig rig(bvh_config());
+  const test::RawPeer pausing = rig.connect();
+  int frames = 0;
+  while (rig.stats().dropped() < 10 && frames < 20'000) rig.step(frames++);
+  std::string text = next_lines(pausing);
+  for (int i = 0; i < 10; ++i) {
+    rig.step(frames++);
+    text += next_lines(pausing);
+  }
+  CHECK(rig.stats().receivers() == 1);
+  CHECK(count_of(text, "||\n") == rig.stats().sent());
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    const std::vector<std::string> all{std::istream_iterator<std::string>(words), {}};
+    REQUIRE(all.size() == 2 + 354 + 1);  // number, name, values and "||"
+  }
+}
+
+TEST_CASE("a line that a client takes in pieces goes out whole before the next one") {
+  LineClients clients = LineClients::open("127.0.0.1:0", {}).value();
+  const test::RawPeer peer(clients.endpoint());
+  CHECK(clients.look(0).empty());
+  CHECK(clients.size() == 1);
+  const std::string line = std::string(2'000'000, 'a') + "\n";  // far more than all buffers hold
+  CHECK(clients.send(line, 1).sent == 1);
+  CHECK(clients.send("lost\n", 2).dropped == 1);
+  std::string text;
+  for (int i = 0; i < 2000 && text.size() < line.size(); ++i) {
+    text += peer.receive(1 << 20, std::chrono::milliseconds(1));
+    CHECK(clients.look(3).empty());
+  }
+  CHECK((text == line));
+  CHECK(clients.send("next\n", 4).sent == 1);
+  CHECK(peer.receive(5) == "next\n");
 }
 
 TEST_CASE("there are at most 16 clients; one that goes makes room") {
