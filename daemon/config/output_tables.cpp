@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <span>
@@ -103,9 +105,13 @@ void OutputReader::read_streams(TableReader& table, OutputConfig& output) const 
                                        hands ? ", left_hand or right_hand" : ""));
 }
 
-bool is_port(const std::string& endpoint) {
-  const std::string port = endpoint.substr(endpoint.rfind(':') + 1);
-  return port.size() <= 5 && std::stoi(port) > 0 && std::stoi(port) <= 65535;
+// Whether the port of an endpoint is one that a program can have.
+bool has_port(std::string_view endpoint) {
+  const std::string_view port = endpoint.substr(endpoint.rfind(':') + 1);
+  const char* const end = port.data() + port.size();
+  std::uint16_t number = 0;
+  const auto [read_to, error] = std::from_chars(port.data(), end, number);
+  return error == std::errc() && read_to == end && number > 0;
 }
 
 void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
@@ -119,7 +125,7 @@ void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
   std::set<std::string> seen;
   for (const std::string& endpoint : output.to) {
     const auto address = drivers::parse_endpoint(endpoint);
-    if (!address || !is_port(endpoint)) {
+    if (!address || !has_port(endpoint)) {
       table.add_error("to", fmt::format("{} should be an address in numbers and a port from 1 to"
                                         " 65535, like 127.0.0.1:39539",
                                         in_quotes(endpoint)));
@@ -145,7 +151,7 @@ void OutputReader::read_bvh(TableReader& table, OutputConfig& output) const {
   const auto address = drivers::listen_address(output.listen, output.peers, "the clients'");
   if (!address) {
     table.add_error("listen", address.error().message);
-  } else if (!is_port(output.listen)) {
+  } else if (!has_port(output.listen)) {
     table.add_error("listen", "clients must know the port: choose one from 1 to 65535");
   }
 }

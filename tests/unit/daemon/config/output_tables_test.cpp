@@ -115,6 +115,11 @@ TEST_CASE("a wrong output is one sentence with its line") {
           "posed.toml:15: '" + std::string(endpoint) +
               "' should be an address in numbers and a port from 1 to 65535, like 127.0.0.1:39539");
   }
+  for (const char* port : {"\\u0000", "+1", "1 ", "\\u001b[2J"}) {
+    const std::string sentence = output_complaint(kToAnn + "to = [\"127.0.0.1:" + port + "\"]\n");
+    CHECK(sentence.find("should be an address in numbers and a port") != std::string::npos);
+    CHECK(sentence.find('\x1b') == std::string::npos);
+  }
   CHECK(output_complaint(kToAnn + "to = [\"127.0.0.1:1\", \"127.0.0.1:1\"]\n")
             .find("'127.0.0.1:1' is listed twice") != std::string::npos);
   CHECK(output_complaint(kToAnn + kTo + "rate_hz = -1\n").find("out of range") !=
@@ -154,6 +159,7 @@ header = true
   CHECK(output_complaint(bvh + "listen = \"0.0.0.0:7002\"\n").find("in peers") !=
         std::string::npos);
   CHECK(output_complaint(bvh + "listen = \"here\"\n").find("posed.toml:15: 'here' should be") == 0);
+  CHECK(output_complaint(bvh + "listen = \"\\u001b[2J\"\n").find('\x1b') == std::string::npos);
   CHECK(output_complaint(bvh + "listen = \"127.0.0.1:0\"\n").find("choose one from 1 to 65535") !=
         std::string::npos);
   CHECK(output_complaint(bvh + "peers = [\"studio\"]\n").find("'studio' should be an address") !=
