@@ -215,7 +215,9 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths
     rows.push_back("  " + fit(clean_name(source.name()), widths.name - 1) + text);
   }
   for (const v1::OutputStats& output : stats.output()) {
-    rows.push_back("  " + fit(clean_name(output.name()), widths.name - 1) + output_row(output));
+    // Names with their stream's behind the kind are often too long for the column.
+    rows.push_back("  " + fit(clean_name(output.name()), widths.name - 2) + " " +
+                   output_row(output));
   }
   for (const v1::StreamStats& stream : stats.stream()) {
     for (const std::string& text :
@@ -233,6 +235,9 @@ Widths widths_for(const v1::Stats& stats, int wanted) {
   Widths widths{.line = 0, .model = 0};
   for (const v1::StreamStats& stream : stats.stream()) {
     widths.name = std::max(widths.name, static_cast<int>(stream.stream().size()) + 2);
+  }
+  for (const v1::OutputStats& output : stats.output()) {
+    widths.name = std::max(widths.name, static_cast<int>(output.name().size()) + 2);
   }
   return widths;
 }

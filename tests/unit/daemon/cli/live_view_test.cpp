@@ -164,6 +164,11 @@ TEST_CASE("the live view has a line for each output, with what went wrong if any
   REQUIRE(lines.size() >= 5);
   CHECK(lines[3] == "  vmc       vmc output: 1 receiver, 10 frames, 30 sent");
   CHECK(lines[4] == "  bvh       bvh output: 2 receivers, 0 frames, 0 sent, 3 dropped, 4 failed");
+  vmc.set_name("vmc-stage-performer");
+  CHECK(
+      live_view(stats, {.title = "posed"})[3].starts_with("  vmc-stag~ vmc output: 1 receiver, "));
+  const auto wide = live_view(stats, {.title = "posed", .width = 0, .height = 0});
+  CHECK(wide[3].starts_with("  vmc-stage-performer vmc output: 1 receiver, "));
 }
 
 TEST_CASE("a daemon that does not answer is not shown as live") {
