@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/assembly/body_streams.hpp"
+#include "daemon/assembly/output_threads.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/device_supervisor.hpp"
@@ -92,6 +93,7 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<pipeline::Ring<pipeline::Ack>> acks;
   std::unique_ptr<BodyStreams> bodies;               // null: no device has several
   std::unique_ptr<control::RequestHandler> handler;  // owns the models
+  std::unique_ptr<OutputThreads> outputs;
   std::unique_ptr<publish::Publisher> publisher;
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
@@ -101,6 +103,7 @@ class Daemon::Parts final : public control::DaemonControl {
 
  private:
   Result<> open_sockets();
+  Result<> open_publisher();
   Result<> open_engines();
   Result<> start_threads();
   [[nodiscard]] StreamUsers users() const {
@@ -178,6 +181,13 @@ Result<> Daemon::Parts::open_sockets() {
   auto started = net::ZapAuthenticator::start(context.get(), std::move(allowed));
   if (!started) return std::unexpected(started.error());
   authenticator = std::move(*started);
+  auto opened_outputs = OutputThreads::open(config.outputs);
+  if (!opened_outputs) return std::unexpected(opened_outputs.error());
+  outputs = std::move(*opened_outputs);
+  return open_publisher();
+}
+
+Result<> Daemon::Parts::open_publisher() {
   std::vector<publish::StreamInfo> infos;
   infos.reserve(streams.size());
   for (const auto& stream : streams) {
@@ -201,7 +211,8 @@ Result<> Daemon::Parts::open_sockets() {
                                     .more_stats = hooks.more_stats,
                                     .record_sink = hooks.record_sink,
                                     .clock = system::monotonic_ns,
-                                    .slots = streams.size()};
+                                    .slots = streams.size(),
+                                    .outputs = outputs->outputs()};
   if (bodies != nullptr) {
     options.slots += bodies->count();
     for (const auto& source : bodies->sources()) {
@@ -288,6 +299,10 @@ Result<> Daemon::Parts::start_threads() {
                                               *handler);
   if (!server) return std::unexpected(server.error());
   control = std::move(*server);
+  outputs->start([this](std::optional<std::uint32_t> stream, const std::string& text) {
+    if (stream) return publisher->post_event(*stream, v1::Event::KIND_WARNING, text);
+    spdlog::warn("{}", text);
+  });
   const bool fifo = config.realtime && system::ask_for_realtime();
   publisher_thread = std::thread([this, fifo] {
     system::enter_hot_thread("posed-publish", fifo ? system::kPublisherPriority : 0);
@@ -354,6 +369,7 @@ void Daemon::Parts::halt() noexcept {
   control.reset();
   if (publisher) publisher->stop();
   if (publisher_thread.joinable()) publisher_thread.join();
+  if (outputs) outputs->stop();
 }
 
 Daemon::Daemon(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}

@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/config_file.hpp"
+#include "daemon/config/output_tables.hpp"
 #include "daemon/config/stream_tables.hpp"
 #include "daemon/net/keys.hpp"
 #include "models/stages/registry.hpp"
@@ -113,10 +114,12 @@ void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonCo
                                   config.control_endpoint + "; give control another port");
   }
   read_streams(root, file, config);
+  read_outputs(root, file, config);
   root.finish();
 }
 
-// Every key that a config may have, found by reading a config that has every table.
+// Every key that a config may have, found by reading a config that has every table. [[output]] is
+// left out: who misplaces a key of its names (body, listen) means that of a stream or source.
 std::set<std::string> all_keys(Drivers drivers) {
   std::string text = "[publish]\n[control]\n[security]\n[[security.client]]\n";
   for (const drivers::Driver& driver : drivers) {

@@ -3,8 +3,10 @@
 // a lower folder that has a use for it, too.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/net/security.hpp"
@@ -54,6 +56,29 @@ struct SourceConfig {
   StreamConfig every;
 };
 
+enum class OutputKind : std::uint8_t { kVmc, kBvh };
+
+// As in the config.
+[[nodiscard]] constexpr std::string_view kind_name(OutputKind kind) noexcept {
+  return kind == OutputKind::kVmc ? "vmc" : "bvh";
+}
+
+// Another way out for the frames of some streams, beside ZeroMQ.
+struct OutputConfig {
+  std::string name;  // [a-z0-9_-]{1,32}, or KIND-STREAM where the file does not say; unique
+  OutputKind kind = OutputKind::kVmc;
+  std::string body, left_hand, right_hand;  // streams; at least one is not empty
+  double rate_hz = 0.0;                     // at most so many frames a second; 0: all
+  // vmc
+  std::vector<std::string> to;  // addresses and ports
+  bool vrm1_names = false;      // of blend shapes; false: those of VRM 0
+  bool assistant = false;       // sends hands only
+  // bvh
+  std::string listen = "127.0.0.1:7002";  // address and port that clients connect to
+  std::vector<std::string> peers;         // addresses that may connect; empty: this machine
+  bool header = false;                    // clients get a BVH's HIERARCHY first
+};
+
 // Who may connect; without a server key CURVE is off.
 struct SecurityConfig {
   std::filesystem::path server_key;  // NAME.key; empty: no CURVE
@@ -69,6 +94,7 @@ struct DaemonConfig {
   SecurityConfig security;
   std::vector<StreamConfig> streams;  // of devices with one body
   std::vector<SourceConfig> sources;
+  std::vector<OutputConfig> outputs;
   // How many streams there may be at once, with those that come while the daemon runs. Memory is
   // set aside for all of them only if there is a source.
   int max_streams = 64;

@@ -18,6 +18,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/address.hpp"
+#include "drivers/transport/listener.hpp"
 
 namespace posed::emulate {
 namespace {
@@ -93,15 +94,9 @@ Result<EmulatedPort> EmulatedPort::listen_tcp(const std::string& endpoint) {
   const auto address = drivers::parse_endpoint(endpoint);
   if (!address) return std::unexpected(address.error());
   EmulatedPort port(Kind::kTcpServer, {}, "");
-  port.listener_ =
-      ::socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const int yes = 1;
-  setsockopt(port.listener_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  if (port.listener_ < 0 || ::bind(port.listener_, address->get(), address->size) != 0 ||
-      ::listen(port.listener_, 1) != 0) {
-    return fail("cannot listen on " + endpoint + " (" + errno_text() +
-                "); use an address of this machine and a port that is free");
-  }
+  const auto fd = drivers::listen_on(*address, endpoint, 1);
+  if (!fd) return std::unexpected(fd.error());
+  port.listener_ = *fd;
   drivers::Address bound;
   ::getsockname(port.listener_, bound.get(), &bound.size);
   port.name_ = drivers::endpoint_text(bound);

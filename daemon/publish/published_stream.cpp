@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "daemon/publish/frame_output.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
@@ -108,6 +109,11 @@ void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
 void PublishedStream::count_sample() {
   const std::scoped_lock lock(mutex_);
   ++now_.published.samples;
+}
+
+void PublishedStream::leave_outputs() noexcept {
+  for (FrameOutput* const output : outputs) output->stream_leaves(info.stream);
+  outputs.clear();
 }
 
 void PublishedStream::set_model(std::string name) {

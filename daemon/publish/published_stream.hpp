@@ -42,6 +42,8 @@ class PublishedStream {
   // current second, except those of a stale frame, which are old.
   void count(const Frame& frame, const StageStamps& stamps);
   void count_sample();
+  // Tells its outputs that it leaves.
+  void leave_outputs() noexcept;
   void set_model(std::string name);
 
   // Published so far.
@@ -59,7 +61,8 @@ class PublishedStream {
   Channel styled;
   std::optional<Channel> raw;
   ShedTally shed;
-  bool announced = false;  // its skeleton was sent, and an event if it is a body
+  std::vector<FrameOutput*> outputs;  // that want it
+  bool announced = false;             // its skeleton was sent, and an event if it is a body
 
  private:
   // What stats() reads while the publisher continues.

@@ -11,6 +11,7 @@
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/event_text.hpp"
+#include "daemon/publish/frame_output.hpp"
 #include "daemon/publish/published_slots.hpp"
 #include "daemon/publish/publisher_requests.hpp"
 #include "daemon/system/process.hpp"
@@ -141,9 +142,9 @@ void Publisher::take_all() {
 }
 
 std::int64_t Publisher::turn(std::int64_t now_ns) {
+  announce_new();  // outputs must know a stream before its first frame, too
   take_all();
   do_what_was_asked();
-  announce_new();
   // Also at the first turn, so that a status request that comes at once already finds the streams.
   if (reported_ns_ == kNoTime_ns || now_ns >= reported_ns_ + kNanosPerSecond) {
     every_second(now_ns);
@@ -194,6 +195,7 @@ PublishedStream* Publisher::stream_of(const pipeline::Item& item) {
   const std::uint32_t slot = pipeline::slot_of(id);
   while (slots_->current(id) == nullptr) {
     report_shed(*slots_->holder(slot), true);
+    slots_->holder(slot)->leave_outputs();
     slots_->advance(slot);
   }
   announce_new();
@@ -212,6 +214,7 @@ void Publisher::take(const pipeline::Item& item) {
       break;
     case Kind::kSample:
       published->count_sample();
+      for (FrameOutput* const output : published->outputs) output->sample(item.sample);
       send(published->styled.sensor_topic, published->styled.samples.encode(item.sample));
       break;
     case Kind::kEvent:
@@ -259,7 +262,9 @@ void Publisher::take_frame(PublishedStream& published, const Frame& frame, bool 
   const bool timed = !raw && stamps.decoded_ns != kNoTime_ns;
   const std::size_t stages = timed ? published.info.stages.size() : 0;
   send(channel.pose_topic, channel.frames.stamp(stamps, std::span(frame.stage_us).first(stages)));
-  if (!raw) published.count(frame, stamps);
+  if (raw) return;
+  published.count(frame, stamps);
+  for (FrameOutput* const output : published.outputs) output->frame(frame);
 }
 
 void Publisher::send_event(PublishedStream& published, v1::Event::Kind kind, std::int64_t time_ns,
@@ -341,10 +346,19 @@ void Publisher::announce_new() {
     }
     send_skeleton(published.styled);
     if (published.raw) send_skeleton(*published.raw);
+    connect_outputs(published);
     if (info.source.empty()) return;
     send_event(published, v1::Event::KIND_FOUND, options_.data_clock(), 0,
                body_words(info.source, info.body) + " has come");
   });
+}
+
+void Publisher::connect_outputs(PublishedStream& published) {
+  for (FrameOutput* const output : options_.outputs) {
+    if (!output->wants(published.info.name)) continue;
+    output->stream_comes(published.info);
+    published.outputs.push_back(output);
+  }
 }
 
 std::int64_t Publisher::send_skeletons(std::int64_t now_ns) {
@@ -384,6 +398,7 @@ void Publisher::every_second(std::int64_t now_ns) {
   });
   slots_->fill_left(stats);
   add_sources(stats);
+  add_outputs(stats);
   if (options_.more_stats) options_.more_stats(stats);
   reported_ns_ = now_ns;
   reported_cpu_ns_ = cpu_ns;

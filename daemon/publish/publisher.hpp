@@ -31,6 +31,8 @@ class PeerGuard;
 
 namespace posed::publish {
 
+class FrameOutput;
+
 struct StreamInfo {
   std::uint32_t stream = 0;  // id; its slot is below PublisherOptions::slots
   std::string name;
@@ -79,6 +81,8 @@ struct PublisherOptions {
   std::size_t slots = 0;
   std::vector<SourceInfo> sources{};
   double more_messages_per_s = 0.0;  // of the streams that may come
+  // Which get the streams that they want; outlive the publisher.
+  std::vector<FrameOutput*> outputs{};
 };
 
 // The length of a message queue that holds a quarter of a second of all streams together.
@@ -150,12 +154,15 @@ class Publisher {
   // Sends the skeletons that are due; returns when the next one is.
   [[nodiscard]] std::int64_t send_skeletons(std::int64_t now_ns);
   void want_skeletons(std::string_view prefix);
+  // The stream has got its slot.
+  void connect_outputs(PublishedStream& published);
   // Returns false if more subscriptions may wait.
   [[nodiscard]] bool hear_subscriptions(std::int64_t now_ns);
   [[nodiscard]] bool is_topic(std::string_view prefix) const;
   void every_second(std::int64_t now_ns);
   // Call after the streams were added, because a source says how many it has.
   void add_sources(v1::Stats& stats) const;
+  void add_outputs(v1::Stats& stats) const;
   // These and the functions for other threads: publisher_requests.cpp.
   [[nodiscard]] bool asked() const noexcept;
   void do_what_was_asked();

@@ -6,6 +6,7 @@
 
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
+#include "daemon/publish/frame_output.hpp"
 #include "daemon/publish/published_slots.hpp"
 #include "proto/text/clean.hpp"
 
@@ -67,6 +68,7 @@ v1::Stats Publisher::stats() const {
   slots_->fill(stats);
   stats.set_time_ns(options_.data_clock());
   add_sources(stats);
+  add_outputs(stats);
   if (options_.more_stats) options_.more_stats(stats);
   return stats;
 }
@@ -87,6 +89,10 @@ void Publisher::add_sources(v1::Stats& stats) const {
     source.set_streams(
         static_cast<std::uint32_t>(std::ranges::count_if(stats.stream(), of_source)));
   }
+}
+
+void Publisher::add_outputs(v1::Stats& stats) const {
+  for (const FrameOutput* const output : options_.outputs) output->fill(*stats.add_output());
 }
 
 bool Publisher::asked() const noexcept { return requests_->asked.load(); }
@@ -119,7 +125,10 @@ void Publisher::do_what_was_asked() {
 }
 
 void Publisher::remove_now(std::uint32_t stream) {
-  if (PublishedStream* const published = slots_->find(stream)) report_shed(*published, true);
+  if (PublishedStream* const published = slots_->find(stream)) {
+    report_shed(*published, true);
+    published->leave_outputs();
+  }
   slots_->remove(stream);
 }
 

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "drivers/axis/layout.hpp"
-#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::axis {
@@ -105,34 +104,6 @@ void AxisEmulator::move(double time_s) {
   }
 }
 
-void AxisEmulator::fill_message(Person& person) {
-  Message& message = person.message;
-  message.frame_number = number_;
-  const Skeleton& skeleton = *person.skeleton;
-  // Adding zero makes a negative zero positive: the same pose gives the same bytes.
-  const auto angles_at = [&](std::size_t joint, std::size_t at) {
-    auto& near_rad = person.near_rad[joint];
-    near_rad = channels_from_rotation(skeleton, static_cast<int>(joint),
-                                      to_eigen_double(person.rotation_xyzw[joint]), near_rad);
-    for (std::size_t i = 0; i < 3; ++i) message.values[at + i] = near_rad[i] / kDegree + 0.0;
-  };
-  const auto root = static_cast<std::size_t>(skeleton.root_joint);
-  Eigen::Vector3d root_m(person.root_m[0], person.root_m[1], person.root_m[2]);
-  if (root == 1) {  // the reference stays at the origin
-    angles_at(0, 3);
-    root_m = to_eigen_double(person.rotation_xyzw[0]).conjugate() * root_m;
-  }
-  for (std::size_t b = 0; b < kBones; ++b) {
-    const std::size_t at = rotations_at(message.content, b);
-    angles_at(root + b, at);
-    if (b != kHips && !message.content.displacement) continue;
-    for (std::size_t i = 0; i < 3; ++i) {
-      message.values[at - 3 + i] = b == kHips ? root_m[static_cast<int>(i)] / kCentimetre_m
-                                              : static_cast<double>(person.entry.offset_cm[b][i]);
-    }
-  }
-}
-
 void AxisEmulator::encode(const Person& person, Bytes& out) const {
   const std::size_t before = out.size();
   out.resize(before + kMaxText);
@@ -155,7 +126,9 @@ void AxisEmulator::emit(std::int64_t now_ns, Bytes& out) {
     for (Person& person : people_) {
       if (!person.present) continue;
       const std::size_t before = waiting_.size();
-      fill_message(person);
+      person.message.frame_number = number_;
+      fill_values(*person.skeleton, person.entry.offset_cm, person.rotation_xyzw, person.root_m,
+                  person.near_rad, person.message);
       encode(person, waiting_);
       for (std::size_t left = waiting_.size() - before; settings_.split_bytes != 0 && left != 0;) {
         piece_.push_back(std::min(left, settings_.split_bytes));

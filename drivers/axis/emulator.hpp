@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "drivers/axis/description.hpp"
+#include "drivers/axis/pose_message.hpp"
 #include "drivers/emulate/pace.hpp"
 #include "drivers/emulator.hpp"
 
@@ -45,14 +46,13 @@ class AxisEmulator final : public Emulator {
     AvatarEntry entry;
     std::shared_ptr<const Skeleton> skeleton;
     Vec3f root_m{};
-    std::array<Quatf, kBones + 1> rotation_xyzw{};             // [joint of the skeleton]
-    std::array<std::array<double, 3>, kBones + 1> near_rad{};  // last angles, so that none jumps
+    std::array<Quatf, kBones + 1> rotation_xyzw{};  // [joint of the skeleton]
+    NearAngles near_rad{};
     Message message;
     bool present = true;
     bool posed = false;  // by pose()
   };
   void move(double time_s);
-  void fill_message(Person& person);
   void encode(const Person& person, Bytes& out) const;
 
   EmulatorSettings settings_;

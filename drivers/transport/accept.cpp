@@ -4,13 +4,13 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <optional>
 
 #include "drivers/transport/address.hpp"
 #include "drivers/transport/keep_alive.hpp"
+#include "drivers/transport/listener.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers {
@@ -26,31 +26,10 @@ Result<Address> address_of(const ListenSettings& settings) {
                         "the " + std::string(settings.device) + "s'");
 }
 
-Result<int> listen_at(const ListenSettings& settings) {
-  const auto address = address_of(settings);
-  if (!address) return std::unexpected(address.error());
-  const int fd =
-      ::socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const int yes = 1;
-  if (fd >= 0) ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
-  if (fd < 0 || ::bind(fd, address->get(), address->size) != 0 || ::listen(fd, kBacklog) != 0) {
-    const int error = errno;
-    if (fd >= 0) ::close(fd);
-    return fail("cannot listen on " + settings.endpoint + " (" + errno_text(error) +
-                "); use an address of this machine and a port that is free");
-  }
-  return fd;
-}
-
 // Meanwhile the device waits in the listener's queue and is accepted once a descriptor is free.
 std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
   return fail("a " + std::string(settings.device) + " has connected to " + settings.endpoint +
               ", but posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
-}
-
-bool may_connect(const Address& peer, const std::vector<std::string>& peers) {
-  if (peers.empty()) return is_loopback(host_of(peer));
-  return std::ranges::find(peers, host_text(peer)) != peers.end();
 }
 
 }  // namespace
@@ -63,7 +42,9 @@ Result<> check_listen(const ListenSettings& settings) {
 Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
   auto listener = listeners_.find(settings.endpoint);
   if (listener == listeners_.end()) {
-    const auto fd = listen_at(settings);
+    const auto address = address_of(settings);
+    if (!address) return std::unexpected(address.error());
+    const auto fd = listen_on(*address, settings.endpoint, kBacklog);
     if (!fd) return std::unexpected(fd.error());
     listener = listeners_.emplace(settings.endpoint, *fd).first;
   }

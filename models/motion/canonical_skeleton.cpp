@@ -8,11 +8,12 @@
 
 namespace posed::motion {
 
-Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skeleton) {
-  const int hips = skeleton.joint_of(Bone::kHips);
-  if (hips < 0) {
-    return fail("skeleton " + in_quotes(skeleton.name) +
-                " has no hips, so it is no person's; name its joints as VRM does");
+Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skeleton, Bone root) {
+  const int top = skeleton.joint_of(root);
+  if (top < 0) {
+    return fail("skeleton " + in_quotes(skeleton.name) + " has no " + std::string(bone_name(root)) +
+                (root == Bone::kHips ? ", so it is no person's" : "") +
+                "; name its joints as VRM does");
   }
   auto canonical = std::make_shared<Skeleton>();
   canonical->name = "humanoid of " + skeleton.name;
@@ -26,9 +27,9 @@ Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skele
       position_m[j] = position_m[parent] + skeleton.joints[parent].T_world_joint * from.offset_m;
       place[j] = place[parent];
     }
-    // Joints above the hips have no bone and are left out; so is a bone that hangs beside the hips.
-    const bool is_hips = static_cast<int>(j) == hips;
-    if (!from.bone || (!is_hips && place[j] < 0)) continue;
+    // Joints above the root are left out; so is a bone that hangs beside it.
+    const bool is_root = static_cast<int>(j) == top;
+    if (!from.bone || (!is_root && place[j] < 0)) continue;
     Joint joint;
     joint.name = bone_name(*from.bone);
     joint.parent = place[j];

@@ -1,5 +1,6 @@
-// BVH: parts of the clip reader. To read a file, call read_clip() in clip.hpp; the functions here
-// read from memory (for tests, fuzzing and the device description in a log).
+// BVH: parts of the clip reader and writer. To read or write a file, call read_clip() or
+// write_bvh() in clip.hpp; the functions here work in memory (for tests, fuzzing, the device
+// description in a log and outputs).
 //
 // The format: a joint's rotation is the product of its channels in listed order, the first
 // outermost. Position channels replace OFFSET. Angles are in degrees; the unit of length is not
@@ -29,5 +30,9 @@ struct BvhHeader {
 // Reads a whole BVH text.
 [[nodiscard]] Result<Clip> parse_bvh(std::string_view text, const std::string& name,
                                      const ReadOptions& options = {});
+
+// The first section of a file, "HIERARCHY" to the last "}", with the skeleton's own channels. Of an
+// Acclaim skeleton it would be wrong: convert that first (with_zyx_channels in clip.hpp).
+[[nodiscard]] std::string bvh_hierarchy(const Skeleton& skeleton, double metres_per_unit);
 
 }  // namespace posed::clip

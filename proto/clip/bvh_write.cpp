@@ -1,7 +1,10 @@
 #include <array>
 #include <charconv>
 #include <ostream>
+#include <string>
+#include <vector>
 
+#include "proto/clip/bvh.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
@@ -24,28 +27,32 @@ void append(std::string& out, double value) {
   out += text == "-0" || text.empty() ? "0" : text;
 }
 
-class Writer {
- public:
-  explicit Writer(const Clip& clip) : clip_(clip), skeleton_(*clip.skeleton) {}
+std::string motion_head(const Clip& clip) {
+  std::string out = "MOTION\nFrames: " + std::to_string(clip.frames()) + "\nFrame Time: ";
+  append(out, 1.0 / clip.frame_rate_hz);
+  return out + "\n";
+}
 
-  [[nodiscard]] std::string header() {
+std::string motion_line(const Clip& clip, int index) {
+  std::string line;
+  const std::vector<Channel>& channels = clip.skeleton->channels;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const double value = clip.channels(index, static_cast<Eigen::Index>(c));
+    if (c > 0) line += ' ';
+    append(line, channels[c].translation ? value / clip.metres_per_unit : value * kDegreesPerRad);
+  }
+  return line + "\n";
+}
+
+class HierarchyWriter {
+ public:
+  HierarchyWriter(const Skeleton& skeleton, double metres_per_unit)
+      : skeleton_(skeleton), metres_per_unit_(metres_per_unit) {}
+
+  [[nodiscard]] std::string text() {
     out_ = "HIERARCHY\n";
     joint(0, 0);
-    out_ += "MOTION\nFrames: " + std::to_string(clip_.frames()) + "\nFrame Time: ";
-    append(out_, 1.0 / clip_.frame_rate_hz);
-    out_ += "\n";
     return std::move(out_);
-  }
-
-  [[nodiscard]] std::string row(int index) const {
-    std::string line;
-    for (std::size_t c = 0; c < skeleton_.channels.size(); ++c) {
-      const double value = clip_.channels(index, static_cast<Eigen::Index>(c));
-      if (c > 0) line += ' ';
-      append(line, skeleton_.channels[c].translation ? value / clip_.metres_per_unit
-                                                     : value * kDegreesPerRad);
-    }
-    return line + "\n";
   }
 
  private:
@@ -56,7 +63,7 @@ class Writer {
     out_ += "OFFSET";
     for (int i = 0; i < 3; ++i) {
       out_ += ' ';
-      append(out_, value_m[i] / clip_.metres_per_unit);
+      append(out_, value_m[i] / metres_per_unit_);
     }
     out_ += '\n';
   }
@@ -99,19 +106,22 @@ class Writer {
     out_ += "}\n";
   }
 
-  const Clip& clip_;
   const Skeleton& skeleton_;
+  double metres_per_unit_;
   std::string out_;
 };
 
 }  // namespace
 
+std::string bvh_hierarchy(const Skeleton& skeleton, double metres_per_unit) {
+  return HierarchyWriter(skeleton, metres_per_unit).text();
+}
+
 Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
   if (is_acclaim(*clip.skeleton)) return write_bvh(with_zyx_channels(clip), path);
   return write_text(path, [&clip](std::ostream& file) {
-    Writer writer(clip);
-    file << writer.header();
-    for (int i = 0; i < clip.frames() && file; ++i) file << writer.row(i);
+    file << bvh_hierarchy(*clip.skeleton, clip.metres_per_unit) << motion_head(clip);
+    for (int i = 0; i < clip.frames() && file; ++i) file << motion_line(clip, i);
   });
 }
 

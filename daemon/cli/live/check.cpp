@@ -81,6 +81,19 @@ ordered_json summary_of(const config::SourceConfig& source) {
   return summary;
 }
 
+ordered_json summary_of(const config::OutputConfig& output) {
+  ordered_json summary{{"name", output.name}, {"kind", config::kind_name(output.kind)}};
+  for (const auto& [part, stream] : {std::pair{"body", output.body},
+                                     {"left_hand", output.left_hand},
+                                     {"right_hand", output.right_hand}}) {
+    if (!stream.empty()) summary[part] = stream;
+  }
+  if (output.kind == config::OutputKind::kVmc) summary["to"] = output.to;
+  if (output.kind == config::OutputKind::kBvh) summary["listen"] = output.listen;
+  if (output.rate_hz > 0.0) summary["rate_hz"] = output.rate_hz;
+  return summary;
+}
+
 std::string security_of(const config::DaemonConfig& config) {
   if (config.security.server_key.empty()) return "no keys";
   return "keys, " + std::to_string(config.security.clients.size()) + " clients allowed";
@@ -100,8 +113,25 @@ void print_source(const ordered_json& source) {
   std::puts("");
 }
 
+// "output vmc-ann: vmc, body ann, to 127.0.0.1:39539"
+void print_output(const ordered_json& output) {
+  std::string line =
+      "output " + output["name"].get<std::string>() + ": " + output["kind"].get<std::string>();
+  for (const char* part : {"body", "left_hand", "right_hand"}) {
+    if (output.contains(part))
+      line += std::string(", ") + part + " " + output[part].get<std::string>();
+  }
+  if (output.contains("listen")) line += ", on " + output["listen"].get<std::string>();
+  for (const ordered_json& to : output.value("to", ordered_json::array()))
+    line += ", to " + to.get<std::string>();
+  if (output.contains("rate_hz")) {
+    line += ", at most " + json_text(output["rate_hz"]) + " Hz";
+  }
+  std::puts(clean(line).c_str());
+}
+
 void print(const config::DaemonConfig& config, const ordered_json& streams,
-           const ordered_json& sources) {
+           const ordered_json& sources, const ordered_json& outputs) {
   std::printf("publishes on %s, controlled on %s (%s)\n", config.publish_endpoint.c_str(),
               config.control_endpoint.c_str(), security_of(config).c_str());
   for (const ordered_json& stream : streams) {
@@ -127,6 +157,7 @@ void print(const config::DaemonConfig& config, const ordered_json& streams,
     }
   }
   for (const ordered_json& source : sources) print_source(source);
+  for (const ordered_json& output : outputs) print_output(output);
 }
 
 // Returns 0 if everything would run; 2 if the config is wrong; 1 if it is right, but a file or a
@@ -148,6 +179,10 @@ int check(const CheckOptions& options) {
       sources.push_back(summary_of(source));
     }
   }
+  ordered_json outputs = ordered_json::array();
+  for (const config::OutputConfig& output : reading.config.outputs) {
+    outputs.push_back(summary_of(output));
+  }
   int exit_code = 0;
   ordered_json errors = ordered_json::array();
   for (const Error& error : reading.errors) {
@@ -160,10 +195,11 @@ int check(const CheckOptions& options) {
                            {"control", reading.config.control_endpoint},
                            {"streams", streams},
                            {"sources", sources},
+                           {"outputs", outputs},
                            {"errors", errors}};
     std::printf("%s\n", json_text(all).c_str());
   } else if (errors.empty()) {
-    print(reading.config, streams, sources);
+    print(reading.config, streams, sources, outputs);
   }
   return exit_code;
 }

@@ -195,6 +195,16 @@ std::string source_row(const v1::SourceStats& source) {
   return text + dropped;
 }
 
+// "3 receivers, 1200 frames, 3600 sent"
+std::string output_row(const v1::OutputStats& output) {
+  std::string text = fmt::format(
+      "{} output: {} receiver{}, {} frames, {} sent", clean_name(output.kind()), output.receivers(),
+      output.receivers() == 1 ? "" : "s", output.frames(), output.sent());
+  if (output.dropped() > 0) text += fmt::format(", {} dropped", output.dropped());
+  if (output.failures() > 0) text += fmt::format(", {} failed", output.failures());
+  return text;
+}
+
 // The lines below the rows of the streams.
 std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths) {
   std::vector<std::string> rows;
@@ -203,6 +213,11 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths
     const std::string text = source_row(source);
     if (text.empty()) continue;
     rows.push_back("  " + fit(clean_name(source.name()), widths.name - 1) + text);
+  }
+  for (const v1::OutputStats& output : stats.output()) {
+    // Names with their stream's behind the kind are often too long for the column.
+    rows.push_back("  " + fit(clean_name(output.name()), widths.name - 2) + " " +
+                   output_row(output));
   }
   for (const v1::StreamStats& stream : stats.stream()) {
     for (const std::string& text :
@@ -220,6 +235,9 @@ Widths widths_for(const v1::Stats& stats, int wanted) {
   Widths widths{.line = 0, .model = 0};
   for (const v1::StreamStats& stream : stats.stream()) {
     widths.name = std::max(widths.name, static_cast<int>(stream.stream().size()) + 2);
+  }
+  for (const v1::OutputStats& output : stats.output()) {
+    widths.name = std::max(widths.name, static_cast<int>(output.name().size()) + 2);
   }
   return widths;
 }

@@ -146,6 +146,31 @@ TEST_CASE("the live view shows what the kernel dropped of a device's datagrams")
   CHECK(lines[7] == "  walker1   body 'Ann' of optitrack");
 }
 
+TEST_CASE("the live view has a line for each output, with what went wrong if anything did") {
+  v1::Stats stats = stats_of(1);
+  v1::OutputStats& vmc = *stats.add_output();
+  vmc.set_name("vmc");
+  vmc.set_kind("vmc");
+  vmc.set_receivers(1);
+  vmc.set_frames(10);
+  vmc.set_sent(30);
+  v1::OutputStats& bvh = *stats.add_output();
+  bvh.set_name("bvh");
+  bvh.set_kind("bvh");
+  bvh.set_receivers(2);
+  bvh.set_dropped(3);
+  bvh.set_failures(4);
+  const auto lines = live_view(stats, {.title = "posed", .width = 0, .height = 0});
+  REQUIRE(lines.size() >= 5);
+  CHECK(lines[3] == "  vmc       vmc output: 1 receiver, 10 frames, 30 sent");
+  CHECK(lines[4] == "  bvh       bvh output: 2 receivers, 0 frames, 0 sent, 3 dropped, 4 failed");
+  vmc.set_name("vmc-stage-performer");
+  CHECK(
+      live_view(stats, {.title = "posed"})[3].starts_with("  vmc-stag~ vmc output: 1 receiver, "));
+  const auto wide = live_view(stats, {.title = "posed", .width = 0, .height = 0});
+  CHECK(wide[3].starts_with("  vmc-stage-performer vmc output: 1 receiver, "));
+}
+
 TEST_CASE("a daemon that does not answer is not shown as live") {
   v1::Stats stats = stats_of(2);
   stats.mutable_stream(0)->set_label("g");

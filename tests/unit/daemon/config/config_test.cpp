@@ -412,6 +412,16 @@ TEST_CASE("the shipped config contains every key with its default") {
     INFO("config/posed.toml: " << b.sources[0].driver << "." << option.name);
     CHECK((b.sources[0].options.at(std::string(option.name)) == option.default_value));
   }
+  REQUIRE(b.outputs.size() == 2);
+  const OutputConfig no_output;
+  CHECK(b.outputs[0].left_hand == no_output.left_hand);
+  CHECK(b.outputs[0].right_hand == no_output.right_hand);
+  CHECK(b.outputs[0].rate_hz == no_output.rate_hz);
+  CHECK(b.outputs[0].vrm1_names == no_output.vrm1_names);
+  CHECK(b.outputs[0].assistant == no_output.assistant);
+  CHECK(b.outputs[1].listen == no_output.listen);
+  CHECK(b.outputs[1].peers == no_output.peers);
+  CHECK(b.outputs[1].header == no_output.header);
 }
 
 }  // namespace

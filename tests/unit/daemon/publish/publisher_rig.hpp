@@ -20,7 +20,7 @@ namespace posed::publish {
 class PublisherRig {
  public:
   // `runs`: has a thread; otherwise the test calls turn().
-  explicit PublisherRig(bool runs = true) {
+  explicit PublisherRig(bool runs = true, std::vector<FrameOutput*> outputs = {}) {
     StreamInfo info = toy_info("toy");
     info.raw = true;
     PublisherOptions options;
@@ -29,6 +29,7 @@ class PublisherRig {
     options.clock = system::monotonic_ns;
     options.slots = 4;
     options.more_messages_per_s = 1000.0;
+    options.outputs = std::move(outputs);
     publisher = Publisher::open(std::move(options), {std::move(info)}, ring, *wake).value();
     subscriber = net::open_socket(context.get(), ZMQ_SUB).value();
     REQUIRE(net::set_option(subscriber.get(), ZMQ_SUBSCRIBE, std::string_view()));

@@ -1,0 +1,61 @@
+#include "daemon/assembly/output_threads.hpp"
+
+#include <utility>
+
+#include "daemon/system/clock.hpp"
+#include "daemon/system/realtime.hpp"
+
+namespace posed::assembly {
+
+Result<std::unique_ptr<OutputThreads>> OutputThreads::open(
+    const std::vector<config::OutputConfig>& configs) {
+  auto threads = std::unique_ptr<OutputThreads>(new OutputThreads);
+  for (const config::OutputConfig& config : configs) {
+    auto output = output::open_output(config);
+    if (!output) return std::unexpected(output.error());
+    auto poller = system::Poller::open();
+    if (!poller) return std::unexpected(poller.error());
+    if (auto added = (*poller)->add((*output)->wake()); !added) {
+      return std::unexpected(added.error());
+    }
+    threads->running_.push_back(
+        {.output = std::move(*output), .poller = std::move(*poller), .thread = {}});
+  }
+  return threads;
+}
+
+std::vector<publish::FrameOutput*> OutputThreads::outputs() const {
+  std::vector<publish::FrameOutput*> outputs;
+  for (const Running& running : running_) outputs.push_back(running.output.get());
+  return outputs;
+}
+
+void OutputThreads::start(const output::Tell& tell) {
+  for (Running& running : running_) {
+    running.output->set_tell(tell);
+    running.thread = std::thread([this, &running] { run(running); });
+  }
+}
+
+void OutputThreads::run(Running& running) {
+  output::Output& output = *running.output;
+  system::name_thread("out-" + output.name());
+  while (true) {
+    output.wake().going_to_sleep();  // before the turn, so that what comes during it ends the wait
+    const bool last = stop_.load(std::memory_order_acquire);
+    const std::int64_t due_ns = output.turn(system::monotonic_ns());
+    if (last) break;
+    static_cast<void>(running.poller->wait(system::time_left_ns(due_ns, system::monotonic_ns)));
+    output.wake().awake();
+  }
+}
+
+void OutputThreads::stop() noexcept {
+  stop_.store(true, std::memory_order_release);
+  for (Running& running : running_) running.output->wake().notify();
+  for (Running& running : running_) {
+    if (running.thread.joinable()) running.thread.join();
+  }
+}
+
+}  // namespace posed::assembly

@@ -1,0 +1,215 @@
+#include "daemon/config/output_tables.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "drivers/transport/address.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/nearest_word.hpp"
+
+namespace posed::config {
+namespace {
+
+constexpr std::size_t kMaxOutputs = 16;
+constexpr std::size_t kMaxReceivers = 64;
+constexpr Range kOutputRate{0.0, 1000.0};  // frames a second
+constexpr std::array<std::string_view, 2> kKindWords{"vmc", "bvh"};
+constexpr std::array<std::string_view, 2> kNamesWords{"vrm0", "vrm1"};
+constexpr std::array<std::string_view, 2> kRoleWords{"performer", "assistant"};
+
+constexpr std::array<std::string_view, 3> kBvhKeys{"listen", "peers", "header"};
+constexpr std::array<std::string_view, 5> kVmcKeys{"left_hand", "right_hand", "to", "names",
+                                                   "role"};
+
+class OutputReader {
+ public:
+  OutputReader(const ConfigFile& file, DaemonConfig& config) : file_(file), config_(config) {}
+
+  void read(TableReader& table);
+
+ private:
+  void read_vmc(TableReader& table, OutputConfig& output) const;
+  void read_bvh(TableReader& table, OutputConfig& output) const;
+  void read_streams(TableReader& table, OutputConfig& output) const;
+  void check_stream(TableReader& table, const char* key, const std::string& name) const;
+  void refuse_keys(TableReader& table, std::string_view kind,
+                   std::span<const std::string_view> keys) const;
+  void name_it(TableReader& table, OutputConfig& output);
+  [[nodiscard]] bool may_be_stream(const std::string& name) const;
+  [[nodiscard]] std::set<std::string> stream_names() const;
+
+  const ConfigFile& file_;
+  DaemonConfig& config_;
+  std::map<std::string, int> lines_;  // of the tables, by the outputs' names
+};
+
+std::set<std::string> OutputReader::stream_names() const {
+  std::set<std::string> names;
+  for (const StreamConfig& stream : config_.streams) names.insert(stream.name);
+  for (const SourceConfig& source : config_.sources) {
+    for (const auto& named : source.named) names.insert(named.stream.name);
+  }
+  return names;
+}
+
+// Bodies that nobody names become streams under names that begin with their source's.
+bool OutputReader::may_be_stream(const std::string& name) const {
+  return stream_names().contains(name) ||
+         std::ranges::any_of(config_.sources, [&](const SourceConfig& source) {
+           return source.all && name.starts_with(source.name + "-");
+         });
+}
+
+void OutputReader::check_stream(TableReader& table, const char* key,
+                                const std::string& name) const {
+  if (name.empty() || may_be_stream(name)) return;
+  const std::string near = nearest(name, stream_names());
+  table.add_error(key, fmt::format("there is no stream named {}; {}", in_quotes(name),
+                                   near.empty() ? "name that of a [[stream]] table, or SOURCE-BODY"
+                                                  " for a body of streams = \"all\""
+                                                : "the nearest is " + in_quotes(near)));
+}
+
+void OutputReader::read_streams(TableReader& table, OutputConfig& output) const {
+  const std::array<std::pair<const char*, std::string*>, 3> parts{
+      {{"body", &output.body},
+       {"left_hand", &output.left_hand},
+       {"right_hand", &output.right_hand}}};
+  const bool hands = output.kind == OutputKind::kVmc;
+  std::set<std::string> taken;
+  bool any = false;
+  for (const auto& [key, name] : std::span(parts).first(hands ? 3 : 1)) {
+    table.read(key, *name);
+    // A value that is no text has its error already.
+    any = any || !name->empty() || (table.has(key) && !table.has_text(key));
+    check_stream(table, key, *name);
+    if (name->empty() || taken.insert(*name).second) continue;
+    table.add_error(key, fmt::format("{} is another part of this avatar already; each part has a"
+                                     " stream of its own",
+                                     in_quotes(*name)));
+  }
+  if (any) return;
+  file_.findings.add_error(table.line(),
+                           fmt::format("the output names no stream; add body = \"STREAM\"{}",
+                                       hands ? ", left_hand or right_hand" : ""));
+}
+
+// Whether the port of an endpoint is one that a program can have.
+bool has_port(std::string_view endpoint) {
+  const std::string_view port = endpoint.substr(endpoint.rfind(':') + 1);
+  const char* const end = port.data() + port.size();
+  std::uint16_t number = 0;
+  const auto [read_to, error] = std::from_chars(port.data(), end, number);
+  return error == std::errc() && read_to == end && number > 0;
+}
+
+void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
+  output.vrm1_names = table.choice("names", kNamesWords) == 1;
+  output.assistant = table.choice("role", kRoleWords) == 1;
+  const std::size_t errors = file_.findings.errors.size();
+  if (table.need("to", "name the receivers, like to = [\"127.0.0.1:39539\"]")) {
+    table.read("to", output.to);
+  }
+  if (file_.findings.errors.size() > errors) return;
+  std::set<std::string> seen;
+  for (const std::string& endpoint : output.to) {
+    const auto address = drivers::parse_endpoint(endpoint);
+    if (!address || !has_port(endpoint)) {
+      table.add_error("to", fmt::format("{} should be an address in numbers and a port from 1 to"
+                                        " 65535, like 127.0.0.1:39539",
+                                        in_quotes(endpoint)));
+    } else if (!seen.insert(drivers::endpoint_text(*address)).second) {
+      table.add_error("to", fmt::format("{} is listed twice; it would get each frame twice",
+                                        in_quotes(endpoint)));
+    }
+  }
+  if (output.to.empty() || output.to.size() > kMaxReceivers) {
+    table.add_error("to", fmt::format("output.to takes 1 to {} receivers", kMaxReceivers));
+  }
+}
+
+void OutputReader::read_bvh(TableReader& table, OutputConfig& output) const {
+  table.read("listen", output.listen);
+  table.read("peers", output.peers);
+  table.read("header", output.header);
+  for (const std::string& peer : output.peers) {
+    if (const auto host = drivers::parse_host(peer); !host) {
+      table.add_error("peers", host.error().message);
+    }
+  }
+  const auto address = drivers::listen_address(output.listen, output.peers, "the clients'");
+  if (!address) {
+    table.add_error("listen", address.error().message);
+  } else if (!has_port(output.listen)) {
+    table.add_error("listen", "clients must know the port: choose one from 1 to 65535");
+  }
+}
+
+// Keys that only the other kind has.
+void OutputReader::refuse_keys(TableReader& table, std::string_view kind,
+                               std::span<const std::string_view> keys) const {
+  for (const std::string_view key : keys) {
+    table.skip(key);
+    if (!table.has(key)) continue;
+    table.add_error(key,
+                    fmt::format("{} is for outputs of kind = \"{}\"; leave it out", key, kind));
+  }
+}
+
+void OutputReader::name_it(TableReader& table, OutputConfig& output) {
+  table.read("name", output.name);
+  if (!output.name.empty() && !is_stream_name(output.name)) {
+    return table.add_error("name",
+                           "an output's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
+  }
+  if (output.name.empty()) {
+    for (const std::string* stream : {&output.right_hand, &output.left_hand, &output.body}) {
+      if (!stream->empty()) output.name = fmt::format("{}-{}", kind_name(output.kind), *stream);
+    }
+  }
+  const auto [first, is_new] = lines_.try_emplace(output.name, table.line());
+  if (is_new || output.name.empty()) return;
+  table.add_error("name", fmt::format("a second output is named {} (the first stands in line {});"
+                                      " give one of them another name",
+                                      in_quotes(output.name), first->second));
+}
+
+void OutputReader::read(TableReader& table) {
+  OutputConfig& output = config_.outputs.emplace_back();
+  const std::size_t errors = file_.findings.errors.size();
+  const bool there = table.need("kind", "write kind = \"vmc\" or \"bvh\"");
+  output.kind = static_cast<OutputKind>(table.choice("kind", kKindWords));
+  if (!there || file_.findings.errors.size() > errors) return;
+  table.read("rate_hz", output.rate_hz, kOutputRate);
+  if (output.kind == OutputKind::kVmc) {
+    refuse_keys(table, "bvh", kBvhKeys);
+    read_streams(table, output);
+    read_vmc(table, output);
+  } else {
+    refuse_keys(table, "vmc", kVmcKeys);
+    read_streams(table, output);
+    read_bvh(table, output);
+  }
+  name_it(table, output);
+  table.finish();
+}
+
+}  // namespace
+
+void read_outputs(TableReader& root, const ConfigFile& file, DaemonConfig& config) {
+  OutputReader reader(file, config);
+  for (TableReader& table : root.tables("output", kMaxOutputs)) reader.read(table);
+}
+
+}  // namespace posed::config

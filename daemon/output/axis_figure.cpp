@@ -1,0 +1,63 @@
+#include "daemon/output/axis_figure.hpp"
+
+#include <utility>
+
+#include "drivers/axis/layout.hpp"
+#include "proto/clip/bvh.hpp"
+
+namespace posed::output {
+namespace {
+
+namespace axis = drivers::axis;
+
+constexpr std::uint8_t kOrder = 0;  // YXZ, as the applications are set at first
+
+}  // namespace
+
+Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton,
+                                    std::string_view name) {
+  axis::AvatarEntry entry;
+  entry.avatar = axis::make_avatar(0, name);
+  const auto average = axis::skeleton_of(entry, kOrder);
+  if (!average) return std::unexpected(average.error());
+  const auto to_average = motion::Retarget::bind(skeleton, *average);
+  if (!to_average) return std::unexpected(to_average.error());
+  const auto scale = static_cast<float>(1.0 / to_average->scale());
+  for (Vec3f& offset_cm : entry.offset_cm) {
+    for (float& x_cm : offset_cm) x_cm *= scale;
+  }
+  auto figure = axis::skeleton_of(entry, kOrder);
+  if (!figure) return std::unexpected(figure.error());
+  auto to_figure = motion::Retarget::bind(std::move(skeleton), std::move(*figure));
+  if (!to_figure) return std::unexpected(to_figure.error());
+  AxisFigure made(std::move(*to_figure), entry.offset_cm);
+  made.message_.avatar = entry.avatar;
+  made.message_.content.displacement = true;
+  return made;
+}
+
+std::string_view AxisFigure::line(const Frame& frame) noexcept {
+  to_figure_.apply(frame, pose_);
+  axis::fill_values(*to_figure_.target(), offset_cm_, pose_.rotation_xyzw, pose_.root_position_m,
+                    near_rad_, message_);
+  const std::size_t size = axis::encode_text(message_, std::span(text_).first(axis::kMaxText));
+  text_[size] = '\n';
+  return {text_.data(), size + 1};
+}
+
+std::string AxisFigure::hierarchy() const {
+  // With displacement every joint has a position.
+  Skeleton figure = *to_figure_.target();
+  figure.channels.clear();
+  for (std::uint16_t joint = 0; joint < figure.joints.size(); ++joint) {
+    for (const Axis along : {Axis::kX, Axis::kY, Axis::kZ}) {
+      figure.channels.push_back({.joint = joint, .axis = along, .translation = true});
+    }
+    for (const Channel& channel : to_figure_.target()->channels) {
+      if (channel.joint == joint && !channel.translation) figure.channels.push_back(channel);
+    }
+  }
+  return clip::bvh_hierarchy(figure, axis::kCentimetre_m);
+}
+
+}  // namespace posed::output

@@ -1,0 +1,48 @@
+// AxisFigure: poses of any person as lines of text in the form in which Axis Neuron sends them (the
+// line of a BVH, drivers/axis/protocol.hpp), and the BVH header that describes the figure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "drivers/axis/bones.hpp"
+#include "drivers/axis/pose_message.hpp"
+#include "drivers/axis/protocol.hpp"
+#include "models/motion/retarget.hpp"
+#include "proto/frame/frame.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::output {
+
+// One thread.
+class AxisFigure {
+ public:
+  // The figure has the legs of `skeleton`, so that its feet stand where the person's do, and for
+  // the rest the proportions of an average person. Fails if it has no bone of a person. Cold.
+  [[nodiscard]] static Result<AxisFigure> make(std::shared_ptr<const Skeleton> skeleton,
+                                               std::string_view name);
+
+  // "0 ann 0.000000 92.1... ||\n", a frame of the skeleton; valid until the next call. A joint that
+  // was not measured stays with its parent as in the T-pose.
+  [[nodiscard]] std::string_view line(const Frame& frame) noexcept;
+
+  // The HIERARCHY of a BVH whose channels are the values of a line.
+  [[nodiscard]] std::string hierarchy() const;
+
+ private:
+  AxisFigure(motion::Retarget retarget, const drivers::axis::Proportions& offset_cm)
+      : to_figure_(std::move(retarget)), offset_cm_(offset_cm) {}
+
+  motion::Retarget to_figure_;
+  drivers::axis::Proportions offset_cm_;
+  drivers::axis::NearAngles near_rad_{};
+  drivers::axis::Message message_;
+  Frame pose_{};
+  std::array<char, drivers::axis::kMaxText + 1> text_{};
+};
+
+}  // namespace posed::output

@@ -1,0 +1,57 @@
+#include "daemon/output/bvh_output.hpp"
+
+#include <string>
+#include <utility>
+
+#include "proto/text/clean.hpp"
+
+namespace posed::output {
+
+Result<std::unique_ptr<Output>> BvhOutput::open(const config::OutputConfig& config,
+                                                std::unique_ptr<system::EventFd> wake) {
+  auto clients = LineClients::open(config.listen, config.peers);
+  if (!clients) return std::unexpected(clients.error());
+  return std::make_unique<BvhOutput>(config, std::move(wake), std::move(*clients));
+}
+
+BvhOutput::BvhOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
+                     LineClients clients)
+    : Output(config, std::move(wake)),
+      header_(config.header),
+      limit_(config.rate_hz),
+      clients_(std::move(clients)) {}
+
+std::int64_t BvhOutput::turn(std::int64_t now_ns) {
+  const Delivery& delivery = receive();
+  take_stream(delivery.streams[index_of(Part::kBody)]);
+  if (look_ns_ == kNoTime_ns || now_ns >= look_ns_) {
+    for (const std::string& news : clients_.look(now_ns)) tell(news);
+    counters.failures = clients_.refused();
+    look_ns_ = now_ns + LineClients::kLook_ns;
+  }
+  delivery.for_each([&](Part /*part*/, const Frame& frame) {
+    if (figure_ == nullptr || clients_.size() == 0 || !limit_.admit(now_ns)) return;
+    const auto outcome = clients_.send(figure_->line(frame), now_ns);
+    counters.sent += outcome.sent;
+    counters.dropped += outcome.dropped;
+  });
+  counters.receivers = static_cast<std::uint32_t>(clients_.size());
+  return look_ns_;
+}
+
+void BvhOutput::take_stream(const std::shared_ptr<const PartStream>& stream) {
+  if (known_ == stream) return;
+  known_ = stream;
+  figure_.reset();
+  if (stream == nullptr) return;
+  if (stream->skeleton == nullptr)
+    return tell("stream " + in_quotes(stream->name) + " has no pose");
+  auto figure = AxisFigure::make(stream->skeleton, stream->name);
+  if (!figure) {
+    return tell("stream " + in_quotes(stream->name) + " cannot be sent: " + figure.error().message);
+  }
+  figure_ = std::make_unique<AxisFigure>(std::move(*figure));
+  if (header_) clients_.set_greeting(figure_->hierarchy());
+}
+
+}  // namespace posed::output

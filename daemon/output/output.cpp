@@ -1,0 +1,51 @@
+#include "daemon/output/output.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/output/bvh_output.hpp"
+#include "daemon/output/vmc_output.hpp"
+#include "posed/v1/posed.pb.h"
+
+namespace posed::output {
+
+Output::Output(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake)
+    : name_(config.name),
+      kind_(config::kind_name(config.kind)),
+      wake_(std::move(wake)),
+      inbox_({config.body, config.left_hand, config.right_hand}, *wake_) {}
+
+void Output::fill(v1::OutputStats& stats) const {
+  stats.set_name(name_);
+  stats.set_kind(kind_);
+  stats.set_receivers(counters.receivers.load());
+  stats.set_frames(inbox_.frames());
+  stats.set_sent(counters.sent.load());
+  stats.set_dropped(inbox_.dropped() + counters.dropped.load());
+  stats.set_failures(counters.failures.load());
+}
+
+const Delivery& Output::receive() {
+  inbox_.take(delivery_);
+  return delivery_;
+}
+
+void Output::tell(const std::string& text) const {
+  std::optional<std::uint32_t> concerned;
+  for (const auto& stream : streams()) {
+    if (stream != nullptr && !concerned) concerned = stream->id;
+  }
+  const std::string sentence = "output " + name_ + ": " + text;
+  if (tell_) return tell_(concerned, sentence);
+  spdlog::warn("{}", sentence);
+}
+
+Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config) {
+  auto wake = system::EventFd::open();
+  if (!wake) return std::unexpected(wake.error());
+  auto opened = config.kind == config::OutputKind::kBvh ? BvhOutput::open(config, std::move(*wake))
+                                                        : VmcOutput::open(config, std::move(*wake));
+  if (!opened) return fail("output " + config.name + ": " + opened.error().message);
+  return opened;
+}
+
+}  // namespace posed::output

@@ -1,0 +1,111 @@
+#include "daemon/output/udp_receivers.hpp"
+
+#include <cerrno>
+#include <utility>
+
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace posed::output {
+namespace {
+
+constexpr std::int64_t kRetry_ns = kNanosPerSecond;
+constexpr std::int64_t kGood_ns = 2 * kNanosPerSecond;
+
+// Connected sockets, because only those learn that nobody listens at the other side.
+Result<int> open_socket(const drivers::Address& address) {
+  const int fd = ::socket(address.storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd < 0) return fail("cannot open a UDP socket (" + errno_text() + ")");
+  const int yes = 1;  // who writes down a broadcast address wants that
+  ::setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+  return fd;
+}
+
+std::string why(int error) {
+  if (error == ECONNREFUSED) return "nobody listens there; start the receiver, or correct its port";
+  if (error == EAGAIN || error == ENOBUFS) return "the network takes no more at this rate";
+  return errno_text(error);
+}
+
+}  // namespace
+
+Result<UdpReceivers> UdpReceivers::open(const std::vector<std::string>& endpoints) {
+  UdpReceivers receivers;
+  for (const std::string& endpoint : endpoints) {
+    const auto address = drivers::parse_endpoint(endpoint);
+    if (!address) return std::unexpected(address.error());
+    const auto fd = open_socket(*address);
+    if (!fd) return std::unexpected(fd.error());
+    Receiver& receiver = receivers.receivers_.emplace_back();
+    receiver.endpoint = endpoint;
+    receiver.address = *address;
+    receiver.fd = *fd;
+    connect(receiver);
+  }
+  return receivers;
+}
+
+UdpReceivers::~UdpReceivers() {
+  for (const Receiver& receiver : receivers_) ::close(receiver.fd);
+}
+
+void UdpReceivers::connect(Receiver& receiver) noexcept {
+  receiver.connected = ::connect(receiver.fd, receiver.address.get(), receiver.address.size) == 0;
+  if (!receiver.connected) receiver.error = errno;
+}
+
+bool UdpReceivers::send_to(Receiver& receiver, std::span<const std::byte> datagram,
+                           std::int64_t now_ns) noexcept {
+  if (!receiver.connected) {
+    if (receiver.retry_ns != kNoTime_ns && now_ns < receiver.retry_ns) return false;
+    receiver.retry_ns = now_ns + kRetry_ns;
+    connect(receiver);
+    if (!receiver.connected) return false;
+  }
+  const auto send = [&] {
+    return ::send(receiver.fd, datagram.data(), datagram.size(), MSG_NOSIGNAL) >= 0;
+  };
+  if (send()) return true;
+  receiver.error = errno;
+  if (receiver.error == ECONNREFUSED) {
+    // That was the answer to an earlier datagram; this one has not been sent yet.
+    static_cast<void>(send());
+  } else if (receiver.error != EAGAIN && receiver.error != ENOBUFS) {
+    receiver.connected = false;  // the machine may get another address, and the socket with it
+    receiver.retry_ns = now_ns + kRetry_ns;
+  }
+  return false;
+}
+
+UdpReceivers::Outcome UdpReceivers::send(std::span<const std::byte> datagram,
+                                         std::int64_t now_ns) noexcept {
+  Outcome outcome;
+  for (Receiver& receiver : receivers_) {
+    if (send_to(receiver, datagram, now_ns)) {
+      ++outcome.sent;
+      if (receiver.good_ns == kNoTime_ns) receiver.good_ns = now_ns;
+    } else {
+      ++outcome.failed;
+      receiver.failing = true;
+      receiver.good_ns = kNoTime_ns;
+    }
+  }
+  return outcome;
+}
+
+std::vector<std::string> UdpReceivers::take_news(std::int64_t now_ns) {
+  std::vector<std::string> news;
+  for (Receiver& receiver : receivers_) {
+    if (receiver.failing && !receiver.told) {
+      receiver.told = true;
+      news.push_back("sending to " + receiver.endpoint + " fails: " + why(receiver.error));
+    } else if (receiver.failing && receiver.good_ns != kNoTime_ns &&
+               now_ns >= receiver.good_ns + kGood_ns) {
+      receiver.failing = receiver.told = false;
+      news.push_back("sending to " + receiver.endpoint + " works again");
+    }
+  }
+  return news;
+}
+
+}  // namespace posed::output

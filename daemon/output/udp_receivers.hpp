@@ -1,0 +1,61 @@
+// UdpReceivers: sends datagrams to any number of addresses, each through a socket of its own. A
+// receiver that is not there, or is unreachable, affects no other one: what fails is counted, and
+// told when it begins and when it ends.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/transport/address.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
+
+namespace posed::output {
+
+// One thread.
+class UdpReceivers {
+ public:
+  // "127.0.0.1:39539", numbers only. Fails if an address is none, or without a descriptor; an
+  // address that cannot be reached now is tried again once a second. Cold.
+  [[nodiscard]] static Result<UdpReceivers> open(const std::vector<std::string>& endpoints);
+  ~UdpReceivers();
+  UdpReceivers(UdpReceivers&& other) noexcept : receivers_(std::move(other.receivers_)) {}
+  UdpReceivers& operator=(UdpReceivers&&) = delete;
+  UdpReceivers(const UdpReceivers&) = delete;
+  UdpReceivers& operator=(const UdpReceivers&) = delete;
+
+  struct Outcome {
+    std::uint64_t sent = 0, failed = 0;  // datagrams, one for each receiver
+  };
+  // To all of them. Never waits.
+  [[nodiscard]] Outcome send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept;
+
+  // What has changed since the last call, one sentence each. A receiver counts as failing from the
+  // first failure until it has taken everything for two seconds.
+  [[nodiscard]] std::vector<std::string> take_news(std::int64_t now_ns);
+
+  [[nodiscard]] std::size_t size() const noexcept { return receivers_.size(); }
+
+ private:
+  struct Receiver {
+    std::string endpoint;
+    drivers::Address address;
+    int fd = -1;
+    bool connected = false;
+    std::int64_t retry_ns = kNoTime_ns;  // when to connect again
+    int error = 0;                       // the last one
+    bool failing = false, told = false;  // told: that it is
+    std::int64_t good_ns = kNoTime_ns;   // when it took a datagram again; kNoTime_ns: not since
+  };
+  UdpReceivers() = default;
+  static void connect(Receiver& receiver) noexcept;
+  [[nodiscard]] static bool send_to(Receiver& receiver, std::span<const std::byte> datagram,
+                                    std::int64_t now_ns) noexcept;
+
+  std::vector<Receiver> receivers_;
+};
+
+}  // namespace posed::output

@@ -1,0 +1,101 @@
+#include "daemon/output/vmc_output.hpp"
+
+#include <string>
+#include <utility>
+
+#include "proto/text/clean.hpp"
+
+namespace posed::output {
+namespace {
+
+namespace vmc = drivers::vmc;
+
+// A part that has been silent for longer no longer leads.
+constexpr std::int64_t kLeads_ns = kNanosPerSecond / 4;
+
+}  // namespace
+
+Result<std::unique_ptr<Output>> VmcOutput::open(const config::OutputConfig& config,
+                                                std::unique_ptr<system::EventFd> wake) {
+  auto receivers = UdpReceivers::open(config.to);
+  if (!receivers) return std::unexpected(receivers.error());
+  return std::make_unique<VmcOutput>(config, std::move(wake), std::move(*receivers));
+}
+
+VmcOutput::VmcOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
+                     UdpReceivers receivers)
+    : Output(config, std::move(wake)),
+      assistant_(config.assistant),
+      avatar_(config.assistant),
+      shapes_(config.vrm1_names ? VrmNames::kVrm1 : VrmNames::kVrm0),
+      limit_(config.rate_hz),
+      receivers_(std::move(receivers)),
+      writer_(std::make_unique<vmc::DatagramWriter>(vmc::Packing::kBundles)) {
+  measured_ns_.fill(kNoTime_ns);
+  counters.receivers = static_cast<std::uint32_t>(receivers_.size());
+}
+
+std::int64_t VmcOutput::turn(std::int64_t now_ns) {
+  if (begin_ns_ == kNoTime_ns) begin_ns_ = now_ns;
+  const Delivery& delivery = receive();
+  take_streams(delivery.streams);
+  if (delivery.sample && !assistant_) shapes_.take(*delivery.sample);
+  delivery.for_each([&](Part part, const Frame& frame) { take(part, frame, now_ns); });
+  for (const std::string& news : receivers_.take_news(now_ns)) tell(news);
+  return system::kForever_ns;
+}
+
+void VmcOutput::take_streams(const PartStreams& streams) {
+  for (const Part part : kAllParts) {
+    const auto& stream = streams[index_of(part)];
+    if (known_[index_of(part)] == stream) continue;
+    known_[index_of(part)] = stream;
+    measured_ns_[index_of(part)] = kNoTime_ns;
+    const auto set = avatar_.set_skeleton(part, stream ? stream->skeleton : nullptr);
+    if (!set) {
+      tell("stream " + in_quotes(stream->name) + " cannot move its " +
+           std::string(words_for(part)) + ": " + set.error().message);
+    }
+    if (part != Part::kBody) continue;
+    const std::size_t left_out =
+        shapes_.set_layout(stream ? stream->samples : drivers::SampleLayout{});
+    if (left_out > 0) {
+      tell(std::to_string(left_out) + " blend shapes of stream " + in_quotes(stream->name) +
+           " are left out: their names are too long for a frame");
+    }
+  }
+}
+
+bool VmcOutput::leads(Part part, std::int64_t now_ns) const noexcept {
+  for (const Part before : kAllParts) {
+    if (before == part) return true;
+    const std::int64_t measured_ns = measured_ns_[index_of(before)];
+    if (measured_ns != kNoTime_ns && now_ns < measured_ns + kLeads_ns) return false;
+  }
+  return true;
+}
+
+void VmcOutput::take(Part part, const Frame& frame, std::int64_t now_ns) {
+  if (!avatar_.take(part, frame)) return;
+  if (frame.quality != Quality::kStale) measured_ns_[index_of(part)] = now_ns;
+  if (leads(part, now_ns) && limit_.admit(now_ns)) send(frame, now_ns);
+}
+
+void VmcOutput::send(const Frame& frame, std::int64_t now_ns) {
+  writer_->start();
+  avatar_.write(*writer_);
+  if (!assistant_) shapes_.write(*writer_);
+  if (frame.quality == Quality::kStale || frame.quality == Quality::kHeld) {
+    writer_->status({.tracking = false});
+  } else {
+    writer_->loaded();
+  }
+  writer_->time(static_cast<float>(seconds(now_ns - begin_ns_)));
+  for (std::size_t i = 0; i < writer_->datagrams(); ++i) {
+    const auto outcome = receivers_.send(writer_->datagram(i), now_ns);
+    counters.sent += outcome.sent;
+    counters.failures += outcome.failed;
+  }
+}
+
+}  // namespace posed::output

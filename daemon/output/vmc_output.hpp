@@ -1,0 +1,46 @@
+// VmcOutput: sends one avatar to programs of the VMC protocol, as OSC over UDP: of each frame root,
+// bones, blend shapes, status and time, in bundles that fit a network packet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "daemon/output/avatar.hpp"
+#include "daemon/output/blend_shapes.hpp"
+#include "daemon/output/output.hpp"
+#include "daemon/output/rate_limit.hpp"
+#include "daemon/output/udp_receivers.hpp"
+#include "drivers/vmc/messages.hpp"
+
+namespace posed::output {
+
+class VmcOutput final : public Output {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
+                                                            std::unique_ptr<system::EventFd> wake);
+  VmcOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
+            UdpReceivers receivers);
+
+  [[nodiscard]] std::int64_t turn(std::int64_t now_ns) override;
+
+ private:
+  void take_streams(const PartStreams& streams);
+  void take(Part part, const Frame& frame, std::int64_t now_ns);
+  // Whether the frames of this part are the ones that are sent: those of the body, or, while it has
+  // none, those of the left hand, then of the right one.
+  [[nodiscard]] bool leads(Part part, std::int64_t now_ns) const noexcept;
+  void send(const Frame& frame, std::int64_t now_ns);
+
+  bool assistant_;
+  Avatar avatar_;
+  BlendShapes shapes_;
+  RateLimit limit_;
+  UdpReceivers receivers_;
+  std::unique_ptr<drivers::vmc::DatagramWriter> writer_;
+  PartStreams known_;                             // that the avatar has
+  std::array<std::int64_t, kParts> measured_ns_;  // [part] when its last measured frame came
+  std::int64_t begin_ns_ = kNoTime_ns;            // of the time that is sent
+};
+
+}  // namespace posed::output

@@ -1,0 +1,178 @@
+#include <catch2/catch.hpp>
+
+#include "daemon/config/config.hpp"
+
+namespace posed::config {
+namespace {
+
+Result<std::unique_ptr<const drivers::SourceLayout>> no_bodies(std::span<const std::byte>) {
+  return fail("not used here");
+}
+
+Reading read_with_outputs(const std::string& text) {
+  static const std::vector<drivers::Driver> drivers = [] {
+    drivers::Driver glove{.name = "glove",
+                          .summary = "a hand",
+                          .options = {},
+                          .open = nullptr,
+                          .make_decoder = nullptr,
+                          .describe = nullptr};
+    drivers::Driver mocap = glove;
+    mocap.name = "mocap";
+    mocap.make_layout = no_bodies;
+    return std::vector{glove, mocap};
+  }();
+  return read_config(R"([[stream]]
+name = "left"
+driver = "glove"
+[[source]]
+name = "stage"
+driver = "mocap"
+streams = "all"
+[[stream]]
+name = "ann"
+source = "stage"
+body = "Ann"
+)" + text,
+                     "posed.toml", drivers);
+}
+
+// The only error, with its line.
+std::string output_complaint(const std::string& text) {
+  const Reading reading = read_with_outputs(text);
+  INFO(text);
+  for (const Error& error : reading.errors) UNSCOPED_INFO(error.text());
+  REQUIRE(reading.errors.size() == 1);
+  CHECK(reading.errors[0].exit_code == ExitCode::kWrongUse);
+  return reading.errors[0].text();
+}
+
+const std::string kToAnn = R"([[output]]
+kind = "vmc"
+body = "ann"
+)";
+const std::string kTo = "to = [\"127.0.0.1:39539\"]\n";
+
+}  // namespace
+
+TEST_CASE("an output is read with its defaults, and named by kind and stream") {
+  const Reading reading = read_with_outputs(kToAnn + kTo + R"([[output]]
+name = "hands"
+kind = "vmc"
+left_hand = "left"
+right_hand = "stage-bob"
+to = ["127.0.0.1:39540", "[::1]:39540", "192.168.1.20:39540"]
+rate_hz = 60
+names = "vrm1"
+role = "assistant"
+)");
+  for (const Error& error : reading.errors) FAIL_CHECK(error.text());
+  REQUIRE(reading.config.outputs.size() == 2);
+  const OutputConfig& first = reading.config.outputs[0];
+  CHECK(first.name == "vmc-ann");
+  CHECK(first.kind == OutputKind::kVmc);
+  CHECK(first.body == "ann");
+  CHECK(first.to == std::vector<std::string>{"127.0.0.1:39539"});
+  CHECK(first.rate_hz == 0.0);
+  CHECK_FALSE(first.vrm1_names);
+  CHECK_FALSE(first.assistant);
+  const OutputConfig& second = reading.config.outputs[1];
+  CHECK(second.name == "hands");
+  CHECK(second.body.empty());
+  CHECK(second.left_hand == "left");
+  CHECK(second.right_hand == "stage-bob");
+  CHECK(second.to.size() == 3);
+  CHECK(second.rate_hz == 60.0);
+  CHECK(second.vrm1_names);
+  CHECK(second.assistant);
+}
+
+TEST_CASE("a wrong output is one sentence with its line") {
+  CHECK(output_complaint("[[output]]\nbody = \"ann\"\n" + kTo) ==
+        "posed.toml:12: output.kind is missing; write kind = \"vmc\" or \"bvh\"");
+  CHECK(output_complaint("[[output]]\nkind = \"vcm\"\nbody = \"ann\"\n" + kTo)
+            .find("posed.toml:13: output.kind must be one of these words") == 0);
+  CHECK(output_complaint("[[output]]\nkind = \"vmc\"\n" + kTo) ==
+        "posed.toml:12: the output names no stream; add body = \"STREAM\", left_hand or"
+        " right_hand");
+  CHECK(output_complaint("[[output]]\nkind = \"vmc\"\nbody = \"anne\"\n" + kTo) ==
+        "posed.toml:14: there is no stream named 'anne'; the nearest is 'ann'");
+  CHECK(output_complaint("[[output]]\nkind = \"vmc\"\nbody = \"stage\"\n" + kTo)
+            .find("posed.toml:14: there is no stream named 'stage'; name that of a") == 0);
+  CHECK(output_complaint("[[output]]\nkind = \"vmc\"\nbody = 3\n" + kTo).find("posed.toml:14: ") ==
+        0);
+  CHECK(output_complaint(kToAnn + "left_hand = \"ann\"\n" + kTo) ==
+        "posed.toml:15: 'ann' is another part of this avatar already; each part has a stream of"
+        " its own");
+  CHECK(output_complaint(kToAnn) ==
+        "posed.toml:12: output.to is missing; name the receivers, like to = [\"127.0.0.1:39539\"]");
+  CHECK(output_complaint(kToAnn + "to = []\n") ==
+        "posed.toml:15: output.to takes 1 to 64 receivers");
+  CHECK(output_complaint(kToAnn + "to = \"127.0.0.1:39539\"\n").find("posed.toml:15: ") == 0);
+  for (const char* endpoint : {"localhost:39539", "127.0.0.1", "127.0.0.1:", "127.0.0.1:0",
+                               "127.0.0.1:65536", "127.0.0.1:99999999999999999999", ":39539", ""}) {
+    CHECK(output_complaint(kToAnn + "to = [\"" + endpoint + "\"]\n") ==
+          "posed.toml:15: '" + std::string(endpoint) +
+              "' should be an address in numbers and a port from 1 to 65535, like 127.0.0.1:39539");
+  }
+  for (const char* port : {"\\u0000", "+1", "1 ", "\\u001b[2J"}) {
+    const std::string sentence = output_complaint(kToAnn + "to = [\"127.0.0.1:" + port + "\"]\n");
+    CHECK(sentence.find("should be an address in numbers and a port") != std::string::npos);
+    CHECK(sentence.find('\x1b') == std::string::npos);
+  }
+  CHECK(output_complaint(kToAnn + "to = [\"127.0.0.1:1\", \"127.0.0.1:1\"]\n")
+            .find("'127.0.0.1:1' is listed twice") != std::string::npos);
+  CHECK(output_complaint(kToAnn + kTo + "rate_hz = -1\n").find("out of range") !=
+        std::string::npos);
+  CHECK(output_complaint(kToAnn + kTo + "names = \"vrm2\"\n").find("vrm0, vrm1") !=
+        std::string::npos);
+  CHECK(output_complaint(kToAnn + kTo + "role = \"marionette\"\n").find("assistant") !=
+        std::string::npos);
+  CHECK(output_complaint(kToAnn + kTo + "name = \"Ann!\"\n").find("an output's name has 1 to 32") !=
+        std::string::npos);
+  CHECK(output_complaint(kToAnn + kTo + kToAnn + kTo) ==
+        "posed.toml:16: a second output is named 'vmc-ann' (the first stands in line 12); give one"
+        " of them another name");
+  CHECK(output_complaint(kToAnn + kTo + "colour = 1\n").find("unknown key 'output.colour'") !=
+        std::string::npos);
+}
+
+TEST_CASE("a BVH output listens on this machine, or names who may connect") {
+  const std::string bvh = "[[output]]\nkind = \"bvh\"\nbody = \"ann\"\n";
+  const Reading reading = read_with_outputs(bvh + R"([[output]]
+name = "open"
+kind = "bvh"
+body = "ann"
+listen = "0.0.0.0:7003"
+peers = ["192.168.1.20"]
+header = true
+)");
+  for (const Error& error : reading.errors) FAIL_CHECK(error.text());
+  REQUIRE(reading.config.outputs.size() == 2);
+  CHECK(reading.config.outputs[0].name == "bvh-ann");
+  CHECK(reading.config.outputs[0].kind == OutputKind::kBvh);
+  CHECK(reading.config.outputs[0].listen == "127.0.0.1:7002");
+  CHECK_FALSE(reading.config.outputs[0].header);
+  CHECK(reading.config.outputs[1].listen == "0.0.0.0:7003");
+  CHECK(reading.config.outputs[1].peers == std::vector<std::string>{"192.168.1.20"});
+  CHECK(reading.config.outputs[1].header);
+  CHECK(output_complaint(bvh + "listen = \"0.0.0.0:7002\"\n").find("in peers") !=
+        std::string::npos);
+  CHECK(output_complaint(bvh + "listen = \"here\"\n").find("posed.toml:15: 'here' should be") == 0);
+  CHECK(output_complaint(bvh + "listen = \"\\u001b[2J\"\n").find('\x1b') == std::string::npos);
+  CHECK(output_complaint(bvh + "listen = \"127.0.0.1:0\"\n").find("choose one from 1 to 65535") !=
+        std::string::npos);
+  CHECK(output_complaint(bvh + "peers = [\"studio\"]\n").find("'studio' should be an address") !=
+        std::string::npos);
+  CHECK(output_complaint(bvh + "to = [\"127.0.0.1:39539\"]\n") ==
+        "posed.toml:15: to is for outputs of kind = \"vmc\"; leave it out");
+  CHECK(output_complaint(bvh + "left_hand = \"left\"\n").find("is for outputs of kind = \"vmc\"") !=
+        std::string::npos);
+  CHECK(
+      output_complaint(kToAnn + kTo + "header = true\n").find("is for outputs of kind = \"bvh\"") !=
+      std::string::npos);
+  CHECK(output_complaint("[[output]]\nkind = \"bvh\"\n") ==
+        "posed.toml:12: the output names no stream; add body = \"STREAM\"");
+}
+
+}  // namespace posed::config

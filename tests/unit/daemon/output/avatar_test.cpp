@@ -1,0 +1,217 @@
+#include "daemon/output/avatar.hpp"
+
+#include <map>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/output/blend_shapes.hpp"
+#include "drivers/vmc/emulator.hpp"
+#include "drivers/vmc/osc.hpp"
+#include "models/motion/canonical_skeleton.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::output {
+namespace {
+
+namespace vmc = drivers::vmc;
+
+// As it is sent: Unity's axes.
+struct SentBone {
+  Vec3f position_m{};
+  Quatf rotation_xyzw{};
+};
+
+// The bones of a writer's frame by name, and "root".
+std::map<std::string, SentBone> sent_bones(const vmc::DatagramWriter& writer) {
+  std::map<std::string, SentBone> bones;
+  for (std::size_t i = 0; i < writer.datagrams(); ++i) {
+    vmc::each_message(writer.datagram(i), [&](const vmc::OscMessage& message) {
+      vmc::OscArguments arguments(message);
+      SentBone& bone = bones[std::string(arguments.text())];
+      for (float& x : bone.position_m) x = arguments.f32();
+      for (float& x : bone.rotation_xyzw) x = arguments.f32();
+      CHECK(arguments.ok());
+    });
+  }
+  return bones;
+}
+
+std::map<std::string, SentBone> written(const Avatar& avatar) {
+  vmc::DatagramWriter writer(vmc::Packing::kBundles);
+  writer.start();
+  avatar.write(writer);
+  return sent_bones(writer);
+}
+
+std::shared_ptr<const Skeleton> shared_hand(Side side) {
+  return std::make_shared<const Skeleton>(hand_skeleton(side));
+}
+
+Frame bent_hand(const Skeleton& skeleton, double flexion_rad) {
+  HandAngles angles{};
+  for (std::size_t joint = 3; joint < kHandJoints; ++joint) angles[3 * joint] = flexion_rad;
+  Frame frame;
+  set_hand_angles(skeleton, angles, frame);
+  return frame;
+}
+
+double turn_rad(const Quatf& rotation) {
+  return angle_between_rad(to_eigen_double(rotation), Eigen::Quaterniond::Identity());
+}
+
+}  // namespace
+
+TEST_CASE("a flat hand is sent with identity rotations, a bent one turned about Unity's axes") {
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    const bool left = side == Side::kLeft;
+    const std::string prefix = left ? "Left" : "Right";
+    const auto skeleton = shared_hand(side);
+    Avatar avatar(false);
+    const Part part = left ? Part::kLeftHand : Part::kRightHand;
+    REQUIRE(avatar.set_skeleton(part, skeleton));
+    CHECK(written(avatar).empty());  // no pose yet
+    REQUIRE(avatar.take(part, bent_hand(*skeleton, 0.0)));
+    const auto flat = written(avatar);
+    CHECK(flat.size() == kHandJoints);  // neither wrist nor root
+    for (const auto& [name, bone] : flat) {
+      INFO(name);
+      CHECK(name.starts_with(prefix));
+      CHECK(turn_rad(bone.rotation_xyzw) < 1e-6);
+    }
+    // Unity's left hand points to -X: so do its fingers, one joint from the other.
+    const Vec3f& next_m = flat.at(prefix + "IndexIntermediate").position_m;
+    CHECK((left ? -next_m[0] : next_m[0]) > 0.02F);
+    CHECK(std::abs(next_m[1]) < 1e-3F);
+
+    REQUIRE(avatar.take(part, bent_hand(*skeleton, 0.5)));
+    const SentBone bent = written(avatar).at(prefix + "MiddleIntermediate");
+    // The fingers bend down: about Unity's +Z on its left (-X to -Y), about -Z on its right.
+    const float half = static_cast<float>(std::sin(0.25));
+    CHECK(bent.rotation_xyzw[0] == Approx(0.0F).margin(1e-3));
+    CHECK(bent.rotation_xyzw[1] == Approx(0.0F).margin(1e-3));
+    CHECK(bent.rotation_xyzw[2] == Approx(left ? half : -half).margin(1e-3));
+  }
+}
+
+TEST_CASE("a hand's stream replaces the fingers of the body and leaves its wrist alone") {
+  const clip::Clip walk = motion::make_walker({.seconds = 0.2}).value();
+  const auto hand = shared_hand(Side::kLeft);
+  Avatar avatar(false);
+  REQUIRE(avatar.set_skeleton(Part::kBody, walk.skeleton));
+  REQUIRE(avatar.take(Part::kBody, walk.frame(2)));
+  const auto alone = written(avatar);
+  CHECK(alone.contains("root"));
+  CHECK(alone.contains("Hips"));
+  REQUIRE(avatar.set_skeleton(Part::kLeftHand, hand));
+  REQUIRE(avatar.take(Part::kLeftHand, bent_hand(*hand, 0.5)));
+  const auto both = written(avatar);
+  int fingers = 0;
+  for (const auto& [name, bone] : both) {
+    INFO(name);
+    const auto before = alone.find(name);
+    if (before != alone.end()) {
+      CHECK(before->second.rotation_xyzw == bone.rotation_xyzw);
+    } else {
+      CHECK(name.starts_with("Left"));
+      ++fingers;
+    }
+  }
+  CHECK(fingers == kHandJoints);
+  // It leaves.
+  REQUIRE(avatar.set_skeleton(Part::kLeftHand, nullptr));
+  CHECK(written(avatar).size() == alone.size());
+  CHECK_FALSE(avatar.take(Part::kLeftHand, bent_hand(*hand, 0.5)));
+}
+
+TEST_CASE("an assistant's avatar has hands only") {
+  const vmc::VmcEmulator emulator(60.0, vmc::Packing::kOneBundle);  // has every bone
+  const auto person = std::make_shared<const Skeleton>(*emulator.skeleton(0));
+  Frame frame;
+  frame.joint_count = static_cast<std::uint16_t>(person->joints.size());
+  frame.rotation_xyzw.fill(kIdentity);
+  frame.valid.set();
+  Avatar performer(false);
+  REQUIRE(performer.set_skeleton(Part::kBody, person));
+  REQUIRE(performer.take(Part::kBody, frame));
+  CHECK(written(performer).size() == kBones + 1);  // and the root
+  Avatar assistant(true);
+  REQUIRE(assistant.set_skeleton(Part::kBody, person));
+  REQUIRE(assistant.take(Part::kBody, frame));
+  const auto bones = written(assistant);
+  CHECK(bones.size() == 2 * (1 + kHandJoints));
+  CHECK(bones.contains("LeftHand"));
+  CHECK(bones.contains("RightThumbProximal"));
+  CHECK_FALSE(bones.contains("root"));
+  Skeleton armless;
+  armless.name = "armless";
+  armless.joints.emplace_back().name = "hips";
+  REQUIRE(armless.finish());
+  const auto refused =
+      assistant.set_skeleton(Part::kBody, std::make_shared<const Skeleton>(armless));
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().message.find("no bones of a hand") != std::string::npos);
+}
+
+TEST_CASE("a skeleton that cannot move its part is refused in one sentence") {
+  Avatar avatar(false);
+  const auto body = avatar.set_skeleton(Part::kBody, shared_hand(Side::kLeft));
+  REQUIRE_FALSE(body);
+  CHECK(body.error().message.find("has no hips") != std::string::npos);
+  const auto wrong = avatar.set_skeleton(Part::kRightHand, shared_hand(Side::kLeft));
+  REQUIRE_FALSE(wrong);
+  CHECK(wrong.error().message.find("has no rightHand") != std::string::npos);
+  const auto walk = motion::make_walker({.seconds = 0.2}).value();
+  const auto without = avatar.set_skeleton(Part::kRightHand, walk.skeleton);
+  REQUIRE_FALSE(without);
+  CHECK(without.error().message.find("no bones of a right hand") != std::string::npos);
+  CHECK(written(avatar).empty());
+}
+
+TEST_CASE("blend shapes go out under the names of the wanted version") {
+  CHECK(preset_name("Joy", VrmNames::kVrm0) == "Joy");
+  CHECK(preset_name("Joy", VrmNames::kVrm1) == "happy");
+  CHECK(preset_name("blinkLeft", VrmNames::kVrm0) == "Blink_L");
+  CHECK(preset_name("jawOpen", VrmNames::kVrm1) == "jawOpen");
+  BlendShapes shapes(VrmNames::kVrm1);
+  CHECK(shapes.set_layout({.names = {"Joy", "tra/1/x", "bend", "jawOpen", "A", ""},
+                           .units = {"1", "1", "rad", "1", "1", "1"}}) == 1);
+  vmc::DatagramWriter writer(vmc::Packing::kMessages);
+  writer.start();
+  shapes.write(writer);
+  CHECK(writer.datagrams() == 0);
+  Sample sample;
+  sample.value_count = 5;
+  sample.value = {0.25F, 9.0F, 9.0F, 0.5F, 0.75F};
+  sample.valid.set(0).set(1).set(2).set(3);  // A was not measured
+  shapes.take(sample);
+  shapes.write(writer);
+  std::string text;
+  for (std::size_t i = 0; i < writer.datagrams(); ++i) {
+    vmc::each_message(writer.datagram(i), [&](const vmc::OscMessage& message) {
+      vmc::OscArguments arguments(message);
+      text += message.address;
+      if (!message.types.empty()) {
+        text += " " + std::string(arguments.text());
+        text += " " + std::to_string(arguments.f32());
+      }
+      text += "\n";
+    });
+  }
+  CHECK(text ==
+        "/VMC/Ext/Blend/Val happy 0.250000\n/VMC/Ext/Blend/Val jawOpen 0.500000\n"
+        "/VMC/Ext/Blend/Apply\n");
+  // More names than a frame has room for: the last ones are left out and counted.
+  drivers::SampleLayout many;
+  for (int i = 0; i < 200; ++i) {
+    many.names.push_back(std::to_string(i) + std::string(100, 'x'));
+    many.units.emplace_back("1");
+  }
+  const std::size_t left_out = shapes.set_layout(many);
+  CHECK(left_out > 50);
+  CHECK(left_out < 150);
+}
+
+}  // namespace posed::output

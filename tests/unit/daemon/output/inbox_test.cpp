@@ -1,0 +1,132 @@
+#include "daemon/output/inbox.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "daemon/output/rate_limit.hpp"
+#include "tests/unit/daemon/output/output_rig.hpp"
+
+namespace posed::output {
+namespace {
+
+Frame numbered(std::uint32_t stream, std::uint64_t sequence) {
+  Frame frame;
+  frame.header.stream = stream;
+  frame.header.sequence = sequence;
+  return frame;
+}
+
+struct InboxRig {
+  std::unique_ptr<system::EventFd> wake = system::EventFd::open().value();
+  Inbox inbox{{"ann", "", "glove"}, *wake};
+  Delivery delivery;
+
+  // "B1 B2 R7": parts and sequences.
+  std::string taken() {
+    inbox.take(delivery);
+    std::string text;
+    delivery.for_each([&](Part part, const Frame& frame) {
+      text += "BLR"[index_of(part)] + std::to_string(frame.header.sequence) + " ";
+    });
+    return text;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("an inbox takes the frames of the streams that its output names, in their order") {
+  InboxRig rig;
+  CHECK(rig.inbox.wants("ann"));
+  CHECK(rig.inbox.wants("glove"));
+  CHECK_FALSE(rig.inbox.wants("bob"));
+  CHECK_FALSE(rig.inbox.wants(""));
+  rig.inbox.frame(numbered(3, 1));  // nobody of this id has come
+  rig.inbox.stream_comes(info_of(3, "ann", nullptr));
+  rig.inbox.stream_comes(info_of(4, "glove", nullptr));
+  rig.inbox.frame(numbered(3, 2));
+  rig.inbox.frame(numbered(4, 7));
+  rig.inbox.frame(numbered(3, 3));
+  CHECK(rig.taken() == "B2 R7 B3 ");
+  REQUIRE(rig.delivery.streams[0] != nullptr);
+  CHECK(rig.delivery.streams[0]->name == "ann");
+  CHECK(rig.delivery.streams[1] == nullptr);
+  CHECK(rig.taken().empty());
+  CHECK(rig.inbox.frames() == 3);
+  CHECK(rig.inbox.dropped() == 0);
+}
+
+TEST_CASE("a full inbox keeps the newest frames and counts the others") {
+  InboxRig rig;
+  rig.inbox.stream_comes(info_of(3, "ann", nullptr));
+  for (int round = 0; round < 3; ++round) {  // the ring begins at another place each time
+    for (std::uint64_t i = 1; i <= Delivery::kDepth + 5; ++i) rig.inbox.frame(numbered(3, i));
+    std::string expected;
+    for (std::uint64_t i = 6; i <= Delivery::kDepth + 5; ++i) {
+      expected += "B" + std::to_string(i) + " ";
+    }
+    CHECK(rig.taken() == expected);
+  }
+  CHECK(rig.inbox.dropped() == 15);
+}
+
+TEST_CASE("the frames of a stream that leaves or returns otherwise are not sent any more") {
+  InboxRig rig;
+  rig.inbox.stream_comes(info_of(3, "ann", nullptr));
+  rig.inbox.stream_comes(info_of(4, "glove", nullptr));
+  rig.inbox.frame(numbered(3, 1));
+  rig.inbox.frame(numbered(4, 1));
+  rig.inbox.stream_comes(info_of(0x10003, "ann", nullptr));  // its next generation
+  rig.inbox.frame(numbered(3, 2));
+  rig.inbox.frame(numbered(0x10003, 3));
+  rig.inbox.stream_leaves(3);  // too late to matter
+  CHECK(rig.taken() == "R1 B3 ");
+  CHECK(rig.inbox.dropped() == 1);
+  rig.inbox.frame(numbered(4, 2));
+  rig.inbox.stream_leaves(4);
+  CHECK(rig.taken().empty());
+  CHECK(rig.delivery.streams[2] == nullptr);
+  CHECK(rig.inbox.dropped() == 2);
+}
+
+TEST_CASE("only the newest sample of the body waits") {
+  InboxRig rig;
+  rig.inbox.stream_comes(info_of(3, "ann", nullptr));
+  rig.inbox.stream_comes(info_of(4, "glove", nullptr));
+  Sample sample;
+  sample.header.stream = 3;
+  sample.value[0] = 1.0F;
+  rig.inbox.sample(sample);
+  sample.value[0] = 2.0F;
+  rig.inbox.sample(sample);
+  sample.header.stream = 4;
+  sample.value[0] = 3.0F;
+  rig.inbox.sample(sample);
+  rig.inbox.take(rig.delivery);
+  REQUIRE(rig.delivery.sample);
+  CHECK(rig.delivery.sample->value[0] == 2.0F);
+  rig.inbox.take(rig.delivery);
+  CHECK_FALSE(rig.delivery.sample);
+}
+
+TEST_CASE("a rate limit thins a faster stream evenly and leaves a slower one alone") {
+  const auto admitted = [](double limit_hz, double rate_hz, double jitter_s) {
+    RateLimit limit(limit_hz);
+    int count = 0;
+    for (int i = 0; i < 1000; ++i) {
+      const double time_s = i / rate_hz + (i % 2 == 0 ? jitter_s : -jitter_s);
+      if (limit.admit(nanoseconds(1.0 + time_s))) ++count;
+    }
+    return count;
+  };
+  CHECK(admitted(60.0, 120.0, 0.0) == 500);
+  CHECK(admitted(60.0, 240.0, 0.0) == 250);
+  CHECK(admitted(60.0, 60.0, 0.0015) == 1000);  // jitter costs nothing
+  CHECK(admitted(60.0, 30.0, 0.005) == 1000);
+  CHECK(admitted(60.0, 100.0, 0.0) == Approx(600).margin(2));
+  CHECK(admitted(0.0, 1000.0, 0.0) == 1000);
+  RateLimit limit(10.0);  // a pause is not made up for
+  CHECK(limit.admit(0));
+  CHECK(limit.admit(5 * kNanosPerSecond));
+  CHECK_FALSE(limit.admit(5 * kNanosPerSecond + kNanosPerSecond / 20));
+}
+
+}  // namespace posed::output
