@@ -130,7 +130,9 @@ HandPose HandMap::read(const Frame& glove) const noexcept {
     if (reading.above >= 0)
       turn = world[static_cast<std::size_t>(reading.above)].conjugate() * turn;
     pose.turn[i] = (reading.before * turn * reading.after).normalized();
-    pose.valid[i] = glove.valid[joint] && pose.turn[i].coeffs().allFinite();
+    // false for a rotation that is none: not finite, or all zero
+    const bool sound = pose.turn[i].norm() > 0.5;
+    pose.valid[i] = glove.valid[joint] && sound;
   }
   return pose;
 }

@@ -15,7 +15,7 @@ constexpr std::int64_t kIntervalsAveraged = 16;
 // A glove whose time goes back by more than this has started again.
 constexpr std::int64_t kJumpBack_ns = kNanosPerSecond;
 
-// From 0 to 1 without a jump of the speed.
+// From 0 to 1 without a jump of the speed. RT-safe.
 double eased(std::int64_t since_ns, std::int64_t length_ns) noexcept {
   const double part =
       std::clamp(static_cast<double>(since_ns) / static_cast<double>(length_ns), 0.0, 1.0);
@@ -30,10 +30,12 @@ HandTrack::HandTrack(double rate_hz, std::int64_t hold_ns, const HandPose& relax
       interval_ns_(rate_hz > 0.0 ? std::min(nanoseconds(1.0 / rate_hz), kLongestInterval_ns)
                                  : kUsualInterval_ns) {}
 
+// RT-safe.
 std::int64_t HandTrack::silent_after_ns() const noexcept {
   return std::max(kSilentIntervals * interval_ns_, kLeastSilence_ns);
 }
 
+// RT-safe.
 void HandTrack::hear(const TimedPose& pose, std::int64_t now_ns) noexcept {
   heard_ns_ = std::max(heard_ns_, now_ns);
   if (!history_.empty()) {
@@ -51,7 +53,7 @@ void HandTrack::hear(const TimedPose& pose, std::int64_t now_ns) noexcept {
   history_.add(pose);
 }
 
-// What the glove says of this time, or is assumed to say.
+// What the glove says of this time, or is assumed to say. RT-safe.
 TimedPose HandTrack::source_pose(std::int64_t time_ns) noexcept {
   TimedPose at = history_.at(time_ns);
   const std::int64_t before_ns = std::exchange(used_ns_, at.time_ns);
@@ -66,6 +68,7 @@ TimedPose HandTrack::source_pose(std::int64_t time_ns) noexcept {
   return at;
 }
 
+// RT-safe.
 std::optional<TimedPose> HandTrack::pose_at(std::int64_t time_ns) noexcept {
   if (history_.empty()) return std::nullopt;
   TimedPose at = source_pose(time_ns);

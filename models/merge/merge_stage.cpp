@@ -8,7 +8,7 @@
 
 namespace posed::merge {
 
-// A frame cannot have been measured after it arrived.
+// A frame cannot have been measured after it arrived. RT-safe.
 std::int64_t time_of(const Header& header) noexcept {
   if (!header.clock.valid || header.device_ns == kNoTime_ns) return header.arrival_ns;
   return std::min(to_host_ns(header.clock, header.device_ns), header.arrival_ns);

@@ -151,6 +151,7 @@ TEST_CASE("a joint that the glove does not measure stays the body's") {
   for (int ms = 0; ms <= 20; ms += 10) {
     Frame frame = test::glove_frame(*hand.glove, 0.3, ms * kMs);
     frame.valid[static_cast<std::size_t>(hand_joint(1, 1))] = false;
+    frame.rotation_xyzw[static_cast<std::size_t>(hand_joint(4, 2))] = {};  // no rotation at all
     hand.rig.glove(0, frame);
   }
   hand.send_body(15 * kMs);
@@ -159,6 +160,8 @@ TEST_CASE("a joint that the glove does not measure stays the body's") {
   CHECK_FALSE(hand.valid(frame));
   CHECK(frame.valid[static_cast<std::size_t>(
       hand.rig.skeleton->joint_of(hand_bone(Side::kLeft, kBentJoint + 1)))]);
+  CHECK_FALSE(
+      frame.valid[static_cast<std::size_t>(hand.rig.skeleton->joint_of(Bone::kLeftLittleDistal))]);
 }
 
 TEST_CASE("a glove whose clock starts again goes on at once") {
