@@ -163,7 +163,7 @@ TEST_CASE("two people get the hands of the gloves, no frame is lost, and the log
 TEST_CASE("whatever happens to bodies and gloves, a merged log replays bit for bit", "[property]") {
   const TempFolder folder;
   const auto path = folder.path() / "merged.plog";
-  const auto [first, last] = seeds(4);
+  const auto [first, last] = seeds(8);
   std::uint64_t compared = 0;
   for (std::uint64_t seed = first; seed <= last; ++seed) {
     INFO("seed " << seed << "; POSED_SEED=" << seed << " runs it alone");
