@@ -30,7 +30,7 @@ class HandHistory {
   // The pose at this time, interpolated between the two around it; beyond the ends the first or the
   // last one as it is. A joint that only one of the two knows is the one of the nearer. The quality
   // is the worse one. Call only if there is one. RT-safe.
-  [[nodiscard]] TimedPose at(std::int64_t time_ns) const noexcept {
+  [[nodiscard]] TimedPose pose_at(std::int64_t time_ns) const noexcept {
     if (time_ns >= newest().time_ns) return newest();
     std::size_t i = 1;
     while (i < count_ && back(i).time_ns > time_ns) ++i;

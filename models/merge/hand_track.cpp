@@ -55,7 +55,7 @@ void HandTrack::hear(const TimedPose& pose, std::int64_t now_ns) noexcept {
 
 // What the glove says of this time, or is assumed to say. RT-safe.
 TimedPose HandTrack::source_pose(std::int64_t time_ns) noexcept {
-  TimedPose at = history_.at(time_ns);
+  TimedPose at = history_.pose_at(time_ns);
   const std::int64_t before_ns = std::exchange(used_ns_, at.time_ns);
   if (at.time_ns >= time_ns) return at;
   const std::int64_t silent_ns = time_ns - at.time_ns - hold_ns_;
