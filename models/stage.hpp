@@ -90,6 +90,12 @@ class Stage {
 
   virtual void process(const StageFrame& in, StageOut& out) noexcept = 0;
 
+  // A frame that has left the last stage of partner number `partner`, a stream that the parameters
+  // name (StageType::partners). It comes when the partner publishes it, between the calls for the
+  // stage's own stream, once that stream has begun.
+  virtual void partner(std::size_t /*partner*/, const StageFrame& /*in*/,
+                       StageOut& /*out*/) noexcept {}
+
   // Something of the stream arrived, a frame or a sample: it is not silent. Called before
   // process().
   virtual void heard(std::int64_t /*arrival_ns*/) noexcept {}

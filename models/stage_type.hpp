@@ -23,11 +23,18 @@ class ModelFile;
 
 namespace posed {
 
+// A stream whose frames a stage gets beside those of its own.
+struct StagePartner {
+  std::shared_ptr<const Skeleton> skeleton{};  // of the frames that it publishes; null: none named
+  double rate_hz = 0.0;                        // nominal; 0: unknown
+};
+
 // What a stage is made for.
 struct StageContext {
   std::shared_ptr<const Skeleton> skeleton{};  // of the frames that enter; never null
   double rate_hz = 0.0;                        // nominal, of the stream; 0: unknown
   Parameters parameters{};                     // complete
+  std::vector<StagePartner> partners{};        // [StageType::partners]
 };
 
 // A parameter that contradicts others.
@@ -57,6 +64,10 @@ struct StageType {
   std::string_view name;  // no other stage or driver has it; the name of its table in the config
   std::string_view summary;
   std::vector<ParameterSpec> parameters{};
+  // Those parameters, all of them text, that name other streams; an empty name is none. A partner
+  // has a device of one body, so that its skeleton is known before the first frame, and no partners
+  // itself.
+  std::vector<std::string_view> partners{};
 
   // Whether a stream without a table for this stage has it all the same; null: never.
   bool (*is_default)(const Skeleton& skeleton) = nullptr;

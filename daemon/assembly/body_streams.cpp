@@ -94,7 +94,7 @@ Result<> BodyStreams::start(StreamUsers users, std::set<std::string> reserved) {
   for (const auto& source : sources_) named += source->config.named.size();
   builder_ = std::make_unique<devices::SourceBuilder>(
       sources_, devices::StreamSlots(first_, static_cast<std::uint32_t>(count_), named),
-      std::move(reserved), models_, *this);
+      std::move(reserved), models_, users_.partners, *this);
   thread_ = std::thread([this] { run(); });
   for (const auto& source : sources_) {
     if (!devices::DeviceSupervisor::wanted(*source->source)) continue;

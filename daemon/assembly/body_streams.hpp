@@ -30,6 +30,7 @@ struct StreamUsers {
   control::RequestHandler* handler = nullptr;
   pipeline::Worker* worker = nullptr;
   pipeline::Reader* reader = nullptr;
+  pipeline::PartnerStreams partners{};                    // that stages may name
   std::function<void(const devices::NewStream&)> record;  // before its first item; may be empty
 };
 

@@ -81,6 +81,7 @@ class Daemon::Parts final : public control::DaemonControl {
   config::DaemonConfig config;
   DaemonHooks hooks;
   std::vector<std::unique_ptr<devices::OpenStream>> streams;
+  pipeline::PartnerStreams partners;  // those of them that stages may name
   std::atomic<bool> stop_asked{false};
 
   net::Context context;
@@ -111,6 +112,7 @@ class Daemon::Parts final : public control::DaemonControl {
             .handler = handler.get(),
             .worker = worker.get(),
             .reader = reader.get(),
+            .partners = partners,
             .record = hooks.record_stream};
   }
   // Names that the bodies of sources must leave alone.
@@ -118,13 +120,15 @@ class Daemon::Parts final : public control::DaemonControl {
 };
 
 Result<> Daemon::Parts::open() {
-  for (const config::StreamConfig& stream_config : config.streams) {
-    auto stream = devices::open_stream(stream_config);
+  streams.resize(config.streams.size());
+  for (const std::size_t i : devices::opening_order(config.streams)) {
+    auto stream = devices::open_stream(config.streams[i], partners);
     if (!stream) return std::unexpected(stream.error());
     for (const std::string& warning : (*stream)->source->device.warnings) {
-      spdlog::warn("{}: {}", stream_config.name, warning);
+      spdlog::warn("{}: {}", config.streams[i].name, warning);
     }
-    streams.push_back(std::move(*stream));
+    devices::add_partner(partners, i, **stream);
+    streams[i] = std::move(*stream);
   }
   // Each stream has its own slots, so that no stream can use up another's, and every event finds
   // one.

@@ -21,6 +21,8 @@ struct StageConfig {
   const StageType* type = nullptr;
   Parameters parameters{};        // complete
   std::filesystem::path model{};  // the model's file; empty: none
+  // [StageType::partners] where the config names them, for errors; 0: nowhere.
+  std::vector<int> partner_lines{};
 };
 
 struct StreamConfig {

@@ -57,6 +57,9 @@ bool read_stage(TableReader& table, const ConfigFile& file, StageConfig& stage) 
     }
     stage.parameters.emplace(spec.name, std::move(value));
   }
+  for (const std::string_view name : type.partners) {
+    stage.partner_lines.push_back(table.has(name) ? table.line_of(name) : 0);
+  }
   if (type.check != nullptr && enabled) {
     const auto fault = type.check(stage.parameters, !model.empty());
     if (fault) table.add_error(fault->parameter, fault->sentence);

@@ -11,6 +11,7 @@
 
 #include "daemon/config/driver_tables.hpp"
 #include "daemon/config/name_check.hpp"
+#include "daemon/config/partner_check.hpp"
 #include "daemon/config/source_tables.hpp"
 #include "daemon/config/stage_tables.hpp"
 #include "proto/text/clean.hpp"
@@ -76,6 +77,7 @@ void StreamReader::read(TableReader& root) {
   }
   for (TableReader& table : streams) read_stream(table);
   check_sources(sources);
+  check_partners(config_, file_.findings);
   check_names(std::move(names_), file_.findings);
 }
 

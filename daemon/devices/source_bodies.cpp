@@ -227,7 +227,8 @@ void SourceBodies::add(Stream& stream, const config::StreamConfig& config) {
 }
 
 Result<> SourceBodies::make_engine_of(NewStream& stream) const {
-  auto stages = load_stages(stream.config, stream.body.skeleton, stream.rate_hz, shared_.models);
+  auto stages = load_stages(stream.config, stream.body.skeleton, stream.rate_hz, shared_.models,
+                            shared_.partners);
   if (!stages) return std::unexpected(stages.error());
   stream.stages = std::move(*stages);
   auto bound = bind_stages(stream.stages);

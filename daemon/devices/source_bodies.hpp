@@ -27,6 +27,7 @@ struct SharedBodies {
   StreamSlots slots;
   BodyNames names;
   ModelFiles& models;
+  const pipeline::PartnerStreams& partners;
   // With which a stream goes on that returns under its name; by the name of one that has left.
   std::map<std::string, pipeline::NextNumbers> numbers{};
   std::size_t made = 0;  // streams since the start

@@ -8,11 +8,13 @@
 namespace posed::devices {
 
 SourceBuilder::SourceBuilder(std::vector<std::unique_ptr<BodySource>>& sources, StreamSlots slots,
-                             std::set<std::string> reserved, ModelFiles& models, StreamHost& host)
+                             std::set<std::string> reserved, ModelFiles& models,
+                             const pipeline::PartnerStreams& partners, StreamHost& host)
     : shared_{.host = host,
               .slots = std::move(slots),
               .names = BodyNames(std::move(reserved)),
-              .models = models} {
+              .models = models,
+              .partners = partners} {
   for (const auto& source : sources) {
     sources_.push_back(std::make_unique<SourceBodies>(shared_, *source));
   }

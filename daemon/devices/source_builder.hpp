@@ -18,10 +18,11 @@ class SourceBuilder {
   // At most this often the bodies of a source change.
   static constexpr std::int64_t kBetweenUpdates_ns = 500'000'000;
 
-  // Sources, models and host outlive the builder, and the reader ends before it. `reserved` are the
-  // names of all other streams.
+  // Sources, models, partners and host outlive the builder, and the reader ends before it.
+  // `reserved` are the names of all other streams, `partners` those that stages may name.
   SourceBuilder(std::vector<std::unique_ptr<BodySource>>& sources, StreamSlots slots,
-                std::set<std::string> reserved, ModelFiles& models, StreamHost& host);
+                std::set<std::string> reserved, ModelFiles& models,
+                const pipeline::PartnerStreams& partners, StreamHost& host);
 
   // Does what is due. Returns when to call it next at the latest; call earlier if the EventFd of
   // the sources' BodyExchange is notified.

@@ -31,7 +31,7 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
 
 Result<LoadedStages> load_stages(const config::StreamConfig& config,
                                  std::shared_ptr<const Skeleton> skeleton, double rate_hz,
-                                 ModelFiles& files) {
+                                 ModelFiles& files, const pipeline::PartnerStreams& partners) {
   LoadedStages loaded;
   loaded.settings = {
       .publish_raw = config.publish_raw, .stale_after_s = config.stale_after_s, .rate_hz = rate_hz};
@@ -52,6 +52,9 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
     auto bytes = files.load(stage.model);
     if (!bytes) return std::unexpected(bytes.error());
     file = std::move(*bytes);
+  }
+  if (auto found = pipeline::find_partners(loaded.settings, partners); !found) {
+    return std::unexpected(found.error());
   }
   auto published = pipeline::published_skeleton(loaded.settings, loaded.skeleton);
   if (!published) return std::unexpected(published.error());

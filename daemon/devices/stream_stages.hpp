@@ -27,10 +27,11 @@ struct LoadedStages {
 };
 
 // Chooses the stages and reads their model files. `rate_hz` is the stream's nominal rate, 0 when
-// unknown.
+// unknown; `partners` are the streams that stages may name.
 [[nodiscard]] Result<LoadedStages> load_stages(const config::StreamConfig& config,
                                                std::shared_ptr<const Skeleton> skeleton,
-                                               double rate_hz, ModelFiles& files);
+                                               double rate_hz, ModelFiles& files,
+                                               const pipeline::PartnerStreams& partners);
 
 // What the stages of a stream start with.
 struct BoundStages {

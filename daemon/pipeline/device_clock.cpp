@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "proto/frame/device_time.hpp"
+
 namespace posed::pipeline {
 namespace {
 

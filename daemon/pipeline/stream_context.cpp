@@ -28,12 +28,13 @@ std::uint64_t shed_depth(double rate_hz) noexcept {
 
 StreamContext::StreamContext(EngineOptions options, double rate_hz, StreamCounters& counters,
                              std::size_t slots, const WorkerPorts& ports,
-                             const std::uint64_t& next_item)
+                             const PartnerRoutes& routes, const std::uint64_t& next_item)
     : engine_(std::move(options)),
       stream_(engine_.stream()),
       depth_(shed_depth(rate_hz)),
       counters_(counters),
       ports_(ports),
+      routes_(routes),
       next_item_(next_item),
       share_(slots, counters.publisher.taken) {
   const NextNumbers next = next_numbers(counters);
@@ -89,7 +90,13 @@ void StreamContext::flush() noexcept {
   engine_.flush(*this);
 }
 
+// Its partners' stages get each frame, also one for which the publisher has no room.
 void StreamContext::item(const Item& item) noexcept {
+  publish(item);
+  routes_.published(item);
+}
+
+void StreamContext::publish(const Item& item) noexcept {
   if ((within_share(item) && !share_.has_room()) || !ports_.out->push(item)) {
     if (ports_.record_sink != nullptr && is_pose(item)) {
       ports_.record_sink->unpublished(item.frame.header.stream);

@@ -10,6 +10,7 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/partner_routes.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
 #include "daemon/pipeline/worker.hpp"
 
@@ -17,10 +18,11 @@ namespace posed::pipeline {
 
 class StreamContext final : private EngineOut {
  public:
-  // `slots` is how many slots of the ring to the publisher the stream may fill. `ports` and
-  // `next_item`, the number of the item before which a decision takes effect, are the worker's.
+  // `slots` is how many slots of the ring to the publisher the stream may fill. `ports`, `routes`
+  // and `next_item`, the number of the item before which a decision takes effect, are the worker's.
   StreamContext(EngineOptions options, double rate_hz, StreamCounters& counters, std::size_t slots,
-                const WorkerPorts& ports, const std::uint64_t& next_item);
+                const WorkerPorts& ports, const PartnerRoutes& routes,
+                const std::uint64_t& next_item);
 
   [[nodiscard]] std::uint32_t stream() const noexcept { return stream_; }
   [[nodiscard]] const StreamEngine& engine() const noexcept { return engine_; }
@@ -36,6 +38,9 @@ class StreamContext final : private EngineOut {
   void pass_on(const StreamEvent& event) noexcept;
   // Call after an item of the stream has been handled.
   void taken() noexcept;
+  // The worker has the stream now, or not any more: what its partners publish comes here.
+  void join(PartnerRoutes& routes) noexcept { routes.add(engine_, *this); }
+  void leave(PartnerRoutes& routes) const noexcept { routes.remove(engine_); }
 
   // What the stages are to do from the first item on. Cold, before the worker has the object.
   void set_first_commands(std::vector<Command> commands) { first_commands_ = std::move(commands); }
@@ -61,6 +66,7 @@ class StreamContext final : private EngineOut {
  private:
   void item(const Item& item) noexcept override;
   void decision(const Decision& decision) noexcept override;
+  void publish(const Item& item) noexcept;
   void publish_state() noexcept;
 
   StreamEngine engine_;
@@ -68,6 +74,7 @@ class StreamContext final : private EngineOut {
   std::uint64_t depth_;
   StreamCounters& counters_;
   const WorkerPorts& ports_;
+  const PartnerRoutes& routes_;
   const std::uint64_t& next_item_;
   std::vector<Command> first_commands_;
   std::size_t begun_ = 0;  // how many of them were applied

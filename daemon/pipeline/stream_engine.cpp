@@ -127,6 +127,17 @@ void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
   out.item(other_);
 }
 
+void StreamEngine::on_partner(const PartnerFeed& feed, const Frame& frame,
+                              EngineOut& out) noexcept {
+  if (state_ != StreamState::kLive && state_ != StreamState::kStale) return;
+  stage_us_.fill(0.0F);
+  Chain rest(*this, feed.stage + 1, out);
+  const std::size_t before = time_stage(feed.stage);
+  options_.stages[feed.stage].stage->partner(feed.partner, {.frame = frame}, rest);
+  time_stage(before);
+  report_played(last_arrival_ns_, out);
+}
+
 // Data arrived: a stream that was silent has recovered.
 void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
   last_arrival_ns_ = arrival_ns;

@@ -32,12 +32,20 @@ struct EngineStage {
   std::unique_ptr<Stage> stage;
 };
 
+// A stage gets the frames of another stream.
+struct PartnerFeed {
+  std::uint32_t stream = 0;  // id of the partner
+  std::size_t stage = 0;     // index in EngineOptions::stages
+  std::size_t partner = 0;   // index in StageType::partners
+};
+
 struct EngineOptions {
   std::uint32_t stream = 0;
   std::int64_t stale_after_ns = nanoseconds(system::kStaleAfter_s);
   bool publish_raw = false;
   std::vector<EngineStage> stages{};  // in the order in which they run
-  Clock clock = nullptr;              // to time the stages; null: they are not timed
+  std::vector<PartnerFeed> feeds{};
+  Clock clock = nullptr;  // to time the stages; null: they are not timed
 };
 
 // Runs the stages of one stream as a list. All calls come from one thread and are RT-safe, except
@@ -58,6 +66,10 @@ class StreamEngine final {
   void on_frame(const Frame& frame, EngineOut& out) noexcept;
   // The same for a sample; missing samples are recorded as a decision, but no event reports them.
   void on_sample(const Sample& sample, EngineOut& out) noexcept;
+  // A frame that a partner has just published. Ignored before the first frame or sample of the
+  // stream's own, so that it does not matter since when the engine exists.
+  void on_partner(const PartnerFeed& feed, const Frame& frame, EngineOut& out) noexcept;
+  [[nodiscard]] const std::vector<PartnerFeed>& feeds() const noexcept { return options_.feeds; }
   // Call before flush() or end(), with the sequences that were decoded last: frames and samples
   // that are missing after the last ones seen are recorded as shed, too.
   void close_gaps(std::uint64_t last_frame, std::uint64_t last_sample, EngineOut& out) noexcept;

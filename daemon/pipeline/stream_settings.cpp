@@ -4,15 +4,33 @@
 #include <utility>
 
 #include "daemon/pipeline/counters.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::pipeline {
 namespace {
 
 StageContext context_of(const StreamSettings& settings, std::size_t stage,
                         std::shared_ptr<const Skeleton> skeleton) {
-  return {.skeleton = std::move(skeleton),
-          .rate_hz = settings.rate_hz,
-          .parameters = settings.stages[stage].parameters};
+  StageContext context{.skeleton = std::move(skeleton),
+                       .rate_hz = settings.rate_hz,
+                       .parameters = settings.stages[stage].parameters};
+  for (const PartnerStream& partner : settings.stages[stage].partners) {
+    context.partners.push_back(partner.about);
+  }
+  return context;
+}
+
+// Empty: the parameter names no stream.
+const std::string& partner_name(const StageSettings& stage, std::size_t partner) {
+  return parameter<std::string>(stage.parameters, std::string(stage.type->partners[partner]));
+}
+
+// From which streams stage number `stage` of the engine gets frames.
+void add_feeds(const StageSettings& settings, std::size_t stage, std::vector<PartnerFeed>& feeds) {
+  for (std::size_t i = 0; i < settings.partners.size(); ++i) {
+    const PartnerStream& partner = settings.partners[i];
+    if (partner.about.skeleton) feeds.push_back({partner.stream, stage, i});
+  }
 }
 
 // The skeleton of the frames that leave the first `stages` stages.
@@ -32,6 +50,34 @@ Result<std::shared_ptr<const Skeleton>> skeleton_before(const StreamSettings& se
 
 StageSettings stage_settings(const StageType& type, const Parameters& changed) {
   return {.type = &type, .parameters = complete_parameters(type.parameters, changed).value()};
+}
+
+bool has_partners(const StreamSettings& settings) {
+  return std::ranges::any_of(settings.stages, [](const StageSettings& stage) {
+    for (std::size_t i = 0; i < stage.type->partners.size(); ++i) {
+      if (!partner_name(stage, i).empty()) return true;
+    }
+    return false;
+  });
+}
+
+Result<> find_partners(StreamSettings& settings, const PartnerStreams& known) {
+  for (StageSettings& stage : settings.stages) {
+    stage.partners.assign(stage.type->partners.size(), {});
+    for (std::size_t i = 0; i < stage.partners.size(); ++i) {
+      const std::string& name = partner_name(stage, i);
+      if (name.empty()) continue;
+      const auto found = known.find(name);
+      if (found == known.end() || !found->second.about.skeleton) {
+        return misuse("stage " + std::string(stage.type->name) + " cannot have stream " +
+                      in_quotes(name) +
+                      ": there must be a [[stream]] of this name, with a device of one body that"
+                      " opens and has poses, and without such a stage itself");
+      }
+      stage.partners[i] = found->second;
+    }
+  }
+  return {};
 }
 
 std::vector<const StageType*> stage_types_of(const StreamSettings& settings) {
@@ -80,6 +126,7 @@ Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings&
     auto stage = type.make(*context, models[i]);
     if (!stage) return std::unexpected(stage.error());
     options.stages.push_back({&type, std::move(*stage)});
+    add_feeds(settings.stages[i], i, options.feeds);
     live +=
         static_cast<std::size_t>(std::ranges::count(type.parameters, true, &ParameterSpec::live));
   }

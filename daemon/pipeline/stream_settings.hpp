@@ -2,6 +2,8 @@
 // from the device log; engine_options() makes the same engine from them for both.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -16,9 +18,17 @@
 
 namespace posed::pipeline {
 
+// A stream that a stage may take as a partner.
+struct PartnerStream {
+  std::uint32_t stream = 0;  // its id
+  StagePartner about{};
+};
+using PartnerStreams = std::map<std::string, PartnerStream>;  // by name
+
 struct StageSettings {
   const StageType* type = nullptr;
-  Parameters parameters{};  // complete
+  Parameters parameters{};                // complete
+  std::vector<PartnerStream> partners{};  // [StageType::partners], by find_partners()
   // The model with which the stage starts.
   std::string model_sha256{};  // of its file, which the log keeps; empty: no model
   std::string model_name{};    // for people
@@ -33,6 +43,11 @@ struct StreamSettings {
 
 // The stage's settings with every default. For tests and tools; `changed` must fit the table.
 [[nodiscard]] StageSettings stage_settings(const StageType& type, const Parameters& changed = {});
+
+// Whether a stage of the stream names a partner: then its partners have to be known before it.
+[[nodiscard]] bool has_partners(const StreamSettings& settings);
+// Finds the streams that the stages name. `known`: all that can be partners. Cold.
+[[nodiscard]] Result<> find_partners(StreamSettings& settings, const PartnerStreams& known);
 
 // The kinds of the stages, in order.
 [[nodiscard]] std::vector<const StageType*> stage_types_of(const StreamSettings& settings);

@@ -31,6 +31,7 @@ Worker::Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller)
   if (ports_.streams == nullptr) return;
   contexts_.resize(ports_.streams->slots);
   coming_.resize(ports_.streams->slots);
+  routes_.reserve(contexts_.size());
 }
 
 Worker::~Worker() = default;
@@ -39,14 +40,20 @@ std::unique_ptr<StreamContext> Worker::make_context(EngineOptions options, doubl
                                                     StreamCounters& counters,
                                                     std::size_t slots) const {
   return std::make_unique<StreamContext>(std::move(options), rate_hz, counters, slots, ports_,
-                                         position_);
+                                         routes_, position_);
 }
 
 void Worker::add(EngineOptions options, double rate_hz, StreamCounters& counters,
                  std::size_t slots) {
   owned_.push_back(make_context(std::move(options), rate_hz, counters, slots));
   if (contexts_.size() < owned_.size()) contexts_.resize(owned_.size());
-  contexts_[owned_.size() - 1] = owned_.back().get();
+  routes_.reserve(contexts_.size());
+  put(static_cast<std::uint32_t>(owned_.size() - 1), *owned_.back());
+}
+
+void Worker::put(std::uint32_t slot, StreamContext& context) noexcept {
+  contexts_[slot] = &context;
+  context.join(routes_);
 }
 
 const StreamEngine& Worker::engine(std::uint32_t stream) const {
@@ -107,7 +114,8 @@ void Worker::take_streams() noexcept {
   if (ports_.streams == nullptr) return;
   const auto take_one = [this](StreamContext* context) noexcept {
     const std::uint32_t slot = slot_of(context->stream());
-    (contexts_[slot] == nullptr ? contexts_ : coming_)[slot] = context;
+    if (contexts_[slot] == nullptr) return put(slot, *context);
+    coming_[slot] = context;
   };
   while (ports_.streams->coming.consume(take_one)) {
   }
@@ -127,8 +135,12 @@ StreamContext* Worker::find(std::uint32_t stream) noexcept {
 void Worker::give_back(StreamContext& context, const StreamEvent& end) noexcept {
   const std::uint32_t slot = slot_of(context.stream());
   take_streams();
-  contexts_[slot] = std::exchange(coming_[slot], nullptr);
-  if (contexts_[slot] != nullptr) contexts_[slot]->follow(context, end);
+  context.leave(routes_);
+  contexts_[slot] = nullptr;
+  if (StreamContext* const next = std::exchange(coming_[slot], nullptr)) {
+    put(slot, *next);
+    next->follow(context, end);
+  }
   // never full: it has room for all streams that are there and that wait
   static_cast<void>(ports_.streams->gone.push(&context));
   ports_.streams->builder.notify();

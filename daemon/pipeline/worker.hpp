@@ -12,6 +12,7 @@
 
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/partner_routes.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
@@ -85,6 +86,7 @@ class Worker {
   void take(const Item& item, StreamContext& context) noexcept;
   void take_streams() noexcept;
   [[nodiscard]] StreamContext* find(std::uint32_t stream) noexcept;
+  void put(std::uint32_t slot, StreamContext& context) noexcept;
   void give_back(StreamContext& context, const StreamEvent& end) noexcept;
   void acknowledge(const Ack& ack) noexcept;
   void send_acks() noexcept;
@@ -97,6 +99,7 @@ class Worker {
   std::vector<std::unique_ptr<StreamContext>> owned_;  // those from the start
   std::vector<StreamContext*> contexts_;               // by slot; null where there is none
   std::vector<StreamContext*> coming_;                 // by slot: follow when the slot is free
+  PartnerRoutes routes_;                               // to the streams in contexts_
   std::uint64_t position_ = 1;  // number of the item before which a decision made now takes effect
   // Acks for which the ring was full; never more than there are commands under way.
   std::array<Ack, kMaxUnderWay> unsent_{};

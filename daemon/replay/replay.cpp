@@ -36,20 +36,29 @@ Result<> Replay::open_contexts() {
     if (!context) return std::unexpected(context.error());
     contexts_.push_back(std::move(*context));
   }
+  routes.reserve(contexts_.size());
   return {};
 }
 
+// Those whose stages name other streams come after these.
 Result<> Replay::open_sources() {
-  for (const log::SourceRow& row : reader_.sources()) {
-    std::vector<ReplayStreamContext*> streams;
-    for (std::size_t i = 0; i < contexts_.size(); ++i) {
-      if (reader_.streams()[i].source == row.id) streams.push_back(contexts_[i].get());
+  sources_.resize(reader_.sources().size());
+  for (const bool with_partners : {false, true}) {
+    for (std::size_t s = 0; s < sources_.size(); ++s) {
+      const log::SourceRow& row = reader_.sources()[s];
+      std::vector<ReplayStreamContext*> streams;
+      bool named = false;
+      for (std::size_t i = 0; i < contexts_.size(); ++i) {
+        if (reader_.streams()[i].source != row.id) continue;
+        streams.push_back(contexts_[i].get());
+        named = named || pipeline::has_partners(contexts_[i]->stream().settings);
+      }
+      // nothing of a source without streams was published
+      if (streams.empty() || named != with_partners) continue;
+      auto source = ReplaySource::open(row, std::move(streams), *this, reader_.file());
+      if (!source) return std::unexpected(source.error());
+      sources_[s] = std::move(*source);
     }
-    sources_.emplace_back();
-    if (streams.empty()) continue;  // nothing of it was published
-    auto source = ReplaySource::open(row, std::move(streams), *this, reader_.file());
-    if (!source) return std::unexpected(source.error());
-    sources_.back() = std::move(*source);
   }
   return {};
 }
@@ -88,13 +97,21 @@ Result<> Replay::load_gaps() {
       const log::StreamRow& row = reader_.streams()[i];
       const bool chunks = gap.kind == log::GapRow::Kind::kChunks && row.source == gap.owner;
       const bool decisions = gap.kind == log::GapRow::Kind::kDecisions && row.id == gap.owner;
-      if (chunks || decisions) contexts_[i]->set_gap(gap.after_chunk);
+      if (chunks || decisions) set_gap(i, gap.after_chunk);
     }
     if (gap.kind != log::GapRow::Kind::kChunks) continue;
     if (ReplaySource* const source = source_of(gap.owner)) source->set_gap(gap.after_chunk);
   }
   for (const auto& context : contexts_) gapped_.push_back(context.get());
   return {};
+}
+
+// What a stream publishes also depends on the partners of its stages.
+void Replay::set_gap(std::size_t stream, std::int64_t after_chunk) {
+  contexts_[stream]->set_gap(after_chunk);
+  for (const auto& context : contexts_) {
+    if (context->needs(contexts_[stream]->index())) context->set_gap(after_chunk);
+  }
 }
 
 void Replay::apply_gaps(std::int64_t chunk) {

@@ -56,6 +56,7 @@ class Replay final : private ReplayHost {
   [[nodiscard]] Result<> load_descriptions();
   [[nodiscard]] Result<> load_decisions();
   [[nodiscard]] Result<> load_gaps();
+  void set_gap(std::size_t stream, std::int64_t after_chunk);
   void apply_gaps(std::int64_t chunk);
   void apply(const Schedule::Entry& entry) noexcept;
   // Null if nothing is to be replayed of it.

@@ -36,15 +36,23 @@ Result<> ReplayStreamContext::describe(drivers::Description description) {
     return fail("stream " + in_quotes(stream_.name) + " has stages but no skeleton", file_);
   }
   settings.rate_hz = description.rate_hz;  // the models are bound to this rate
+  if (auto found = pipeline::find_partners(settings, host_.partners); !found) {
+    return fail("stream " + in_quotes(stream_.name) + ": " + found.error().message, file_);
+  }
   auto published = pipeline::published_skeleton(settings, description.skeleton);
   if (!published) return std::unexpected(published.error());
   stream_.published = std::move(*published);
+  if (stream_.source.empty() && !pipeline::has_partners(settings)) {
+    host_.partners[stream_.name] = {
+        .stream = index_, .about = {.skeleton = stream_.published, .rate_hz = settings.rate_hz}};
+  }
   stream_.description = std::move(description);
   stream_.described = true;
   return make_engine();
 }
 
 void ReplayStreamContext::set_aside() {
+  if (engine_) host_.routes.remove(*engine_);
   engine_.reset();
   models_in_use_.clear();
 }
@@ -69,7 +77,17 @@ Result<> ReplayStreamContext::make_engine() {
   }
   engine_ = std::make_unique<pipeline::StreamEngine>(std::move(*options));
   engine_->start_at(last_frame_ + 1, last_sample_ + 1);
+  host_.routes.add(*engine_, *this);
   return {};
+}
+
+bool ReplayStreamContext::needs(std::uint32_t partner) const noexcept {
+  for (const pipeline::StageSettings& stage : stream_.settings.stages) {
+    for (const pipeline::PartnerStream& named : stage.partners) {
+      if (named.about.skeleton && named.stream == partner) return true;
+    }
+  }
+  return false;
 }
 
 // A decision may be the first that comes: the live engine waits for its body's first frame, too.

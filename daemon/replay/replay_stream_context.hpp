@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/partner_routes.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "daemon/replay/replay_models.hpp"
@@ -58,6 +59,9 @@ class ReplayHost {
   virtual void failed(Error error) noexcept = 0;
 
   std::uint64_t next_item = 1;  // the next Item::number
+  pipeline::PartnerStreams
+      partners{};                    // streams that stages may name, by what was described so far
+  pipeline::PartnerRoutes routes{};  // to the engines that there are
 };
 
 class ReplayStreamContext final : private pipeline::EngineOut {
@@ -104,6 +108,8 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   // record whether the stream ended; it ended then.
   void finish(std::optional<std::int64_t> end_ns) noexcept;
 
+  // Whether its stages name this stream as a partner.
+  [[nodiscard]] bool needs(std::uint32_t partner) const noexcept;
   [[nodiscard]] std::uint32_t index() const noexcept { return index_; }
   [[nodiscard]] std::uint32_t log_id() const noexcept { return log_id_; }
   [[nodiscard]] const ReplayStream& stream() const noexcept { return stream_; }
@@ -128,6 +134,7 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   void item(const pipeline::Item& item) noexcept override {
     if (item.kind == pipeline::Item::Kind::kFrame) last_out_ = item.frame.header.sequence;
     host_.publish(item);
+    host_.routes.published(item);
   }
   void decision(const pipeline::Decision&) noexcept override {}
 

@@ -6,6 +6,7 @@
 
 #include "models/generate/generate_type.hpp"
 #include "models/hand/constrain_type.hpp"
+#include "models/merge/merge_type.hpp"
 #include "models/retarget/retarget_type.hpp"
 #include "models/style/style_type.hpp"
 
@@ -13,10 +14,8 @@ namespace posed {
 
 std::span<const StageType* const> stage_types() {
   static const std::array types{
-      &style::style_type(),
-      &generate::generate_type(),
-      &hand::constrain_type(),
-      &retarget::retarget_type(),
+      &merge::merge_type(),    &style::style_type(),       &generate::generate_type(),
+      &hand::constrain_type(), &retarget::retarget_type(),
   };
   return types;
 }

@@ -52,12 +52,13 @@ void VirtualBodies::add_to(pipeline::Reader& reader) {
 
 void VirtualBodies::start(pipeline::Worker& worker, pipeline::Reader& reader,
                           record::RecordRings* record_sink, std::set<std::string> reserved,
-                          std::function<void()> meanwhile) {
+                          pipeline::PartnerStreams partners, std::function<void()> meanwhile) {
   worker_ = &worker;
   reader_ = &reader;
   record_sink_ = record_sink;
   std::size_t named_bodies = 0;
   meanwhile_ = std::move(meanwhile);
+  partners_ = std::move(partners);
   for (const auto& source : sources_) {
     for (const auto& named : source->config.named) reserved.insert(named.stream.name);
     named_bodies += source->config.named.size();
@@ -65,7 +66,7 @@ void VirtualBodies::start(pipeline::Worker& worker, pipeline::Reader& reader,
   builder_ = std::make_unique<devices::SourceBuilder>(
       sources_,
       devices::StreamSlots(first_, static_cast<std::uint32_t>(counters_.size()), named_bodies),
-      std::move(reserved), models_, *this);
+      std::move(reserved), models_, partners_, *this);
   builder_due_ns_ = virtual_now_ns;
 }
 

@@ -54,7 +54,8 @@ class VirtualBodies final : public devices::StreamHost {
   void add_to(pipeline::Reader& reader);
   // `meanwhile` lets the other parts run while the builder is at work.
   void start(pipeline::Worker& worker, pipeline::Reader& reader, record::RecordRings* record_sink,
-             std::set<std::string> reserved, std::function<void()> meanwhile);
+             std::set<std::string> reserved, pipeline::PartnerStreams partners,
+             std::function<void()> meanwhile);
 
   // Whether the reader has bodies or a device to take.
   [[nodiscard]] bool reader_is_called() const;
@@ -103,6 +104,7 @@ class VirtualBodies final : public devices::StreamHost {
   pipeline::Reader* reader_ = nullptr;
   record::RecordRings* record_sink_ = nullptr;
   devices::ModelFiles models_;
+  pipeline::PartnerStreams partners_;  // that stages may name
   std::function<void()> meanwhile_;
   std::unique_ptr<devices::SourceBuilder> builder_;
   std::int64_t builder_due_ns_ = 0;

@@ -47,6 +47,7 @@ class VirtualDaemon::Parts {
   std::vector<VirtualCommand> script;
   std::vector<pipeline::Ack> acks_taken;
   std::unique_ptr<VirtualBodies> bodies;  // null without sources
+  pipeline::PartnerStreams partners;      // that stages may name
 
  private:
   enum Part : std::uint8_t {
@@ -61,6 +62,7 @@ class VirtualDaemon::Parts {
   };
 
   void open();
+  void find_partners();
   void open_log();
   [[nodiscard]] pipeline::EngineOptions engine_of(VirtualStreamContext& context) const;
   void take_turn(Part part);
@@ -91,6 +93,21 @@ class VirtualDaemon::Parts {
   std::array<std::int64_t, kParts> due{};            // as returned by the part's last turn
   std::array<std::int64_t, kParts> held_until_ns{};  // no turn before this time
 };
+
+void VirtualDaemon::Parts::find_partners() {
+  for (const auto& context : contexts) {
+    const VirtualStream& stream = context->stream;
+    if (pipeline::has_partners(stream.settings)) continue;
+    const auto skeleton =
+        pipeline::published_skeleton(stream.settings, stream.description.skeleton);
+    REQUIRE(skeleton);
+    partners[stream.name] = {.stream = context->published.id,
+                             .about = {.skeleton = *skeleton, .rate_hz = stream.settings.rate_hz}};
+  }
+  for (const auto& context : contexts) {
+    REQUIRE(pipeline::find_partners(context->stream.settings, partners));
+  }
+}
 
 void VirtualDaemon::Parts::open_log() {
   if (options.log.empty()) return;
@@ -139,6 +156,7 @@ void VirtualDaemon::Parts::open() {
   if (!sources.empty()) {
     bodies = std::make_unique<VirtualBodies>(std::move(sources), count, options.bodies);
   }
+  find_partners();
   open_log();
   std::size_t slots = pipeline::kEventSlots + contexts.size();
   for (const auto& context : contexts) slots += context->stream.slots;
@@ -183,7 +201,7 @@ void VirtualDaemon::Parts::open() {
     std::set<std::string> names;
     for (const auto& context : contexts) names.insert(context->stream.name);
     bodies->add_to(*reader);
-    bodies->start(*worker, *reader, record_sink.get(), std::move(names),
+    bodies->start(*worker, *reader, record_sink.get(), std::move(names), partners,
                   [this] { run_beside_builder(); });
   }
   std::ranges::stable_sort(script, {}, &VirtualCommand::at_s);

@@ -151,9 +151,10 @@ struct VirtualBody {
 // frames.
 [[nodiscard]] VirtualStream walking_stream(const std::string& name, double length_s,
                                            unsigned style_seed = 1);
-// A right-handed LucidGlove at 100 Hz whose decoder gives a sample before each frame, with generate
+// A LucidGlove at 100 Hz whose decoder gives a sample before each frame, with generate
 // (a lag of two frames, with a gesture model) and constrain.
-[[nodiscard]] VirtualStream glove_stream(const std::string& name, double length_s);
+[[nodiscard]] VirtualStream glove_stream(const std::string& name, double length_s,
+                                         Side side = Side::kRight);
 
 // A room with two to six people at 60 to 120 Hz who come and go and change their skeleton, and
 // whose system repeats, cuts, distorts or floods its descriptions. What happens, and the stages of

@@ -91,17 +91,21 @@ VirtualStream walking_stream(const std::string& name, double length_s, unsigned 
   return stream;
 }
 
-VirtualStream glove_stream(const std::string& name, double length_s) {
+VirtualStream glove_stream(const std::string& name, double length_s, Side side) {
   const drivers::Driver& driver = *drivers::find_driver("lucidgloves");
+  const drivers::Options options =
+      drivers::complete_options(driver,
+                                {{"hand", std::string(side == Side::kLeft ? "left" : "right")}})
+          .value();
   VirtualStream stream;
   stream.name = name;
-  stream.description = driver.expect({}).value();
+  stream.description = driver.expect(options).value();
   stream.settings.stages = {
       pipeline::stage_settings(generate::generate_type(), {{"lag_frames", std::int64_t{2}}}),
       pipeline::stage_settings(hand::constrain_type())};
   stream.model_files = {gesture::serialize_model(toy_gesture_model()), ""};
   stream.links.emplace_back();
-  const auto glove = driver.emulate(drivers::complete_options(driver, {}).value()).value();
+  const auto glove = driver.emulate(options).value();
   using drivers::glove::Pose;
   const HandAngles flat = drivers::glove::hand_in(Pose::kFlat);
   const HandAngles fist = drivers::glove::hand_in(Pose::kFist);

@@ -39,10 +39,13 @@ ordered_json summary_of(const pipeline::StageSettings& stage) {
   return summary;
 }
 
-// A description of what one stream would run, made with its device opened and its model bound.
-Result<ordered_json> try_stream(const config::StreamConfig& config) {
-  const auto stream = devices::open_stream(config);
+// A description of what stream number `number` would run, made with its device opened and its model
+// bound. Streams after it may have it as a partner.
+Result<ordered_json> try_stream(const config::StreamConfig& config, std::size_t number,
+                                pipeline::PartnerStreams& partners) {
+  const auto stream = devices::open_stream(config, partners);
   if (!stream) return std::unexpected(stream.error());
+  devices::add_partner(partners, number, **stream);
   const auto missing = devices::try_kept_device(*(*stream)->source);
   if (!missing) return devices::of_stream(config.name, missing.error());
   const auto bound = devices::bind_stages((*stream)->stages);
@@ -167,10 +170,16 @@ int check(const CheckOptions& options) {
   ordered_json streams = ordered_json::array();
   ordered_json sources = ordered_json::array();
   if (reading.errors.empty()) {
-    for (const config::StreamConfig& stream : reading.config.streams) {
-      auto summary = try_stream(stream);
-      if (summary) streams.push_back(std::move(*summary));
+    const auto& configs = reading.config.streams;
+    std::vector<ordered_json> tried(configs.size());
+    pipeline::PartnerStreams partners;
+    for (const std::size_t i : devices::opening_order(configs)) {
+      auto summary = try_stream(configs[i], i, partners);
+      if (summary) tried[i] = std::move(*summary);
       if (!summary) reading.errors.push_back(summary.error());
+    }
+    for (ordered_json& summary : tried) {
+      if (!summary.is_null()) streams.push_back(std::move(summary));
     }
     for (const config::SourceConfig& source : reading.config.sources) {
       devices::ModelFiles models;

@@ -46,7 +46,7 @@ class Room final : private StreamHost {
     const std::size_t named = source->config.named.size();
     sources_.push_back(std::move(source));
     builder_.emplace(sources_, StreamSlots(1, slots, named), std::set<std::string>{"walker"},
-                     models_, static_cast<StreamHost&>(*this));
+                     models_, partners_, static_cast<StreamHost&>(*this));
   }
 
   // The device describes these bodies, and all that follows is done. What the reader is given is
@@ -122,6 +122,7 @@ class Room final : private StreamHost {
   std::array<pipeline::StreamCounters, 16> counters_;
   std::vector<std::uint32_t> gone_;
   ModelFiles models_;
+  pipeline::PartnerStreams partners_;
   std::optional<SourceBuilder> builder_;
   std::int64_t now_ns_ = 0;
 };

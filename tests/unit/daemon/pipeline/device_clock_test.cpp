@@ -11,6 +11,7 @@
 
 #include "daemon/pipeline/device_clock.hpp"
 #include "drivers/unrolled_counter.hpp"
+#include "proto/frame/device_time.hpp"
 
 namespace posed::pipeline {
 namespace {

@@ -1,0 +1,59 @@
+// HandTrack: what one glove has measured so far, and the hand pose that a body gets at any time.
+// While the glove measures, that is its pose at this time; when it falls silent, the last pose is
+// held and then eases to a relaxed hand; when it comes back, the hand eases back (README.md). It
+// knows only the times that it is told. One thread; nothing allocates after construction.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "models/merge/hand_history.hpp"
+#include "models/merge/hand_pose.hpp"
+
+namespace posed::merge {
+
+class HandTrack {
+ public:
+  static constexpr std::int64_t kRelax_ns = 500'000'000;   // from the held pose to the relaxed one
+  static constexpr std::int64_t kReturn_ns = 100'000'000;  // from there to what the glove measures
+
+  // `rate_hz` of the glove, 0 when unknown; later it is measured. `relaxed`: a hand at rest.
+  HandTrack(double rate_hz, std::int64_t hold_ns, const HandPose& relaxed);
+
+  // The body has begun at `now_ns`; from now on the glove is expected. RT-safe.
+  void begin(std::int64_t now_ns) noexcept {
+    if (heard_ns_ == kNoTime_ns) heard_ns_ = now_ns;
+  }
+  // The glove's next pose, which came at `now_ns`. A pose that is not later than the newest one is
+  // ignored, unless the glove's time has jumped back. RT-safe.
+  void hear(const TimedPose& pose, std::int64_t now_ns) noexcept;
+
+  // Whether a body's frame of this time is better with the glove's next pose, and the glove has not
+  // been silent for so long that none is likely to come. RT-safe.
+  [[nodiscard]] bool awaited(std::int64_t time_ns, std::int64_t now_ns) const noexcept {
+    const bool here = !history_.empty() && history_.newest().time_ns >= time_ns;
+    return !here && heard_ns_ != kNoTime_ns && now_ns - heard_ns_ < silent_after_ns();
+  }
+  // The pose for a body's frame; empty as long as the glove has not measured any. Times do not
+  // decrease. RT-safe.
+  [[nodiscard]] std::optional<TimedPose> pose_at(std::int64_t time_ns) noexcept;
+
+  // Without a frame for so long the glove counts as silent. RT-safe.
+  [[nodiscard]] std::int64_t silent_after_ns() const noexcept;
+
+ private:
+  [[nodiscard]] TimedPose source_pose(std::int64_t time_ns) noexcept;
+
+  HandHistory history_;
+  HandPose relaxed_;
+  std::int64_t hold_ns_;
+  std::int64_t interval_ns_;            // between two of the glove's frames, smoothed
+  std::int64_t heard_ns_ = kNoTime_ns;  // when the last of them came
+  std::int64_t used_ns_ = kNoTime_ns;   // time of the measurement that the last frame got
+  // What the last frame got, and what the hand eases back from.
+  bool has_shown_ = false, returns_ = false;
+  std::int64_t shown_ns_ = 0, left_ns_ = 0;
+  HandPose shown_, left_;
+};
+
+}  // namespace posed::merge

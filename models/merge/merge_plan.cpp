@@ -1,0 +1,122 @@
+#include "models/merge/merge_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+#include <utility>
+
+namespace posed::merge {
+namespace {
+
+// Of the joints of this side's hand that a glove may turn.
+void add_hand_angles(const Skeleton& skeleton, Side side,
+                     std::vector<MergePlan::JointAngles>& angles) {
+  std::vector<int> joints{skeleton.joint_of(hand_bone_of(side))};
+  for (int finger = 0; finger < kHandJoints; ++finger) {
+    joints.push_back(skeleton.joint_of(hand_bone(side, finger)));
+  }
+  MergePlan::JointAngles one;
+  for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+    const auto of_joint = [j](const Channel& channel) {
+      return is_rotation(channel) && channel.joint == j;
+    };
+    one = {.joint = j,
+           .first = one.first + one.count,
+           .count = static_cast<std::size_t>(std::ranges::count_if(skeleton.channels, of_joint))};
+    if (std::ranges::count(joints, static_cast<int>(j)) > 0) angles.push_back(one);
+  }
+}
+
+}  // namespace
+
+std::optional<Wrist> wrist_from_name(std::string_view name) {
+  if (name == "auto") return Wrist::kAuto;
+  if (name == "body") return Wrist::kBody;
+  if (name == "glove") return Wrist::kGlove;
+  return std::nullopt;
+}
+
+Result<MergePlan> MergePlan::make(const StageContext& context) {
+  constexpr std::array kNames{"left", "right"};
+  MergePlan plan;
+  plan.body = context.skeleton;
+  plan.wait_ns = nanoseconds(parameter<double>(context.parameters, "wait_s"));
+  plan.hold_ns = nanoseconds(parameter<double>(context.parameters, "hold_s"));
+  const auto wrist = wrist_from_name(parameter<std::string>(context.parameters, "wrist"));
+  std::array<const Skeleton*, 2> gloves{};
+  for (std::size_t i = 0; i < gloves.size() && i < context.partners.size(); ++i) {
+    gloves[i] = context.partners[i].skeleton.get();
+    if (gloves[i] == nullptr) continue;
+    const auto& stream = parameter<std::string>(context.parameters, kNames[i]);
+    if (auto fits = HandMap::check(stream, static_cast<Side>(i), *gloves[i]); !fits) {
+      return std::unexpected(fits.error());
+    }
+  }
+  if (gloves[0] == nullptr && gloves[1] == nullptr) {
+    return misuse(
+        "stage merge names no glove; name a glove's stream as its left, as its right or"
+        " both");
+  }
+  auto merged = merge_skeletons(*context.skeleton, gloves);
+  if (!merged) return std::unexpected(merged.error());
+  plan.merged = std::move(*merged);
+  const Skeleton& skeleton = *plan.merged.skeleton;
+  plan.angles = static_cast<std::uint16_t>(std::ranges::count_if(skeleton.channels, is_rotation));
+  for (std::size_t i = 0; i < gloves.size(); ++i) {
+    if (gloves[i] == nullptr) continue;
+    auto map =
+        HandMap::bind(parameter<std::string>(context.parameters, kNames[i]), static_cast<Side>(i),
+                      *gloves[i], skeleton, wrist.value_or(Wrist::kAuto));
+    if (!map) return std::unexpected(map.error());
+    plan.hands[i] = Hand{.glove = context.partners[i].skeleton,
+                         .rate_hz = context.partners[i].rate_hz,
+                         .map = std::move(*map)};
+    add_hand_angles(skeleton, static_cast<Side>(i), plan.hand_angles);
+  }
+  return plan;
+}
+
+// RT-safe.
+void MergePlan::expand(const Frame& in, Frame& out) const noexcept {
+  out.header = in.header;
+  out.skeleton = merged.skeleton->id;
+  out.joint_count = static_cast<std::uint16_t>(merged.skeleton->joints.size());
+  out.angle_count = in.angle_count == merged.angle_of.size() ? angles : std::uint16_t{0};
+  out.quality = in.quality;
+  out.source = in.source;
+  out.lag_frames = in.lag_frames;
+  out.lag_ms = in.lag_ms;
+  out.label = in.label;
+  out.label_probability = in.label_probability;
+  out.root_position_m = in.root_position_m;
+  out.stamps = in.stamps;
+  out.stage_us = in.stage_us;
+  out.valid.reset();
+  for (std::size_t j = 0; j < out.joint_count; ++j) out.rotation_xyzw[j] = kIdentity;
+  for (std::size_t j = 0; j < merged.joint_of.size(); ++j) {
+    const auto to = static_cast<std::size_t>(merged.joint_of[j]);
+    out.rotation_xyzw[to] = in.rotation_xyzw[j];
+    out.valid[to] = in.valid[j];
+  }
+  for (std::size_t i = 0; i < std::min<std::size_t>(in.angle_count, merged.angle_of.size()); ++i) {
+    out.angle_rad[static_cast<std::size_t>(merged.angle_of[i])] = in.angle_rad[i];
+  }
+  for (const JointAngles& joint : hand_angles) {
+    for (float& angle_rad : std::span(out.angle_rad).subspan(joint.first, joint.count)) {
+      if (!std::isfinite(angle_rad)) angle_rad = 0.0F;
+    }
+  }
+}
+
+// RT-safe.
+void MergePlan::remove_unknown_angles(Frame& frame) const noexcept {
+  for (const JointAngles& joint : hand_angles) {
+    if (frame.valid[joint.joint]) continue;
+    std::ranges::fill(std::span(frame.angle_rad).subspan(joint.first, joint.count),
+                      std::numeric_limits<float>::quiet_NaN());
+  }
+}
+
+}  // namespace posed::merge
