@@ -5,7 +5,7 @@
 namespace posed::relay {
 namespace {
 
-constexpr std::int64_t kSilent_ns = 3 * kNanosPerSecond;  // three stats are missing
+constexpr std::int64_t kNoStats_ns = 3 * kNanosPerSecond;  // three stats are missing
 
 }  // namespace
 
@@ -21,7 +21,7 @@ std::optional<std::string> MergedStats::take(std::size_t upstream, std::string_v
   heard.at_ns = now_ns;
   if (heard_.size() == 1) return std::string(bytes);
   const auto answers = [&](const Heard& one) {
-    return one.ever && now_ns - one.at_ns < kSilent_ns;
+    return one.ever && now_ns - one.at_ns < kNoStats_ns;
   };
   for (std::size_t i = 0; i < upstream; ++i) {
     if (answers(heard_[i])) return std::nullopt;  // an earlier one gives the beat

@@ -19,8 +19,8 @@ namespace posed::drivers {
 namespace {
 
 constexpr std::chrono::milliseconds kPatience{1000};
-constexpr int kMessagesWaiting = 16;      // in libzmq
-constexpr int kReceiveBuffer = 8 * 1024;  // bytes, in the kernel before libzmq
+constexpr int kMessagesWaiting = 16;   // in libzmq
+constexpr int kLinkBuffer = 8 * 1024;  // bytes, in the kernel before libzmq
 // Bytes between thread and reader, which the kernel doubles for its own use: a quarter of a second
 // of a large skeleton at 120 Hz.
 constexpr int kQueue = 128 * 1024;
@@ -53,7 +53,7 @@ Result<> set_all(void* socket, const SubscriptionSettings& settings) {
   const std::string_view most(reinterpret_cast<const char*>(&largest), sizeof largest);
   for (const Result<>& set : {net::set_option(socket, ZMQ_MAXMSGSIZE, most),
                               net::set_option(socket, ZMQ_RCVHWM, kMessagesWaiting),
-                              net::set_option(socket, ZMQ_RCVBUF, kReceiveBuffer)}) {
+                              net::set_option(socket, ZMQ_RCVBUF, kLinkBuffer)}) {
     if (!set) return set;
   }
   for (const std::string& topic : settings.topics) {

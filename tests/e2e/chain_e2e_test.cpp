@@ -26,7 +26,8 @@ using nlohmann::json;
 
 // The frames that a monitor prints, by their arrival on the first machine where that is the
 // device's time, until there are `count`.
-std::vector<json> frames_of(const std::string& endpoint, const std::string& stream, int count) {
+std::vector<json> monitored_frames(const std::string& endpoint, const std::string& stream,
+                                   int count) {
   const auto out = posed({"monitor", "--connect", endpoint, "--stream", stream, "--count",
                           std::to_string(count), "--json", "--timeout", "30"});
   INFO(out.err);
@@ -86,8 +87,8 @@ TEST_CASE("a daemon streams what another one publishes, to float precision") {
   // some.
   next.folder.write("posed.toml", chain_config(served.publish, "", "walker-raw"));
   next.launch("run");
-  const auto second = frames_of(next.publish, "up-walker-raw", 20);
-  const auto first = frames_of(served.publish, "walker-raw", 600);
+  const auto second = monitored_frames(next.publish, "up-walker-raw", 20);
+  const auto first = monitored_frames(served.publish, "walker-raw", 600);
   CHECK(furthest(first, second) < 1e-6);  // the sender's rotations have unit length to 1e-7
   std::uint64_t before = 0;
   for (const json& frame : second) {
@@ -116,7 +117,7 @@ TEST_CASE("a chained stream is lost and found with the daemon before it") {
   next.launch("run");  // before the first one is there
   Process events({"monitor", "--connect", next.publish, "--topic", "event"});
   launch_first(served, endpoint);
-  CHECK(frames_of(next.publish, "up-walker", 5).size() == 5);
+  CHECK(monitored_frames(next.publish, "up-walker", 5).size() == 5);
   const auto comes = [&](const std::string& part) {
     while (const auto line = events.line()) {
       if (line->contains(part)) return true;
@@ -128,7 +129,7 @@ TEST_CASE("a chained stream is lost and found with the daemon before it") {
   CHECK(comes(" lost "));
   launch_first(served, endpoint);
   CHECK(comes(" found "));
-  CHECK(frames_of(next.publish, "up-walker", 5).size() == 5);
+  CHECK(monitored_frames(next.publish, "up-walker", 5).size() == 5);
 }
 
 TEST_CASE("daemons and a relay chain with keys, and say which key is wrong") {
@@ -153,7 +154,7 @@ TEST_CASE("daemons and a relay chain with keys, and say which key is wrong") {
   };
   with_key("next");  // beside the config, by a relative path
   next.launch("run");
-  CHECK(frames_of(next.publish, "up-walker", 5).size() == 5);
+  CHECK(monitored_frames(next.publish, "up-walker", 5).size() == 5);
   next.daemon.reset();
   const auto says = [&](const std::string& part) {
     next.launch("run");
@@ -177,7 +178,7 @@ TEST_CASE("an emulated posed is heard over ZeroMQ, recorded, and replayed bit fo
   Stage next;
   next.folder.write("posed.toml", chain_config(json::parse(*ready).at("port")));
   next.record();
-  CHECK(frames_of(next.publish, "up-walker", 60).size() == 60);
+  CHECK(monitored_frames(next.publish, "up-walker", 60).size() == 60);
   next.daemon->send(SIGINT);
   CHECK(next.daemon->exit_code() == 0);
   const auto replayed = posed({"replay", next.path("take.plog"), "--speed", "max", "--expect"});

@@ -42,7 +42,7 @@ struct RelayCommand {
 };
 
 // Without a file the relay has no keys for its subscribers.
-Result<config::SecurityConfig> security_of(const RelayCommand& command) {
+Result<config::SecurityConfig> relay_security(const RelayCommand& command) {
   if (!command.security.empty()) {
     if (command.insecure) {
       return misuse("--insecure has no effect beside --security: leave one of them out");
@@ -160,7 +160,7 @@ void serve_relay(relay::Relay& relay, net::ZapAuthenticator& authenticator,
 
 Result<> run_relay(const RelayCommand& command) {
   prepare_to_serve();
-  const auto security = security_of(command);
+  const auto security = relay_security(command);
   if (!security) return std::unexpected(security.error());
   auto upstreams = upstreams_of(command);
   if (!upstreams) return std::unexpected(upstreams.error());
@@ -220,9 +220,9 @@ void add_relay(CLI::App& app, int& exit_code) {
   posed monitor --connect tcp://127.0.0.1:5580           # as from the daemon itself
   posed relay --from tcp://192.168.1.10:5570 --from tcp://192.168.1.11:5570 --key relay.key \
       --server-key server.pub --security relay.toml --bind tcp://0.0.0.0:5580
-A subscriber gets the skeletons of its streams within 0.1 s. The relay never holds poses back: one
-too slow for the stream misses frames. Streams of one name come from the first daemon that sends
-them; the others' are counted as clashes. SIGHUP reads the clients in [security] again.)");
+A subscriber gets the skeletons of its streams within 0.1 s. The relay never holds poses back: a
+subscriber too slow for the stream misses frames. Streams of one name come from the first daemon
+that sends them; the others' are counted as clashes. SIGHUP reads the clients again.)");
   command->callback([options, &exit_code] {
     const auto done = run_relay(*options);
     exit_code = done ? 0 : report(done.error());
