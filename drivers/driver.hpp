@@ -1,6 +1,7 @@
-// The contract between posed and a device. A driver starts no threads: the daemon owns them all. It
-// has two parts: a Transport that delivers raw chunks of bytes, and a Decoder that turns chunks
-// into frames. A log of the chunks therefore replays through the same decoder that ran live.
+// The contract between posed and a device. A driver starts no threads, except where a library must
+// not run in the reader (transport/subscription): the daemon owns all others. It has two parts: a
+// Transport that delivers raw chunks of bytes, and a Decoder that turns chunks into frames. So a
+// log of the chunks replays through the same decoder that ran live.
 #pragma once
 
 #include <cstddef>

@@ -14,6 +14,7 @@
 #include "drivers/mvn/mvn.hpp"
 #include "drivers/natnet/natnet.hpp"
 #include "drivers/p5/p5.hpp"
+#include "drivers/posed/posed.hpp"
 #include "drivers/rokoko/rokoko.hpp"
 #include "drivers/template/template.hpp"
 #include "drivers/template_mocap/template_mocap.hpp"
@@ -23,10 +24,12 @@ namespace posed::drivers {
 
 std::span<const Driver> registry() {
   static const std::array drivers{
-      axis_driver(),     cyberglove_driver(),     described_driver(),   file_driver(),
-      fivedt_driver(),   labels_driver(),         lucidgloves_driver(), mocopi_driver(),
-      mvn_driver(),      natnet_driver(),         p5_driver(),          rokoko_driver(),
-      template_driver(), template_mocap_driver(), vmc_driver(),
+      axis_driver(),        cyberglove_driver(), described_driver(),
+      file_driver(),        fivedt_driver(),     labels_driver(),
+      lucidgloves_driver(), mocopi_driver(),     mvn_driver(),
+      natnet_driver(),      p5_driver(),         posed_driver(),
+      rokoko_driver(),      template_driver(),   template_mocap_driver(),
+      vmc_driver(),
   };
   return drivers;
 }

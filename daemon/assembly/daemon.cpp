@@ -13,7 +13,6 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/device_supervisor.hpp"
-#include "daemon/net/keys.hpp"
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/pipeline/reader.hpp"
@@ -22,6 +21,7 @@
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
 #include "proto/text/stream_name.hpp"
+#include "proto/zmq/keys.hpp"
 
 namespace posed::assembly {
 namespace {

@@ -22,6 +22,7 @@ namespace posed::cli {
 
 void add_demo(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
+void add_relay(CLI::App& app, int& exit_code);
 void add_record(CLI::App& app, int& exit_code);
 void add_replay(CLI::App& app, int& exit_code);
 void add_synth(CLI::App& app, int& exit_code);

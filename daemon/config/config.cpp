@@ -8,13 +8,13 @@
 #include "daemon/config/config_file.hpp"
 #include "daemon/config/output_tables.hpp"
 #include "daemon/config/stream_tables.hpp"
-#include "daemon/net/keys.hpp"
 #include "models/stages/registry.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/stream_name.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
+#include "proto/zmq/keys.hpp"
 
 namespace posed::config {
 namespace {
@@ -41,9 +41,8 @@ void read_endpoint(TableReader& root, const char* name, std::string& endpoint, b
   } else if (!net::is_loopback(endpoint) && !secured && !insecure) {
     table->add_error(
         "endpoint",
-        fmt::format("{} can be reached from other machines by anyone; add a server_key in"
-                    " [security], or say insecure = true in [{}]",
-                    clean_name(endpoint), name));
+        fmt::format("{}; add a server_key in [security], or say insecure = true in [{}]",
+                    net::open_to_anyone(endpoint), name));
   }
 }
 
@@ -180,6 +179,22 @@ Result<config::DaemonConfig> load_config(const std::filesystem::path& path, Driv
   Reading reading = read_config_file(path, drivers);
   if (!reading.errors.empty()) return std::unexpected(reading.errors.front());
   return std::move(reading.config);
+}
+
+Result<SecurityConfig> load_security(const std::filesystem::path& path) {
+  Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
+  SecurityConfig security;
+  const auto root_table = load_toml(path, kLimits);
+  if (!root_table) return std::unexpected(root_table.error());
+  TableReader root(*root_table, "", findings);
+  const ConfigFile file{.folder = path.parent_path(), .drivers = {}, .findings = findings};
+  if (auto table = root.table("security")) read_security(*table, file, security);
+  root.finish();
+  if (findings.errors.empty() && security.server_key.empty()) {
+    findings.add_error(0,
+                       "there is no server_key; name the NAME.key of `posed keygen` in [security]");
+  }
+  return findings.result(std::move(security));
 }
 
 }  // namespace posed::config

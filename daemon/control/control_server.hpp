@@ -11,9 +11,9 @@
 #include "daemon/control/request_handler.hpp"
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
-#include "daemon/net/zmq_handle.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/system/event_fd.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::control {
 

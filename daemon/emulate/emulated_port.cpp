@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -129,13 +130,29 @@ Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endp
   return port;
 }
 
+Result<EmulatedPort> EmulatedPort::publish(const std::string& endpoint) {
+  EmulatedPort port(Kind::kPublish, {}, "");
+  auto context = net::open_context();
+  if (!context) return std::unexpected(context.error());
+  port.context_ = std::move(*context);
+  auto socket = net::open_socket(port.context_.get(), ZMQ_PUB);
+  if (!socket) return std::unexpected(socket.error());
+  port.publisher_ = std::move(*socket);
+  auto bound = net::bind_socket(port.publisher_.get(), endpoint);
+  if (!bound) return std::unexpected(bound.error());
+  port.name_ = *bound;
+  return port;
+}
+
 EmulatedPort::EmulatedPort(EmulatedPort&& other) noexcept
     : kind_(other.kind_),
       fds_(std::exchange(other.fds_, {})),
       other_side_(std::exchange(other.other_side_, -1)),
       listener_(std::exchange(other.listener_, -1)),
       name_(std::move(other.name_)),
-      link_(std::exchange(other.link_, {})) {}
+      link_(std::exchange(other.link_, {})),
+      context_(std::move(other.context_)),
+      publisher_(std::move(other.publisher_)) {}
 
 EmulatedPort::~EmulatedPort() {
   std::error_code ignored;
@@ -186,6 +203,14 @@ std::optional<EmulatedPort::Heard> EmulatedPort::receive(std::chrono::nanosecond
 }
 
 void EmulatedPort::send(std::uint8_t socket, std::span<const std::byte> bytes) noexcept {
+  if (kind_ == Kind::kPublish) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const auto end = std::min(text.find('\0'), text.size());
+    if (!net::send_part(publisher_.get(), text.substr(0, end), true)) return;
+    static_cast<void>(
+        net::send_part(publisher_.get(), text.substr(std::min(end + 1, text.size())), false));
+    return;
+  }
   if (socket >= fds_.size()) return;
   while (!bytes.empty()) {
     const ssize_t sent = kind_ == Kind::kTerminal

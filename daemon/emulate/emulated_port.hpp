@@ -1,5 +1,6 @@
 // EmulatedPort connects an emulator with a program that expects a device: through a pseudo-terminal
-// for serial gloves, through a TCP connection to the host or from it, or through UDP. Cold.
+// for serial gloves, through a TCP connection to the host or from it, through UDP, or through
+// ZeroMQ. Cold.
 #pragma once
 
 #include <chrono>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "proto/frame/result.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::emulate {
 
@@ -31,6 +33,10 @@ class EmulatedPort {
   // `ports`: those of this machine that they come from; 0 or left out: any.
   [[nodiscard]] static Result<EmulatedPort> open_udp(const std::vector<std::string>& endpoints,
                                                      const std::vector<std::uint16_t>& ports = {});
+
+  // Publishes over ZeroMQ at this endpoint, "tcp://127.0.0.1:5575": what send() gets is a topic, a
+  // zero byte and the message.
+  [[nodiscard]] static Result<EmulatedPort> publish(const std::string& endpoint);
 
   ~EmulatedPort();
   EmulatedPort(EmulatedPort&& other) noexcept;
@@ -52,7 +58,7 @@ class EmulatedPort {
   void send(std::uint8_t socket, std::span<const std::byte> bytes) noexcept;
 
  private:
-  enum class Kind : std::uint8_t { kTerminal, kTcp, kTcpServer, kUdp };
+  enum class Kind : std::uint8_t { kTerminal, kTcp, kTcpServer, kUdp, kPublish };
   EmulatedPort(Kind kind, std::vector<int> fds, std::string name) noexcept
       : kind_(kind), fds_(std::move(fds)), name_(std::move(name)) {}
 
@@ -67,6 +73,8 @@ class EmulatedPort {
   int listener_ = -1;  // of a server
   std::string name_;
   std::filesystem::path link_;
+  net::Context context_;  // of a publisher
+  net::Socket publisher_;
 };
 
 }  // namespace posed::emulate

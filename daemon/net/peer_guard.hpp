@@ -26,9 +26,9 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::net {
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "daemon/net/keys.hpp"
-#include "daemon/net/zmq_handle.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::net {
 namespace {
@@ -58,20 +58,6 @@ Result<> secure_server(void* socket, Domain domain, const std::string& secret_z8
   return set_option(socket, ZMQ_CURVE_SECRETKEY, secret_z85);
 }
 
-Result<> secure_client(void* socket, const std::filesystem::path& key_file,
-                       const std::filesystem::path& server_key_file) {
-  const auto own = read_secret_key(key_file);
-  if (!own) return std::unexpected(own.error());
-  const auto server = read_public_key(server_key_file);
-  if (!server) return std::unexpected(server.error());
-  for (const Result<>& set : {set_option(socket, ZMQ_CURVE_SERVERKEY, *server),
-                              set_option(socket, ZMQ_CURVE_PUBLICKEY, own->public_z85),
-                              set_option(socket, ZMQ_CURVE_SECRETKEY, own->secret_z85)}) {
-    if (!set) return set;
-  }
-  return {};
-}
-
 bool is_loopback(std::string_view endpoint) {
   if (endpoint.starts_with("ipc://") || endpoint.starts_with("inproc://")) return true;
   constexpr std::string_view kTcp = "tcp://";
@@ -79,6 +65,10 @@ bool is_loopback(std::string_view endpoint) {
   const std::string_view address = endpoint.substr(kTcp.size());
   const std::string_view host = address.substr(0, address.rfind(':'));
   return host == "localhost" || host == "[::1]" || is_loopback_address(host);
+}
+
+std::string open_to_anyone(std::string_view endpoint) {
+  return clean_name(endpoint) + " can be reached from other machines by anyone";
 }
 
 }  // namespace posed::net

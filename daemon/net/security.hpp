@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,13 +42,11 @@ class AccessList {
 // running in the same context, or every client is refused.
 [[nodiscard]] Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85);
 
-// Makes `socket` a CURVE client with its own NAME.key and the server's NAME.pub. Call before
-// connect.
-[[nodiscard]] Result<> secure_client(void* socket, const std::filesystem::path& key_file,
-                                     const std::filesystem::path& server_key_file);
-
 // Whether an endpoint that binds there can be reached from this machine only: tcp to 127.*, ::1 or
 // localhost, ipc and inproc.
 [[nodiscard]] bool is_loopback(std::string_view endpoint);
+
+// The beginning of the sentence that refuses to listen beyond loopback without keys.
+[[nodiscard]] std::string open_to_anyone(std::string_view endpoint);
 
 }  // namespace posed::net

@@ -14,7 +14,7 @@
 
 #include "daemon/net/security.hpp"
 #include "daemon/net/zap_request.hpp"
-#include "daemon/net/zmq_handle.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::net {
 

@@ -1,31 +1,14 @@
-// Converts frames and other messages to the wire format (proto/wire/posed/v1/posed.proto). The
-// message for frames is reused: its packed arrays are overwritten in place and never cleared, so
-// encoding a frame allocates nothing.
+// Converts samples to the wire format (proto/wire/posed/v1/posed.proto). The message is reused, so
+// encoding a sample allocates nothing.
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 #include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/frame.hpp"
-#include "proto/frame/skeleton.hpp"
 
 namespace posed::publish {
-
-// The frame message of one published stream. One thread; RT-safe after the first frame.
-class FrameEncoder {
- public:
-  explicit FrameEncoder(const std::string& stream) { message_.set_stream(stream); }
-
-  // The frame without stage stamps, as logs store it; valid until the next call.
-  [[nodiscard]] const v1::Frame& encode(const Frame& frame);
-  // Adds the stage stamps that are known to the message that encode() made.
-  [[nodiscard]] const v1::Frame& stamp(const StageStamps& stamps, std::span<const float> stage_us);
-
- private:
-  v1::Frame message_;
-};
 
 class SampleEncoder {
  public:
@@ -35,8 +18,5 @@ class SampleEncoder {
  private:
   v1::Sample message_;
 };
-
-[[nodiscard]] v1::Skeleton skeleton_message(const std::string& stream, const Skeleton& skeleton,
-                                            double rate_hz);
 
 }  // namespace posed::publish

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "daemon/publish/frame_output.hpp"
+#include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
@@ -66,7 +67,7 @@ Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
       frames(name),
       samples(name, info.description.samples) {
   if (const auto& of = unstyled ? info.description.skeleton : info.skeleton) {
-    skeleton = skeleton_message(name, *of, info.rate_hz);
+    skeleton = message::skeleton_message(name, *of, info.rate_hz);
     if (!unstyled) {
       for (const StageType* stage : info.stages) skeleton->add_stage(std::string(stage->name));
     }

@@ -12,6 +12,7 @@
 #include "daemon/publish/histogram.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/shed_tally.hpp"
+#include "proto/message/frame_message.hpp"
 
 namespace posed::publish {
 
@@ -25,7 +26,7 @@ struct Channel {
   Channel(const std::string& name, const StreamInfo& info, bool unstyled);
 
   std::string pose_topic, skeleton_topic, sensor_topic, event_topic;
-  FrameEncoder frames;
+  message::FrameEncoder frames;
   SampleEncoder samples;
   std::optional<v1::Skeleton> skeleton;
   // When the skeleton is to be sent next: soon after a subscription, but not at every one of many.

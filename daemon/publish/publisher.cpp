@@ -1,15 +1,12 @@
 #include "daemon/publish/publisher.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <time.h>
 
-#include "daemon/net/peer_guard.hpp"
-#include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/event_text.hpp"
 #include "daemon/publish/frame_output.hpp"
 #include "daemon/publish/published_slots.hpp"
@@ -19,25 +16,8 @@
 namespace posed::publish {
 namespace {
 
-constexpr double kQueueDepth_s = 0.25;
-constexpr int kMinQueue = 16;
-// The longest part that a subscriber may send: it holds a CURVE handshake and a long name. After
-// that come subscriptions, one at a time, so that a flood of them is received no faster than it is
-// processed.
-constexpr std::int64_t kMaxPart = 512;  // bytes
-// At least two: through a queue of one, libzmq 4.3.4 delivers nothing from a peer that uses CURVE.
-constexpr int kSubscriptionsWaiting = 2;
-constexpr int kReceiveBuffer_bytes = 8 * 1024;
-// Bytes of one peer that have not become a message: the kernel and libzmq hold up to 16 KB before
-// the publisher receives anything.
-constexpr std::uint64_t kMaxUnheard = 24 * 1024;
-constexpr std::uint64_t kMaxUnheardOfAll = 512 * 1024;
-constexpr int kSubscriptionsATurn = 64;
 // A skeleton is sent to all its subscribers when one of them subscribes, but at most this often.
 constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
-// bytes; the kernel's default alone can hold seconds of old poses
-constexpr int kSendBuffer = 8 * 1024;
-
 std::int64_t clock_ns(clockid_t clock) {
   timespec now{};
   clock_gettime(clock, &now);
@@ -61,66 +41,32 @@ Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake,
 
 }  // namespace
 
-int send_high_water_mark(double messages_per_s) {
-  return std::max(kMinQueue, static_cast<int>(std::ceil(messages_per_s * kQueueDepth_s)));
-}
-
-Result<> set_queue_options(void* socket, double messages_per_s) {
-  const int depth = send_high_water_mark(messages_per_s);
-  if (auto set = net::set_option(socket, ZMQ_SNDHWM, depth); !set) return set;
-  return net::set_option(socket, ZMQ_SNDBUF, kSendBuffer);
-}
-
 Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
                                                    std::vector<StreamInfo> streams,
                                                    pipeline::Ring<pipeline::Item>& in,
                                                    system::EventFd& wake) {
-  auto socket = net::open_socket(options.context, ZMQ_XPUB);
-  if (!socket) return std::unexpected(socket.error());
   double messages_per_s = options.more_messages_per_s;
   for (const StreamInfo& stream : streams) messages_per_s += stream.rate_hz * (stream.raw ? 2 : 1);
-  if (auto set = set_queue_options(socket->get(), messages_per_s); !set) {
-    return std::unexpected(set.error());
-  }
-  if (auto set = net::set_option(socket->get(), ZMQ_XPUB_VERBOSER, 1); !set) {
-    return std::unexpected(set.error());
-  }
-  if (options.authenticator != nullptr) {
-    auto secured = net::secure_server(socket->get(), net::Domain::kPublish, options.secret_z85);
-    if (!secured) return std::unexpected(secured.error());
-  }
-  if (auto set = net::set_receive_limits(socket->get(), kMaxPart, kSubscriptionsWaiting,
-                                         kReceiveBuffer_bytes);
-      !set) {
-    return std::unexpected(set.error());
-  }
-  auto guard = net::PeerGuard::open(options.context, socket->get(),
-                                    {.name = "publish",
-                                     .max_peers = net::peer_shares().publish,
-                                     .max_unheard = kMaxUnheard,
-                                     .max_unheard_of_all = kMaxUnheardOfAll,
-                                     .authenticator = options.authenticator});
-  if (!guard) return std::unexpected(guard.error());
-  auto endpoint = net::bind_socket(socket->get(), options.endpoint);
-  if (!endpoint) return std::unexpected(endpoint.error());
+  auto socket = PublishSocket::open({.context = options.context,
+                                     .endpoint = options.endpoint,
+                                     .authenticator = options.authenticator,
+                                     .secret_z85 = options.secret_z85,
+                                     .messages_per_s = messages_per_s});
+  if (!socket) return std::unexpected(socket.error());
   auto poller = open_poller(wake, socket->get());
   if (!poller) return std::unexpected(poller.error());
   return std::unique_ptr<Publisher>(new Publisher(std::move(options), std::move(streams), in, wake,
-                                                  std::move(*socket), std::move(*endpoint),
-                                                  std::move(*poller), std::move(*guard)));
+                                                  std::move(*socket), std::move(*poller)));
 }
 
 Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
-                     pipeline::Ring<pipeline::Item>& in, system::EventFd& wake, net::Socket socket,
-                     std::string endpoint, std::unique_ptr<system::Poller> poller,
-                     std::unique_ptr<net::PeerGuard> guard)
+                     pipeline::Ring<pipeline::Item>& in, system::EventFd& wake,
+                     PublishSocket socket, std::unique_ptr<system::Poller> poller)
     : options_(std::move(options)),
       in_(in),
       wake_(wake),
       socket_(std::move(socket)),
-      guard_(std::move(guard)),
       subscriptions_([this](std::string_view prefix) { return is_topic(prefix); }),
-      endpoint_(std::move(endpoint)),
       poller_(std::move(poller)),
       slots_(std::make_unique<PublishedSlots>(std::max(options_.slots, streams.size()))),
       requests_(std::make_unique<Requests>()) {
@@ -134,7 +80,7 @@ Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
 
 Publisher::~Publisher() = default;
 
-const std::string& Publisher::endpoint() const noexcept { return endpoint_; }
+const std::string& Publisher::endpoint() const noexcept { return socket_.endpoint(); }
 
 void Publisher::take_all() {
   while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
@@ -149,7 +95,8 @@ std::int64_t Publisher::turn(std::int64_t now_ns) {
   if (reported_ns_ == kNoTime_ns || now_ns >= reported_ns_ + kNanosPerSecond) {
     every_second(now_ns);
   }
-  const bool all_heard = hear_subscriptions(now_ns);
+  const bool all_heard = socket_.hear(subscriptions_, now_ns,
+                                      [this](std::string_view prefix) { want_skeletons(prefix); });
   const std::int64_t skeleton_ns = send_skeletons(now_ns);
   if (!all_heard) return now_ns;
   return std::min(reported_ns_ + kNanosPerSecond, skeleton_ns);
@@ -280,28 +227,6 @@ void Publisher::send_event(PublishedStream& published, v1::Event::Kind kind, std
                    (kind >= v1::Event::KIND_RECORDING_GAP && kind <= v1::Event::KIND_WARNING);
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "{}: {}", event.stream(), text);
   send(published.styled.event_topic, event);
-}
-
-// A subscription message is one byte (1: subscribe, 0: unsubscribe), then the beginning of a topic.
-bool Publisher::hear_subscriptions(std::int64_t now_ns) {
-  for (const int peer : guard_->take_gone()) subscriptions_.forget(peer);
-  net::Message message;
-  for (int i = 0; i < kSubscriptionsATurn; ++i) {
-    if (!message.receive(socket_.get())) return true;
-    const std::string_view text = message.text();
-    const int peer = net::source_of(message);
-    // gone meanwhile, or libzmq unsubscribes for a peer that is gone
-    if (!guard_->knows(peer)) continue;
-    guard_->heard(peer, message.property("User-Id"));
-    if (text.empty() || static_cast<unsigned char>(text.front()) > 1) {
-      guard_->cut(peer, "sent an invalid subscription");
-    } else if (!subscriptions_.ask(peer, text.substr(1), text.front() == 1, now_ns)) {
-      guard_->cut(peer, "subscribed to too much");
-    } else if (text.front() == 1) {
-      want_skeletons(text.substr(1));
-    }
-  }
-  return false;
 }
 
 bool Publisher::is_topic(std::string_view prefix) const {

@@ -13,21 +13,16 @@
 #include <vector>
 
 #include "daemon/devices/present_device.hpp"
-#include "daemon/net/zmq_handle.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
+#include "daemon/publish/publish_socket.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
-
-namespace posed::net {
-class ZapAuthenticator;
-class PeerGuard;
-}  // namespace posed::net
 
 namespace posed::publish {
 
@@ -85,11 +80,6 @@ struct PublisherOptions {
   std::vector<FrameOutput*> outputs{};
 };
 
-// The length of a message queue that holds a quarter of a second of all streams together.
-[[nodiscard]] int send_high_water_mark(double messages_per_s);
-// Sets that queue length, and a small kernel buffer behind it. Call before bind.
-[[nodiscard]] Result<> set_queue_options(void* socket, double messages_per_s);
-
 class PublishedSlots;
 class PublishedStream;
 
@@ -137,9 +127,8 @@ class Publisher {
  private:
   struct Requests;
   Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
-            pipeline::Ring<pipeline::Item>& in, system::EventFd& wake, net::Socket socket,
-            std::string endpoint, std::unique_ptr<system::Poller> poller,
-            std::unique_ptr<net::PeerGuard> guard);
+            pipeline::Ring<pipeline::Item>& in, system::EventFd& wake, PublishSocket socket,
+            std::unique_ptr<system::Poller> poller);
   void take_all();
   void take(const pipeline::Item& item);
   void take_frame(PublishedStream& published, const Frame& frame, bool raw);
@@ -156,8 +145,6 @@ class Publisher {
   void want_skeletons(std::string_view prefix);
   // The stream has got its slot.
   void connect_outputs(PublishedStream& published);
-  // Returns false if more subscriptions may wait.
-  [[nodiscard]] bool hear_subscriptions(std::int64_t now_ns);
   [[nodiscard]] bool is_topic(std::string_view prefix) const;
   void every_second(std::int64_t now_ns);
   // Call after the streams were added, because a source says how many it has.
@@ -177,10 +164,8 @@ class Publisher {
   PublisherOptions options_;
   pipeline::Ring<pipeline::Item>& in_;
   system::EventFd& wake_;
-  net::Socket socket_;
-  std::unique_ptr<net::PeerGuard> guard_;
+  PublishSocket socket_;
   Subscriptions subscriptions_;
-  std::string endpoint_;
   std::unique_ptr<system::Poller> poller_;
   std::unique_ptr<PublishedSlots> slots_;
   std::unique_ptr<Requests> requests_;

@@ -119,7 +119,7 @@ void Publisher::do_what_was_asked() {
     requests_->done.notify_all();
   }
   if (!batch.check || options_.authenticator == nullptr) return;
-  guard_->cut_unless([this](std::string_view user) {
+  socket_.guard().cut_unless([this](std::string_view user) {
     return options_.authenticator->allows(user, net::Domain::kPublish);
   });
 }

@@ -53,13 +53,16 @@ bool Subscriptions::ask(int peer_id, std::string_view prefix, bool on, std::int6
   if (found != peer.waits.end() || is_topic_(prefix)) return true;
   peer.waits.emplace(prefix);
   if (!possible) return ++peer.impossible <= kMaxImpossible;
-  ++wanted_[std::string(prefix)];
+  const auto wanted = wanted_.try_emplace(std::string(prefix), 0).first;
+  if (++wanted->second == 1 && changed_) changed_(wanted->first, true);
   return wanted_.size() <= kMaxWanted;
 }
 
 void Subscriptions::drop(const std::string& prefix) {
   const auto wanted = wanted_.find(prefix);
-  if (--wanted->second == 0) wanted_.erase(wanted);
+  if (--wanted->second > 0) return;
+  if (changed_) changed_(prefix, false);
+  wanted_.erase(wanted);
 }
 
 void Subscriptions::forget(int peer_id) {

@@ -31,9 +31,11 @@ inline constexpr double kMaxPerSecond = 256.0;  // messages of one peer a second
 
 class Subscriptions {
  public:
-  // `is_topic` returns whether an existing topic begins with the prefix.
-  explicit Subscriptions(std::function<bool(std::string_view prefix)> is_topic)
-      : is_topic_(std::move(is_topic)) {}
+  // `is_topic` returns whether an existing topic begins with the prefix. `changed` hears when the
+  // first peer waits for a prefix, and when none does any more; it may be empty.
+  explicit Subscriptions(std::function<bool(std::string_view prefix)> is_topic,
+                         std::function<void(const std::string& prefix, bool wanted)> changed = {})
+      : is_topic_(std::move(is_topic)), changed_(std::move(changed)) {}
 
   // The peer subscribes (or, if `on` is false, unsubscribes). Returns false if it exceeds a limit.
   [[nodiscard]] bool ask(int peer, std::string_view prefix, bool on, std::int64_t now_ns);
@@ -53,6 +55,7 @@ class Subscriptions {
   void drop(const std::string& prefix);
 
   std::function<bool(std::string_view prefix)> is_topic_;
+  std::function<void(const std::string& prefix, bool wanted)> changed_;
   std::map<int, Peer> peers_;
   // number of peers by prefix; only prefixes that could become a topic
   std::map<std::string, std::size_t, std::less<>> wanted_;

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "daemon/net/zap_authenticator.hpp"
-#include "daemon/net/zmq_handle.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/ring.hpp"
@@ -19,6 +18,7 @@
 #include "daemon/replay/replay.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::replay {
 

@@ -14,4 +14,11 @@ Result<std::unique_ptr<UdpTransport>> TransportFactory::udp(const UdpSettings& s
   return UdpTransport::open(settings);
 }
 
+Result<std::unique_ptr<SubscriptionTransport>> TransportFactory::subscribe(
+    const SubscriptionSettings& settings) {
+  if (const auto ok = check_subscription(settings); !ok) return std::unexpected(ok.error());
+  if (only_prepare_) return not_opened();
+  return SubscriptionTransport::open(settings, *cancel_);
+}
+
 }  // namespace posed::drivers

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "drivers/transport/connection.hpp"
+#include "drivers/transport/subscription.hpp"
 #include "drivers/transport/udp.hpp"
 #include "drivers/transport/usb.hpp"
 #include "proto/frame/result.hpp"
@@ -73,6 +74,11 @@ class TransportFactory {
 
   // Opens the sockets of a device that sends datagrams. Does not wait for it. Cold.
   [[nodiscard]] Result<std::unique_ptr<UdpTransport>> udp(const UdpSettings& settings);
+
+  // Subscribes to topics of another posed. Waits up to a second for it; an error says why it
+  // refuses. Cold.
+  [[nodiscard]] Result<std::unique_ptr<SubscriptionTransport>> subscribe(
+      const SubscriptionSettings& settings);
 
   // Ends present and future waits, here and on the links made here; for a thread that stops posed
   // while a device is being opened. Any thread.

@@ -16,11 +16,11 @@
 #include <string>
 #include <thread>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/options.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/reader.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/e2e/stage.hpp"
 #include "tests/support/free_port.hpp"
 

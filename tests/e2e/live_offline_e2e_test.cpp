@@ -8,10 +8,10 @@
 #include <map>
 #include <sstream>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "daemon/record/decision_code.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/reader.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 

@@ -13,8 +13,8 @@
 
 #include <zmq.h>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/control.pb.h"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/pipe.hpp"
 

@@ -5,9 +5,9 @@
 #include <map>
 #include <random>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {

@@ -12,7 +12,6 @@
 
 #include "daemon/pipeline/description_row.hpp"
 #include "daemon/pipeline/messages.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/replay/expectation.hpp"
 #include "daemon/replay/replay.hpp"
 #include "drivers/template_mocap/protocol.hpp"
@@ -22,6 +21,7 @@
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/writer.hpp"
+#include "proto/message/frame_message.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -284,7 +284,7 @@ void replay_log(const std::filesystem::path& path) {
   }
   replay::Replay& replay = **opened;
   auto expectation = replay::Expectation::open(*reader);
-  publish::FrameEncoder encoder("s");
+  message::FrameEncoder encoder("s");
   const auto out = [&](const pipeline::Item& item) {
     using Kind = pipeline::Item::Kind;
     if (item.kind != Kind::kFrame && item.kind != Kind::kRawFrame) return;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/lab/gadget.hpp"
 
 namespace posed::lab {

@@ -9,10 +9,10 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/publish/encode.hpp"
 #include "daemon/replay/expectation.hpp"
 #include "daemon/replay/replay.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/message/frame_message.hpp"
 
 namespace posed::test {
 
@@ -42,7 +42,7 @@ inline Replayed replayed(const std::filesystem::path& path, bool expect = true) 
     }
     expectation = std::move(*live);
   }
-  std::vector<publish::FrameEncoder> encoders;  // for the styled and the raw topic of each stream
+  std::vector<message::FrameEncoder> encoders;  // for the styled and the raw topic of each stream
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     encoders.emplace_back(replay.stream(id).name);
     encoders.emplace_back(replay.stream(id).name + "-raw");

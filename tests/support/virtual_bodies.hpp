@@ -16,10 +16,10 @@
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/stream_context.hpp"
 #include "daemon/pipeline/worker.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/record/record_rings.hpp"
 #include "daemon/record/recorded_stream.hpp"
 #include "daemon/system/event_fd.hpp"
+#include "proto/message/frame_message.hpp"
 #include "tests/support/scripted_device.hpp"
 #include "tests/support/virtual_daemon.hpp"
 
@@ -32,7 +32,7 @@ struct PublishedStream {
 
   std::uint32_t id;
   pipeline::StreamCounters& counters;
-  publish::FrameEncoder styled, raw;
+  message::FrameEncoder styled, raw;
   VirtualDaemon::Published published;
   bool ended = false;
 };

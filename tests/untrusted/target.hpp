@@ -12,9 +12,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/clip/clip.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/e2e/stage.hpp"
 #include "tests/support/raw_peer.hpp"
 #include "tests/unit/models/style/toy_style.hpp"

@@ -18,8 +18,6 @@
 #include "daemon/cli/bench/hop_report.hpp"
 #include "daemon/cli/bench/hop_subscriber.hpp"
 #include "daemon/cli/cli.hpp"
-#include "daemon/net/zmq_handle.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
@@ -27,7 +25,9 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_model.hpp"
 #include "models/style/style_type.hpp"
+#include "proto/message/frame_message.hpp"
 #include "proto/text/json_text.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::cli {
 namespace {
@@ -220,7 +220,7 @@ std::string sample_body(const devices::OpenStream& stream) {
   pose_from_channels(skeleton, std::vector<double>(skeleton.channels.size(), 0.1), frame);
   frame.header.sequence = frame.header.arrival_ns = system::monotonic_ns();
   frame.header.device_ns = frame.header.arrival_ns;
-  publish::FrameEncoder encoder(stream.config.name);
+  message::FrameEncoder encoder(stream.config.name);
   static_cast<void>(encoder.encode(frame));
   const std::int64_t some_ns = frame.header.arrival_ns;
   return encoder.stamp({some_ns, some_ns}, {}).SerializeAsString();

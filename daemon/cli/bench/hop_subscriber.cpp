@@ -8,9 +8,9 @@
 #include <cstring>
 #include <map>
 
-#include "daemon/net/zmq_handle.hpp"
 #include "daemon/system/clock.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::cli {
 namespace {

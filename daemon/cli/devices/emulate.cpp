@@ -27,7 +27,7 @@ namespace {
 struct EmulateOptions {
   std::string what;  // a log's path or a driver's name
   std::string stream;
-  std::string tcp, listen;
+  std::string tcp, listen, publish;
   std::vector<std::string> udp;
   std::filesystem::path link, clip;
   std::vector<std::string> set;     // KEY=VALUE
@@ -121,6 +121,7 @@ Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
   if (!options.udp.empty()) return emulate::EmulatedPort::open_udp(options.udp, ports);
   if (!options.tcp.empty()) return emulate::EmulatedPort::connect_tcp(options.tcp);
   if (!options.listen.empty()) return emulate::EmulatedPort::listen_tcp(options.listen);
+  if (!options.publish.empty()) return emulate::EmulatedPort::publish(options.publish);
   if (const auto to = default_udp(options); to && !options.pty && options.link.empty()) {
     return emulate::EmulatedPort::open_udp({*to});
   }
@@ -170,7 +171,7 @@ Result<> emulate(const EmulateOptions& options) {
 
 void add_emulate(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
-      "emulate", "Emulate a device on a pseudo-terminal, a TCP connection or over UDP");
+      "emulate", "Emulate a device on a pseudo-terminal, a TCP connection, over UDP or ZeroMQ");
   auto options = std::make_shared<EmulateOptions>();
   command->add_option("WHAT", options->what, "A device log (.plog) or a driver's name")->required();
   auto* pty = command->add_flag("--pty", options->pty, "Behind a pseudo-terminal (the default)");
@@ -182,11 +183,15 @@ void add_emulate(CLI::App& app, int& exit_code) {
   auto* udp = command->add_option("--udp", options->udp,
                                   "Send datagrams to a host; several: one for each of its sockets");
   udp->type_name("IP:PORT")->excludes(pty)->excludes(tcp)->excludes(listen);
+  auto* publish = command->add_option("--publish", options->publish,
+                                      "Publish over ZeroMQ, as another posed does");
+  publish->type_name("ENDPOINT")->excludes(pty)->excludes(tcp)->excludes(listen)->excludes(udp);
   command->add_option("--link", options->link, "Also a link to the pseudo-terminal, by this name")
       ->type_name("PATH")
       ->excludes(tcp)
       ->excludes(listen)
-      ->excludes(udp);
+      ->excludes(udp)
+      ->excludes(publish);
   command->add_option("--speed", options->speed, "Times the device's own pace, 0.01 to 1000")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1000.0));
@@ -212,6 +217,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
   posed emulate cyberglove --link /tmp/glove   # and a stream with port = "/tmp/glove"
   posed emulate lucidgloves --tcp 127.0.0.1:65432
   posed emulate template_mocap --udp 127.0.0.1:7400
+  posed emulate posed --set stream=ann --publish tcp://127.0.0.1:5575
   posed emulate take1.plog --stream right      # the bytes of a recorded glove
   posed emulate cyberglove --fault drop:0.01 --fault burst:0.001
 Faults of so many bytes: drop, zero, flip, insert, noise (any of drop, flip, insert);

@@ -1,14 +1,13 @@
 #include "daemon/cli/live/client.hpp"
 
-#include <array>
 #include <csignal>
 #include <cstdio>
-#include <cstring>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/system/clock.hpp"
+#include "proto/zmq/keys.hpp"
 
 namespace posed::cli {
 namespace {
@@ -19,41 +18,7 @@ using net::Domain;
 constexpr int kMessagesWaiting = 16;
 constexpr int kReceiveBuffer = 8 * 1024;  // bytes
 
-// A secured daemon may close the connection to a client without a key before the client has read
-// the ZMTP greeting; libzmq then reports no reason. So the client concludes that it was refused
-// only after it was closed on this many times in a row; a daemon that is merely ending is not there
-// for a second try.
-constexpr int kHangUps = 3;
-
-constexpr const char* kMonitorEndpoint = "inproc://posed.connection";
-constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
-                        ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
-                        ZMQ_EVENT_DISCONNECTED;
-
 volatile std::sig_atomic_t interrupt_came = 0;
-
-// Reads the first part of a monitor message: event number and value (zmq_socket_monitor).
-std::uint16_t read_event(void* monitor) {
-  net::Message part;
-  if (!part.receive(monitor)) return 0;
-  std::uint16_t event = 0;
-  if (part.text().size() >= sizeof event) std::memcpy(&event, part.text().data(), sizeof event);
-  while (part.more() && part.receive(monitor, 0)) {
-  }
-  return event;
-}
-
-Result<net::Socket> watch(void* context, void* socket) {
-  if (zmq_socket_monitor(socket, kMonitorEndpoint, kEvents) != 0) {
-    return fail(std::string("cannot watch the connection: ") + zmq_strerror(zmq_errno()));
-  }
-  auto monitor = net::open_socket(context, ZMQ_PAIR);
-  if (!monitor) return monitor;
-  if (auto done = net::connect_socket(monitor->get(), kMonitorEndpoint); !done) {
-    return std::unexpected(done.error());
-  }
-  return monitor;
-}
 
 }  // namespace
 
@@ -84,7 +49,7 @@ Result<Connection> Connection::open(const ClientOptions& options, int type) {
       if (!set) return std::unexpected(set.error());
     }
   }
-  auto monitor = watch(context->get(), socket->get());
+  auto monitor = net::LinkMonitor::open(context->get(), socket->get(), !options.key.empty());
   if (!monitor) return std::unexpected(monitor.error());
   if (auto done = net::connect_socket(socket->get(), options.endpoint); !done) {
     return std::unexpected(done.error());
@@ -94,7 +59,7 @@ Result<Connection> Connection::open(const ClientOptions& options, int type) {
 }
 
 Connection::Connection(ClientOptions options, Domain domain, net::Context context,
-                       net::Socket socket, net::Socket monitor)
+                       net::Socket socket, net::LinkMonitor monitor)
     : options_(std::move(options)),
       domain_(domain),
       context_(std::move(context)),
@@ -107,38 +72,22 @@ bool Connection::wait(std::chrono::milliseconds timeout) {
 }
 
 std::optional<Error> Connection::refusal() {
-  const bool keyless = options_.key.empty();
-  const std::string& where = options_.endpoint;
-  while (const std::uint16_t event = read_event(monitor_.get())) {
-    switch (event) {
-      case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
-        established_ = true;
-        hang_ups_ = 0;
-        break;
-      case ZMQ_EVENT_DISCONNECTED:
-        established_ = false;
-        break;
-      case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
-        return fail("the daemon at " + where +
-                    " refuses this key: it is not on its list, or may not " +
-                    (domain_ == Domain::kPublish ? "subscribe" : "control"))
-            .error();
-      case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
-        return keyless ? wants_key()
-                       : fail("the daemon at " + where +
-                              " does not use keys, or is not posed; leave out --key")
-                             .error();
-      case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
-        if (!keyless) {
-          return fail("the daemon at " + where + " hangs up: --server-key " +
-                      options_.server_key.string() + " is not its key, or it just ended")
-              .error();
-        }
-        if (++hang_ups_ == kHangUps) return wants_key();
-        break;
-      default:
-        break;
-    }
+  const std::string daemon = "the daemon at " + options_.endpoint;
+  switch (monitor_.take_news()) {
+    case net::Refusal::kNone:
+      return std::nullopt;
+    case net::Refusal::kKeyNotAllowed:
+      return fail(daemon + " refuses this key: it is not on its list, or may not " +
+                  (domain_ == Domain::kPublish ? "subscribe" : "control"))
+          .error();
+    case net::Refusal::kTalksNoKeys:
+      return fail(daemon + " does not use keys, or is not posed; leave out --key").error();
+    case net::Refusal::kHangsUp:
+      return fail(daemon + " hangs up: --server-key " + options_.server_key.string() +
+                  " is not its key, or it just ended")
+          .error();
+    case net::Refusal::kWantsKey:
+      return wants_key();
   }
   return std::nullopt;
 }
@@ -150,7 +99,7 @@ Error Connection::wants_key() const {
 }
 
 Error Connection::no_answer() const {
-  if (established_) {
+  if (established()) {
     return fail("the daemon at " + options_.endpoint + " does not answer; is this its " +
                 (domain_ == Domain::kControl ? "control" : "publish") + " endpoint?")
         .error();
@@ -165,8 +114,8 @@ Error Connection::no_answer() const {
 
 std::string Connection::silence(double silence_s) const {
   return fmt::format("no answer for {:.0f} s: {}", silence_s,
-                     established_ ? "the connection stands, but the daemon is stopped or stuck"
-                                  : "the daemon has ended, or cannot be reached");
+                     established() ? "the connection stands, but the daemon is stopped or stuck"
+                                   : "the daemon has ended, or cannot be reached");
 }
 
 SilenceWatch::SilenceWatch(const Connection& connection, double timeout_s)
@@ -214,7 +163,7 @@ void add_timeout_option(CLI::App& command, double& timeout_s) {
 }
 
 Interrupt::Interrupt() {
-  struct sigaction action{};
+  struct sigaction action {};
   // no SA_RESTART, so that the signal ends a wait
   action.sa_handler = [](int) { interrupt_came = 1; };
   sigaction(SIGINT, &action, nullptr);

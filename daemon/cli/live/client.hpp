@@ -9,8 +9,9 @@
 
 #include "daemon/cli/live/heartbeat.hpp"
 #include "daemon/net/security.hpp"
-#include "daemon/net/zmq_handle.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/zmq/link_monitor.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace CLI {
 class App;
@@ -43,23 +44,21 @@ class Connection {
   // time.
   [[nodiscard]] std::optional<Error> refusal();
   // Whether the connection is established, as of the last call of refusal().
-  [[nodiscard]] bool established() const { return established_; }
+  [[nodiscard]] bool established() const { return monitor_.established(); }
   [[nodiscard]] Error no_answer() const;  // the error if nothing answers at the endpoint
   // The sentence for a daemon that has answered before but has been silent for `silence_s`.
   [[nodiscard]] std::string silence(double silence_s) const;
 
  private:
   Connection(ClientOptions options, net::Domain domain, net::Context context, net::Socket socket,
-             net::Socket monitor);
+             net::LinkMonitor monitor);
   [[nodiscard]] Error wants_key() const;
 
   ClientOptions options_;
   net::Domain domain_;
   net::Context context_;
   net::Socket socket_;
-  net::Socket monitor_;
-  bool established_ = false;
-  int hang_ups_ = 0;  // in a row, before the handshake
+  net::LinkMonitor monitor_;
 };
 
 // Watches the daemon's heartbeat, its stats, and prints on stderr when it falls silent and when it

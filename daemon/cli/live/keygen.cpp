@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/cli/cli.hpp"
-#include "daemon/net/keys.hpp"
+#include "proto/zmq/keys.hpp"
 
 namespace posed::cli {
 

@@ -20,15 +20,6 @@ namespace {
 
 constexpr std::chrono::milliseconds kReadyLineWithin{300};
 
-sigset_t end_signals() {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
-  sigaddset(&set, SIGHUP);
-  return set;
-}
-
 // Returns whether the daemon uses keys, so that there is a list to read. If the config is wrong the
 // old list stays in use.
 bool read_clients_again(assembly::Daemon& daemon, const std::string& path) {
@@ -51,6 +42,15 @@ bool read_clients_again(assembly::Daemon& daemon, const std::string& path) {
 }
 
 }  // namespace
+
+sigset_t end_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  sigaddset(&set, SIGHUP);
+  return set;
+}
 
 void add_serve_options(CLI::App& command, ServeOptions& options) {
   command.add_option("--config", options.config, "The daemon's config, TOML")->required();

@@ -1,6 +1,7 @@
 // Shared by the commands that serve (`run`, `record`, `demo`): start and end of serving.
 #pragma once
 
+#include <csignal>
 #include <optional>
 #include <string>
 
@@ -17,6 +18,9 @@ namespace posed::cli {
 // comes during the start stays pending and ends serve(). Also limits repeated log lines
 // (sum_up_repeats()), because untrusted clients can cause them.
 void prepare_to_serve();
+
+// SIGINT, SIGTERM and SIGHUP.
+[[nodiscard]] sigset_t end_signals();
 
 // Prints one JSON line with the daemon's endpoints; waits at most 0.3 s for stdout, and warns if
 // the line could not be written.

@@ -20,7 +20,6 @@
 #include "daemon/cli/logs/no_body.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/replay/broadcast.hpp"
 #include "daemon/replay/expectation.hpp"
 #include "daemon/replay/frame_file.hpp"
@@ -28,6 +27,7 @@
 #include "daemon/replay/replay.hpp"
 #include "models/gp/isa.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/message/frame_message.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 #include "proto/text/stream_name.hpp"
@@ -108,7 +108,7 @@ class Outputs {
   explicit Outputs(const replay::Replay& replay) : replay_(replay) {
     for (std::uint32_t id = 0; id < replay.streams(); ++id) {
       const std::string& name = replay.stream(id).name;
-      encoders_.push_back({publish::FrameEncoder(name), publish::FrameEncoder(raw_name(name))});
+      encoders_.push_back({message::FrameEncoder(name), message::FrameEncoder(raw_name(name))});
     }
   }
 
@@ -146,7 +146,7 @@ class Outputs {
 
  private:
   const replay::Replay& replay_;
-  std::vector<std::array<publish::FrameEncoder, 2>> encoders_;  // styled, raw
+  std::vector<std::array<message::FrameEncoder, 2>> encoders_;  // styled, raw
 };
 
 Result<double> speed_of(const std::string& text) {

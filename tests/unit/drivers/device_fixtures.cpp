@@ -203,6 +203,13 @@ std::vector<DeviceFixture> make_specimens() {
        .chunk_samples = 1,
        .emulated = true,
        .whole_reports = true},
+      {.name = "posed",
+       .driver = "posed",
+       .options = {},
+       .loop_chunks = 72,  // a step back by more than 64 frames is a restart, not a late frame
+       .chunk_frames = 1,
+       .emulated = true,
+       .datagrams = true},
       {.name = "rokoko",
        .driver = "rokoko",
        .options = {},

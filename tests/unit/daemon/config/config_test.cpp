@@ -7,8 +7,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/net/keys.hpp"
 #include "models/stages/registry.hpp"
+#include "proto/zmq/keys.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 

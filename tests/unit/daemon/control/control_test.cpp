@@ -9,9 +9,9 @@
 
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/request_handler.hpp"
-#include "daemon/net/keys.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "proto/zmq/keys.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"

@@ -4,11 +4,11 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/net/keys.hpp"
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/security.hpp"
 #include "daemon/net/zap_authenticator.hpp"
-#include "daemon/net/zmq_handle.hpp"
+#include "proto/zmq/keys.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::net {

@@ -56,6 +56,21 @@ TEST_CASE("the subscriptions that match no topic yet, or never can, are limited"
   CHECK(subscriptions.wanted() == kMaxWanted / 2);
 }
 
+TEST_CASE("the first subscription to a prefix is told, and the end of the last one") {
+  std::string told;
+  Subscriptions subscriptions(
+      [](std::string_view) { return false; },
+      [&](const std::string& prefix, bool wanted) { told += (wanted ? "+" : "-") + prefix + " "; });
+  for (const int peer : {1, 2, 1}) CHECK(subscriptions.ask(peer, "pose/a", true, 0));
+  CHECK(subscriptions.ask(2, "nonsense", true, 0));  // never a topic: nobody need hear of it
+  CHECK(subscriptions.ask(2, "stats", true, 0));
+  CHECK(told == "+pose/a +stats ");
+  CHECK(subscriptions.ask(1, "pose/a", false, 0));
+  CHECK(told == "+pose/a +stats ");
+  subscriptions.forget(2);
+  CHECK(told == "+pose/a +stats -pose/a -stats ");
+}
+
 TEST_CASE("a peer that subscribes too often is refused, and admitted again later") {
   Subscriptions subscriptions(is_walker);
   int asked = 0;

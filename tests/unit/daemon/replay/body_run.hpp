@@ -21,12 +21,12 @@
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
 #include "daemon/pipeline/stream_settings.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/record/decision_code.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/template_mocap/emulator.hpp"
 #include "proto/log/writer.hpp"
+#include "proto/message/frame_message.hpp"
 
 namespace posed::test {
 
@@ -111,7 +111,7 @@ class BodyRun final : private pipeline::IntakeOut {
     BodyRun& run;
     std::uint32_t id;
     drivers::Body body;
-    publish::FrameEncoder styled, raw;
+    message::FrameEncoder styled, raw;
     std::unique_ptr<pipeline::StreamEngine> engine;
     int place = -1;  // among those of the source; -1: it has left
     std::uint64_t last_frame = 0;

@@ -14,12 +14,12 @@
 
 #include "daemon/pipeline/intake.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/log/digest.hpp"
+#include "proto/message/frame_message.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -124,7 +124,7 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
   drivers::Device device_;
   std::string model_bytes_;
   record::StreamSettings settings_;
-  publish::FrameEncoder styled_, raw_;
+  message::FrameEncoder styled_, raw_;
   std::uint64_t& next_item_;
   std::uint64_t place_ = 0;  // number of the item in the engine; 0 between items
   pipeline::Intake intake_;

@@ -30,4 +30,9 @@ struct KeyPair {
 // Whether `text` has the form of a key: 40 characters of Z85.
 [[nodiscard]] bool is_key(const std::string& text);
 
+// Makes `socket` a CURVE client with its own NAME.key and the server's NAME.pub. Call before
+// connect.
+[[nodiscard]] Result<> secure_client(void* socket, const std::filesystem::path& key_file,
+                                     const std::filesystem::path& server_key_file);
+
 }  // namespace posed::net

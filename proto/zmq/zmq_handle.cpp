@@ -1,4 +1,4 @@
-#include "daemon/net/zmq_handle.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 #include <array>
 #include <cerrno>

@@ -1,4 +1,4 @@
-#include "daemon/net/keys.hpp"
+#include "proto/zmq/keys.hpp"
 
 #include <array>
 #include <cerrno>
@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zmq.h>
+
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::net {
 namespace {
@@ -105,7 +107,7 @@ Result<KeyPair> read_secret_key(const std::filesystem::path& path) {
     return misuse("this is the public half; name the .key file here", path);
   }
   const File file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  struct stat about{};
+  struct stat about {};
   if (file.ok() && fstat(file.get(), &about) == 0 && (about.st_mode & 077) != 0) {
     return fail(
         "others can read this secret key; make a new one with `posed keygen`, or, if nobody"
@@ -130,6 +132,20 @@ Result<std::string> read_public_key(const std::filesystem::path& path) {
         path);
   }
   return read_key(File(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)), path);
+}
+
+Result<> secure_client(void* socket, const std::filesystem::path& key_file,
+                       const std::filesystem::path& server_key_file) {
+  const auto own = read_secret_key(key_file);
+  if (!own) return std::unexpected(own.error());
+  const auto server = read_public_key(server_key_file);
+  if (!server) return std::unexpected(server.error());
+  for (const Result<>& set : {set_option(socket, ZMQ_CURVE_SERVERKEY, *server),
+                              set_option(socket, ZMQ_CURVE_PUBLICKEY, own->public_z85),
+                              set_option(socket, ZMQ_CURVE_SECRETKEY, own->secret_z85)}) {
+    if (!set) return set;
+  }
+  return {};
 }
 
 }  // namespace posed::net

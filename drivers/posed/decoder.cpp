@@ -1,0 +1,118 @@
+#include "drivers/posed/decoder.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/pose_values.hpp"
+#include "proto/frame/label.hpp"
+#include "proto/frame/plausible.hpp"
+
+namespace posed::drivers::chain {
+namespace {
+
+constexpr std::uint64_t kMaxLag_frames = 1000;
+constexpr float kMaxLag_ms = 60'000.0F;
+
+// Puts rotations and validity of all joints in their places; false when they are none of this
+// skeleton. RT-safe.
+bool take_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame) noexcept {
+  if (upstream.rotation_xyzw.count != 4 * joints || upstream.validity.size() != joints) {
+    return false;
+  }
+  for (std::size_t j = 0; j < joints; ++j) {
+    Quatf& rotation = frame.rotation_xyzw[j];
+    std::copy_n(&upstream.rotation_xyzw.values[4 * j], 4, rotation.begin());
+    bool seen = false;
+    if (!take_rotation(rotation, seen)) return false;
+    frame.valid[j] = seen && upstream.validity[j] != std::byte{0};
+  }
+  frame.joint_count = static_cast<std::uint16_t>(joints);
+  return true;
+}
+
+// The angles of the rotation channels, if the upstream sends them. Of a joint that was not measured
+// an angle may be NaN. RT-safe.
+bool take_angles(const UpstreamFrame& upstream, const Skeleton& skeleton, Frame& frame) noexcept {
+  const std::size_t count = upstream.angle_rad.count;
+  if (count == 0) return true;
+  std::size_t taken = 0;
+  for (const Channel& channel : skeleton.channels) {
+    if (channel.translation) continue;
+    if (taken == count) return false;
+    const float angle_rad = upstream.angle_rad.values[taken];
+    const bool finite = std::isfinite(angle_rad);
+    if (finite ? std::abs(angle_rad) > kMaxAngle_rad : frame.valid[channel.joint]) return false;
+    frame.angle_rad[taken++] = angle_rad;
+  }
+  frame.angle_count = static_cast<std::uint16_t>(taken);
+  return taken == count;
+}
+
+// What the upstream says of the pose beside the joints. RT-safe.
+bool take_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
+  const float probability = upstream.label_probability;
+  const bool sound = upstream.quality <= static_cast<std::uint64_t>(Quality::kStale) &&
+                     upstream.source <= static_cast<std::uint64_t>(Source::kLabels) &&
+                     (upstream.label.empty() || is_label_name(upstream.label)) &&
+                     probability >= 0.0F && probability <= 1.0F &&
+                     upstream.lag_frames <= kMaxLag_frames && upstream.lag_ms >= 0.0F &&
+                     upstream.lag_ms <= kMaxLag_ms;  // false for NaN
+  if (!sound) return false;
+  frame.quality = static_cast<Quality>(upstream.quality);
+  frame.source = static_cast<Source>(upstream.source);
+  std::ranges::copy(upstream.label, frame.label.begin());
+  frame.label_probability = probability;
+  frame.lag_frames = static_cast<std::uint16_t>(upstream.lag_frames);
+  frame.lag_ms = upstream.lag_ms;
+  return true;
+}
+
+}  // namespace
+
+// RT-safe.
+void UpstreamDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                           Sink& sink) noexcept {
+  sink.outcome(take(bytes, sink));
+}
+
+// RT-safe.
+Outcome UpstreamDecoder::take(std::span<const std::byte> bytes, Sink& sink) noexcept {
+  UpstreamMessage message;
+  if (!split_message(bytes, message)) return Outcome::kShort;
+  if (message.topic == pose_topic_) return take_pose(message.body, sink);
+  if (message.topic != skeleton_topic_) return Outcome::kForeign;
+  if (message.body.empty()) return Outcome::kShort;
+  sink.description(message.body);
+  return Outcome::kOk;
+}
+
+// RT-safe.
+Outcome UpstreamDecoder::take_pose(std::span<const std::byte> body, Sink& sink) noexcept {
+  upstream_ = {};
+  if (const Outcome read = read_frame(body, upstream_); read != Outcome::kOk) return read;
+  // Until its skeleton comes, a pose says nothing.
+  if (layout_ == nullptr || upstream_.skeleton_id != layout_->upstream_id) return Outcome::kForeign;
+  const Skeleton& skeleton = *layout_->bodies[0].skeleton;
+  Frame frame;
+  frame.skeleton = skeleton.id;
+  const bool sound = take_joints(upstream_, skeleton.joints.size(), frame) &&
+                     take_angles(upstream_, skeleton, frame) && take_words(upstream_, frame) &&
+                     upstream_.root_position_m.count == 3 &&
+                     is_plausible(upstream_.root_position_m.values);
+  if (!sound) return Outcome::kOutOfRange;
+  // While its own source is silent the upstream repeats the last pose once a second. That is no
+  // sign of life: the stream becomes stale here, too.
+  if (frame.quality == Quality::kStale && upstream_.sequence == sequence_) {
+    return Outcome::kDuplicate;
+  }
+  if (const Outcome order = order_.take(upstream_.sequence); order != Outcome::kOk) return order;
+  sequence_ = upstream_.sequence;
+  // The sequence says what is new; a clock that was set back only stops the time.
+  static_cast<void>(clock_.take(seconds(upstream_.arrival_ns)));
+  frame.header.device_ns = clock_.device_ns();
+  frame.root_position_m = upstream_.root_position_m.values;
+  sink.frame(0, frame);
+  return Outcome::kOk;
+}
+
+}  // namespace posed::drivers::chain

@@ -1,0 +1,70 @@
+// SubscriptionTransport: receives topics of another posed over ZeroMQ. libzmq allocates, locks and
+// wakes its own threads while it receives, so a thread of this object does that and passes each
+// message on through a pair of connected sockets; the reader makes one read of a descriptor, as for
+// UDP. The kernel's buffer between the two is the bounded queue: when it is full, its oldest
+// message is discarded and counted, because newest data wins.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/driver.hpp"
+#include "drivers/transport/cancel.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/zmq/link_monitor.hpp"
+#include "proto/zmq/zmq_handle.hpp"
+
+namespace posed::drivers {
+
+struct SubscriptionSettings {
+  std::string endpoint{};              // "tcp://192.168.1.10:5570"
+  std::filesystem::path key{};         // own NAME.key; empty: no CURVE
+  std::filesystem::path server_key{};  // the publisher's NAME.pub
+  std::vector<std::string> topics{};   // whole topics; others with the same beginning are left out
+};
+
+// Checks the endpoint and reads the key files, without connecting. Cold.
+[[nodiscard]] Result<> check_subscription(const SubscriptionSettings& settings);
+
+class SubscriptionTransport final : public Transport {
+ public:
+  // Waits for the connection for up to a second, or until `cancel` fires. Cold.
+  [[nodiscard]] static Result<std::unique_ptr<SubscriptionTransport>> open(
+      const SubscriptionSettings& settings, const Cancel& cancel);
+  ~SubscriptionTransport() override;
+
+  [[nodiscard]] int poll_fd() const noexcept override { return reader_; }
+  // Keeps what came since open(): a skeleton may be among it.
+  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  // A chunk is a topic, a zero byte, and the message. Chunk::lost when the connection ended.
+  [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+
+ private:
+  explicit SubscriptionTransport(const SubscriptionSettings& settings);
+  [[nodiscard]] Result<> connect();
+  [[nodiscard]] Result<> await_link(const Cancel& cancel);
+  // The thread: receives until the link or the object ends.
+  void receive_all();
+  void take_message();
+  // Puts a message into the queue.
+  void hand_over(std::size_t size) noexcept;
+
+  SubscriptionSettings settings_;
+  net::Context context_;
+  net::Socket socket_;
+  std::unique_ptr<net::LinkMonitor> monitor_;  // ends before the socket
+  int reader_ = -1, writer_ = -1;              // the two ends of the queue
+  int stop_ = -1;                              // eventfd
+  std::vector<std::byte> outgoing_;            // of the thread
+  std::vector<std::byte> incoming_;            // of the reader
+  std::atomic<std::uint32_t> dropped_{0}, damaged_{0};
+  std::thread thread_;
+};
+
+}  // namespace posed::drivers

@@ -1,0 +1,74 @@
+#include "proto/zmq/link_monitor.hpp"
+
+#include <atomic>
+#include <cstring>
+#include <string>
+
+namespace posed::net {
+namespace {
+
+// A secured daemon may close the connection to a client without a key before the client has read
+// the ZMTP greeting; libzmq then reports no reason. So the client concludes that it was refused
+// only after it was closed on this many times in a row; a daemon that is merely ending is not there
+// for a second try.
+constexpr int kHangUps = 3;
+
+constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
+                        ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
+                        ZMQ_EVENT_DISCONNECTED;
+
+// Reads the first part of a monitor message: event number and value (zmq_socket_monitor).
+std::uint16_t read_event(void* monitor) {
+  Message part;
+  if (!part.receive(monitor)) return 0;
+  std::uint16_t event = 0;
+  if (part.text().size() >= sizeof event) std::memcpy(&event, part.text().data(), sizeof event);
+  while (part.more() && part.receive(monitor, 0)) {
+  }
+  return event;
+}
+
+}  // namespace
+
+Result<LinkMonitor> LinkMonitor::open(void* context, void* socket, bool with_key) {
+  // unique names, because a context may have several
+  static std::atomic<unsigned> number{0};
+  const std::string endpoint = "inproc://posed.link." + std::to_string(++number);
+  if (zmq_socket_monitor(socket, endpoint.c_str(), kEvents) != 0) {
+    return fail(std::string("cannot watch the connection: ") + zmq_strerror(zmq_errno()));
+  }
+  auto monitor = open_socket(context, ZMQ_PAIR);
+  if (!monitor) return std::unexpected(monitor.error());
+  if (auto done = connect_socket(monitor->get(), endpoint); !done) {
+    return std::unexpected(done.error());
+  }
+  return LinkMonitor(std::move(*monitor), with_key);
+}
+
+Refusal LinkMonitor::take_news() {
+  while (const std::uint16_t event = read_event(monitor_.get())) {
+    switch (event) {
+      case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
+        established_ = true;
+        hang_ups_ = 0;
+        break;
+      case ZMQ_EVENT_DISCONNECTED:
+        if (established_) ++ends_;
+        established_ = false;
+        break;
+      case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
+        return Refusal::kKeyNotAllowed;
+      case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
+        return with_key_ ? Refusal::kTalksNoKeys : Refusal::kWantsKey;
+      case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+        if (with_key_) return Refusal::kHangsUp;
+        if (++hang_ups_ == kHangUps) return Refusal::kWantsKey;
+        break;
+      default:
+        break;
+    }
+  }
+  return Refusal::kNone;
+}
+
+}  // namespace posed::net
