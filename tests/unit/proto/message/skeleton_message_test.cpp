@@ -21,6 +21,7 @@ Skeleton toy() {
   skeleton.joints[2].name = "LeftArm";
   skeleton.joints[2].parent = 1;
   skeleton.joints[2].offset_m = {0.25, 0.125, 0.0};
+  skeleton.joints[2].end_site_m = Eigen::Vector3d(0.5, 0.0, 0.0);
   skeleton.channels = {{.joint = 0, .axis = Axis::kX, .translation = true},
                        {.joint = 0, .axis = Axis::kZ},
                        {.joint = 2, .axis = Axis::kY}};
@@ -40,6 +41,7 @@ TEST_CASE("a skeleton comes back from its message") {
     CHECK(got->joints[j].name == sent.joints[j].name);
     CHECK(got->joints[j].parent == sent.joints[j].parent);
     CHECK(got->joints[j].offset_m == sent.joints[j].offset_m);
+    CHECK(got->joints[j].end_site_m == sent.joints[j].end_site_m);
     CHECK(got->joints[j].bone == sent.joints[j].bone);
     CHECK(got->joints[j].T_world_joint.angularDistance(sent.joints[j].T_world_joint) < 1e-6);
   }
@@ -70,6 +72,9 @@ TEST_CASE("a damaged skeleton message is refused in one sentence") {
       [](v1::Skeleton& m) { m.add_offset_m(0.0F); },
       [&](v1::Skeleton& m) { m.set_offset_m(4, nan); },
       [](v1::Skeleton& m) { m.set_offset_m(4, 1e6F); },
+      [](v1::Skeleton& m) { m.add_end_site_m(0.0F); },
+      [](v1::Skeleton& m) { m.set_end_site_m(8, 1e6F); },
+      [&](v1::Skeleton& m) { m.set_end_site_m(8, nan); },
       [](v1::Skeleton& m) { m.add_humanoid_bone("head"); },
       [](v1::Skeleton& m) { m.set_t_world_joint_xyzw(3, 0.0F); },
       [&](v1::Skeleton& m) { m.set_t_world_joint_xyzw(3, nan); },
