@@ -28,7 +28,7 @@ struct UdpSocketSettings {
 struct UdpSettings {
   std::vector<UdpSocketSettings> sockets{};  // [Chunk::socket]
   // On which the groups are joined: its name or one of its addresses; empty: the system's choice.
-  std::string interface {};
+  std::string interface{};
   std::vector<std::string> peers{};  // addresses that may send; empty: loopback only
 };
 

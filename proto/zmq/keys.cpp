@@ -107,7 +107,7 @@ Result<KeyPair> read_secret_key(const std::filesystem::path& path) {
     return misuse("this is the public half; name the .key file here", path);
   }
   const File file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  struct stat about {};
+  struct stat about{};
   if (file.ok() && fstat(file.get(), &about) == 0 && (about.st_mode & 077) != 0) {
     return fail(
         "others can read this secret key; make a new one with `posed keygen`, or, if nobody"

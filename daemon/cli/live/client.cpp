@@ -163,7 +163,7 @@ void add_timeout_option(CLI::App& command, double& timeout_s) {
 }
 
 Interrupt::Interrupt() {
-  struct sigaction action {};
+  struct sigaction action{};
   // no SA_RESTART, so that the signal ends a wait
   action.sa_handler = [](int) { interrupt_came = 1; };
   sigaction(SIGINT, &action, nullptr);

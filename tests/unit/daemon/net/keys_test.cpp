@@ -15,7 +15,7 @@ TEST_CASE("keygen writes a pair that reads back, the secret half for its owner o
   const auto pair = write_new_keys("stage", folder.path() / "keys");
   REQUIRE(pair);
   const auto secret = folder.path() / "keys/stage.key";
-  struct stat about {};
+  struct stat about{};
   REQUIRE(stat(secret.c_str(), &about) == 0);
   CHECK((about.st_mode & 0777) == 0600);
 

@@ -19,9 +19,9 @@ constexpr double kSettled_s = 30.0;  // the clocks' drift is known by then
 constexpr double kRamp_rad_per_s = 0.6, kRamp_s = 2.0;
 
 // A device: when it measures its n-th frame, what its clock says then, and when the frame comes.
-class Device {
+class MergedDevice {
  public:
-  Device(double rate_hz, double ppm, std::uint64_t seed)
+  MergedDevice(double rate_hz, double ppm, std::uint64_t seed)
       : rate_hz_(rate_hz), scale_(1.0 + ppm * 1e-6), dice_(seed) {}
 
   [[nodiscard]] double time_s(std::uint64_t n) const { return static_cast<double>(n) / rate_hz_; }
@@ -63,7 +63,7 @@ std::vector<double> merged_run(double (*bent_rad)(double), double length_s) {
     CHECK(out.frame.header.sequence == bent.size() + 1);
     bent.push_back(rotation_log(map->read(out.frame).turn[4]).norm());
   };
-  Device bodies(120.0, 50.0, 1), gloves(100.0, -50.0, 2);
+  MergedDevice bodies(120.0, 50.0, 1), gloves(100.0, -50.0, 2);
   Header next_body = bodies.next(), next_glove = gloves.next();
   const Frame pose = test::body_frame(*body, 1, 0);
   while (bodies.time_s(next_body.sequence) < length_s) {
