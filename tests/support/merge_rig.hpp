@@ -18,10 +18,9 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rotation.hpp"
+#include "tests/support/ms.hpp"
 
 namespace posed::test {
-
-inline constexpr std::int64_t kMs = 1'000'000;
 
 inline std::shared_ptr<const Skeleton> glove_skeleton(Side side) {
   return std::make_shared<const Skeleton>(hand_skeleton(side));
