@@ -39,6 +39,7 @@ void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept 
 void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                       Sink& sink) noexcept {
   now_ns_ = heard_time_.to(arrival_ns);
+  arrival_ns_ = arrival_ns;
   if (stream_) {
     framer_.feed(bytes, [&](std::span<const std::byte> datagram) noexcept {
       sink.outcome(datagram.empty() ? Outcome::kForeign : take(datagram, sink));
@@ -71,7 +72,7 @@ Outcome MvnDecoder::take(std::span<const std::byte> bytes, Sink& sink) noexcept 
 Outcome MvnDecoder::take_pose(const Datagram& datagram, Sink& sink) noexcept {
   Tracked* tracked = find_or_add(datagram.head.character);
   if (tracked == nullptr) return Outcome::kOutOfRange;
-  if (!tracked->prefers(datagram.head, now_ns_)) return Outcome::kOk;
+  if (!tracked->prefers(datagram.head, arrival_ns_)) return Outcome::kOk;
   const Tracked::Part part = tracked->take_part(datagram, gathered_);
   if (part.lost) sink.outcome(Outcome::kShort);  // stands for the part that did not come
   return part.whole ? take_sample(*tracked, datagram.head, part.items, sink) : part.outcome;

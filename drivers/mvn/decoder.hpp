@@ -49,6 +49,7 @@ class MvnDecoder final : public Decoder {
   const MvnLayout* layout_ = nullptr;  // null until the first description is in use
   HeardTime heard_time_;               // MVN may pause: that makes nobody leave
   std::int64_t now_ns_ = kNoTime_ns;   // arrival of the bytes, in that time
+  std::int64_t arrival_ns_ = kNoTime_ns;
   std::int64_t described_ns_ = kNoTime_ns;
   std::array<Tracked, kMaxCharacters> characters_;
   CharacterPose pose_;

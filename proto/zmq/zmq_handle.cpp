@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cerrno>
+#include <utility>
 
 namespace posed::net {
 namespace {
@@ -50,6 +51,13 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
 }
 
 Result<> connect_socket(void* socket, const std::string& endpoint) {
+  // A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.
+  for (const auto& [option, value] : {std::pair{ZMQ_TCP_KEEPALIVE, 1},
+                                      {ZMQ_TCP_KEEPALIVE_IDLE, 2},
+                                      {ZMQ_TCP_KEEPALIVE_INTVL, 1},
+                                      {ZMQ_TCP_KEEPALIVE_CNT, 3}}) {
+    if (auto set = set_option(socket, option, value); !set) return set;
+  }
   if (zmq_connect(socket, endpoint.c_str()) == 0) return {};
   return misuse("cannot connect to '" + endpoint + "': " + last_error() +
                 "; an endpoint reads like tcp://127.0.0.1:5570");

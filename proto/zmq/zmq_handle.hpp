@@ -72,6 +72,7 @@ class Message {
 // Binds and returns the endpoint that is really bound ("tcp://127.0.0.1:*" picks a free port). If
 // the port is busy, the error says so in one sentence.
 [[nodiscard]] Result<std::string> bind_socket(void* socket, const std::string& endpoint);
+// Connects now or as soon as somebody listens there, and again after a loss, also a silent one.
 [[nodiscard]] Result<> connect_socket(void* socket, const std::string& endpoint);
 
 // Returns whether libzmq accepted the part; never blocks.

@@ -99,6 +99,12 @@ class Subscriber {
     if (!socket_) throw std::runtime_error("no ZeroMQ socket: raise the limit of open files");
     set(ZMQ_RCVHWM, 16);  // newest data wins: keep no old poses
     set(ZMQ_LINGER, 0);
+    // A daemon that loses its power or its network says nothing: TCP finds that out in five
+    // seconds.
+    set(ZMQ_TCP_KEEPALIVE, 1);
+    set(ZMQ_TCP_KEEPALIVE_IDLE, 2);
+    set(ZMQ_TCP_KEEPALIVE_INTVL, 1);
+    set(ZMQ_TCP_KEEPALIVE_CNT, 3);
     if (!keys.own_secret_file.empty()) use(keys);
     for (const char* topic : {"pose/", "skeleton/"}) {
       const std::string whole = topic + stream_;
@@ -117,8 +123,12 @@ class Subscriber {
       const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
           end - std::chrono::steady_clock::now());
       zmq_pollitem_t item{socket_.get(), 0, ZMQ_POLLIN, 0};
-      if (left.count() < 0 || zmq_poll(&item, 1, static_cast<long>(left.count())) <= 0) return {};
-      const std::string topic = part(), body = part();
+      if (left.count() < 0) return {};
+      if (zmq_poll(&item, 1, static_cast<long>(left.count())) <= 0) continue;  // a signal, or time
+      bool more = false;
+      const std::string topic = part(more);
+      const std::string body = more ? part(more) : std::string();
+      while (more) part(more);
       // A subscription is a prefix: "walker" also brings "walker-raw".
       if (topic == "skeleton/" + stream_) {
         auto skeleton = std::make_shared<posed::v1::Skeleton>();
@@ -167,14 +177,15 @@ class Subscriber {
 
   void set(int option, int value) { zmq_setsockopt(socket_.get(), option, &value, sizeof value); }
 
-  // The next part of a message; empty where there is none.
-  std::string part() {
+  // The next part of a message, of which the socket has all or nothing.
+  std::string part(bool& more) {
     zmq_msg_t message;
     zmq_msg_init(&message);
     std::string bytes;
     if (zmq_msg_recv(&message, socket_.get(), 0) >= 0) {
       bytes.assign(static_cast<const char*>(zmq_msg_data(&message)), zmq_msg_size(&message));
     }
+    more = zmq_msg_more(&message) != 0;
     zmq_msg_close(&message);
     return bytes;
   }

@@ -93,14 +93,8 @@ namespace Posed
             {
                 name = name.Replace("Proximal", "Intermediate").Replace("Metacarpal", "Proximal");
             }
-            try
-            {
-                return (int)(HumanBodyBones)Enum.Parse(typeof(HumanBodyBones), name);
-            }
-            catch (ArgumentException)
-            {
-                return -1;
-            }
+            if (!Enum.IsDefined(typeof(HumanBodyBones), name) || name == "LastBone") return -1;
+            return (int)(HumanBodyBones)Enum.Parse(typeof(HumanBodyBones), name);
         }
 
         // Of the hips above the lower of the feet, in T-pose: the lengths of a leg's bones.

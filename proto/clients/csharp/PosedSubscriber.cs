@@ -12,6 +12,7 @@ namespace Posed
     {
         private const int LongestMessage = 1 << 20;
         private const int RetryMs = 1000;
+        private const int SilenceMs = 5000; // stats come every second, whatever the streams do
 
         private readonly string host, stream;
         private readonly int port;
@@ -80,11 +81,13 @@ namespace Posed
             using (var client = new TcpClient(host, port))
             {
                 client.NoDelay = true;
+                client.ReceiveTimeout = SilenceMs;
                 lock (gate) connection = client;
                 Stream wire = client.GetStream();
                 Greet(wire);
                 Subscribe(wire, "pose/" + stream);
                 Subscribe(wire, "skeleton/" + stream);
+                Subscribe(wire, "stats");
                 Problem = "";
                 while (!stopped)
                 {

@@ -4,7 +4,6 @@
 
 #include <catch2/catch.hpp>
 
-#include <fstream>
 #include <memory>
 #include <vector>
 
@@ -116,13 +115,6 @@ inline double mvn_apart_m(const Vec3f& a, const Vec3f& b) {
 
 inline double mvn_apart_rad(const Quatf& a, const Quatf& b) {
   return angle_between_rad(to_eigen_double(a), to_eigen_double(b));
-}
-
-inline MvnBytes file_bytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace posed::test

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "tests/support/pcapng.hpp"
 #include "tests/unit/drivers/mvn_rig.hpp"
 
 namespace posed::drivers::mvn {

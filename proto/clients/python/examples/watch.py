@@ -10,6 +10,7 @@ parser.add_argument("--connect", default="tcp://127.0.0.1:5570", metavar="ENDPOI
 parser.add_argument("--count", type=int, default=0, help="frames to print; 0: until Ctrl-C")
 parser.add_argument("--key", help="your NAME.key, where the daemon asks for keys")
 parser.add_argument("--server-key", help="the daemon's NAME.pub")
+parser.add_argument("--timeout", type=float, default=10, metavar="SECONDS", help="without a pose; default 10")
 options = parser.parse_args()
 
 
@@ -20,7 +21,7 @@ def text(point):
 try:
     with posed.Client(options.connect, [options.stream], key=options.key,
                       server_key=options.server_key) as client:
-        for number, frame in enumerate(client.frames(timeout_s=10), start=1):
+        for number, frame in enumerate(client.frames(options.timeout), start=1):
             age = "" if frame.age_s is None else f", {frame.age_s * 1000:.1f} ms old"
             print(f"{frame.stream} {frame.sequence}{age}")
             for name, place in frame.positions_m().items():

@@ -103,13 +103,20 @@ class Client:
             yield topic, message
 
     def frames(self, timeout_s=None):
-        """The poses, as Frames; without those that came before their skeleton."""
+        """The poses, as Frames; without those that came before their skeleton.
+
+        Raises PosedError when no pose comes for `timeout_s`.
+        """
+        last_s = time.monotonic()
         for topic, message in self.messages(timeout_s):
-            if not topic.startswith("pose/"):
-                continue
-            skeleton = self.skeletons.get(message.stream)
-            if skeleton is not None and skeleton.id == message.skeleton_id:
-                yield Frame(message, skeleton, self._age_s(message))
+            if topic.startswith("pose/"):
+                last_s = time.monotonic()
+                skeleton = self.skeletons.get(message.stream)
+                if skeleton is not None and skeleton.id == message.skeleton_id:
+                    yield Frame(message, skeleton, self._age_s(message))
+            elif timeout_s is not None and time.monotonic() - last_s > timeout_s:
+                # stats come every second, whatever the streams do
+                raise PosedError(f"no pose came for {timeout_s} s; is the stream's name right?")
 
     def _age_s(self, message):
         if self.stats is None:

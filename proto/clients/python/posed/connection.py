@@ -21,6 +21,11 @@ def open_socket(context, kind, endpoint, key, server_key):
         raise PosedError("name both keys: your own NAME.key and the daemon's NAME.pub")
     socket = context.socket(kind)
     socket.setsockopt(zmq.LINGER, 0)
+    # A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.
+    socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
+    socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 2)
+    socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 1)
+    socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 3)
     if key is not None:
         secret = read_key(key)
         socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
