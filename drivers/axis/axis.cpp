@@ -53,12 +53,7 @@ Result<StreamSettings> read_device_info(const std::string& text, const std::stri
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto settings = read_device_info(text, identity);
   if (!settings) return std::unexpected(settings.error());
-  return Description{.driver = std::string(kName),
-                     .text = text,
-                     .identity = identity,
-                     .skeleton = nullptr,
-                     .samples = {},
-                     .rate_hz = settings->rate_hz};
+  return source_description(kName, text, identity, settings->rate_hz);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
@@ -121,10 +116,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete(given);
   auto transport = open_network(*options, ports);
   if (!transport) return std::unexpected(transport.error());
-  auto device = make_device(axis_driver(), expected->text, expected->identity);
-  if (!device) return device;
-  device->transport = std::move(*transport);
-  return device;
+  return make_device(axis_driver(), *expected, std::move(*transport));
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {

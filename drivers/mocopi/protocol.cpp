@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <limits>
 
 #include "drivers/byte_writer.hpp"
+#include "drivers/rate_text.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::drivers::mocopi {
@@ -15,7 +15,6 @@ namespace {
 constexpr std::string_view kFormat = "sony motion format";
 constexpr std::uint8_t kFormatVersion = 1;
 constexpr std::string_view kDeviceInfoPrefix = "mocopi rate=";
-constexpr double kMaxRate_hz = 1000.0;
 
 struct BoneRow {
   std::string_view name;
@@ -225,15 +224,7 @@ std::string device_info_text(double rate_hz) {
 }
 
 Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  double rate_hz = 0.0;
-  if (text.starts_with(kDeviceInfoPrefix)) {
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] =
-        std::from_chars(text.data() + kDeviceInfoPrefix.size(), end, rate_hz);
-    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= kMaxRate_hz) {
-      return rate_hz;
-    }
-  }
+  if (const auto rate_hz = parse_rate(text, kDeviceInfoPrefix)) return *rate_hz;
   return fail("is not described as a mocopi ('mocopi rate=60'); is it another device?", identity);
 }
 

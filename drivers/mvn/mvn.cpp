@@ -10,6 +10,7 @@
 #include "drivers/mvn/emulator.hpp"
 #include "drivers/mvn/layout.hpp"
 #include "drivers/options.hpp"
+#include "drivers/rate_text.hpp"
 #include "drivers/transport/network_options.hpp"
 #include "proto/clip/text.hpp"
 
@@ -18,7 +19,6 @@ namespace mvn {
 namespace {
 
 constexpr double kDefaultRate_hz = 60.0;
-constexpr double kMaxRate_hz = 1000.0;
 constexpr std::int64_t kDefaultLongest = 1472;  // bytes: the usual 1500 of a network without heads
 constexpr std::int64_t kMaxLongest = 65'000;
 
@@ -36,12 +36,7 @@ std::string device_info_text(const DeviceInfo& info) {
 Result<DeviceInfo> parse_device_info(const std::string& text, const std::string& identity) {
   for (const bool stream : {false, true}) {
     const std::string start = std::string("mvn link=") + (stream ? "tcp" : "udp") + " rate=";
-    if (!text.starts_with(start)) continue;
-    DeviceInfo info{.stream = stream};
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data() + start.size(), end, info.rate_hz);
-    const bool sound = error == std::errc() && stop == end && info.rate_hz > 0.0;
-    if (sound && info.rate_hz <= kMaxRate_hz) return info;
+    if (const auto rate_hz = parse_rate(text, start)) return DeviceInfo{stream, *rate_hz};
   }
   return fail("is not described as Xsens MVN ('mvn link=udp rate=60'); is it another device?",
               identity);
@@ -50,12 +45,7 @@ Result<DeviceInfo> parse_device_info(const std::string& text, const std::string&
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto info = parse_device_info(text, identity);
   if (!info) return std::unexpected(info.error());
-  return Description{.driver = "mvn",
-                     .text = text,
-                     .identity = identity,
-                     .skeleton = nullptr,
-                     .samples = {},
-                     .rate_hz = info->rate_hz};
+  return source_description("mvn", text, identity, info->rate_hz);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
@@ -87,7 +77,7 @@ Result<MvnEmulator::Settings> emulator_settings(const Options& options) {
   const double rate_hz = option<double>(options, "rate_hz");
   const auto characters = option<std::int64_t>(options, "characters");
   const auto longest = option<std::int64_t>(options, "datagram_bytes");
-  if (!(rate_hz > 0.0 && rate_hz <= kMaxRate_hz)) {
+  if (!(rate_hz > 0.0 && rate_hz <= kMostRate_hz)) {
     return misuse("rate_hz should be more than 0 and at most 1000");
   }
   if (characters < 1 || characters > 2) return misuse("characters should be 1 or 2");
@@ -118,10 +108,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   if (!expected) return std::unexpected(expected.error());
   auto transport = open_network(*complete_options(mvn_driver(), given), ports);
   if (!transport) return std::unexpected(transport.error());
-  auto device = make_device(mvn_driver(), expected->text, expected->identity);
-  if (!device) return device;
-  device->transport = std::move(*transport);
-  return device;
+  return make_device(mvn_driver(), *expected, std::move(*transport));
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {

@@ -17,12 +17,7 @@ constexpr std::int64_t kDefaultNatNetRate_hz = 120;
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto settings = parse_settings(text, identity);
   if (!settings) return std::unexpected(settings.error());
-  return Description{.driver = "natnet",
-                     .text = text,
-                     .identity = identity,
-                     .skeleton = nullptr,
-                     .samples = {},
-                     .rate_hz = static_cast<double>(settings->rate_hz)};
+  return source_description("natnet", text, identity, static_cast<double>(settings->rate_hz));
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
@@ -102,9 +97,8 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(natnet_driver(), given);
   auto transport = ports.udp(*sockets_of(*options));
   if (!transport) return std::unexpected(transport.error());
-  auto device = make_device(natnet_driver(), expected->text, expected->identity);
+  auto device = make_device(natnet_driver(), *expected, std::move(*transport));
   if (!device) return device;
-  device->transport = std::move(*transport);
   device->poll.period_ns = Requests::kPeriod_ns;
   return device;
 }

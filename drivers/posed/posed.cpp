@@ -17,12 +17,7 @@ constexpr double kDefaultRate_hz = 60.0;
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto info = parse_device_info(text, identity);
   if (!info) return std::unexpected(info.error());
-  return Description{.driver = "posed",
-                     .text = text,
-                     .identity = identity,
-                     .skeleton = nullptr,
-                     .samples = {},
-                     .rate_hz = info->rate_hz};
+  return source_description("posed", text, identity, info->rate_hz);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
@@ -67,10 +62,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(posed_driver(), given);
   auto transport = ports.subscribe(settings_of(*options));
   if (!transport) return std::unexpected(transport.error());
-  auto device = make_device(posed_driver(), expected->text, expected->identity);
-  if (!device) return device;
-  device->transport = std::move(*transport);
-  return device;
+  return make_device(posed_driver(), *expected, std::move(*transport));
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {

@@ -2,18 +2,17 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <string_view>
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/pose_values.hpp"
+#include "drivers/rate_text.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {
 
 constexpr std::string_view kDeviceInfoPrefix = "rokoko rate=";
-constexpr double kMaxRate_hz = 1000.0;
 
 // Writes little-endian numbers into bytes that are there. RT-safe.
 class FixedWriter {
@@ -117,15 +116,7 @@ std::string device_info_text(double rate_hz) {
 }
 
 Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  double rate_hz = 0.0;
-  if (text.starts_with(kDeviceInfoPrefix)) {
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] =
-        std::from_chars(text.data() + kDeviceInfoPrefix.size(), end, rate_hz);
-    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= kMaxRate_hz) {
-      return rate_hz;
-    }
-  }
+  if (const auto rate_hz = parse_rate(text, kDeviceInfoPrefix)) return *rate_hz;
   return fail("is not described as Rokoko Studio ('rokoko rate=60'); is it another device?",
               identity);
 }

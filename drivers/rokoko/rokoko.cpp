@@ -17,12 +17,7 @@ constexpr double kDefaultRate_hz = 60.0;
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto rate_hz = parse_device_info(text, identity);
   if (!rate_hz) return std::unexpected(rate_hz.error());
-  return Description{.driver = "rokoko",
-                     .text = text,
-                     .identity = identity,
-                     .skeleton = nullptr,
-                     .samples = {},
-                     .rate_hz = *rate_hz};
+  return source_description("rokoko", text, identity, *rate_hz);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& /*description*/) {
@@ -63,10 +58,7 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(rokoko_driver(), given);
   auto transport = ports.udp(udp_settings(*options));
   if (!transport) return std::unexpected(transport.error());
-  auto device = make_device(rokoko_driver(), expected->text, expected->identity);
-  if (!device) return device;
-  device->transport = std::move(*transport);
-  return device;
+  return make_device(rokoko_driver(), *expected, std::move(*transport));
 }
 
 Result<std::unique_ptr<Emulator>> emulate(const Options& given) {

@@ -1,9 +1,9 @@
 #include "drivers/template/protocol.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <string_view>
 
+#include "drivers/rate_text.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
 
@@ -53,13 +53,7 @@ std::string device_info_text(double rate_hz) {
 }
 
 Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  double rate_hz = 0.0;
-  if (text.starts_with(kDeviceInfoPrefix)) {
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] =
-        std::from_chars(text.data() + kDeviceInfoPrefix.size(), end, rate_hz);
-    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= 1e6) return rate_hz;
-  }
+  if (const auto rate_hz = parse_rate(text, kDeviceInfoPrefix, 1e6)) return *rate_hz;
   return fail("does not greet as a bend sensor ('BEND1 rate=100'); is it another device?",
               identity);
 }

@@ -3,13 +3,13 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <set>
 #include <string_view>
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"
+#include "drivers/rate_text.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
@@ -22,7 +22,6 @@ constexpr std::size_t kHeadBytes = 8;
 constexpr std::size_t kChecksumBytes = 4;
 constexpr std::size_t kLeastJoint = 15;  // bytes: a name of one letter, parent, offset
 constexpr std::string_view kDeviceInfoPrefix = "template_mocap rate=";
-constexpr double kMaxRate_hz = 1000.0;
 
 std::uint32_t checksum(std::span<const std::byte> bytes) noexcept {
   return static_cast<std::uint32_t>(
@@ -176,15 +175,7 @@ std::string device_info_text(double rate_hz) {
 }
 
 Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  double rate_hz = 0.0;
-  if (text.starts_with(kDeviceInfoPrefix)) {
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] =
-        std::from_chars(text.data() + kDeviceInfoPrefix.size(), end, rate_hz);
-    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= kMaxRate_hz) {
-      return rate_hz;
-    }
-  }
+  if (const auto rate_hz = parse_rate(text, kDeviceInfoPrefix)) return *rate_hz;
   return fail(
       "is not described as a template mocap system ('template_mocap rate=100'); is it "
       "another device?",

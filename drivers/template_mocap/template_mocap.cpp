@@ -19,12 +19,7 @@ constexpr std::int64_t kAskEvery_ns = kNanosPerSecond;
 Result<Description> describe(const std::string& text, const std::string& identity) {
   const auto rate_hz = parse_device_info(text, identity);
   if (!rate_hz) return std::unexpected(rate_hz.error());
-  return Description{.driver = "template_mocap",
-                     .text = text,
-                     .identity = identity,
-                     .skeleton = nullptr,
-                     .samples = {},
-                     .rate_hz = *rate_hz};
+  return source_description("template_mocap", text, identity, *rate_hz);
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& /*description*/) {
@@ -58,9 +53,8 @@ Result<Device> open(const Options& given, TransportFactory& ports) {
   const auto options = complete_options(template_mocap_driver(), given);
   auto transport = ports.udp(udp_settings(*options));
   if (!transport) return std::unexpected(transport.error());
-  auto device = make_device(template_mocap_driver(), expected->text, expected->identity);
+  auto device = make_device(template_mocap_driver(), *expected, std::move(*transport));
   if (!device) return device;
-  device->transport = std::move(*transport);
   device->poll = {.request = encode_request(), .period_ns = kAskEvery_ns};
   return device;
 }

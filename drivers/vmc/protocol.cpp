@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/pose_values.hpp"
+#include "drivers/rate_text.hpp"
 #include "proto/clip/text.hpp"
 
 namespace posed::drivers::vmc {
@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::uint8_t kVersion = 1;
 constexpr std::string_view kVmcInfoPrefix = "vmc rate=";
-constexpr double kVmcMaxRate_hz = 1000.0;
 
 // Little-endian values into memory that is large enough.
 class RoomWriter {
@@ -116,14 +115,7 @@ std::string device_info_text(double rate_hz) {
 }
 
 Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  double rate_hz = 0.0;
-  if (text.starts_with(kVmcInfoPrefix)) {
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data() + kVmcInfoPrefix.size(), end, rate_hz);
-    if (error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= kVmcMaxRate_hz) {
-      return rate_hz;
-    }
-  }
+  if (const auto rate_hz = parse_rate(text, kVmcInfoPrefix)) return *rate_hz;
   return fail("is not described as a VMC performer ('vmc rate=60'); is it another device?",
               identity);
 }

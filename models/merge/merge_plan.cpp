@@ -80,19 +80,11 @@ Result<MergePlan> MergePlan::make(const StageContext& context) {
 
 // RT-safe.
 void MergePlan::expand(const Frame& in, Frame& out) const noexcept {
-  out.header = in.header;
+  copy_all_but_pose(in, out);
   out.skeleton = merged.skeleton->id;
   out.joint_count = static_cast<std::uint16_t>(merged.skeleton->joints.size());
   out.angle_count = in.angle_count == merged.angle_of.size() ? angles : std::uint16_t{0};
-  out.quality = in.quality;
-  out.source = in.source;
-  out.lag_frames = in.lag_frames;
-  out.lag_ms = in.lag_ms;
-  out.label = in.label;
-  out.label_probability = in.label_probability;
   out.root_position_m = in.root_position_m;
-  out.stamps = in.stamps;
-  out.stage_us = in.stage_us;
   out.valid.reset();
   for (std::size_t j = 0; j < out.joint_count; ++j) out.rotation_xyzw[j] = kIdentity;
   for (std::size_t j = 0; j < merged.joint_of.size(); ++j) {

@@ -106,18 +106,10 @@ void Retarget::apply(const Frame& in, Frame& out) const noexcept {
     const Quaterniond local = to_eigen_double(in.rotation_xyzw[j]);
     source[j] = parent < 0 ? local : source[static_cast<std::size_t>(parent)] * local;
   }
-  out.header = in.header;
+  copy_all_but_pose(in, out);
   out.skeleton = to_->id;
   out.joint_count = static_cast<std::uint16_t>(to_->joints.size());
   out.angle_count = angles_;
-  out.quality = in.quality;
-  out.source = in.source;
-  out.lag_frames = in.lag_frames;
-  out.lag_ms = in.lag_ms;
-  out.label = in.label;
-  out.label_probability = in.label_probability;
-  out.stamps = in.stamps;
-  out.stage_us = in.stage_us;
   out.valid.reset();
   // C is the rotation of a joint in the world relative to its T-pose: G = C T.
   Rotations C;

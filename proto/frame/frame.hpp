@@ -62,6 +62,20 @@ struct Frame {
 };
 static_assert(std::is_trivially_copyable_v<Frame>);
 
+// Gives `out` everything of `in` that does not depend on a skeleton: times, quality, source, lag,
+// label. RT-safe.
+inline void copy_all_but_pose(const Frame& in, Frame& out) noexcept {
+  out.header = in.header;
+  out.quality = in.quality;
+  out.source = in.source;
+  out.lag_frames = in.lag_frames;
+  out.lag_ms = in.lag_ms;
+  out.label = in.label;
+  out.label_probability = in.label_probability;
+  out.stamps = in.stamps;
+  out.stage_us = in.stage_us;
+}
+
 struct Sample {
   Header header;
   std::uint16_t value_count = 0;

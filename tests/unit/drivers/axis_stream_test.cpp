@@ -1,7 +1,6 @@
 // Axis streams as a whole: they give the frames of the BVH with the same numbers, avatars come and
 // go, and the emulator makes every form of them.
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <sstream>
 
@@ -13,6 +12,7 @@
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/axis_rig.hpp"
 #include "tests/unit/drivers/device_fixtures.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -431,16 +431,6 @@ TEST_CASE("the emulated Axis avatars move smoothly and for ever") {
 
 namespace {
 
-std::string axis_row(std::int64_t at_ns, const char* form, const AxisBytes& bytes) {
-  std::string line = "at " + std::to_string(at_ns) + ' ' + form;
-  for (const std::byte byte : bytes) {
-    std::array<char, 8> hex{};
-    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
-    line += hex.data();
-  }
-  return line + '\n';
-}
-
 // Datagrams cut at 1024 bytes, a lost one, a repeated message, damage, text, and an avatar that
 // leaves and is then described away.
 std::string axis_log() {
@@ -452,8 +442,9 @@ std::string axis_log() {
     rig.now_ns += after_ns;
     const int before = rig.sink.descriptions;
     rig.feed(bytes);
-    text += axis_row(rig.now_ns, "hex", bytes);
-    if (rig.sink.descriptions != before) text += axis_row(rig.now_ns, "bodies", rig.sink.described);
+    text += test::recorded_row(rig.now_ns, "hex", bytes);
+    if (rig.sink.descriptions != before)
+      text += test::recorded_row(rig.now_ns, "bodies", rig.sink.described);
   };
   const auto next = [](AxisEmulator& emulator) {
     AxisBytes bytes;

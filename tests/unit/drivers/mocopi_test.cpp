@@ -2,7 +2,6 @@
 #include <catch2/catch.hpp>
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <random>
 
@@ -13,6 +12,7 @@
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers::mocopi {
 namespace {
@@ -232,16 +232,6 @@ TEST_CASE("any bytes for mocopi's decoder: no allocation, sound frames") {
 
 namespace {
 
-std::string log_row(std::int64_t at_ns, const char* form, const Bytes& bytes) {
-  std::string line = "at " + std::to_string(at_ns) + ' ' + form;
-  for (const std::byte byte : bytes) {
-    std::array<char, 8> hex{};
-    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
-    line += hex.data();
-  }
-  return line + '\n';
-}
-
 // A frame before the skeleton, damage, a repeated datagram.
 std::string emulated_mocopi_log() {
   std::string text =
@@ -249,14 +239,15 @@ std::string emulated_mocopi_log() {
       "driver mocopi\nidentity udp 127.0.0.1:12351\ntext mocopi rate=60\n";
   MocopiEmulator emulator(60.0);
   const Bytes skeleton = next(emulator);
-  text += log_row(1'000'000, "hex", next(emulator)) + log_row(2'000'000, "hex", skeleton) +
-          log_row(2'000'000, "bodies", content_of(skeleton));
+  text += test::recorded_row(1'000'000, "hex", next(emulator)) +
+          test::recorded_row(2'000'000, "hex", skeleton) +
+          test::recorded_row(2'000'000, "bodies", content_of(skeleton));
   for (int i = 1; i <= 8; ++i) {
     Bytes bytes = next(emulator);
     if (i == 3) bytes[140] = std::byte{0x7F};
     if (i == 5) bytes.resize(bytes.size() / 2);
-    text += log_row(i * 16'666'667LL, "hex", bytes);
-    if (i == 7) text += log_row(i * 16'666'667LL, "hex", bytes);
+    text += test::recorded_row(i * 16'666'667LL, "hex", bytes);
+    if (i == 7) text += test::recorded_row(i * 16'666'667LL, "hex", bytes);
   }
   return text;
 }

@@ -1,13 +1,13 @@
 // MVN over TCP, the options, the descriptions that the decoder writes, and the golden log.
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <fstream>
 #include <random>
 
 #include "drivers/driver.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/mvn_rig.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers::mvn {
 namespace {
@@ -215,16 +215,6 @@ TEST_CASE("mvn: wrong options are refused at once") {
 
 namespace {
 
-std::string mvn_row(std::int64_t at_ns, const char* form, std::span<const std::byte> bytes) {
-  std::string line = "at " + std::to_string(at_ns) + ' ' + form;
-  for (const std::byte byte : bytes) {
-    std::array<char, 8> hex{};
-    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
-    line += hex.data();
-  }
-  return line + '\n';
-}
-
 // Two characters; the first one has gloves, so its samples are split. A bit of the second one's
 // pose flips, another one is cut, one comes twice, and a part of the first one's sample is lost.
 std::string mvn_log() {
@@ -248,9 +238,9 @@ std::string mvn_log() {
       const int before = session.sink.descriptions;
       session.now_ns = at_ns;
       session.feed(bytes);
-      text += mvn_row(at_ns, "hex", bytes);
+      text += test::recorded_row(at_ns, "hex", bytes);
       if (session.sink.descriptions != before) {
-        text += mvn_row(at_ns, "bodies", session.sink.described);
+        text += test::recorded_row(at_ns, "bodies", session.sink.described);
       }
     }
   }

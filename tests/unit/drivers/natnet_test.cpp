@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 
 #include "drivers/natnet/emulator.hpp"
@@ -15,6 +14,7 @@
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/natnet_rig.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -366,16 +366,6 @@ TEST_CASE("wrong options of NatNet are refused at once") {
 
 namespace {
 
-std::string natnet_row(std::int64_t at_ns, const char* form, const NatNetBytes& bytes) {
-  std::string line = "at " + std::to_string(at_ns) + ' ' + form;
-  for (const std::byte byte : bytes) {
-    std::array<char, 8> hex{};
-    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
-    line += hex.data();
-  }
-  return line + '\n';
-}
-
 // A frame before the description, damage, a repeated datagram, and a body that leaves.
 std::string emulated_natnet_log() {
   const auto description = natnet_driver().expect({}).value();
@@ -387,11 +377,12 @@ std::string emulated_natnet_log() {
   NatNetRig rig;
   const auto describe = [&](std::int64_t at_ns, const NatNetBytes& datagram) {
     REQUIRE(rig.feed(datagram) == Outcome::kOk);
-    text += natnet_row(at_ns, "hex", datagram) + natnet_row(at_ns, "bodies", rig.sink.described);
+    text += test::recorded_row(at_ns, "hex", datagram) +
+            test::recorded_row(at_ns, "bodies", rig.sink.described);
   };
   const NatNetBytes bodies = next(emulator);
-  text += natnet_row(1'000'000, "hex", asked(emulator, natnet::encode_connect()));
-  text += natnet_row(2'000'000, "hex", next(emulator));
+  text += test::recorded_row(1'000'000, "hex", asked(emulator, natnet::encode_connect()));
+  text += test::recorded_row(2'000'000, "hex", next(emulator));
   describe(3'000'000, bodies);
   for (int i = 1; i <= 7; ++i) {
     const std::int64_t at_ns = i * 10'000'000;
@@ -399,8 +390,8 @@ std::string emulated_natnet_log() {
     NatNetBytes bytes = next(emulator);
     if (i == 2) bytes[40] ^= std::byte{0x10};
     if (i == 3) bytes.resize(bytes.size() / 2);
-    text += natnet_row(at_ns, "hex", bytes);
-    if (i == 4) text += natnet_row(at_ns, "hex", bytes);
+    text += test::recorded_row(at_ns, "hex", bytes);
+    if (i == 4) text += test::recorded_row(at_ns, "hex", bytes);
     if (i != 6) continue;
     describe(at_ns, asked(emulator, natnet::encode_message(MessageId::kRequestModelDef, {})));
   }

@@ -1,5 +1,6 @@
 #include "tests/unit/drivers/recorded_log.hpp"
 
+#include <array>
 #include <catch2/catch.hpp>
 
 #include <cmath>
@@ -95,6 +96,17 @@ bool same_line(const std::string& a, const std::string& b) {
 }
 
 }  // namespace
+
+std::string recorded_row(std::int64_t at_ns, std::string_view form,
+                         std::span<const std::byte> bytes) {
+  std::string line = "at " + std::to_string(at_ns) + ' ' + std::string(form);
+  for (const std::byte byte : bytes) {
+    std::array<char, 8> hex{};
+    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
+    line += hex.data();
+  }
+  return line + '\n';
+}
 
 RecordedLog read_recorded_log(const std::filesystem::path& path) {
   RecordedLog log;

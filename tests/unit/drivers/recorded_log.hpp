@@ -12,7 +12,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "drivers/driver.hpp"
@@ -30,6 +32,10 @@ struct RecordedLog {
   };
   std::vector<Row> rows;
 };
+
+// A row of such a log; `form` is "hex" or "bodies".
+[[nodiscard]] std::string recorded_row(std::int64_t at_ns, std::string_view form,
+                                       std::span<const std::byte> bytes);
 
 [[nodiscard]] RecordedLog read_recorded_log(const std::filesystem::path& path);
 

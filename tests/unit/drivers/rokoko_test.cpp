@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <sstream>
 
@@ -13,6 +12,7 @@
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {
@@ -381,16 +381,6 @@ TEST_CASE("Studio's names: the same twice, escapes, no UTF-8, none, too long") {
 
 namespace {
 
-std::string hex_row(std::int64_t at_ns, const char* form, const Bytes& bytes) {
-  std::string line = "at " + std::to_string(at_ns) + ' ' + form;
-  for (const std::byte byte : bytes) {
-    std::array<char, 8> hex{};
-    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
-    line += hex.data();
-  }
-  return line + '\n';
-}
-
 // Frames before the description is in use, damage, a repeated frame, the prop that leaves, a loop.
 std::string emulated_studio_log() {
   std::string text =
@@ -405,9 +395,9 @@ std::string emulated_studio_log() {
     Bytes bytes = streaming.next();
     if (i == 3) bytes[7] ^= std::byte{0x10};
     if (i == 4) bytes.resize(bytes.size() / 2);
-    text += hex_row(at_ns, "hex", bytes);
-    if (i == 1) text += hex_row(at_ns, "bodies", streaming.studio.sink.described);
-    if (i == 5) text += hex_row(at_ns, "hex", bytes);
+    text += test::recorded_row(at_ns, "hex", bytes);
+    if (i == 1) text += test::recorded_row(at_ns, "bodies", streaming.studio.sink.described);
+    if (i == 5) text += test::recorded_row(at_ns, "hex", bytes);
   }
   return text;
 }

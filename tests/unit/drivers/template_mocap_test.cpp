@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <random>
 
@@ -14,6 +13,7 @@
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers::mocap {
 namespace {
@@ -357,16 +357,6 @@ TEST_CASE("wrong options of the mocap system are refused at once") {
 
 namespace {
 
-std::string row(std::int64_t at_ns, const char* form, const Bytes& bytes) {
-  std::string line = "at " + std::to_string(at_ns) + ' ' + form;
-  for (const std::byte byte : bytes) {
-    std::array<char, 8> hex{};
-    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
-    line += hex.data();
-  }
-  return line + '\n';
-}
-
 // A frame before the description, both bodies, damage, a repeated datagram, and one body leaving.
 std::string emulated_log() {
   std::string text =
@@ -374,17 +364,18 @@ std::string emulated_log() {
       "in.\ndriver template_mocap\nidentity udp 127.0.0.1:7400\ntext template_mocap rate=100\n";
   MocapEmulator emulator(100.0);
   const Bytes first = next(emulator);
-  text += row(1'000'000, "hex", next(emulator)) + row(2'000'000, "hex", first) +
-          row(2'000'000, "bodies", content_of(first));
+  text += test::recorded_row(1'000'000, "hex", next(emulator)) +
+          test::recorded_row(2'000'000, "hex", first) +
+          test::recorded_row(2'000'000, "bodies", content_of(first));
   for (int i = 1; i <= 12; ++i) {
     const std::int64_t at_ns = i * 10'000'000;
     if (i == 9) emulator.set_present(0, false);
     Bytes bytes = next(emulator);
     if (i == 3) bytes[40] ^= std::byte{0x10};
     if (i == 5) bytes.resize(bytes.size() / 2);
-    if (i == 9) text += row(at_ns, "bodies", content_of(bytes));
-    text += row(at_ns, "hex", bytes);
-    if (i == 7) text += row(at_ns, "hex", bytes);
+    if (i == 9) text += test::recorded_row(at_ns, "bodies", content_of(bytes));
+    text += test::recorded_row(at_ns, "hex", bytes);
+    if (i == 7) text += test::recorded_row(at_ns, "hex", bytes);
   }
   return text;
 }

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <random>
@@ -12,6 +11,7 @@
 #include "proto/frame/rotation.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 #include "tests/unit/drivers/vmc_rig.hpp"
 
 namespace posed::drivers {
@@ -307,16 +307,6 @@ TEST_CASE("wrong options of the VMC driver are refused at once") {
 
 namespace {
 
-std::string vmc_row(std::int64_t at_ns, const char* form, const Bytes& bytes) {
-  std::string line = "at " + std::to_string(at_ns) + ' ' + form;
-  for (const std::byte byte : bytes) {
-    std::array<char, 8> hex{};
-    (void)std::snprintf(hex.data(), hex.size(), " %02x", std::to_integer<unsigned>(byte));
-    line += hex.data();
-  }
-  return line + '\n';
-}
-
 // Frames in several bundles; damage, a bundle that is lost and one that is late, and a model that
 // is unloaded.
 std::string emulated_vmc_log() {
@@ -342,11 +332,11 @@ std::string emulated_vmc_log() {
     if (i == 12) burst.pop_back();
     if (i == 13) burst.push_back(late);
     for (const Bytes& datagram : burst) {
-      text += vmc_row(now_ns, "hex", datagram);
+      text += test::recorded_row(now_ns, "hex", datagram);
       const int before = session.sink.descriptions;
       session.feed(datagram, now_ns);
       if (session.sink.descriptions != before)
-        text += vmc_row(now_ns, "bodies", session.sink.described);
+        text += test::recorded_row(now_ns, "bodies", session.sink.described);
     }
   }
   return text;
