@@ -8,6 +8,7 @@ namespace posed::drivers::mvn {
 namespace {
 
 constexpr std::int64_t kBetweenDescriptions_ns = 300'000'000;
+constexpr std::size_t kTimeCodeBytes = 12;  // "HH:MM:SS.mmm"; closing bytes may follow
 
 // The joints of a skeleton with or without fingers from the segments of a pose. A segment that was
 // not seen moves with its parent. RT-safe.
@@ -63,6 +64,8 @@ Outcome MvnDecoder::take(std::span<const std::byte> bytes, Sink& sink) noexcept 
       return take_scale(datagram);
     case Type::kCentreOfMass:
       return take_mass(datagram, sink);
+    case Type::kTimeCode:
+      return take_timecode(datagram);
     default:
       return is_pose(datagram.head.type) ? take_pose(datagram, sink) : Outcome::kOk;
   }
@@ -91,6 +94,8 @@ Outcome MvnDecoder::take_sample(Tracked& tracked, const Head& head,
   Frame frame;
   fill_frame(pose_, layout_->entries[body].fingers, frame);
   frame.header.device_ns = device_ns;
+  // It may come before or after the pose of its sample.
+  if (head.sample - timecode_sample_ <= 1) frame.timecode = timecode_;
   frame.skeleton = layout_->bodies[body].skeleton->id;
   sink.frame(body, frame);
   return Outcome::kOk;
@@ -120,6 +125,14 @@ Outcome MvnDecoder::take_mass(const Datagram& datagram, Sink& sink) noexcept {
     sample.valid.set(i);
   }
   sink.sample(body, sample);
+  return Outcome::kOk;
+}
+
+// RT-safe.
+Outcome MvnDecoder::take_timecode(const Datagram& datagram) noexcept {
+  const auto* text = reinterpret_cast<const char*>(datagram.payload.data());
+  timecode_ = to_timecode({text, std::min(datagram.payload.size(), kTimeCodeBytes)});
+  timecode_sample_ = datagram.head.sample;
   return Outcome::kOk;
 }
 

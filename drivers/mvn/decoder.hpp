@@ -37,6 +37,7 @@ class MvnDecoder final : public Decoder {
   [[nodiscard]] Outcome take_sample(Tracked& tracked, const Head& head,
                                     std::span<const std::byte> items, Sink& sink) noexcept;
   [[nodiscard]] Outcome take_mass(const Datagram& datagram, Sink& sink) noexcept;
+  [[nodiscard]] Outcome take_timecode(const Datagram& datagram) noexcept;
   [[nodiscard]] Outcome take_meta(const Datagram& datagram) noexcept;
   [[nodiscard]] Outcome take_scale(const Datagram& datagram) noexcept;
   [[nodiscard]] Tracked* find(std::uint8_t character) noexcept;
@@ -52,6 +53,8 @@ class MvnDecoder final : public Decoder {
   std::int64_t arrival_ns_ = kNoTime_ns;
   std::int64_t described_ns_ = kNoTime_ns;
   std::array<Tracked, kMaxCharacters> characters_;
+  Timecode timecode_{};  // the newest, of this sample:
+  std::uint32_t timecode_sample_ = 0;
   CharacterPose pose_;
   Assembly::Buffer gathered_{};
   std::array<std::byte, kMaxMvnDescription> description_{};

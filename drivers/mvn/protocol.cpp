@@ -14,7 +14,7 @@ namespace {
 constexpr std::string_view kMagic = "MXTP";
 constexpr std::size_t kVectorBytes = 12;
 constexpr std::size_t kTrackerBytes = 68;  // of newer versions
-constexpr std::size_t kTimeCodeBytes = 8;  // "HH:MM:SS", at least
+constexpr std::size_t kLeastTimeCode = 8;  // "HH:MM:SS", at least
 constexpr std::size_t kLeastName = 4;      // bytes: the size of an empty name
 constexpr std::size_t kLeastSegment = 16;  // bytes: an empty name, a position
 constexpr float kCentimetre_m = 0.01F;
@@ -164,7 +164,7 @@ bool is_right_size(const Head& head, std::size_t payload_bytes) noexcept {
     case Type::kCentreOfMass:
       return payload_bytes >= kVectorBytes;
     case Type::kTimeCode:
-      return payload_bytes >= kTimeCodeBytes;
+      return payload_bytes >= kLeastTimeCode;
     case Type::kTrackers:
       if (payload_bytes == head.items * kTrackerBytes) return true;
       break;

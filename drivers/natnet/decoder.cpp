@@ -124,6 +124,7 @@ Outcome NatNetDecoder::take_frame(std::span<const std::byte> payload, Sink& sink
   if (layout_ == nullptr) return Outcome::kForeign;
   if (const Outcome order = order_.take(view.number); order != Outcome::kOk) return order;
   device_ns_ = time_.of(view, clock_hz_);
+  timecode_ = to_timecode(view.timecode);
   taken_.reset();
   const Outcome bodies = take_bodies(view, sink);
   return worse(bodies, take_markers(view, sink));
@@ -148,6 +149,7 @@ Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept
   if (taken_[body]) return Outcome::kOutOfRange;
   taken_.set(body);
   frame.header.device_ns = device_ns_;
+  frame.timecode = timecode_;
   frame.skeleton = layout_->bodies[body].skeleton->id;
   sink.frame(body, frame);
   return Outcome::kOk;

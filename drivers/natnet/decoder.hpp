@@ -69,6 +69,7 @@ class NatNetDecoder final : public Decoder {
   float rate_hz_ = 0.0F;
   DeviceTime time_;
   std::int64_t device_ns_ = kNoTime_ns;  // of the frame at hand
+  Timecode timecode_{};                  // the same
   DatagramOrder order_{32};
   std::bitset<kMaxBodies> taken_;  // bodies of the frame at hand so far
   const BodyTable nobody_{};

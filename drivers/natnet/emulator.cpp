@@ -24,6 +24,14 @@ std::uint64_t ticks_at(std::int64_t time_ns) {
          static_cast<std::uint64_t>(time_ns) / (kNanosPerSecond / kEmulatedClock_hz);
 }
 
+// Of a generator of 30 frames per second that shows one hour at the start.
+std::uint32_t timecode_at(std::int64_t time_ns) {
+  const auto frames = static_cast<std::uint32_t>(time_ns / (kNanosPerSecond / 30));
+  const std::uint32_t all_seconds = frames / 30;
+  const std::uint32_t hours = 1 + all_seconds / 3600;
+  return (hours % 24) << 24 | (all_seconds / 60 % 60) << 16 | (all_seconds % 60) << 8 | frames % 30;
+}
+
 // What make_layout makes of the emulator's own description, so that its skeletons are those that
 // the host will build.
 std::unique_ptr<const SourceLayout> layout_of(const ModelDef& model, Version version) {
@@ -120,6 +128,7 @@ void NatNetEmulator::emit(std::int64_t now_ns, Bytes& out) {
     frames_.step(now_ns);
     move(seconds(time_ns));
     FramePacket packet{.number = number_++,
+                       .timecode = timecode_at(time_ns),
                        .timestamp_s = seconds(time_ns),
                        .exposure_ticks = ticks_at(time_ns),
                        .bodies_changed = std::exchange(changed_, false)};

@@ -98,7 +98,7 @@ void write_parts(ByteWriter& writer, const FramePacket& frame, const Reading& re
 void write_suffix(ByteWriter& writer, const FramePacket& frame, const Reading& reading) {
   const Version version = reading.version;
   if (version < Version{3, 0}) writer.f32(static_cast<float>(frame.timestamp_s));
-  writer.u32(0);  // timecode
+  writer.u32(frame.timecode);
   writer.u32(0);
   if (version >= Version{2, 7}) {
     writer.f64(frame.timestamp_s);

@@ -17,6 +17,7 @@ struct SkeletonPacket {
 
 struct FramePacket {
   std::uint32_t number = 0;
+  std::uint32_t timecode = 0;
   double timestamp_s = 0.0;
   std::uint64_t exposure_ticks = 0;
   bool bodies_changed = false;

@@ -124,7 +124,8 @@ bool read_parts(ByteReader& reader, const Reading& reading, FrameView& view) noe
 bool read_suffix(ByteReader& reader, const Reading& reading, FrameView& view) noexcept {
   const Version version = reading.version;
   if (version < Version{3, 0}) view.timestamp_s = static_cast<double>(reader.f32());
-  static_cast<void>(reader.bytes(8));  // timecode
+  view.timecode = reader.u32();
+  static_cast<void>(reader.u32());  // its subframe
   if (version >= Version{2, 7}) {
     view.timestamp_s = reader.f64();
   } else if (reading.timestamp) {

@@ -15,7 +15,7 @@
 //   from 2.11        devices, the same                                        count f32 }
 //   from 4.1         perhaps more parts, skipped
 //   before 3.0       f32 software latency [s]; what Motive 1.5 to 1.9 send there is the timestamp
-//   u32 timecode, u32 its subframe
+//   u32 timecode (hours in the highest byte, minutes, seconds, frames), u32 its subframe
 //   timestamp [s]    f64 from 2.7, f32 in 2.6
 //   from 3.0         u64 ticks of camera mid-exposure, of receipt and of sending
 //   from 4.1         u32 seconds, u32 fraction
@@ -74,6 +74,7 @@ struct Entries {
 struct FrameView {
   std::uint32_t number = 0;
   Entries rigid_bodies{}, skeletons{}, labelled{};
+  std::uint32_t timecode = 0;  // hours, minutes, seconds, frames, a byte each
   double timestamp_s = 0.0;
   std::uint64_t exposure_ticks = 0;  // 0 before 3.0
   bool bodies_changed = false;

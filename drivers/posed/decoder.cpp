@@ -61,6 +61,7 @@ bool take_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
   frame.quality = static_cast<Quality>(upstream.quality);
   frame.source = static_cast<Source>(upstream.source);
   std::ranges::copy(upstream.label, frame.label.begin());
+  frame.timecode = to_timecode(upstream.timecode);
   frame.label_probability = probability;
   frame.lag_frames = static_cast<std::uint16_t>(upstream.lag_frames);
   frame.lag_ms = upstream.lag_ms;

@@ -28,7 +28,8 @@ enum FrameField : std::uint32_t {
   kLabel = 14,
   kLabelProbability = 15,
   kLagFrames = 16,
-  kLag = 17
+  kLag = 17,
+  kTimecode = 22
 };
 
 // Adds one number or several packed ones; false if they do not fit. RT-safe.
@@ -92,6 +93,9 @@ bool take_field(const WireField& field, UpstreamFrame& frame) noexcept {
       return take_number(field, frame.lag_frames);
     case kLag:
       return take_float(field, frame.lag_ms);
+    case kTimecode:
+      frame.timecode = field.text();
+      return field.type == WireType::kBytes;
     default:
       return true;
   }

@@ -38,6 +38,7 @@ struct UpstreamFrame {
   std::uint64_t quality = 0;
   std::uint64_t source = 0;
   std::string_view label{};
+  std::string_view timecode{};
   float label_probability = 0.0F;
   std::uint64_t lag_frames = 0;
   float lag_ms = 0.0F;

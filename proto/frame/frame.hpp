@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "proto/frame/time.hpp"
+#include "proto/frame/timecode.hpp"
 
 namespace posed {
 
@@ -51,6 +52,7 @@ struct Frame {
   float lag_ms = 0.0F;
   std::array<char, kMaxLabel> label{};  // recognised or played gesture; empty when none
   float label_probability = 0.0F;
+  Timecode timecode{};  // empty when the source has none
   Vec3f root_position_m{};  // the skeleton's root_joint in the world
   StageStamps stamps;
   std::array<float, 8> stage_us{};  // spent in each stage of the stream, in their order
@@ -63,7 +65,7 @@ struct Frame {
 static_assert(std::is_trivially_copyable_v<Frame>);
 
 // Gives `out` everything of `in` that does not depend on a skeleton: times, quality, source, lag,
-// label. RT-safe.
+// label, timecode. RT-safe.
 inline void copy_all_but_pose(const Frame& in, Frame& out) noexcept {
   out.header = in.header;
   out.quality = in.quality;
@@ -72,6 +74,7 @@ inline void copy_all_but_pose(const Frame& in, Frame& out) noexcept {
   out.lag_ms = in.lag_ms;
   out.label = in.label;
   out.label_probability = in.label_probability;
+  out.timecode = in.timecode;
   out.stamps = in.stamps;
   out.stage_us = in.stage_us;
 }

@@ -29,8 +29,8 @@ const v1::Frame& FrameEncoder::encode(const Frame& frame) {
   assign(*message_.mutable_angle_rad(), {frame.angle_rad.data(), frame.angle_count});
   message_.set_quality(static_cast<v1::Quality>(frame.quality));
   message_.set_source(static_cast<v1::Source>(frame.source));
-  const auto label_end = std::ranges::find(frame.label, '\0');
-  message_.mutable_label()->assign(frame.label.begin(), label_end);
+  message_.mutable_label()->assign(frame.label.begin(), std::ranges::find(frame.label, '\0'));
+  message_.mutable_timecode()->assign(view_of(frame.timecode));
   message_.set_label_probability(frame.label_probability);
   message_.set_lag_frames(frame.lag_frames);
   message_.set_lag_ms(frame.lag_ms);

@@ -202,6 +202,17 @@ std::vector<Finding> check_sizes(const SourceFile& file) {
   return findings;
 }
 
+std::vector<Finding> check_field_comments(const SourceFile& file) {
+  static const std::regex field(R"(^\s*(?!option|syntax|reserved)[\w. <>,]+ \w+ = \d+;)");
+  std::vector<Finding> findings;
+  for (std::size_t i = 0; i < file.lines.size(); ++i) {
+    const std::string& line = file.lines[i];
+    if (!std::regex_search(line, field) || line.find("; ") != std::string::npos) continue;
+    findings.push_back({file.path, static_cast<int>(i) + 1, "a field without a comment"});
+  }
+  return findings;
+}
+
 std::vector<Finding> check_guarded_input(const SourceFile& file) {
   static const std::regex parses(R"(\btoml::parse(_file)?\b\s*\()");
   static const std::regex reads_all(R"(\bistreambuf_iterator\b|\brdbuf\s*\()");

@@ -52,6 +52,9 @@ struct Target {
                                                     const std::string& text);
 // At most 500 lines a file, 100 columns a line, no left-over marks.
 [[nodiscard]] std::vector<Finding> check_sizes(const SourceFile& file);
+// Programmers read the .proto files as the description of what posed publishes: every field has a
+// comment on its line.
+[[nodiscard]] std::vector<Finding> check_field_comments(const SourceFile& file);
 // TOML is parsed in proto/text/toml.cpp alone, which checks its depth first; outside of tests a
 // whole file is read by load_file alone, which bounds it.
 [[nodiscard]] std::vector<Finding> check_guarded_input(const SourceFile& file);

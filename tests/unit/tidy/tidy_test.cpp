@@ -156,6 +156,24 @@ TEST_CASE("files and lines are short and finished", "[tidy]") {
   CHECK(findings_of(posed::tidy::check_sizes) == "");
 }
 
+TEST_CASE("every field of the wire format is described", "[tidy]") {
+  const auto bad = posed::tidy::source_from_text(
+      "a.proto", "message A {\n  string a = 1;  // a name\n  repeated v1.B b = 2;\n}\n");
+  CHECK(listed(posed::tidy::check_field_comments(bad)).find("a.proto:3") == 0);
+  std::string missing;
+  int files = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(posed::test::source_dir() / "proto/wire/posed/v1")) {
+    std::ifstream file(entry.path());
+    const std::string text(std::istreambuf_iterator<char>(file), {});
+    const auto name = entry.path().filename().string();
+    missing += listed(posed::tidy::check_field_comments(posed::tidy::source_from_text(name, text)));
+    ++files;
+  }
+  CHECK(files == 4);
+  CHECK(missing == "");
+}
+
 TEST_CASE("TOML and whole files are read through their guards", "[tidy]") {
   const auto bad = posed::tidy::source_from_text(
       "daemon/a.cpp",
