@@ -47,5 +47,7 @@ void add_bench(CLI::App& app, int& exit_code);
 void add_bench_decoders(CLI::App& bench, int& exit_code);
 void add_bench_pipeline(CLI::App& bench, int& exit_code);
 void add_bench_predict(CLI::App& bench, int& exit_code);
+void add_bench_relay(CLI::App& bench, int& exit_code);
+void add_bench_stage(CLI::App& bench, int& exit_code);
 
 }  // namespace posed::cli

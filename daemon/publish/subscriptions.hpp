@@ -21,6 +21,8 @@
 namespace posed::publish {
 
 inline constexpr std::size_t kMaxWanted = 4096;  // distinct prefixes that could become a topic
+// Those of one peer, so that one cannot use up what all have.
+inline constexpr std::size_t kMaxWantedOfPeer = kMaxWanted / 4;
 // prefixes of one peer that could never become one
 inline constexpr std::size_t kMaxImpossible = 8;
 inline constexpr double kMaxAtOnce = 8192.0;    // messages of one peer in a burst

@@ -20,6 +20,11 @@ std::optional<std::string> MergedStats::take(std::size_t upstream, std::string_v
   heard.ever = true;
   heard.at_ns = now_ns;
   if (heard_.size() == 1) return std::string(bytes);
+  for (v1::StreamStats& stream : *heard.stats.mutable_stream()) {
+    // What is set already comes from a relay before this one.
+    if (stream.has_monotonic_to_utc_ns()) continue;
+    stream.set_monotonic_to_utc_ns(heard.stats.monotonic_to_utc_ns());
+  }
   const auto answers = [&](const Heard& one) {
     return one.ever && now_ns - one.at_ns < kNoStats_ns;
   };

@@ -17,9 +17,9 @@ class MergedStats {
   explicit MergedStats(std::size_t upstreams) : heard_(upstreams) {}
 
   // Stats came from an upstream. Returns what to publish: of one upstream its own bytes; of several
-  // the streams and sources of all that are not silent, with everything else as the first of them
-  // says it, whenever that one sends its stats. Empty: nothing now. `sound` is false for bytes that
-  // are no stats.
+  // the streams and sources of all that are not silent, each stream with the clock of its own
+  // machine, and everything else as the first of them says it, whenever that one sends its stats.
+  // Empty: nothing now. `sound` is false for bytes that are no stats.
   [[nodiscard]] std::optional<std::string> take(std::size_t upstream, std::string_view bytes,
                                                 std::int64_t now_ns, bool& sound);
 

@@ -26,6 +26,8 @@ constexpr double kMaxChangesAtOnce = publish::kMaxAtOnce / 2.0;
 constexpr double kMaxChangesPerSecond = publish::kMaxPerSecond / 2.0;
 // The relay always hears these: skeletons for those who come later, stats to see its upstreams.
 constexpr std::array<const char*, 2> kOwn{"skeleton/", "stats"};
+// An upstream sees the relay as one subscriber.
+constexpr std::size_t kMaxPassed = publish::kMaxWantedOfPeer - kOwn.size();
 
 // Whether a daemon publishes under this topic, whatever the stream.
 bool is_whole_topic(std::string_view topic) {
@@ -160,12 +162,15 @@ void Relay::pass_subscriptions(std::int64_t now_ns) {
   const double earned = seconds(std::max<std::int64_t>(now_ns - budgeted_ns_, 0));
   budget_ = std::min(budget_ + earned * kMaxChangesPerSecond, kMaxChangesAtOnce);
   budgeted_ns_ = now_ns;
-  while (!changed_.empty() && budget_ >= 1.0) {
-    const std::string prefix = *changed_.begin();
+  for (auto change = changed_.begin(); change != changed_.end() && budget_ >= 1.0;) {
+    const std::string& prefix = *change;
     const bool wanted = wanted_.contains(prefix);
-    // Who subscribes beyond the limit is being cut, so it need not be passed.
-    const bool too_many = wanted && passed_.size() >= publish::kMaxWanted;
-    if (wanted != passed_.contains(prefix) && !too_many) {
+    // What the upstreams do not allow one subscriber waits until others have ended.
+    if (wanted && passed_.size() >= kMaxPassed) {
+      ++change;
+      continue;
+    }
+    if (wanted != passed_.contains(prefix)) {
       budget_ -= 1.0;
       // An upstream that cannot take it now is one that has been stuck for long: it learns of it
       // when it connects anew, because libzmq then repeats all subscriptions.
@@ -178,7 +183,7 @@ void Relay::pass_subscriptions(std::int64_t now_ns) {
         passed_.erase(prefix);
       }
     }
-    changed_.erase(changed_.begin());
+    change = changed_.erase(change);
   }
 }
 

@@ -172,6 +172,7 @@ TEST_CASE("a relay refuses what it cannot do, in one sentence") {
   CHECK(has(open.err, "can be reached from other machines by anyone"));
   CHECK(with({"--bind", "tcp://0.0.0.0:*", "--insecure", "--seconds", "0.1"}).code == 0);
   CHECK(with({"--bind", "nonsense://x", "--insecure"}).code == 1);
+  CHECK(has(with({"--bind", "tcp://127.0.0.1:*", "--insecure"}).err, "--insecure has no effect"));
   CHECK(with({"--key", "a.key", "--server-key", "a.pub", "--server-key", "b.pub"}).code == 2);
   CHECK(with({"--security", "/nonexistent.toml"}).code != 0);
   TempFolder folder;

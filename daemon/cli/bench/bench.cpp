@@ -10,6 +10,8 @@ void add_bench(CLI::App& app, int& exit_code) {
   add_bench_predict(*bench, exit_code);
   add_bench_pipeline(*bench, exit_code);
   add_bench_decoders(*bench, exit_code);
+  add_bench_stage(*bench, exit_code);
+  add_bench_relay(*bench, exit_code);
 }
 
 }  // namespace posed::cli

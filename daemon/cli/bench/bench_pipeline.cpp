@@ -1,11 +1,7 @@
 // `posed bench pipeline`: what the daemon adds to a bare ZeroMQ hop, from the reader's arrival
 // stamp to another process. The two alternate every second, on the same frames.
-#include <unistd.h>
-
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -15,16 +11,13 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
+#include "daemon/cli/bench/bench_parts.hpp"
 #include "daemon/cli/bench/hop_report.hpp"
 #include "daemon/cli/bench/hop_subscriber.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
-#include "models/gp/synthetic.hpp"
-#include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_model.hpp"
-#include "models/style/style_type.hpp"
 #include "proto/message/frame_message.hpp"
 #include "proto/text/json_text.hpp"
 #include "proto/zmq/zmq_handle.hpp"
@@ -32,7 +25,7 @@
 namespace posed::cli {
 namespace {
 
-constexpr double kRate_hz = 120.0;
+constexpr double kRate_hz = kWalkers_hz;
 constexpr const char* kBenchPipelineFooter =
     R"(Synthetic walkers at 120 Hz through the real daemon: file driver, rings, a style model of
 --points poses, publisher; no recording, no real-time priority. Every other second the reader sends
@@ -49,85 +42,6 @@ struct HopOptions {
   bool gate = false;
   bool json = false;
 };
-
-// A field of the line `some` of the CPU's pressure: "avg10=" [percent] or "total=" [us since boot];
-// negative if the kernel does not report it.
-double cpu_pressure(const std::string& field) {
-  std::ifstream file("/proc/pressure/cpu");
-  std::string word;
-  while (file >> word) {
-    if (word.starts_with(field)) return std::atof(word.c_str() + field.size());
-  }
-  return -1.0;
-}
-
-// A folder that is deleted with this object.
-class WorkFolder {
- public:
-  WorkFolder()
-      : path_(std::filesystem::temp_directory_path() /
-              ("posed_bench_" + std::to_string(getpid()))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~WorkFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
-
-// Writes a model of the requested size for the walker's skeleton; its poses are synthetic.
-Result<> write_synthetic_model(const Skeleton& skeleton, int points,
-                               const std::filesystem::path& path) {
-  style::StyleModel model;
-  auto spec = motion::describe_space(motion::Space::kNative, skeleton);
-  if (!spec) return std::unexpected(spec.error());
-  model.space = std::move(*spec);
-  const auto space = motion::PoseSpace::bind(model.space, skeleton);
-  if (!space) return std::unexpected(space.error());
-  const int dims = space->dims();
-  model.process = gp::synthetic(points, dims).process;
-  model.limit_rad = Eigen::VectorXd::Constant(dims, 0.5);
-  model.input_mean = Eigen::VectorXd::Zero(dims);
-  model.input_sd = Eigen::VectorXd::Ones(dims);
-  model.from = "walker";
-  model.to = "other";
-  return style::save_model(model, path);
-}
-
-Result<config::DaemonConfig> make_config(const HopOptions& options, const WorkFolder& folder) {
-  const auto clip = motion::make_walker({.rate_hz = kRate_hz});
-  if (!clip) return std::unexpected(clip.error());
-  if (auto written = clip::write_bvh(*clip, folder / "walker.bvh"); !written) {
-    return std::unexpected(written.error());
-  }
-  if (auto written = write_synthetic_model(*clip->skeleton, options.points, folder / "model.style");
-      !written) {
-    return std::unexpected(written.error());
-  }
-  config::DaemonConfig config;
-  config.publish_endpoint = config.control_endpoint = "tcp://127.0.0.1:*";
-  config.realtime = false;
-  for (int i = 0; i < options.streams; ++i) {
-    config::StreamConfig stream;
-    stream.name = "walker" + std::to_string(i);
-    stream.driver = "file";
-    stream.options = {{"path", (folder / "walker.bvh").string()}};
-    stream.stale_after_s = 3.0;  // each gets its turn every other second
-    const StageType& type = style::style_type();
-    stream.stages.push_back(
-        {.type = &type,
-         .parameters = *complete_parameters(type.parameters, {{"gate", options.gate}}),
-         .model = folder / "model.style"});
-    config.streams.push_back(std::move(stream));
-  }
-  return config;
-}
 
 // The bare hop: the reader thread sends directly during its seconds.
 class BareHop {
@@ -253,8 +167,11 @@ Result<Watched> measure(const HopOptions& options) {
   auto subscriber = HopSubscriber::fork();
   if (!subscriber) return std::unexpected(subscriber.error());
   const WorkFolder folder;
-  const auto config = make_config(options, folder);
+  auto config = walkers_config(
+      {.streams = options.streams, .points = options.points, .gate = options.gate}, folder);
   if (!config) return std::unexpected(config.error());
+  // Each gets its turn every other second.
+  for (config::StreamConfig& stream : config->streams) stream.stale_after_s = 3.0;
   auto daemon = assembly::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
   auto context = net::open_context();
@@ -271,7 +188,7 @@ Result<Watched> measure(const HopOptions& options) {
   }
   turns.start_ns = system::monotonic_ns() + kNanosPerSecond / 2;
   if (auto started = (*daemon)->start(); !started) return std::unexpected(started.error());
-  (*subscriber)->begin((*daemon)->publish_endpoint(), (*hop)->endpoint());
+  (*subscriber)->begin({(*daemon)->publish_endpoint(), (*hop)->endpoint()});
   Watched watched;
   watched.pressure_before_percent = cpu_pressure("avg10=");
   const double pressure_us = cpu_pressure("total=");
@@ -286,14 +203,6 @@ Result<Watched> measure(const HopOptions& options) {
   watched.report = report_hops(arrivals->messages, turns.start_ns,
                                turns.start_ns + options.seconds * kNanosPerSecond);
   return watched;
-}
-
-nlohmann::ordered_json to_json(const HopFigures& figures) {
-  return {{"p50_us", figures.p50_us},
-          {"p99_us", figures.p99_us},
-          {"p999_us", figures.p999_us},
-          {"max_us", figures.max_us},
-          {"messages", figures.messages}};
 }
 
 nlohmann::ordered_json to_json(const HopOptions& options, const Watched& watched) {
@@ -321,12 +230,7 @@ void print(const HopOptions& options, const Watched& watched) {
   const HopReport& report = watched.report;
   std::printf("%d stream(s) x %.0f Hz x GP of %d poses, %d s\n", options.streams, kRate_hz,
               options.points, options.seconds);
-  std::printf("%-10s %9s %9s %9s %9s %9s\n", "us", "p50", "p99", "p99.9", "max", "messages");
-  for (const auto& [name, figures] :
-       {std::pair{"bare", report.bare}, std::pair{"pipeline", report.pipeline}}) {
-    std::printf("%-10s %9.1f %9.1f %9.1f %9.1f %9llu\n", name, figures.p50_us, figures.p99_us,
-                figures.p999_us, figures.max_us, static_cast<unsigned long long>(figures.messages));
-  }
+  print_figures({{"bare", report.bare}, {"pipeline", report.pipeline}});
   std::printf("p50 added %.1f us; median over 1-s block pairs: p50 ratio %.2f, p99 ratio %.2f\n",
               report.pipeline.p50_us - report.bare.p50_us, report.block_p50_ratio,
               report.block_p99_ratio);

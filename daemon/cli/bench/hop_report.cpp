@@ -18,18 +18,18 @@ double quantile(const Ages& sorted, double p) {
   return sorted[static_cast<std::size_t>(std::lround(p * last))];
 }
 
-HopFigures figures(Ages ages) {
-  std::ranges::sort(ages);
-  return {quantile(ages, 0.5), quantile(ages, 0.99), quantile(ages, 0.999),
-          ages.empty() ? 0.0 : ages.back(), ages.size()};
-}
-
 double median(Ages values) {
   std::ranges::sort(values);
   return quantile(values, 0.5);
 }
 
 }  // namespace
+
+HopFigures figures_of(Ages ages_us) {
+  std::ranges::sort(ages_us);
+  return {quantile(ages_us, 0.5), quantile(ages_us, 0.99), quantile(ages_us, 0.999),
+          ages_us.empty() ? 0.0 : ages_us.back(), ages_us.size()};
+}
 
 HopReport report_hops(std::span<const Arrival> arrivals, std::int64_t start_ns,
                       std::int64_t end_ns) {
@@ -46,12 +46,12 @@ HopReport report_hops(std::span<const Arrival> arrivals, std::int64_t start_ns,
   Ages p99_ratios;
   for (const auto& [pair, ages] : pairs) {
     if (ages[0].empty() || ages[1].empty()) continue;
-    const HopFigures pipeline = figures(ages[0]);
-    const HopFigures bare = figures(ages[1]);
+    const HopFigures pipeline = figures_of(ages[0]);
+    const HopFigures bare = figures_of(ages[1]);
     p50_ratios.push_back(pipeline.p50_us / bare.p50_us);
     p99_ratios.push_back(pipeline.p99_us / bare.p99_us);
   }
-  return {figures(all[1]), figures(all[0]), median(p50_ratios), median(p99_ratios)};
+  return {figures_of(all[1]), figures_of(all[0]), median(p50_ratios), median(p99_ratios)};
 }
 
 }  // namespace posed::cli

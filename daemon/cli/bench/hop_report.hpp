@@ -1,4 +1,4 @@
-// Evaluates the message ages that the subscriber of `posed bench pipeline` has recorded.
+// Evaluates the message ages that the benchmarks' subscribers have recorded.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +20,8 @@ struct HopReport {
   double block_p50_ratio = 0.0;
   double block_p99_ratio = 0.0;
 };
+
+[[nodiscard]] HopFigures figures_of(std::vector<double> ages_us);
 
 // Block 0 begins at `start_ns`; the pipeline has the even blocks. The first pair (warm-up) and
 // everything after `end_ns` are left out.

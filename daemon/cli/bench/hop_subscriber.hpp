@@ -1,5 +1,5 @@
-// The receiver of `posed bench pipeline`: a subscriber in its own process that records how old each
-// message is when it arrives.
+// The receiver of the benchmarks: a subscriber in its own process that records how old each message
+// is when it arrives.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/cli/bench/child_process.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::cli {
@@ -14,6 +15,7 @@ namespace posed::cli {
 // A received message. Its topic says which kind it is: bare/... or pose/...
 struct Arrival {
   std::int64_t arrival_ns = 0;  // stamped in the reader
+  std::int64_t sent_ns = 0;     // age when it was handed to ZeroMQ; of a pose
   std::int64_t age_ns = 0;      // age when the subscriber received it
   bool bare = false;
 };
@@ -25,22 +27,17 @@ struct ReceivedMessages {
 
 class HopSubscriber {
  public:
-  // Forks; call before the process has a second thread or a ZeroMQ context.
-  [[nodiscard]] static Result<std::unique_ptr<HopSubscriber>> fork();
-  ~HopSubscriber();
-  HopSubscriber(const HopSubscriber&) = delete;
-  HopSubscriber& operator=(const HopSubscriber&) = delete;
+  // Forks; ChildProcess::fork says when.
+  [[nodiscard]] static Result<std::unique_ptr<HopSubscriber>> fork(bool gives_way = false);
 
-  // Makes the process connect to both endpoints; returns when the endpoints have been sent.
-  void begin(const std::string& pipeline_endpoint, const std::string& bare_endpoint);
+  // Makes the process connect to the endpoints; returns when they have been sent.
+  void begin(const std::vector<std::string>& endpoints);
   // Ends the process and returns what it recorded.
   [[nodiscard]] Result<ReceivedMessages> finish();
 
  private:
-  HopSubscriber(int process, int to, int from) : process_(process), to_(to), from_(from) {}
-  int process_;
-  int to_;    // pipe to the child: two lines; closing it ends the child
-  int from_;  // pipe from the child: gaps, then ReceivedMessages
+  explicit HopSubscriber(ChildProcess process) : process_(std::move(process)) {}
+  ChildProcess process_;
 };
 
 }  // namespace posed::cli

@@ -49,7 +49,12 @@ Result<config::SecurityConfig> relay_security(const RelayCommand& command) {
     }
     return config::load_security(command.security);
   }
-  if (net::is_loopback(command.bind) || command.insecure) return config::SecurityConfig{};
+  if (net::is_loopback(command.bind)) {
+    if (!command.insecure) return config::SecurityConfig{};
+    return misuse("--insecure has no effect at " + command.bind +
+                  ", which only this machine reaches: leave it out");
+  }
+  if (command.insecure) return config::SecurityConfig{};
   return misuse(net::open_to_anyone(command.bind) +
                 "; name a file with a server_key in [security] (--security), or say --insecure");
 }

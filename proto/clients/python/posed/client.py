@@ -68,6 +68,7 @@ class Client:
         self._socket.subscribe("stats")
         self.skeletons = {}  # Skeleton by stream
         self.stats = None  # the last posed.v1.Stats
+        self._to_utc_ns = {}
 
     def __enter__(self):
         return self
@@ -100,6 +101,9 @@ class Client:
                 self.skeletons[stream] = Skeleton(message)
             elif kind == "stats":
                 self.stats = message
+                # A relay tells the clock of each stream's machine.
+                self._to_utc_ns = {one.stream: one.monotonic_to_utc_ns for one in message.stream
+                                   if one.HasField("monotonic_to_utc_ns")}
             yield topic, message
 
     def frames(self, timeout_s=None):
@@ -121,5 +125,6 @@ class Client:
     def _age_s(self, message):
         if self.stats is None:
             return None
-        utc_ns = message.arrival_ns + self.stats.monotonic_to_utc_ns
+        to_utc_ns = self._to_utc_ns.get(message.stream, self.stats.monotonic_to_utc_ns)
+        utc_ns = message.arrival_ns + to_utc_ns
         return (time.time_ns() - utc_ns) / 1e9

@@ -42,18 +42,28 @@ TEST_CASE("existing topics cost nothing; others are counted once each, until the
 TEST_CASE("the subscriptions that match no topic yet, or never can, are limited") {
   Subscriptions subscriptions(is_walker);
   for (std::size_t i = 0; i < kMaxWanted; ++i) {
-    const int peer = static_cast<int>(i % 2);
+    const int peer = static_cast<int>(i % 4);
     REQUIRE(subscriptions.ask(peer, "pose/" + std::to_string(i), true, 0));
   }
-  CHECK_FALSE(subscriptions.ask(3, "pose/one-more", true, 0));
-  CHECK(subscriptions.ask(3, "pose/walker", true, 0));
+  CHECK_FALSE(subscriptions.ask(5, "pose/one-more", true, 0));
+  CHECK(subscriptions.ask(5, "pose/walker", true, 0));
   for (std::size_t i = 0; i < kMaxImpossible; ++i) {
-    REQUIRE(subscriptions.ask(4, "nonsense " + std::to_string(i), true, 0));
+    REQUIRE(subscriptions.ask(6, "nonsense " + std::to_string(i), true, 0));
   }
-  CHECK_FALSE(subscriptions.ask(4, "nonsense", true, 0));
+  CHECK_FALSE(subscriptions.ask(6, "nonsense", true, 0));
   subscriptions.forget(0);
-  subscriptions.forget(3);
+  subscriptions.forget(1);
+  subscriptions.forget(5);
   CHECK(subscriptions.wanted() == kMaxWanted / 2);
+}
+
+TEST_CASE("one peer cannot use up the subscriptions that all have together") {
+  Subscriptions subscriptions(is_walker);
+  int asked = 0;
+  while (subscriptions.ask(1, "pose/" + std::to_string(asked), true, 0)) {
+    REQUIRE(++asked < static_cast<int>(kMaxWanted) / 2);
+  }
+  CHECK(subscriptions.ask(2, "pose/mine", true, 0));
 }
 
 TEST_CASE("the first subscription to a prefix is told, and the end of the last one") {

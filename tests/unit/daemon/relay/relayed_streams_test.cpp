@@ -87,6 +87,7 @@ TEST_CASE(
 std::string toy_stats(const std::string& stream, std::int64_t time_ns) {
   v1::Stats stats;
   stats.set_time_ns(time_ns);
+  stats.set_monotonic_to_utc_ns(time_ns + 1000);
   stats.add_stream()->set_stream(stream);
   stats.add_source()->set_name(stream + "-source");
   return stats.SerializeAsString();
@@ -107,6 +108,8 @@ TEST_CASE("stats of one upstream pass as they are, those of several as one") {
   REQUIRE(merged.stream().size() == 2);
   CHECK(merged.stream(0).stream() == "ann");
   CHECK(merged.stream(1).stream() == "bob");
+  CHECK(merged.stream(0).monotonic_to_utc_ns() == 1005);  // each on its own machine's clock
+  CHECK(merged.stream(1).monotonic_to_utc_ns() == 1007);
   CHECK(merged.source().size() == 2);
   CHECK_FALSE(two.take(1, toy_stats("bob", 8), kNow_ns + 2, sound));  // the first gives the beat
   const auto alone = two.take(1, toy_stats("bob", 9), kNow_ns + 4 * kNanosPerSecond, sound);
