@@ -52,6 +52,7 @@ void DeviceSupervisor::run() {
       look_for_device();
     } else {
       write_to_device();
+      if (upkeep_ != nullptr) upkeep_->upkeep(ports_.clock());
       watch_silence();
     }
     sleep();
@@ -85,6 +86,7 @@ bool DeviceSupervisor::settling() const { return ports_.clock() < settled_ns_; }
 // Closes the link; only then can the port be opened again.
 void DeviceSupervisor::take_back() {
   writer_ = nullptr;
+  upkeep_ = nullptr;
   device_.reset();
   away_ = true;
   source_.present->gone();
@@ -132,6 +134,7 @@ void DeviceSupervisor::look_for_device() {
   found_once_ = true;
   device_ = std::move(*found);
   writer_ = dynamic_cast<drivers::ColdWriter*>(device_->transport.get());
+  upkeep_ = dynamic_cast<drivers::Upkeep*>(device_->transport.get());
   drops_reported_ = 0;
   away_ = false;
   reported_.clear();

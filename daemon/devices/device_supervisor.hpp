@@ -15,6 +15,7 @@
 #include "daemon/pipeline/reader.hpp"
 #include "drivers/transport/cold_writer.hpp"
 #include "drivers/transport/hotplug_monitor.hpp"
+#include "drivers/transport/upkeep.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::devices {
@@ -57,6 +58,7 @@ class DeviceSupervisor {
   drivers::HotplugMonitor hotplug_;
   std::unique_ptr<drivers::Device> device_;  // the open device; null while it is unplugged
   drivers::ColdWriter* writer_ = nullptr;    // the same device's writer, if writing to it blocks
+  drivers::Upkeep* upkeep_ = nullptr;        // the same device's upkeep, if its link needs any
   std::uint64_t drops_reported_ = 0;         // of the writer
   bool away_ = true;
   bool found_once_ = false;

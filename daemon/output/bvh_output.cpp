@@ -26,17 +26,21 @@ std::int64_t BvhOutput::turn(std::int64_t now_ns) {
   take_stream(delivery.streams[index_of(Part::kBody)]);
   if (look_ns_ == kNoTime_ns || now_ns >= look_ns_) {
     for (const std::string& news : clients_.look(now_ns)) tell(news);
-    counters.failures = clients_.refused();
     look_ns_ = now_ns + LineClients::kLook_ns;
   }
+  const Frame* newest = nullptr;
   delivery.for_each([&](Part /*part*/, const Frame& frame) {
-    if (figure_ == nullptr || clients_.size() == 0 || !limit_.admit(now_ns)) return;
-    const auto outcome = clients_.send(figure_->line(frame), now_ns);
-    counters.sent += outcome.sent;
-    counters.dropped += outcome.dropped;
+    newest = &frame;
+    if (!limit_.limits()) send(frame, now_ns);
   });
-  counters.receivers = static_cast<std::uint32_t>(clients_.size());
+  if (limit_.limits() && newest != nullptr && limit_.admit(now_ns)) send(*newest, now_ns);
+  set_receivers(clients_.size());
   return look_ns_;
+}
+
+void BvhOutput::send(const Frame& frame, std::int64_t now_ns) {
+  if (figure_ == nullptr || clients_.size() == 0) return;
+  count(clients_.send(figure_->line(frame), now_ns));
 }
 
 void BvhOutput::take_stream(const std::shared_ptr<const PartStream>& stream) {

@@ -25,6 +25,7 @@ class BvhOutput final : public Output {
 
  private:
   void take_stream(const std::shared_ptr<const PartStream>& stream);
+  void send(const Frame& frame, std::int64_t now_ns);
 
   bool header_;
   RateLimit limit_;

@@ -1,6 +1,7 @@
 #include "daemon/output/inbox.hpp"
 
 #include <algorithm>
+#include <mutex>
 
 namespace posed::output {
 
@@ -82,11 +83,12 @@ void Inbox::sample(const Sample& sample) noexcept {
 }
 
 void Inbox::stream_leaves(std::uint32_t stream) noexcept {
+  std::shared_ptr<const PartStream> leaving;  // freed behind the lock
   {
     const std::scoped_lock lock(mutex_);
     const auto part = part_of(stream);
     if (!part) return;
-    waiting_.streams[index_of(*part)].reset();
+    waiting_.streams[index_of(*part)].swap(leaving);
     dropped_ += waiting_.remove(*part);
   }
   wake_.notify();
@@ -94,6 +96,7 @@ void Inbox::stream_leaves(std::uint32_t stream) noexcept {
 
 void Inbox::take(Delivery& into) {
   into.count_ = 0;
+  into.streams = {};  // freed before the lock
   const std::scoped_lock lock(mutex_);
   waiting_.swap_frames(into);
   into.streams = waiting_.streams;

@@ -1,6 +1,7 @@
 // Inbox: between the publisher's thread, which puts frames in, and the output's own thread, which
 // takes them out. It is bounded: if the output is slow, the newest frames replace the oldest, which
-// are counted. The lock is held for the copy of one frame at the most.
+// are counted. The publisher is a real-time thread: the lock is one that inherits its priority, it
+// is held for copies of frames only, and nothing is freed and nobody woken under it.
 #pragma once
 
 #include <array>
@@ -8,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +18,7 @@
 #include "daemon/output/part.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/event_fd.hpp"
+#include "daemon/system/priority_mutex.hpp"
 #include "proto/frame/frame.hpp"
 
 namespace posed::output {
@@ -94,7 +95,7 @@ class Inbox {
 
   std::array<std::string, kParts> names_;  // [part]
   system::EventFd& wake_;
-  std::mutex mutex_;
+  system::PriorityMutex mutex_;
   Delivery waiting_;  // under mutex_
   std::atomic<std::uint64_t> frames_{0}, dropped_{0};
 };

@@ -48,7 +48,6 @@ LineClients::LineClients(LineClients&& other) noexcept
       greeting_(std::move(other.greeting_)),
       peers_(std::move(other.peers_)),
       clients_(std::exchange(other.clients_, {})),
-      refused_(other.refused_),
       told_ns_(other.told_ns_) {}
 
 LineClients::~LineClients() {
@@ -70,7 +69,8 @@ bool LineClients::write(Client& client, std::string_view text) {
     return false;
   }
   client.rest = text.substr(static_cast<std::size_t>(sent));
-  return sent > 0;
+  client.stuck_ns = kNoTime_ns;
+  return true;
 }
 
 bool LineClients::write_rest(Client& client) {
@@ -80,14 +80,15 @@ bool LineClients::write_rest(Client& client) {
   return client.rest.empty();
 }
 
-LineClients::Outcome LineClients::send(std::string_view line, std::int64_t now_ns) {
-  Outcome outcome;
+SendOutcome LineClients::send(std::string_view line, std::int64_t now_ns) {
+  SendOutcome outcome;
   for (Client& client : clients_) {
     if (!client.greeted && !greeting_.empty()) client.greeted = write(client, greeting_);
     const bool ready = client.greeted || greeting_.empty();
     if (ready && write_rest(client) && write(client, line)) {
-      client.stuck_ns = kNoTime_ns;
       ++outcome.sent;
+    } else if (client.gone) {
+      ++outcome.failed;
     } else {
       ++outcome.dropped;
       if (client.stuck_ns == kNoTime_ns) client.stuck_ns = now_ns;
@@ -99,7 +100,6 @@ LineClients::Outcome LineClients::send(std::string_view line, std::int64_t now_n
 
 void LineClients::refuse(const drivers::Address& peer, const std::string& why, std::int64_t now_ns,
                          std::vector<std::string>& news) {
-  ++refused_;
   // Whoever may connect may do so all the time.
   if (told_ns_ != kNoTime_ns && now_ns < told_ns_ + kNanosPerSecond) return;
   told_ns_ = now_ns;
@@ -134,8 +134,7 @@ std::vector<std::string> LineClients::look(std::int64_t now_ns) {
     if (client.gone || client.stuck_ns == kNoTime_ns) continue;
     if (now_ns < client.stuck_ns + kPatience_ns) continue;
     client.gone = true;
-    ++refused_;
-    news.push_back(client.from + " was disconnected: it took no line for 2 s");
+    news.push_back(client.from + " was disconnected: it took nothing for 2 s");
   }
   remove_gone();
   let_in(now_ns, news);

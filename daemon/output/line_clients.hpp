@@ -1,6 +1,6 @@
 // LineClients: programs that connect over TCP to get lines of text. Each gets whole lines only: one
-// that does not read fast enough misses whole lines, and one that has taken none for two seconds is
-// disconnected. What clients send is discarded.
+// that does not read fast enough misses whole lines, and one that has taken nothing for two seconds
+// is disconnected. What clients send is discarded.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/output/send_outcome.hpp"
 #include "drivers/transport/address.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
@@ -36,18 +37,12 @@ class LineClients {
   // disconnected, because they could not make sense of what follows.
   void set_greeting(std::string greeting);
 
-  struct Outcome {
-    std::uint64_t sent = 0, dropped = 0;  // one for each client
-  };
-  [[nodiscard]] Outcome send(std::string_view line, std::int64_t now_ns);
+  [[nodiscard]] SendOutcome send(std::string_view line, std::int64_t now_ns);
 
   // Lets clients in, looks which have gone, and disconnects those that take nothing. Returns what
   // people should know, one sentence each. Call it every kLook_ns.
   [[nodiscard]] std::vector<std::string> look(std::int64_t now_ns);
   static constexpr std::int64_t kLook_ns = kNanosPerSecond / 20;
-
-  // Clients that were not let in, or were disconnected.
-  [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
   struct Client {
@@ -56,7 +51,7 @@ class LineClients {
     std::string rest{};  // of the line that it has taken a part of
     bool greeted = false;
     bool gone = false;
-    std::int64_t stuck_ns = kNoTime_ns;  // since when it has not taken what it should
+    std::int64_t stuck_ns = kNoTime_ns;  // since when it has taken nothing of what it should
   };
   LineClients() = default;
   void let_in(std::int64_t now_ns, std::vector<std::string>& news);
@@ -73,7 +68,6 @@ class LineClients {
   std::string endpoint_, greeting_;
   std::vector<std::string> peers_;
   std::vector<Client> clients_;
-  std::uint64_t refused_ = 0;
   std::int64_t told_ns_ = kNoTime_ns;  // when a refusal was last told
 };
 

@@ -17,16 +17,22 @@ Output::Output(const config::OutputConfig& config, std::unique_ptr<system::Event
 void Output::fill(v1::OutputStats& stats) const {
   stats.set_name(name_);
   stats.set_kind(kind_);
-  stats.set_receivers(counters.receivers.load());
+  stats.set_receivers(receivers_now_.load());
   stats.set_frames(inbox_.frames());
-  stats.set_sent(counters.sent.load());
-  stats.set_dropped(inbox_.dropped() + counters.dropped.load());
-  stats.set_failures(counters.failures.load());
+  stats.set_sent(sent_.load());
+  stats.set_dropped(inbox_.dropped() + dropped_.load());
+  stats.set_failures(failures_.load());
 }
 
 const Delivery& Output::receive() {
   inbox_.take(delivery_);
   return delivery_;
+}
+
+void Output::count(const SendOutcome& outcome) noexcept {
+  sent_ += outcome.sent;
+  dropped_ += outcome.dropped;
+  failures_ += outcome.failed;
 }
 
 void Output::tell(const std::string& text) const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -12,6 +13,7 @@
 
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/output/inbox.hpp"
+#include "daemon/output/send_outcome.hpp"
 #include "daemon/publish/frame_output.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "proto/frame/result.hpp"
@@ -50,18 +52,19 @@ class Output : public publish::FrameOutput {
   // The streams as of the last receive().
   [[nodiscard]] const PartStreams& streams() const noexcept { return delivery_.streams; }
   void tell(const std::string& text) const;
-
-  struct Counters {
-    std::atomic<std::uint64_t> sent{0}, dropped{0}, failures{0};
-    std::atomic<std::uint32_t> receivers{0};
-  };
-  Counters counters;
+  // For fill().
+  void count(const SendOutcome& outcome) noexcept;
+  void set_receivers(std::size_t count) noexcept {
+    receivers_now_ = static_cast<std::uint32_t>(count);
+  }
 
  private:
   std::string name_, kind_;
   std::unique_ptr<system::EventFd> wake_;
   Inbox inbox_;
   Delivery delivery_;
+  std::atomic<std::uint64_t> sent_{0}, dropped_{0}, failures_{0};
+  std::atomic<std::uint32_t> receivers_now_{0};
   Tell tell_;
 };
 

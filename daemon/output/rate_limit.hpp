@@ -1,6 +1,6 @@
 // RateLimit: lets through at most so many frames a second, evenly. A frame that comes a quarter of
 // a period early still goes, so that a stream of just that rate loses none to the jitter of its
-// times.
+// times. Of frames that come together at most one goes, and that should be the newest.
 #pragma once
 
 #include <algorithm>
@@ -15,6 +15,8 @@ class RateLimit {
   // Frames a second; 0: no limit.
   explicit RateLimit(double rate_hz) noexcept
       : period_ns_(rate_hz > 0.0 ? nanoseconds(1.0 / rate_hz) : 0) {}
+
+  [[nodiscard]] bool limits() const noexcept { return period_ns_ > 0; }
 
   [[nodiscard]] bool admit(std::int64_t now_ns) noexcept {
     if (due_ns_ != kNoTime_ns && now_ns < due_ns_ - period_ns_ / 4) return false;

@@ -54,38 +54,49 @@ void UdpReceivers::connect(Receiver& receiver) noexcept {
   if (!receiver.connected) receiver.error = errno;
 }
 
+bool UdpReceivers::is_connected(Receiver& receiver, std::int64_t now_ns) noexcept {
+  if (receiver.connected) return true;
+  if (receiver.retry_ns != kNoTime_ns && now_ns < receiver.retry_ns) return false;
+  receiver.retry_ns = now_ns + kRetry_ns;
+  connect(receiver);
+  return receiver.connected;
+}
+
 bool UdpReceivers::send_to(Receiver& receiver, std::span<const std::byte> datagram,
-                           std::int64_t now_ns) noexcept {
-  if (!receiver.connected) {
-    if (receiver.retry_ns != kNoTime_ns && now_ns < receiver.retry_ns) return false;
-    receiver.retry_ns = now_ns + kRetry_ns;
-    connect(receiver);
-    if (!receiver.connected) return false;
+                           std::int64_t now_ns, SendOutcome& outcome) noexcept {
+  if (!is_connected(receiver, now_ns)) {
+    ++outcome.failed;
+    return false;
   }
   const auto send = [&] {
     return ::send(receiver.fd, datagram.data(), datagram.size(), MSG_NOSIGNAL) >= 0;
   };
-  if (send()) return true;
+  if (send()) {
+    ++outcome.sent;
+    return true;
+  }
   receiver.error = errno;
+  if (receiver.error == EAGAIN || receiver.error == ENOBUFS) {
+    ++outcome.dropped;
+    return false;
+  }
+  ++outcome.failed;
   if (receiver.error == ECONNREFUSED) {
     // That was the answer to an earlier datagram; this one has not been sent yet.
-    static_cast<void>(send());
-  } else if (receiver.error != EAGAIN && receiver.error != ENOBUFS) {
+    if (send()) ++outcome.sent;
+  } else {
     receiver.connected = false;  // the machine may get another address, and the socket with it
     receiver.retry_ns = now_ns + kRetry_ns;
   }
   return false;
 }
 
-UdpReceivers::Outcome UdpReceivers::send(std::span<const std::byte> datagram,
-                                         std::int64_t now_ns) noexcept {
-  Outcome outcome;
+SendOutcome UdpReceivers::send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept {
+  SendOutcome outcome;
   for (Receiver& receiver : receivers_) {
-    if (send_to(receiver, datagram, now_ns)) {
-      ++outcome.sent;
+    if (send_to(receiver, datagram, now_ns, outcome)) {
       if (receiver.good_ns == kNoTime_ns) receiver.good_ns = now_ns;
     } else {
-      ++outcome.failed;
       receiver.failing = true;
       receiver.good_ns = kNoTime_ns;
     }

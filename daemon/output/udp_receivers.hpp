@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/output/send_outcome.hpp"
 #include "drivers/transport/address.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
@@ -27,11 +28,9 @@ class UdpReceivers {
   UdpReceivers(const UdpReceivers&) = delete;
   UdpReceivers& operator=(const UdpReceivers&) = delete;
 
-  struct Outcome {
-    std::uint64_t sent = 0, failed = 0;  // datagrams, one for each receiver
-  };
-  // To all of them. Never waits.
-  [[nodiscard]] Outcome send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept;
+  // To all of them. Never waits. To an address that cannot be reached the datagrams of the second
+  // until the next try fail, too.
+  [[nodiscard]] SendOutcome send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept;
 
   // What has changed since the last call, one sentence each. A receiver counts as failing from the
   // first failure until it has taken everything for two seconds.
@@ -52,8 +51,10 @@ class UdpReceivers {
   };
   UdpReceivers() = default;
   static void connect(Receiver& receiver) noexcept;
-  [[nodiscard]] static bool send_to(Receiver& receiver, std::span<const std::byte> datagram,
-                                    std::int64_t now_ns) noexcept;
+  [[nodiscard]] static bool is_connected(Receiver& receiver, std::int64_t now_ns) noexcept;
+  // Counts what became of the datagram. Returns whether all is well with the receiver.
+  static bool send_to(Receiver& receiver, std::span<const std::byte> datagram, std::int64_t now_ns,
+                      SendOutcome& outcome) noexcept;
 
   std::vector<Receiver> receivers_;
 };

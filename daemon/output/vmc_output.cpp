@@ -32,7 +32,7 @@ VmcOutput::VmcOutput(const config::OutputConfig& config, std::unique_ptr<system:
       receivers_(std::move(receivers)),
       writer_(std::make_unique<vmc::DatagramWriter>(vmc::Packing::kBundles)) {
   measured_ns_.fill(kNoTime_ns);
-  counters.receivers = static_cast<std::uint32_t>(receivers_.size());
+  set_receivers(receivers_.size());
 }
 
 std::int64_t VmcOutput::turn(std::int64_t now_ns) {
@@ -40,7 +40,13 @@ std::int64_t VmcOutput::turn(std::int64_t now_ns) {
   const Delivery& delivery = receive();
   take_streams(delivery.streams);
   if (delivery.sample && !assistant_) shapes_.take(*delivery.sample);
-  delivery.for_each([&](Part part, const Frame& frame) { take(part, frame, now_ns); });
+  const Frame* newest = nullptr;
+  delivery.for_each([&](Part part, const Frame& frame) {
+    if (!take(part, frame, now_ns)) return;
+    newest = &frame;
+    if (!limit_.limits()) send(frame, now_ns);
+  });
+  if (limit_.limits() && newest != nullptr && limit_.admit(now_ns)) send(*newest, now_ns);
   for (const std::string& news : receivers_.take_news(now_ns)) tell(news);
   return system::kForever_ns;
 }
@@ -75,10 +81,10 @@ bool VmcOutput::leads(Part part, std::int64_t now_ns) const noexcept {
   return true;
 }
 
-void VmcOutput::take(Part part, const Frame& frame, std::int64_t now_ns) {
-  if (!avatar_.take(part, frame)) return;
+bool VmcOutput::take(Part part, const Frame& frame, std::int64_t now_ns) {
+  if (!avatar_.take(part, frame)) return false;
   if (frame.quality != Quality::kStale) measured_ns_[index_of(part)] = now_ns;
-  if (leads(part, now_ns) && limit_.admit(now_ns)) send(frame, now_ns);
+  return leads(part, now_ns);
 }
 
 void VmcOutput::send(const Frame& frame, std::int64_t now_ns) {
@@ -92,9 +98,7 @@ void VmcOutput::send(const Frame& frame, std::int64_t now_ns) {
   }
   writer_->time(static_cast<float>(seconds(now_ns - begin_ns_)));
   for (std::size_t i = 0; i < writer_->datagrams(); ++i) {
-    const auto outcome = receivers_.send(writer_->datagram(i), now_ns);
-    counters.sent += outcome.sent;
-    counters.failures += outcome.failed;
+    count(receivers_.send(writer_->datagram(i), now_ns));
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"
+#include "drivers/emulate/timecode.hpp"
 #include "drivers/natnet/axes.hpp"
 #include "drivers/natnet/figure.hpp"
 #include "proto/frame/rotation.hpp"
@@ -22,14 +23,6 @@ constexpr double kEmulatedLap_s = 12.0;
 std::uint64_t ticks_at(std::int64_t time_ns) {
   return 3600 * kEmulatedClock_hz +
          static_cast<std::uint64_t>(time_ns) / (kNanosPerSecond / kEmulatedClock_hz);
-}
-
-// Of a generator of 30 frames per second that shows one hour at the start.
-std::uint32_t timecode_at(std::int64_t time_ns) {
-  const auto frames = static_cast<std::uint32_t>(time_ns / (kNanosPerSecond / 30));
-  const std::uint32_t all_seconds = frames / 30;
-  const std::uint32_t hours = 1 + all_seconds / 3600;
-  return (hours % 24) << 24 | (all_seconds / 60 % 60) << 16 | (all_seconds % 60) << 8 | frames % 30;
 }
 
 // What make_layout makes of the emulator's own description, so that its skeletons are those that
@@ -128,7 +121,7 @@ void NatNetEmulator::emit(std::int64_t now_ns, Bytes& out) {
     frames_.step(now_ns);
     move(seconds(time_ns));
     FramePacket packet{.number = number_++,
-                       .timecode = timecode_at(time_ns),
+                       .timecode = emulate::timecode_at(time_ns),
                        .timestamp_s = seconds(time_ns),
                        .exposure_ticks = ticks_at(time_ns),
                        .bodies_changed = std::exchange(changed_, false)};

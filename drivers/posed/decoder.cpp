@@ -83,6 +83,7 @@ Outcome UpstreamDecoder::take(std::span<const std::byte> bytes, Sink& sink) noex
   if (message.topic == pose_topic_) return take_pose(message.body, sink);
   if (message.topic != skeleton_topic_) return Outcome::kForeign;
   if (message.body.empty()) return Outcome::kShort;
+  if (is_of_other_stream(message.body, stream_)) return Outcome::kForeign;
   sink.description(message.body);
   return Outcome::kOk;
 }
@@ -102,12 +103,10 @@ Outcome UpstreamDecoder::take_pose(std::span<const std::byte> body, Sink& sink) 
                      is_plausible(upstream_.root_position_m.values);
   if (!sound) return Outcome::kOutOfRange;
   // While its own source is silent the upstream repeats the last pose once a second. That is no
-  // sign of life: the stream becomes stale here, too.
-  if (frame.quality == Quality::kStale && upstream_.sequence == sequence_) {
-    return Outcome::kDuplicate;
-  }
+  // sign of life, also for who has only just connected: the stream becomes or stays stale here,
+  // too.
+  if (frame.quality == Quality::kStale) return Outcome::kDuplicate;
   if (const Outcome order = order_.take(upstream_.sequence); order != Outcome::kOk) return order;
-  sequence_ = upstream_.sequence;
   // The sequence says what is new; a clock that was set back only stops the time.
   static_cast<void>(clock_.take(seconds(upstream_.arrival_ns)));
   frame.header.device_ns = clock_.device_ns();

@@ -18,7 +18,7 @@ namespace posed::drivers::chain {
 class UpstreamDecoder final : public Decoder {
  public:
   explicit UpstreamDecoder(const std::string& stream)
-      : pose_topic_("pose/" + stream), skeleton_topic_("skeleton/" + stream) {}
+      : stream_(stream), pose_topic_("pose/" + stream), skeleton_topic_("skeleton/" + stream) {}
 
   // Takes one message per call. RT-safe.
   void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
@@ -33,10 +33,9 @@ class UpstreamDecoder final : public Decoder {
   [[nodiscard]] Outcome take(std::span<const std::byte> bytes, Sink& sink) noexcept;
   [[nodiscard]] Outcome take_pose(std::span<const std::byte> body, Sink& sink) noexcept;
 
-  std::string pose_topic_, skeleton_topic_;
+  std::string stream_, pose_topic_, skeleton_topic_;
   const UpstreamLayout* layout_ = nullptr;  // null until the upstream has sent a skeleton
   DatagramOrder order_{64};
-  std::uint64_t sequence_ = 0;  // of the newest frame; the upstream's count from 1
   TimestampClock clock_;
   UpstreamFrame upstream_;
 };

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/emulate/timecode.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/message/skeleton_message.hpp"
 
@@ -70,6 +71,7 @@ void UpstreamEmulator::emit(std::int64_t now_ns, Bytes& out) {
   } else {
     const double time_s = seconds(frames_.due_ns());
     pose_.header.arrival_ns = kBegan_ns + frames_.due_ns();
+    pose_.timecode = to_timecode(emulate::timecode_at(frames_.due_ns()));
     frames_.step(now_ns);
     ++pose_.header.sequence;
     if (!posed_) {

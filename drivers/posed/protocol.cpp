@@ -31,6 +31,8 @@ enum FrameField : std::uint32_t {
   kLag = 17,
   kTimecode = 22
 };
+// Of posed.v1.Skeleton.
+constexpr std::uint32_t kSkeletonStream = 1;
 
 // Adds one number or several packed ones; false if they do not fit. RT-safe.
 template <std::size_t N>
@@ -130,6 +132,17 @@ Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexce
     if (!take_field(field, frame)) return Outcome::kOutOfRange;
   }
   return fields.ok() ? Outcome::kOk : Outcome::kShort;
+}
+
+// RT-safe.
+bool is_of_other_stream(std::span<const std::byte> skeleton, std::string_view stream) noexcept {
+  WireReader fields(skeleton);
+  WireField field;
+  bool other = false;
+  while (fields.next(field)) {
+    if (field.number == kSkeletonStream) other = field.text() != stream;  // the last one counts
+  }
+  return other;
 }
 
 std::string device_info_text(const UpstreamInfo& info) {

@@ -59,6 +59,11 @@ struct UpstreamMessage {
 // another type. Fields that a later version adds are skipped. RT-safe.
 [[nodiscard]] Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexcept;
 
+// Whether posed.v1.Skeleton names a stream and it is not this one. Other damage is for make_layout
+// to find. RT-safe.
+[[nodiscard]] bool is_of_other_stream(std::span<const std::byte> skeleton,
+                                      std::string_view stream) noexcept;
+
 // Device info: "posed stream=ann rate=60".
 struct UpstreamInfo {
   std::string stream;

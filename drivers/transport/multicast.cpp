@@ -39,7 +39,7 @@ Result<unsigned> interface_index(const std::string& interface) {
               "'; name one that `ip address` lists, or one of its addresses");
 }
 
-// Joins or leaves. RT-safe except for its system call.
+// Joins or leaves.
 bool change(int fd, const Address& group, unsigned index, bool join) noexcept {
   if (group.storage.ss_family == AF_INET6) {
     sockaddr_in6 address{};

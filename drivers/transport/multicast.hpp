@@ -19,8 +19,8 @@ class Membership {
                                                const std::string& interface);
 
   // Leaves and joins again, because an interface that goes away takes the membership with it, and
-  // one that returns has another number. While it is away, nothing happens. Three or four system
-  // calls, and RT-safe otherwise.
+  // one that returns has another number. While it is away, nothing happens. Other threads may read
+  // the socket meanwhile. Cold.
   void renew(int fd) noexcept;
 
  private:

@@ -21,6 +21,10 @@ namespace {
 constexpr std::chrono::milliseconds kPatience{1000};
 constexpr int kMessagesWaiting = 16;   // in libzmq
 constexpr int kLinkBuffer = 8 * 1024;  // bytes, in the kernel before libzmq
+// Bytes. libzmq ends the connection at a larger message, so this is well above what is delivered: a
+// message that is only too long to be a chunk is counted, and costs no connection.
+constexpr std::int64_t kMostReceived = 1024 * 1024;
+static_assert(kMostReceived > std::int64_t{kMaxChunk});
 // Bytes between thread and reader, which the kernel doubles for its own use: a quarter of a second
 // of a large skeleton at 120 Hz.
 constexpr int kQueue = 128 * 1024;
@@ -49,8 +53,7 @@ Error refusal_error(net::Refusal refusal, const SubscriptionSettings& settings) 
 }
 
 Result<> set_all(void* socket, const SubscriptionSettings& settings) {
-  const std::int64_t largest = kMaxChunk;
-  const std::string_view most(reinterpret_cast<const char*>(&largest), sizeof largest);
+  const std::string_view most(reinterpret_cast<const char*>(&kMostReceived), sizeof kMostReceived);
   for (const Result<>& set : {net::set_option(socket, ZMQ_MAXMSGSIZE, most),
                               net::set_option(socket, ZMQ_RCVHWM, kMessagesWaiting),
                               net::set_option(socket, ZMQ_RCVBUF, kLinkBuffer)}) {

@@ -224,15 +224,13 @@ Result<> UdpTransport::start(std::int64_t now_ns) {
     for (std::size_t i = 0; i < received_; ++i) read_control(i, old);
   }
   next_ = received_;
-  const auto has_group = [](const Socket& socket) { return socket.membership.has_value(); };
-  if (std::ranges::any_of(sockets_, has_group)) rejoin_ns_ = now_ns + kRejoin_ns;
+  joined_ns_ = now_ns;
   return {};
 }
 
-// RT-safe except for its system calls, which are made only while nothing comes.
-void UdpTransport::rejoin(std::int64_t now_ns) noexcept {
-  if (rejoin_ns_ == kNoTime_ns || now_ns < rejoin_ns_) return;
-  rejoin_ns_ = now_ns + kRejoin_ns;
+void UdpTransport::upkeep(std::int64_t now_ns) noexcept {
+  if (now_ns < std::max(joined_ns_, group_heard_ns_.load()) + kRejoin_ns) return;
+  joined_ns_ = now_ns;
   for (Socket& socket : sockets_) {
     if (socket.membership) socket.membership->renew(socket.fd);
   }
@@ -251,10 +249,7 @@ bool UdpTransport::owns(Socket& socket, const Host& sender) const noexcept {
 // RT-safe except for its reads. A flood of datagrams to be dropped ends the call after one batch.
 Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
   Chunk chunk;
-  if (next_ >= received_ && !receive(now_ns)) {
-    rejoin(now_ns);
-    return chunk;
-  }
+  if (next_ >= received_ && !receive(now_ns)) return chunk;
   while (next_ < received_) {
     const std::size_t i = next_++;
     mmsghdr& message = batch_->message[i];
@@ -272,7 +267,7 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
       continue;
     }
     if (!socket.keeps_to) socket.to = sender;
-    if (socket.membership) rejoin_ns_ = now_ns + kRejoin_ns;
+    if (socket.membership) group_heard_ns_.store(now_ns);
     chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
     chunk.socket = static_cast<std::uint8_t>(socket_);
     break;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "drivers/driver.hpp"
 #include "drivers/transport/address.hpp"
 #include "drivers/transport/multicast.hpp"
+#include "drivers/transport/upkeep.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::drivers {
@@ -35,7 +37,7 @@ struct UdpSettings {
 // Checks these settings without opening a socket. Cold.
 [[nodiscard]] Result<> check_udp(const UdpSettings& settings);
 
-class UdpTransport final : public Transport {
+class UdpTransport final : public Transport, public Upkeep {
  public:
   // An address other than loopback without peers is an error. Cold.
   [[nodiscard]] static Result<std::unique_ptr<UdpTransport>> open(const UdpSettings& settings);
@@ -45,14 +47,15 @@ class UdpTransport final : public Transport {
   [[nodiscard]] std::string endpoint(std::size_t socket) const;
 
   [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
-  // In the past while datagrams wait in this object, where poll_fd does not show them; otherwise
-  // when a group is to be joined again, if nothing comes until then.
+  // In the past while datagrams wait in this object, where poll_fd does not show them.
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
-    return next_ < received_ ? batch_ns_ : rejoin_ns_;
+    return next_ < received_ ? batch_ns_ : kNoTime_ns;
   }
   // Discards what came since open(): it is old by now.
   [[nodiscard]] Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+  // While nothing comes of a group, joins it again every two seconds.
+  void upkeep(std::int64_t now_ns) noexcept override;
   using Transport::send;
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
 
@@ -62,9 +65,9 @@ class UdpTransport final : public Transport {
     std::optional<Address> to;  // a configured one, or the last sender
     bool keeps_to = false;      // `to` is configured
     std::uint32_t dropped = 0;  // by the kernel, of all so far; begins again after 2^32
-    std::optional<Membership> membership{};
-    Host sender{};                       // whose datagrams are taken
-    std::int64_t heard_ns = kNoTime_ns;  // when it sent the last; kNoTime_ns: nobody has yet
+    std::optional<Membership> membership{};  // of upkeep; whether there is one never changes
+    Host sender{};                           // whose datagrams are taken
+    std::int64_t heard_ns = kNoTime_ns;      // when it sent the last; kNoTime_ns: nobody has yet
   };
   struct Batch;  // the buffers of one recvmmsg
 
@@ -75,7 +78,6 @@ class UdpTransport final : public Transport {
   [[nodiscard]] bool may_send(const Host& host) const noexcept;
   // Whether the socket takes datagrams of this sender. From then on it does.
   [[nodiscard]] bool owns(Socket& socket, const Host& sender) const noexcept;
-  void rejoin(std::int64_t now_ns) noexcept;
   // What the kernel says beside a datagram.
   void read_control(std::size_t i, Chunk& chunk) noexcept;
 
@@ -87,7 +89,8 @@ class UdpTransport final : public Transport {
   std::size_t socket_ = 0;               // that the batch came from
   std::int64_t batch_ns_ = 0;            // host time and wall clock, taken before the batch
   std::int64_t wall_ns_ = 0;
-  std::int64_t rejoin_ns_ = kNoTime_ns;  // kNoTime_ns: there is no group
+  std::atomic<std::int64_t> group_heard_ns_{kNoTime_ns};  // when a group was last heard
+  std::int64_t joined_ns_ = kNoTime_ns;  // of upkeep: when the groups were last joined
 };
 
 }  // namespace posed::drivers

@@ -5,17 +5,21 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <set>
 #include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_model.hpp"
+#include "tests/e2e/logged_frames.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/has.hpp"
+#include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
 
 namespace posed::test {
@@ -79,6 +83,15 @@ double furthest(const std::vector<json>& first, const std::vector<json>& second)
   return worst;
 }
 
+// Ends the recording and compares its replay with what was published.
+void check_replay(Stage& recorded) {
+  recorded.daemon->send(SIGINT);
+  CHECK(recorded.daemon->exit_code() == 0);
+  const auto replayed = posed({"replay", recorded.path("take.plog"), "--speed", "max", "--expect"});
+  INFO(replayed.err);
+  CHECK(replayed.code == 0);
+}
+
 TEST_CASE("a daemon streams what another one publishes, to float precision") {
   Served served;
   served.start();
@@ -132,6 +145,38 @@ TEST_CASE("a chained stream is lost and found with the daemon before it") {
   CHECK(monitored_frames(next.publish, "up-walker", 5).size() == 5);
 }
 
+TEST_CASE(
+    "a recording in which the upstream went and returned as another person replays as it was") {
+  const std::string endpoint = "tcp://127.0.0.1:" + std::to_string(free_port());
+  Stage first;
+  first.folder.write("posed.toml",
+                     replaced(Stage::kEndpoints, "tcp://127.0.0.1:*", endpoint) + Stage::kWalker);
+  const auto publish = [&](const clip::Clip& walk) {
+    REQUIRE(clip::write_bvh(walk, first.folder.path() / "walk.bvh"));
+    first.launch("run");
+  };
+  const auto joints_now = [](const Stage& stage) {
+    return monitored_frames(stage.publish, "up-walker", 1).at(0).at("rotationXyzw").size() / 4;
+  };
+  publish(toy_walk(240, 120.0));
+  Stage next;
+  next.folder.write("posed.toml", chain_config(endpoint));
+  next.record();
+  const std::size_t before = joints_now(next);
+  first.daemon->send(SIGKILL);
+  publish(motion::make_walker({.seconds = 2.0, .rate_hz = 120.0}).value());
+  std::size_t after = before;
+  for (int i = 0; i < 600 && after == before; ++i) after = joints_now(next);
+  CHECK(after > before);
+  CHECK(monitored_frames(next.publish, "up-walker", 30).size() == 30);
+  check_replay(next);
+  std::set<int> people;  // that the log has frames of, by their joints
+  static_cast<void>(check_frames_follow(
+      next.path("take.plog"), "up-walker",
+      [&](const auto& frame) { people.insert(frame.rotation_xyzw_size() / 4); }));
+  CHECK(people == std::set{static_cast<int>(before), static_cast<int>(after)});
+}
+
 TEST_CASE("daemons and a relay chain with keys, and say which key is wrong") {
   Served served;
   for (const char* name : {"server", "next", "stranger"}) {
@@ -179,11 +224,20 @@ TEST_CASE("an emulated posed is heard over ZeroMQ, recorded, and replayed bit fo
   next.folder.write("posed.toml", chain_config(json::parse(*ready).at("port")));
   next.record();
   CHECK(monitored_frames(next.publish, "up-walker", 60).size() == 60);
-  next.daemon->send(SIGINT);
-  CHECK(next.daemon->exit_code() == 0);
-  const auto replayed = posed({"replay", next.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replayed.err);
-  CHECK(replayed.code == 0);
+  check_replay(next);
+}
+
+TEST_CASE("an emulated posed is published to other machines only if that is wanted") {
+  const auto emulate = [](const std::string& endpoint, std::vector<std::string> more) {
+    std::vector<std::string> words{"emulate", "posed", "--publish", endpoint, "--seconds", "0.1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return posed(std::move(words));
+  };
+  const auto open = emulate("tcp://0.0.0.0:*", {});
+  CHECK(open.code == 2);
+  CHECK(has(open.err, "can be reached from other machines by anyone"));
+  CHECK(emulate("tcp://0.0.0.0:*", {"--insecure"}).code == 0);
+  CHECK(emulate("tcp://127.0.0.1:*", {}).code == 0);
 }
 
 TEST_CASE("the configs of a stage of three machines are sound") {

@@ -38,6 +38,18 @@ TEST_CASE("the Python client's joints and fingertips are those of the clip that 
   CHECK(nearest_m(shown, served.folder.path() / "walk.bvh", true) < 2e-6);  // six decimals
 }
 
+TEST_CASE("the Python client reads the timecode") {
+  Process emulator(
+      {"emulate", "posed", "--set", "stream=walker", "--publish", "tcp://127.0.0.1:*"});
+  const auto ready = emulator.line();
+  REQUIRE(ready);
+  const std::string said =
+      example("watch.py", "walker --count 1 --connect " +
+                              std::string(nlohmann::json::parse(*ready).at("port")));
+  INFO(said);
+  CHECK(has(said, ", 01:00:"));
+}
+
 TEST_CASE("the Python client records, has keys, and says what the daemon refuses") {
   Served served;
   for (const char* name : {"stage", "me"}) {

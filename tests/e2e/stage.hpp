@@ -22,6 +22,11 @@ class Stage {
       "realtime = false\n[publish]\nendpoint = \"tcp://127.0.0.1:*\"\n"
       "[control]\nendpoint = \"tcp://127.0.0.1:*\"\n";
 
+  // Behind them: the clip walk.bvh, again and again, as the stream walker.
+  static constexpr const char* kWalker =
+      "[[stream]]\nname = \"walker\"\ndriver = \"file\"\n"
+      "[stream.file]\npath = \"walk.bvh\"\nloop = true\n";
+
   [[nodiscard]] std::string path(const std::string& name) const {
     return (folder.path() / name).string();
   }

@@ -18,6 +18,7 @@
 #include "daemon/emulate/clip_motion.hpp"
 #include "daemon/emulate/emulated_device.hpp"
 #include "daemon/emulate/log_emulator.hpp"
+#include "daemon/net/security.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "proto/text/json_text.hpp"
 
@@ -34,6 +35,7 @@ struct EmulateOptions {
   std::vector<std::string> faults;  // KIND:RATE
   std::uint64_t seed = 1;
   bool pty = false;
+  bool insecure = false;
   double speed = 1.0;
   std::optional<double> seconds;
 };
@@ -121,7 +123,13 @@ Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
   if (!options.udp.empty()) return emulate::EmulatedPort::open_udp(options.udp, ports);
   if (!options.tcp.empty()) return emulate::EmulatedPort::connect_tcp(options.tcp);
   if (!options.listen.empty()) return emulate::EmulatedPort::listen_tcp(options.listen);
-  if (!options.publish.empty()) return emulate::EmulatedPort::publish(options.publish);
+  if (!options.publish.empty()) {
+    if (!net::is_loopback(options.publish) && !options.insecure) {
+      return misuse(net::open_to_anyone(options.publish) +
+                    "; publish at tcp://127.0.0.1:PORT, or say --insecure");
+    }
+    return emulate::EmulatedPort::publish(options.publish);
+  }
   if (const auto to = default_udp(options); to && !options.pty && options.link.empty()) {
     return emulate::EmulatedPort::open_udp({*to});
   }
@@ -186,6 +194,8 @@ void add_emulate(CLI::App& app, int& exit_code) {
   auto* publish = command->add_option("--publish", options->publish,
                                       "Publish over ZeroMQ, as another posed does");
   publish->type_name("ENDPOINT")->excludes(pty)->excludes(tcp)->excludes(listen)->excludes(udp);
+  command->add_flag("--insecure", options->insecure, "Let other machines subscribe to --publish")
+      ->needs(publish);
   command->add_option("--link", options->link, "Also a link to the pseudo-terminal, by this name")
       ->type_name("PATH")
       ->excludes(tcp)

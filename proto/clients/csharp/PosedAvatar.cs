@@ -4,10 +4,8 @@ using System;
 using System.Collections.Generic;
 using UnityEngine;
 
-namespace Posed
-{
-    public sealed class PosedAvatar : MonoBehaviour
-    {
+namespace Posed {
+    public sealed class PosedAvatar : MonoBehaviour {
         public string host = "127.0.0.1";
         public int port = 5570;
         public string stream = "walker";
@@ -16,46 +14,37 @@ namespace Posed
         private PosedSubscriber subscriber;
         private Transform[] bones; // by HumanBodyBones; null where the avatar has none
         private Quaternion[] rest; // of the bones in T-pose, relative to this object
-        private Vector3 hipsRest; // place of the hips in T-pose, relative to this object
+        private float leg; // of the avatar, from the hips to the ankle; 0 where a bone is missing
         private uint boundTo;
         private int[] boneOfJoint; // -1: the avatar has no such bone
         private float scale;
 
-        public void Start()
-        {
+        public void Start() {
             var animator = GetComponent<Animator>();
             bones = new Transform[(int)HumanBodyBones.LastBone];
             rest = new Quaternion[bones.Length];
             Quaternion toObject = Quaternion.Inverse(transform.rotation);
-            for (int i = 0; i < bones.Length; ++i)
-            {
+            for (int i = 0; i < bones.Length; ++i) {
                 bones[i] = animator.GetBoneTransform((HumanBodyBones)i);
                 if (bones[i] != null) rest[i] = toObject * bones[i].rotation;
             }
-            Transform hips = bones[(int)HumanBodyBones.Hips];
-            if (hips != null) hipsRest = toObject * (hips.position - transform.position);
+            leg = LegOf(bones);
             subscriber = new PosedSubscriber(host, port, stream);
         }
 
-        public void OnDestroy()
-        {
-            if (subscriber != null) subscriber.Dispose();
-        }
+        public void OnDestroy() => subscriber?.Dispose();
 
-        public void Update()
-        {
+        public void Update() {
             PosedFrame frame;
             PosedSkeleton skeleton;
             if (subscriber != null && subscriber.TryTake(out frame, out skeleton)) Apply(frame, skeleton);
         }
 
         // A bone's turn in the room relative to its T-pose is the same in every skeleton.
-        public void Apply(PosedFrame frame, PosedSkeleton skeleton)
-        {
+        public void Apply(PosedFrame frame, PosedSkeleton skeleton) {
             if (boneOfJoint == null || boundTo != skeleton.Id) Bind(skeleton);
             var turned = new Quaternion[skeleton.Names.Count]; // in the room, in Unity's axes
-            for (int joint = 0; joint < turned.Length; ++joint)
-            {
+            for (int joint = 0; joint < turned.Length; ++joint) {
                 int parent = skeleton.Parents[joint];
                 Quaternion local = ToUnity(frame.Rotations, joint);
                 turned[joint] = parent < 0 ? local : turned[parent] * local;
@@ -70,52 +59,52 @@ namespace Posed
             hips.position = transform.position + transform.rotation * (place * scale);
         }
 
-        private void Bind(PosedSkeleton skeleton)
-        {
+        private void Bind(PosedSkeleton skeleton) {
             boundTo = skeleton.Id;
             boneOfJoint = new int[skeleton.Names.Count];
-            for (int joint = 0; joint < boneOfJoint.Length; ++joint)
-            {
+            for (int joint = 0; joint < boneOfJoint.Length; ++joint) {
                 int bone = BoneNamed(skeleton.Bones[joint]);
                 boneOfJoint[joint] = bone >= 0 && bones[bone] != null ? bone : -1;
             }
-            float height = HipsHeight(skeleton);
-            scale = height > 0.1f && hipsRest.y > 0.1f ? hipsRest.y / height : 1f;
+            float theirs = LegOf(skeleton);
+            scale = theirs > 0.1f && leg > 0.1f ? leg / theirs : 1f;
         }
 
         // VRM's names are Unity's with a small first letter, but for the thumbs and the little fingers' "Little".
-        private static int BoneNamed(string vrm)
-        {
+        private static int BoneNamed(string vrm) {
             if (vrm.Length == 0) return -1;
             string name = char.ToUpperInvariant(vrm[0]) + vrm.Substring(1);
-            bool thumb = name.IndexOf("Thumb", StringComparison.Ordinal) >= 0;
-            if (thumb)
-            {
-                name = name.Replace("Proximal", "Intermediate").Replace("Metacarpal", "Proximal");
-            }
+            bool thumb = name.Contains("Thumb");
+            if (thumb) name = name.Replace("Proximal", "Intermediate").Replace("Metacarpal", "Proximal");
             if (!Enum.IsDefined(typeof(HumanBodyBones), name) || name == "LastBone") return -1;
             return (int)(HumanBodyBones)Enum.Parse(typeof(HumanBodyBones), name);
         }
 
-        // Of the hips above the lower of the feet, in T-pose: the lengths of a leg's bones.
-        private static float HipsHeight(PosedSkeleton skeleton)
-        {
-            int joint = skeleton.Bones.IndexOf("leftFoot");
-            int hips = skeleton.Bones.IndexOf("hips");
-            float height = 0f;
-            for (; joint >= 0 && joint != hips; joint = skeleton.Parents[joint])
-            {
-                int at = 3 * joint;
-                height += (float)Math.Sqrt(skeleton.Offsets[at] * skeleton.Offsets[at]
-                    + skeleton.Offsets[at + 1] * skeleton.Offsets[at + 1]
-                    + skeleton.Offsets[at + 2] * skeleton.Offsets[at + 2]);
+        // The lengths of the bones from the hips to the left ankle, of this avatar and of a stream's person.
+        private static float LegOf(Transform[] bones) {
+            HumanBodyBones[] chain = { HumanBodyBones.Hips, HumanBodyBones.LeftUpperLeg, HumanBodyBones.LeftLowerLeg,
+                HumanBodyBones.LeftFoot };
+            float length = 0f;
+            for (int i = 1; i < chain.Length; ++i) {
+                Transform upper = bones[(int)chain[i - 1]], lower = bones[(int)chain[i]];
+                if (upper == null || lower == null) return 0f;
+                length += (lower.position - upper.position).magnitude;
             }
-            return height;
+            return length;
+        }
+
+        private static float LegOf(PosedSkeleton skeleton) {
+            int hips = skeleton.Bones.IndexOf("hips"), joint = skeleton.Bones.IndexOf("leftFoot");
+            List<float> offset = skeleton.Offsets;
+            float length = 0f;
+            for (; joint >= 0 && joint != hips; joint = skeleton.Parents[joint]) {
+                length += new Vector3(offset[3 * joint], offset[3 * joint + 1], offset[3 * joint + 2]).magnitude;
+            }
+            return length;
         }
 
         // posed is right-handed and Unity left-handed; both have Y up and people who face +Z, so X changes sign.
-        private static Quaternion ToUnity(List<float> values, int index)
-        {
+        private static Quaternion ToUnity(List<float> values, int index) {
             int at = 4 * index;
             return new Quaternion(values[at], -values[at + 1], -values[at + 2], values[at + 3]);
         }

@@ -4,12 +4,9 @@ using System;
 using System.Collections.Generic;
 using System.Text;
 
-namespace Posed
-{
+namespace Posed {
     // Right-handed, Y up, metres; rotations are x, y, z, w, relative to the parent joint.
-    public sealed class PosedSkeleton
-    {
-        public string Stream = "";
+    public sealed class PosedSkeleton {
         public uint Id;
         public int Root;
         public List<string> Names = new List<string>();
@@ -19,69 +16,58 @@ namespace Posed
         public List<float> RestRotations = new List<float>(); // 4 a joint, in the world, in T-pose
     }
 
-    public sealed class PosedFrame
-    {
-        public string Stream = "";
+    public sealed class PosedFrame {
         public ulong Sequence;
         public uint SkeletonId;
         public int Quality; // 0 measured, 1 predicted, 2 held, 3 stale
+        public string Timecode = ""; // "hh:mm:ss:ff" or "hh:mm:ss.mmm"; "" where the source has none
         public List<float> RootPosition = new List<float>(); // 3
         public List<float> Rotations = new List<float>(); // 4 a joint
         public byte[] Validity = new byte[0]; // 1 a joint
     }
 
     // Reads one message; a damaged one throws FormatException.
-    public struct ProtoReader
-    {
+    public struct ProtoReader {
         private readonly byte[] bytes;
         private readonly int end;
         private int at;
 
         public ProtoReader(byte[] bytes) : this(bytes, 0, bytes.Length) { }
 
-        private ProtoReader(byte[] bytes, int begin, int end)
-        {
+        private ProtoReader(byte[] bytes, int begin, int end) {
             this.bytes = bytes;
             this.end = end;
             at = begin;
         }
 
-        public static PosedFrame ReadFrame(byte[] bytes)
-        {
+        public static PosedFrame ReadFrame(byte[] bytes) {
             var frame = new PosedFrame();
             var reader = new ProtoReader(bytes);
             int kind;
-            for (int field = reader.Next(out kind); field != 0; field = reader.Next(out kind))
-            {
-                switch (field)
-                {
-                    case 1: frame.Stream = reader.Text(kind); break;
+            for (int field = reader.Next(out kind); field != 0; field = reader.Next(out kind)) {
+                switch (field) {
                     case 2: frame.Sequence = reader.Number(kind); break;
                     case 7: frame.SkeletonId = (uint)reader.Number(kind); break;
                     case 8: reader.Floats(kind, frame.RootPosition); break;
                     case 9: reader.Floats(kind, frame.Rotations); break;
                     case 10: frame.Validity = reader.Bytes(kind); break;
                     case 12: frame.Quality = (int)reader.Number(kind); break;
+                    case 22: frame.Timecode = reader.Text(kind); break;
                     default: reader.Skip(kind); break;
                 }
             }
-            if (frame.RootPosition.Count != 3 || frame.Rotations.Count != 4 * frame.Validity.Length)
-            {
+            if (frame.RootPosition.Count != 3 || frame.Rotations.Count != 4 * frame.Validity.Length) {
                 throw new FormatException("a pose with the wrong number of values");
             }
             return frame;
         }
 
-        public static PosedSkeleton ReadSkeleton(byte[] bytes)
-        {
+        public static PosedSkeleton ReadSkeleton(byte[] bytes) {
             var skeleton = new PosedSkeleton();
             var reader = new ProtoReader(bytes);
             int kind;
-            for (int field = reader.Next(out kind); field != 0; field = reader.Next(out kind))
-            {
-                switch (field)
-                {
-                    case 1: skeleton.Stream = reader.Text(kind); break;
+            for (int field = reader.Next(out kind); field != 0; field = reader.Next(out kind)) {
+                switch (field) {
                     case 2: skeleton.Id = (uint)reader.Number(kind); break;
                     case 4: skeleton.Names.Add(reader.Text(kind)); break;
                     case 5: reader.SignedNumbers(kind, skeleton.Parents); break;
@@ -96,8 +82,7 @@ namespace Posed
             bool whole = joints > 0 && skeleton.Bones.Count == joints && skeleton.Parents.Count == joints
                 && skeleton.Offsets.Count == 3 * joints && skeleton.RestRotations.Count == 4 * joints
                 && skeleton.Root >= 0 && skeleton.Root < joints;
-            for (int joint = 0; whole && joint < joints; ++joint)
-            {
+            for (int joint = 0; whole && joint < joints; ++joint) {
                 whole = skeleton.Parents[joint] >= -1 && skeleton.Parents[joint] < joint;
             }
             if (!whole) throw new FormatException("a skeleton whose lists do not fit each other");
@@ -105,8 +90,7 @@ namespace Posed
         }
 
         // The next field's number, 0 at the end, and how it is encoded.
-        private int Next(out int kind)
-        {
+        private int Next(out int kind) {
             kind = 0;
             if (at == end) return 0;
             ulong tag = Varint();
@@ -115,11 +99,9 @@ namespace Posed
             return (int)(tag >> 3);
         }
 
-        private ulong Varint()
-        {
+        private ulong Varint() {
             ulong value = 0;
-            for (int shift = 0; shift < 64; shift += 7)
-            {
+            for (int shift = 0; shift < 64; shift += 7) {
                 byte next = bytes[Take(1)];
                 value |= (ulong)(next & 0x7F) << shift;
                 if (next < 0x80) return value;
@@ -128,62 +110,50 @@ namespace Posed
         }
 
         // The place of the next `size` bytes.
-        private int Take(ulong size)
-        {
+        private int Take(ulong size) {
             if (size > (ulong)(end - at)) throw new FormatException("the message ends inside a field");
             int place = at;
             at += (int)size;
             return place;
         }
 
-        private ulong Number(int kind)
-        {
+        private ulong Number(int kind) {
             if (kind == 0) return Varint();
             if (kind == 5) return BitConverter.ToUInt32(bytes, Take(4));
             if (kind == 1) return BitConverter.ToUInt64(bytes, Take(8));
             throw new FormatException("a number is encoded as text");
         }
 
-        private ProtoReader Inside(int kind)
-        {
+        private ProtoReader Inside(int kind) {
             if (kind != 2) throw new FormatException("a list is encoded as a number");
             int size = (int)Math.Min(Varint(), int.MaxValue);
             int begin = Take((ulong)size);
             return new ProtoReader(bytes, begin, begin + size);
         }
 
-        private string Text(int kind)
-        {
-            ProtoReader inside = Inside(kind);
-            return Encoding.UTF8.GetString(bytes, inside.at, inside.end - inside.at);
-        }
+        private string Text(int kind) => Encoding.UTF8.GetString(Bytes(kind));
 
-        private byte[] Bytes(int kind)
-        {
+        private byte[] Bytes(int kind) {
             ProtoReader inside = Inside(kind);
             var copy = new byte[inside.end - inside.at];
             Array.Copy(bytes, inside.at, copy, 0, copy.Length);
             return copy;
         }
 
-        private void Floats(int kind, List<float> values)
-        {
+        private void Floats(int kind, List<float> values) {
             ProtoReader inside = Inside(kind);
             while (inside.at < inside.end) values.Add(BitConverter.ToSingle(bytes, inside.Take(4)));
         }
 
-        private void SignedNumbers(int kind, List<int> values)
-        {
+        private void SignedNumbers(int kind, List<int> values) {
             ProtoReader inside = Inside(kind);
-            while (inside.at < inside.end)
-            {
+            while (inside.at < inside.end) {
                 ulong coded = inside.Varint(); // zigzag
                 values.Add((int)(coded >> 1) ^ -(int)(coded & 1));
             }
         }
 
-        private void Skip(int kind)
-        {
+        private void Skip(int kind) {
             if (kind == 2) Inside(kind);
             else Number(kind);
         }

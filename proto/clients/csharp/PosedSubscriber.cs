@@ -6,10 +6,8 @@ using System.Net.Sockets;
 using System.Text;
 using System.Threading;
 
-namespace Posed
-{
-    public sealed class PosedSubscriber : IDisposable
-    {
+namespace Posed {
+    public sealed class PosedSubscriber : IDisposable {
         private const int LongestMessage = 1 << 20;
         private const int RetryMs = 1000;
         private const int SilenceMs = 5000; // stats come every second, whatever the streams do
@@ -26,8 +24,7 @@ namespace Posed
         // Why there is no connection, for people; "" while there is one.
         public string Problem { get; private set; }
 
-        public PosedSubscriber(string host, int port, string stream)
-        {
+        public PosedSubscriber(string host, int port, string stream) {
             this.host = host;
             this.port = port;
             this.stream = stream;
@@ -37,10 +34,8 @@ namespace Posed
         }
 
         // The newest pose, once, with its skeleton; false while there is no newer one. Any thread.
-        public bool TryTake(out PosedFrame frame, out PosedSkeleton itsSkeleton)
-        {
-            lock (gate)
-            {
+        public bool TryTake(out PosedFrame frame, out PosedSkeleton itsSkeleton) {
+            lock (gate) {
                 frame = newest;
                 itsSkeleton = skeleton;
                 if (frame == null || skeleton == null || skeleton.Id != frame.SkeletonId
@@ -50,36 +45,25 @@ namespace Posed
             }
         }
 
-        public void Dispose()
-        {
+        public void Dispose() {
             stopped = true;
-            lock (gate)
-            {
-                if (connection != null) connection.Close();
-            }
+            lock (gate) connection?.Close();
             thread.Join(RetryMs);
         }
 
-        private void Run()
-        {
-            while (!stopped)
-            {
-                try
-                {
+        private void Run() {
+            while (!stopped) {
+                try {
                     Receive();
-                }
-                catch (Exception error) // whatever it is, it is tried again
-                {
+                } catch (Exception error) { // whatever it is, it is tried again
                     Problem = error.Message;
                 }
                 for (int waited = 0; waited < RetryMs && !stopped; waited += 50) Thread.Sleep(50);
             }
         }
 
-        private void Receive()
-        {
-            using (var client = new TcpClient(host, port))
-            {
+        private void Receive() {
+            using (var client = new TcpClient(host, port)) {
                 client.NoDelay = true;
                 client.ReceiveTimeout = SilenceMs;
                 lock (gate) connection = client;
@@ -89,8 +73,7 @@ namespace Posed
                 Subscribe(wire, "skeleton/" + stream);
                 Subscribe(wire, "stats");
                 Problem = "";
-                while (!stopped)
-                {
+                while (!stopped) {
                     bool more;
                     byte[] topic = ReadFrame(wire, out more);
                     if (!more) continue;
@@ -101,24 +84,19 @@ namespace Posed
             }
         }
 
-        private void Take(string topic, byte[] body)
-        {
+        private void Take(string topic, byte[] body) {
             // A subscription is a prefix: "walker" also brings "walker-raw".
-            if (topic == "pose/" + stream)
-            {
+            if (topic == "pose/" + stream) {
                 PosedFrame frame = ProtoReader.ReadFrame(body);
                 lock (gate) newest = frame;
-            }
-            else if (topic == "skeleton/" + stream)
-            {
+            } else if (topic == "skeleton/" + stream) {
                 PosedSkeleton read = ProtoReader.ReadSkeleton(body);
                 lock (gate) skeleton = read;
             }
         }
 
         // Greeting: signature, version 3.0, mechanism NULL; then READY with the kind of socket.
-        private static void Greet(Stream wire)
-        {
+        private static void Greet(Stream wire) {
             var greeting = new byte[64];
             greeting[0] = 0xFF;
             greeting[9] = 0x7F;
@@ -127,8 +105,7 @@ namespace Posed
             wire.Write(greeting, 0, greeting.Length);
             byte[] theirs = ReadBytes(wire, greeting.Length);
             if (theirs[0] != 0xFF || theirs[10] < 3) throw new IOException("no ZeroMQ of version 4 or later answers");
-            if (Encoding.ASCII.GetString(theirs, 12, 5) != "NULL\0")
-            {
+            if (Encoding.ASCII.GetString(theirs, 12, 5) != "NULL\0") {
                 throw new IOException("the daemon wants a key; this client has none: use a daemon or relay on loopback");
             }
             byte[] ready = Encoding.ASCII.GetBytes("\x05READY\x0BSocket-Type\0\0\0\x03SUB");
@@ -137,13 +114,11 @@ namespace Posed
             ReadFrame(wire, out more); // their READY
         }
 
-        private static void Subscribe(Stream wire, string topic)
-        {
+        private static void Subscribe(Stream wire, string topic) {
             Send(wire, 0x00, Encoding.UTF8.GetBytes("\x01" + topic));
         }
 
-        private static void Send(Stream wire, byte flags, byte[] body)
-        {
+        private static void Send(Stream wire, byte flags, byte[] body) {
             if (body.Length > 255) throw new IOException("the stream's name is too long");
             var frame = new byte[2 + body.Length];
             frame[0] = flags;
@@ -153,8 +128,7 @@ namespace Posed
         }
 
         // Flags (1: more parts follow, 2: eight bytes of length), length, content.
-        private static byte[] ReadFrame(Stream wire, out bool more)
-        {
+        private static byte[] ReadFrame(Stream wire, out bool more) {
             int flags = ReadBytes(wire, 1)[0];
             ulong size = 0;
             foreach (byte part in ReadBytes(wire, (flags & 2) != 0 ? 8 : 1)) size = size << 8 | part;
@@ -163,11 +137,9 @@ namespace Posed
             return ReadBytes(wire, (int)size);
         }
 
-        private static byte[] ReadBytes(Stream wire, int count)
-        {
+        private static byte[] ReadBytes(Stream wire, int count) {
             var bytes = new byte[count];
-            for (int got = 0; got < count;)
-            {
+            for (int got = 0; got < count;) {
                 int now = wire.Read(bytes, got, count - got);
                 if (now <= 0) throw new IOException("the daemon has closed the connection");
                 got += now;

@@ -382,6 +382,30 @@ TEST_CASE("mvn: the centre of mass is a sample of its body") {
   CHECK(session.damaged() == 0);
 }
 
+TEST_CASE("mvn: a frame carries the time code of its sample or of the one before") {
+  KnownSession session(10);
+  const auto timecode_of_frame = [&](std::uint32_t sample) {
+    session.sink.clear();
+    session.feed(test::mvn_datagram(Type::kQuaternion, sample));
+    REQUIRE(session.sink.frames.size() == 1);
+    return std::string(view_of(session.sink.frames[0].timecode));
+  };
+  const auto tell = [&](std::uint32_t sample, std::string_view text) {
+    session.feed(encode_datagram(test::mvn_head(Type::kTimeCode, sample, false),
+                                 std::as_bytes(std::span(text))));
+  };
+  CHECK(timecode_of_frame(11).empty());
+  tell(12, "01:02:03.004");
+  CHECK(timecode_of_frame(12) == "01:02:03.004");
+  CHECK(timecode_of_frame(13) == "01:02:03.004");  // its own comes behind it
+  CHECK(timecode_of_frame(14).empty());            // MVN has stopped sending it
+  tell(15, std::string_view("01:02:03.034\0", 13));
+  CHECK(timecode_of_frame(15) == "01:02:03.034");
+  tell(16, "no time code");
+  CHECK(timecode_of_frame(16).empty());
+  CHECK(session.damaged() == 0);
+}
+
 TEST_CASE("mvn: more characters than there is room for are counted") {
   MvnSession session;
   for (std::uint32_t round = 0; round < 25; ++round) {

@@ -124,6 +124,31 @@ TEST_CASE("every NatNet version, there and back, told or found out") {
   }
 }
 
+TEST_CASE("all bodies of a NatNet packet carry its timecode") {
+  NatNetEmulator emulator(Settings{});
+  NatNetRig rig;
+  REQUIRE(rig.feed(next(emulator)) == Outcome::kOk);  // the bodies
+  const auto& person = static_cast<const natnet::NatNetLayout&>(rig.layout()).tables[0];
+  natnet::FramePacket packet;
+  packet.rigid_bodies.push_back({.id = natnet::kWandId, .rotation_xyzw = kIdentity});
+  natnet::SkeletonPacket& skeleton = packet.skeletons.emplace_back();
+  skeleton.id = person.id;
+  for (const auto bone : person.bone_ids) {
+    skeleton.bones.push_back({.id = person.id << 16 | bone, .rotation_xyzw = kIdentity});
+  }
+  for (const std::uint32_t timecode : {0x01020304U, 0U}) {
+    rig.sink.clear();
+    ++packet.number;
+    packet.timecode = timecode;
+    const natnet::Reading reading{.version = Settings{}.version, .timestamp = true};
+    REQUIRE(rig.feed(natnet::encode_frame(packet, reading)) == Outcome::kOk);
+    REQUIRE(rig.sink.frames.size() == 2);
+    for (const Frame& frame : rig.sink.frames) {
+      CHECK(view_of(frame.timecode) == (timecode == 0 ? "" : "01:02:03:04"));
+    }
+  }
+}
+
 TEST_CASE("NatNet's axes and skeleton coordinates come out the same") {
   for (const std::string up : {"y", "z"}) {
     for (const std::string sent : {"local", "global"}) {

@@ -83,6 +83,7 @@ TEST_CASE("a frame of another posed arrives as it was published") {
   sent.quality = Quality::kPredicted;
   sent.source = Source::kLabels;
   sent.label = {'f', 'i', 's', 't'};
+  sent.timecode = to_timecode("01:02:03:04");
   sent.label_probability = 0.75F;
   sent.lag_frames = 2;
   sent.lag_ms = 20.0F;
@@ -106,6 +107,7 @@ TEST_CASE("a frame of another posed arrives as it was published") {
   CHECK(got.quality == Quality::kPredicted);
   CHECK(got.source == Source::kLabels);
   CHECK(got.label == sent.label);
+  CHECK(view_of(got.timecode) == "01:02:03:04");
   CHECK(got.label_probability == 0.75F);
   CHECK(got.lag_frames == 2);
   CHECK(got.lag_ms == 20.0F);
@@ -139,11 +141,37 @@ TEST_CASE("a pose that a silent upstream repeats is no sign of life") {
   }
   CHECK(rig.sink.frames.size() == 1);
   CHECK(rig.sink.count(Outcome::kDuplicate) == 100);
-  Frame first = rig.frame(9);  // but who comes later sees it once
-  first.quality = Quality::kStale;
-  rig.feed(first);
-  REQUIRE(rig.sink.frames.size() == 2);
-  CHECK(rig.sink.frames[1].quality == Quality::kStale);
+}
+
+TEST_CASE("who connects to a silent upstream hears no frame until it speaks again") {
+  ChainRig rig;
+  rig.describe();
+  Frame stale = rig.frame(9);
+  stale.quality = Quality::kStale;
+  for (int i = 0; i < 3; ++i) rig.feed(stale);
+  CHECK(rig.sink.frames.empty());
+  CHECK(rig.sink.count(Outcome::kDuplicate) == 3);
+  rig.feed(rig.frame(10));
+  CHECK(rig.sink.frames.size() == 1);
+}
+
+TEST_CASE("a skeleton of another stream than the topic says is foreign") {
+  ChainRig rig;
+  v1::Skeleton message = message::skeleton_message("bob", rig.hand, 100.0);
+  const auto feed = [&](const std::string& body) {
+    rig.decoder->feed(join_message("skeleton/walker", body), 0, rig.sink);
+  };
+  feed(message.SerializeAsString());
+  CHECK(rig.sink.count(Outcome::kForeign) == 1);
+  CHECK(rig.sink.described.empty());
+  message.set_stream(kStream);
+  const std::string good = message.SerializeAsString();
+  feed(good + std::string("\x0A\x03"
+                          "bob"));  // protobuf takes the last one of a field
+  CHECK(rig.sink.count(Outcome::kForeign) == 2);
+  feed(good);
+  CHECK(rig.sink.count(Outcome::kForeign) == 2);
+  CHECK_FALSE(rig.sink.described.empty());
 }
 
 TEST_CASE("poses without their skeleton, and other topics, are foreign") {
@@ -223,6 +251,7 @@ void check_as_protobuf(const UpstreamFrame& got, const v1::Frame& expected) {
   CHECK(got.skeleton_id == expected.skeleton_id());
   CHECK(got.quality == static_cast<std::uint64_t>(expected.quality()));
   CHECK(got.label == expected.label());
+  CHECK(got.timecode == expected.timecode());
   CHECK(got.label_probability == expected.label_probability());
   CHECK(got.lag_frames == expected.lag_frames());
   CHECK(got.lag_ms == expected.lag_ms());
@@ -253,6 +282,7 @@ TEST_CASE("the reader finds what protobuf finds, in packed and unpacked lists") 
     message.mutable_validity()->assign(random() % 97, '\1');
     message.set_quality(static_cast<v1::Quality>(random() % 4));
     if (random() % 2 == 0) message.set_label("fist");
+    if (random() % 2 == 0) message.set_timecode("10:20:30.400");
     message.set_label_probability(real());
     message.set_lag_frames(random());
     message.set_lag_ms(real());

@@ -91,10 +91,11 @@ TEST_CASE("messages that cannot be chunks are counted") {
   REQUIRE(net::send_part(rig.publisher.get(), "1", true));
   REQUIRE(net::send_part(rig.publisher.get(), "2", false));
   rig.publish("pose/ann", std::string(kMaxChunk - 4, 'x'));
+  rig.publish("pose/ann", std::string(8 * kMaxChunk, 'x'));
   rig.publish("pose/ann", "good");
   const Chunk chunk = rig.next();
   CHECK(text_of(chunk).ends_with("good"));
-  CHECK(chunk.damaged == 3);
+  CHECK(chunk.damaged == 4);
 }
 
 TEST_CASE("the end of the connection is told behind the last message") {

@@ -14,6 +14,8 @@ namespace UnityEngine
             this.z = z;
         }
 
+        public float magnitude { get { return (float)Math.Sqrt(x * x + y * y + z * z); } }
+
         public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
         public static Vector3 operator -(Vector3 a, Vector3 b) { return new Vector3(a.x - b.x, a.y - b.y, a.z - b.z); }
         public static Vector3 operator *(Vector3 a, float s) { return new Vector3(a.x * s, a.y * s, a.z * s); }

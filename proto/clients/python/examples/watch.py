@@ -23,7 +23,8 @@ try:
                       server_key=options.server_key) as client:
         for number, frame in enumerate(client.frames(options.timeout), start=1):
             age = "" if frame.age_s is None else f", {frame.age_s * 1000:.1f} ms old"
-            print(f"{frame.stream} {frame.sequence}{age}")
+            timecode = frame.timecode and f", {frame.timecode}"
+            print(f"{frame.stream} {frame.sequence}{age}{timecode}")
             for name, place in frame.positions_m().items():
                 print(f"  {name} {text(place)}")
             for name, place in frame.tips_m().items():

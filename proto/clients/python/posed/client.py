@@ -28,6 +28,7 @@ class Frame:
         self.age_s = age_s
         self.stream = message.stream
         self.sequence = message.sequence
+        self.timecode = message.timecode  # "hh:mm:ss:ff" or "hh:mm:ss.mmm"; "" where there is none
         self.root_m = tuple(message.root_position_m)
         values = message.rotation_xyzw
         self.rotations = [tuple(values[i:i + 4]) for i in range(0, len(values), 4)]

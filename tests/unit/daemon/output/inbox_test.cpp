@@ -2,6 +2,12 @@
 
 #include <catch2/catch.hpp>
 
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <thread>
+#include <vector>
+
 #include "daemon/output/rate_limit.hpp"
 #include "tests/unit/daemon/output/output_rig.hpp"
 
@@ -29,6 +35,37 @@ struct InboxRig {
     });
     return text;
   }
+};
+
+// Skeletons that, when they are freed, let another thread use the inbox.
+class FreedSkeletons {
+ public:
+  explicit FreedSkeletons(Inbox& inbox) : inbox_(inbox) {}
+
+  [[nodiscard]] std::shared_ptr<const Skeleton> make() {
+    return {new Skeleton, [this](const Skeleton* skeleton) {
+              delete skeleton;
+              note();
+            }};
+  }
+  int freed = 0, under_the_lock = 0;
+
+ private:
+  void note() {
+    ++freed;
+    const auto done = std::make_shared<std::atomic<bool>>(false);
+    others_.emplace_back([this, done] {
+      inbox_.sample({});
+      *done = true;
+    });
+    for (int i = 0; i < 500 && !*done; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    if (!*done) ++under_the_lock;
+  }
+
+  Inbox& inbox_;
+  std::vector<std::jthread> others_;
 };
 
 }  // namespace
@@ -85,6 +122,23 @@ TEST_CASE("the frames of a stream that leaves or returns otherwise are not sent 
   CHECK(rig.taken().empty());
   CHECK(rig.delivery.streams[2] == nullptr);
   CHECK(rig.inbox.dropped() == 2);
+}
+
+TEST_CASE("an inbox frees nothing while it is locked") {
+  InboxRig rig;
+  FreedSkeletons skeletons(rig.inbox);
+  rig.inbox.stream_comes(info_of(3, "ann", skeletons.make()));
+  rig.inbox.stream_leaves(3);
+  CHECK(skeletons.freed == 1);
+  rig.inbox.stream_comes(info_of(4, "ann", skeletons.make()));
+  rig.inbox.stream_comes(info_of(5, "ann", skeletons.make()));
+  CHECK(skeletons.freed == 2);
+  rig.inbox.take(rig.delivery);
+  rig.inbox.stream_leaves(5);
+  CHECK(skeletons.freed == 2);  // the delivery still has it
+  rig.inbox.take(rig.delivery);
+  CHECK(skeletons.freed == 3);
+  CHECK(skeletons.under_the_lock == 0);
 }
 
 TEST_CASE("only the newest sample of the body waits") {

@@ -1,0 +1,17 @@
+// Upkeep: a transport whose link needs something now and then that costs more system calls than the
+// reader thread may make. The device's supervisor thread does it.
+#pragma once
+
+#include <cstdint>
+
+namespace posed::drivers {
+
+class Upkeep {
+ public:
+  virtual ~Upkeep() = default;
+
+  // Call it a few times a second, from one thread; another one may read and send meanwhile. Cold.
+  virtual void upkeep(std::int64_t now_ns) noexcept = 0;
+};
+
+}  // namespace posed::drivers
