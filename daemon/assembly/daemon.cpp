@@ -11,6 +11,7 @@
 #include "daemon/assembly/body_streams.hpp"
 #include "daemon/assembly/output_threads.hpp"
 #include "daemon/control/control_server.hpp"
+#include "daemon/control/trigger_server.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/device_supervisor.hpp"
 #include "daemon/net/peer_guard.hpp"
@@ -75,6 +76,12 @@ class Daemon::Parts final : public control::DaemonControl {
   void model_in_use(std::uint32_t stream, const std::string& name) override {
     publisher->set_model_name(stream, name);
   }
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
+    if (hooks.record_sink != nullptr) return hooks.record_sink->mark_take(mark);
+    return fail(
+        "the daemon is not recording; start it with `posed record` or a [record] table in its"
+        " config");
+  }
   void fill(v1::Stats& stats) override { stats = publisher->stats(); }
   void stop() override { stop_asked.store(true); }
 
@@ -99,6 +106,7 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
   std::unique_ptr<control::ControlServer> control;
+  std::unique_ptr<control::TriggerServer> trigger;  // null: the config has no [trigger]
   std::thread publisher_thread, worker_thread, reader_thread;
   std::vector<std::unique_ptr<devices::DeviceSupervisor>> supervisors;
 
@@ -303,6 +311,12 @@ Result<> Daemon::Parts::start_threads() {
                                               *handler);
   if (!server) return std::unexpected(server.error());
   control = std::move(*server);
+  if (config.trigger) {
+    auto listening =
+        control::TriggerServer::start(config.trigger->listen, config.trigger->peers, *this);
+    if (!listening) return std::unexpected(listening.error());
+    trigger = std::move(*listening);
+  }
   outputs->start([this](std::optional<std::uint32_t> stream, const std::string& text) {
     if (stream) return publisher->post_event(*stream, v1::Event::KIND_WARNING, text);
     spdlog::warn("{}", text);
@@ -370,6 +384,7 @@ void Daemon::Parts::halt() noexcept {
   if (bodies) bodies->stop();
   if (worker) worker->stop();
   if (worker_thread.joinable()) worker_thread.join();
+  trigger.reset();
   control.reset();
   if (publisher) publisher->stop();
   if (publisher_thread.joinable()) publisher_thread.join();

@@ -8,6 +8,7 @@
 #include "daemon/config/config_file.hpp"
 #include "daemon/config/output_tables.hpp"
 #include "daemon/config/stream_tables.hpp"
+#include "daemon/config/take_tables.hpp"
 #include "models/stages/registry.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
@@ -114,13 +115,16 @@ void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonCo
   }
   read_streams(root, file, config);
   read_outputs(root, file, config);
+  read_record(root, file, config);
+  read_trigger(root, config);
   root.finish();
 }
 
-// Every key that a config may have, found by reading a config that has every table. [[output]] is
-// left out: who misplaces a key of its names (body, listen) means that of a stream or source.
+// Every key that a config may have, found by reading a config that has every table. [[output]]
+// and [trigger] are left out: who misplaces a key of their names (body, listen) means that of a
+// stream or source.
 std::set<std::string> all_keys(Drivers drivers) {
-  std::string text = "[publish]\n[control]\n[security]\n[[security.client]]\n";
+  std::string text = "[publish]\n[control]\n[security]\n[[security.client]]\n[record]\n";
   for (const drivers::Driver& driver : drivers) {
     const char* table = driver.make_layout == nullptr ? "stream" : "source";
     text += fmt::format("[[{0}]]\ndriver = \"{1}\"\n[{0}.{1}]\n", table, driver.name);

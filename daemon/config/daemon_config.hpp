@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -81,6 +82,19 @@ struct OutputConfig {
   bool header = false;                    // clients get a BVH's HIERARCHY first
 };
 
+// `posed run` records from its start.
+struct RecordConfig {
+  std::filesystem::path folder = "takes";  // of the logs, which are named after their time
+  bool frames = false;                     // keep the published frames, too
+  bool clips = false;                      // each take of each stream as a BVH, when it ends
+};
+
+// Where capture systems say that a recording begins or ends.
+struct TriggerConfig {
+  std::string listen = "127.0.0.1:1512";  // address and port, UDP
+  std::vector<std::string> peers;         // addresses that may send; empty: this machine
+};
+
 // Who may connect; without a server key CURVE is off.
 struct SecurityConfig {
   std::filesystem::path server_key;  // NAME.key; empty: no CURVE
@@ -97,6 +111,8 @@ struct DaemonConfig {
   std::vector<StreamConfig> streams;  // of devices with one body
   std::vector<SourceConfig> sources;
   std::vector<OutputConfig> outputs;
+  std::optional<RecordConfig> record;
+  std::optional<TriggerConfig> trigger;
   // How many streams there may be at once, with those that come while the daemon runs. Memory is
   // set aside for all of them only if there is a source.
   int max_streams = 64;

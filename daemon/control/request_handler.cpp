@@ -58,6 +58,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
     if (request.has_status()) daemon_control_.fill(*reply.mutable_status());
     return make_reply(std::move(requester), reply);
   }
+  if (request.has_take()) return mark_take(request, std::move(requester));
   const std::scoped_lock lock(mutex_);
   switch (request.request_case()) {
     case v1::ControlRequest::kSetParameter:
@@ -85,6 +86,23 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   }
   if (!done) return refusal(std::move(requester), done.error().text());
   return std::nullopt;  // acknowledge() makes the reply
+}
+
+Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester requester) {
+  const auto& wanted = request.take();
+  if (!wanted.start() && !wanted.name().empty()) {
+    return refusal(std::move(requester), "a take gets its name when it begins; leave it out here");
+  }
+  if (auto fine = pipeline::check_take_name(wanted.name()); !fine) {
+    return refusal(std::move(requester), fine.error().text());
+  }
+  const auto take = daemon_control_.mark_take(
+      {.start = wanted.start(), .time_ns = clock_(), .name = wanted.name()});
+  if (!take) return refusal(std::move(requester), take.error().text());
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  *reply.mutable_take() = pipeline::stats_of(*take);
+  return make_reply(std::move(requester), reply);
 }
 
 bool RequestHandler::is_earlier(Streams::iterator stream) const {

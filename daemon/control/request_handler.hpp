@@ -19,6 +19,7 @@
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/stream_settings.hpp"
+#include "daemon/pipeline/take.hpp"
 #include "daemon/system/clock.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
@@ -72,6 +73,8 @@ class DaemonControl {
   virtual void keep_model(std::span<const std::byte> bytes) = 0;
   // A model has taken effect; `stats` should report its name.
   virtual void model_in_use(std::uint32_t stream, const std::string& name) = 0;
+  // Marks a take in the log; fails if the daemon is not recording. Any cold thread.
+  [[nodiscard]] virtual Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) = 0;
   virtual void fill(v1::Stats& stats) = 0;
   virtual void stop() = 0;  // starts the daemon's shutdown; returns at once
 };
@@ -141,6 +144,7 @@ class RequestHandler {
   [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
                                    const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);
+  [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
   [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
   // Whether the slot has a later generation.
   [[nodiscard]] bool is_earlier(Streams::iterator stream) const;

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/take.hpp"
 
 namespace posed::pipeline {
 
@@ -51,6 +52,10 @@ class RecordSink {
   // Control thread, before the command that names the model: keeps the bytes of a model file under
   // their SHA-256. Cold: allocates and locks.
   virtual void keep_model(std::span<const std::byte> bytes) = 0;
+
+  // Any cold thread: marks the beginning or the end of a take, behind the last chunk that was read
+  // before the newest one. Returns the take that began or ended. Allocates and locks.
+  [[nodiscard]] virtual Result<Take> mark_take(const TakeMark& mark) = 0;
 };
 
 }  // namespace posed::pipeline

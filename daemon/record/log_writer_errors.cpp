@@ -40,14 +40,11 @@ void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
     tally.lost_from_frame =
         std::min(tally.lost_from_frame, std::exchange(tally.uncommitted_from_frame, kNoFrame));
   });
-  RecorderEvent event{.kind = RecorderEvent::Kind::kError,
-                      .streams = {},
-                      .time_ns = now_ns,
-                      .text = "recording stopped, streaming continues: " + error.text()};
-  for (SourceState& source : sources_) {
-    source.last_chunk = source.committed_chunk;
-    event.streams.insert(event.streams.end(), source.streams.begin(), source.streams.end());
-  }
+  const RecorderEvent event{.kind = RecorderEvent::Kind::kError,
+                            .streams = streams_now(),
+                            .time_ns = now_ns,
+                            .text = "recording stopped, streaming continues: " + error.text()};
+  for (SourceState& source : sources_) source.last_chunk = source.committed_chunk;
   spdlog::error("{}", event.text);
   report_(event);
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <spdlog/spdlog.h>
+
 #include "daemon/record/decision_code.hpp"
 
 namespace posed::record {
@@ -52,6 +54,7 @@ void LogWriterLoop::drain(std::int64_t now_ns) {
           std::span<const std::byte> bytes) { put_chunk(header, positions, bytes, now_ns); });
   for (auto& model : rings_.take_models()) models_.push_back(std::move(model));
   take_streams();  // also those all of whose records were lost
+  take_changes();
 }
 
 void LogWriterLoop::take_streams() {
@@ -59,6 +62,26 @@ void LogWriterLoop::take_streams() {
     const std::uint32_t id = stream.id, source = stream.source;
     add_stream(id, source, std::move(stream));
   }
+}
+
+// A take's row waits for the next commit that works, so a full disk costs no take.
+void LogWriterLoop::take_changes() {
+  for (TakeChange& change : rings_.take_changes()) {
+    spdlog::info("{}", change.text);
+    report_({.kind = RecorderEvent::Kind::kTake,
+             .streams = streams_now(),
+             .time_ns = change.time_ns,
+             .text = std::move(change.text)});
+    takes_.insert_or_assign(change.row.id, std::move(change.row));
+  }
+}
+
+std::vector<std::uint32_t> LogWriterLoop::streams_now() const {
+  std::vector<std::uint32_t> streams;
+  for (const SourceState& source : sources_) {
+    streams.insert(streams.end(), source.streams.begin(), source.streams.end());
+  }
+  return streams;
 }
 
 void LogWriterLoop::add_stream(std::uint32_t id, std::uint32_t source,
@@ -192,9 +215,13 @@ Result<> LogWriterLoop::commit(std::int64_t now_ns) {
   for (const auto& model : models_) {
     if (auto kept = writer_->add_blob(model); !kept) return std::unexpected(kept.error());
   }
+  for (const auto& [number, take] : takes_) {
+    if (auto done = writer_->add(take); !done) return done;
+  }
   if (auto done = write_stream_rows(); !done) return done;
   if (auto done = writer_->commit(); !done) return done;
   models_.clear();
+  takes_.clear();
   for (SourceState& source : sources_) source.committed_chunk = source.last_chunk;
   for (auto& [id, stream] : streams_) {
     if (stream.named) stream.row.reset();

@@ -23,9 +23,10 @@ namespace posed::record {
 
 // An event of the recorder that a person should know about.
 struct RecorderEvent {
-  enum class Kind : std::uint8_t { kGap, kError };
+  enum class Kind : std::uint8_t { kGap, kError, kTake };
   Kind kind = Kind::kGap;
-  // Which it concerns: those that a source has now if it lacks chunks; all of them for an error.
+  // Which it concerns: those that a source has now if it lacks chunks; all of them for an error and
+  // for a take.
   std::vector<std::uint32_t> streams;
   std::int64_t time_ns = 0;
   std::string text;
@@ -93,6 +94,8 @@ class LogWriterLoop {
   [[nodiscard]] Result<log::GapRow> gap_row(const Tally& tally, std::uint64_t lost,
                                             std::int64_t now_ns, std::uint64_t from_frame) const;
   void take_streams();
+  void take_changes();
+  [[nodiscard]] std::vector<std::uint32_t> streams_now() const;
   void add_stream(std::uint32_t id, std::uint32_t source, std::optional<RecordedStream> row);
   // The state of a stream that a record names; null if it was never added. `item`: from which on
   // the record proves that the stream is there; 0: it does not say.
@@ -122,6 +125,7 @@ class LogWriterLoop {
   std::map<std::uint32_t, StreamState> streams_;  // by id
   std::vector<log::StreamPosition> places_;       // of the chunk that is written
   std::vector<std::vector<std::byte>> models_;    // not yet committed
+  std::map<std::int64_t, log::TakeRow> takes_;    // by number; those not yet committed as they are
   std::int64_t last_commit_ns_ = 0;
   std::int64_t retry_ns_ = 0;        // when to try again
   std::int64_t retry_after_ns_ = 0;  // grows while attempts fail

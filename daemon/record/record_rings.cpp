@@ -59,6 +59,7 @@ void RecordRings::add_stream(RecordedStream stream) {
 void RecordRings::chunk(std::uint32_t number, std::uint8_t socket, pipeline::Direction direction,
                         std::int64_t arrival_ns, const pipeline::Position& next,
                         std::span<const std::byte> bytes) noexcept {
+  newest_item_.store(next.item, kRelaxed);
   Source& source = sources_[number];
   const auto positions = std::as_bytes(next.streams);
   const ChunkHeader header{.bytes = static_cast<std::uint32_t>(positions.size() + bytes.size()),
@@ -110,6 +111,10 @@ void RecordRings::unpublished(std::uint32_t id) noexcept {
 void RecordRings::keep_model(std::span<const std::byte> bytes) {
   const std::lock_guard lock(added_mutex_);
   models_.emplace_back(bytes.begin(), bytes.end());
+}
+
+Result<pipeline::Take> RecordRings::mark_take(const pipeline::TakeMark& mark) {
+  return takes_.mark(mark, newest_item_.load(kRelaxed));
 }
 
 std::vector<std::vector<std::byte>> RecordRings::take_models() {

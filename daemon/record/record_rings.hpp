@@ -12,6 +12,7 @@
 #include <deque>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,6 +23,7 @@
 #include "daemon/record/record_ring.hpp"
 #include "daemon/record/recorded_stream.hpp"
 #include "daemon/record/ring_sizes.hpp"
+#include "daemon/record/takes.hpp"
 #include "proto/log/rows.hpp"
 
 namespace posed::record {
@@ -101,6 +103,10 @@ class RecordRings final : public pipeline::RecordSink {
                  std::span<const std::byte> bytes) noexcept override;
   void unpublished(std::uint32_t stream) noexcept override;
   void keep_model(std::span<const std::byte> bytes) override;
+  // A take has the chunks from the newest one at its beginning up to the one before the newest at
+  // its end, with all their items. So two takes in a row have each item once.
+  [[nodiscard]] Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override;
+  [[nodiscard]] std::optional<pipeline::Take> running_take() const { return takes_.running(); }
 
   // Called by the recorder thread for what is there now: each(header, positions, bytes),
   // each(header, bytes) or each(record).
@@ -132,6 +138,7 @@ class RecordRings final : public pipeline::RecordSink {
   }
   [[nodiscard]] std::vector<std::vector<std::byte>> take_models();
   [[nodiscard]] std::vector<RecordedStream> take_streams();
+  [[nodiscard]] std::vector<TakeChange> take_changes() { return takes_.take_changes(); }
 
   [[nodiscard]] std::size_t sources() const noexcept { return sources_.size(); }
   // Any thread.
@@ -174,7 +181,9 @@ class RecordRings final : public pipeline::RecordSink {
   std::deque<Source> sources_;                       // by number
   std::deque<Slot> slots_;                           // by slot
   std::vector<pipeline::StreamPosition> positions_;  // of the chunk that the recorder has
-  std::mutex added_mutex_;                           // of the following, and of adding to a slot
+  std::atomic<std::uint64_t> newest_item_{1};        // the first of the newest chunk
+  Takes takes_;
+  std::mutex added_mutex_;  // of the following, and of adding to a slot
   std::vector<std::vector<std::byte>> models_;
   std::vector<RecordedStream> streams_;
 };

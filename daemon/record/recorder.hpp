@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -57,6 +58,7 @@ class Recorder {
   [[nodiscard]] Result<> finish();
 
   // Any thread.
+  [[nodiscard]] std::optional<pipeline::Take> running_take() const { return rings_.running_take(); }
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return log_writer_.lost_chunks(); }
   [[nodiscard]] std::uint64_t errors() const noexcept { return log_writer_.errors(); }
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }

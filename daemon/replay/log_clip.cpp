@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/replay/log_takes.hpp"
 #include "daemon/replay/replay.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/reader.hpp"
@@ -104,6 +105,8 @@ class Collector {
     clip_.add(frame);
   }
 
+  [[nodiscard]] std::size_t frames() const { return arrival_ns_.size(); }
+
   [[nodiscard]] Result<clip::Clip> finish(const std::string& path, double rate_hz) const {
     auto clip = clip_.finish(path, rate_hz, times_s());
     if (clip && missing_ > 0) {
@@ -137,11 +140,74 @@ class Collector {
   std::vector<std::int64_t> arrival_ns_, device_ns_;
 };
 
+// By stream, the name of its clip: that of the stream, or "walker#2" if its skeleton changes.
+std::map<std::uint32_t, std::string> clip_names(const Replay& replay) {
+  std::map<std::uint32_t, std::string> names;
+  for (const auto& [name, ids] : parts_by_name(replay)) {
+    const bool one = check_same_skeleton(replay, name, ids, {}).has_value();
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      names[ids[i]] = one ? name : name + "#" + std::to_string(i + 1);
+    }
+  }
+  return names;
+}
+
+// Collects one take after the other.
+class TakeCollector {
+ public:
+  TakeCollector(const Replay& replay, std::vector<log::TakeRow> takes, std::string file,
+                const EachTakeClip& each)
+      : replay_(replay),
+        takes_(std::move(takes)),
+        file_(std::move(file)),
+        each_(each),
+        names_(clip_names(replay)) {}
+
+  void take(const pipeline::Item& item) {
+    while (next_ < takes_.size() && replay_.position() > takes_[next_].last_item) end_take();
+    const auto name = names_.find(item.frame.header.stream);
+    if (item.kind != pipeline::Item::Kind::kFrame || name == names_.end()) return;
+    if (next_ == takes_.size() || !holds(takes_[next_], replay_.position())) return;
+    collectors_.try_emplace(name->second, replay_.stream(name->first).published)
+        .first->second.take(item.frame);
+    rate_hz_[name->second] = replay_.stream(name->first).description.rate_hz;
+  }
+  void finish() {
+    while (next_ < takes_.size()) end_take();
+  }
+
+ private:
+  void end_take() {
+    for (const auto& [name, collector] : collectors_) {
+      if (collector.frames() < 2) continue;  // no clip
+      each_(takes_[next_], name, collector.finish(file_, rate_hz_[name]));
+    }
+    collectors_.clear();
+    ++next_;
+  }
+
+  const Replay& replay_;
+  std::vector<log::TakeRow> takes_;  // in their order; they do not overlap
+  std::string file_;
+  const EachTakeClip& each_;
+  std::map<std::uint32_t, std::string> names_;  // of the clips, by stream
+  std::map<std::string, Collector> collectors_;
+  std::map<std::string, double> rate_hz_;  // as collectors_
+  std::size_t next_ = 0;                   // the take that is collected
+};
+
 }  // namespace
 
-Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::string& stream) {
+Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::string& stream,
+                               const std::string& wanted_take) {
   auto reader = log::Reader::open(path);
   if (!reader) return std::unexpected(reader.error());
+  log::TakeRow interval{.name = {}, .last_item = log::kToTheEnd};
+  if (!wanted_take.empty()) {
+    auto found = find_take(*reader, wanted_take);
+    if (!found) return std::unexpected(found.error());
+    interval = std::move(*found);
+  }
   auto opened = Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   Replay& replay = **opened;
@@ -150,13 +216,20 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   const ReplayStream& first = replay.stream(ids->front());
   Collector collector(first.published);
   const auto take = [&](const pipeline::Item& item) {
-    if (item.kind == pipeline::Item::Kind::kFrame &&
+    if (item.kind == pipeline::Item::Kind::kFrame && holds(interval, replay.position()) &&
         std::ranges::find(*ids, item.frame.header.stream) != ids->end()) {
       collector.take(item.frame);
     }
   };
-  const auto done = replay.run(take, [](const log::ChunkRow&) { return true; });
+  const auto done = replay.run(
+      take, [&](const log::ChunkRow&) { return replay.position() <= interval.last_item; });
   if (!done) return std::unexpected(done.error());
+  if (!wanted_take.empty() && collector.frames() < 2) {
+    return fail("take " + std::to_string(interval.id) + " has " +
+                    std::to_string(collector.frames()) + " frames of stream " +
+                    in_quotes(first.name) + ", and a clip needs two",
+                path.string());
+  }
   auto clip = collector.finish(path.string(), first.description.rate_hz);
   if (!clip) return clip;
   for (const std::uint32_t id : *ids) {
@@ -167,6 +240,26 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
     break;
   }
   return clip;
+}
+
+Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
+                        const std::function<bool()>& goes_on) {
+  auto reader = log::Reader::open(path);
+  if (!reader) return std::unexpected(reader.error());
+  auto takes = reader->takes();
+  if (!takes) return std::unexpected(takes.error());
+  if (takes->empty()) return {};
+  auto opened = Replay::open(*reader);
+  if (!opened) return std::unexpected(opened.error());
+  TakeCollector collector(**opened, std::move(*takes), path.string(), each);
+  bool stopped = false;
+  const auto done =
+      (*opened)->run([&](const pipeline::Item& item) { collector.take(item); },
+                     [&](const log::ChunkRow&) { return !(stopped = stopped || !goes_on()); });
+  if (!done) return done;
+  if (stopped) return fail("interrupted: the log is complete, but not all of its takes are clips");
+  collector.finish();
+  return {};
 }
 
 }  // namespace posed::replay

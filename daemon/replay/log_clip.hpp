@@ -2,18 +2,32 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/log/rows.hpp"
 
 namespace posed::replay {
 
 // The stream named `stream`; the only one if that is empty. A body that came several times has
 // several parts, which become one clip; "walker#2" is the second part alone, for a body that
 // changed its skeleton. Times are those of the device if it has them, otherwise those of arrival,
-// starting from 0. `warnings` describes what the log or the run left out.
+// starting from 0. `take`: only what was published during this take of the log, by its number or
+// its name; empty: all. `warnings` describes what the log or the run left out.
 [[nodiscard]] Result<clip::Clip> clip_of_log(const std::filesystem::path& path,
-                                             const std::string& stream);
+                                             const std::string& stream,
+                                             const std::string& take = {});
+
+// `stream`: its name, with "#2" behind it for a part with a skeleton of its own.
+using EachTakeClip =
+    std::function<void(const log::TakeRow& take, const std::string& stream, Result<clip::Clip>)>;
+
+// Calls `each` with the clip of each take and stream, in the order of the takes; one replay of the
+// log makes them all, with the frames of one take in memory. Streams with fewer than two frames in
+// a take are left out. Ends with an error when `goes_on` says no.
+[[nodiscard]] Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
+                                      const std::function<bool()>& goes_on);
 
 }  // namespace posed::replay

@@ -128,6 +128,7 @@ std::optional<std::uint64_t> Replay::broken_at(std::uint32_t stream) const {
 
 void Replay::before(const pipeline::Item& item, std::uint32_t index) noexcept {
   while (const Schedule::Entry* entry = schedule_.due(item, index)) apply(*entry);
+  position_ = item.number;
 }
 
 void Replay::reach(std::uint64_t item) noexcept {

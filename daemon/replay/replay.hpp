@@ -45,6 +45,11 @@ class Replay final : private ReplayHost {
   using Pace = std::function<bool(const log::ChunkRow&)>;
   [[nodiscard]] Result<> run(const Out& out, const Pace& pace);
 
+  // During run() and afterwards: the number of the item that is handled, or of the last one. What
+  // the stages emit between two items, such as by a tick, counts to the one before. 0: before the
+  // first; in formats 1 and 2 always.
+  [[nodiscard]] std::uint64_t position() const noexcept { return position_; }
+
   // During run() and afterwards: the first frame of a stream from which the log is known to lack
   // chunks or decisions; frames from there on cannot be compared.
   [[nodiscard]] std::optional<std::uint64_t> broken_at(std::uint32_t stream) const;
@@ -77,6 +82,7 @@ class Replay final : private ReplayHost {
   std::vector<ReplayStreamContext*> gapped_;            // whose gap is still to come
   Schedule schedule_;
   const Out* out_ = nullptr;  // of the current run()
+  std::uint64_t position_ = 0;
   std::optional<Error> error_;
 };
 

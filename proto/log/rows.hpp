@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 
@@ -92,12 +93,16 @@ struct GapRow {
   std::int64_t time_ns = 0;  // when the gap was noticed
 };
 
+// The last item of a take that was still running when the recording ended: the largest number of
+// the column, so that a comparison with it needs no special case.
+inline constexpr std::uint64_t kToTheEnd = std::numeric_limits<std::int64_t>::max();
+
 // Table take: an interval marked by a user.
 struct TakeRow {
-  std::int64_t id = 0;
+  std::int64_t id = 0;  // the take's number
   std::string name;
   std::uint64_t first_item = 0;
-  std::uint64_t last_item = 0;
+  std::uint64_t last_item = 0;  // below first_item: nothing came; kToTheEnd: it was never ended
 };
 
 // Spelling of the (stage, name) of decisions.

@@ -20,7 +20,7 @@ enum Table : std::size_t { kChunk, kDecision, kFrame, kGap, kNumbered };
 constexpr std::array<const char*, kNumbered> kNames{"chunk", "decision", "frame", "gap"};
 
 // The writer's other statements.
-enum Sql : std::size_t { kSource = kNumbered, kStream, kBlob, kBegin, kCommit, kSqlCount };
+enum Sql : std::size_t { kSource = kNumbered, kStream, kTake, kBlob, kBegin, kCommit, kSqlCount };
 constexpr std::array<std::string_view, kSqlCount> kSql{
     "INSERT INTO chunk VALUES(?,?,?,?,?,?,?,?,?)",
     "INSERT INTO decision VALUES(?,?,?,?,?,?,?,?)",
@@ -28,6 +28,7 @@ constexpr std::array<std::string_view, kSqlCount> kSql{
     "INSERT INTO gap VALUES(?,?,?,?,?,?,?)",
     "INSERT INTO source VALUES(?,?,?,?,?,?,?)",
     "INSERT OR REPLACE INTO stream VALUES(?,?,?,?,?,?,?)",
+    "INSERT OR REPLACE INTO take VALUES(?,?,?,?,?)",
     "INSERT OR IGNORE INTO blob VALUES(?,?)",
     "BEGIN IMMEDIATE",
     "COMMIT",
@@ -208,6 +209,15 @@ Result<> Writer::add(const GapRow& row) {
       .bind(stored(row.lost))
       .bind(row.time_ns);
   return state_->insert(kGap);
+}
+
+Result<> Writer::add(const TakeRow& row) {
+  return state_->insert(state_->statements[kTake]
+                            .bind(row.id)
+                            .bind(row.name)
+                            .bind(stored(row.first_item))
+                            .bind(stored(row.last_item))
+                            .bind_checksum());
 }
 
 Result<std::string> Writer::add_blob(std::span<const std::byte> bytes) {

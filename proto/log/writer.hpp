@@ -33,14 +33,15 @@ class Writer {
 
   // Chunks, decisions, frames and gaps get the next id of their table; the id in the row is
   // ignored. A row of a stream that is there already is replaced: whether a commit that failed has
-  // kept it is not known. Each source and stream that a row refers to must be added before the same
-  // commit.
+  // kept it is not known. So is that of a take, which is written when it begins and when it ends.
+  // Each source and stream that a row refers to must be added before the same commit.
   [[nodiscard]] Result<> add(const SourceRow& row);
   [[nodiscard]] Result<> add(const StreamRow& row);
   [[nodiscard]] Result<> add(const ChunkRow& row);
   [[nodiscard]] Result<> add(const DecisionRow& row);
   [[nodiscard]] Result<> add(const FrameRow& row);
   [[nodiscard]] Result<> add(const GapRow& row);
+  [[nodiscard]] Result<> add(const TakeRow& row);
   // Stores the bytes once, even if added again; returns their SHA-256.
   [[nodiscard]] Result<std::string> add_blob(std::span<const std::byte> bytes);
 

@@ -49,6 +49,10 @@ class DaemonControl final : public control::DaemonControl {
   }
   void keep_model(std::span<const std::byte>) override {}
   void model_in_use(std::uint32_t stream, const std::string&) override { demand(stream <= 2); }
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
+    if (!pipeline::check_take_name(mark.name)) std::abort();
+    return pipeline::Take{.number = 1, .name = mark.name};
+  }
   void fill(v1::Stats& stats) override { stats.set_rss_bytes(1); }
   void stop() override {}
 

@@ -127,6 +127,9 @@ class Sockets final : public control::DaemonControl {
   bool send(const pipeline::DeviceCommand&) override { return true; }
   void keep_model(std::span<const std::byte>) override {}
   void model_in_use(std::uint32_t, const std::string&) override {}
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
+    return fail("not recording");
+  }
   void fill(v1::Stats&) override {}
   void stop() override {}
 

@@ -20,6 +20,7 @@
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/live_view.hpp"
 #include "daemon/control/uploads.hpp"
+#include "daemon/pipeline/take.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
@@ -43,6 +44,7 @@ struct CtlOptions {
   std::string labels;
   double tempo = 1.0;
   bool loop = false;
+  std::string take;  // name
 };
 
 Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
@@ -239,6 +241,21 @@ int haptics(const CtlOptions& options) {
   });
 }
 
+// Marks a take; prints which one has begun or ended.
+int mark_take(const CtlOptions& options, bool start) {
+  if (auto fine = pipeline::check_take_name(options.take); !fine) return report(fine.error());
+  v1::ControlRequest request;
+  request.mutable_take()->set_start(start);
+  request.mutable_take()->set_name(options.take);
+  return ask_and_print(options, request, [&](const v1::ControlReply& reply) {
+    const pipeline::Take take{.number = reply.take().number(), .name = reply.take().name()};
+    std::printf("%s %s\n", pipeline::words_of(take).c_str(), start ? "begins" : "has ended");
+  });
+}
+
+int start_take(const CtlOptions& options) { return mark_take(options, true); }
+int stop_take(const CtlOptions& options) { return mark_take(options, false); }
+
 int show_status(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_status();
@@ -359,6 +376,25 @@ void add_glove_actions(Actions& actions, CtlOptions& options) {
       ->expected(3);
 }
 
+void add_take_actions(CLI::App& command, const std::shared_ptr<CtlOptions>& options,
+                      int& exit_code) {
+  CLI::App* take = command.add_subcommand("take", "Mark a take in the recording");
+  take->require_subcommand(1)->fallthrough();
+  take->footer(
+      "Examples:\n"
+      "  posed ctl take start walk-3\n"
+      "  posed ctl take stop\n"
+      "  posed convert LOG.plog --takes       # later: what was marked");
+  Actions actions(*take, options, exit_code);
+  CLI::App* start = actions.add("start", "Begin a take, which ends the one that runs", start_take,
+                                "Example:\n  posed ctl take start walk-3\nThe daemon numbers the "
+                                "takes; names may repeat. It must be recording:\n`posed record`, "
+                                "or `posed run` with a [record] table.");
+  start->add_option("name", options->take, "Shown to people, at most 128 bytes; may be left out");
+  static_cast<void>(
+      actions.add("stop", "End the take that runs", stop_take, "Example:\n  posed ctl take stop"));
+}
+
 }  // namespace
 
 void add_ctl(CLI::App& app, int& exit_code) {
@@ -376,6 +412,7 @@ void add_ctl(CLI::App& app, int& exit_code) {
   add_style_actions(actions, *options);
   add_hand_actions(actions, *options);
   add_glove_actions(actions, *options);
+  add_take_actions(*command, options, exit_code);
   static_cast<void>(actions.add("status", "Print the daemon's state once", show_status,
                                 std::string("Examples:\n  posed ctl status\n  posed ctl --json "
                                             "status | jq .status.stream[0].state\n") +

@@ -57,6 +57,10 @@ std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
     line += fmt::format("   rec {} lost {} errors {}", clean_name(stats.recorder_file()),
                         stats.recorder_lost_chunks(), stats.recorder_errors());
   }
+  if (stats.has_take()) {
+    line += fmt::format("   take {}", stats.take().number());
+    if (!stats.take().name().empty()) line += " " + in_quotes(stats.take().name());
+  }
   return line;
 }
 

@@ -1,10 +1,12 @@
 #include <memory>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/live/serve.hpp"
+#include "daemon/cli/logs/recording.hpp"
 #include "daemon/config/config.hpp"
 
 namespace posed::cli {
@@ -14,6 +16,15 @@ Result<> run(const ServeOptions& options) {
   prepare_to_serve();
   auto config = config::load_config(options.config, drivers::registry());
   if (!config) return std::unexpected(config.error());
+  if (config->record) {
+    auto log = new_log(config->record->folder);
+    if (!log) return std::unexpected(log.error());
+    return stream_and_record({.out = std::move(*log),
+                              .frames = config->record->frames,
+                              .clips = config->record->clips,
+                              .serve = options},
+                             *config);
+  }
   auto daemon = assembly::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
   if (auto sound = check_end(**daemon, options); !sound) return sound;
@@ -35,6 +46,7 @@ void add_run(CLI::App& app, int& exit_code) {
       "SIGTERM end it cleanly. Examples:\n"
       "  posed run --config config/demo.toml\n"
       "  posed run --config mine.toml --until-end     # for clips with loop = false\n"
+      "  posed run --config mine.toml                 # with a [record] table it records, too\n"
       "  posed monitor --count 10                     # in another terminal: see the poses");
   command->callback([options, &exit_code] {
     const auto done = run(*options);

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -11,10 +12,13 @@
 #include "daemon/cli/models/waiting.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/replay/log_clip.hpp"
+#include "daemon/replay/log_takes.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -29,6 +33,8 @@ struct Convert {
   double metres_per_unit = 0.0;  // 0: not given
   std::string hand;              // "left", "right" or not given
   std::string stream;            // of a log; empty: the only one
+  std::string take;              // of a log, a number or a name; empty: all
+  bool takes = false;            // list those of a log
   bool overwrite = false, json = false;
   bool rate_given = false, shape_given = false;
 };
@@ -52,6 +58,8 @@ Result<> check_options(const Convert& convert) {
   for (const auto& checked :
        {useless(!convert.stream.empty(), is_log(convert.in),
                 "is not a device log (.plog), so --stream has no effect"),
+        useless(!convert.take.empty(), is_log(convert.in),
+                "is not a device log (.plog), so --take has no effect"),
         useless(!convert.read.asf.empty(), is_amc(convert.in),
                 "is not an AMC, so --skeleton has no effect"),
         useless(convert.rate_given, is_amc(convert.in), "is not an AMC, so --rate has no effect"),
@@ -74,7 +82,7 @@ Result<> check_options(const Convert& convert) {
 
 // A BVH file cannot store gaps or an uneven clock.
 Result<clip::Clip> read_log(const Convert& convert) {
-  auto clip = replay::clip_of_log(convert.in, convert.stream);
+  auto clip = replay::clip_of_log(convert.in, convert.stream, convert.take);
   if (!clip || is_hand_csv(convert.out)) return clip;
   clip::hold_missing(*clip);
   if (clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
@@ -101,7 +109,58 @@ Result<> write(const Convert& convert, const clip::Clip& clip) {
   return clip::write_hand_csv(*hand, convert.out);
 }
 
+// "2  walk  from 3.20 s, 10.05 s long", a line each.
+void print_takes(const std::vector<replay::LoggedTake>& takes) {
+  for (const replay::LoggedTake& take : takes) {
+    const char* end = take.row.last_item == log::kToTheEnd ? ", to the end of the recording" : "";
+    std::printf("%lld  %s  ", static_cast<long long>(take.row.id), clean(take.row.name).c_str());
+    if (take.begin_s) {
+      std::printf("from %.2f s, %.2f s long%s\n", *take.begin_s, *take.end_s - *take.begin_s, end);
+    } else {
+      std::printf("nothing came%s\n", end);
+    }
+  }
+}
+
+void print_takes_json(const std::vector<replay::LoggedTake>& takes) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const replay::LoggedTake& take : takes) {
+    nlohmann::ordered_json& one =
+        list.emplace_back(nlohmann::ordered_json{{"take", take.row.id},
+                                                 {"name", take.row.name},
+                                                 {"first_item", take.row.first_item},
+                                                 {"ended", take.row.last_item != log::kToTheEnd}});
+    if (one["ended"]) one["last_item"] = take.row.last_item;
+    if (!take.begin_s) continue;
+    one["begin_s"] = *take.begin_s;
+    one["length_s"] = *take.end_s - *take.begin_s;
+  }
+  std::printf("%s\n", json_text(list).c_str());
+}
+
+int list_takes(const Convert& convert) {
+  if (!is_log(convert.in)) {
+    return report(misuse("is not a device log (.plog), so it has no takes", convert.in).error());
+  }
+  auto reader = log::Reader::open(convert.in);
+  if (!reader) return report(reader.error());
+  const auto takes = replay::logged_takes(*reader);
+  if (!takes) return report(takes.error());
+  if (convert.json) {
+    print_takes_json(*takes);
+  } else if (takes->empty()) {
+    std::fprintf(stderr, "posed: %s: has no takes\n", convert.in.c_str());
+  } else {
+    print_takes(*takes);
+  }
+  return static_cast<int>(ExitCode::kDone);
+}
+
 int run(Convert& convert) {
+  if (convert.takes) return list_takes(convert);
+  if (convert.out.empty()) {
+    return report(misuse("say what to write: --out OUT.bvh", convert.in).error());
+  }
   if (auto ok = check_options(convert); !ok) return report(ok.error());
   if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
   if (!convert.hand.empty()) {
@@ -141,7 +200,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   auto convert = std::make_shared<Convert>();
   command->add_option("IN", convert->in, "To read: .bvh, .amc, a hand as .csv, or a log (.plog)")
       ->required();
-  command->add_option("--out", convert->out, "Clip to write: .bvh, or .csv of a hand")->required();
+  auto* out = command->add_option("--out", convert->out, "Clip to write: .bvh, or .csv of a hand");
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   auto* rate =
@@ -155,6 +214,9 @@ void add_convert(CLI::App& app, int& exit_code) {
                       "Skeleton profile (default: found by the joints' names)");
   command->add_option("--stream", convert->stream,
                       "Which of a log's streams (default: the only one); NAME#2: its second part");
+  command->add_option("--take", convert->take,
+                      "Only this take of a log: its number, or its name if that is unique");
+  command->add_flag("--takes", convert->takes, "List the takes of a log instead")->excludes(out);
   command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape =
@@ -173,7 +235,9 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert 07_01.amc --out walk.bvh\n"
       "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
       "  posed convert glove.csv --hand left --out glove.bvh\n"
-      "  posed convert take1.plog --stream walker --out walker.bvh");
+      "  posed convert take1.plog --stream walker --out walker.bvh\n"
+      "  posed convert take1.plog --takes\n"
+      "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh");
   command->callback([convert, rate, shape, &exit_code] {
     convert->rate_given = rate->count() > 0;
     convert->shape_given = shape->count() > 0;

@@ -66,6 +66,14 @@ class Control:
             reply = self._ask(request)
         return reply
 
+    def take(self, name=""):
+        """Begins a take in the recording, which ends the one that runs; reply.take has its number."""
+        return self._take(True, name)
+
+    def end_take(self):
+        """Ends the take that runs."""
+        return self._take(False, "")
+
     def status(self):
         """The daemon's state: posed.v1.Stats."""
         request = control_pb2.ControlRequest()
@@ -85,6 +93,12 @@ class Control:
         command.word.extend(words)
         for option, value in numbers.items():
             command.number[option] = value
+        return self._ask(request)
+
+    def _take(self, start, name):
+        request = control_pb2.ControlRequest()
+        request.take.start, request.take.name = start, name
+        request.take.SetInParent()
         return self._ask(request)
 
     def _hang_up(self):

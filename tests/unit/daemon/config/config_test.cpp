@@ -233,6 +233,23 @@ TEST_CASE("generate: lags, tempo and labels are checked") {
   CHECK(complaint("[stream.constrain]\nenable = true\n").find("'enabled'") != std::string::npos);
 }
 
+TEST_CASE("the tables of recordings and triggers are checked") {
+  CHECK(complaint("[record]\nclips = \"csv\"\n").find("bvh") != std::string::npos);
+  CHECK(complaint("[record]\nfolder = \"\"\n").find("name a folder") != std::string::npos);
+  CHECK(complaint("[record]\nframe = true\n").find("'frames'") != std::string::npos);
+  CHECK(complaint("[trigger]\nlisten = \"0.0.0.0:1512\"\n").find("addresses in peers") !=
+        std::string::npos);
+  CHECK(complaint("[trigger]\npeers = [\"stage\"]\n").find("address in numbers") !=
+        std::string::npos);
+  const Reading reading = read(std::string(kWalker) +
+                               "[record]\nfolder = \"/logs\"\nclips = \"bvh\"\n[trigger]\n"
+                               "listen = \"0.0.0.0:7060\"\npeers = [\"192.168.1.5\"]\n");
+  REQUIRE(reading.errors.empty());
+  CHECK(reading.config.record->folder == "/logs");
+  CHECK(reading.config.record->clips);
+  CHECK(reading.config.trigger->peers.size() == 1);
+}
+
 TEST_CASE("the error for a wrong unit names the right one") {
   const std::string stream = "[[stream]]\nname = \"w\"\ndriver = \"glove\"\n";
   CHECK(complaint("stale_after_s = \"500 ms\"\n", stream) ==
@@ -394,6 +411,15 @@ TEST_CASE("the shipped config contains every key with its default") {
   CHECK(a.publish_insecure == b.publish_insecure);
   CHECK(a.control_endpoint == b.control_endpoint);
   CHECK(a.control_insecure == b.control_insecure);
+  CHECK_FALSE(a.record);
+  REQUIRE(b.record);
+  CHECK(b.record->folder == (test::source_dir() / "config/takes"));
+  CHECK(b.record->frames == config::RecordConfig{}.frames);
+  CHECK(b.record->clips == config::RecordConfig{}.clips);
+  CHECK_FALSE(a.trigger);
+  REQUIRE(b.trigger);
+  CHECK(b.trigger->listen == config::TriggerConfig{}.listen);
+  CHECK(b.trigger->peers.empty());
   CHECK(a.streams[0].publish_raw == b.streams[0].publish_raw);
   CHECK(a.streams[0].stale_after_s == b.streams[0].stale_after_s);
   CHECK(a.streams[0].options == b.streams[0].options);

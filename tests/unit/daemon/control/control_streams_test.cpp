@@ -36,6 +36,9 @@ class PatientDaemonControl final : public DaemonControl {
   }
   void keep_model(std::span<const std::byte>) override {}
   void model_in_use(std::uint32_t stream, const std::string&) override { in_use = stream; }
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
+    return fail("not recording");
+  }
   void fill(v1::Stats&) override {}
   void stop() override {}
   std::optional<Command> next() {

@@ -43,6 +43,11 @@ class FakeDaemonControl final : public DaemonControl {
   void model_in_use(std::uint32_t stream, const std::string& name) override {
     in_use = std::to_string(stream) + " " + name;
   }
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
+    if (!recording) return fail("not recording");
+    marks.push_back(mark);
+    return pipeline::Take{.number = 7, .name = mark.name, .start_ns = mark.time_ns};
+  }
   void fill(v1::Stats& stats) override { stats.set_rss_bytes(42); }
   void stop() override { stopped = true; }
 
@@ -50,6 +55,8 @@ class FakeDaemonControl final : public DaemonControl {
   std::vector<pipeline::DeviceCommand> to_device;
   std::vector<std::size_t> kept;
   std::string in_use;
+  std::vector<pipeline::TakeMark> marks;
+  bool recording = true;
   bool full = false;
   std::atomic<bool> stopped{false};
 };
@@ -115,6 +122,32 @@ struct Fixture {
         {.ticket = command.ticket, .stream = command.stream, .sequence = sequence}));
   }
 };
+
+TEST_CASE("a take is marked and answered with its number, or refused with a reason") {
+  Fixture fixture;
+  v1::ControlRequest request;
+  request.mutable_take()->set_start(true);
+  request.mutable_take()->set_name("walk \u00e4");
+  const auto begun = reply_of(fixture.ask(request));
+  CHECK(begun.ok());
+  CHECK(begun.take().number() == 7);
+  CHECK(begun.take().name() == "walk \u00e4");
+  REQUIRE(fixture.daemon_control.marks.size() == 1);
+  CHECK(fixture.daemon_control.marks[0].start);
+  for (const auto& [name, why] : {std::pair{std::string(129, 'x'), "129 bytes"},
+                                  {std::string("a\nb"), "cannot be printed"}}) {
+    request.mutable_take()->set_name(name);
+    CHECK(has(fixture.refused(request), why));
+  }
+  request.mutable_take()->set_start(false);
+  request.mutable_take()->set_name("walk");
+  CHECK(has(fixture.refused(request), "when it begins"));
+  request.mutable_take()->clear_name();
+  CHECK(reply_of(fixture.ask(request)).ok());
+  CHECK_FALSE(fixture.daemon_control.marks[1].start);
+  fixture.daemon_control.recording = false;
+  CHECK(has(fixture.refused(request), "not recording"));
+}
 
 TEST_CASE("an alpha goes to its stream, and the reply comes when it took effect") {
   Fixture fixture;
@@ -288,6 +321,9 @@ class Booth final : public DaemonControl {
   }
   void keep_model(std::span<const std::byte>) override {}
   void model_in_use(std::uint32_t, const std::string&) override {}
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
+    return fail("not recording");
+  }
   void fill(v1::Stats& stats) override { stats.set_rss_bytes(42); }
   void stop() override { stopped = true; }
   [[nodiscard]] const std::string& endpoint() const { return server_->endpoint(); }

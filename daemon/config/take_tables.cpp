@@ -1,0 +1,45 @@
+#include "daemon/config/take_tables.hpp"
+
+#include <array>
+#include <string>
+#include <string_view>
+
+#include "drivers/transport/address.hpp"
+
+namespace posed::config {
+namespace {
+
+constexpr std::array<std::string_view, 2> kClipWords{"none", "bvh"};
+
+}  // namespace
+
+void read_record(TableReader& root, const ConfigFile& file, DaemonConfig& config) {
+  auto table = root.table("record");
+  if (!table) return;
+  RecordConfig& record = config.record.emplace();
+  std::string folder = record.folder.string();
+  table->read("folder", folder);
+  if (folder.empty()) table->add_error("folder", "name a folder, like folder = \"takes\"");
+  record.folder = file.resolve(folder);
+  table->read("frames", record.frames);
+  record.clips = table->choice("clips", kClipWords) == 1;
+  table->finish();
+}
+
+void read_trigger(TableReader& root, DaemonConfig& config) {
+  auto table = root.table("trigger");
+  if (!table) return;
+  TriggerConfig& trigger = config.trigger.emplace();
+  table->read("listen", trigger.listen);
+  table->read("peers", trigger.peers);
+  table->finish();
+  for (const std::string& peer : trigger.peers) {
+    if (const auto host = drivers::parse_host(peer); !host) {
+      table->add_error("peers", host.error().message);
+    }
+  }
+  const auto address = drivers::listen_address(trigger.listen, trigger.peers, "the senders'");
+  if (!address) table->add_error("listen", address.error().message);
+}
+
+}  // namespace posed::config

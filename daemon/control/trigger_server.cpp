@@ -1,0 +1,100 @@
+#include "daemon/control/trigger_server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/system/clock.hpp"
+
+namespace posed::control {
+namespace {
+
+constexpr int kDatagramsARound = 16;
+
+}  // namespace
+
+Result<std::unique_ptr<TriggerServer>> TriggerServer::start(const std::string& listen,
+                                                            const std::vector<std::string>& peers,
+                                                            DaemonControl& daemon_control) {
+  const auto address = drivers::listen_address(listen, peers, "the senders'");
+  if (!address) return std::unexpected(address.error());
+  std::vector<drivers::Host> hosts;
+  for (const std::string& peer : peers) {
+    const auto host = drivers::parse_host(peer);
+    if (!host) return std::unexpected(host.error());
+    hosts.push_back(drivers::host_of(*host));
+  }
+  auto wake = system::EventFd::open();
+  if (!wake) return std::unexpected(wake.error());
+  const int fd = ::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd < 0 || ::bind(fd, address->get(), address->size) != 0) {
+    const std::string why = errno_text();
+    if (fd >= 0) ::close(fd);
+    return fail("the trigger cannot listen on " + listen + ": " + why +
+                "; end the program that has this port, or choose another in [trigger]");
+  }
+  spdlog::info("trigger: listening on {}", listen);
+  return std::unique_ptr<TriggerServer>(
+      new TriggerServer(fd, std::move(*wake), std::move(hosts), daemon_control));
+}
+
+TriggerServer::TriggerServer(int fd, std::unique_ptr<system::EventFd> wake,
+                             std::vector<drivers::Host> peers, DaemonControl& daemon_control)
+    : fd_(fd),
+      wake_(std::move(wake)),
+      peers_(std::move(peers)),
+      trigger_(daemon_control, system::monotonic_ns),
+      thread_([this] { serve(); }) {}
+
+TriggerServer::~TriggerServer() {
+  stop_.store(true, std::memory_order_release);
+  wake_->notify();
+  thread_.join();
+  ::close(fd_);
+}
+
+// Between two rounds it pauses, so that a flood costs little of a core; the kernel drops the rest.
+void TriggerServer::serve() {
+  constexpr int kPause_ms = 10;
+  while (!stop_.load(std::memory_order_acquire)) {
+    int taken = 0;
+    while (taken < kDatagramsARound && take_datagram()) ++taken;
+    wake_->going_to_sleep();
+    if (!stop_.load(std::memory_order_acquire)) {
+      std::array<pollfd, 2> wait{{{.fd = wake_->fd(), .events = POLLIN, .revents = 0},
+                                  {.fd = fd_, .events = POLLIN, .revents = 0}}};
+      const bool flooded = taken == kDatagramsARound;
+      ::poll(wait.data(), flooded ? 1 : 2, flooded ? kPause_ms : -1);
+    }
+    wake_->awake();
+  }
+}
+
+bool TriggerServer::take_datagram() {
+  std::array<char, kMaxTrigger + 1> bytes;  // one more shows that it is too long
+  drivers::Address sender;
+  const ssize_t size = ::recvfrom(fd_, bytes.data(), bytes.size(), 0, sender.get(), &sender.size);
+  if (size < 0) return false;
+  if (!may_send(sender)) {
+    spdlog::warn(
+        "trigger: a datagram from {} is ignored ({} so far); to obey this address, name it"
+        " in [trigger] peers",
+        drivers::host_text(sender), ++strangers_);
+    return true;
+  }
+  trigger_.take({bytes.data(), static_cast<std::size_t>(size)}, drivers::host_text(sender));
+  return true;
+}
+
+bool TriggerServer::may_send(const drivers::Address& sender) const {
+  const drivers::Host host = drivers::host_of(sender);
+  if (peers_.empty()) return drivers::is_loopback(host);
+  return std::ranges::find(peers_, host) != peers_.end();
+}
+
+}  // namespace posed::control

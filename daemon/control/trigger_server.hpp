@@ -1,0 +1,46 @@
+// TriggerServer: the UDP socket of the trigger, and its cold thread. Datagrams are not
+// authenticated: only those of peers, or of this machine, are read.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/control/trigger.hpp"
+#include "daemon/system/event_fd.hpp"
+#include "drivers/transport/address.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::control {
+
+class TriggerServer {
+ public:
+  // `listen` and `peers` as in the config. Binds and starts the thread; `daemon_control` outlives
+  // the server. Broadcasts are received where `listen` is 0.0.0.0.
+  [[nodiscard]] static Result<std::unique_ptr<TriggerServer>> start(
+      const std::string& listen, const std::vector<std::string>& peers,
+      DaemonControl& daemon_control);
+  ~TriggerServer();
+  TriggerServer(const TriggerServer&) = delete;
+  TriggerServer& operator=(const TriggerServer&) = delete;
+
+ private:
+  TriggerServer(int fd, std::unique_ptr<system::EventFd> wake, std::vector<drivers::Host> peers,
+                DaemonControl& daemon_control);
+  void serve();
+  // Returns false if none waits.
+  [[nodiscard]] bool take_datagram();
+  [[nodiscard]] bool may_send(const drivers::Address& sender) const;
+
+  int fd_;
+  std::unique_ptr<system::EventFd> wake_;
+  std::vector<drivers::Host> peers_;
+  Trigger trigger_;
+  std::uint64_t strangers_ = 0;  // datagrams of others
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace posed::control

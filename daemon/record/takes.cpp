@@ -1,0 +1,71 @@
+#include "daemon/record/takes.hpp"
+
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/frame/time.hpp"
+
+namespace posed::record {
+namespace {
+
+std::string with_remark(std::string sentence, const std::string& remark) {
+  return remark.empty() ? sentence : sentence + "; " + remark;
+}
+
+}  // namespace
+
+Result<pipeline::Take> Takes::mark(const pipeline::TakeMark& mark, std::uint64_t next_item) {
+  const std::scoped_lock lock(mutex_);
+  if (!mark.start && !running_) return fail("no take is running, so there is none to end");
+  if (mark.start && last_number_ == kMaxTakes) {
+    return fail("this recording has " + std::to_string(kMaxTakes) +
+                " takes already; begin another recording");
+  }
+  std::optional<pipeline::Take> marked = running_;
+  if (running_) end(mark, next_item);
+  if (mark.start) {
+    begin(mark, next_item);
+    marked = running_;
+  }
+  return *marked;
+}
+
+void Takes::end(const pipeline::TakeMark& mark, std::uint64_t next_item) {
+  const pipeline::Take take = *std::exchange(running_, std::nullopt);
+  std::string sentence = fmt::format("{} has ended after {:.1f} s", pipeline::words_of(take),
+                                     seconds(mark.time_ns - take.start_ns));
+  if (!mark.start) sentence = with_remark(std::move(sentence), mark.remark);
+  changes_.push_back({.row = {.id = take.number,
+                              .name = take.name,
+                              .first_item = first_item_,
+                              .last_item = next_item - 1},
+                      .time_ns = mark.time_ns,
+                      .text = std::move(sentence)});
+}
+
+void Takes::begin(const pipeline::TakeMark& mark, std::uint64_t next_item) {
+  running_ = {.number = ++last_number_,
+              .name = mark.name,
+              .start_ns = mark.time_ns,
+              .timecode = mark.timecode};
+  first_item_ = next_item;
+  changes_.push_back({.row = {.id = last_number_,
+                              .name = mark.name,
+                              .first_item = next_item,
+                              .last_item = log::kToTheEnd},
+                      .time_ns = mark.time_ns,
+                      .text = with_remark(pipeline::words_of(*running_) + " begins", mark.remark)});
+}
+
+std::optional<pipeline::Take> Takes::running() const {
+  const std::scoped_lock lock(mutex_);
+  return running_;
+}
+
+std::vector<TakeChange> Takes::take_changes() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(changes_, {});
+}
+
+}  // namespace posed::record
