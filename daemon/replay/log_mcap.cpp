@@ -58,7 +58,7 @@ class LogToMcap {
   LogToMcap(const Replay& replay, std::int64_t offset_ns, std::ostream& out)
       : replay_(replay),
         offset_ns_(offset_ns),
-        writer_(out, "posed " POSED_VERSION),
+        writer_(out, "posed"),
         frame_schema_(add_schema(*v1::Frame::descriptor())),
         skeleton_schema_(add_schema(*v1::Skeleton::descriptor())),
         sample_schema_(add_schema(*v1::Sample::descriptor())),

@@ -73,21 +73,21 @@ def compare(path, joints, frames, step_s, metres_per_unit):
     """The largest distance [m] of a bone's head from its joint, over all frames and joints."""
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
+    # glTF has keys at times, and the importer puts them at this rate; a BVH has frames, from 1.
     scene.render.fps = 1000
-    scene.render.fps_base = 1000 * step_s  # a frame of Blender is one of the clip
-    unit = 1.0
-    first = 0
+    unit, first, step = 1.0, 0, step_s * scene.render.fps
     if path.endswith(".glb"):
         bpy.ops.import_scene.gltf(filepath=path)
     else:
-        unit, first = metres_per_unit, 1
+        unit, first, step = metres_per_unit, 1, 1
         bpy.ops.import_anim.bvh(filepath=path, axis_forward="-Z", axis_up="Y")
     armature = next(o for o in bpy.data.objects if o.type == "ARMATURE")
     # Both importers turn Y up to Blender's Z up.
     to_posed = Matrix.Rotation(-np.pi / 2, 4, "X") @ armature.matrix_world
     worst, where = 0.0, None
     for i, row in enumerate(frames):
-        scene.frame_set(first + i)
+        whole, part = divmod(first + i * step, 1)
+        scene.frame_set(int(whole), subframe=part)
         for (name, *_), truth in zip(joints, positions(joints, row)):
             head = np.array(to_posed @ armature.pose.bones[name].head) * unit
             distance = np.linalg.norm(head - truth * metres_per_unit)

@@ -5,6 +5,6 @@ import { withClips } from './files.mjs';
 
 const [program] = process.argv.slice(2);
 await withClips(program, async (folder, clip) => {
-  await checkVrma(program, folder, clip);
-  await checkMcap(program, folder, clip);
+  const skeleton = await checkMcap(program, folder, clip);
+  await checkVrma(program, folder, clip, skeleton);
 });

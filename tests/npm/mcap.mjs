@@ -66,6 +66,7 @@ async function checkStream(file) {
   assert.ok(chunks > 0);
 }
 
+// Returns the skeleton of the clip.
 export async function checkMcap(program, folder, clip) {
   const log = await record(program, folder, clip);
   const path = join(folder, 'take.mcap');
@@ -96,4 +97,5 @@ export async function checkMcap(program, folder, clip) {
   }
   assert.ok(worst < 1e-3, `${worst} rad`);
   console.log(`mcap: 2 streams of ${frames.length} frames, at most ${worst.toExponential(1)} rad off`);
+  return topics.get('skeleton/walker')[0].value;
 }

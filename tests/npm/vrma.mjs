@@ -16,8 +16,9 @@ async function load(path) {
   return loader.parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), '');
 }
 
-// The demo's walker is the canonical humanoid in its T-pose, so the rotations of its BVH are those of VRM.
-export async function checkVrma(program, folder, clip) {
+// The joints of the demo's walker have the names of VRM's bones, with a capital. `skeleton` is its message
+// posed.v1.Skeleton, whose T frames turn the rotations of its BVH into those of VRM.
+export async function checkVrma(program, folder, clip, skeleton) {
   const path = join(folder, 'walk.vrma');
   posed(program, 'convert', clip, '--out', path);
   const warnings = [];
@@ -27,8 +28,9 @@ export async function checkVrma(program, folder, clip) {
   assert.equal(gltf.userData.vrmAnimations.length, 1);
   const [animation] = gltf.userData.vrmAnimations;
   const { joints, frames } = readBvh(clip);
+  const boneOf = ({ name }) => name[0].toLowerCase() + name.slice(1);
   const { rotation, translation } = animation.humanoidTracks;
-  assert.deepEqual([...rotation.keys()].sort(), joints.map((joint) => joint.name).sort());
+  assert.deepEqual([...rotation.keys()].sort(), joints.map(boneOf).sort());
   assert.deepEqual([...translation.keys()], ['hips']);
   assert.ok(animation.restHipsPosition.y > 0.5);
   const hips = translation.get('hips').values;
@@ -39,12 +41,16 @@ export async function checkVrma(program, folder, clip) {
       assert.ok(Math.abs(hips[3 * i + 'XYZ'.indexOf(channel[0])] - frame[c] / 100) < 1e-5);
     });
   });
+  const tFrame = (joint) =>
+    joint < 0 ? new Quaternion() : new Quaternion().fromArray(skeleton.T_world_jointXyzw, 4 * joint);
   let worst = 0;
-  for (const joint of joints) {
-    const track = rotation.get(joint.name);
+  for (const [j, joint] of joints.entries()) {
+    const [above, own] = [tFrame(skeleton.parent[j]), tFrame(j).invert()];
+    const track = rotation.get(boneOf(joint));
     assert.equal(track.times.length, frames.length);
     frames.forEach((frame, i) => {
-      worst = Math.max(worst, turnOf(joint, frame).angleTo(new Quaternion().fromArray(track.values, 4 * i)));
+      const truth = turnOf(joint, frame).premultiply(above).multiply(own);
+      worst = Math.max(worst, truth.angleTo(new Quaternion().fromArray(track.values, 4 * i)));
     });
   }
   assert.ok(worst < 1e-3, `${worst} rad`);
