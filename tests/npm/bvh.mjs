@@ -33,3 +33,9 @@ export function turnOf({ channels, column }, frame) {
   });
   return turn;
 }
+
+// [rad]; accurate for small angles, unlike three's angleTo.
+export function angleBetween(a, b) {
+  const { x, y, z, w } = a.clone().conjugate().multiply(b);
+  return 2 * Math.atan2(Math.hypot(x, y, z), Math.abs(w));
+}

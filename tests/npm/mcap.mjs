@@ -7,7 +7,7 @@ import protobuf from 'protobufjs';
 import descriptor from 'protobufjs/ext/descriptor.js';
 import { Quaternion } from 'three';
 
-import { readBvh, turnOf } from './bvh.mjs';
+import { angleBetween, readBvh, turnOf } from './bvh.mjs';
 import { posed, record } from './files.mjs';
 
 // Parts of a file, as @mcap/core asks for them.
@@ -82,20 +82,20 @@ export async function checkMcap(program, folder, clip) {
   let worst = 0;
   for (const name of ['plain', 'walker']) {
     const [skeleton] = topics.get(`skeleton/${name}`);
-    assert.deepEqual(skeleton.value.jointName, joints.map((joint) => joint.name));
+    assert.deepEqual(skeleton.value.joint_name, joints.map((joint) => joint.name));
     const poses = topics.get(`pose/${name}`);
     assert.equal(poses.length, frames.length);
     poses.forEach(({ time, sequence, value }, i) => {
       assert.equal(sequence, i + 1);
-      assert.equal(value.skeletonId, skeleton.value.id);
+      assert.equal(value.skeleton_id, skeleton.value.id);
       assert.ok(before - time < 60_000_000_000n && time <= before);  // recorded just now, in UTC
       joints.forEach((joint, j) => {
-        const turned = new Quaternion().fromArray(value.rotationXyzw, 4 * j);
-        worst = Math.max(worst, turned.angleTo(turnOf(joint, frames[i])));
+        const turned = new Quaternion().fromArray(value.rotation_xyzw, 4 * j);
+        worst = Math.max(worst, angleBetween(turned, turnOf(joint, frames[i])));
       });
     });
   }
-  assert.ok(worst < 1e-3, `${worst} rad`);
+  assert.ok(worst < 1e-5, `${worst} rad`);
   console.log(`mcap: 2 streams of ${frames.length} frames, at most ${worst.toExponential(1)} rad off`);
   return topics.get('skeleton/walker')[0].value;
 }
