@@ -9,6 +9,7 @@
 
 #include "daemon/replay/log_mcap.hpp"
 #include "daemon/replay/mcap_writer.hpp"
+#include "proto/log/reader.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
 #include "tests/unit/daemon/replay/mcap_reader.hpp"
