@@ -15,9 +15,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // Extensions of formats that posed or other programs recognise.
-constexpr std::array<std::string_view, 17> kFormats{
-    ".bvh", ".amc", ".asf", ".csv", ".style", ".gesture", ".toml", ".lab", ".plog",
-    ".svg", ".dot", ".gv",  ".txt", ".json",  ".bin",     ".key",  ".pub"};
+constexpr std::array<std::string_view, 20> kFormats{
+    ".bvh", ".amc", ".asf", ".csv",  ".style", ".gesture", ".toml", ".lab", ".plog", ".svg",
+    ".dot", ".gv",  ".txt", ".json", ".bin",   ".key",     ".pub",  ".glb", ".vrma", ".mcap"};
 
 std::string listed(const std::vector<std::string_view>& extensions) {
   std::string text;

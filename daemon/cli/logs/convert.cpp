@@ -1,4 +1,5 @@
-// `posed convert`: converts a clip to another format, or a stream of a device log to a clip.
+// `posed convert`: converts a clip to another format, a stream of a device log to a clip, or a
+// whole log to MCAP.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -9,16 +10,17 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/logs/convert_mcap.hpp"
+#include "daemon/cli/logs/list_takes.hpp"
 #include "daemon/cli/models/waiting.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/replay/log_clip.hpp"
-#include "daemon/replay/log_takes.hpp"
+#include "models/motion/vrm_animation.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frames_clip.hpp"
+#include "proto/clip/gltf.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/text.hpp"
-#include "proto/log/reader.hpp"
-#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -45,6 +47,7 @@ bool ends_in(const std::string& path, const std::string& extension) {
 
 bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
 bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
+bool is_mcap(const std::string& path) { return ends_in(path, ".mcap"); }
 
 // An option that would have no effect for this input or output is an error.
 Result<> check_options(const Convert& convert) {
@@ -60,6 +63,10 @@ Result<> check_options(const Convert& convert) {
                 "is not a device log (.plog), so --stream has no effect"),
         useless(!convert.take.empty(), is_log(convert.in),
                 "is not a device log (.plog), so --take has no effect"),
+        useless(!convert.stream.empty() || !convert.take.empty(), !is_mcap(convert.out),
+                "a .mcap holds the whole log, so --stream and --take have no effect"),
+        useless(is_mcap(convert.out), is_log(convert.in),
+                "is not a device log (.plog), and only a log becomes a .mcap; name a .glb"),
         useless(!convert.read.asf.empty(), is_amc(convert.in),
                 "is not an AMC, so --skeleton has no effect"),
         useless(convert.rate_given, is_amc(convert.in), "is not an AMC, so --rate has no effect"),
@@ -70,22 +77,24 @@ Result<> check_options(const Convert& convert) {
         useless(!convert.hand.empty(), csv_in || to_csv,
                 "neither IN nor OUT is a hand CSV, so --hand has no effect"),
         useless(convert.shape_given, csv_in && !to_csv,
-                "--hand-shape is for a hand CSV that becomes a BVH, and has no effect here")}) {
+                "--hand-shape is for a hand CSV that becomes a figure, and has no effect here")}) {
     if (!checked) return checked;
   }
   return OutputFiles(convert.overwrite)
       .reads(convert.in)
       .reads(convert.read.asf)
-      .writes(convert.out, {".bvh", ".csv"})
+      .writes(convert.out, {".bvh", ".csv", ".glb", ".vrma", ".mcap"})
       .check();
 }
 
-// A BVH file cannot store gaps or an uneven clock.
+bool has_even_clock(const std::string& path) { return ends_in(path, ".bvh"); }
+
+// Only a hand CSV can store gaps, and a BVH no uneven clock.
 Result<clip::Clip> read_log(const Convert& convert) {
   auto clip = replay::clip_of_log(convert.in, convert.stream, convert.take);
   if (!clip || is_hand_csv(convert.out)) return clip;
   clip::hold_missing(*clip);
-  if (clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
+  if (has_even_clock(convert.out) && clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
     clip->warnings.emplace_back(kUneven);
   return clip;
 }
@@ -98,70 +107,27 @@ Result<clip::Clip> read(const Convert& convert) {
   auto hand = clip::hand_of(*clip, convert.read);
   if (!hand) return std::unexpected(hand.error());
   clip::fill_gaps(*hand);
-  if (clip::has_uneven_times(hand->time_s, hand->rate_hz)) hand->warnings.emplace_back(kUneven);
+  if (has_even_clock(convert.out) && clip::has_uneven_times(hand->time_s, hand->rate_hz))
+    hand->warnings.emplace_back(kUneven);
   return clip::clip_of_hand(*hand, convert.read.hand_shape);
 }
 
 Result<> write(const Convert& convert, const clip::Clip& clip) {
+  if (ends_in(convert.out, ".glb")) return clip::write_glb(clip, convert.out);
+  if (ends_in(convert.out, ".vrma")) return motion::write_vrm_animation(clip, convert.out);
   if (!is_hand_csv(convert.out)) return clip::write_bvh(clip, convert.out);
   const auto hand = clip::hand_of(clip, convert.read);
   if (!hand) return std::unexpected(hand.error());
   return clip::write_hand_csv(*hand, convert.out);
 }
 
-// "2  walk  from 3.20 s, 10.05 s long", a line each.
-void print_takes(const std::vector<replay::LoggedTake>& takes) {
-  for (const replay::LoggedTake& take : takes) {
-    const char* end = take.row.last_item == log::kToTheEnd ? ", to the end of the recording" : "";
-    std::printf("%lld  %s  ", static_cast<long long>(take.row.id), clean(take.row.name).c_str());
-    if (take.begin_s) {
-      std::printf("from %.2f s, %.2f s long%s\n", *take.begin_s, *take.end_s - *take.begin_s, end);
-    } else {
-      std::printf("nothing came%s\n", end);
-    }
-  }
-}
-
-void print_takes_json(const std::vector<replay::LoggedTake>& takes) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const replay::LoggedTake& take : takes) {
-    nlohmann::ordered_json& one =
-        list.emplace_back(nlohmann::ordered_json{{"take", take.row.id},
-                                                 {"name", take.row.name},
-                                                 {"first_item", take.row.first_item},
-                                                 {"ended", take.row.last_item != log::kToTheEnd}});
-    if (one["ended"]) one["last_item"] = take.row.last_item;
-    if (!take.begin_s) continue;
-    one["begin_s"] = *take.begin_s;
-    one["length_s"] = *take.end_s - *take.begin_s;
-  }
-  std::printf("%s\n", json_text(list).c_str());
-}
-
-int list_takes(const Convert& convert) {
-  if (!is_log(convert.in)) {
-    return report(misuse("is not a device log (.plog), so it has no takes", convert.in).error());
-  }
-  auto reader = log::Reader::open(convert.in);
-  if (!reader) return report(reader.error());
-  const auto takes = replay::logged_takes(*reader);
-  if (!takes) return report(takes.error());
-  if (convert.json) {
-    print_takes_json(*takes);
-  } else if (takes->empty()) {
-    std::fprintf(stderr, "posed: %s: has no takes\n", convert.in.c_str());
-  } else {
-    print_takes(*takes);
-  }
-  return static_cast<int>(ExitCode::kDone);
-}
-
 int run(Convert& convert) {
-  if (convert.takes) return list_takes(convert);
+  if (convert.takes) return list_takes(convert.in, convert.json);
   if (convert.out.empty()) {
     return report(misuse("say what to write: --out OUT.bvh", convert.in).error());
   }
   if (auto ok = check_options(convert); !ok) return report(ok.error());
+  if (is_mcap(convert.out)) return convert_to_mcap(convert.in, convert.out, convert.json);
   if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
   if (!convert.hand.empty()) {
     convert.read.hand = convert.hand == "left" ? Side::kLeft : Side::kRight;
@@ -196,11 +162,12 @@ int run(Convert& convert) {
 
 void add_convert(CLI::App& app, int& exit_code) {
   CLI::App* command =
-      app.add_subcommand("convert", "Write a clip, or a log's stream, in another format");
+      app.add_subcommand("convert", "Write a clip, a log's stream or a log in another format");
   auto convert = std::make_shared<Convert>();
   command->add_option("IN", convert->in, "To read: .bvh, .amc, a hand as .csv, or a log (.plog)")
       ->required();
-  auto* out = command->add_option("--out", convert->out, "Clip to write: .bvh, or .csv of a hand");
+  auto* out = command->add_option(
+      "--out", convert->out, "To write: .bvh, .csv of a hand, .glb, .vrma; .mcap of a whole log");
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   auto* rate =
@@ -219,8 +186,8 @@ void add_convert(CLI::App& app, int& exit_code) {
   command->add_flag("--takes", convert->takes, "List the takes of a log instead")->excludes(out);
   command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
-  auto* shape =
-      command->add_option("--hand-shape", convert->read.hand_shape, "Bones of a hand CSV's BVH");
+  auto* shape = command->add_option("--hand-shape", convert->read.hand_shape,
+                                    "Bones of a hand CSV that becomes a figure");
   shape->capture_default_str();
   add_overwrite_option(*command, convert->overwrite);
   command->add_flag("--json", convert->json, "Print a summary as JSON on stdout");
@@ -230,14 +197,19 @@ void add_convert(CLI::App& app, int& exit_code) {
       "holds 45 angles a frame; any BVH with the fifteen finger joints of a hand can become "
       "one.\n"
       "A log gives the frames that were published, styled as they were; its BVH is in "
-      "centimetres.\n\n"
+      "centimetres.\n"
+      "A .glb is glTF: the figure as an armature, for Blender and game engines. A .vrma moves any\n"
+      "VRM avatar and needs a person's bones. Both keep the clip's times. A .mcap has pose/,\n"
+      "skeleton/ and sensor/ of all streams of a log, with the protobuf schema, in UTC.\n\n"
       "Examples:\n"
       "  posed convert 07_01.amc --out walk.bvh\n"
       "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
       "  posed convert glove.csv --hand left --out glove.bvh\n"
       "  posed convert take1.plog --stream walker --out walker.bvh\n"
       "  posed convert take1.plog --takes\n"
-      "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh");
+      "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
+      "  posed convert walk.bvh --out walk.vrma\n"
+      "  posed convert take1.plog --out take1.mcap");
   command->callback([convert, rate, shape, &exit_code] {
     convert->rate_given = rate->count() > 0;
     convert->shape_given = shape->count() > 0;

@@ -1,0 +1,88 @@
+#include "models/motion/vrm_animation.hpp"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "models/motion/canonical_skeleton.hpp"
+#include "models/motion/retarget.hpp"
+#include "proto/clip/gltf.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::motion {
+namespace {
+
+constexpr std::array kRequired{Bone::kHips,          Bone::kSpine,         Bone::kHead,
+                               Bone::kLeftUpperArm,  Bone::kLeftLowerArm,  Bone::kLeftHand,
+                               Bone::kRightUpperArm, Bone::kRightLowerArm, Bone::kRightHand,
+                               Bone::kLeftUpperLeg,  Bone::kLeftLowerLeg,  Bone::kLeftFoot,
+                               Bone::kRightUpperLeg, Bone::kRightLowerLeg, Bone::kRightFoot};
+
+Result<> check_bones(const Skeleton& skeleton, const std::string& path) {
+  std::string missing;
+  for (const Bone bone : kRequired) {
+    if (skeleton.joint_of(bone) >= 0) continue;
+    missing += (missing.empty() ? "" : ", ") + std::string(bone_name(bone));
+  }
+  if (missing.empty()) return {};
+  return fail("skeleton " + in_quotes(skeleton.name) +
+                  " lacks bones that a VRM figure must have: " + missing +
+                  "; name its joints as VRM does, or write .glb, which takes any skeleton",
+              path);
+}
+
+// How high the hips of the T-pose are above its lowest point, so that the figure stands on the
+// ground.
+double hips_height_m(const Skeleton& humanoid) {
+  double lowest_m = 0.0;
+  std::vector<double> height_m;  // [joint], from the hips
+  for (const Joint& joint : humanoid.joints) {
+    height_m.push_back(joint.parent < 0
+                           ? 0.0
+                           : height_m[static_cast<std::size_t>(joint.parent)] + joint.offset_m.y());
+    lowest_m = std::min(lowest_m, height_m.back());
+    if (joint.end_site_m) lowest_m = std::min(lowest_m, height_m.back() + joint.end_site_m->y());
+  }
+  return -lowest_m;
+}
+
+std::vector<clip::GltfNode> nodes_of(const Skeleton& humanoid) {
+  std::vector<clip::GltfNode> nodes;
+  for (const Joint& joint : humanoid.joints) {
+    clip::GltfNode node{.name = joint.name, .parent = joint.parent, .offset_m = joint.offset_m};
+    node.bone = joint.bone;
+    nodes.push_back(std::move(node));
+  }
+  nodes.front().offset_m = {0.0, hips_height_m(humanoid), 0.0};
+  return nodes;
+}
+
+}  // namespace
+
+Result<> write_vrm_animation(const clip::Clip& clip, const std::filesystem::path& path) {
+  auto time_s = clip::gltf_times(clip);
+  if (!time_s) return std::unexpected(time_s.error());
+  if (auto ok = check_bones(*clip.skeleton, clip.path); !ok) return ok;
+  auto humanoid = canonical_skeleton(*clip.skeleton);
+  if (!humanoid) return std::unexpected(humanoid.error());
+  if (auto ok = check_bones(**humanoid, clip.path); !ok) return ok;  // some hang beside the hips
+  const auto retarget = Retarget::bind(clip.skeleton, *humanoid);
+  if (!retarget) return std::unexpected(retarget.error());
+  clip::GltfMotion motion{
+      .name = path.stem().string(), .time_s = std::move(*time_s), .nodes = nodes_of(**humanoid)};
+  Frame pose;
+  for (int i = 0; i < clip.frames(); ++i) {
+    retarget->apply(clip.frame(i), pose);
+    const auto& p = pose.root_position_m;
+    clip::add_position(motion.nodes.front(), Eigen::Vector3f(p[0], p[1], p[2]).cast<double>());
+    for (std::size_t j = 0; j < motion.nodes.size(); ++j) {
+      clip::add_rotation(motion.nodes[j], to_eigen_double(pose.rotation_xyzw[j]));
+    }
+  }
+  return clip::write_gltf(motion, clip::GltfKind::kVrmAnimation, path);
+}
+
+}  // namespace posed::motion

@@ -1,0 +1,215 @@
+// What a viewer shows of a .glb and of a .vrma is the motion of the clip.
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+
+#include "models/motion/canonical_skeleton.hpp"
+#include "models/motion/kinematics.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "models/motion/vrm_animation.hpp"
+#include "proto/clip/gltf.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/file_text.hpp"
+#include "tests/support/has.hpp"
+#include "tests/support/read_gltf.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::motion {
+namespace {
+
+constexpr double kSame_m = 1e-5;
+
+clip::Clip walker_clip() { return make_walker({.seconds = 1.0, .rate_hz = 60.0}).value(); }
+
+void check_glb(const clip::Clip& clip) {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "out.glb";
+  REQUIRE(clip::write_glb(clip, path));
+  const test::ReadGltf read(path);
+  const Skeleton& skeleton = *clip.skeleton;
+  REQUIRE(std::ssize(read.time_s) == clip.frames());
+  REQUIRE(read.model.skins.size() == 1);
+  CHECK(read.model.skins[0].joints.size() == read.model.nodes.size());
+  for (int i = 0; i < clip.frames(); ++i) {
+    const WorldPose truth = world_pose(skeleton, clip.frame(i));
+    const auto shown = read.at(static_cast<std::size_t>(i));
+    std::size_t tip = skeleton.joints.size();
+    for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+      CHECK((shown[j].translation() - truth.position_m[j]).norm() < kSame_m);
+      const auto& end = skeleton.joints[j].end_site_m;
+      if (!end) continue;
+      const Eigen::Vector3d at = truth.position_m[j] + truth.rotation[j] * *end;
+      CHECK((shown[tip++].translation() - at).norm() < kSame_m);
+    }
+    CHECK(tip == read.model.nodes.size());
+  }
+}
+
+void check_vrma(const clip::Clip& clip) {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "out.vrma";
+  REQUIRE(write_vrm_animation(clip, path));
+  const test::ReadGltf read(path);
+  const auto& extension = read.model.extensions.at("VRMC_vrm_animation");
+  CHECK(extension.Get("specVersion").Get<std::string>() == "1.0");
+  const auto& bones = extension.Get("humanoid").Get("humanBones");
+  const auto humanoid = canonical_skeleton(*clip.skeleton).value();
+  REQUIRE(bones.Keys().size() == humanoid->joints.size());
+  double lowest_m = 1.0;
+  const Skeleton& skeleton = *clip.skeleton;
+  for (const std::string& name : bones.Keys()) {
+    const auto node = static_cast<std::size_t>(bones.Get(name).Get("node").Get<int>());
+    CHECK(read.model.nodes.at(node).rotation.empty());  // identity in T-pose
+    double height_m = 0.0;
+    for (int n = static_cast<int>(node); n >= 0; n = read.parent[static_cast<std::size_t>(n)]) {
+      height_m += read.model.nodes[static_cast<std::size_t>(n)].translation[1];
+    }
+    lowest_m = std::min(lowest_m, height_m);
+  }
+  CHECK(lowest_m > -1e-6);  // the T-pose stands on the ground, here on toes or their tips
+  CHECK(lowest_m < 0.15);
+  for (std::size_t i = 0; i < read.time_s.size(); ++i) {
+    const WorldPose truth = world_pose(skeleton, clip.frame(static_cast<int>(i)));
+    const auto shown = read.at(i);
+    for (const std::string& name : bones.Keys()) {
+      const auto node = static_cast<std::size_t>(bones.Get(name).Get("node").Get<int>());
+      const int joint = skeleton.joint_of(bone_from_name(name).value());
+      REQUIRE(joint >= 0);
+      const auto j = static_cast<std::size_t>(joint);
+      // In the world a bone is turned from its T-pose as the clip's joint is from its own.
+      const Eigen::Quaterniond turned =
+          truth.rotation[j] * skeleton.joints[j].T_world_joint.conjugate();
+      CHECK(angle_between_rad(Eigen::Quaterniond(shown[node].rotation()), turned) < 1e-5);
+      if (name == "hips") {
+        CHECK((shown[node].translation() - truth.position_m[j]).norm() < kSame_m);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("a .glb shows the joints and end sites where the clip has them") {
+  check_glb(walker_clip());
+}
+
+TEST_CASE("a joint below the root moves in a .glb if it has position channels") {
+  auto skeleton = std::make_shared<Skeleton>();
+  for (const char* name : {"reference", "hips"}) {
+    Joint joint;
+    joint.name = name;
+    joint.parent = static_cast<int>(skeleton->joints.size()) - 1;
+    joint.offset_m = Eigen::Vector3d(0.1, 0.2, -0.3);
+    skeleton->joints.push_back(joint);
+  }
+  for (const std::uint16_t joint : {std::uint16_t{0}, std::uint16_t{1}}) {
+    for (const bool translation : {true, false}) {
+      for (const Axis axis : {Axis::kZ, Axis::kX, Axis::kY}) {
+        skeleton->channels.push_back({.joint = joint, .axis = axis, .translation = translation});
+      }
+    }
+  }
+  skeleton->root_joint = 1;
+  REQUIRE(skeleton->finish());
+  clip::Clip clip{.path = "two.bvh", .skeleton = skeleton, .frame_rate_hz = 30.0};
+  clip.channels = clip::ChannelMatrix::Random(5, 12);
+  const test::TempFolder folder;
+  REQUIRE(clip::write_glb(clip, folder.path() / "out.glb"));
+  const test::ReadGltf read(folder.path() / "out.glb");
+  for (int i = 0; i < clip.frames(); ++i) {
+    const auto p = clip.frame(i).root_position_m;
+    const Eigen::Vector3d truth = Eigen::Vector3f(p[0], p[1], p[2]).cast<double>();
+    CHECK((read.at(static_cast<std::size_t>(i))[1].translation() - truth).norm() < kSame_m);
+  }
+}
+
+TEST_CASE("a .glb keeps the clip's own times") {
+  clip::Clip clip = walker_clip();
+  for (int i = 0; i < clip.frames(); ++i) clip.time_s.push_back(7.0 + i * 0.01 + (i % 3) * 0.002);
+  const test::TempFolder folder;
+  REQUIRE(clip::write_glb(clip, folder.path() / "out.glb"));
+  const test::ReadGltf read(folder.path() / "out.glb");
+  for (int i = 0; i < clip.frames(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    CHECK(read.time_s[at] == Approx(clip.time_s[at] - 7.0).margin(1e-6));
+  }
+  check_glb(clip);
+}
+
+TEST_CASE("CMU's walk as .glb and .vrma") {
+  const auto amc = test::shared("data/cmu/07_01.amc");
+  if (!amc) SKIP_WITHOUT_SHARED();
+  clip::Clip clip = clip::read_clip(*amc).value();
+  clip.channels = clip.channels.topRows(20).eval();
+  check_glb(clip);
+  check_vrma(clip);
+}
+
+TEST_CASE("a .vrma turns the bones of the humanoid as the clip does and moves its hips") {
+  check_vrma(walker_clip());
+}
+
+TEST_CASE("neighbouring rotations of a glTF track have the nearer of two signs") {
+  clip::GltfNode node;
+  const Eigen::Quaterniond q(0.6, 0.8, 0.0, 0.0);
+  clip::add_rotation(node, q);
+  clip::add_rotation(node, Eigen::Quaterniond(-q.coeffs()));
+  CHECK(node.rotation_xyzw[4] == node.rotation_xyzw[0]);
+  CHECK(node.rotation_xyzw[7] == node.rotation_xyzw[3]);
+}
+
+TEST_CASE("the same clip gives the same bytes, whatever the names of its joints hold") {
+  clip::Clip clip = walker_clip();
+  auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
+  skeleton->joints[1].name = "\xff\"\n\\";
+  clip.skeleton = skeleton;
+  const test::TempFolder folder;
+  REQUIRE(clip::write_glb(clip, folder.path() / "one.glb"));
+  const std::string one = test::file_text(folder.path() / "one.glb");
+  REQUIRE(clip::write_glb(clip, folder.path() / "one.glb"));
+  CHECK(test::file_text(folder.path() / "one.glb") == one);
+  CHECK(test::ReadGltf(folder.path() / "one.glb").model.nodes[1].name == "\\xff\"\\n\\");
+}
+
+TEST_CASE("clips that glTF cannot hold are refused with a reason") {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "out.glb";
+  const auto error = [&](const clip::Clip& clip) {
+    const auto written = clip::write_glb(clip, path);
+    REQUIRE_FALSE(written);
+    CHECK_FALSE(std::filesystem::exists(path));
+    return written.error().message;
+  };
+  clip::Clip clip = walker_clip();
+  clip::Clip changed = clip;
+  changed.channels.resize(0, clip.channels.cols());
+  CHECK(test::has(error(changed), "no frames"));
+  changed = clip;
+  for (int i = 0; i < clip.frames(); ++i) changed.time_s.push_back(i * 0.01);
+  changed.time_s[3] = changed.time_s[2];
+  CHECK(test::has(error(changed), "frame 4 is not later"));
+  changed.time_s[3] = std::numeric_limits<double>::quiet_NaN();
+  CHECK(test::has(error(changed), "frame 4 is not later"));
+  changed = clip;
+  changed.channels(2, 5) = std::numeric_limits<double>::quiet_NaN();
+  CHECK(test::has(error(changed), "has no value"));
+}
+
+TEST_CASE("a .vrma needs the bones that VRM requires, and names those that are missing") {
+  const test::TempFolder folder;
+  clip::Clip clip = walker_clip();
+  auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
+  for (Joint& joint : skeleton->joints) {
+    if (joint.bone == Bone::kLeftHand || joint.bone == Bone::kSpine) joint.bone.reset();
+  }
+  clip.skeleton = skeleton;
+  const auto written = write_vrm_animation(clip, folder.path() / "out.vrma");
+  REQUIRE_FALSE(written);
+  CHECK(test::has(written.error().message, "spine, leftHand;"));
+  CHECK_FALSE(std::filesystem::exists(folder.path() / "out.vrma"));
+}
+
+}  // namespace posed::motion
