@@ -27,7 +27,7 @@ std::string remark_of(const TriggerMessage& message, const std::string& sender) 
   add("notes", message.notes);
   if (!message.start && message.result != "SUCCESS") add("result", message.result);
   if (!message.delay.empty() && message.delay != "0") {
-    remark += ", the delay of " + in_quotes(message.delay) + " ms is not waited for";
+    remark += ", its delay " + in_quotes(message.delay) + " (ms) is not waited for";
   }
   return remark;
 }

@@ -9,7 +9,7 @@
 namespace posed::record {
 namespace {
 
-std::string with_remark(std::string sentence, const std::string& remark) {
+std::string with_remark(const std::string& sentence, const std::string& remark) {
   return remark.empty() ? sentence : sentence + "; " + remark;
 }
 
@@ -35,7 +35,7 @@ void Takes::end(const pipeline::TakeMark& mark, std::uint64_t next_item) {
   const pipeline::Take take = *std::exchange(running_, std::nullopt);
   std::string sentence = fmt::format("{} has ended after {:.1f} s", pipeline::words_of(take),
                                      seconds(mark.time_ns - take.start_ns));
-  if (!mark.start) sentence = with_remark(std::move(sentence), mark.remark);
+  if (!mark.start) sentence = with_remark(sentence, mark.remark);
   changes_.push_back({.row = {.id = take.number,
                               .name = take.name,
                               .first_item = first_item_,

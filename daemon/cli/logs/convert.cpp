@@ -179,11 +179,16 @@ void add_convert(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1e-6, 1e6));
   command->add_option("--profile", convert->read.profile,
                       "Skeleton profile (default: found by the joints' names)");
-  command->add_option("--stream", convert->stream,
-                      "Which of a log's streams (default: the only one); NAME#2: its second part");
-  command->add_option("--take", convert->take,
-                      "Only this take of a log: its number, or its name if that is unique");
-  command->add_flag("--takes", convert->takes, "List the takes of a log instead")->excludes(out);
+  auto* stream = command->add_option(
+      "--stream", convert->stream,
+      "Which of a log's streams (default: the only one); NAME#2: its second part");
+  auto* take =
+      command->add_option("--take", convert->take,
+                          "Only this take of a log: its number, or its name if that is unique");
+  command->add_flag("--takes", convert->takes, "List the takes of a log instead")
+      ->excludes(out)
+      ->excludes(stream)
+      ->excludes(take);
   command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape = command->add_option("--hand-shape", convert->read.hand_shape,

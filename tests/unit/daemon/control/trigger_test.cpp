@@ -113,7 +113,7 @@ TEST_CASE("a trigger begins and ends takes, each command once") {
   CHECK(begun.name == "walk");
   CHECK(begun.timecode == "01:02:03:04");
   CHECK(begun.time_ns == 42);
-  CHECK(begun.remark == "triggered by 192.168.1.5, the delay of '500' ms is not waited for");
+  CHECK(begun.remark == "triggered by 192.168.1.5, its delay '500' (ms) is not waited for");
   triggered.take(start, "192.168.1.6");  // another sender counts for itself
   CHECK(triggered.daemon.marks.size() == 2);
   const std::string stop =

@@ -8,6 +8,7 @@
 #include "daemon/replay/log_clip.hpp"
 #include "daemon/replay/replay.hpp"
 #include "proto/clip/frames_clip.hpp"
+#include "proto/log/writer.hpp"
 #include "tests/unit/daemon/replay/staged_run.hpp"
 
 namespace posed::test {
@@ -102,6 +103,39 @@ TEST_CASE("a log's stream becomes a clip of its published frames") {
     REQUIRE(back);
     check_same(*back, frames);
   }
+}
+
+TEST_CASE("takes are cut out of a log's stream by number or name, each frame once") {
+  const TempFolder folder;
+  const auto path = folder.path() / "take.plog";
+  write_staged_log(path, kFrames);
+  auto writer = log::Writer::reopen(path);
+  REQUIRE(writer);
+  REQUIRE(writer->add(log::TakeRow{1, "walk", 1, 60}));
+  REQUIRE(writer->add(log::TakeRow{2, "walk", 61, log::kToTheEnd}));  // before it has ended
+  REQUIRE(writer->add(log::TakeRow{2, "walk", 61, 130}));
+  REQUIRE(writer->add(log::TakeRow{3, "late", 131, log::kToTheEnd}));
+  REQUIRE(writer->add(log::TakeRow{4, "none", 131, 130}));
+  REQUIRE(writer->close());
+  std::vector<Frame> cut;
+  for (const char* take : {"1", "2", "late"}) {
+    const auto clip = replay::clip_of_log(path, "b", take);
+    if (!clip) FAIL(clip.error().text());
+    CHECK(clip->frames() > 10);
+    for (int i = 0; i < clip->frames(); ++i) cut.push_back(clip->frame(i));
+  }
+  const auto whole = replay::clip_of_log(path, "b");
+  REQUIRE(whole);
+  check_same(*whole, cut);
+  const auto refusal = [&](const std::string& take) {
+    const auto clip = replay::clip_of_log(path, "b", take);
+    return clip ? "" : clip.error().message;
+  };
+  CHECK(refusal("walk") ==
+        "has several takes named 'walk'; give the number of one: take 1 'walk', take 2 'walk'");
+  CHECK(refusal("5") ==
+        "has no take '5', but take 1 'walk', take 2 'walk', take 3 'late', take 4 'none'");
+  CHECK(refusal("none") == "take 4 has 0 frames of stream 'b', and a clip needs two");
 }
 
 TEST_CASE("the stream of a log must be named if there are several, and must exist") {
