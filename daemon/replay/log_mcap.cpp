@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -47,8 +48,10 @@ std::optional<std::int64_t> utc_offset_ns(const log::Reader& reader) {
   const std::string& text = found->second;
   std::int64_t offset_ns = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset_ns);
-  const bool plausible =
-      error == std::errc() && end == text.data() + text.size() && is_possible_time(offset_ns);
+  // The sum with a time of the log must fit.
+  constexpr std::int64_t kMost_ns = std::numeric_limits<std::int64_t>::max() / 2;
+  const bool plausible = error == std::errc() && end == text.data() + text.size() &&
+                         offset_ns >= 0 && offset_ns <= kMost_ns;
   return plausible ? std::optional(offset_ns) : std::nullopt;
 }
 

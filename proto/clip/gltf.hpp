@@ -37,8 +37,9 @@ enum class GltfKind : std::uint8_t {
   kVrmAnimation,  // VRMC_vrm_animation 1.0: nodes with a bone are the humanoid's
 };
 
-// Times of the clip's frames, from 0. Fails for a clip without frames, and when a time is not later
-// than the one before it, in the precision of a float, which is glTF's.
+// Times of the clip's frames, from 0. glTF wants each later than the one before it, in the
+// precision of a float: frames that came at one moment are set apart by its least step. Fails for a
+// clip without frames, and for a time that is before the last one or no number.
 [[nodiscard]] Result<std::vector<float>> gltf_times(const Clip& clip);
 
 // Adds the rotation of the next frame, in that of the two signs of a quaternion that is nearer to

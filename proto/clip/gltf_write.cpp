@@ -176,17 +176,22 @@ Result<> check(const GltfMotion& motion, const std::string& path) {
 Result<std::vector<float>> gltf_times(const Clip& clip) {
   if (clip.frames() == 0) return fail("has no frames, so there is nothing to write", clip.path);
   std::vector<float> time_s;
+  double last_s = 0.0;
   for (int i = 0; i < clip.frames(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     const double now_s =
         clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[at] - clip.time_s.front();
-    const auto rounded_s = static_cast<float>(now_s);
-    if (!std::isfinite(rounded_s) || (i > 0 && rounded_s <= time_s.back())) {
-      return fail("frame " + std::to_string(i + 1) +
-                      " is not later than the one before it, as glTF needs it",
+    auto rounded_s = static_cast<float>(now_s);
+    if (!std::isfinite(rounded_s) || now_s < last_s) {
+      return fail("the time of frame " + std::to_string(i + 1) +
+                      " is before that of the last one, or is none; mend the clip's times",
                   clip.path);
     }
+    if (i > 0 && rounded_s <= time_s.back()) {
+      rounded_s = std::nextafter(time_s.back(), std::numeric_limits<float>::max());
+    }
     time_s.push_back(rounded_s);
+    last_s = now_s;
   }
   return time_s;
 }
