@@ -52,7 +52,7 @@ struct Frame {
   float lag_ms = 0.0F;
   std::array<char, kMaxLabel> label{};  // recognised or played gesture; empty when none
   float label_probability = 0.0F;
-  Timecode timecode{};  // empty when the source has none
+  Timecode timecode{};      // empty when the source has none
   Vec3f root_position_m{};  // the skeleton's root_joint in the world
   StageStamps stamps;
   std::array<float, 8> stage_us{};  // spent in each stage of the stream, in their order

@@ -25,8 +25,8 @@ namespace posed::cli {
 namespace {
 
 constexpr const char* kBenchRelayFooter =
-    R"(Synthetic walkers at 120 Hz through the real daemon, heard in turn by one subscriber, and by a
-relay with --subscribers. Relay and subscribers are processes of their own that give way to the
+    R"(Synthetic walkers at 120 Hz through the real daemon, heard in turn by one subscriber and by
+a relay with --subscribers. Relay and subscribers are processes of their own that give way to the
 daemon, as on other machines. CPU is the daemon's process alone; `send` is the time from a frame's
 arrival to its hand-over to ZeroMQ. At the end subscribers that come late ask for a skeleton.
 
@@ -34,7 +34,7 @@ arrival to its hand-over to ZeroMQ. At the end subscribers that come late ask fo
   posed bench relay --subscribers 50 --seconds 5 --json)";
 
 constexpr int kLateJoiners = 20;
-constexpr std::chrono::seconds kSettle{2};
+constexpr std::chrono::seconds kConnect{2};
 
 struct RelayBench {
   int subscribers = 200;
@@ -51,14 +51,14 @@ struct Turn {
   std::vector<std::unique_ptr<HopSubscriber>> behind;
 };
 
-struct Heard {
+struct HeardFrames {
   double cpu_percent = 0.0;  // of one core, mean of the turns
   std::vector<double> send_us{};
   std::uint64_t gaps = 0;
 };
 
 struct RelayFigures {
-  Heard direct, relayed;
+  HeardFrames direct, relayed;
   std::vector<double> late_us;
 };
 
@@ -101,7 +101,7 @@ Result<std::vector<Turn>> fork_turns(const RelayBench& bench) {
 
 // Measures the daemon while all subscribers are there.
 double cpu_percent_during(int seconds) {
-  std::this_thread::sleep_for(kSettle);
+  std::this_thread::sleep_for(kConnect);
   const std::int64_t cpu_ns = system::cpu_time_ns();
   const std::int64_t begun_ns = system::monotonic_ns();
   std::this_thread::sleep_for(std::chrono::seconds(seconds));
@@ -109,7 +109,7 @@ double cpu_percent_during(int seconds) {
          static_cast<double>(system::monotonic_ns() - begun_ns);
 }
 
-Result<> take(HopSubscriber& subscriber, Heard& heard, bool ages) {
+Result<> take(HopSubscriber& subscriber, HeardFrames& heard, bool ages) {
   auto received = subscriber.finish();
   if (!received) return std::unexpected(received.error());
   heard.gaps += received->gaps;
@@ -181,7 +181,7 @@ Result<RelayFigures> measure(const RelayBench& bench) {
 }
 
 void print_json(const RelayBench& bench, const RelayFigures& figures) {
-  const auto heard = [](const Heard& one) {
+  const auto heard = [](const HeardFrames& one) {
     return nlohmann::ordered_json{{"cpu_percent", one.cpu_percent},
                                   {"send", to_json(figures_of(one.send_us))},
                                   {"sequence_gaps", one.gaps}};

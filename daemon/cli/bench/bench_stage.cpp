@@ -32,8 +32,8 @@ namespace posed::cli {
 namespace {
 
 constexpr const char* kBenchStageFooter =
-    R"(Emulated VMC performers send over UDP on loopback; the real daemon styles each with a model of
---points poses, publishes it and sends it to a VMC avatar. Emulators, subscriber and avatars are
+    R"(Emulated VMC performers send over UDP on loopback; the real daemon styles each with a model
+of --points poses, publishes it and sends it to a VMC avatar. Emulators, subscriber and avatars are
 processes of their own; CPU is the daemon's process alone. `send` is the time from the kernel's
 receive stamp to the hand-over to ZeroMQ.
 

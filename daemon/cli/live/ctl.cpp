@@ -49,12 +49,12 @@ struct CtlOptions {
 
 Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
                              const v1::ControlRequest& request) {
-  using Clock = std::chrono::steady_clock;
+  using Steady = std::chrono::steady_clock;
   if (!net::send_part(connection.socket(), request.SerializeAsString(), false)) {
     return fail("the request cannot be sent");
   }
-  const auto end = Clock::now() + std::chrono::duration<double>(options.timeout_s);
-  while (Clock::now() < end && !Interrupt::came()) {
+  const auto end = Steady::now() + std::chrono::duration<double>(options.timeout_s);
+  while (Steady::now() < end && !Interrupt::came()) {
     if (auto refused = connection.refusal()) return std::unexpected(*refused);
     if (!connection.wait(kLookAround)) continue;
     net::Message message;

@@ -97,8 +97,8 @@ void print_ready(const assembly::Daemon& daemon) {
 }
 
 void serve(assembly::Daemon& daemon, const ServeOptions& options) {
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
+  using Steady = std::chrono::steady_clock;
+  const auto start = Steady::now();
   const sigset_t set = end_signals();
   const timespec look_every{.tv_sec = 0, .tv_nsec = 50'000'000};
   while (true) {
@@ -112,7 +112,7 @@ void serve(assembly::Daemon& daemon, const ServeOptions& options) {
       break;
     }
     if (options.until_end && daemon.all_ended()) break;
-    const std::chrono::duration<double> served = Clock::now() - start;
+    const std::chrono::duration<double> served = Steady::now() - start;
     if (options.seconds && served.count() >= *options.seconds) break;
   }
   daemon.stop();

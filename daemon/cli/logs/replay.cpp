@@ -61,19 +61,19 @@ class Pacer {
                    seconds(step.skipped_ns), chunk.id);
     }
     const auto due = start_ + std::chrono::nanoseconds(step.due_ns);
-    while (!Interrupt::came() && Clock::now() < due) {
+    while (!Interrupt::came() && Steady::now() < due) {
       std::this_thread::sleep_until(
-          std::min<Clock::time_point>(due, Clock::now() + std::chrono::milliseconds(50)));
+          std::min<Steady::time_point>(due, Steady::now() + std::chrono::milliseconds(50)));
     }
     return !Interrupt::came();
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
+  using Steady = std::chrono::steady_clock;
   std::string log_;
   double speed_;
   replay::Pace pace_;
-  Clock::time_point start_ = Clock::now();
+  Steady::time_point start_ = Steady::now();
 };
 
 // Shows the progress of the replay once it takes long.
