@@ -16,10 +16,8 @@ namespace posed::relay {
 namespace {
 
 constexpr int kMessagesATurn = 256;
-// Assumed until the first second is over.
-constexpr double kFirstRate_hz = 1000.0;
-// The rate jumps when the first subscribers come; messages.
-constexpr int kShortestQueue = 64;
+// Messages a second that the first queue is made for; most relays pass on more.
+constexpr double kFirstRate_hz = 256.0;
 // Half of what a daemon allows one subscriber, so that it never cuts the relay because the relay's
 // own subscribers come and go.
 constexpr double kMaxChangesAtOnce = publish::kMaxAtOnce / 2.0;
@@ -196,9 +194,11 @@ void Relay::every_second(std::int64_t now_ns) {
   second_ns_ = now_ns;
   passed_before_ = counts_.messages;
   // All skeletons may come together, so they have room beside the poses.
-  const int queue = std::max(publish::send_high_water_mark(rate_hz), kShortestQueue) +
-                    static_cast<int>(streams_.streams());
-  if (queue == queue_) return;
+  const int queue = publish::send_high_water_mark(rate_hz) + static_cast<int>(streams_.streams());
+  // A queue that becomes shorter can stop a connection for good: libzmq's receiving side reports
+  // what it took every half queue, and while it still counts by the old, longer one, the sending
+  // side finds the new one full.
+  if (queue <= queue_) return;
   queue_ = queue;
   static_cast<void>(net::set_option(socket_.get(), ZMQ_SNDHWM, queue));
 }

@@ -68,7 +68,7 @@ class Relay {
   void send(std::string_view topic, std::string_view bytes);
   // Tells the upstreams which subscriptions have come or gone, at the pace that they accept.
   void pass_subscriptions(std::int64_t now_ns);
-  // Makes the queues as long as a quarter of a second of what passes.
+  // Makes the queues as long as a quarter of a second of the most that has passed.
   void every_second(std::int64_t now_ns);
 
   net::ZapAuthenticator* authenticator_;

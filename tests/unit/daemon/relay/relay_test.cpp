@@ -104,6 +104,19 @@ TEST_CASE("a relay passes on what its subscribers want, and subscribes to nothin
   CHECK(rig.relay->counts().upstreams == 1);
 }
 
+TEST_CASE("who subscribes before the relay knows the rate goes on to hear everything") {
+  RelayRig rig;
+  const auto early = rig.subscriber("pose/ann");
+  REQUIRE(rig.subscribes("pose/ann"));
+  // The length of the queues is settled after the first second, here at 200 messages.
+  for (int i = 0; i < 500; ++i) {
+    const std::string number = std::to_string(i);
+    rig.publish("pose/ann", number);
+    REQUIRE(rig.next(early) == "pose/ann=" + number);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
 TEST_CASE("a subscription ends upstream when its last subscriber has gone") {
   RelayRig rig;
   std::optional<net::Socket> first = rig.subscriber("pose/ann");
