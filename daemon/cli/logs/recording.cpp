@@ -179,7 +179,8 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   };
   if (auto done = daemon.start(std::move(hooks)); !done) {
     daemon.stop();
-    static_cast<void>((*recorder)->finish());
+    // What failed at the start is told, not what follows from it.
+    [[maybe_unused]] const auto closed = (*recorder)->finish();
     std::error_code ignored;
     std::filesystem::remove(plan.out, ignored);  // nothing was recorded
     return done;
