@@ -55,7 +55,7 @@ bool Subscriptions::ask(int peer_id, std::string_view prefix, bool on, std::int6
   if (!possible) return ++peer.impossible <= kMaxImpossible;
   const auto wanted = wanted_.try_emplace(std::string(prefix), 0).first;
   if (++wanted->second == 1 && changed_) changed_(wanted->first, true);
-  return wanted_.size() <= kMaxWanted && peer.waits.size() <= kMaxWantedOfPeer + kMaxImpossible;
+  return wanted_.size() <= kMaxWanted && peer.waits.size() - peer.impossible <= kMaxWantedOfPeer;
 }
 
 void Subscriptions::drop(const std::string& prefix) {

@@ -9,6 +9,7 @@
 
 #include "daemon/net/security.hpp"
 #include "daemon/replay/pace.hpp"
+#include "daemon/replay/stream_info.hpp"
 #include "daemon/system/clock.hpp"
 
 namespace posed::replay {
@@ -122,18 +123,13 @@ Broadcast::~Broadcast() {
 
 publish::StreamInfo Broadcast::info_of(std::uint32_t id) {
   const ReplayStream& stream = replay_.stream(id);
-  return {.stream = id,
-          .name = stream.name,
-          .description = stream.description,
-          .skeleton = stream.published,
-          .rate_hz = stream.settings.rate_hz,
-          .stages = pipeline::stage_types_of(stream.settings),
-          .raw = stream.settings.publish_raw,
-          .model = pipeline::first_model(settings_[id]),
-          .counters = &counters_[id],
-          .source_counters = &source_counters_,
-          .source = stream.source,
-          .body = stream.body};
+  publish::StreamInfo info = stream_info(id, stream);
+  info.model = pipeline::first_model(settings_[id]);
+  info.counters = &counters_[id];
+  info.source_counters = &source_counters_;
+  info.source = stream.source;
+  info.body = stream.body;
+  return info;
 }
 
 // If the log lacks the end of the stream that had the name before, it ends now.

@@ -16,6 +16,7 @@
 #include "daemon/publish/published_stream.hpp"
 #include "daemon/replay/mcap_writer.hpp"
 #include "daemon/replay/replay.hpp"
+#include "daemon/replay/stream_info.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
@@ -107,15 +108,8 @@ class LogToMcap {
     auto& place = raw ? parts_[id].raw : parts_[id].styled;
     if (place == nullptr) {
       const ReplayStream& stream = replay_.stream(id);
-      const publish::StreamInfo info{.stream = id,
-                                     .name = stream.name,
-                                     .description = stream.description,
-                                     .skeleton = stream.published,
-                                     .rate_hz = stream.settings.rate_hz,
-                                     .stages = pipeline::stage_types_of(stream.settings),
-                                     .raw = stream.settings.publish_raw,
-                                     .model = {}};
-      place = std::make_unique<Named>(raw ? raw_name(stream.name) : stream.name, info, raw);
+      place = std::make_unique<Named>(raw ? raw_name(stream.name) : stream.name,
+                                      stream_info(id, stream), raw);
     }
     return *place;
   }

@@ -8,6 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/system/clock.hpp"
+#include "daemon/system/process.hpp"
 #include "models/gp/synthetic.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_model.hpp"
@@ -22,6 +24,13 @@ double cpu_pressure(const std::string& field) {
     if (word.starts_with(field)) return std::atof(word.c_str() + field.size());
   }
   return -1.0;
+}
+
+CpuShare::CpuShare() : cpu_ns_(system::cpu_time_ns()), begun_ns_(system::monotonic_ns()) {}
+
+double CpuShare::percent() const {
+  return 100.0 * static_cast<double>(system::cpu_time_ns() - cpu_ns_) /
+         static_cast<double>(system::monotonic_ns() - begun_ns_);
 }
 
 WorkFolder::WorkFolder()

@@ -1,6 +1,7 @@
 // What the benchmarks of a whole daemon share.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -19,6 +20,16 @@ namespace posed::cli {
 // A field of the line `some` of the CPU's pressure: "avg10=" [percent] or "total=" [us since boot];
 // negative if the kernel does not report it.
 [[nodiscard]] double cpu_pressure(const std::string& field);
+
+// The CPU time of this process since the construction, in percent of one core.
+class CpuShare {
+ public:
+  CpuShare();
+  [[nodiscard]] double percent() const;
+
+ private:
+  std::int64_t cpu_ns_, begun_ns_;
+};
 
 // A folder that is deleted with this object.
 class WorkFolder {

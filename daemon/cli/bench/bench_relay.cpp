@@ -17,7 +17,6 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/relay/relay.hpp"
 #include "daemon/system/clock.hpp"
-#include "daemon/system/process.hpp"
 #include "proto/text/json_text.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
@@ -102,20 +101,18 @@ Result<std::vector<Turn>> fork_turns(const RelayBench& bench) {
 // Measures the daemon while all subscribers are there.
 double cpu_percent_during(int seconds) {
   std::this_thread::sleep_for(kConnect);
-  const std::int64_t cpu_ns = system::cpu_time_ns();
-  const std::int64_t begun_ns = system::monotonic_ns();
+  const CpuShare cpu;
   std::this_thread::sleep_for(std::chrono::seconds(seconds));
-  return 100.0 * static_cast<double>(system::cpu_time_ns() - cpu_ns) /
-         static_cast<double>(system::monotonic_ns() - begun_ns);
+  return cpu.percent();
 }
 
 Result<> take(HopSubscriber& subscriber, HeardFrames& heard, bool ages) {
   auto received = subscriber.finish();
   if (!received) return std::unexpected(received.error());
   heard.gaps += received->gaps;
-  for (const Arrival& arrival : received->messages) {
-    if (ages) heard.send_us.push_back(static_cast<double>(arrival.sent_ns) * 1e-3);
-  }
+  if (!ages) return {};
+  const std::vector<double> ages_us = send_ages_us(received->messages);
+  heard.send_us.insert(heard.send_us.end(), ages_us.begin(), ages_us.end());
   return {};
 }
 

@@ -192,13 +192,13 @@ void count(const v1::Stats& stats, StageFigures& figures) {
 // Sleeps while the performers perform.
 void watch(int seconds_, StageFigures& figures) {
   std::this_thread::sleep_for(kSettle);
-  const std::int64_t cpu_ns = system::cpu_time_ns();
+  const CpuShare cpu;
   const std::int64_t begun_ns = system::monotonic_ns();
   const double pressure_us = cpu_pressure("total=");
   std::this_thread::sleep_for(std::chrono::seconds(seconds_));
-  const auto took_ns = static_cast<double>(system::monotonic_ns() - begun_ns);
-  figures.cpu_percent = 100.0 * static_cast<double>(system::cpu_time_ns() - cpu_ns) / took_ns;
-  figures.pressure_percent = (cpu_pressure("total=") - pressure_us) / (took_ns * 1e-5);
+  figures.cpu_percent = cpu.percent();
+  figures.pressure_percent =
+      (cpu_pressure("total=") - pressure_us) / (seconds(system::monotonic_ns() - begun_ns) * 1e4);
   figures.rss_bytes = system::resident_bytes();
 }
 
@@ -232,11 +232,7 @@ Result<StageFigures> measure(const StageBench& bench) {
   auto received = (*subscriber)->finish();
   if (!received) return std::unexpected(received.error());
   figures.gaps = received->gaps;
-  std::vector<double> send_us;
-  for (const Arrival& arrival : received->messages) {
-    send_us.push_back(static_cast<double>(arrival.sent_ns) * 1e-3);
-  }
-  figures.send = figures_of(std::move(send_us));
+  figures.send = figures_of(send_ages_us(received->messages));
   avatars->pipes().close_to();
   if (!avatars->pipes().read(&figures.avatars_heard, sizeof figures.avatars_heard)) {
     return fail("the avatars' process ended early");

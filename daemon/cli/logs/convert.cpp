@@ -122,7 +122,10 @@ Result<> write(const Convert& convert, const clip::Clip& clip) {
 }
 
 int run(Convert& convert) {
-  if (convert.takes) return list_takes(convert.in, convert.json);
+  if (convert.takes) {
+    if (is_log(convert.in)) return list_takes(convert.in, convert.json);
+    return report(misuse("is not a device log (.plog), so it has no takes", convert.in).error());
+  }
   if (convert.out.empty()) {
     return report(misuse("say what to write: --out OUT.bvh", convert.in).error());
   }

@@ -46,9 +46,6 @@ void print_takes_json(const std::vector<replay::LoggedTake>& takes) {
 }  // namespace
 
 int list_takes(const std::string& path, bool json) {
-  if (!path.ends_with(".plog")) {
-    return report(misuse("is not a device log (.plog), so it has no takes", path).error());
-  }
   auto reader = log::Reader::open(path);
   if (!reader) return report(reader.error());
   const auto takes = replay::logged_takes(*reader);

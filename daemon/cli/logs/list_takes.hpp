@@ -5,7 +5,7 @@
 
 namespace posed::cli {
 
-// Prints them, a line each, or as JSON. Returns the exit code.
+// Prints those of the log at `path`, a line each, or as JSON. Returns the exit code.
 [[nodiscard]] int list_takes(const std::string& path, bool json);
 
 }  // namespace posed::cli

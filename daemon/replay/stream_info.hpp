@@ -1,0 +1,24 @@
+// What a publisher or a file needs to know of a replayed stream. Cold.
+#pragma once
+
+#include <cstdint>
+
+#include "daemon/pipeline/stream_settings.hpp"
+#include "daemon/publish/publisher.hpp"
+#include "daemon/replay/replay.hpp"
+
+namespace posed::replay {
+
+// Without counters, model, source and body.
+[[nodiscard]] inline publish::StreamInfo stream_info(std::uint32_t id, const ReplayStream& stream) {
+  return {.stream = id,
+          .name = stream.name,
+          .description = stream.description,
+          .skeleton = stream.published,
+          .rate_hz = stream.settings.rate_hz,
+          .stages = pipeline::stage_types_of(stream.settings),
+          .raw = stream.settings.publish_raw,
+          .model = {}};
+}
+
+}  // namespace posed::replay
