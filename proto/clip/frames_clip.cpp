@@ -61,7 +61,7 @@ double median_step_s(const std::vector<double>& time_s) {
 
 }  // namespace
 
-FramesClip::FramesClip(std::shared_ptr<const Skeleton> skeleton)
+FramesClip::FramesClip(const std::shared_ptr<const Skeleton>& skeleton)
     : skeleton_(writable(skeleton)),
       exact_(skeleton_ == skeleton),
       moving_(moving_joint(*skeleton_)),

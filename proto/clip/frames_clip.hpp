@@ -14,7 +14,7 @@ namespace posed::clip {
 
 class FramesClip {
  public:
-  explicit FramesClip(std::shared_ptr<const Skeleton> skeleton);
+  explicit FramesClip(const std::shared_ptr<const Skeleton>& skeleton);
 
   // Adds a frame of the skeleton. A channel without a value becomes NaN.
   void add(const Frame& frame);

@@ -106,7 +106,7 @@ Result<ClipFormat> parse_description(std::string_view description, const std::st
   files.text = body.substr(files.asf.size());
   ReadOptions options;
   options.amc_rate_hz = *rate_hz;
-  options.metres_per_unit = *metres;
+  options.metres_per_unit = metres;
   if (const auto at = facts.find("profile"); at != facts.end()) options.profile = at->second;
   if (const auto at = facts.find("shape"); at != facts.end()) options.hand_shape = at->second;
   if (const auto at = facts.find("hand"); at != facts.end()) {

@@ -12,7 +12,7 @@ constexpr std::size_t kMaxPathBytes = 4096;  // longest path in Linux
 }  // namespace
 
 std::string Error::text() const {
-  const std::string sentence = clean(message);
+  std::string sentence = clean(message);
   if (file.empty()) return sentence;
   const std::string place = clean(file, kMaxPathBytes);
   if (line == 0) return place + ": " + sentence;
