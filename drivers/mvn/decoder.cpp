@@ -62,12 +62,10 @@ Outcome MvnDecoder::take(std::span<const std::byte> bytes, Sink& sink) noexcept 
       return take_meta(datagram);
     case Type::kScale:
       return take_scale(datagram);
-    case Type::kCentreOfMass:
-      return take_mass(datagram, sink);
     case Type::kTimeCode:
       return take_timecode(datagram);
     default:
-      return is_pose(datagram.head.type) ? take_pose(datagram, sink) : Outcome::kOk;
+      return is_pose(datagram.head.type) ? take_pose(datagram, sink) : take_values(datagram, sink);
   }
 }
 
@@ -101,28 +99,30 @@ Outcome MvnDecoder::take_sample(Tracked& tracked, const Head& head,
   return Outcome::kOk;
 }
 
-// RT-safe.
-Outcome MvnDecoder::take_mass(const Datagram& datagram, Sink& sink) noexcept {
+// Types 20 to 24. RT-safe.
+Outcome MvnDecoder::take_values(const Datagram& datagram, Sink& sink) noexcept {
   Tracked* tracked = find(datagram.head.character);
   if (tracked == nullptr) return Outcome::kForeign;  // nobody with a pose
-  Vec3f position_m;
-  const Outcome outcome = decode_centre_of_mass(datagram.payload, position_m);
+  const Outcome outcome = decode_values(datagram, values_);
   if (outcome != Outcome::kOk) return outcome;
-  const Outcome order = tracked->mass_order.take(datagram.head.sample);
+  const auto group = static_cast<std::size_t>(values_.group);
+  const Outcome order = tracked->value_order[group].take(datagram.head);
   if (order != Outcome::kOk) return order;
-  tracked->changed = tracked->changed || !tracked->character.mass;
-  tracked->character.mass = true;
+  tracked->changed = tracked->changed || !tracked->character.values[group];
+  tracked->character.values.set(group);
   const std::int64_t device_ns = device_time_ns(*tracked, datagram.head);
   const std::size_t body = layout_ == nullptr ? 0 : layout_->body_of(datagram.head.character);
-  if (layout_ == nullptr || body == layout_->bodies.size() || !layout_->entries[body].mass) {
-    return Outcome::kForeign;
-  }
+  if (layout_ == nullptr || body == layout_->bodies.size()) return Outcome::kForeign;
+  const MvnLayout::Entry& entry = layout_->entries[body];
+  if (!entry.groups[group]) return Outcome::kForeign;  // until it is described
+  const std::size_t begin = entry.values.begin[group];
+  if (begin == ValuePlaces::kNone || values_.valid.none()) return Outcome::kOk;
   Sample sample;
   sample.header.device_ns = device_ns;
-  sample.value_count = kMassValues;
-  for (std::size_t i = 0; i < kMassValues; ++i) {
-    sample.value[i] = position_m[i];
-    sample.valid.set(i);
+  sample.value_count = static_cast<std::uint16_t>(entry.values.count);
+  for (std::size_t i = 0; i < value_count(values_.group); ++i) {
+    sample.value[begin + i] = values_.valid[i] ? values_.value[i] : 0.0F;
+    sample.valid[begin + i] = values_.valid[i];
   }
   sink.sample(body, sample);
   return Outcome::kOk;

@@ -36,7 +36,7 @@ class MvnDecoder final : public Decoder {
   [[nodiscard]] Outcome take_pose(const Datagram& datagram, Sink& sink) noexcept;
   [[nodiscard]] Outcome take_sample(Tracked& tracked, const Head& head,
                                     std::span<const std::byte> items, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_mass(const Datagram& datagram, Sink& sink) noexcept;
+  [[nodiscard]] Outcome take_values(const Datagram& datagram, Sink& sink) noexcept;
   [[nodiscard]] Outcome take_timecode(const Datagram& datagram) noexcept;
   [[nodiscard]] Outcome take_meta(const Datagram& datagram) noexcept;
   [[nodiscard]] Outcome take_scale(const Datagram& datagram) noexcept;
@@ -56,6 +56,7 @@ class MvnDecoder final : public Decoder {
   Timecode timecode_{};  // the newest, of this sample:
   std::uint32_t timecode_sample_ = 0;
   CharacterPose pose_;
+  GroupValues values_;
   Assembly::Buffer gathered_{};
   std::array<std::byte, kMaxMvnDescription> description_{};
   Framer framer_;

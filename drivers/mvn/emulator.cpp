@@ -15,8 +15,6 @@ namespace {
 constexpr double kStep_hz = 0.9;  // double steps and waves a second
 constexpr double kPath_m = 1.0;   // radius of the circle that the walker follows
 constexpr double kLap_s = 12.0;
-constexpr std::uint8_t kJoints = 22;    // items of type 20
-constexpr std::uint8_t kTrackers = 17;  // items of type 23
 
 using Rotations = std::array<Quatf, kSegments>;
 
@@ -189,12 +187,11 @@ void MvnEmulator::add_sample(const Person& person, Type type, std::int64_t time_
     case Type::kTimeCode:
       return add(time_text(time_ns));
     case Type::kJointAngles:
-      return add_items(encode_ignored(type, kJoints));
-    case Type::kTrackers:
-      return add_items(encode_ignored(type, kTrackers));
     case Type::kLinear:
     case Type::kAngular:
-      return add_items(encode_ignored(type, kBodySegments));
+    case Type::kTrackers:
+      return add_items(encode_values(
+          type, pose_of(character, person.root_m, person.rotation_xyzw, /*local=*/false)));
     default:
       return add_items(encode_pose(
           type, pose_of(character, person.root_m, person.rotation_xyzw, type == Type::kUnity)));

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "drivers/byte_writer.hpp"
+#include "drivers/mvn/axes.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 
@@ -16,8 +17,6 @@ void write_vector(BigEndianWriter& writer, const Vec3f& v) {
   for (const float x : v) writer.f32(x);
 }
 
-Vec3f to_z_up(const Vec3f& v) { return {v[2], v[0], v[1]}; }
-
 // Angles about the fixed axes X, Y, Z, in this order of turning [degrees].
 Vec3f to_euler(const Quatf& rotation) {
   const Eigen::Matrix3d m = to_eigen_double(rotation).toRotationMatrix();
@@ -26,6 +25,11 @@ Vec3f to_euler(const Quatf& rotation) {
   const double z = std::atan2(m(1, 0), m(0, 0));
   return {static_cast<float>(x / kDegree), static_cast<float>(y / kDegree),
           static_cast<float>(z / kDegree)};
+}
+
+void write_rotation(BigEndianWriter& writer, const Quatf& q) {
+  writer.f32(q[3]);
+  write_vector(writer, to_z_up({q[0], q[1], q[2]}));
 }
 
 void write_segment(BigEndianWriter& writer, Type type, const SegmentPose& segment) {
@@ -43,9 +47,20 @@ void write_segment(BigEndianWriter& writer, Type type, const SegmentPose& segmen
       break;
     default:
       write_vector(writer, to_z_up(p));
-      writer.f32(q[3]);
-      write_vector(writer, to_z_up({q[0], q[1], q[2]}));
+      write_rotation(writer, q);
   }
+}
+
+// How a segment is turned from the one above it.
+Quatf between(const SegmentPose& above, const SegmentPose& segment) {
+  return from_eigen(to_eigen_double(above.rotation_xyzw).conjugate() *
+                    to_eigen_double(segment.rotation_xyzw));
+}
+
+// A whole suit has 17 trackers: on all segments but the lower spine, the neck and the toes.
+bool has_tracker(std::size_t segment) {
+  constexpr std::array<std::size_t, 6> kWithout{1, 2, 3, 5, 18, 22};
+  return std::ranges::find(kWithout, segment) == kWithout.end();
 }
 
 void write_text(BigEndianWriter& writer, std::string_view text) {
@@ -103,11 +118,28 @@ std::vector<std::byte> encode_scale(std::span<const Vec3f, kBodySegments> positi
   return writer.finish();
 }
 
-std::vector<std::byte> encode_ignored(Type type, std::size_t items) {
+std::vector<std::byte> encode_values(Type type, const CharacterPose& pose) {
   BigEndianWriter writer;
-  for (std::size_t i = 0; i < items; ++i) {
-    writer.i32(static_cast<std::int32_t>(i + 1));
-    writer.bytes(std::vector<std::byte>(item_bytes(type) - sizeof(std::int32_t)));
+  for (std::size_t i = 0; i < kBodySegments; ++i) {
+    const bool joint = type == Type::kJointAngles;
+    if (joint && parent_segment(i) < 0) continue;
+    if (type == Type::kTrackers && !has_tracker(i)) continue;
+    const std::size_t end = writer.size() + item_bytes(type);
+    const auto id = static_cast<std::int32_t>(i + 1);
+    if (joint) {
+      const auto parent = static_cast<std::size_t>(parent_segment(i));
+      writer.i32(kPointsOfSegment * static_cast<std::int32_t>(parent + 1));
+      writer.i32(kPointsOfSegment * id);
+      write_vector(writer, to_z_up(to_euler(between(pose.segments[parent], pose.segments[i]))));
+    } else {
+      writer.i32(id);
+      if (type == Type::kLinear) {
+        write_vector(writer, to_z_up(pose.segments[i].position_m));
+      } else {
+        write_rotation(writer, pose.segments[i].rotation_xyzw);
+      }
+    }
+    writer.bytes(std::vector<std::byte>(end - writer.size()));
   }
   return writer.finish();
 }

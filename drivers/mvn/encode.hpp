@@ -25,8 +25,10 @@ namespace posed::drivers::mvn {
 // Where the body's segments are in T-pose, in posed's axes.
 [[nodiscard]] std::vector<std::byte> encode_scale(std::span<const Vec3f, kBodySegments> position_m);
 
-// As many items of a type that posed ignores, all zero but their numbers.
-[[nodiscard]] std::vector<std::byte> encode_ignored(Type type, std::size_t items);
+// The items of type 20, 21, 22 or 23 for a body at rest: the angles, positions or rotations of a
+// global pose in posed's axes; velocities, accelerations and magnetic fields are zero. Of 23 those
+// of 44 bytes, on the 17 segments where a suit has trackers.
+[[nodiscard]] std::vector<std::byte> encode_values(Type type, const CharacterPose& pose);
 
 [[nodiscard]] std::vector<std::byte> encode_centre_of_mass(const Vec3f& position_m);
 

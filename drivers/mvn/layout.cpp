@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint8_t kDescriptionVersion = 1;
 constexpr std::uint8_t kWithFingers = 1;
-constexpr std::uint8_t kWithMass = 2;
+constexpr std::uint8_t kMostFlags = (1U << (1 + kValueGroups)) - 1;
 
 // RT-safe.
 class FixedWriter {
@@ -45,9 +45,9 @@ Result<Character> read_character(ByteReader& reader) {
   character.id = reader.u8();
   const std::uint8_t flags = reader.u8();
   character.fingers = (flags & kWithFingers) != 0;
-  character.mass = (flags & kWithMass) != 0;
+  character.values = ValueGroups(flags >> 1);
   character.name_bytes = reader.u8();
-  if (flags > (kWithFingers | kWithMass) || character.name_bytes > kMvnNameBytes) {
+  if (flags > kMostFlags || character.name_bytes > kMvnNameBytes) {
     return mvn_wrong("has a character that makes no sense");
   }
   const std::string_view name = reader.text(character.name_bytes);
@@ -86,7 +86,7 @@ std::size_t write_description_head(std::size_t characters, std::span<std::byte> 
 std::size_t write_character(const Character& character, std::span<std::byte> to) noexcept {
   FixedWriter writer(to);
   writer.u8(character.id);
-  writer.u8((character.fingers ? kWithFingers : 0U) | (character.mass ? kWithMass : 0U));
+  writer.u8((character.fingers ? kWithFingers : 0U) | character.values.to_ulong() << 1);
   writer.u8(character.name_bytes);
   for (std::size_t i = 0; i < character.name_bytes; ++i) {
     writer.u8(static_cast<unsigned char>(character.name[i]));
@@ -144,11 +144,11 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
     Body& body = layout->bodies.emplace_back();
     body.name = body_name(*character);
     body.skeleton = std::move(*skeleton);
-    if (character->mass) {
-      body.samples = {.names = {"centre_of_mass_x", "centre_of_mass_y", "centre_of_mass_z"},
-                      .units = {"m", "m", "m"}};
-    }
-    layout->entries.push_back({character->id, character->fingers, character->mass});
+    body.samples = name_values(character->values);
+    layout->entries.push_back({.character = character->id,
+                               .fingers = character->fingers,
+                               .groups = character->values,
+                               .values = place_values(character->values)});
   }
   if (reader.left() != 0) return mvn_wrong("goes on after its last character");
   return layout;

@@ -5,7 +5,7 @@
 //   +-----+-------+-----------+-------+-----------+------+------------------------------------+
 //   |  1  | count | character | flags | name size | name | each segment: offset x, y, z (f32) |
 //   +-----+-------+-----------+-------+-----------+------+------------------------------------+
-//    flags      u8, 1: with fingers, 2: with the centre of mass
+//    flags      u8, 1: with fingers; 2 and the higher bits: the groups of values (values.hpp)
 //    name size  u8, bytes of the name as type 12 told it; 0 when it did not
 //    offset     [m], in posed's axes, from the parent in T-pose; of 23 segments, or of 63 with
 //               fingers; of the pelvis the height above the floor
@@ -21,18 +21,18 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/mvn/segments.hpp"
+#include "drivers/mvn/values.hpp"
 
 namespace posed::drivers::mvn {
 
 inline constexpr std::size_t kMaxCharacters = 32;
 inline constexpr std::size_t kMvnNameBytes = 60;
-inline constexpr std::size_t kMassValues = 3;
 
 // What is known about a character. Plain, because the decoder keeps it.
 struct Character {
   std::uint8_t id = 0;
   bool fingers = false;
-  bool mass = false;
+  ValueGroups values;  // those that it has sent
   std::uint8_t name_bytes = 0;
   std::array<char, kMvnNameBytes> name{};
   std::array<Vec3f, kSegments> offset_m{};  // [segment]
@@ -55,7 +55,8 @@ class MvnLayout final : public SourceLayout {
   struct Entry {
     std::uint8_t character = 0;
     bool fingers = false;
-    bool mass = false;
+    ValueGroups groups;
+    ValuePlaces values{};
   };
   std::vector<Entry> entries;  // [body]
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/mvn/axes.hpp"
 #include "drivers/pose_values.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
@@ -13,10 +14,10 @@ namespace {
 
 constexpr std::string_view kMagic = "MXTP";
 constexpr std::size_t kVectorBytes = 12;
-constexpr std::size_t kTrackerBytes = 68;  // of newer versions
-constexpr std::size_t kLeastTimeCode = 8;  // "HH:MM:SS", at least
-constexpr std::size_t kLeastName = 4;      // bytes: the size of an empty name
-constexpr std::size_t kLeastSegment = 16;  // bytes: an empty name, a position
+constexpr std::size_t kLongTrackerBytes = 68;  // of newer versions
+constexpr std::size_t kLeastTimeCode = 8;      // "HH:MM:SS", at least
+constexpr std::size_t kLeastName = 4;          // bytes: the size of an empty name
+constexpr std::size_t kLeastSegment = 16;      // bytes: an empty name, a position
 constexpr float kCentimetre_m = 0.01F;
 constexpr std::uint8_t kLast = 0x80;
 
@@ -31,15 +32,6 @@ bool is_known(Type type) noexcept {
       return item_bytes(type) != 0;
   }
 }
-
-Vec3f read_vector(BigEndianReader& reader) noexcept {
-  Vec3f v;
-  for (float& x : v) x = reader.f32();
-  return v;
-}
-
-// From X forward, Y left, Z up to posed's Z forward, X left, Y up.
-Vec3f from_z_up(const Vec3f& v) noexcept { return {v[1], v[2], v[0]}; }
 
 // A rotation about fixed axes, X first [degrees].
 bool read_euler(BigEndianReader& reader, SegmentPose& segment) noexcept {
@@ -64,14 +56,14 @@ bool read_segment(Type type, BigEndianReader& reader, SegmentPose& segment) noex
     for (std::size_t i = 0; i < 3; ++i) segment.position_m[i] = p[i] * kCentimetre_m;
     return read_euler(reader, segment) && is_plausible(segment.position_m);
   }
-  const float w = reader.f32();
-  const Vec3f v = read_vector(reader);
   if (type == Type::kUnity) {  // mirrored at the plane between left and right
+    const float w = reader.f32();
+    const Vec3f v = read_vector(reader);
     segment.position_m = {-p[0], p[1], p[2]};
     segment.rotation_xyzw = {v[0], -v[1], -v[2], w};
   } else {
     segment.position_m = from_z_up(p);
-    segment.rotation_xyzw = {v[1], v[2], v[0], w};
+    segment.rotation_xyzw = read_quaternion(reader);
   }
   return take_rotation(segment.rotation_xyzw, segment.seen) && is_plausible(segment.position_m);
 }
@@ -166,7 +158,7 @@ bool is_right_size(const Head& head, std::size_t payload_bytes) noexcept {
     case Type::kTimeCode:
       return payload_bytes >= kLeastTimeCode;
     case Type::kTrackers:
-      if (payload_bytes == head.items * kTrackerBytes) return true;
+      if (payload_bytes == head.items * kLongTrackerBytes) return true;
       break;
     default:
       break;
@@ -245,13 +237,6 @@ Outcome decode_scale(std::span<const std::byte> payload,
   if (!reader.ok() || reader.left() != 0) return Outcome::kShort;
   told = segments != 0;
   return sound && (!told || segments >= kBodySegments) ? Outcome::kOk : Outcome::kOutOfRange;
-}
-
-Outcome decode_centre_of_mass(std::span<const std::byte> payload, Vec3f& position_m) noexcept {
-  BigEndianReader reader(payload);
-  position_m = from_z_up(read_vector(reader));
-  if (!reader.ok()) return Outcome::kShort;
-  return is_plausible(position_m) ? Outcome::kOk : Outcome::kOutOfRange;
 }
 
 }  // namespace posed::drivers::mvn

@@ -42,9 +42,17 @@
 //    13  segments (i32) | each: name size (i32) | name | x, y, z (f32)       the T-pose, as in 02
 //        points (i32) | each: segment (u16) | point (u16) | name size (i32) | name | flags (u32) |
 //        x, y, z (f32)
-//    20  joint angles, 20 bytes each       23  motion trackers, 44 or 68 bytes each
-//    21  linear kinematics, 40 bytes each  24  centre of mass: x, y, z (f32) as in 02, perhaps more
-//    22  angular kinematics, 44 bytes each 25  time code: text "HH:MM:SS.mmm"
+//    20  parent point (i32) | child point (i32) | x, y, z (f32)                       20 bytes
+//        the angles of a joint, about its segment's axes; a point is 256 segment id + its number
+//    21  id (i32) | position | velocity | acceleration, each x, y, z (f32)            40 bytes
+//    22  id (i32) | w, x, y, z (f32) | angular velocity | angular acceleration        44 bytes
+//    23  segment id (i32) | w, x, y, z (f32) | free acceleration | magnetic field     44 bytes
+//        or: ... | free acceleration | acceleration | angular velocity | magnetic field  68 bytes
+//    24  centre of mass: x, y, z (f32), perhaps more
+//    25  time code: text "HH:MM:SS.mmm"
+//
+// The axes of 20 to 24 are those of 02; degrees, metres, seconds and radians, for magnetic fields
+// no known unit.
 #pragma once
 
 #include <array>
@@ -63,6 +71,7 @@ inline constexpr std::size_t kHeadBytes = 24;
 inline constexpr std::size_t kMaxProps = 4;
 inline constexpr std::size_t kMaxItems = kSegments + kMaxProps;
 inline constexpr std::size_t kMaxPoseBytes = kMaxItems * 32;
+inline constexpr std::int32_t kPointsOfSegment = 256;  // numbers of type 20 for each segment
 
 enum class Type : std::uint8_t {
   kEuler = 1,
@@ -141,9 +150,5 @@ struct CharacterPose {
 [[nodiscard]] Outcome decode_scale(std::span<const std::byte> payload,
                                    std::array<Vec3f, kBodySegments>& position_m,
                                    bool& told) noexcept;
-
-// In posed's axes. RT-safe.
-[[nodiscard]] Outcome decode_centre_of_mass(std::span<const std::byte> payload,
-                                            Vec3f& position_m) noexcept;
 
 }  // namespace posed::drivers::mvn

@@ -9,6 +9,7 @@
 #include "drivers/mvn/layout.hpp"
 #include "drivers/mvn/protocol.hpp"
 #include "drivers/mvn/time_code.hpp"
+#include "drivers/mvn/values.hpp"
 
 namespace posed::drivers::mvn {
 
@@ -25,8 +26,8 @@ class Tracked {
   std::int64_t first_ns = 0;
   std::int64_t heard_ns = 0;  // a pose; before the first one: anything
   TimeCode clock;
-  DatagramOrder mass_order{32};
-  Character character;  // as it is described
+  std::array<PartOrder, kValueGroups> value_order;  // [group]
+  Character character;                              // as it is described
 
   void begin(std::uint8_t id, std::int64_t now_ns) noexcept;
 

@@ -4,8 +4,8 @@
         METRES_PER_UNIT FILE...
 
 The truth is the forward kinematics of CLIP.bvh, computed here with numpy. Each FILE (.glb, or a .bvh in the same
-unit as CLIP) is imported, and the head of each bone is compared with its joint in every frame. The largest distance is
-printed; above 1 mm the check fails.
+unit as CLIP) is imported, and the head of each bone is compared with its joint in every frame. A .bvh may also be a
+take: a part of CLIP, which is looked for by its rotations. The largest distance is printed; above 1 mm the check fails.
 """
 import builtins
 import sys
@@ -69,6 +69,17 @@ def positions(joints, row):
     return [place for place, _ in world]
 
 
+def part_of(joints, frames, path):
+    """The frames of the clip that a .bvh has, wherever it begins; all of them for another file."""
+    if not path.endswith(".bvh"):
+        return frames
+    taken = read_bvh(path)[1]
+    turns = [channel.endswith("rotation") for *_, channels in joints for channel in channels]
+    begins = range(len(frames) - len(taken) + 1)
+    begin = min(begins, key=lambda b: np.abs((frames[b:b + len(taken)] - taken)[:, turns]).max())
+    return frames[begin:begin + len(taken)]
+
+
 def compare(path, joints, frames, step_s, metres_per_unit):
     """The largest distance [m] of a bone's head from its joint, over all frames and joints."""
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -102,7 +113,7 @@ def compare(path, joints, frames, step_s, metres_per_unit):
 def main():
     clip, metres_per_unit, *files = sys.argv[sys.argv.index("--") + 1:]
     joints, frames, step_s = read_bvh(clip)
-    worst = [compare(path, joints, frames, step_s, float(metres_per_unit)) for path in files]
+    worst = [compare(path, joints, part_of(joints, frames, path), step_s, float(metres_per_unit)) for path in files]
     if not worst or not max(worst) < LIMIT_M:
         raise SystemExit("Blender shows another motion than the clip's")
 

@@ -6,6 +6,10 @@ using UnityEngine;
 
 namespace Posed {
     public sealed class PosedAvatar : MonoBehaviour {
+        // From the hips to the ankle; every Humanoid has these bones.
+        private static readonly HumanBodyBones[] Leg = {
+            HumanBodyBones.Hips, HumanBodyBones.LeftUpperLeg, HumanBodyBones.LeftLowerLeg, HumanBodyBones.LeftFoot };
+
         public string host = "127.0.0.1";
         public int port = 5570;
         public string stream = "walker";
@@ -14,7 +18,7 @@ namespace Posed {
         private PosedSubscriber subscriber;
         private Transform[] bones; // by HumanBodyBones; null where the avatar has none
         private Quaternion[] rest; // of the bones in T-pose, relative to this object
-        private float leg; // of the avatar, from the hips to the ankle; 0 where a bone is missing
+        private float leg; // its length
         private uint boundTo;
         private int[] boneOfJoint; // -1: the avatar has no such bone
         private float scale;
@@ -28,7 +32,9 @@ namespace Posed {
                 bones[i] = animator.GetBoneTransform((HumanBodyBones)i);
                 if (bones[i] != null) rest[i] = toObject * bones[i].rotation;
             }
-            leg = LegOf(bones);
+            for (int i = 1; i < Leg.Length; ++i) {
+                leg += (bones[(int)Leg[i]].position - bones[(int)Leg[i - 1]].position).magnitude;
+            }
             subscriber = new PosedSubscriber(host, port, stream);
         }
 
@@ -53,10 +59,9 @@ namespace Posed {
                 Quaternion turn = turned[joint] * Quaternion.Inverse(ToUnity(skeleton.RestRotations, joint));
                 bones[bone].rotation = transform.rotation * turn * rest[bone];
             }
-            Transform hips = bones[(int)HumanBodyBones.Hips];
-            if (hips == null || !moveThroughRoom) return;
+            if (!moveThroughRoom) return;
             var place = new Vector3(-frame.RootPosition[0], frame.RootPosition[1], frame.RootPosition[2]);
-            hips.position = transform.position + transform.rotation * (place * scale);
+            bones[(int)HumanBodyBones.Hips].position = transform.position + transform.rotation * (place * scale);
         }
 
         private void Bind(PosedSkeleton skeleton) {
@@ -67,7 +72,7 @@ namespace Posed {
                 boneOfJoint[joint] = bone >= 0 && bones[bone] != null ? bone : -1;
             }
             float theirs = LegOf(skeleton);
-            scale = theirs > 0.1f && leg > 0.1f ? leg / theirs : 1f;
+            scale = theirs > 0.1f ? leg / theirs : 1f;
         }
 
         // VRM's names are Unity's with a small first letter, but for the thumbs and the little fingers' "Little".
@@ -76,23 +81,11 @@ namespace Posed {
             string name = char.ToUpperInvariant(vrm[0]) + vrm.Substring(1);
             bool thumb = name.Contains("Thumb");
             if (thumb) name = name.Replace("Proximal", "Intermediate").Replace("Metacarpal", "Proximal");
-            if (!Enum.IsDefined(typeof(HumanBodyBones), name) || name == "LastBone") return -1;
-            return (int)(HumanBodyBones)Enum.Parse(typeof(HumanBodyBones), name);
+            HumanBodyBones bone;
+            return Enum.TryParse(name, out bone) && bone < HumanBodyBones.LastBone ? (int)bone : -1;
         }
 
-        // The lengths of the bones from the hips to the left ankle, of this avatar and of a stream's person.
-        private static float LegOf(Transform[] bones) {
-            HumanBodyBones[] chain = { HumanBodyBones.Hips, HumanBodyBones.LeftUpperLeg, HumanBodyBones.LeftLowerLeg,
-                HumanBodyBones.LeftFoot };
-            float length = 0f;
-            for (int i = 1; i < chain.Length; ++i) {
-                Transform upper = bones[(int)chain[i - 1]], lower = bones[(int)chain[i]];
-                if (upper == null || lower == null) return 0f;
-                length += (lower.position - upper.position).magnitude;
-            }
-            return length;
-        }
-
+        // The length of the same leg of the stream's person; 0 where it has no such bones.
         private static float LegOf(PosedSkeleton skeleton) {
             int hips = skeleton.Bones.IndexOf("hips"), joint = skeleton.Bones.IndexOf("leftFoot");
             List<float> offset = skeleton.Offsets;

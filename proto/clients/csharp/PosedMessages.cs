@@ -8,7 +8,6 @@ namespace Posed {
     // Right-handed, Y up, metres; rotations are x, y, z, w, relative to the parent joint.
     public sealed class PosedSkeleton {
         public uint Id;
-        public int Root;
         public List<string> Names = new List<string>();
         public List<string> Bones = new List<string>(); // VRM names; "" where a joint is no such bone
         public List<int> Parents = new List<int>(); // -1: the top; a parent precedes its children
@@ -27,12 +26,10 @@ namespace Posed {
     }
 
     // Reads one message; a damaged one throws FormatException.
-    public struct ProtoReader {
+    public sealed class ProtoReader {
         private readonly byte[] bytes;
         private readonly int end;
-        private int at;
-
-        public ProtoReader(byte[] bytes) : this(bytes, 0, bytes.Length) { }
+        private int at, field, kind; // of the field that Next() found: its number, how it is encoded
 
         private ProtoReader(byte[] bytes, int begin, int end) {
             this.bytes = bytes;
@@ -42,18 +39,17 @@ namespace Posed {
 
         public static PosedFrame ReadFrame(byte[] bytes) {
             var frame = new PosedFrame();
-            var reader = new ProtoReader(bytes);
-            int kind;
-            for (int field = reader.Next(out kind); field != 0; field = reader.Next(out kind)) {
-                switch (field) {
-                    case 2: frame.Sequence = reader.Number(kind); break;
-                    case 7: frame.SkeletonId = (uint)reader.Number(kind); break;
-                    case 8: reader.Floats(kind, frame.RootPosition); break;
-                    case 9: reader.Floats(kind, frame.Rotations); break;
-                    case 10: frame.Validity = reader.Bytes(kind); break;
-                    case 12: frame.Quality = (int)reader.Number(kind); break;
-                    case 22: frame.Timecode = reader.Text(kind); break;
-                    default: reader.Skip(kind); break;
+            var reader = new ProtoReader(bytes, 0, bytes.Length);
+            while (reader.Next()) {
+                switch (reader.field) {
+                    case 2: frame.Sequence = reader.Number(); break;
+                    case 7: frame.SkeletonId = (uint)reader.Number(); break;
+                    case 8: reader.Floats(frame.RootPosition); break;
+                    case 9: reader.Floats(frame.Rotations); break;
+                    case 10: frame.Validity = reader.Bytes(); break;
+                    case 12: frame.Quality = (int)reader.Number(); break;
+                    case 22: frame.Timecode = reader.Text(); break;
+                    default: reader.Skip(); break;
                 }
             }
             if (frame.RootPosition.Count != 3 || frame.Rotations.Count != 4 * frame.Validity.Length) {
@@ -64,24 +60,21 @@ namespace Posed {
 
         public static PosedSkeleton ReadSkeleton(byte[] bytes) {
             var skeleton = new PosedSkeleton();
-            var reader = new ProtoReader(bytes);
-            int kind;
-            for (int field = reader.Next(out kind); field != 0; field = reader.Next(out kind)) {
-                switch (field) {
-                    case 2: skeleton.Id = (uint)reader.Number(kind); break;
-                    case 4: skeleton.Names.Add(reader.Text(kind)); break;
-                    case 5: reader.SignedNumbers(kind, skeleton.Parents); break;
-                    case 6: reader.Floats(kind, skeleton.Offsets); break;
-                    case 7: skeleton.Bones.Add(reader.Text(kind)); break;
-                    case 8: reader.Floats(kind, skeleton.RestRotations); break;
-                    case 11: skeleton.Root = (int)reader.Number(kind); break;
-                    default: reader.Skip(kind); break;
+            var reader = new ProtoReader(bytes, 0, bytes.Length);
+            while (reader.Next()) {
+                switch (reader.field) {
+                    case 2: skeleton.Id = (uint)reader.Number(); break;
+                    case 4: skeleton.Names.Add(reader.Text()); break;
+                    case 5: reader.SignedNumbers(skeleton.Parents); break;
+                    case 6: reader.Floats(skeleton.Offsets); break;
+                    case 7: skeleton.Bones.Add(reader.Text()); break;
+                    case 8: reader.Floats(skeleton.RestRotations); break;
+                    default: reader.Skip(); break;
                 }
             }
             int joints = skeleton.Names.Count;
             bool whole = joints > 0 && skeleton.Bones.Count == joints && skeleton.Parents.Count == joints
-                && skeleton.Offsets.Count == 3 * joints && skeleton.RestRotations.Count == 4 * joints
-                && skeleton.Root >= 0 && skeleton.Root < joints;
+                && skeleton.Offsets.Count == 3 * joints && skeleton.RestRotations.Count == 4 * joints;
             for (int joint = 0; whole && joint < joints; ++joint) {
                 whole = skeleton.Parents[joint] >= -1 && skeleton.Parents[joint] < joint;
             }
@@ -89,14 +82,14 @@ namespace Posed {
             return skeleton;
         }
 
-        // The next field's number, 0 at the end, and how it is encoded.
-        private int Next(out int kind) {
-            kind = 0;
-            if (at == end) return 0;
+        // Goes to the next field; false at the end.
+        private bool Next() {
+            if (at == end) return false;
             ulong tag = Varint();
+            if (tag >> 3 == 0 || tag > uint.MaxValue) throw new FormatException("a field without number");
+            field = (int)(tag >> 3);
             kind = (int)(tag & 7);
-            if (tag >> 3 == 0 || tag >> 3 > 0x1FFFFFFF) throw new FormatException("a field without number");
-            return (int)(tag >> 3);
+            return true;
         }
 
         private ulong Varint() {
@@ -117,45 +110,45 @@ namespace Posed {
             return place;
         }
 
-        private ulong Number(int kind) {
+        private ulong Number() {
             if (kind == 0) return Varint();
             if (kind == 5) return BitConverter.ToUInt32(bytes, Take(4));
             if (kind == 1) return BitConverter.ToUInt64(bytes, Take(8));
             throw new FormatException("a number is encoded as text");
         }
 
-        private ProtoReader Inside(int kind) {
+        private ProtoReader Inside() {
             if (kind != 2) throw new FormatException("a list is encoded as a number");
             int size = (int)Math.Min(Varint(), int.MaxValue);
             int begin = Take((ulong)size);
             return new ProtoReader(bytes, begin, begin + size);
         }
 
-        private string Text(int kind) => Encoding.UTF8.GetString(Bytes(kind));
+        private string Text() => Encoding.UTF8.GetString(Bytes());
 
-        private byte[] Bytes(int kind) {
-            ProtoReader inside = Inside(kind);
+        private byte[] Bytes() {
+            ProtoReader inside = Inside();
             var copy = new byte[inside.end - inside.at];
             Array.Copy(bytes, inside.at, copy, 0, copy.Length);
             return copy;
         }
 
-        private void Floats(int kind, List<float> values) {
-            ProtoReader inside = Inside(kind);
+        private void Floats(List<float> values) {
+            ProtoReader inside = Inside();
             while (inside.at < inside.end) values.Add(BitConverter.ToSingle(bytes, inside.Take(4)));
         }
 
-        private void SignedNumbers(int kind, List<int> values) {
-            ProtoReader inside = Inside(kind);
+        private void SignedNumbers(List<int> values) {
+            ProtoReader inside = Inside();
             while (inside.at < inside.end) {
                 ulong coded = inside.Varint(); // zigzag
                 values.Add((int)(coded >> 1) ^ -(int)(coded & 1));
             }
         }
 
-        private void Skip(int kind) {
-            if (kind == 2) Inside(kind);
-            else Number(kind);
+        private void Skip() {
+            if (kind == 2) Inside();
+            else Number();
         }
     }
 }

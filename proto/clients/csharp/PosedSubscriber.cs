@@ -16,7 +16,7 @@ namespace Posed {
         private readonly int port;
         private readonly object gate = new object();
         private readonly Thread thread;
-        private volatile bool stopped;
+        private readonly ManualResetEvent stop = new ManualResetEvent(false);
         private TcpClient connection;
         private PosedFrame newest;
         private PosedSkeleton skeleton;
@@ -46,20 +46,19 @@ namespace Posed {
         }
 
         public void Dispose() {
-            stopped = true;
+            stop.Set();
             lock (gate) connection?.Close();
             thread.Join(RetryMs);
         }
 
         private void Run() {
-            while (!stopped) {
+            do {
                 try {
                     Receive();
                 } catch (Exception error) { // whatever it is, it is tried again
                     Problem = error.Message;
                 }
-                for (int waited = 0; waited < RetryMs && !stopped; waited += 50) Thread.Sleep(50);
-            }
+            } while (!stop.WaitOne(RetryMs));
         }
 
         private void Receive() {
@@ -73,12 +72,11 @@ namespace Posed {
                 Subscribe(wire, "skeleton/" + stream);
                 Subscribe(wire, "stats");
                 Problem = "";
-                while (!stopped) {
+                while (!stop.WaitOne(0)) {
                     bool more;
                     byte[] topic = ReadFrame(wire, out more);
-                    if (!more) continue;
+                    if (!more) continue; // every message of posed has two parts
                     byte[] body = ReadFrame(wire, out more);
-                    while (more) ReadFrame(wire, out more); // no message of posed has a third part
                     Take(Encoding.UTF8.GetString(topic), body);
                 }
             }
@@ -86,12 +84,9 @@ namespace Posed {
 
         private void Take(string topic, byte[] body) {
             // A subscription is a prefix: "walker" also brings "walker-raw".
-            if (topic == "pose/" + stream) {
-                PosedFrame frame = ProtoReader.ReadFrame(body);
-                lock (gate) newest = frame;
-            } else if (topic == "skeleton/" + stream) {
-                PosedSkeleton read = ProtoReader.ReadSkeleton(body);
-                lock (gate) skeleton = read;
+            lock (gate) {
+                if (topic == "pose/" + stream) newest = ProtoReader.ReadFrame(body);
+                if (topic == "skeleton/" + stream) skeleton = ProtoReader.ReadSkeleton(body);
             }
         }
 
@@ -108,8 +103,7 @@ namespace Posed {
             if (Encoding.ASCII.GetString(theirs, 12, 5) != "NULL\0") {
                 throw new IOException("the daemon wants a key; this client has none: use a daemon or relay on loopback");
             }
-            byte[] ready = Encoding.ASCII.GetBytes("\x05READY\x0BSocket-Type\0\0\0\x03SUB");
-            Send(wire, 0x04, ready);
+            Send(wire, 0x04, Encoding.ASCII.GetBytes("\x05READY\x0BSocket-Type\0\0\0\x03SUB"));
             bool more;
             ReadFrame(wire, out more); // their READY
         }
@@ -138,12 +132,8 @@ namespace Posed {
         }
 
         private static byte[] ReadBytes(Stream wire, int count) {
-            var bytes = new byte[count];
-            for (int got = 0; got < count;) {
-                int now = wire.Read(bytes, got, count - got);
-                if (now <= 0) throw new IOException("the daemon has closed the connection");
-                got += now;
-            }
+            byte[] bytes = new BinaryReader(wire).ReadBytes(count); // reads on until they are there
+            if (bytes.Length < count) throw new IOException("the daemon has closed the connection");
             return bytes;
         }
     }

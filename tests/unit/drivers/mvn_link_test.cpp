@@ -127,7 +127,7 @@ TEST_CASE("mvn: headers without a length are not for TCP") {
 
 TEST_CASE("mvn: a description is refused when anything in it is wrong") {
   Character gloved = emulated_walker();
-  gloved.mass = true;
+  gloved.values.set(static_cast<std::size_t>(ValueGroup::kCentreOfMass));
   const std::array<Character, 2> both{gloved, named(200)};
   const MvnBytes good = description(both);
   const auto layout = make_layout(good);
@@ -149,7 +149,7 @@ TEST_CASE("mvn: a description is refused when anything in it is wrong") {
   };
   CHECK(refused(good, 0, 2));      // version
   CHECK(refused(good, 1, 33));     // characters
-  CHECK(refused(good, 3, 4));      // flags
+  CHECK(refused(good, 3, 0x80));   // flags
   CHECK(refused(good, 4, 61));     // the name's size
   CHECK(refused(good, 14, 0x7F));  // an offset: NaN or too long
   MvnBytes longer = good;
@@ -168,8 +168,10 @@ TEST_CASE("mvn: a description is refused when anything in it is wrong") {
 }
 
 TEST_CASE("mvn: learning and describing characters does not allocate") {
-  auto emulator = test::mvn_emulator(
-      {Type::kQuaternion, Type::kCentreOfMass, Type::kMeta, Type::kScale}, 2, 700);
+  auto emulator =
+      test::mvn_emulator({Type::kQuaternion, Type::kCentreOfMass, Type::kJointAngles, Type::kLinear,
+                          Type::kAngular, Type::kTrackers, Type::kMeta, Type::kScale},
+                         2, 700);
   std::vector<std::pair<std::int64_t, MvnBytes>> datagrams;
   while (emulator.next_due_ns() < kNanosPerSecond) {
     const std::int64_t due_ns = emulator.next_due_ns();
@@ -215,6 +217,34 @@ TEST_CASE("mvn: wrong options are refused at once") {
 
 namespace {
 
+// The row of a datagram, and that of the description that it brought about.
+std::string recorded_row_of(MvnSession& session, const MvnBytes& bytes) {
+  const int before = session.sink.descriptions;
+  session.feed(bytes);
+  std::string text = test::recorded_row(session.now_ns, "hex", bytes);
+  if (session.sink.descriptions != before) {
+    text += test::recorded_row(session.now_ns, "bodies", session.sink.described);
+  }
+  return text;
+}
+
+// Joint angles, kinematics and trackers of the first character, once before they are described and
+// once after.
+std::string mvn_values_log(MvnSession& session) {
+  std::string text;
+  for (const std::uint32_t sample : {50U, 51U}) {
+    session.now_ns += 400'000'000;
+    for (const Type type : {Type::kJointAngles, Type::kLinear, Type::kAngular, Type::kTrackers}) {
+      const MvnBytes payload = encode_values(type, test::mvn_pose(false));
+      Head head = test::mvn_head(type, sample, true);
+      head.items = static_cast<std::uint8_t>(payload.size() / item_bytes(type));
+      head.time_ms = sample * 100;
+      text += recorded_row_of(session, encode_datagram(head, payload));
+    }
+  }
+  return text;
+}
+
 // Two characters; the first one has gloves, so its samples are split. A bit of the second one's
 // pose flips, another one is cut, one comes twice, and a part of the first one's sample is lost.
 std::string mvn_log() {
@@ -235,16 +265,11 @@ std::string mvn_log() {
     if (i == 32) bytes.resize(bytes.size() / 2);
     if (i == 35) continue;
     for (int twice = 0; twice < (i == 37 ? 2 : 1); ++twice) {
-      const int before = session.sink.descriptions;
       session.now_ns = at_ns;
-      session.feed(bytes);
-      text += test::recorded_row(at_ns, "hex", bytes);
-      if (session.sink.descriptions != before) {
-        text += test::recorded_row(at_ns, "bodies", session.sink.described);
-      }
+      text += recorded_row_of(session, bytes);
     }
   }
-  return text;
+  return text + mvn_values_log(session);
 }
 
 }  // namespace

@@ -170,9 +170,13 @@ TEST_CASE("mvn: a datagram has the bytes of its drawing") {
   for (std::size_t i = 0; i < expected.size(); ++i) {
     CHECK(std::to_integer<unsigned>(bytes[i]) == expected[i]);
   }
-  Vec3f position_m;
-  CHECK(decode_centre_of_mass(std::span(bytes).subspan(kHeadBytes), position_m) == Outcome::kOk);
-  CHECK(position_m == Vec3f{1.0F, 0.0F, -2.0F});
+  Datagram datagram;
+  REQUIRE(decode_datagram(bytes, datagram) == Outcome::kOk);
+  GroupValues values;
+  CHECK(decode_values(datagram, values) == Outcome::kOk);
+  CHECK(values.group == ValueGroup::kCentreOfMass);
+  CHECK(Vec3f{values.value[0], values.value[1], values.value[2]} == Vec3f{1.0F, 0.0F, -2.0F});
+  CHECK(values.valid.count() == 3);
 }
 
 TEST_CASE("mvn: type 01 turns about X, then Y, then Z, in centimetres and degrees") {
@@ -201,8 +205,9 @@ TEST_CASE("mvn: every datagram that is cut is short, and one that goes on, too")
   all.push_back(encode_datagram(head, encode_centre_of_mass({})));
   for (const Type type : {Type::kJointAngles, Type::kLinear, Type::kAngular, Type::kTrackers}) {
     head.type = type;
-    head.items = 3;
-    all.push_back(encode_datagram(head, encode_ignored(type, 3)));
+    const MvnBytes payload = encode_values(type, test::mvn_pose(false));
+    head.items = static_cast<std::uint8_t>(payload.size() / item_bytes(type));
+    all.push_back(encode_datagram(head, payload));
   }
   WalkerSession session;
   for (const MvnBytes& bytes : all) {
