@@ -2,19 +2,16 @@
 // error message, and an accepted text can be used.
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/device_info.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace {
 
+using posed::fuzz::demand;
 using namespace posed::drivers::glove;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 Model small_model() {
   return {.driver = "small",

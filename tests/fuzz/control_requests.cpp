@@ -18,6 +18,7 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/log/digest.hpp"
 #include "tests/fuzz/check_command.hpp"
+#include "tests/fuzz/demand.hpp"
 #include "tests/fuzz/model_envelope.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
@@ -25,13 +26,10 @@
 
 namespace {
 
+using posed::fuzz::demand;
 using namespace posed;
 
 constexpr std::size_t kHeader = 24;  // bytes of a model file before its payload
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 class DaemonControl final : public control::DaemonControl {
  public:

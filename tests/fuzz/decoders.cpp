@@ -2,17 +2,19 @@
 // a log stores. The first byte selects the decoder, the second one how the rest is cut into chunks.
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "drivers/driver.hpp"
 #include "drivers/template_mocap/protocol.hpp"
 #include "proto/frame/hand.hpp"
+#include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
 
+using posed::fuzz::demand;
+using posed::fuzz::feed;
 using posed::test::CollectSink;
 
 constexpr std::string_view kBvh =
@@ -49,10 +51,6 @@ std::string cyberglove_device_info(const std::string& form) {
          " mode=stream time=1 status=1 ticks=1152 multiplier=3";
 }
 
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
-
 std::unique_ptr<posed::drivers::Decoder> decoder_of(const char* driver, const std::string& text) {
   const posed::drivers::Driver* found = posed::drivers::find_driver(driver);
   demand(found != nullptr);
@@ -80,12 +78,12 @@ void try_bytes(const char* driver, const std::string& text, std::size_t piece,
   const auto whole_decoder = decoder_of(driver, text);
   demand(decoder != nullptr);
   CollectSink whole(0);
-  whole_decoder->feed(bytes, 0, whole);
+  feed(*whole_decoder, bytes, 0, whole);
   check(whole);
   CollectSink cut(0);
   while (!bytes.empty()) {
     const std::size_t length = std::min(piece, bytes.size());
-    decoder->feed(bytes.first(length), 0, cut);
+    feed(*decoder, bytes.first(length), 0, cut);
     bytes = bytes.subspan(length);
   }
   demand(cut.outcomes == whole.outcomes && cut.frames.size() == whole.frames.size() &&
@@ -129,20 +127,20 @@ void try_bodies(const posed::drivers::Driver& driver, std::span<const std::byte>
     std::vector<std::byte> packet;
     const std::int64_t due_ns = (*emulator)->next_due_ns();
     (*emulator)->emit(due_ns, packet);
-    decoder->feed(packet, due_ns, first);
+    feed(*decoder, packet, due_ns, first);
   }
   const auto layout = driver.make_layout(first.bytes);
   demand(layout.has_value());
   decoder->use(**layout);
   CollectSink sink(0);
-  decoder->feed(bytes, 0, sink);
+  feed(*decoder, bytes, 0, sink);
   for (const std::size_t body : sink.bodies) demand(body < (*layout)->bodies.size());
   for (const posed::Frame& frame : sink.frames) demand(posed::test::is_sound(frame));
   const auto any = driver.make_layout(bytes);
   if (!any) return;
   demand((*any)->bodies.size() <= posed::kMaxBodies);
   decoder->use(**any);
-  decoder->feed(bytes, 0, sink);
+  feed(*decoder, bytes, 0, sink);
 }
 
 // The bytes are a datagram, a datagram's content with a right head and checksum, and a description.
@@ -153,13 +151,13 @@ void try_mocap(std::span<const std::byte> bytes) {
   demand(layout.has_value());
   const auto decoder = decoder_of("template_mocap", "template_mocap rate=100");
   CollectSink sink(0);
-  decoder->feed(bytes, 0, sink);
+  feed(*decoder, bytes, 0, sink);
   decoder->use(**layout);
-  decoder->feed(bytes, 0, sink);
+  feed(*decoder, bytes, 0, sink);
   if (bytes.size() <= 60'000) {
     for (const auto kind :
          {posed::drivers::mocap::Kind::kDescription, posed::drivers::mocap::Kind::kFrame}) {
-      decoder->feed(posed::drivers::mocap::encode_datagram(kind, bytes), 0, sink);
+      feed(*decoder, posed::drivers::mocap::encode_datagram(kind, bytes), 0, sink);
     }
   }
   for (const std::size_t body : sink.bodies) demand(body < (*layout)->bodies.size());
@@ -168,7 +166,7 @@ void try_mocap(std::span<const std::byte> bytes) {
   if (!any) return;
   demand((*any)->bodies.size() <= posed::kMaxBodies);
   decoder->use(**any);
-  decoder->feed(bytes, 0, sink);
+  feed(*decoder, bytes, 0, sink);
 }
 
 }  // namespace
@@ -233,7 +231,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     default:
       if (const auto decoder = decoder_of("file", text)) {
         CollectSink sink(0);
-        decoder->feed(bytes, 0, sink);
+        feed(*decoder, bytes, 0, sink);
         check(sink);
       }
   }

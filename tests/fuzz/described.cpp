@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "drivers/described/protocol.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
@@ -21,11 +21,9 @@ namespace {
 using posed::drivers::described::DescribedDecoder;
 using posed::drivers::described::parse_device;
 using posed::drivers::described::Table;
+using posed::fuzz::demand;
+using posed::fuzz::feed;
 using posed::test::CollectSink;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 // A delimiter, odd bits in both orders, and a packet that states its length.
 constexpr const char* kDelimited = R"(
@@ -138,13 +136,14 @@ void check(const CollectSink& sink) {
 void try_bytes(const std::shared_ptr<const Table>& table, std::size_t piece,
                std::span<const std::byte> bytes) {
   CollectSink whole(0);
-  decoder_of(table).feed(bytes, 0, whole);
+  auto decoder_of_whole = decoder_of(table);
+  feed(decoder_of_whole, bytes, 0, whole);
   check(whole);
   CollectSink cut(0);
   auto decoder = decoder_of(table);
   while (!bytes.empty()) {
     const std::size_t length = std::min(piece, bytes.size());
-    decoder.feed(bytes.first(length), 0, cut);
+    feed(decoder, bytes.first(length), 0, cut);
     bytes = bytes.subspan(length);
   }
   check(cut);

@@ -4,7 +4,6 @@
 // same -seed.
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <string>
 #include <utility>
@@ -12,19 +11,18 @@
 
 #include "drivers/described/device_file.hpp"
 #include "drivers/driver.hpp"
+#include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
 
 using posed::drivers::Driver;
 using posed::drivers::Options;
+using posed::fuzz::demand;
+using posed::fuzz::feed;
 using Bytes = std::vector<std::byte>;
 
 constexpr std::size_t kRecords = 2;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 class SoundSink final : public posed::Sink {
  public:
@@ -95,8 +93,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto bytes = std::as_bytes(std::span(data, size));
   SoundSink sink;
   for (Glove& glove : gloves) {
-    glove.decoder->feed(bytes, 0, sink);
-    glove.decoder->feed(edited(glove.records, bytes), 0, sink);
+    feed(*glove.decoder, bytes, 0, sink);
+    feed(*glove.decoder, edited(glove.records, bytes), 0, sink);
   }
   return 0;
 }

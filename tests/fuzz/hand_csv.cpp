@@ -3,16 +3,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string_view>
 
 #include "proto/clip/hand_clip.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace {
 
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
+using posed::fuzz::demand;
 
 }  // namespace
 

@@ -2,11 +2,11 @@
 // first byte says how the rest is cut into datagrams, each of which also gets a right head.
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 
 #include "drivers/mvn/decoder.hpp"
 #include "drivers/mvn/emulator.hpp"
 #include "drivers/mvn/encode.hpp"
+#include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
@@ -14,11 +14,9 @@ namespace {
 using posed::drivers::SourceLayout;
 using posed::drivers::mvn::Head;
 using posed::drivers::mvn::MvnDecoder;
+using posed::fuzz::demand;
+using posed::fuzz::feed;
 using posed::test::CollectSink;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 const SourceLayout& two_characters() {
   static const auto layout = [] {
@@ -36,8 +34,7 @@ const SourceLayout& two_characters() {
 
 void check(const CollectSink& sink) {
   for (const std::size_t body : sink.bodies) demand(body < two_characters().bodies.size());
-  for (const posed::Frame& frame : sink.frames) demand(posed::test::is_sound(frame));
-  for (const posed::Sample& sample : sink.samples) demand(posed::test::is_sound(sample));
+  posed::fuzz::demand_sound(sink);
   if (sink.descriptions > 0) demand(posed::drivers::mvn::make_layout(sink.described).has_value());
 }
 
@@ -56,16 +53,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (std::size_t at = 0; at < bytes.size(); at += piece) {
     const auto part = bytes.subspan(at, std::min(piece, bytes.size() - at));
     now_ns += 200'000'000;
-    datagrams.feed(part, now_ns, sink);
-    stream.feed(part, now_ns, sink);
+    feed(datagrams, part, now_ns, sink);
+    feed(stream, part, now_ns, sink);
     Head head;
     std::vector<std::byte> framed(posed::drivers::mvn::kHeadBytes);
     std::ranges::copy(part.first(std::min(part.size(), framed.size())), framed.begin());
     std::ranges::copy(std::as_bytes(std::span("MXTP", 4)), framed.begin());
     if (!posed::drivers::mvn::read_head(framed, head)) continue;
     const auto whole = encode_datagram(head, part.subspan(std::min(part.size(), framed.size())));
-    datagrams.feed(whole, now_ns, sink);
-    stream.feed(whole, now_ns, sink);
+    feed(datagrams, whole, now_ns, sink);
+    feed(stream, whole, now_ns, sink);
   }
   check(sink);
   const auto any = posed::drivers::mvn::make_layout(bytes);

@@ -2,28 +2,25 @@
 // byte selects the version, the rest is the payload.
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 
 #include "drivers/natnet/encode.hpp"
 #include "drivers/natnet/figure.hpp"
 #include "drivers/natnet/natnet.hpp"
+#include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
 
+using posed::fuzz::demand;
+using posed::fuzz::feed;
 namespace natnet = posed::drivers::natnet;
 using posed::test::CollectSink;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 void check(const CollectSink& sink, const posed::drivers::SourceLayout& layout) {
   for (const std::size_t body : sink.bodies) demand(body < layout.bodies.size());
   for (const std::size_t body : sink.sample_bodies) demand(body < layout.bodies.size());
-  for (const posed::Frame& frame : sink.frames) demand(posed::test::is_sound(frame));
-  for (const posed::Sample& sample : sink.samples) demand(posed::test::is_sound(sample));
+  posed::fuzz::demand_sound(sink);
 }
 
 }  // namespace
@@ -43,11 +40,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   demand(bodies.has_value());
   decoder->use(**bodies);
   CollectSink sink(0);
-  decoder->feed(bytes, 0, sink);
+  feed(*decoder, bytes, 0, sink);
   for (const auto id :
        {natnet::MessageId::kFrame, natnet::MessageId::kServerInfo, natnet::MessageId::kResponse,
         natnet::MessageId::kModelDef, natnet::MessageId::kFrame}) {
-    decoder->feed(natnet::encode_message(id, bytes), 0, sink);
+    feed(*decoder, natnet::encode_message(id, bytes), 0, sink);
     (void)decoder->next_request(0);
   }
   check(sink, **bodies);
@@ -56,7 +53,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   demand((*any)->bodies.size() <= posed::kMaxBodies);
   decoder->use(**any);
   sink.clear();
-  decoder->feed(natnet::encode_message(natnet::MessageId::kFrame, bytes), 0, sink);
+  feed(*decoder, natnet::encode_message(natnet::MessageId::kFrame, bytes), 0, sink);
   check(sink, **any);
   return 0;
 }

@@ -1,7 +1,6 @@
 // The decoder of another posed's stream on any bytes: as a message, as the body of a pose and of a
 // skeleton, with the skeleton of the emulator in use. What its reader accepts, protobuf accepts.
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -9,16 +8,15 @@
 #include "drivers/posed/decoder.hpp"
 #include "drivers/posed/emulator.hpp"
 #include "posed/v1/posed.pb.h"
+#include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
 
+using posed::fuzz::demand;
+using posed::fuzz::feed;
 using posed::test::CollectSink;
 namespace chain = posed::drivers::chain;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 // The numbers that were read are those that protobuf reads; text that is not UTF-8 is refused by
 // protobuf alone.
@@ -41,21 +39,21 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   compare(bytes);
   chain::UpstreamDecoder decoder("walker");
   CollectSink sink(0);
-  decoder.feed(bytes, 0, sink);
+  feed(decoder, bytes, 0, sink);
   chain::UpstreamEmulator emulator({.stream = "walker", .rate_hz = 60.0});
   std::vector<std::byte> skeleton;
   emulator.emit(0, skeleton);
-  decoder.feed(skeleton, 0, sink);
+  feed(decoder, skeleton, 0, sink);
   const auto layout = chain::make_layout(sink.described);
   demand(layout.has_value());
   decoder.use(**layout);
-  decoder.feed(chain::join_message("pose/walker", text), 0, sink);
-  decoder.feed(chain::join_message("skeleton/walker", text), 0, sink);
+  feed(decoder, chain::join_message("pose/walker", text), 0, sink);
+  feed(decoder, chain::join_message("skeleton/walker", text), 0, sink);
   if (const auto any = chain::make_layout(bytes)) {
     demand((*any)->bodies.size() == 1);
     decoder.use(**any);
-    decoder.feed(chain::join_message("pose/walker", text), 0, sink);
+    feed(decoder, chain::join_message("pose/walker", text), 0, sink);
   }
-  for (const posed::Frame& frame : sink.frames) demand(posed::test::is_sound(frame));
+  posed::fuzz::demand_sound(sink);
   return 0;
 }

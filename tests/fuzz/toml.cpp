@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 
 #include <sys/mman.h>
@@ -19,14 +18,12 @@
 #include "proto/frame/hand_shape.hpp"
 #include "proto/frame/profile.hpp"
 #include "proto/text/toml.hpp"
+#include "tests/fuzz/demand.hpp"
 
 namespace {
 
 using posed::TomlLimits;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
+using posed::fuzz::demand;
 
 void check_sentence(const posed::Error& error) {
   demand(!error.message.empty() && error.line >= 0);

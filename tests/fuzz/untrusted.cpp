@@ -18,15 +18,13 @@
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/clock.hpp"
+#include "tests/fuzz/demand.hpp"
 #include "tests/support/raw_peer.hpp"
 
 namespace {
 
+using posed::fuzz::demand;
 using namespace posed;
-
-void demand(bool holds) {
-  if (!holds) std::abort();
-}
 
 std::string topic(FuzzedDataProvider& data) {
   constexpr std::array<const char*, 8> kBegins{"",       "pose/", "skeleton/", "sensor/",
