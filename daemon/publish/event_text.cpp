@@ -2,7 +2,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
 
 namespace posed::publish {
@@ -88,6 +87,21 @@ std::string sentence(const ShedTally::Sum& shed) {
 
 std::string body_words(const std::string& source, const std::string& body) {
   return fmt::format("body {} of source {}", in_quotes(body), source);
+}
+
+std::string has_left(const std::string& source, const std::string& body, std::uint64_t last_frame) {
+  return fmt::format("{} has left after frame {}", body_words(source, body), last_frame);
+}
+
+v1::Event event_message(const std::string& stream, v1::Event::Kind kind, std::int64_t time_ns,
+                        std::uint64_t sequence, const std::string& text) {
+  v1::Event event;
+  event.set_stream(stream);
+  event.set_kind(kind);
+  event.set_time_ns(time_ns);
+  event.set_sequence(sequence);
+  event.set_text(text);
+  return event;
 }
 
 }  // namespace posed::publish

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <time.h>
 
@@ -180,10 +179,7 @@ void Publisher::take_notice(PublishedStream& published, const pipeline::StreamEv
   if (kind == v1::Event::KIND_ENDED) {
     report_shed(published, true);
     const StreamInfo& info = published.info;
-    if (!info.source.empty()) {
-      text = fmt::format("{} has left after frame {}", body_words(info.source, info.body),
-                         event.sequence);
-    }
+    if (!info.source.empty()) text = has_left(info.source, info.body, event.sequence);
   }
   send_event(published, kind, event.time_ns, event.sequence, text);
 }
@@ -216,12 +212,7 @@ void Publisher::take_frame(PublishedStream& published, const Frame& frame, bool 
 
 void Publisher::send_event(PublishedStream& published, v1::Event::Kind kind, std::int64_t time_ns,
                            std::uint64_t sequence, const std::string& text) {
-  v1::Event event;
-  event.set_stream(published.info.name);
-  event.set_kind(kind);
-  event.set_time_ns(time_ns);
-  event.set_sequence(sequence);
-  event.set_text(text);
+  const v1::Event event = event_message(published.info.name, kind, time_ns, sequence, text);
   const bool bad = kind == v1::Event::KIND_STALE || kind == v1::Event::KIND_SHED ||
                    kind == v1::Event::KIND_LOST || kind == v1::Event::KIND_CLOCK_JUMPED ||
                    (kind >= v1::Event::KIND_RECORDING_GAP && kind <= v1::Event::KIND_WARNING);

@@ -13,6 +13,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 
+#include "daemon/publish/event_text.hpp"
 #include "daemon/publish/published_stream.hpp"
 #include "daemon/replay/mcap_writer.hpp"
 #include "daemon/replay/replay.hpp"
@@ -66,6 +67,7 @@ class LogToMcap {
         frame_schema_(add_schema(*v1::Frame::descriptor())),
         skeleton_schema_(add_schema(*v1::Skeleton::descriptor())),
         sample_schema_(add_schema(*v1::Sample::descriptor())),
+        event_schema_(add_schema(*v1::Event::descriptor())),
         parts_(replay.streams()) {}
 
   void take(const pipeline::Item& item) {
@@ -78,6 +80,7 @@ class LogToMcap {
         take_sample(item.sample);
         break;
       case pipeline::Item::Kind::kEvent:
+        take_event(item.stream_event);
         break;
     }
   }
@@ -152,10 +155,26 @@ class LogToMcap {
         from.channel.samples.encode(sample));
   }
 
+  void take_event(const pipeline::StreamEvent& event) {
+    const ReplayStream& stream = replay_.stream(event.stream);
+    const auto kind = static_cast<v1::Event::Kind>(event.kind);
+    std::string text = publish::sentence(event);
+    if (kind == v1::Event::KIND_SHED) {
+      const auto frames = static_cast<std::uint64_t>(event.value);
+      text = publish::sentence(
+          publish::ShedTally::Sum{frames, event.sequence, event.sequence + frames - 1});
+    } else if (kind == v1::Event::KIND_ENDED && !stream.source.empty()) {
+      text = publish::has_left(stream.source, stream.body, event.sequence);
+    }
+    add(named(event.stream, false).channel.event_topic, event_schema_, event.sequence,
+        event.time_ns,
+        publish::event_message(stream.name, kind, event.time_ns, event.sequence, text));
+  }
+
   const Replay& replay_;
   std::int64_t offset_ns_;
   McapWriter writer_;
-  std::uint16_t frame_schema_, skeleton_schema_, sample_schema_;
+  std::uint16_t frame_schema_, skeleton_schema_, sample_schema_, event_schema_;
   std::vector<Part> parts_;  // [stream]
   std::map<std::string, std::uint16_t> topics_;
   std::string bytes_;

@@ -5,32 +5,13 @@
 #include <vector>
 
 #include "proto/clip/gltf.hpp"
-#include "proto/frame/skeleton.hpp"
+#include "proto/frame/joint_channels.hpp"
 
 namespace posed::clip {
 namespace {
 
 GltfNode end_site_of(const Joint& joint, int parent) {
   return {.name = joint.name + "_end", .parent = parent, .offset_m = *joint.end_site_m};
-}
-
-bool has_channels(const Skeleton& skeleton, int joint, bool translation) {
-  return std::ranges::any_of(skeleton.channels, [&](const Channel& channel) {
-    return channel.joint == joint && channel.translation == translation;
-  });
-}
-
-// Position channels replace the joint's offset.
-Eigen::Vector3d local_position_m(const Skeleton& skeleton, int joint,
-                                 std::span<const double> values) {
-  Eigen::Vector3d position_m = skeleton.joints[static_cast<std::size_t>(joint)].offset_m;
-  for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
-    const Channel& channel = skeleton.channels[c];
-    if (channel.translation && channel.joint == joint) {
-      position_m[static_cast<int>(channel.axis)] = values[c];
-    }
-  }
-  return position_m;
 }
 
 std::span<const double> values_of(const Clip& clip, int frame) {
@@ -49,11 +30,13 @@ Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
     const Joint& joint = skeleton.joints[j];
     GltfNode node{.name = joint.name, .parent = joint.parent, .offset_m = joint.offset_m};
     node.bone = joint.bone;
-    const bool moves = has_channels(skeleton, j, true);
-    const bool turns = has_channels(skeleton, j, false);
+    const auto channels = channels_of(skeleton, j);
+    const auto first = channels.data() - skeleton.channels.data();
+    const bool moves = std::ranges::any_of(channels, &Channel::translation);
+    const bool turns = !std::ranges::all_of(channels, &Channel::translation);
     for (int i = 0; i < clip.frames(); ++i) {
       const auto values = values_of(clip, i);
-      if (moves) add_position(node, local_position_m(skeleton, j, values));
+      if (moves) add_position(node, local_position(joint, channels, values.data() + first));
       if (turns) add_rotation(node, local_rotation(skeleton, j, values));
     }
     motion.nodes.push_back(std::move(node));

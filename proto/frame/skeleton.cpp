@@ -7,6 +7,7 @@
 #include <zlib.h>
 
 #include "proto/frame/bone_names.hpp"
+#include "proto/frame/joint_channels.hpp"
 #include "proto/frame/t_pose.hpp"
 #include "proto/text/clean.hpp"
 
@@ -118,13 +119,6 @@ Result<> check_channels(const Skeleton& skeleton) {
   return {};
 }
 
-// The channels of one joint. RT-safe.
-std::span<const Channel> channels_of(const Skeleton& skeleton, int joint) noexcept {
-  const auto range = std::ranges::equal_range(
-      skeleton.channels, joint, {}, [](const Channel& c) { return static_cast<int>(c.joint); });
-  return {range.begin(), range.end()};
-}
-
 // q * v, bit for bit as Eigen computes it, but inlined: Eigen's call would take a sixth of the time
 // of a glove's packet. RT-safe.
 Eigen::Vector3d turned(const Eigen::Quaterniond& q, const Eigen::Vector3d& v) noexcept {
@@ -150,16 +144,6 @@ Eigen::Quaterniond local_rotation(const Joint& joint, std::span<const Channel> c
   // C M C^-1 rotates M's axis by C and keeps its angle.
   if (any) m.vec() = turned(joint.channel_frame, m.vec());
   return m;
-}
-
-// Position of a joint in its parent's frame. RT-safe.
-Eigen::Vector3d local_position(const Joint& joint, std::span<const Channel> channels,
-                               const double* values) noexcept {
-  Eigen::Vector3d position = joint.offset_m;
-  for (std::size_t i = 0; i < channels.size(); ++i) {
-    if (channels[i].translation) position[static_cast<int>(channels[i].axis)] = values[i];
-  }
-  return position;
 }
 
 // The product of rotations about axes a and b that is closest to q: dot(q, qa(x) qb(y)) is bilinear

@@ -227,17 +227,25 @@ TEST_CASE("an emulated posed is heard over ZeroMQ, recorded, and replayed bit fo
   check_replay(next);
 }
 
-TEST_CASE("an emulated posed is published to other machines only if that is wanted") {
-  const auto emulate = [](const std::string& endpoint, std::vector<std::string> more) {
-    std::vector<std::string> words{"emulate", "posed", "--publish", endpoint, "--seconds", "0.1"};
+TEST_CASE("an emulated device is open to other machines only if that is wanted") {
+  const auto emulate = [](const char* driver, const char* where, const std::string& address,
+                          std::vector<std::string> more) {
+    std::vector<std::string> words{"emulate", driver, where, address, "--seconds", "0.1"};
     words.insert(words.end(), more.begin(), more.end());
     return posed(std::move(words));
   };
-  const auto open = emulate("tcp://0.0.0.0:*", {});
-  CHECK(open.code == 2);
-  CHECK(has(open.err, "can be reached from other machines by anyone"));
-  CHECK(emulate("tcp://0.0.0.0:*", {"--insecure"}).code == 0);
-  CHECK(emulate("tcp://127.0.0.1:*", {}).code == 0);
+  for (const auto& [driver, where, open, here] :
+       {std::array{"posed", "--publish", "tcp://0.0.0.0:*", "tcp://127.0.0.1:*"},
+        std::array{"axis", "--listen", "0.0.0.0:0", "127.0.0.1:0"}}) {
+    const auto refused = emulate(driver, where, open, {});
+    CHECK(refused.code == 2);
+    CHECK(has(refused.err, "can be reached from other machines by anyone"));
+    CHECK(emulate(driver, where, open, {"--insecure"}).code == 0);
+    CHECK(emulate(driver, where, here, {}).code == 0);
+    const auto pointless = emulate(driver, where, here, {"--insecure"});
+    CHECK(pointless.code == 2);
+    CHECK(has(pointless.err, "--insecure has no effect"));
+  }
 }
 
 TEST_CASE("the configs of a stage of three machines are sound") {

@@ -144,6 +144,31 @@ TEST_CASE("check reports what a config would run, or everything that is wrong wi
   CHECK(has(gone.err, "one.style"));
 }
 
+TEST_CASE("check tells where the daemon would record and who may trigger takes") {
+  const Served served;
+  const auto config = served.path("posed.toml");
+  const auto plain = posed({"check", "--config", config, "--json"});
+  CHECK_FALSE(json::parse(plain.out).contains("record"));
+  CHECK_FALSE(json::parse(plain.out).contains("trigger"));
+  std::ofstream(config, std::ios::app) << R"(
+[record]
+folder = "monday"
+clips = "bvh"
+[trigger]
+listen = "127.0.0.1:1599"
+)";
+  const auto shown = posed({"check", "--config", config});
+  INFO(shown.err);
+  CHECK(has(shown.out, "records to " + served.path("monday") + ", each take as BVH\n"));
+  CHECK(has(shown.out, "takes are triggered at 127.0.0.1:1599 by this machine\n"));
+  const auto told = json::parse(posed({"check", "--config", config, "--json"}).out);
+  CHECK(told.at("record").at("folder") == served.path("monday"));
+  CHECK(told.at("record").at("frames") == false);
+  CHECK(told.at("record").at("clips") == true);
+  CHECK(told.at("trigger").at("listen") == "127.0.0.1:1599");
+  CHECK(told.at("trigger").at("peers").empty());
+}
+
 TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {
   Served served;
   for (const char* name : {"server", "viewer", "director", "unlisted", "other"}) {

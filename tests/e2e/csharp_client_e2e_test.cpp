@@ -88,19 +88,19 @@ void check_avatar(const std::string& said, const clip::Clip& clip, double scale)
   INFO(said);
   const AvatarPose avatar = parse_avatar(said);
   REQUIRE(avatar.turn.contains("hips"));
-  double nearest_rad = 1.0;
-  int nearest = 0;
+  // The toy's steps repeat, so that the joints alone do not tell which frame it is.
+  double nearest_rad = 1.0, nearest_m = 1.0;
   for (int i = 0; i < clip.frames(); ++i) {
+    const Vec3f root_m = clip.frame(i).root_position_m;
+    const Eigen::Vector3d expected_m(-root_m[0], root_m[1], root_m[2]);
+    const double now_m = (avatar.hips - scale * expected_m).norm();
     const double now_rad = off_rad(avatar, clip, i);
-    if (now_rad < nearest_rad) {
-      nearest_rad = now_rad;
-      nearest = i;
-    }
+    if (now_rad + now_m > nearest_rad + nearest_m) continue;
+    nearest_rad = now_rad;
+    nearest_m = now_m;
   }
   CHECK(nearest_rad < 1e-5);
-  const Vec3f root_m = clip.frame(nearest).root_position_m;
-  const Eigen::Vector3d expected_m(-root_m[0], root_m[1], root_m[2]);
-  CHECK((avatar.hips - scale * expected_m).norm() < 1e-5);
+  CHECK(nearest_m < 1e-5);
   CHECK(avatar.timecode.empty());
 }
 

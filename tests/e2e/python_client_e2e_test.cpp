@@ -1,7 +1,9 @@
 // The Python client's examples with the real daemon: forward kinematics, keys, gestures, recording.
 #include <catch2/catch.hpp>
 
+#include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "models/gesture/model_file.hpp"
@@ -13,17 +15,20 @@
 namespace posed::test {
 namespace {
 
-// What Debian's own python3 prints for `script` of the client's examples.
-std::string example(const std::string& script, const std::string& arguments) {
+// What Debian's own python3 prints for a script that uses the client.
+std::string run_python(const std::filesystem::path& script, const std::string& arguments) {
   const auto build = posed_binary().parent_path() / "python";
-  const auto path = source_dir() / "proto/clients/python/examples" / script;
   const std::string command = "PYTHONPATH='" + build.string() + "' timeout 60 /usr/bin/python3 '" +
-                              path.string() + "' " + arguments + " 2>&1";
+                              script.string() + "' " + arguments + " 2>&1";
   const std::unique_ptr<FILE, int (*)(FILE*)> client(popen(command.c_str(), "r"), pclose);
   REQUIRE(client);
   std::string said;
   for (char line[512]; std::fgets(line, sizeof line, client.get()) != nullptr;) said += line;
   return said;
+}
+
+std::string example(const std::string& script, const std::string& arguments) {
+  return run_python(source_dir() / "proto/clients/python/examples" / script, arguments);
 }
 
 }  // namespace
@@ -84,6 +89,38 @@ TEST_CASE("the Python client performs gestures on a hand") {
   stage.launch("run");
   CHECK(has(example("play.py", "hand p --connect " + stage.control), "playing from frame "));
   CHECK(has(example("play.py", "hand --connect " + stage.control), "back to the live hand"));
+}
+
+TEST_CASE("the Python client marks takes of a recording") {
+  Served served;
+  const auto script = served.folder.write("takes.py", R"(
+import sys
+import posed
+
+with posed.Control(sys.argv[1]) as control:
+    try:
+        control.end_take()
+    except posed.PosedError as error:
+        print("refused:", error)
+    first = control.take("walk").take
+    print("began", first.number, first.name, control.status().take.name)
+    second = control.take().take
+    print("began", second.number, repr(second.name), second.start_ns > first.start_ns)
+    print("ended", control.end_take().take.number, control.status().HasField("take"))
+)");
+  served.record();
+  const std::string said = run_python(script, served.control);
+  INFO(said);
+  CHECK(has(said, "refused: "));
+  CHECK(has(said, "began 1 walk walk\nbegan 2 '' True\nended 2 False\n"));
+  served.daemon->send(SIGTERM);
+  CHECK(served.daemon->exit_code() == 0);
+  const auto takes = posed({"convert", served.path("take.plog"), "--takes", "--json"});
+  INFO(takes.err);
+  const auto marked = nlohmann::json::parse(takes.out);
+  REQUIRE(marked.size() == 2);
+  CHECK(marked[0].at("name") == "walk");
+  CHECK(marked[1].at("ended") == true);
 }
 
 }  // namespace posed::test

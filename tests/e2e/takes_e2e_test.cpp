@@ -53,6 +53,51 @@ json takes_of(const std::string& log) {
   return json::parse(outcome.out);
 }
 
+// A daemon that writes the takes' clips at its end, of streams fast enough that this takes a while.
+class ClipTakes : public Takes {
+ public:
+  ClipTakes() {
+    std::string text = std::string(kEndpoints) + "[record]\nclips = \"bvh\"\n";
+    for (const char* name : {"walker", "b", "c", "d", "e", "f", "g", "h"}) {
+      text += std::string("[[stream]]\nname = \"") + name + "\"\ndriver = \"file\"\n" +
+              "[stream.file]\npath = \"walk.bvh\"\nloop = true\npace = 8.0\n" +
+              "[stream.style]\nmodel = \"one.style\"\n";
+    }
+    folder.write("posed.toml", text);
+    start();
+    take({"start", "walk"});
+    std::this_thread::sleep_for(200ms);
+    take({"start", "run"});
+    std::this_thread::sleep_for(2500ms);
+  }
+  // The recording's files whose names end so, without the folder.
+  [[nodiscard]] std::vector<std::string> files(const std::string& end) const {
+    std::vector<std::string> found;
+    for (const auto& file : std::filesystem::directory_iterator(path("takes"))) {
+      const std::string name = file.path().filename().string();
+      if (name.ends_with(end)) found.push_back(name);
+    }
+    return found;
+  }
+  // The log has both takes, and nothing is there beside it and whole clips of theirs.
+  void check_whole(std::size_t clips) const {
+    const auto logs = files(".plog");
+    REQUIRE(logs.size() == 1);
+    const std::string log = path("takes/" + logs[0]);
+    const json takes = takes_of(log);
+    REQUIRE(takes.size() == 2);
+    CHECK(takes[0].at("ended") == true);
+    CHECK(frames_of(log, "run").size() > 10'000);
+    CHECK(files(".bvh").size() == clips);
+    CHECK(files("").size() == 1 + clips);
+    for (const std::string take : {"1", "2"}) {
+      for (const std::string& clip : files("-" + take + "-walker.bvh")) {
+        CHECK(file_text(path("takes/" + clip)).ends_with(frames_of(log, take)));
+      }
+    }
+  }
+};
+
 }  // namespace
 
 TEST_CASE("takes marked by ctl are intervals of the whole clip, and replay is as without them") {
@@ -143,6 +188,30 @@ TEST_CASE("a [record] table makes `run` record into a folder, and without one ta
     const std::string clip = file_text(stem + "-" + take + "-walker.bvh");
     CHECK(clip.ends_with(stage.frames_of(log, take)));
   }
+}
+
+TEST_CASE("a signal that already waits when clips of takes would be written leaves none") {
+  ClipTakes stage;
+  stage.daemon->send(SIGSTOP);  // so that the daemon gets both at once
+  stage.daemon->send(SIGINT);
+  stage.daemon->send(SIGTERM);
+  stage.daemon->send(SIGCONT);
+  CHECK(stage.daemon->exit_code() == 1);
+  CHECK(has(stage.daemon->errors(), "interrupted: the log is complete"));
+  stage.check_whole(0);
+}
+
+TEST_CASE("a second SIGINT while clips of takes are written leaves the log and whole clips") {
+  ClipTakes stage;
+  stage.daemon->send(SIGINT);
+  for (int i = 0; i < 20'000 && stage.files("-1-walker.bvh").empty(); ++i) {
+    std::this_thread::sleep_for(1ms);
+  }
+  stage.daemon->send(SIGINT);
+  // On a machine that stalls the test here all clips may have been written before the signal.
+  const bool interrupted = stage.daemon->exit_code() == 1;
+  CHECK(has(stage.daemon->errors(), "interrupted: the log is complete") == interrupted);
+  stage.check_whole(interrupted ? 8 : 16);
 }
 
 TEST_CASE("datagrams of a capture system mark takes, once each, and rubbish marks none") {

@@ -77,12 +77,16 @@ export async function checkMcap(program, folder, clip) {
   const topics = await readMessages(file);
   await checkStream(file);
   await file.close();
-  assert.deepEqual([...topics.keys()].sort(), ['pose/plain', 'pose/walker', 'skeleton/plain', 'skeleton/walker']);
+  assert.deepEqual([...topics.keys()].sort(), ['event/plain', 'event/walker', 'pose/plain', 'pose/walker',
+    'skeleton/plain', 'skeleton/walker']);
   const { joints, frames } = readBvh(clip);
   let worst = 0;
   for (const name of ['plain', 'walker']) {
     const [skeleton] = topics.get(`skeleton/${name}`);
     assert.deepEqual(skeleton.value.joint_name, joints.map((joint) => joint.name));
+    const [started] = topics.get(`event/${name}`);
+    assert.equal(started.value.kind, 1);  // KIND_STARTED
+    assert.equal(started.value.text, 'the first data came');
     const poses = topics.get(`pose/${name}`);
     assert.equal(poses.length, frames.length);
     poses.forEach(({ time, sequence, value }, i) => {

@@ -1,4 +1,4 @@
-// A figure that waves every joint, as BVH: a clip that posed did not make.
+// A figure that waves every joint, those of the fingers, too, as BVH: a clip that posed did not make.
 import { writeFileSync } from 'node:fs';
 
 const FRAMES = 120;
@@ -8,9 +8,19 @@ const RATE_HZ = 60;
 const leg = (side, x) => [
   `${side}UpperLeg`, [x, -4, 0], [[`${side}LowerLeg`, [0, -42, 0], [[`${side}Foot`, [0, -41, 0], [], [0, -4, 12]]]]],
 ];
+const finger = (side, sign, name, bones, z) => {
+  const [first, second, third] = bones.map((bone) => `${side}${name}${bone}`);
+  const reach = (x) => [sign * x, 0, 0];
+  return [first, [sign * 8, 0, z], [[second, reach(4), [[third, reach(3), [], reach(2)]]]]];
+};
+const fingers = (side, sign) => [
+  finger(side, sign, 'Thumb', ['Metacarpal', 'Proximal', 'Distal'], 4),
+  ...['Index', 'Middle', 'Ring', 'Little'].map((name, i) =>
+    finger(side, sign, name, ['Proximal', 'Intermediate', 'Distal'], 3 - 2 * i)),
+];
 const arm = (side, sign) => [
   `${side}Shoulder`, [sign * 3, 10, 0], [[`${side}UpperArm`, [sign * 12, 0, 0], [
-    [`${side}LowerArm`, [sign * 28, 0, 0], [[`${side}Hand`, [sign * 25, 0, 0], [], [sign * 8, 0, 0]]]],
+    [`${side}LowerArm`, [sign * 28, 0, 0], [[`${side}Hand`, [sign * 25, 0, 0], fingers(side, sign)]]],
   ]]],
 ];
 const figure = [

@@ -20,6 +20,7 @@
 #include "daemon/emulate/log_emulator.hpp"
 #include "daemon/net/security.hpp"
 #include "models/gesture/synthetic_signer.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -113,6 +114,23 @@ std::optional<std::string> default_udp(const EmulateOptions& options) {
   return std::get<std::string>(listen->second);
 }
 
+// What other machines can reach needs --insecure, and only that may have it.
+Result<> check_reach(const EmulateOptions& options) {
+  const bool publishes = !options.publish.empty();
+  const std::string& address = publishes ? options.publish : options.listen;
+  if (address.empty() || net::is_loopback(publishes ? address : "tcp://" + address)) {
+    if (!options.insecure) return {};
+    return misuse(address.empty()
+                      ? "--insecure has no effect without --listen and --publish: leave it out"
+                      : "--insecure has no effect at " + clean_name(address) +
+                            ", which only this machine reaches: leave it out");
+  }
+  if (options.insecure) return {};
+  return misuse(net::open_to_anyone(address) +
+                (publishes ? "; publish at tcp://127.0.0.1:PORT" : "; listen at 127.0.0.1:PORT") +
+                ", or say --insecure");
+}
+
 Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
                                         const drivers::Emulator& emulator) {
   const auto ports = emulator.ports();
@@ -123,13 +141,7 @@ Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
   if (!options.udp.empty()) return emulate::EmulatedPort::open_udp(options.udp, ports);
   if (!options.tcp.empty()) return emulate::EmulatedPort::connect_tcp(options.tcp);
   if (!options.listen.empty()) return emulate::EmulatedPort::listen_tcp(options.listen);
-  if (!options.publish.empty()) {
-    if (!net::is_loopback(options.publish) && !options.insecure) {
-      return misuse(net::open_to_anyone(options.publish) +
-                    "; publish at tcp://127.0.0.1:PORT, or say --insecure");
-    }
-    return emulate::EmulatedPort::publish(options.publish);
-  }
+  if (!options.publish.empty()) return emulate::EmulatedPort::publish(options.publish);
   if (const auto to = default_udp(options); to && !options.pty && options.link.empty()) {
     return emulate::EmulatedPort::open_udp({*to});
   }
@@ -138,6 +150,7 @@ Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
 
 Result<> emulate(const EmulateOptions& options) {
   const Interrupt interrupt;
+  if (const auto ok = check_reach(options); !ok) return ok;
   auto emulator = open_emulator(options);
   if (!emulator) return std::unexpected(emulator.error());
   emulate::EmulatedDevice::Settings settings{.speed = options.speed};
@@ -194,8 +207,8 @@ void add_emulate(CLI::App& app, int& exit_code) {
   auto* publish = command->add_option("--publish", options->publish,
                                       "Publish over ZeroMQ, as another posed does");
   publish->type_name("ENDPOINT")->excludes(pty)->excludes(tcp)->excludes(listen)->excludes(udp);
-  command->add_flag("--insecure", options->insecure, "Let other machines subscribe to --publish")
-      ->needs(publish);
+  command->add_flag("--insecure", options->insecure,
+                    "Let other machines reach --listen or --publish");
   command->add_option("--link", options->link, "Also a link to the pseudo-terminal, by this name")
       ->type_name("PATH")
       ->excludes(tcp)

@@ -97,6 +97,14 @@ ordered_json summary_of(const config::OutputConfig& output) {
   return summary;
 }
 
+ordered_json summary_of(const config::RecordConfig& record) {
+  return {{"folder", record.folder.string()}, {"frames", record.frames}, {"clips", record.clips}};
+}
+
+ordered_json summary_of(const config::TriggerConfig& trigger) {
+  return {{"listen", trigger.listen}, {"peers", trigger.peers}};
+}
+
 std::string security_of(const config::DaemonConfig& config) {
   if (config.security.server_key.empty()) return "no keys";
   return "keys, " + std::to_string(config.security.clients.size()) + " clients allowed";
@@ -133,6 +141,24 @@ void print_output(const ordered_json& output) {
   std::puts(clean(line).c_str());
 }
 
+// "records to takes, with the published frames, each take as BVH"
+void print_record(const config::RecordConfig& record) {
+  const std::string folder = clean(record.folder.string());
+  std::printf("records to %s%s%s\n", folder.c_str(),
+              record.frames ? ", with the published frames" : "",
+              record.clips ? ", each take as BVH" : "");
+}
+
+// "takes are triggered at 127.0.0.1:1512 by 192.168.1.20"
+void print_trigger(const config::TriggerConfig& trigger) {
+  std::string line = "takes are triggered at " + trigger.listen + " by ";
+  if (trigger.peers.empty()) line += "this machine";
+  for (std::size_t i = 0; i < trigger.peers.size(); ++i) {
+    line += (i == 0 ? "" : ", ") + trigger.peers[i];
+  }
+  std::puts(clean(line).c_str());
+}
+
 void print(const config::DaemonConfig& config, const ordered_json& streams,
            const ordered_json& sources, const ordered_json& outputs) {
   std::printf("publishes on %s, controlled on %s (%s)\n", config.publish_endpoint.c_str(),
@@ -161,6 +187,8 @@ void print(const config::DaemonConfig& config, const ordered_json& streams,
   }
   for (const ordered_json& source : sources) print_source(source);
   for (const ordered_json& output : outputs) print_output(output);
+  if (config.record) print_record(*config.record);
+  if (config.trigger) print_trigger(*config.trigger);
 }
 
 // Returns 0 if everything would run; 2 if the config is wrong; 1 if it is right, but a file or a
@@ -199,13 +227,15 @@ int check(const CheckOptions& options) {
     errors.push_back({{"file", error.file}, {"line", error.line}, {"message", error.message}});
   }
   if (options.json) {
-    const ordered_json all{{"ok", errors.empty()},
-                           {"publish", reading.config.publish_endpoint},
-                           {"control", reading.config.control_endpoint},
-                           {"streams", streams},
-                           {"sources", sources},
-                           {"outputs", outputs},
-                           {"errors", errors}};
+    ordered_json all{{"ok", errors.empty()},
+                     {"publish", reading.config.publish_endpoint},
+                     {"control", reading.config.control_endpoint},
+                     {"streams", streams},
+                     {"sources", sources},
+                     {"outputs", outputs}};
+    if (reading.config.record) all["record"] = summary_of(*reading.config.record);
+    if (reading.config.trigger) all["trigger"] = summary_of(*reading.config.trigger);
+    all["errors"] = errors;
     std::printf("%s\n", json_text(all).c_str());
   } else if (errors.empty()) {
     print(reading.config, streams, sources, outputs);

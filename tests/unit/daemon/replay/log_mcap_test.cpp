@@ -1,6 +1,7 @@
 // A whole log as MCAP: what the run published, in a file that other programs open.
 #include <catch2/catch.hpp>
 
+#include <map>
 #include <sstream>
 
 #include <google/protobuf/descriptor.h>
@@ -59,7 +60,7 @@ TEST_CASE("an MCAP holds every published frame of a log, byte for byte") {
   CHECK(summary->warnings.empty());
   const McapReader mcap(file_text(out));
   CHECK(mcap.messages.size() == summary->messages);
-  CHECK(summary->topics == 8);  // pose and skeleton of two streams, styled and raw
+  CHECK(summary->topics == 10);  // pose and skeleton of two streams, styled and raw; their events
   const auto reader = log::Reader::open(log);
   REQUIRE(reader);
   const std::int64_t offset_ns = std::stoll(reader->meta().at("monotonic_to_utc_ns"));
@@ -90,6 +91,28 @@ TEST_CASE("an MCAP holds every published frame of a log, byte for byte") {
       CHECK(skeletons.front() < made.front());
     }
   }
+}
+
+TEST_CASE("an MCAP holds the events that a replay computes") {
+  const TempFolder folder;
+  write_staged_log(folder.path() / "take.plog", kLogFrames);
+  REQUIRE(replay::write_mcap(folder.path() / "take.plog", folder.path() / "take.mcap", go_on));
+  const McapReader mcap(file_text(folder.path() / "take.mcap"));
+  const auto reader = log::Reader::open(folder.path() / "take.plog");
+  REQUIRE(reader);
+  const std::int64_t offset_ns = std::stoll(reader->meta().at("monotonic_to_utc_ns"));
+  std::map<int, std::string> texts;  // by kind, the last one
+  for (const McapMessage* message : of_topic(mcap, "event/a")) {
+    CHECK(message->schema == "posed.v1.Event");
+    v1::Event event;
+    REQUIRE(event.ParseFromString(message->data));
+    CHECK(event.stream() == "a");
+    CHECK(message->log_ns == static_cast<std::uint64_t>(event.time_ns() + offset_ns));
+    texts[event.kind()] = event.text();
+  }
+  CHECK(texts[v1::Event::KIND_STARTED] == "the first data came");
+  CHECK(has(texts[v1::Event::KIND_CONTROL], "style"));
+  CHECK(has(texts[v1::Event::KIND_SHED], "skipped: newer ones waited"));
 }
 
 TEST_CASE("the schema in an MCAP is enough to decode its messages") {
