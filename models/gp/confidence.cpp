@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "models/gp/inducing.hpp"
 #include "models/gp/kernel.hpp"
 #include "models/gp/regression.hpp"
 
@@ -20,41 +21,15 @@ using kernel::kLanes;
 // degrees.
 constexpr int kInducing = 128;
 constexpr double kResidual = 0.015;
-// A pose whose residual variance is below this adds nothing in single precision.
-constexpr double kResidualMin = 1e-6;
 
 // Noise over signal variance. The lower bound keeps the matrix regular for a process without noise.
 double noise_ratio(const Trained& t) { return std::max(t.noise / std::exp(t.lambda), 1e-6); }
 
-struct Inducing {
-  std::vector<int> order;  // of all poses, the chosen ones first
-  int count = 0;
-};
-
-// Greedy pivoted Cholesky: each step adds the pose that the chosen ones explain least.
 Inducing choose(const Trained& t, int limit) {
-  const auto points = static_cast<int>(t.inputs.rows());
-  Inducing chosen;
-  chosen.order.resize(static_cast<std::size_t>(points));
-  std::iota(chosen.order.begin(), chosen.order.end(), 0);
   const double enough = kResidual * std::sqrt(noise_ratio(t));
-  Eigen::VectorXd residual = Eigen::VectorXd::Ones(points);
-  Eigen::MatrixXd factor(points, limit);
-  int& m = chosen.count;
-  for (; m < limit; ++m) {
-    Eigen::Index pivot = 0;
-    const double worst = residual.maxCoeff(&pivot);
-    const bool may_stop = m >= kInducing && m % kLanes == 0;
-    if (worst < kResidualMin || (may_stop && worst < enough)) break;
-    Eigen::VectorXd column = rbf(t.inputs, t.inputs.row(pivot), 0.0, t.mu);
-    column -= factor.leftCols(m) * factor.row(pivot).head(m).transpose();
-    factor.col(m) = column / std::sqrt(worst);
-    residual -= factor.col(m).cwiseAbs2();
-    residual[pivot] = 0.0;
-    std::iter_swap(chosen.order.begin() + m,
-                   std::ranges::find(chosen.order, static_cast<int>(pivot)));
-  }
-  return chosen;
+  return choose_inducing(t.inputs, t.mu, limit, [&](int chosen, double worst) {
+    return chosen >= kInducing && chosen % kLanes == 0 && worst < enough;
+  });
 }
 
 // Lower L with L'L = M for M symmetric and positive: the Cholesky factor of M turned end to end.
@@ -75,8 +50,7 @@ Eigen::MatrixXd exact_triangle(const Trained& t) {
 // formed as (I + A A')^-1 A A', so nothing cancels.
 Eigen::MatrixXd inducing_triangle(const Trained& t, const Inducing& chosen) {
   const int m = chosen.count;
-  const Eigen::MatrixXd poses =
-      t.inputs(std::vector(chosen.order.begin(), chosen.order.begin() + m), Eigen::all);
+  const Eigen::MatrixXd poses = t.inputs(chosen.chosen(), Eigen::all);
   Eigen::MatrixXd K_mm = rbf(poses, poses, 0.0, t.mu);
   K_mm.diagonal().array() += 1e-9;
   const Eigen::LLT<Eigen::MatrixXd> R(K_mm);

@@ -8,6 +8,7 @@
 #include "models/motion/motion.hpp"
 #include "models/motion/symmetric_eigen.hpp"
 #include "models/style/harmonics.hpp"
+#include "models/style/stride_phase.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::style {
@@ -179,7 +180,40 @@ MgpmData stack_states(Dataset& dataset, const std::vector<int>& members,
   return data;
 }
 
-Result<> align_motion(Dataset& dataset, std::size_t motion, const DatasetOptions& options) {
+// Strides of all clips, each a task: the score, the mean cadence and the phase of every frame.
+Result<> follow_clips(Dataset& dataset, const DatasetOptions& options) {
+  const Task task = [&](std::size_t c) {
+    const StridePhase found = follow_strides(dataset.clips[c].leg, dataset.rate_hz);
+    TaskResult numbers{found.score, found.dtheta};
+    numbers.insert(numbers.end(), found.phase.begin(), found.phase.end());
+    return numbers;
+  };
+  const auto count = dataset.clips.size();
+  const TaskProgress progress = [&](std::size_t done) {
+    const double fraction = static_cast<double>(done) / static_cast<double>(count);
+    return !options.progress || options.progress("following strides", fraction);
+  };
+  SerialTasks serial;
+  TaskRunner& tasks = options.tasks != nullptr ? *options.tasks : serial;
+  const auto found = tasks.run(count, task, progress);
+  if (!found) return fail("training was stopped before it was done");
+  for (std::size_t c = 0; c < count; ++c) {
+    const TaskResult& numbers = (*found)[c];
+    AlignedClip& clip = dataset.clips[c];
+    clip.stride_score = numbers[0];
+    clip.dtheta = numbers[1];
+    clip.local_phase = VectorXd::Map(numbers.data() + 2, clip.q.rows());
+  }
+  return {};
+}
+
+// The legs set a clip's phase, whatever estimated it.
+void turn_to_legs(AlignedClip& clip) {
+  if (clip.has_legs) clip.theta0 -= first_harmonic_phase(clip.phase(), clip.leg);
+  clip.theta0 = std::remainder(clip.theta0, 2.0 * std::numbers::pi);
+}
+
+Result<> align_by_mgpm(Dataset& dataset, std::size_t motion, const DatasetOptions& options) {
   const std::vector<int> members = dataset.clips_of(dataset.motions[motion]);
   std::vector<int> subjects;
   const MgpmData data = stack_states(dataset, members, subjects);
@@ -190,10 +224,12 @@ Result<> align_motion(Dataset& dataset, std::size_t motion, const DatasetOptions
   VectorXd theta0(members.size());
   VectorXd dtheta(members.size());
   for (int m = 0; m < std::ssize(members); ++m) {
-    theta0[m] = dataset.clips[members[m]].theta0;
-    dtheta[m] = dataset.clips[members[m]].dtheta;
+    const Stride stride = find_stride(dataset.clips[members[m]].leg, dataset.rate_hz);
+    theta0[m] = stride.theta0;
+    dtheta[m] = stride.dtheta;
   }
-  MgpmOptions mgpm{.starts = options.starts, .seed = options.seed, .progress = {}};
+  MgpmOptions mgpm{
+      .starts = options.starts, .seed = options.seed, .tasks = options.tasks, .progress = {}};
   const double share = 1.0 / static_cast<double>(dataset.motions.size());
   if (options.progress) {
     mgpm.progress = [&](double fraction) {
@@ -207,13 +243,13 @@ Result<> align_motion(Dataset& dataset, std::size_t motion, const DatasetOptions
     AlignedClip& clip = dataset.clips[members[m]];
     clip.theta0 = best.theta0[m];
     clip.dtheta = best.dtheta[m];
-    // The likelihood may shift a clip against its legs, so the phase is set by the legs.
-    if (clip.has_legs) clip.theta0 -= first_harmonic_phase(clip.phase(), clip.leg);
-    clip.theta0 = std::remainder(clip.theta0, 2.0 * std::numbers::pi);
+    clip.local_phase.resize(0);
+    turn_to_legs(clip);  // the likelihood may shift a clip against its legs
   }
   for (int s = 0; s < std::ssize(subjects); ++s) {
     dataset.subjects[subjects[s]].xi = best.xi.row(s).transpose();
   }
+  dataset.fitted.push_back(dataset.motions[motion]);
   dataset.fits.push_back(std::move(fits->front()));
   dataset.states.push_back(data);
   return {};
@@ -222,6 +258,7 @@ Result<> align_motion(Dataset& dataset, std::size_t motion, const DatasetOptions
 }  // namespace
 
 VectorXd AlignedClip::phase() const {
+  if (local_phase.size() > 0) return (local_phase.array() + theta0).matrix();
   return clip_phase(theta0, dtheta, static_cast<int>(q.rows()));
 }
 
@@ -265,17 +302,22 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips, const std::
     dataset.clips.push_back(std::move(clip));
   }
   for (const std::string& motion : dataset.motions) use_principal_component(dataset, motion);
-  for (AlignedClip& clip : dataset.clips) {
-    const Stride stride = find_stride(clip.leg, options.rate_hz);
-    clip.theta0 = stride.theta0;
-    clip.dtheta = stride.dtheta;
+  if (auto followed = follow_clips(dataset, options); !followed) {
+    return std::unexpected(followed.error());
   }
   return dataset;
 }
 
 Result<> align(Dataset& dataset, const DatasetOptions& options) {
   for (std::size_t m = 0; m < dataset.motions.size(); ++m) {
-    if (auto done = align_motion(dataset, m, options); !done) return done;
+    const std::vector<int> members = dataset.clips_of(dataset.motions[m]);
+    const bool legs =
+        std::ranges::all_of(members, [&](int c) { return dataset.clips[c].has_legs; });
+    if (options.mgpm || !legs) {
+      if (auto done = align_by_mgpm(dataset, m, options); !done) return done;
+      continue;
+    }
+    for (const int c : members) turn_to_legs(dataset.clips[c]);
   }
   return {};
 }

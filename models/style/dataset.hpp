@@ -11,6 +11,7 @@
 
 #include "models/motion/pose_space.hpp"
 #include "models/style/mgpm_train.hpp"
+#include "models/tasks.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 
@@ -19,7 +20,7 @@ namespace posed::style {
 struct TrainingClip {
   clip::Clip clip;
   std::string group;    // "masculine"
-  std::string subject;  // who; the same name in two groups is two styles of one person
+  std::string subject;  // who; the same name is one person, in any group, motion or file
   std::string motion;   // "walk"
 };
 
@@ -30,7 +31,9 @@ struct DatasetOptions {
   motion::Space space = motion::Space::kNative;
   double rate_hz = 30.0;
   std::uint64_t seed = 0;
+  bool mgpm = false;  // phases by the MGPM in every motion, not only where legs are missing
   std::vector<MgpmStart> starts{MgpmStart::kSvd, MgpmStart::kRandom};
+  TaskRunner* tasks = nullptr;  // not owned; null: one task after another
   StepProgress progress;
 };
 
@@ -42,7 +45,9 @@ struct AlignedClip {
   Eigen::MatrixXd state;       // y = (v, q, dq/dt) [T x 3 + 2D]; 89 for cmu43, as in Sato et al.
   Eigen::VectorXd leg;         // the stride's reference signal [T]
   bool has_legs = false;       // else `leg` is the first principal component of q
-  double theta0 = 0.0, dtheta = 0.0;  // phase of the first frame, phase per frame
+  double theta0 = 0.0, dtheta = 0.0;  // phase of the first frame, mean phase per frame
+  Eigen::VectorXd local_phase;  // of every frame, from theta0 = 0; empty: the cadence is constant
+  double stride_score = 0.0;    // of the leg signal under its own strides (stride_phase.hpp)
 
   [[nodiscard]] Eigen::VectorXd phase() const;
 };
@@ -59,8 +64,9 @@ struct Dataset {
   std::vector<std::string> motions;  // in order of appearance
   std::vector<AlignedClip> clips;
   std::vector<Subject> subjects;
-  std::vector<MgpmFit> fits;     // the best fit of each motion, in the order of `motions`
-  std::vector<MgpmData> states;  // what each was fitted to
+  std::vector<std::string> fitted;  // the motions that the MGPM was fitted to
+  std::vector<MgpmFit> fits;        // the best fit of each of them, in this order
+  std::vector<MgpmData> states;     // what each was fitted to
   // The columns of `state` that each fit used (the others are constant), and the means of all
   // columns.
   std::vector<std::vector<int>> live_columns;
@@ -76,8 +82,9 @@ struct Dataset {
                                            const std::string& target,
                                            const DatasetOptions& options);
 
-// Estimates phases by the MGPM, one motion at a time, then shifts each clip's phase so that its leg
-// signal peaks at phase 0 (README.md, "Phase alignment").
+// Gives all clips of a motion phases with a common origin: each clip's own strides, shifted so that
+// its leg signal peaks at phase 0. The MGPM estimates the phases of a motion with clips that name
+// no legs and, with `mgpm`, of all (README.md, "Phase alignment").
 [[nodiscard]] Result<> align(Dataset& dataset, const DatasetOptions& options);
 
 }  // namespace posed::style

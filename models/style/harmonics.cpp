@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -17,8 +16,7 @@ using Eigen::VectorXd;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
-// README.md, "Stride": three harmonics, 0.2 for a missing first harmonic, 400 frequencies.
-constexpr int kStrideHarmonics = 3;
+// README.md, "Stride": 0.2 for a missing first harmonic, 400 frequencies.
 constexpr double kFirstHarmonicPenalty = 0.2;
 constexpr int kFrequencies = 400;
 constexpr int kFineSteps = 20;
@@ -58,6 +56,12 @@ double first_harmonic_phase(const VectorXd& theta, const VectorXd& signal) {
   return std::atan2(c(1 + kStrideHarmonics, 0), c(1, 0));
 }
 
+double weak_first_penalty(const VectorXd& c) {
+  const double first = c[1] * c[1] + c[1 + kStrideHarmonics] * c[1 + kStrideHarmonics];
+  const double share = first / (c.tail(2 * kStrideHarmonics).squaredNorm() + 1e-300);
+  return kFirstHarmonicPenalty * (1.0 - share);
+}
+
 bool has_stride(int frames, double rate_hz) { return frames >= kShortestStride_s * rate_hz + 1.0; }
 
 Stride find_stride(const VectorXd& signal, double rate_hz) {
@@ -72,10 +76,7 @@ Stride find_stride(const VectorXd& signal, double rate_hz) {
   const auto try_rate = [&](double dtheta) {
     const MatrixXd z = harmonic_basis(clip_phase(0.0, dtheta, frames), kStrideHarmonics);
     const VectorXd c = z.colPivHouseholderQr().solve(centred);
-    const double first = c[1] * c[1] + c[1 + kStrideHarmonics] * c[1 + kStrideHarmonics];
-    const double share = first / (c.tail(2 * kStrideHarmonics).squaredNorm() + 1e-300);
-    const double score =
-        (centred - z * c).squaredNorm() / power + kFirstHarmonicPenalty * (1.0 - share);
+    const double score = (centred - z * c).squaredNorm() / power + weak_first_penalty(c);
     if (score < best.score) {
       best = {std::atan2(-c[1 + kStrideHarmonics], c[1]), dtheta, score};
     }
@@ -86,20 +87,6 @@ Stride find_stride(const VectorXd& signal, double rate_hz) {
   const double coarse = best.dtheta;
   for (int i = -kFineSteps; i <= kFineSteps; ++i) try_rate(coarse + step * i / kFineSteps);
   return best;
-}
-
-double stride_misfit(const VectorXd& signal, double rate_hz) {
-  constexpr double kWindow_s = 3.5;  // two of the longest strides
-  const auto frames = signal.size();
-  const auto window = std::min(frames, static_cast<Eigen::Index>(kWindow_s * rate_hz));
-  const auto step = std::max<Eigen::Index>(1, window / 2);
-  std::vector<double> scores;
-  for (Eigen::Index begin = 0; begin + window <= frames; begin += step) {
-    scores.push_back(find_stride(signal.segment(begin, window), rate_hz).score);
-  }
-  const auto middle = scores.begin() + std::ssize(scores) / 2;
-  std::ranges::nth_element(scores, middle);
-  return *middle;
 }
 
 }  // namespace posed::style

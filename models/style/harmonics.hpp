@@ -24,6 +24,13 @@ namespace posed::style {
 [[nodiscard]] double first_harmonic_phase(const Eigen::VectorXd& theta,
                                           const Eigen::VectorXd& signal);
 
+// Harmonics that describe a leg's swing.
+inline constexpr int kStrideHarmonics = 3;
+
+// 0 to 0.2: how little of a leg signal's swing is in its first harmonic, from the coefficients of
+// its kStrideHarmonics. Prevents two strides from being taken for one.
+[[nodiscard]] double weak_first_penalty(const Eigen::VectorXd& coefficients);
+
 struct Stride {
   double theta0 = 0.0;  // phase of the first frame: signal ~ A cos(theta0 + t dtheta)
   double dtheta = 0.0;  // rad per frame
@@ -34,12 +41,6 @@ struct Stride {
 // longer than the signal) that three harmonics fit best, with a penalty on a weak first harmonic,
 // which prevents two strides from being taken for one (README.md, "Stride"). Needs has_stride().
 [[nodiscard]] Stride find_stride(const Eigen::VectorXd& signal, double rate_hz);
-
-// How badly strides fit a leg signal, 0 to about 1.2: the median of find_stride's scores over
-// windows of 3.5 s, so that a cadence which changes slowly over a long clip does not count against
-// it. Walks and runs are below 0.06, a jump is 0.67, waving while standing 0.2 to 0.85. Needs
-// has_stride().
-[[nodiscard]] double stride_misfit(const Eigen::VectorXd& signal, double rate_hz);
 
 // Whether `frames` at `rate_hz` can hold a stride at all.
 [[nodiscard]] bool has_stride(int frames, double rate_hz);

@@ -182,28 +182,48 @@ MatrixXd random_styles(int subjects, int q, std::uint64_t seed) {
   return xi;
 }
 
-Error stopped() {
-  return Error{"training was stopped before it was done", {}, 0, ExitCode::kFailed};
-}
-
-// Runs one start. `report(fraction)` returns false to stop.
-bool run_start(const MgpmData& data, const Progress& report, MgpmFit& fit) {
-  const double rounds = kStageOneRounds + kStageTwoRounds;
+// Optimises from one start.
+void run_start(const MgpmData& data, MgpmFit& fit) {
   for (int round = 0; round < kStageOneRounds; ++round) {
     regauge(fit.params);
     optimise(data, false, kStageOneIterations, fit);
-    if (!report((round + 1) / rounds)) return false;
   }
   double previous = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kStageTwoRounds; ++round) {
     regauge(fit.params);
     optimise(data, true, kStageTwoIterations, fit);
-    if (!report((kStageOneRounds + round + 1) / rounds)) return false;
     if (previous - fit.nlp < kSettled * std::abs(fit.nlp)) break;
     previous = fit.nlp;
   }
-  fit.scale = mgpm_evaluate(data, fit.params, &fit.prior, nullptr, fit.harmonics).scale;
-  return true;
+}
+
+// What a start ends with, as a task's numbers and back.
+TaskResult numbers_of(const MgpmFit& fit) {
+  TaskResult numbers{fit.nlp, static_cast<double>(fit.harmonics),
+                     static_cast<double>(fit.evaluations), fit.params.log_gamma,
+                     fit.params.log_noise};
+  const auto append = [&](const auto& values) {
+    numbers.insert(numbers.end(), values.begin(), values.end());
+  };
+  append(fit.params.theta0);
+  append(fit.params.dtheta);
+  append(fit.params.xi.reshaped());
+  return numbers;
+}
+
+void take_numbers(const TaskResult& numbers, MgpmFit& fit) {
+  fit.nlp = numbers[0];
+  fit.harmonics = static_cast<int>(numbers[1]);
+  fit.evaluations = static_cast<int>(numbers[2]);
+  fit.params.log_gamma = numbers[3];
+  fit.params.log_noise = numbers[4];
+  const double* next = numbers.data() + 5;
+  const auto take = [&](auto&& values) {
+    for (auto& value : values) value = *next++;
+  };
+  take(fit.params.theta0);
+  take(fit.params.dtheta);
+  take(fit.params.xi.reshaped());
 }
 
 }  // namespace
@@ -213,7 +233,7 @@ Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data, const VectorXd& th
   const int q = std::min(options.style_dims, data.subjects());
   std::vector<MgpmFit> fits;
   for (std::size_t k = 0; k < options.starts.size(); ++k) {
-    MgpmFit fit;
+    MgpmFit& fit = fits.emplace_back();
     fit.prior.dtheta_mean = dtheta;
     fit.params.theta0 = theta0;
     fit.params.dtheta = dtheta;
@@ -221,13 +241,24 @@ Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data, const VectorXd& th
     fit.params.xi = options.starts[k] == MgpmStart::kSvd
                         ? svd_styles(data, theta0, dtheta, q)
                         : random_styles(data.subjects(), q, options.seed * 1'000'003 + k);
-    const Progress report = [&](double fraction) {
-      if (!options.progress) return true;
-      return options.progress((static_cast<double>(k) + fraction) /
-                              static_cast<double>(options.starts.size()));
-    };
-    if (!run_start(data, report, fit)) return std::unexpected(stopped());
-    fits.push_back(std::move(fit));
+  }
+  const Task task = [&](std::size_t k) {
+    MgpmFit fit = fits[k];
+    run_start(data, fit);
+    return numbers_of(fit);
+  };
+  const TaskProgress progress = [&](std::size_t done) {
+    const double fraction = static_cast<double>(done) / static_cast<double>(fits.size());
+    return !options.progress || options.progress(fraction);
+  };
+  SerialTasks serial;
+  TaskRunner& tasks = options.tasks != nullptr ? *options.tasks : serial;
+  const auto found = tasks.run(fits.size(), task, progress);
+  if (!found) return fail("training was stopped before it was done");
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    MgpmFit& fit = fits[k];
+    take_numbers((*found)[k], fit);
+    fit.scale = mgpm_evaluate(data, fit.params, &fit.prior, nullptr, fit.harmonics).scale;
   }
   std::stable_sort(fits.begin(), fits.end(),
                    [](const MgpmFit& a, const MgpmFit& b) { return a.nlp < b.nlp; });

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "models/style/mgpm.hpp"
+#include "models/tasks.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::style {
@@ -20,7 +21,8 @@ struct MgpmOptions {
   int style_dims = 3;  // q; at most the number of subjects is used
   std::vector<MgpmStart> starts{MgpmStart::kSvd, MgpmStart::kRandom};
   std::uint64_t seed = 0;
-  Progress progress;  // may be empty
+  TaskRunner* tasks = nullptr;  // each start is a task; not owned; null: one after another
+  Progress progress;            // may be empty
 };
 
 struct MgpmFit {

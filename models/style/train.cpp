@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "models/style/harmonics.hpp"
+#include "models/style/leave_out.hpp"
 #include "models/style/training_check.hpp"
 #include "models/style/training_pairs.hpp"
 #include "proto/frame/degree.hpp"
@@ -22,9 +23,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using nlohmann::json;
 
-constexpr double kLimitFactor = 1.5;      // of the largest difference in training
-constexpr double kMeanCycleNoise = 1e-3;  // a group of one subject: its cycle is already an average
-constexpr double kPersonNoise = 0.1;      // several people, whose cycles scatter about the group's
+constexpr double kLimitFactor = 1.5;  // of the largest difference in training
+
+std::unexpected<Error> stopped() { return fail("training was stopped before it was done"); }
 
 struct Learnt {
   gp::Trained process;
@@ -61,13 +62,6 @@ Result<> check_groups(const std::vector<TrainingClip>& clips, const std::string&
   return {};
 }
 
-std::string first_source_of(const Dataset& dataset, const std::string& target) {
-  for (const AlignedClip& clip : dataset.clips) {
-    if (clip.group != target) return clip.group;
-  }
-  return {};
-}
-
 int cycle_frames(const Dataset& dataset, const std::string& motion) {
   double sum = 0.0;
   const auto members = dataset.clips_of(motion);
@@ -76,33 +70,17 @@ int cycle_frames(const Dataset& dataset, const std::string& motion) {
       std::lround(2.0 * std::numbers::pi * static_cast<double>(members.size()) / sum));
 }
 
-bool several_subjects(const Dataset& dataset, const std::string& target) {
-  std::set<std::pair<std::string, std::string>> seen;
-  return std::ranges::any_of(dataset.subjects, [&](const Subject& s) {
-    return s.group != target && !seen.emplace(s.motion, s.group).second;
-  });
-}
-
-Result<Learnt> learn_default(const Dataset& dataset, const std::string& target,
+Result<Learnt> learn_default(const Dataset& dataset, const std::string& target, TaskRunner& tasks,
                              const FoldProgress& progress) {
-  const std::string first = first_source_of(dataset, target);
-  const auto training_pairs = make_training_pairs(dataset, subject_cycles(dataset), target, first);
-  const double noise = several_subjects(dataset, target) ? kPersonNoise : kMeanCycleNoise;
-  const auto folds = make_folds(dataset, target, first);
-  const auto candidates = candidate_lengths_rad(dataset.dims());
-  const bool is_union = dataset.motions.size() > 1 || training_pairs.size() > 2;
-  const ChosenLength chosen =
-      choose_length_rad(folds, candidates, noise, candidates[is_union ? 2 : 1], progress);
-  auto process = fit_difference(training_pairs, chosen.length_rad, noise);
+  const auto pairs = make_training_pairs(dataset, take_cycles(dataset), target);
+  const LeaveOut leave_out = make_folds(dataset, target);
+  const auto chosen = leave_out.folds.empty() ? choose_kernel({pairs, {}}, tasks, progress)
+                                              : choose_kernel(leave_out, tasks, progress);
+  if (!chosen) return stopped();
+  auto process = fit_difference(pairs, chosen->kernel);
   if (!process) return std::unexpected(process.error());
-  Learnt learnt{std::move(*process), {}, {}, chosen.way};
-  const MatrixXd basis = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
-  learnt.differences.resize(learnt.process.inputs.rows(), dataset.dims());
-  for (Eigen::Index i = 0; i < std::ssize(training_pairs); ++i) {
-    learnt.differences.middleRows(i * kGridFrames, kGridFrames) =
-        basis * training_pairs[static_cast<std::size_t>(i)].delta;
-  }
-  learnt.kernel["length_chosen_by"] = folds.empty() ? "default" : "leave-out";
+  Learnt learnt{std::move(*process), grid_outputs(pairs), {}, chosen->way};
+  learnt.kernel["length_chosen_by"] = leave_out.folds.empty() ? "default" : "leave-out";
   return learnt;
 }
 
@@ -153,14 +131,16 @@ Result<Learnt> learn_paper(const Dataset& dataset, const std::string& target) {
 
 // How much of the distance to the target the process closes on its own training clips.
 Way way_on_training(const Dataset& dataset, const Learnt& learnt, const std::string& target) {
-  const auto cycles = subject_cycles(dataset);
+  const auto takes = take_cycles(dataset);
+  const auto differences = differences_of(dataset, takes, target);
   Way way;
   for (const AlignedClip& clip : dataset.clips) {
-    const MatrixXd goal = group_cycle(dataset, cycles, target, clip.motion);
-    if (clip.group == target || goal.size() == 0) continue;
-    const MatrixXd own = group_cycle(dataset, cycles, clip.group, clip.motion);
-    way.add(way_of(clip.q, clip.phase(), goal, gp::posterior_mean(learnt.process, clip.q),
-                   goal.row(0) - own.row(0)));
+    for (const Difference& d : differences) {
+      if (d.group != clip.group || d.motion != clip.motion) continue;
+      const MatrixXd goal = goal_of(dataset, takes, clip, d, target);
+      way.add(way_of(clip.q, clip.phase(), goal, gp::posterior_mean(learnt.process, clip.q),
+                     d.delta.row(0)));
+    }
   }
   return way;
 }
@@ -205,32 +185,38 @@ json report_of(const Dataset& dataset, const Learnt& learnt) {
   for (const AlignedClip& clip : dataset.clips) {
     report["clips"].push_back({{"file", clip.file},
                                {"group", clip.group},
+                               {"subject", dataset.subjects[clip.subject].name},
                                {"motion", clip.motion},
                                {"frames", clip.q.rows()},
                                {"dropped_first_frame", clip.dropped_first},
                                {"period_frames", 2.0 * std::numbers::pi / clip.dtheta},
-                               {"stride_misfit", stride_misfit(clip.leg, dataset.rate_hz)},
+                               {"stride_score", clip.stride_score},
+                               {"residual_deg", cycle_residual_deg(dataset, clip)},
                                {"theta0", clip.theta0}});
   }
-  for (std::size_t m = 0; m < dataset.motions.size(); ++m) {
-    const std::string& motion = dataset.motions[m];
-    const MgpmFit& fit = dataset.fits[m];
+  for (const std::string& motion : dataset.motions) {
     report["cycle_frames"][motion] = cycle_frames(dataset, motion);
+  }
+  for (std::size_t m = 0; m < dataset.fitted.size(); ++m) {
+    const std::string& motion = dataset.fitted[m];
+    const MgpmFit& fit = dataset.fits[m];
     report["mgpm"][motion] = {{"gamma", std::exp(fit.params.log_gamma)},
                               {"noise", std::exp(fit.params.log_noise)},
                               {"log_posterior", -fit.nlp}};
     report["log_likelihood"]["mgpm"][motion] = -(fit.nlp - mgpm_prior_nlp(fit.prior, fit.params));
   }
   const gp::Trained& p = learnt.process;
-  const MatrixXd residual = learnt.differences.rowwise() - p.offset.transpose();
-  const gp::Hyper hyper{p.lambda, std::log(p.mu), std::log(p.b), std::log(p.noise)};
   report["kernel"] = learnt.kernel;
   report["kernel"]["lambda"] = p.lambda;
   report["kernel"]["mu"] = p.mu;
   report["kernel"]["b"] = p.b;
   report["kernel"]["length_deg"] = 1.0 / (kDegree * std::sqrt(p.mu));
   report["noise"] = p.noise;
-  report["log_likelihood"]["gp"] = gp::log_marginal(p.inputs, residual, hyper).log_likelihood;
+  if (p.inputs.rows() == learnt.differences.rows()) {  // with inducing poses there is no evidence
+    const MatrixXd residual = learnt.differences.rowwise() - p.offset.transpose();
+    const gp::Hyper hyper{p.lambda, std::log(p.mu), std::log(p.b), std::log(p.noise)};
+    report["log_likelihood"]["gp"] = gp::log_marginal(p.inputs, residual, hyper).log_likelihood;
+  }
   report["pose_space"] = motion::space_name(dataset.spec.space);
   report["dims"] = dataset.dims();
   report["rate_hz"] = dataset.rate_hz;
@@ -277,28 +263,29 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   const auto report_step = [&](const char* step, double fraction) {
     return !options.dataset.progress || options.dataset.progress(step, fraction);
   };
-  const auto stopped = [] { return fail("training was stopped before it was done"); };
   if (auto checked = check_groups(clips, options.target); !checked) {
     return std::unexpected(checked.error());
   }
   if (auto checked = check_recordings(clips); !checked) return std::unexpected(checked.error());
   if (!report_step("reading poses", 0.0)) return stopped();
-  auto dataset = make_dataset(clips, options.target, options.dataset);
+  DatasetOptions how = options.dataset;
+  how.mgpm = options.mode == TrainMode::kPaper;
+  auto dataset = make_dataset(clips, options.target, how);
   if (!dataset) return std::unexpected(dataset.error());
   if (!report_step("aligning phases", 0.0)) return stopped();
-  if (auto aligned = align(*dataset, options.dataset); !aligned) {
+  if (auto aligned = align(*dataset, how); !aligned) {
     return std::unexpected(aligned.error());
   }
-  bool wanted = report_step("learning the difference", 0.0);
   const auto progress = [&](double fraction) {
-    return wanted = wanted && report_step("learning the difference", fraction);
+    return report_step("learning the difference", fraction);
   };
-  if (!wanted) return stopped();
+  if (!progress(0.0)) return stopped();
+  SerialTasks serial;
+  TaskRunner& tasks = how.tasks != nullptr ? *how.tasks : serial;
   auto learnt = options.mode == TrainMode::kPaper
                     ? learn_paper(*dataset, options.target)
-                    : learn_default(*dataset, options.target, progress);
+                    : learn_default(*dataset, options.target, tasks, progress);
   if (!learnt) return std::unexpected(learnt.error());
-  if (!wanted) return stopped();
 
   StyleModel model;
   model.to = options.target;
@@ -311,7 +298,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   set_input_statistics(*dataset, model);
   model.space = std::move(dataset->spec);
   model.process = std::move(learnt->process);
-  report_step("learning the difference", 1.0);
+  if (!progress(1.0)) return stopped();
   return model;
 }
 

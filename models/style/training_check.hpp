@@ -18,7 +18,7 @@ enum class ClosingBy {
 
 struct TrainingCheck {
   double difference_deg = 0.0;  // of the groups' mean cycles: rms over joints and phases
-  double scatter_deg = 0.0;  // of a subject's cycle from its group's; 0 with one subject per group
+  double scatter_deg = 0.0;     // of a take's cycle from its group's; 0 with one take per group
   Way way;
   ClosingBy closing_by = ClosingBy::kTraining;
   std::vector<std::string> problems;  // each says why the model is unusable, and what to do
@@ -35,6 +35,9 @@ struct TrainingCheck {
 
 // Whether a motion of this name is expected to have strides: walks and runs of all kinds.
 [[nodiscard]] bool is_gait(std::string_view motion);
+
+// How far the clip's frames are from its own cycle at their phases: rms over frames and joints.
+[[nodiscard]] double cycle_residual_deg(const Dataset& dataset, const AlignedClip& clip);
 
 // Checks the aligned clips; `way` is what training measured.
 [[nodiscard]] TrainingCheck check_training(const Dataset& dataset, const std::string& target,

@@ -1,7 +1,9 @@
 #include "models/style/training_pairs.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "models/style/harmonics.hpp"
 
@@ -10,154 +12,240 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using Takes = std::vector<TakeCycle>;
 
-MatrixXd zeros_like(const MatrixXd& m) { return MatrixXd::Zero(m.rows(), m.cols()); }
+const AlignedClip& clip_of(const Dataset& dataset, const TakeCycle& take) {
+  return dataset.clips[static_cast<std::size_t>(take.clip)];
+}
 
-int subjects_in(const Dataset& dataset, const Subject& like) {
-  int count = 0;
-  for (const Subject& s : dataset.subjects) {
-    count += s.group == like.group && s.motion == like.motion ? 1 : 0;
+const std::string& person_of(const Dataset& dataset, const AlignedClip& clip) {
+  return dataset.subjects[static_cast<std::size_t>(clip.subject)].name;
+}
+
+// Everybody with a take of this group and motion, in the takes' order.
+std::vector<std::string> people_in(const Dataset& dataset, const Takes& takes,
+                                   const std::string& group, const std::string& motion) {
+  std::vector<std::string> people;
+  for (const TakeCycle& take : takes) {
+    const AlignedClip& clip = clip_of(dataset, take);
+    if (clip.group != group || clip.motion != motion) continue;
+    const std::string& name = person_of(dataset, clip);
+    if (std::ranges::find(people, name) == people.end()) people.push_back(name);
   }
-  return count;
+  return people;
 }
 
-// The difference that training assigns to a source subject's frames, at these phases.
-MatrixXd difference_at(const MatrixXd& delta, const VectorXd& phase) {
-  return harmonic_basis(phase, kCycleHarmonics) * delta;
-}
-
-// One fold for each source subject whose group has other subjects; those are trained on.
-std::vector<Fold> subject_folds(const Dataset& dataset, const std::vector<SubjectCycle>& cycles,
-                                const std::string& target, const std::string& first_source) {
-  std::vector<Fold> folds;
-  for (const AlignedClip& clip : dataset.clips) {
-    const Subject& subject = dataset.subjects[clip.subject];
-    if (clip.group == target || subjects_in(dataset, subject) < 2) continue;
-    const MatrixXd goal = group_cycle(dataset, cycles, target, clip.motion);
+Difference difference_of(const Dataset& dataset, const Takes& takes, const std::string& target,
+                         const std::string& group, const std::string& motion) {
+  Difference found{motion, group, {}, 0};
+  for (const std::string& person : people_in(dataset, takes, group, motion)) {
+    const MatrixXd goal = group_cycle(dataset, takes, target, motion, person);
     if (goal.size() == 0) continue;
-    std::vector<SubjectCycle> others;
-    for (const SubjectCycle& cycle : cycles) {
-      if (cycle.subject != clip.subject) others.push_back(cycle);
+    const MatrixXd own = goal - group_cycle(dataset, takes, group, motion, person);
+    found.delta = found.people == 0 ? own : MatrixXd(found.delta + own);
+    ++found.people;
+  }
+  if (found.people > 0) {
+    found.delta /= found.people;
+  } else {
+    found.delta =
+        group_cycle(dataset, takes, target, motion) - group_cycle(dataset, takes, group, motion);
+  }
+  return found;
+}
+
+int index_of(const std::vector<Difference>& differences, const AlignedClip& clip) {
+  for (std::size_t d = 0; d < differences.size(); ++d) {
+    if (differences[d].group == clip.group && differences[d].motion == clip.motion) {
+      return static_cast<int>(d);
     }
-    const MatrixXd delta = goal - group_cycle(dataset, others, clip.group, clip.motion);
-    folds.push_back({make_training_pairs(dataset, others, target, first_source), clip.q,
-                     difference_at(delta, clip.phase()), clip.phase(), goal, delta.row(0)});
+  }
+  return kNoDifference;
+}
+
+std::vector<MatrixXd> deltas_of(const std::vector<Difference>& differences) {
+  std::vector<MatrixXd> deltas;
+  for (const Difference& d : differences) deltas.push_back(d.delta);
+  return deltas;
+}
+
+// The takes without those at these indices.
+Takes without(const Takes& takes, const std::vector<int>& left_out) {
+  Takes kept;
+  for (int i = 0; i < std::ssize(takes); ++i) {
+    if (std::ranges::find(left_out, i) == left_out.end()) {
+      kept.push_back(takes[static_cast<std::size_t>(i)]);
+    }
+  }
+  return kept;
+}
+
+bool same_differences(const std::vector<Difference>& a, const std::vector<Difference>& b) {
+  return std::ranges::equal(a, b, [](const Difference& x, const Difference& y) {
+    return x.group == y.group && x.motion == y.motion && (x.people > 0) == (y.people > 0);
+  });
+}
+
+// The fold that asks for the difference on this clip's frames, learnt without some takes.
+Fold fold_of(const Dataset& dataset, const Takes& takes, const AlignedClip& clip,
+             std::vector<int> left_out, const std::string& target) {
+  const auto differences = differences_of(dataset, without(takes, left_out), target);
+  Fold fold;
+  fold.asked = index_of(differences, clip);
+  fold.goal =
+      goal_of(dataset, takes, clip, differences[static_cast<std::size_t>(fold.asked)], target);
+  fold.left_out = std::move(left_out);
+  fold.differences = deltas_of(differences);
+  fold.q = clip.q;
+  fold.phase = clip.phase();
+  return fold;
+}
+
+// What to leave out to ask for this take: all of its person, else the take alone; nothing where
+// either would leave too little to learn the same differences from.
+std::vector<int> leave_out_for(const Dataset& dataset, const Takes& takes,
+                               const std::string& target, std::size_t asked,
+                               const std::vector<Difference>& all) {
+  const AlignedClip& clip = clip_of(dataset, takes[asked]);
+  std::vector<int> person;
+  for (int i = 0; i < std::ssize(takes); ++i) {
+    const AlignedClip& other = clip_of(dataset, takes[static_cast<std::size_t>(i)]);
+    if (person_of(dataset, other) == person_of(dataset, clip)) person.push_back(i);
+  }
+  for (auto& left_out : {person, std::vector<int>{static_cast<int>(asked)}}) {
+    const Takes kept = without(takes, left_out);
+    if (same_differences(differences_of(dataset, kept, target), all)) return left_out;
+  }
+  return {};
+}
+
+std::vector<Fold> take_folds(const Dataset& dataset, const Takes& takes,
+                             const std::string& target) {
+  const auto all = differences_of(dataset, takes, target);
+  std::vector<Fold> folds;
+  for (std::size_t i = 0; i < takes.size(); ++i) {
+    const AlignedClip& clip = clip_of(dataset, takes[i]);
+    if (index_of(all, clip) == kNoDifference) continue;
+    std::vector<int> left_out = leave_out_for(dataset, takes, target, i, all);
+    if (left_out.empty()) continue;
+    folds.push_back(fold_of(dataset, takes, clip, std::move(left_out), target));
   }
   return folds;
 }
 
-// The clip's rows [first, first + count), with the phase at which they start.
+// The clip's rows [first, first + count), with their phases.
 AlignedClip part_of(const AlignedClip& clip, Eigen::Index first, Eigen::Index count) {
   AlignedClip part;
   part.group = clip.group;
   part.motion = clip.motion;
   part.subject = clip.subject;
   part.q = clip.q.middleRows(first, count);
-  part.theta0 = clip.theta0 + clip.dtheta * static_cast<double>(first);
-  part.dtheta = clip.dtheta;
+  part.local_phase = clip.phase().segment(first, count);
   return part;
 }
 
 // Trained on one half of every source clip, tested on the other halves.
-std::vector<Fold> half_folds(const Dataset& dataset, const std::string& target,
-                             const std::string& first_source) {
-  std::vector<Fold> folds;
-  for (const int trained_half : {0, 1}) {
-    Dataset halves;
-    halves.spec = dataset.spec;
-    halves.motions = dataset.motions;
-    halves.subjects = dataset.subjects;
-    std::vector<AlignedClip> tests;
-    for (const AlignedClip& clip : dataset.clips) {
-      if (clip.group == target) {
-        halves.clips.push_back(part_of(clip, 0, clip.q.rows()));
-        continue;
-      }
-      const Eigen::Index middle = clip.q.rows() / 2;
-      const double turns = static_cast<double>(middle) * clip.dtheta / (2.0 * std::numbers::pi);
-      if (turns < 1.0) return {};
-      const Eigen::Index rest = clip.q.rows() - middle;
-      const AlignedClip first = part_of(clip, 0, middle);
-      const AlignedClip second = part_of(clip, middle, rest);
-      halves.clips.push_back(trained_half == 0 ? first : second);
-      tests.push_back(trained_half == 0 ? second : first);
+LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
+  Dataset parts;
+  parts.motions = dataset.motions;
+  parts.subjects = dataset.subjects;
+  std::vector<int> halves[2];  // of the source clips: which parts are first and second ones
+  for (const AlignedClip& clip : dataset.clips) {
+    const Eigen::Index frames = clip.q.rows();
+    if (clip.group == target) {
+      parts.clips.push_back(part_of(clip, 0, frames));
+      continue;
     }
-    const std::vector<SubjectCycle> cycles = subject_cycles(halves);
-    const std::vector<Pairing> training_pairs =
-        make_training_pairs(halves, cycles, target, first_source);
-    for (const AlignedClip& test : tests) {
-      const MatrixXd goal = group_cycle(halves, cycles, target, test.motion);
-      if (goal.size() == 0) continue;
-      const MatrixXd delta = goal - group_cycle(halves, cycles, test.group, test.motion);
-      folds.push_back({training_pairs, test.q, difference_at(delta, test.phase()), test.phase(),
-                       goal, delta.row(0)});
+    const Eigen::Index middle = frames / 2;
+    const VectorXd phase = clip.phase();
+    if (phase[middle] - phase[0] < 2.0 * std::numbers::pi) return {};
+    halves[0].push_back(static_cast<int>(std::ssize(parts.clips)));
+    parts.clips.push_back(part_of(clip, 0, middle));
+    halves[1].push_back(static_cast<int>(std::ssize(parts.clips)));
+    parts.clips.push_back(part_of(clip, middle, frames - middle));
+  }
+  const Takes takes = take_cycles(parts);
+  LeaveOut result{make_training_pairs(parts, takes, target), {}};
+  for (const auto& tested : halves) {
+    for (const int part : tested) {
+      const AlignedClip& clip = parts.clips[static_cast<std::size_t>(part)];
+      result.folds.push_back(fold_of(parts, takes, clip, tested, target));
     }
   }
-  return folds;
+  return result;
 }
 
 }  // namespace
 
-std::vector<SubjectCycle> subject_cycles(const Dataset& dataset) {
-  std::vector<SubjectCycle> cycles;
-  for (int s = 0; s < std::ssize(dataset.subjects); ++s) {
+Takes take_cycles(const Dataset& dataset) {
+  Takes takes;
+  for (int c = 0; c < std::ssize(dataset.clips); ++c) {
+    const AlignedClip& clip = dataset.clips[static_cast<std::size_t>(c)];
+    takes.push_back({c, fit_harmonics(clip.phase(), clip.q, kCycleHarmonics)});
+  }
+  return takes;
+}
+
+MatrixXd group_cycle(const Dataset& dataset, const Takes& takes, const std::string& group,
+                     const std::string& motion, const std::string& person) {
+  if (person.empty()) {
     MatrixXd sum;
-    int clips = 0;
-    for (const AlignedClip& clip : dataset.clips) {
-      if (clip.subject != s) continue;
-      const MatrixXd c = fit_harmonics(clip.phase(), clip.q, kCycleHarmonics);
-      sum = clips == 0 ? c : MatrixXd(sum + c);
-      ++clips;
+    const auto people = people_in(dataset, takes, group, motion);
+    for (const std::string& name : people) {
+      const MatrixXd own = group_cycle(dataset, takes, group, motion, name);
+      sum = sum.size() == 0 ? own : MatrixXd(sum + own);
     }
-    if (clips > 0) cycles.push_back({s, sum / clips});
+    return people.empty() ? sum : MatrixXd(sum / static_cast<double>(people.size()));
   }
-  return cycles;
-}
-
-MatrixXd group_cycle(const Dataset& dataset, const std::vector<SubjectCycle>& cycles,
-                     const std::string& group, const std::string& motion) {
   MatrixXd sum;
-  int subjects = 0;
-  for (const SubjectCycle& cycle : cycles) {
-    const Subject& subject = dataset.subjects[cycle.subject];
-    if (subject.group != group || subject.motion != motion) continue;
-    sum = subjects == 0 ? cycle.coefficients : MatrixXd(sum + cycle.coefficients);
-    ++subjects;
+  int count = 0;
+  for (const TakeCycle& take : takes) {
+    const AlignedClip& clip = clip_of(dataset, take);
+    if (clip.group != group || clip.motion != motion || person_of(dataset, clip) != person)
+      continue;
+    sum = count == 0 ? take.coefficients : MatrixXd(sum + take.coefficients);
+    ++count;
   }
-  return subjects == 0 ? sum : MatrixXd(sum / subjects);
+  return count == 0 ? sum : MatrixXd(sum / count);
 }
 
-std::vector<Pairing> make_training_pairs(const Dataset& dataset,
-                                         const std::vector<SubjectCycle>& cycles,
-                                         const std::string& target,
-                                         const std::string& first_source) {
-  std::vector<Pairing> training_pairs;
-  for (const std::string& motion : dataset.motions) {
-    const MatrixXd goal = group_cycle(dataset, cycles, target, motion);
-    if (goal.size() == 0) continue;
-    std::vector<Pairing> own;  // of the target: the difference is zero
-    bool covered = false;
-    for (const SubjectCycle& cycle : cycles) {
-      const Subject& subject = dataset.subjects[cycle.subject];
-      if (subject.motion != motion) continue;
-      if (subject.group == target) {
-        own.push_back({cycle.coefficients, zeros_like(cycle.coefficients), false});
-        continue;
-      }
-      covered = true;
-      training_pairs.push_back({cycle.coefficients,
-                                goal - group_cycle(dataset, cycles, subject.group, motion),
-                                subject.group == first_source});
-    }
-    if (covered) training_pairs.insert(training_pairs.end(), own.begin(), own.end());
+std::vector<Difference> differences_of(const Dataset& dataset, const Takes& takes,
+                                       const std::string& target) {
+  std::vector<Difference> found;
+  for (const TakeCycle& take : takes) {
+    const AlignedClip& clip = clip_of(dataset, take);
+    if (clip.group == target || index_of(found, clip) != kNoDifference) continue;
+    if (people_in(dataset, takes, target, clip.motion).empty()) continue;
+    found.push_back(difference_of(dataset, takes, target, clip.group, clip.motion));
   }
-  return training_pairs;
+  return found;
 }
 
-std::vector<Fold> make_folds(const Dataset& dataset, const std::string& target,
-                             const std::string& first_source) {
-  auto folds = subject_folds(dataset, subject_cycles(dataset), target, first_source);
-  return folds.empty() ? half_folds(dataset, target, first_source) : folds;
+MatrixXd goal_of(const Dataset& dataset, const Takes& takes, const AlignedClip& clip,
+                 const Difference& difference, const std::string& target) {
+  const MatrixXd own = group_cycle(dataset, takes, target, clip.motion, person_of(dataset, clip));
+  if (own.size() > 0) return own;
+  if (difference.people == 0) return group_cycle(dataset, takes, target, clip.motion);
+  return fit_harmonics(clip.phase(), clip.q, kCycleHarmonics) + difference.delta;
+}
+
+TrainingPairs make_training_pairs(const Dataset& dataset, const Takes& takes,
+                                  const std::string& target) {
+  const auto differences = differences_of(dataset, takes, target);
+  TrainingPairs pairs;
+  pairs.differences = deltas_of(differences);
+  for (const TakeCycle& take : takes) {
+    pairs.inputs.push_back(take.coefficients);
+    pairs.difference.push_back(index_of(differences, clip_of(dataset, take)));
+  }
+  return pairs;
+}
+
+LeaveOut make_folds(const Dataset& dataset, const std::string& target) {
+  const Takes takes = take_cycles(dataset);
+  auto folds = take_folds(dataset, takes, target);
+  if (folds.empty()) return half_folds(dataset, target);
+  return {make_training_pairs(dataset, takes, target), std::move(folds)};
 }
 
 }  // namespace posed::style

@@ -1,41 +1,59 @@
-// The training pairs of a style model: every source subject's cycle with the difference to the
-// target at the same phase, and the target's own cycles with a difference of zero (README.md,
-// "Training pairs"). Cold.
+// The training pairs of a style model: every take's cycle with the difference to the target at the
+// same phase, and the target's own cycles with a difference of zero (README.md, "Training pairs").
+// Cold.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "models/style/dataset.hpp"
-#include "models/style/difference.hpp"
+#include "models/style/leave_out.hpp"
 
 namespace posed::style {
 
-// One subject's average cycle as harmonic coefficients.
-struct SubjectCycle {
-  int subject = 0;  // index into Dataset::subjects
+// The average cycle of one clip as harmonic coefficients.
+struct TakeCycle {
+  int clip = 0;  // index into Dataset::clips
   Eigen::MatrixXd coefficients;
 };
 
-// Cycles of all subjects by harmonic regression at the clips' phases; a subject's clips have equal
-// weight.
-[[nodiscard]] std::vector<SubjectCycle> subject_cycles(const Dataset& dataset);
+// Cycles of all clips by harmonic regression at their phases.
+[[nodiscard]] std::vector<TakeCycle> take_cycles(const Dataset& dataset);
 
-// The mean over a group's subjects in one motion, with equal weights; empty when there is none.
+// The mean over a group's people in one motion, a person's takes first; equal weights. Empty where
+// there is none. With a name, this person's alone.
 [[nodiscard]] Eigen::MatrixXd group_cycle(const Dataset& dataset,
-                                          const std::vector<SubjectCycle>& cycles,
-                                          const std::string& group, const std::string& motion);
+                                          const std::vector<TakeCycle>& takes,
+                                          const std::string& group, const std::string& motion,
+                                          const std::string& person = {});
 
-// The pairs that the process learns from. A motion without the target or without a source gives
-// none; `first_source` is the group whose mean difference is the prior mean.
-[[nodiscard]] std::vector<Pairing> make_training_pairs(const Dataset& dataset,
-                                                       const std::vector<SubjectCycle>& cycles,
-                                                       const std::string& target,
-                                                       const std::string& first_source);
+// What the target adds to one source group in one motion.
+struct Difference {
+  std::string motion, group;
+  Eigen::MatrixXd delta;  // harmonic coefficients
+  int people = 0;         // who walk in both styles; 0: the difference of the groups' means
+};
 
-// Folds for the choice of the length: one source subject left out where a group has several in a
-// motion, else one half of each source clip against the other half; none where clips are too short.
-[[nodiscard]] std::vector<Fold> make_folds(const Dataset& dataset, const std::string& target,
-                                           const std::string& first_source);
+// In the clips' order. The mean over the people who have both styles of what sets their own two
+// apart; where nobody has both, what sets the two groups apart.
+[[nodiscard]] std::vector<Difference> differences_of(const Dataset& dataset,
+                                                     const std::vector<TakeCycle>& takes,
+                                                     const std::string& target);
+
+// The cycle that this clip should reach: its own person's in the target's style; where the person
+// has none, its own cycle and the difference, or, if nobody shows both styles, the target's mean.
+[[nodiscard]] Eigen::MatrixXd goal_of(const Dataset& dataset, const std::vector<TakeCycle>& takes,
+                                      const AlignedClip& clip, const Difference& difference,
+                                      const std::string& target);
+
+// The pairs that the process learns from: an input for each take.
+[[nodiscard]] TrainingPairs make_training_pairs(const Dataset& dataset,
+                                                const std::vector<TakeCycle>& takes,
+                                                const std::string& target);
+
+// Folds for the choice of the kernel: a person left out where others show the difference, else a
+// take where its person has several, else one half of each source clip against the other half; none
+// where clips are too short.
+[[nodiscard]] LeaveOut make_folds(const Dataset& dataset, const std::string& target);
 
 }  // namespace posed::style

@@ -98,6 +98,37 @@ TEST_CASE("command line options beside an experiment file override it or are ref
   }
 }
 
+TEST_CASE("files are takes of one person unless a name before a colon tells them apart",
+          "[train_style]") {
+  const WalkerStudio studio;
+  const auto subjects = [&](const std::vector<std::string>& from, const std::string& to) {
+    std::vector<std::string> what{"--from"};
+    what.insert(what.end(), from.begin(), from.end());
+    what.insert(what.end(), {"--to", to, "--overwrite"});
+    const auto done = studio.train(what, "people.style");
+    REQUIRE(done.code == 0);
+    json report = json::parse(done.out);
+    std::vector<std::string> names;
+    for (const json& clip : report["clips"]) names.push_back(clip["subject"]);
+    return std::pair{names, report["warnings"].dump()};
+  };
+  const std::string march = studio.path("march_1.bvh");
+  const std::string other = studio.path("march_2.bvh");
+  const std::string sway = studio.path("sway_1.bvh");
+  const auto [one, silent] = subjects({march, other}, sway);
+  CHECK(one == std::vector<std::string>(3, "one person"));
+  CHECK(silent == "[]");
+  const auto [two, still_silent] = subjects({"ann:" + march, "bob:" + other}, "ann:" + sway);
+  CHECK(two == std::vector<std::string>{"ann", "bob", "ann"});
+  CHECK(still_silent == "[]");
+  const auto [apart, warning] = subjects({"ann:" + march}, "bob:" + sway);
+  CHECK(has(warning, "nobody shows both 'from' and 'to' in motion walk"));
+  // A file whose own name has a colon is that file.
+  studio.write("eve:1", WalkerFamily::kMarch, 2);
+  const auto [whole, none] = subjects({studio.path("eve:1.bvh")}, sway);
+  CHECK(whole.front() == "one person");
+}
+
 TEST_CASE("no model is trained from useless data", "[train_style]") {
   const WalkerStudio studio;
   const auto refused = [&](const std::string& from, const std::string& to, const std::string& why) {

@@ -68,11 +68,11 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
                clips->from.size() + clips->to.size());
   Experiment experiment;
   experiment.target = "sway";
-  for (const auto& file : clips->from) {
-    experiment.clips.push_back({file, "march", file.stem().string(), "walk", 0});
-  }
-  for (const auto& file : clips->to) {
-    experiment.clips.push_back({file, "sway", file.stem().string(), "walk", 0});
+  // The same number is the same person in both families.
+  for (std::size_t i = 0; i < clips->from.size(); ++i) {
+    const std::string person = std::to_string(i + 1);
+    experiment.clips.push_back({clips->from[i], "march", person, "walk", 0});
+    experiment.clips.push_back({clips->to[i], "sway", person, "walk", 0});
   }
   const auto report = train_and_save(experiment, 0, folder / kDemoModel, false);
   if (!report) return std::unexpected(report.error());

@@ -37,7 +37,7 @@ void read_clip_table(TableReader& table, const std::filesystem::path& folder,
   table.require("group", clip.group);
   table.require("motion", clip.motion);
   clip.file = folder / file;
-  clip.subject = std::filesystem::path(file).stem().string();
+  clip.subject = kOnePerson;
   table.read("subject", clip.subject);
   experiment.clips.push_back(std::move(clip));
 }

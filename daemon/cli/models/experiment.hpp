@@ -10,6 +10,9 @@
 
 namespace posed::cli {
 
+// Who shows the clips that name nobody.
+inline constexpr const char* kOnePerson = "one person";
+
 struct ExperimentClip {
   std::filesystem::path file;  // absolute; relative paths start at the experiment file's folder
   std::string group, subject, motion;

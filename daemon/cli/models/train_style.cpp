@@ -9,6 +9,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/models/experiment.hpp"
+#include "daemon/cli/models/thread_tasks.hpp"
 #include "daemon/cli/models/train_style.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
@@ -22,9 +23,13 @@ using nlohmann::json;
 
 constexpr const char* kTrainStyleFooter = R"(Examples:
   posed train style --from plain_1.bvh plain_2.bvh --to proud_1.bvh proud_2.bvh --out proud.style
+  posed train style --from ann:a.bvh ann:b.bvh bob:c.bvh --to ann:d.bvh --out two.style
   posed train style --motion walk --from 02_02.amc 35_01.amc --to 08_01.amc --pose-space cmu43 \
       --out eight.style
   posed train style --experiment styles.toml --out styles.style --json
+
+Several files are takes of one person, unless PERSON: before a name tells them apart. Differences
+are learnt within people who show both styles; who shows one adds walks to start from only.
 
 An experiment file lists clips with their group, subject and motion; several sources and motions
 make one model:
@@ -36,7 +41,7 @@ make one model:
   [[clip]]
   file = "plain_1.bvh"       # relative to the experiment file
   group = "plain"            # every group but the target is a source
-  subject = "ann"            # default: the file's stem
+  subject = "ann"            # who it is, in any group; without it, one person shows all
   motion = "walk"
 
 The last line says how much of the way to the target the model closes on clips that were held out,
@@ -53,7 +58,22 @@ struct TrainStyleOptions {
   bool overwrite = false, force = false, json = false;
 };
 
-// The clips: from the experiment file, or from --from and --to, where each clip is one subject.
+// A file of --from or --to, with its person: the part before a colon where no file has the whole
+// name. Without one it is the same person as every other file without one.
+ExperimentClip named_clip(const std::string& argument, const std::string& group,
+                          const std::string& motion) {
+  ExperimentClip clip{argument, group, kOnePerson, motion, 0};
+  const auto colon = argument.find(':');
+  std::error_code ignored;
+  if (colon == std::string::npos || colon == 0 || std::filesystem::exists(argument, ignored)) {
+    return clip;
+  }
+  clip.subject = argument.substr(0, colon);
+  clip.file = argument.substr(colon + 1);
+  return clip;
+}
+
+// The clips: from the experiment file, or from --from and --to.
 Result<Experiment> clips_of(const TrainStyleOptions& options) {
   if (!options.experiment.empty()) {
     if (!options.from.empty() || !options.to.empty()) {
@@ -71,9 +91,8 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
   experiment.target = "to";
   for (const auto* files : {&options.from, &options.to}) {
     for (const std::string& file : *files) {
-      experiment.clips.push_back({file, files == &options.from ? "from" : "to",
-                                  std::filesystem::path(file).stem().string(),
-                                  options.motion.value_or("walk"), 0});
+      experiment.clips.push_back(named_clip(file, files == &options.from ? "from" : "to",
+                                            options.motion.value_or("walk")));
     }
   }
   return experiment;
@@ -136,8 +155,9 @@ void print_style_summary(const json& report, const std::string& out) {
 // Maps the progress of one training step to that of the whole training, for a single bar.
 double overall(std::string_view step, double fraction) {
   if (step == "reading poses") return 0.05 * fraction;
-  if (step == "aligning phases") return 0.05 + 0.85 * fraction;
-  return 0.9 + 0.1 * fraction;
+  if (step == "following strides") return 0.05 + 0.15 * fraction;
+  if (step == "aligning phases") return 0.2 + 0.1 * fraction;
+  return 0.3 + 0.7 * fraction;
 }
 
 Result<json> train_style(const TrainStyleOptions& options) {
@@ -175,6 +195,7 @@ int finish(const json& report, const TrainStyleOptions& options) {
 Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
                             const std::filesystem::path& out, bool force) {
   ProgressBar bar;
+  ThreadTasks tasks;
   if (!bar.show("reading clips", 0.0)) return fail("stopped");
   auto clips = load_clips(experiment);
   if (!clips) return std::unexpected(clips.error());
@@ -184,6 +205,7 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   options.dataset.space = experiment.space;
   options.dataset.rate_hz = experiment.rate_hz;
   options.dataset.seed = seed;
+  options.dataset.tasks = &tasks;
   options.dataset.progress = [&bar](std::string_view step, double fraction) {
     return bar.show(step, overall(step, fraction));
   };
@@ -205,8 +227,8 @@ void add_train_style(CLI::App& train_command, int& exit_code) {
   CLI::App* style = train_command.add_subcommand("style", "Learn what makes one style another");
   style->footer(kTrainStyleFooter);
   const auto options = std::make_shared<TrainStyleOptions>();
-  style->add_option("--from", options->from, "Clips of the style to change");
-  style->add_option("--to", options->to, "Clips of the style to give");
+  style->add_option("--from", options->from, "Clips of the style to change: [PERSON:]FILE");
+  style->add_option("--to", options->to, "Clips of the style to give: [PERSON:]FILE");
   style->add_option("--motion", options->motion, "What all clips show (default: walk)");
   style->add_option("--experiment", options->experiment,
                     "TOML file that lists the clips and may set mode, rate_hz and pose_space");

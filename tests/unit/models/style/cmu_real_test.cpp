@@ -23,7 +23,6 @@ namespace {
 
 constexpr std::array kWalks{"02_02", "08_01", "16_15", "35_01", "39_01", "07_01"};
 constexpr std::array kPeriods{29.5, 30.1, 35.0, 33.7, 31.1, 32.4};  // frames at 30 Hz
-constexpr double kPersonNoise = 0.1;  // of the signal variance, as in training with several people
 
 bool cmu_recorded() { return test::shared("data/cmu/02_02.amc").has_value(); }
 
@@ -45,29 +44,37 @@ style::Dataset aligned(style::MgpmStart start, std::uint64_t seed) {
   style::Dataset dataset = walks();
   style::DatasetOptions options;
   options.space = motion::Space::kCmu43;
+  options.mgpm = true;
   options.starts = {start};
   options.seed = seed;
   REQUIRE(style::align(dataset, options));
   return dataset;
 }
 
-// Training pairs from everybody except these: `delta` at the poses of each person's own cycle.
-std::vector<style::Pairing> pairs_without(const std::vector<style::SubjectCycle>& cycles,
-                                          const MatrixXd& delta, const std::vector<int>& without) {
-  std::vector<style::Pairing> training_pairs;
-  for (int s = 0; s < std::ssize(cycles); ++s) {
-    if (std::ranges::find(without, s) != without.end()) continue;
-    training_pairs.push_back({cycles[static_cast<std::size_t>(s)].coefficients, delta, true});
+// The people who are left when these are not learnt from.
+std::vector<int> people_without(int people, const std::vector<int>& without) {
+  std::vector<int> kept;
+  for (int s = 0; s < people; ++s) {
+    if (std::ranges::find(without, s) == without.end()) kept.push_back(s);
   }
-  return training_pairs;
+  return kept;
 }
 
-// The held-out person: their own frames, and the true difference at their phases.
-style::Fold fold_of(const style::Dataset& dataset, std::vector<style::Pairing> train,
-                    const MatrixXd& delta, int person) {
-  const style::AlignedClip& clip = dataset.clips[static_cast<std::size_t>(person)];
-  return {std::move(train), clip.q,
-          style::harmonic_basis(clip.phase(), style::kCycleHarmonics) * delta};
+// Training pairs of these people: `delta` at the poses of each one's own cycle, and a fold for
+// each.
+style::LeaveOut lesson_of(const style::Dataset& dataset,
+                          const std::vector<style::TakeCycle>& cycles,
+                          const std::vector<int>& people, const MatrixXd& delta) {
+  style::LeaveOut lesson;
+  lesson.pairs.differences = {delta};
+  for (const int s : people) {
+    const auto& clip = dataset.clips[static_cast<std::size_t>(s)];
+    lesson.folds.push_back(
+        {{static_cast<int>(lesson.pairs.inputs.size())}, {delta}, 0, clip.q, clip.phase(), {}});
+    lesson.pairs.inputs.push_back(cycles[static_cast<std::size_t>(s)].coefficients);
+    lesson.pairs.difference.push_back(0);
+  }
+  return lesson;
 }
 
 // Mean squared errors per value, summed over the folds.
@@ -79,45 +86,42 @@ struct Errors {
   [[nodiscard]] double of_paper() const { return std::sqrt(paper / truth); }
 };
 
-// The method of Sato et al. on the same fold: one training pair at the mean cycle of the training
-// people, kernel values by evidence.
-double paper_error(const style::Fold& fold) {
-  MatrixXd mean = MatrixXd::Zero(fold.train.front().input.rows(), fold.q.cols());
-  for (const style::Pairing& pairing : fold.train) mean += pairing.input;
-  mean /= static_cast<double>(fold.train.size());
+// The method of Sato et al.: one training pair at the mean cycle of the training people, kernel
+// values by evidence.
+gp::Trained paper_process(const style::TrainingPairs& pairs) {
+  MatrixXd mean = MatrixXd::Zero(pairs.inputs.front().rows(), pairs.inputs.front().cols());
+  for (const MatrixXd& input : pairs.inputs) mean += input;
+  mean /= static_cast<double>(pairs.inputs.size());
   const MatrixXd basis =
       style::harmonic_basis(style::cycle_phases(style::kGridFrames), style::kCycleHarmonics);
-  const auto process = style::fit_paper(basis * mean, basis * fold.train.front().delta);
-  REQUIRE(process);
-  return (gp::posterior(*process, fold.q).mean - fold.truth).squaredNorm();
+  return style::fit_paper(basis * mean, basis * pairs.differences.front()).value();
 }
 
 // Person a's cycle minus person b's, trained on the others without `asked`, and evaluated on
-// `asked`. The kernel's length is chosen by leaving out each training person in turn.
-void ask(const style::Dataset& dataset, const std::vector<style::SubjectCycle>& cycles, int a,
-         int b, int asked, Errors& errors) {
+// `asked`. The kernel is chosen by leaving out each training person in turn.
+void ask(const style::Dataset& dataset, const std::vector<style::TakeCycle>& cycles, int a, int b,
+         int asked, Errors& errors) {
   const MatrixXd delta = cycles[static_cast<std::size_t>(a)].coefficients -
                          cycles[static_cast<std::size_t>(b)].coefficients;
-  std::vector<style::Fold> folds;
-  for (int s = 0; s < std::ssize(cycles); ++s) {
-    if (s == a || s == b || s == asked) continue;
-    folds.push_back(fold_of(dataset, pairs_without(cycles, delta, {a, b, asked, s}), delta, s));
-  }
-  const auto candidates = style::candidate_lengths_rad(dataset.dims());
-  const double length_rad =
-      style::choose_length_rad(folds, candidates, kPersonNoise, candidates[2]).length_rad;
-  const auto fold = fold_of(dataset, pairs_without(cycles, delta, {a, b, asked}), delta, asked);
-  const auto values = static_cast<double>(fold.truth.size());
-  const auto found = style::fold_error(fold, length_rad, kPersonNoise);
-  errors.process += found.error / values;
-  errors.truth += found.truth / values;
-  errors.paper += paper_error(fold) / values;
-  errors.constant += (fold.truth.rowwise() - delta.row(0)).squaredNorm() / values;
+  const int people = static_cast<int>(std::ssize(cycles));
+  const auto lesson = lesson_of(dataset, cycles, people_without(people, {a, b, asked}), delta);
+  SerialTasks tasks;
+  const auto chosen = style::choose_kernel(lesson, tasks, {}).value();
+  const style::AlignedClip& clip = dataset.clips[static_cast<std::size_t>(asked)];
+  const MatrixXd truth = style::harmonic_basis(clip.phase(), style::kCycleHarmonics) * delta;
+  const auto values = static_cast<double>(truth.size());
+  const auto error = [&](const gp::Trained& process) {
+    return (gp::posterior_mean(process, clip.q) - truth).squaredNorm() / values;
+  };
+  errors.process += error(style::fit_difference(lesson.pairs, chosen.kernel).value());
+  errors.paper += error(paper_process(lesson.pairs));
+  errors.truth += truth.squaredNorm() / values;
+  errors.constant += (truth.rowwise() - delta.row(0)).squaredNorm() / values;
 }
 
 // For every ordered pair of people and every third person held out.
 Errors left_out_errors(const style::Dataset& dataset) {
-  const auto cycles = style::subject_cycles(dataset);
+  const auto cycles = style::take_cycles(dataset);
   const int people = static_cast<int>(std::ssize(cycles));
   Errors errors;
   for (int a = 0; a < people; ++a) {

@@ -1,0 +1,36 @@
+// Inducing poses: the few training poses that stand for all, chosen by greedy pivoted Cholesky, and
+// the process that is learnt on them (README.md, "Inducing poses"). Cold; thread-safe.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "models/gp/regression.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::gp {
+
+struct Inducing {
+  std::vector<int> order;  // of all poses, the chosen ones first
+  int count = 0;           // of the chosen ones, m
+  Eigen::MatrixXd factor;  // F [N x m]: F F' is nearly the kernel E of all poses, e^lambda = 1
+
+  [[nodiscard]] std::vector<int> chosen() const { return {order.begin(), order.begin() + count}; }
+  // R, lower [m x m]: the chosen poses' rows of F, so that R R' is their kernel.
+  [[nodiscard]] Eigen::MatrixXd root() const;
+};
+
+// Each step adds the pose that the chosen ones explain least, until there are `limit`, `enough` is
+// true of their number and the largest unexplained variance (of 1), or none is left.
+[[nodiscard]] Inducing choose_inducing(const Eigen::MatrixXd& X, double mu, int limit,
+                                       const std::function<bool(int, double)>& enough);
+
+// As fit() (regression.hpp) with b = 0, but with at most `limit` poses, fitted to all pairs by
+// least squares with the noise as ridge (subset of regressors).
+[[nodiscard]] Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                                           const Eigen::VectorXd& offset, const Hyper& hyper,
+                                           int limit);
+
+}  // namespace posed::gp

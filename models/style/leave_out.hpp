@@ -1,0 +1,48 @@
+// The choice of the kernel by what held-out walkers say: each fold asks a process that was learnt
+// without some takes for the difference on a take's own frames. All folds of one length share the
+// kernel's factor (README.md, "Length of the kernel"). Cold; thread-safe.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "models/style/difference.hpp"
+#include "models/tasks.hpp"
+
+namespace posed::style {
+
+struct Fold {
+  std::vector<int> left_out;                 // inputs that are not learnt from
+  std::vector<Eigen::MatrixXd> differences;  // as the others show them, one for each of the pairs'
+  int asked = 0;                             // the difference that the frames should get
+  Eigen::MatrixXd q;                         // the walker's frames [T x D]
+  Eigen::VectorXd phase;                     // of these frames
+  Eigen::MatrixXd goal;  // the cycle that these frames should reach; empty: Way is not measured
+};
+
+struct LeaveOut {
+  TrainingPairs pairs;
+  std::vector<Fold> folds;
+};
+
+// A kernel and how it did on the folds.
+struct ChosenKernel {
+  Kernel kernel;
+  double error = 0.0;  // mean squared error of a frame's difference, rad^2 summed over dimensions
+  Way way;             // of the walkers held out
+};
+
+// Receives the fraction done; returning false stops the work.
+using FoldProgress = std::function<bool(double fraction)>;
+
+// The best of all combinations of lengths and noises: 30 to 100 degrees, and on while the best is
+// at an edge; noise over signal 1e-3 to 0.1. Without folds, 50 degrees and 1e-3. Nothing when
+// `progress` asked to stop.
+[[nodiscard]] std::optional<ChosenKernel> choose_kernel(const LeaveOut& leave_out,
+                                                        TaskRunner& tasks,
+                                                        const FoldProgress& progress);
+
+}  // namespace posed::style

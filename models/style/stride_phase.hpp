@@ -1,0 +1,21 @@
+// The phase of every frame of a walk whose cadence may change: strides are fitted in short windows
+// and linked in time (README.md, "Stride"). Cold; thread-safe.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace posed::style {
+
+struct StridePhase {
+  Eigen::VectorXd phase;  // rad, one a frame, increasing: signal ~ A cos(phase)
+  double dtheta = 0.0;    // mean cadence, rad per frame
+  // Share of the signal that three harmonics of this phase leave, plus find_stride's penalty on a
+  // weak first harmonic: 0 is a perfect stride, 1 and more none.
+  double score = 0.0;
+};
+
+// Follows the strides of a leg signal sampled at `rate_hz`: periods 0.6 to 1.7 s, no longer than
+// the signal. Needs has_stride() (harmonics.hpp).
+[[nodiscard]] StridePhase follow_strides(const Eigen::VectorXd& signal, double rate_hz);
+
+}  // namespace posed::style

@@ -1,0 +1,58 @@
+// Tasks on threads: results in order, stops and exceptions.
+#include "daemon/cli/models/thread_tasks.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <atomic>
+#include <stdexcept>
+
+using namespace posed;
+using namespace posed::cli;
+
+TEST_CASE("results come in the tasks' order, whatever the number of threads", "[tasks]") {
+  for (const unsigned threads : {0U, 1U, 3U, 64U}) {
+    ThreadTasks tasks(threads);
+    std::size_t told = 0;
+    const auto found = tasks.run(
+        100, [](std::size_t i) { return TaskResult{static_cast<double>(i * i)}; },
+        [&](std::size_t done) {
+          CHECK(done >= told);
+          told = done;
+          return true;
+        });
+    REQUIRE(found);
+    REQUIRE(found->size() == 100);
+    for (std::size_t i = 0; i < 100; ++i) CHECK((*found)[i].front() == static_cast<double>(i * i));
+  }
+  CHECK(ThreadTasks(2).run(0, [](std::size_t) { return TaskResult{}; }, {})->empty());
+}
+
+TEST_CASE("after a stop no other task begins and nothing is given back", "[tasks]") {
+  std::atomic<int> begun = 0;
+  std::atomic<bool> asked = false;
+  const auto found = ThreadTasks(2).run(
+      100'000,
+      [&](std::size_t) {
+        ++begun;
+        asked.wait(false);  // no task ends before the stop
+        return TaskResult{};
+      },
+      [&](std::size_t) {
+        asked = true;
+        asked.notify_all();
+        return false;
+      });
+  CHECK_FALSE(found);
+  CHECK(begun < 100'000);
+}
+
+TEST_CASE("a task's exception reaches the caller", "[tasks]") {
+  ThreadTasks tasks(2);
+  CHECK_THROWS_AS(static_cast<void>(tasks.run(5,
+                                              [](std::size_t i) -> TaskResult {
+                                                if (i == 3) throw std::runtime_error("broken");
+                                                return {};
+                                              },
+                                              {})),
+                  std::runtime_error);
+}
