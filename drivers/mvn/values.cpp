@@ -25,14 +25,13 @@ constexpr std::size_t numbers_of(const Quantity& quantity) noexcept {
   return quantity.kind == QuantityKind::kRotation ? 4 : 3;
 }
 
-// Accelerations and magnetic fields are as the sensors or MVN's filter give them.
-constexpr Quantity kRotationOf{"rotation", "1", QuantityKind::kRotation};
 constexpr std::array kMassQuantities{Quantity{"centre_of_mass", "m", QuantityKind::kPosition}};
 constexpr std::array kAngleQuantities{Quantity{"angle", "rad", QuantityKind::kAngles}};
 constexpr std::array kLinearQuantities{Quantity{"position", "m", QuantityKind::kPosition},
                                        Quantity{"velocity", "m/s"},
                                        Quantity{"acceleration", "m/s^2"}};
-constexpr std::array kAngularQuantities{kRotationOf, Quantity{"angular_velocity", "rad/s"},
+constexpr std::array kAngularQuantities{Quantity{"rotation", "1", QuantityKind::kRotation},
+                                        Quantity{"angular_velocity", "rad/s"},
                                         Quantity{"angular_acceleration", "rad/s^2"}};
 constexpr Quantity kTrackerRotation{"tracker_rotation", "1", QuantityKind::kRotation};
 constexpr Quantity kFreeAcceleration{"tracker_free_acceleration", "m/s^2"};

@@ -1,5 +1,6 @@
-// The decoder of MVN on any datagrams and any TCP stream, with two characters known to it. The
-// first byte says how the rest is cut into datagrams, each of which also gets a right head.
+// The decoder of MVN on any datagrams and any TCP stream, with two characters known to it, who have
+// sent all that fits into samples. The first byte says how the rest is cut into datagrams, each of
+// which also gets a right head.
 #include <algorithm>
 #include <cstdint>
 
@@ -14,6 +15,7 @@ namespace {
 using posed::drivers::SourceLayout;
 using posed::drivers::mvn::Head;
 using posed::drivers::mvn::MvnDecoder;
+using posed::drivers::mvn::ValueGroup;
 using posed::fuzz::demand;
 using posed::fuzz::feed;
 using posed::test::CollectSink;
@@ -23,8 +25,11 @@ const SourceLayout& two_characters() {
     std::vector<std::byte> bytes(posed::drivers::mvn::kMaxMvnDescription);
     const std::span all(bytes);
     std::size_t used = posed::drivers::mvn::write_description_head(2, all);
-    for (const auto& character :
-         {posed::drivers::mvn::emulated_walker(), posed::drivers::mvn::emulated_waver()}) {
+    auto walker = posed::drivers::mvn::emulated_walker();
+    auto waver = posed::drivers::mvn::emulated_waver();
+    walker.values.set();
+    waver.values.set(static_cast<std::size_t>(ValueGroup::kLongTrackers));
+    for (const auto& character : {walker, waver}) {
       used += posed::drivers::mvn::write_character(character, all.subspan(used));
     }
     return posed::drivers::mvn::make_layout(all.first(used)).value();

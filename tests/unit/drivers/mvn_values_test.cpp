@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
-#include <random>
 
 #include "drivers/byte_writer.hpp"
 #include "tests/unit/drivers/mvn_rig.hpp"
