@@ -139,7 +139,7 @@ Result<StageChange> parameter_change(const StreamSettings& settings,
   return StageChange{.kind = StageChange::Kind::kSet,
                      .index = static_cast<std::uint8_t>(place->index),
                      .type = &type,
-                     .value = number_of(*value)};
+                     .value = number_of(spec, *value)};
 }
 
 Result<FoundCommand> find_command(const StreamSettings& settings, const std::string& name) {

@@ -18,12 +18,6 @@ std::string from_to(const StreamEvent& event) {
   return (before.empty() ? "" : before + " -> ") + words(event.after);
 }
 
-// A parameter as the config writes it.
-std::string shown(const ParameterSpec& spec, double value) {
-  if (std::holds_alternative<bool>(spec.default_value)) return value != 0.0 ? "true" : "false";
-  return fmt::format("{:g}", value * spec.people_scale);
-}
-
 std::string changed(const StreamEvent& event) {
   const StageChange& change = event.change;
   if (change.type == nullptr) return {};
@@ -31,7 +25,7 @@ std::string changed(const StreamEvent& event) {
     case StageChange::Kind::kSet: {
       const ParameterSpec& spec = change.type->parameters[change.index];
       return fmt::format("{}.{} {} -> {} from frame {}", change.type->name, spec.shown_name(),
-                         shown(spec, event.value_before), shown(spec, change.value),
+                         people_text(spec, event.value_before), people_text(spec, change.value),
                          event.sequence);
     }
     case StageChange::Kind::kModel:

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <string_view>
 #include <variant>
@@ -71,10 +70,7 @@ bool read_set(const ParameterSpec& spec, const Value& value, Decision& decision)
   const bool flag = std::holds_alternative<bool>(spec.default_value);
   if (value.value_case() != (flag ? Value::kFlag : Value::kNumber)) return false;
   decision.change.value = flag ? (value.flag() ? 1.0 : 0.0) : value.number();
-  const double number = decision.change.value;
-  const bool whole = std::holds_alternative<std::int64_t>(spec.default_value);
-  return spec.live && number >= spec.min && number <= spec.max &&
-         (!whole || std::trunc(number) == number);
+  return spec.live && takes_number(spec, decision.change.value);
 }
 
 bool read_hash(const Value& value, Decision& decision) {

@@ -94,7 +94,7 @@ void MergeStage::release(std::int64_t now_ns, StageOut& out) noexcept {
   --count_;
   merged_.lag_frames = static_cast<std::uint16_t>(merged_.lag_frames + count_);
   plan_.remove_unknown_angles(merged_);
-  out.frame({.frame = merged_});
+  out.frame({.frame = merged_, .input = &merged_});
 }
 
 }  // namespace posed::merge

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "models/feet/feet_type.hpp"
 #include "models/generate/generate_type.hpp"
 #include "models/hand/constrain_type.hpp"
 #include "models/merge/merge_type.hpp"
@@ -14,8 +15,8 @@ namespace posed {
 
 std::span<const StageType* const> stage_types() {
   static const std::array types{
-      &merge::merge_type(),    &style::style_type(),       &generate::generate_type(),
-      &hand::constrain_type(), &retarget::retarget_type(),
+      &merge::merge_type(),       &style::style_type(),    &feet::feet_type(),
+      &generate::generate_type(), &hand::constrain_type(), &retarget::retarget_type(),
   };
   return types;
 }

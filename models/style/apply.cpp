@@ -1,7 +1,11 @@
 #include "models/style/apply.hpp"
 
 #include <algorithm>
+#include <array>
+#include <memory>
+#include <utility>
 
+#include "models/feet/feet_stage.hpp"
 #include "models/motion/turn_sum.hpp"
 #include "models/style/heading.hpp"
 #include "proto/frame/rotation.hpp"
@@ -44,6 +48,82 @@ double settled_heading_rad(const clip::Clip& clip, const motion::PoseSpace& spac
   return heading.value_rad();
 }
 
+// The feet stage behind the style; without one, frames pass through.
+class ThroughFeet final : public StageOut {
+ public:
+  explicit ThroughFeet(std::unique_ptr<Stage> feet) : feet_(std::move(feet)) {}
+
+  void frame(const StageFrame& styled) noexcept override {
+    if (feet_) {
+      feet_->process(styled, caught_);
+    } else {
+      caught_.frame(styled);
+    }
+  }
+  [[nodiscard]] const Frame& get() const { return caught_.get(); }
+
+ private:
+  std::unique_ptr<Stage> feet_;
+  Catch caught_;
+};
+
+Result<std::unique_ptr<Stage>> feet_stage(const clip::Clip& clip, const ApplyOptions& options) {
+  if (!options.feet) return nullptr;
+  auto legs = feet::Legs::find(*clip.skeleton);
+  if (!legs) return fail(legs.error().message, clip.path);
+  return std::make_unique<feet::FeetStage>(clip.skeleton, std::move(*legs), clip.frame_rate_hz,
+                                           *options.feet);
+}
+
+// Moves the root of a clip by its position channels.
+class RootWriter {
+ public:
+  // Returns an error for a clip whose root has no position channels.
+  static Result<RootWriter> open(clip::Clip& clip) {
+    RootWriter writer(clip);
+    const Skeleton& skeleton = *clip.skeleton;
+    for (int j = skeleton.root_joint; j >= 0;
+         j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
+      std::size_t count = 0;
+      for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
+        const Channel& channel = skeleton.channels[c];
+        if (channel.joint != j || !channel.translation) continue;
+        writer.column_[static_cast<std::size_t>(channel.axis)] = static_cast<Eigen::Index>(c);
+        ++count;
+      }
+      writer.joint_ = j;
+      if (count == 3) return writer;
+    }
+    return fail("its root has no position channels, so it cannot move; use --root off", clip.path);
+  }
+
+  // `frame` is the pose that the row has.
+  void write(int row, const Frame& frame, const Eigen::Vector3d& offset_m) {
+    const Skeleton& skeleton = *clip_.skeleton;
+    Eigen::Quaterniond parent = Eigen::Quaterniond::Identity();
+    for (int j = skeleton.joints[static_cast<std::size_t>(joint_)].parent; j >= 0;
+         j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
+      parent = to_eigen_double(frame.rotation_xyzw[static_cast<std::size_t>(j)]) * parent;
+    }
+    const Eigen::Vector3d local_m = parent.conjugate() * offset_m;
+    for (std::size_t i = 0; i < 3; ++i) {
+      clip_.channels(row, column_[i]) += local_m[static_cast<Eigen::Index>(i)];
+    }
+  }
+
+ private:
+  explicit RootWriter(clip::Clip& clip) : clip_(clip) {}
+
+  clip::Clip& clip_;
+  int joint_ = -1;
+  std::array<Eigen::Index, 3> column_{};
+};
+
+Eigen::Vector3d root_step_m(const Frame& from, const Frame& to) {
+  return Eigen::Vector3f(to.root_position_m.data()).cast<double>() -
+         Eigen::Vector3f(from.root_position_m.data()).cast<double>();
+}
+
 // Writes the rotations that the style changed into the channels of a clip.
 class ChannelWriter {
  public:
@@ -81,13 +161,17 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   StyleFilter filter(&ready, options.filter);
   if (!options.cold) filter.settle(clip.frame(0), settled_heading_rad(clip, ready.space));
 
+  auto feet = feet_stage(clip, options);
+  if (!feet) return std::unexpected(feet.error());
   Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip};
   ChannelWriter writer(applied.clip);
+  auto root = RootWriter::open(applied.clip);
+  if (options.feet && !root) return std::unexpected(root.error());
   motion::TurnSum turned;
-  Catch out;
+  ThroughFeet out(std::move(*feet));
   for (int i = 0; i < clip.frames(); ++i) {
     const Frame in = clip.frame(i);
-    filter.process({.frame = in}, out);
+    filter.process({.frame = in, .input = &in}, out);
     for (std::size_t j = 0; j < in.joint_count; ++j) {
       const Quatf& styled = out.get().rotation_xyzw[j];
       if (styled == in.rotation_xyzw[j]) continue;
@@ -95,6 +179,9 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
       writer.write(i, static_cast<int>(j), styled);
     }
     turned.end_frame();
+    const Eigen::Vector3d offset_m = root_step_m(in, out.get());
+    if (root && !offset_m.isZero(0.0)) root->write(i, in, offset_m);
+    applied.max_root_offset_m = std::max(applied.max_root_offset_m, offset_m.norm());
     if (options.progress && i % kProgressEvery == 0 && !options.progress(i, clip.frames())) {
       return fail("stopped before its end", clip.path);
     }

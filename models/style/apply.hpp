@@ -2,7 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
+#include "models/feet/root_motion.hpp"
 #include "models/style/style_filter.hpp"
 #include "models/style/style_model.hpp"
 #include "proto/clip/clip.hpp"
@@ -15,6 +17,8 @@ struct ApplyOptions {
   // True: start exactly as live, with alpha ramping up from 0 and the heading found on the way.
   // False: alpha and heading are settled from the first frame.
   bool cold = false;
+  // What the feet stage behind the style does with the root; empty: there is no such stage.
+  std::optional<feet::RootOptions> feet{};
   std::function<bool(int done, int total)>
       progress;  // may be empty; returning false stops the work
 };
@@ -27,10 +31,12 @@ struct Applied {
   int joints_changed = 0;
   double rms_change_rad = 0.0;  // motion::TurnSum: over frames and changed joints
   double max_change_rad = 0.0;
+  double max_root_offset_m = 0.0;  // of the root from the input's, by the feet stage
 };
 
 // Returns an error for a clip without frames or with a value that is not finite, and for a skeleton
-// that lacks joints of the model; the error names what is missing. `model_name` is for errors.
+// that lacks joints of the model or, with `feet`, has no leg or no position channels; the error
+// names what is missing. `model_name` is for errors.
 [[nodiscard]] Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
                                             const clip::Clip& clip, const ApplyOptions& options);
 

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "models/feet/foot_score.hpp"
 #include "models/motion/motion.hpp"
 #include "models/style/difference.hpp"
 #include "models/style/harmonics.hpp"
@@ -131,6 +132,13 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
   score.source_component_rms_deg = apart / kDegree;
   score.source_period_s = before->period_s;
   score.target_period_s = goal->period_s;
+  score.slide_m_s = {.source = feet::slide_m_s(*source_motion, *source_motion),
+                     .styled = feet::slide_m_s(*source_motion, *styled_motion),
+                     .target = feet::slide_m_s(*target_motion, *target_motion)};
+  score.root_speed_m_s = {.source = feet::root_speed_m_s(*source_motion, before->period_s),
+                          .styled = feet::root_speed_m_s(*styled_motion, before->period_s),
+                          .target = feet::root_speed_m_s(*target_motion, goal->period_s)};
+  score.sink_m = feet::sink_m(*source_motion, *styled_motion);
   return score;
 }
 

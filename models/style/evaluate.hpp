@@ -1,6 +1,8 @@
 // How close a styled clip is to clips of the target style (README.md, "Evaluation"). Cold.
 #pragma once
 
+#include <optional>
+
 #include "models/motion/pose_space.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
@@ -20,6 +22,13 @@ struct StyleScore {
   double component_rms_deg = 0.0;
   double source_component_rms_deg = 0.0;
   double source_period_s = 0.0, target_period_s = 0.0;
+  // Of the feet (models/feet/foot_score.hpp). Empty where nothing stands or there are no legs.
+  struct Clips {
+    std::optional<double> source{}, styled{}, target{};
+  };
+  Clips slide_m_s;                 // of standing feet
+  Clips root_speed_m_s;            // over the ground
+  std::optional<double> sink_m{};  // of the toes
 };
 
 // `styled` is `source` after the filter, with the same skeleton names, rate and frames. Phases come

@@ -150,22 +150,11 @@ void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
   heading_.settle(heading_rad, has_heading ? model_->space.heading_rad(frame) : heading_rad);
 }
 
-// Time since the last frame [s], by the device's clock where there is one. RT-safe
-double StyleFilter::elapsed_s(const Frame& frame) noexcept {
-  const Header& header = frame.header;
-  const std::int64_t now_ns = header.device_ns != kNoTime_ns ? header.device_ns : header.arrival_ns;
-  const std::int64_t before_ns = std::exchange(last_ns_, now_ns);
-  if (before_ns == kNoTime_ns || now_ns == kNoTime_ns || now_ns <= before_ns) return 0.0;
-  // Unsigned: the difference of two times may exceed the signed range.
-  const auto gap_ns = static_cast<std::uint64_t>(now_ns) - static_cast<std::uint64_t>(before_ns);
-  return std::min(static_cast<double>(gap_ns) * 1e-9, kMaxStep_s);
-}
-
 // RT-safe
 void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   Frame frame = in.frame;
   drop_broken_joints(frame);
-  const double dt_s = elapsed_s(frame);
+  const double dt_s = std::min(elapsed_.next_s(frame.header), kMaxStep_s);
   const double slew = options_.alpha_slew_per_s * dt_s;
   alpha_ += std::clamp(alpha_target_ - alpha_, -slew, slew);
   blend_weight_ = std::max(0.0, blend_weight_ - slew);

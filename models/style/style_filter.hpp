@@ -23,6 +23,7 @@
 #include <string>
 #include <utility>
 
+#include "models/elapsed.hpp"
 #include "models/gp/predictor.hpp"
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
@@ -98,7 +99,6 @@ class StyleFilter final : public Stage {
   using Flags = std::array<std::uint8_t, motion::kMaxPoseDims>;
   using Rotations = std::array<Quatf, kMaxJoints>;
 
-  double elapsed_s(const Frame& frame) noexcept;
   void style(Frame& frame, double dt_s) noexcept;
   void answer(const Dims& q, const Flags& available, double dt_s, Dims& delta) noexcept;
   float smoothed_gate(float confidence, double dt_s) noexcept;
@@ -110,7 +110,7 @@ class StyleFilter final : public Stage {
   FilterOptions options_;
   double alpha_ = 0.0;
   double alpha_target_ = 0.0;
-  std::int64_t last_ns_ = kNoTime_ns;
+  Elapsed elapsed_;
   Heading heading_;
   float gate_ = -1.0F;  // smoothed confidence; negative before the first value
   Dims offset_{};       // of the walker's mean pose from the training mean, for `calibrate`

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "proto/text/clean.hpp"
+
 namespace posed {
 namespace {
 
@@ -34,6 +36,22 @@ bool is_whole(double number) {
 
 bool within(const ParameterSpec& spec, double value) {
   return value >= spec.min && value <= spec.max;  // false for NaN
+}
+
+// "off, stride or actor"
+std::string words_of(const ParameterSpec& spec) {
+  std::string text;
+  for (std::size_t i = 0; i < spec.words.size(); ++i) {
+    const bool last = i + 1 == spec.words.size();
+    text += (i == 0 ? "" : last ? " or " : ", ") + std::string(spec.words[i]);
+  }
+  return text;
+}
+
+Result<ParameterValue> one_of_words(const ParameterSpec& spec, const std::string& word,
+                                    std::string_view place) {
+  if (std::ranges::find(spec.words, std::string_view(word)) != spec.words.end()) return word;
+  return misuse(std::string(place) + " must be " + words_of(spec) + ", not " + in_quotes(word));
 }
 
 }  // namespace
@@ -70,6 +88,7 @@ Result<ParameterValue> from_people(const ParameterSpec& spec, const ParameterVal
   if (whole != nullptr && !within(spec, static_cast<double>(*whole))) {
     return misuse(out_of_range(place, static_cast<double>(*whole), spec.min, spec.max, true));
   }
+  if (!spec.words.empty()) return one_of_words(spec, std::get<std::string>(value), place);
   return value;
 }
 
@@ -99,20 +118,48 @@ Result<Parameters> complete_parameters(std::span<const ParameterSpec> table,
   return complete;
 }
 
-double number_of(const ParameterValue& value) {
+double number_of(const ParameterSpec& spec, const ParameterValue& value) {
   if (const auto* flag = std::get_if<bool>(&value)) return *flag ? 1.0 : 0.0;
   if (const auto* whole = std::get_if<std::int64_t>(&value)) return static_cast<double>(*whole);
+  if (const auto* word = std::get_if<std::string>(&value)) {
+    return static_cast<double>(std::ranges::find(spec.words, std::string_view(*word)) -
+                               spec.words.begin());
+  }
   return std::get<double>(value);
 }
 
+bool takes_number(const ParameterSpec& spec, double number) {
+  if (std::holds_alternative<bool>(spec.default_value)) return number == 0.0 || number == 1.0;
+  if (std::holds_alternative<std::string>(spec.default_value)) {
+    return is_whole(number) && number >= 0.0 && number < static_cast<double>(spec.words.size());
+  }
+  const bool whole = std::holds_alternative<std::int64_t>(spec.default_value);
+  return within(spec, number) && (!whole || is_whole(number));
+}
+
+std::string people_text(const ParameterSpec& spec, double number) {
+  if (std::holds_alternative<bool>(spec.default_value)) return number != 0.0 ? "true" : "false";
+  if (!spec.words.empty()) {
+    return takes_number(spec, number) ? std::string(spec.words[static_cast<std::size_t>(number)])
+                                      : std::string();
+  }
+  std::array<char, 32> text{};
+  const double shown = number * spec.people_scale;
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), shown, std::chars_format::general, 6)
+          .ptr;
+  return {text.data(), end};
+}
+
 std::string unit_words(std::string_view name) {
-  constexpr std::array<std::pair<std::string_view, const char*>, 8> kUnits{{
+  constexpr std::array<std::pair<std::string_view, const char*>, 9> kUnits{{
       {"_per_s", " per second"},
       {"_ms", " of milliseconds"},
       {"_s", " of seconds"},
       {"_hz", " of hertz"},
       {"_deg", " of degrees"},
       {"_rad", " of radians"},
+      {"_cm", " of centimetres"},
       {"_m", " of metres"},
       {"_frames", " of frames"},
   }};

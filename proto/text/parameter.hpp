@@ -27,11 +27,14 @@ struct ParameterSpec {
   // The range of a number, both ends included.
   double min = std::numeric_limits<double>::lowest();
   double max = std::numeric_limits<double>::max();
-  bool live = false;  // control can change it while the stream runs; numbers and flags only
+  // Control can change it while the stream runs: numbers, flags, and texts with `words`.
+  bool live = false;
   // People write some numbers in another unit: as `people_name` ("lag_ms"), with `people_scale` of
   // their units to one of ours (1000). Empty: the same name and unit.
   std::string_view people_name{};
   double people_scale = 1.0;
+  // A text that is one of these. Where it is live, a number stands for it: its place here.
+  std::span<const std::string_view> words{};
 
   [[nodiscard]] std::string_view shown_name() const noexcept {
     return people_name.empty() ? name : people_name;
@@ -60,8 +63,13 @@ template <typename T>
   return std::get<T>(parameters.at(name));
 }
 
-// A flag as 0 or 1, a number as it is. Not for text.
-[[nodiscard]] double number_of(const ParameterValue& value);
+// A flag as 0 or 1, a number as it is, a word as its place among the parameter's words. Not for
+// other text.
+[[nodiscard]] double number_of(const ParameterSpec& spec, const ParameterValue& value);
+// Whether a live parameter can have the value that this number, in our units, stands for.
+[[nodiscard]] bool takes_number(const ParameterSpec& spec, double number);
+// That value as the config writes it: "true", "1.5", "stride".
+[[nodiscard]] std::string people_text(const ParameterSpec& spec, double number);
 
 // " of milliseconds" for a name that ends in _ms, and so on; empty without a known unit.
 [[nodiscard]] std::string unit_words(std::string_view name);

@@ -7,6 +7,7 @@ class App;
 
 namespace posed::bench {
 
+void add_bench_feet(CLI::App& app);
 void add_bench_generate(CLI::App& app, int& exit_code);
 void add_bench_json(CLI::App& app);
 void add_bench_smooth(CLI::App& app, int& exit_code);

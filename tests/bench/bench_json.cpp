@@ -1,7 +1,6 @@
 // posed_bench json: what a frame of Rokoko Studio costs its decoder, beside nlohmann::json parsing
 // the same text. The two take turns, frame by frame.
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,6 +13,7 @@
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
 #include "tests/bench/bench.hpp"
+#include "tests/bench/cpu_time.hpp"
 
 namespace posed::bench {
 namespace {
@@ -41,20 +41,6 @@ std::vector<Bytes> studio_frames(bool lz4) {
   std::vector<Bytes> frames(kFrames);
   for (Bytes& frame : frames) emulator.emit(emulator.next_due_ns(), frame);
   return frames;
-}
-
-// CPU time of this thread, so that other programs on the machine do not count.
-double cpu_us() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
-
-template <typename Work>
-double timed_us(const Work& work) {
-  const double start_us = cpu_us();
-  work();
-  return cpu_us() - start_us;
 }
 
 // One way to read a frame, and what each of them took.

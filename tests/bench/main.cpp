@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Times posed beside other programs and methods in the same run", "posed_bench"};
   app.require_subcommand(1);
   int exit_code = 0;
+  posed::bench::add_bench_feet(app);
   posed::bench::add_bench_generate(app, exit_code);
   posed::bench::add_bench_json(app);
   posed::bench::add_bench_smooth(app, exit_code);

@@ -15,7 +15,7 @@ inline void check_command(const pipeline::Command& command) {
   } else if (change.kind == pipeline::StageChange::Kind::kSet) {
     if (change.index >= change.type->parameters.size()) std::abort();
     const ParameterSpec& spec = change.type->parameters[change.index];
-    if (!spec.live || !(change.value >= spec.min && change.value <= spec.max)) std::abort();
+    if (!spec.live || !takes_number(spec, change.value)) std::abort();
   } else if (command.model == nullptr) {
     std::abort();
   }

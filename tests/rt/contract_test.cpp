@@ -15,7 +15,11 @@
 #include "drivers/glove/traits.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"
+#include "models/feet/feet_stage.hpp"
+#include "models/feet/feet_type.hpp"
 #include "models/gesture/synthetic_signer.hpp"
+#include "models/gp/synthetic.hpp"
+#include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "tests/rt/check_no_breach.hpp"
@@ -95,6 +99,35 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   CHECK(rig.take_acks() == 2);
   CHECK(record_sink.chunks > 0);
   CHECK(record_sink.decisions >= 2);
+  if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
+  check_no_breach();
+}
+
+TEST_CASE("a styled body whose feet stand keeps the real-time contract", "[rt]") {
+  watch_log();
+  const test::TempFolder folder;
+  const auto path = folder.path() / "walker.bvh";
+  REQUIRE(clip::write_bvh(motion::make_walker({.rate_hz = 120.0}).value(), path));
+  CountingRecordSink record_sink;
+  auto device = open_device("file", {{"path", path.string()}});
+  const Skeleton& skeleton = *device.description.skeleton;
+  style::StyleModel model;
+  model.space = motion::describe_space(motion::Space::kNative, skeleton).value();
+  model.process = gp::synthetic(56, motion::space_dims(model.space)).process;
+  const auto bound = style::bind_model(model, skeleton, {}, "walker").value();
+  std::vector<RigStream> streams;
+  streams.push_back({.device = std::move(device), .style = bound.get(), .feet = true});
+  Rig rig(std::move(streams), &record_sink);
+  forget_breaches();
+  rig.start();
+  REQUIRE(rig.take_frames(200) == 200);
+  rig.command({.change = {.kind = pipeline::StageChange::Kind::kSet,
+                          .index = feet::FeetStage::kRoot,
+                          .type = &feet::feet_type(),
+                          .value = static_cast<double>(feet::RootMode::kStride)},
+               .ticket = 1});
+  REQUIRE(rig.take_frames(200) == 200);
+  CHECK(rig.take_acks() == 1);
   if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
   check_no_breach();
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "daemon/system/clock.hpp"
+#include "models/feet/feet_type.hpp"
 #include "tests/rt/contract.hpp"
 
 namespace posed::rt {
@@ -32,6 +33,14 @@ Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
     pipeline::EngineOptions options{.stream = i, .stale_after_ns = 50'000'000, .publish_raw = true};
     const drivers::Description& device = stream.device.description;
     if (stream.style != nullptr) options.stages.push_back(test::style_stage(stream.style));
+    if (stream.feet) {
+      const auto parameters =
+          complete_parameters(feet::feet_type().parameters, {{"root", "actor"}});
+      const StageContext context{
+          .skeleton = device.skeleton, .rate_hz = device.rate_hz, .parameters = parameters.value()};
+      options.stages.push_back(
+          {&feet::feet_type(), feet::feet_type().make(context, nullptr).value()});
+    }
     if (stream.gesture != nullptr) {
       const StageContext context{.skeleton = device.skeleton, .rate_hz = device.rate_hz};
       options.stages.push_back({&generate::generate_type(),

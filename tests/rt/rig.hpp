@@ -18,6 +18,7 @@ namespace posed::rt {
 struct RigStream {
   drivers::Device device;
   const style::BoundModel* style = nullptr;
+  bool feet = false;  // behind the style
   const generate::BoundModel* gesture = nullptr;
   pipeline::DeviceSlot* slot = nullptr;  // for a device that can be unplugged
 };

@@ -110,7 +110,7 @@ class MergeRig final : private StageOut {
 
  private:
   void frame(const StageFrame& made) noexcept override {
-    CHECK(made.input == nullptr);
+    CHECK(made.input == &made.frame);  // what it is before a style
     if (each) return each({made.frame, now_ns_});
     out.push_back({made.frame, now_ns_});
   }

@@ -316,9 +316,10 @@ std::string live_parameters() {
     for (const ParameterSpec& spec : stage->parameters) {
       if (!spec.live) continue;
       const bool flag = std::holds_alternative<bool>(spec.default_value);
-      const std::string range = flag ? "true or false"
-                                     : fmt::format("{:g} to {:g}", spec.min * spec.people_scale,
-                                                   spec.max * spec.people_scale);
+      std::string range = flag ? "true or false"
+                               : fmt::format("{:g} to {:g}", spec.min * spec.people_scale,
+                                             spec.max * spec.people_scale);
+      if (!spec.words.empty()) range = fmt::format("{}", fmt::join(spec.words, ", "));
       lines += fmt::format("  {:<26} {:<14} {}\n",
                            fmt::format("{}.{}", stage->name, spec.shown_name()), range, spec.help);
     }

@@ -111,9 +111,10 @@ std::string stages_row(const v1::StreamStats& stream) {
       const ParameterSpec* spec =
           type == nullptr ? nullptr : find_parameter(type->parameters, parameter.name());
       if (spec == nullptr || !spec->live || parameter.name() == "alpha") continue;
-      const double usual = number_of(spec->default_value) * spec->people_scale;
+      const double usual = number_of(*spec, spec->default_value) * spec->people_scale;
       if (parameter.value() == usual) continue;
-      add(fmt::format("{}.{} {:g}", clean_name(one.name()), parameter.name(), parameter.value()));
+      add(fmt::format("{}.{} {}", clean_name(one.name()), parameter.name(),
+                      people_text(*spec, parameter.value() / spec->people_scale)));
     }
   }
   // As far as the column shows, alpha has reached its target.

@@ -10,6 +10,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/models/root_option.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
@@ -93,6 +94,8 @@ Result<> run(ApplyArguments options) {
                                 {"to", model->to},
                                 {"alpha", options.apply.filter.alpha},
                                 {"cold", options.apply.cold},
+                                {"root", root_text(options.apply.feet)},
+                                {"max_root_offset_cm", applied->max_root_offset_m * 100.0},
                                 {"joints_changed", applied->joints_changed},
                                 {"rms_change_deg", rms_deg},
                                 {"max_change_deg", max_deg},
@@ -123,6 +126,7 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--alpha", filter.alpha, "How much: 0 none, 1 the target, negative away")
       ->check(CLI::Range(-style::kMaxAlpha, style::kMaxAlpha))
       ->capture_default_str();
+  add_root_option(*command, options->apply.feet);
   command->add_option("--skeleton", options->read.asf, "NN.asf of an AMC (default: beside it)")
       ->type_name("NN.asf");
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
@@ -133,6 +137,7 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
   posed apply --model walk.style walk_03.bvh --out styled.bvh
+  posed apply --model walk.style --root stride walk_03.bvh --out styled.bvh   # feet stand
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X

@@ -7,6 +7,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/models/root_option.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
@@ -25,6 +26,7 @@ using nlohmann::json;
 constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
+  posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --root stride
 
 The source goes through the same stage as live, and is compared in the model's pose space.
 cycle_ratio: how far the styled walk's average cycle
@@ -33,14 +35,19 @@ constant_cycle_ratio: the same for the model's average change alone, added to ev
 cycle_ratio frame by frame; jerk_ratio: roughness of the styled walk over the unstyled one's;
 moved_rms_deg: the angle between the rotations before and after, rms over frames and changed joints,
 as `apply` reports it; component_rms_deg: the same change per component of the rotation vectors,
-source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure.
+source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure;
+slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 cm/s in the
+unstyled walk; of the target: in itself); sink_cm: how far the lowest styled toe is below the
+lowest unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
 The last line is the verdict; the exit code is 1 when the model is worse than nothing.)";
 
-constexpr double kRough = 1.5;  // a jerk_ratio above this is visible
+constexpr double kCentimetres = 100.0;  // of a metre
+constexpr double kRough = 1.5;          // a jerk_ratio above this is visible
 
 struct EvalOptions {
   std::string model, source, target, skeleton;
   double alpha = 1.0;
+  std::optional<feet::RootOptions> feet;
   bool json = false;
 };
 
@@ -82,7 +89,18 @@ std::string verdict(const Evaluation& e) {
   return text;
 }
 
-json report_of(const Evaluation& e, double alpha) {
+// Null where it is not defined.
+json scaled(const std::optional<double>& value, double scale) {
+  return value ? json(*value * scale) : json();
+}
+
+json of_clips(const style::StyleScore::Clips& clips, double scale) {
+  return {{"source", scaled(clips.source, scale)},
+          {"styled", scaled(clips.styled, scale)},
+          {"target", scaled(clips.target, scale)}};
+}
+
+json report_of(const Evaluation& e, const EvalOptions& options) {
   const style::StyleScore& score = e.score;
   return json{{"cycle_ratio", score.cycle_ratio},
               {"constant_cycle_ratio", e.constant.cycle_ratio},
@@ -95,7 +113,11 @@ json report_of(const Evaluation& e, double alpha) {
               {"target_period_s", score.target_period_s},
               {"distance_deg", e.fit.distance_deg},
               {"far_from_training", e.fit.is_far()},
-              {"alpha", alpha},
+              {"slide_cm_s", of_clips(score.slide_m_s, kCentimetres)},
+              {"sink_cm", scaled(score.sink_m, kCentimetres)},
+              {"root_speed_m_s", of_clips(score.root_speed_m_s, 1.0)},
+              {"root", root_text(options.feet)},
+              {"alpha", options.alpha},
               {"helps", e.helps()},
               {"verdict", verdict(e)}};
 }
@@ -118,6 +140,7 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
   for (const bool full : {false, true}) {
     style::ApplyOptions apply;
     apply.filter.alpha = options.alpha;
+    apply.feet = options.feet;
     apply.progress = [&](int done, int total) {
       return bar.show("styling", 0.5 * full + 0.5 * done / total);
     };
@@ -132,14 +155,21 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
   return evaluation;
 }
 
+// "NAME  1.234", a line for each number; those of an object have its name before theirs.
+void print_numbers(const std::string& prefix, const json& figures) {
+  for (const auto& [name, value] : figures.items()) {
+    if (value.is_object()) print_numbers(prefix + name + ".", value);
+    if (!value.is_number()) continue;
+    std::printf("%-24s %8.3f\n", (prefix + name).c_str(), value.get<double>());
+  }
+}
+
 int finish(const Evaluation& evaluation, const EvalOptions& options) {
-  const json figures = report_of(evaluation, options.alpha);
+  const json figures = report_of(evaluation, options);
   if (options.json) {
     std::printf("%s\n", json_text(figures, 2).c_str());
   } else {
-    for (const auto& [name, value] : figures.items()) {
-      if (value.is_number()) std::printf("%-24s %8.3f\n", name.c_str(), value.get<double>());
-    }
+    print_numbers("", figures);
   }
   std::fflush(stdout);
   std::fprintf(stderr, "posed: %s\n", verdict(evaluation).c_str());
@@ -162,6 +192,7 @@ void add_eval(CLI::App& app, int& exit_code) {
   style->add_option("--alpha", options->alpha, "How much style")
       ->check(CLI::Range(-2.0, 2.0))
       ->capture_default_str();
+  add_root_option(*style, options->feet);
   style->add_flag("--json", options->json, "One JSON object on stdout");
   style->callback([options, &exit_code] {
     const auto evaluation = evaluate(*options);

@@ -164,6 +164,18 @@ lag_ms = 170
   CHECK(parameter<double>(stream.stages[1].parameters, "lag_s") == Approx(0.17));
 }
 
+TEST_CASE("a word in a stage's table is one of those that it takes") {
+  const Reading reading = read(std::string(kWalker) + "[stream.feet]\nroot = \"actor\"\n");
+  REQUIRE(reading.errors.empty());
+  REQUIRE(reading.config.streams[0].stages.size() == 1);
+  const StageConfig& feet = reading.config.streams[0].stages[0];
+  CHECK(parameter<std::string>(feet.parameters, "root") == "actor");
+  CHECK(parameter<double>(feet.parameters, "limit_m") == Approx(0.08));
+  CHECK(complaint("[stream.feet]\nroot = \"walk\"\n")
+            .contains("stream.feet.root must be off, stride or actor, not 'walk'"));
+  CHECK(complaint("[stream.feet]\nlimit_cm = 60.0\n").contains("from 0 to 50"));
+}
+
 TEST_CASE("a wrong list of stages is one sentence") {
   const auto complaint_for = [](const std::string& list) {
     return complaint("", "[[stream]]\nname = \"a\"\ndriver = \"glove\"\nstages = " + list +

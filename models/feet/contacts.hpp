@@ -1,0 +1,58 @@
+// Contacts: which points of the performer's feet stand, found in the unstyled input by speed and
+// height with hysteresis (README.md, "Contacts"). Causal; each frame is judged as it comes. One
+// thread.
+#pragma once
+
+#include <array>
+
+#include <Eigen/Core>
+
+#include "models/feet/legs.hpp"
+
+namespace posed::feet {
+
+struct PointContact {
+  bool standing = false;
+  double speed_m_s = 0.0;
+  double weight = 0.0;  // 0 moves .. 1 stands still, without a step between them
+};
+
+class Contacts {
+ public:
+  // `length_m`: of the legs; all lengths and speeds scale with it.
+  explicit Contacts(const Legs& legs) noexcept;
+
+  // Takes the performer's pose, `dt_s` > 0 after the last one. RT-safe.
+  void update(const LegPose& pose, const Eigen::Vector3d& root_m, double dt_s) noexcept;
+  // The next pose does not continue the last one; the ground stays. RT-safe.
+  void restart() noexcept { started_ = false; }
+  // And the ground is not known any more. RT-safe.
+  void forget() noexcept;
+
+  [[nodiscard]] const PointContact& point(std::size_t leg, std::size_t point) const noexcept {
+    return contact_[leg][point];
+  }
+  // Height at which a point of this kind stands [m]. RT-safe.
+  [[nodiscard]] double ground_m(std::size_t point) const noexcept { return ground_m_[point]; }
+
+ private:
+  struct Track {
+    Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
+    Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();
+    double slow_s = 0.0;  // how long it has been slow
+    bool seen = false;    // in the frame before
+  };
+
+  void follow(Track& track, const Eigen::Vector3d& at_m, double dt_s) noexcept;
+  void judge(const Track& track, std::size_t point, PointContact& contact) const noexcept;
+
+  const Legs* legs_;
+  double scale_;
+  OfPoints<Track> track_{};
+  OfPoints<PointContact> contact_{};
+  std::array<double, kPoints> ground_m_{};
+  std::array<bool, kPoints> grounded_{};  // ground_m_ is known
+  bool started_ = false;
+};
+
+}  // namespace posed::feet

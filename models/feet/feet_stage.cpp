@@ -1,0 +1,180 @@
+#include "models/feet/feet_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "models/feet/leg_reach.hpp"
+#include "proto/frame/rotation.hpp"
+
+namespace posed::feet {
+namespace {
+
+constexpr double kUnknownRate_hz = 60.0;
+constexpr double kMaxStep_s = 0.1;     // a frame of the slowest stream
+constexpr double kGap_s = 0.25;        // after a longer silence the feet have gone on unseen
+constexpr double kFastest_m_s = 12.0;  // no person runs faster
+constexpr double kJump = 0.3;          // of a leg's length: what tracking may be off by in a frame
+constexpr double kChangeTau_s = 0.3;
+constexpr double kNoChange_m = 0.01;  // a style that moves feet by less is fading out or gone
+
+Eigen::Vector3d vector_of(const Vec3f& v) {
+  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+// A root that strides leaves little to hold, and a half is enough of it: more would cost style.
+HoldOptions hold_of(RootMode mode) {
+  return mode == RootMode::kActor ? HoldOptions{.share = 1.0, .ahead = true}
+                                  : HoldOptions{.share = 0.5, .ahead = false};
+}
+
+}  // namespace
+
+FeetStage::FeetStage(std::shared_ptr<const Skeleton> skeleton, Legs legs, double rate_hz,
+                     const RootOptions& options) noexcept
+    : skeleton_(std::move(skeleton)),
+      legs_(std::move(legs)),
+      nominal_s_(1.0 / (rate_hz > 0.0 ? rate_hz : kUnknownRate_hz)),
+      options_(options),
+      contacts_(legs_),
+      root_(legs_) {}
+
+// RT-safe.
+void FeetStage::set(std::size_t parameter, double value) noexcept {
+  if (parameter == kRoot) options_.mode = static_cast<RootMode>(static_cast<int>(value));
+  if (parameter == kLimit) options_.limit_m = value;
+}
+
+// RT-safe.
+ParameterState FeetStage::state(std::size_t parameter) const noexcept {
+  const double value = parameter == kRoot ? static_cast<double>(options_.mode) : options_.limit_m;
+  return {value, value};
+}
+
+// RT-safe.
+bool FeetStage::serves(const StageFrame& in) const noexcept {
+  return in.input != nullptr && in.frame.skeleton == skeleton_->id &&
+         in.input->skeleton == skeleton_->id;
+}
+
+// The time since the last frame [s]. A performer who has gone unseen for a while, or who is
+// somewhere else all at once, begins anew. RT-safe.
+double FeetStage::step_s(const Frame& frame, const Eigen::Vector3d& root_m) noexcept {
+  const double gap_s = elapsed_.next_s(frame.header);
+  const double dt_s = gap_s > 0.0 ? std::min(gap_s, kMaxStep_s) : nominal_s_;
+  const double moved_m = (root_m - last_root_m_).norm();
+  const bool teleports = seen_ && moved_m > kJump * legs_.length_m() + kFastest_m_s * dt_s;
+  if (teleports) {
+    root_.forget();
+    holds_ = {};
+  }
+  if (teleports || gap_s > kGap_s) {
+    contacts_.restart();
+    root_.restart();
+    for (FootHold& hold : holds_) hold.restart();
+  }
+  last_root_m_ = root_m;
+  seen_ = true;
+  return dt_s;
+}
+
+// 0 while the style moves the feet, 1 where it does not. RT-safe.
+double FeetStage::gone(double dt_s) noexcept {
+  change_m_ *= std::exp(-dt_s / kChangeTau_s);
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    if (!performer_.measured[leg] || !avatar_.measured[leg]) continue;
+    for (std::size_t p = 0; p < kPoints; ++p) {
+      if (!legs_.leg(leg).has(p)) continue;
+      const Eigen::Vector3d change_m =
+          avatar_.point_from_root_m[leg][p] - performer_.point_from_root_m[leg][p];
+      change_m_ = std::max(change_m_, change_m.norm());
+    }
+  }
+  return std::clamp(1.0 - change_m_ / kNoChange_m, 0.0, 1.0);
+}
+
+// RT-safe.
+void FeetStage::forget() noexcept {
+  seen_ = false;
+  root_.forget();
+  contacts_.forget();
+  holds_ = {};
+}
+
+// How high the lowest point of the performer's feet is above where such a point stands. RT-safe.
+double FeetStage::lowest_sole_m(const Eigen::Vector3d& root_m) const noexcept {
+  double lowest_m = std::numeric_limits<double>::infinity();
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    if (!performer_.measured[leg]) continue;
+    for (std::size_t p = 0; p < kPoints; ++p) {
+      if (!legs_.leg(leg).has(p)) continue;
+      const double height_m = root_m.y() + performer_.point_from_root_m[leg][p].y();
+      lowest_m = std::min(lowest_m, height_m - contacts_.ground_m(p));
+    }
+  }
+  return lowest_m;
+}
+
+// Bends a leg so that its foot stands. `root_m` is the performer's. RT-safe.
+void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
+                     const Eigen::Vector3d& offset_m, double gone, double dt_s,
+                     Frame& frame) noexcept {
+  const Leg& bones = legs_.leg(leg);
+  FootHold& hold = holds_[leg];
+  if (!performer_.measured[leg] || !avatar_.measured[leg]) return hold.forget();
+  const auto foot = static_cast<std::size_t>(bones.foot);
+  FootPair pair{.performer = {.rotation = performer_.world_rotation[foot]},
+                .avatar = {.rotation = avatar_.world_rotation[foot]}};
+  std::array<PointContact, kPoints> contact{};
+  for (std::size_t p = 0; p < kPoints; ++p) {
+    if (!bones.has(p)) continue;
+    pair.performer.point_m[p] = root_m + performer_.point_from_root_m[leg][p];
+    pair.avatar.point_m[p] = root_m + offset_m + avatar_.point_from_root_m[leg][p];
+    contact[p] = contacts_.point(leg, p);
+  }
+  const FootHold::Change change = hold.update(pair, contact, hold_of(options_.mode), gone, dt_s);
+  if (change.none()) return;
+  const Eigen::Quaterniond turn(rotation_exp(change.turn_rad));
+  const std::array<Eigen::Vector3d, kPoints>& avatar_m = pair.avatar.point_m;
+  double sunk_m = 0.0;
+  for (std::size_t p = 0; p < kPoints; ++p) {
+    if (!bones.has(p)) continue;
+    const Eigen::Vector3d at_m =
+        avatar_m[kAnkle] + change.ankle_m + turn * (avatar_m[p] - avatar_m[kAnkle]);
+    sunk_m = std::max(sunk_m, lowest_sole_m(root_m) - (at_m.y() - contacts_.ground_m(p)));
+  }
+  const Eigen::Vector3d& ankle_m = avatar_.point_from_root_m[leg][kAnkle];
+  const Reach bent = reach(*skeleton_, bones, avatar_,
+                           ankle_m + change.ankle_m + sunk_m * Eigen::Vector3d::UnitY());
+  hold.reached(bent.ankle_m - ankle_m);
+  write_leg(*skeleton_, bones, avatar_, bent, turn * avatar_.world_rotation[foot], frame);
+}
+
+// RT-safe.
+void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
+  const Eigen::Vector3d root_m = vector_of(in.frame.root_position_m);
+  if (!serves(in) || !root_m.allFinite()) {
+    forget();
+    return out.frame(in);
+  }
+  legs_.pose(*in.input, performer_);
+  legs_.pose(in.frame, avatar_);
+  const double dt_s = step_s(in.frame, root_m);
+  const double gone_now = gone(dt_s);
+  contacts_.update(performer_, root_m, dt_s);
+  const PosePair pair{.performer = performer_, .avatar = avatar_, .root_m = root_m};
+  const Eigen::Vector3d offset_m = root_.update(pair, contacts_, gone_now, dt_s, options_);
+  Frame frame = in.frame;
+  if (!offset_m.isZero(0.0)) {
+    const Eigen::Vector3d moved_m = root_m + offset_m;
+    for (int i = 0; i < 3; ++i) {
+      frame.root_position_m[static_cast<std::size_t>(i)] = static_cast<float>(moved_m[i]);
+    }
+  }
+  const double let_go = options_.mode == RootMode::kOff ? 1.0 : gone_now;
+  for (std::size_t leg = 0; leg < kLegs; ++leg) hold(leg, root_m, offset_m, let_go, dt_s, frame);
+  out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
+}
+
+}  // namespace posed::feet

@@ -1,0 +1,97 @@
+#include "models/feet/foot_score.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "models/feet/legs.hpp"
+
+namespace posed::feet {
+namespace {
+
+constexpr double kStill_m_s = 0.1;
+
+Eigen::Vector3d root_of(const Frame& frame) {
+  return Eigen::Vector3f(frame.root_position_m.data()).cast<double>();
+}
+
+// The points of one frame in the world.
+struct FootPoints {
+  FootPoints(const Legs& legs, const Frame& frame) {
+    legs.pose(frame, pose);
+    const Eigen::Vector3d root_m = root_of(frame);
+    for (auto& leg : pose.point_from_root_m) {
+      for (Eigen::Vector3d& at_m : leg) at_m += root_m;
+    }
+  }
+  [[nodiscard]] const Eigen::Vector3d& at_m(std::size_t leg, std::size_t point) const {
+    return pose.point_from_root_m[leg][point];
+  }
+  LegPose pose;
+};
+
+double over_ground_m(const Eigen::Vector3d& step_m) { return std::hypot(step_m.x(), step_m.z()); }
+
+}  // namespace
+
+std::optional<double> slide_m_s(const motion::Motion& source, const motion::Motion& moved) {
+  const auto legs = Legs::find(*source.skeleton);
+  const int frames = std::min(source.size(), moved.size());
+  if (!legs || frames < 2) return std::nullopt;
+  double sum_m_s = 0.0;
+  int count = 0;
+  FootPoints source_before(*legs, source.frames[0]);
+  FootPoints moved_before(*legs, moved.frames[0]);
+  for (int t = 1; t < frames; ++t) {
+    const FootPoints source_now(*legs, source.frames[static_cast<std::size_t>(t)]);
+    const FootPoints moved_now(*legs, moved.frames[static_cast<std::size_t>(t)]);
+    for (std::size_t leg = 0; leg < kLegs; ++leg) {
+      for (const std::size_t p : {kAnkle, kToe}) {
+        if (!legs->leg(leg).has(p)) continue;
+        const Eigen::Vector3d step_m = source_now.at_m(leg, p) - source_before.at_m(leg, p);
+        if (step_m.norm() * source.rate_hz >= kStill_m_s) continue;
+        sum_m_s +=
+            over_ground_m(moved_now.at_m(leg, p) - moved_before.at_m(leg, p)) * source.rate_hz;
+        ++count;
+      }
+    }
+    source_before = source_now;
+    moved_before = moved_now;
+  }
+  if (count == 0) return std::nullopt;
+  return sum_m_s / count;
+}
+
+std::optional<double> sink_m(const motion::Motion& source, const motion::Motion& moved) {
+  const auto legs = Legs::find(*source.skeleton);
+  if (!legs) return std::nullopt;
+  const auto lowest_m = [&](const motion::Motion& motion) {
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Frame& frame : motion.frames) {
+      const FootPoints points(*legs, frame);
+      for (std::size_t leg = 0; leg < kLegs; ++leg) {
+        if (legs->leg(leg).has(kToe)) lowest = std::min(lowest, points.at_m(leg, kToe).y());
+      }
+    }
+    return lowest;
+  };
+  const double sunk_m = lowest_m(source) - lowest_m(moved);
+  if (!std::isfinite(sunk_m)) return std::nullopt;
+  return std::max(0.0, sunk_m);
+}
+
+double root_speed_m_s(const motion::Motion& motion, double period_s) {
+  const int apart = std::max(1, static_cast<int>(std::lround(period_s * motion.rate_hz)));
+  std::vector<double> far_m;
+  for (int t = apart; t < motion.size(); ++t) {
+    far_m.push_back(over_ground_m(root_of(motion.frames[static_cast<std::size_t>(t)]) -
+                                  root_of(motion.frames[static_cast<std::size_t>(t - apart)])));
+  }
+  if (far_m.empty()) return 0.0;
+  const auto middle = far_m.begin() + std::ssize(far_m) / 2;
+  std::ranges::nth_element(far_m, middle);
+  return *middle * motion.rate_hz / apart;
+}
+
+}  // namespace posed::feet

@@ -1,0 +1,26 @@
+// How well the feet of a clip stand (README.md, "Figures"). Cold.
+#pragma once
+
+#include <optional>
+
+#include "models/motion/motion.hpp"
+
+namespace posed::feet {
+
+// Speed [m/s] of those ankles and toes over the ground that stand: that of `moved` in the frames in
+// which `source`, the same motion before it was changed, moves them slower than 0.1 m/s. The mean
+// over these points and frames; empty where nothing stands or the skeleton has no legs.
+[[nodiscard]] std::optional<double> slide_m_s(const motion::Motion& source,
+                                              const motion::Motion& moved);
+
+// How far the lowest toe of `moved` is below that of `source` [m]; 0 if it is not. Empty for a
+// skeleton without legs.
+[[nodiscard]] std::optional<double> sink_m(const motion::Motion& source,
+                                           const motion::Motion& moved);
+
+// Speed of the root over the ground [m/s]: the median of how far it gets within `period_s`, a
+// stride, over that time; so neither its sway nor a stand at either end counts. 0 for a clip that
+// is shorter.
+[[nodiscard]] double root_speed_m_s(const motion::Motion& motion, double period_s);
+
+}  // namespace posed::feet

@@ -1,0 +1,138 @@
+#include "models/feet/root_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/feet/approach.hpp"
+
+namespace posed::feet {
+namespace {
+
+constexpr double kLegOfReference_m = 0.83;  // an adult's; speeds scale with the leg
+constexpr double kFlight = 1e-3;            // weight of going on as before where no foot stands
+constexpr double kDriftTau_s = 0.3;         // over which the offset's own speed is averaged
+constexpr double kForgetTau_s = 1.0;        // over which it ends where no foot stands
+constexpr double kMaxDrift_m_s = 3.0;       // no style changes the speed of a walk by more
+constexpr double kReturnTau_s = 1.0;        // the offset returns by this share of itself ...
+constexpr double kReturn_m_s = 0.1;         // ... and by this
+constexpr double kActorTau_s = 0.2;         // the same for a root that stays on the performer
+
+Eigen::Vector3d shortened(const Eigen::Vector3d& v, double length) {
+  const double norm = v.norm();
+  return norm > length ? Eigen::Vector3d(v * (length / norm)) : v;
+}
+
+}  // namespace
+
+RootMotion::RootMotion(const Legs& legs) noexcept
+    : legs_(&legs), scale_(legs.length_m() / kLegOfReference_m) {}
+
+// RT-safe.
+void RootMotion::forget() noexcept {
+  restart();
+  offset_m_.setZero();
+  drift_m_s_.setZero();
+  rest_m_.setZero();
+  emitted_m_.setZero();
+  fresh_ = true;
+}
+
+// The offset moves so that standing points move over the ground as the performer's do: the weighted
+// mean of what each of them asks for. RT-safe.
+void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s) noexcept {
+  double weight = 0.0;
+  Eigen::Vector3d wanted_m = Eigen::Vector3d::Zero();
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    for (const std::size_t p : {kAnkle, kToe}) {
+      const Placed& at = now[leg][p];
+      const Placed& before = before_[leg][p];
+      if (!at.known || !before.known) continue;
+      const double w = contacts.point(leg, p).weight;
+      weight += w;
+      wanted_m += w * ((at.performer_m - before.performer_m) - (at.avatar_m - before.avatar_m));
+    }
+  }
+  Eigen::Vector3d step_m = (wanted_m + kFlight * dt_s * drift_m_s_) / (weight + kFlight);
+  step_m.y() = 0.0;
+  step_m = shortened(step_m, kMaxDrift_m_s * scale_ * dt_s);
+  const double trust = weight / (weight + kFlight);
+  drift_m_s_ += -std::expm1(-dt_s * trust / kDriftTau_s) * (step_m / dt_s - drift_m_s_);
+  drift_m_s_ *= std::exp(-dt_s * (1.0 - trust) / kForgetTau_s);
+  offset_m_ += step_m;
+}
+
+// The way back to the performer, over the ground. RT-safe.
+void RootMotion::come_back(double gone, double dt_s, RootMode mode) noexcept {
+  const double share = mode == RootMode::kActor ? kReturnTau_s / kActorTau_s : gone;
+  const Eigen::Vector3d back =
+      approached(Eigen::Vector3d(offset_m_.x(), 0.0, offset_m_.z()), share * dt_s / kReturnTau_s,
+                 gone * kReturn_m_s * scale_ * dt_s);
+  offset_m_.x() = back.x();
+  offset_m_.z() = back.z();
+}
+
+// How much higher the avatar's root must be than the performer's so that the lowest point of its
+// feet is as high above the ground as that of the performer's. RT-safe.
+double RootMotion::lift_m(const OfPoints<Placed>& now, const Contacts& contacts) const noexcept {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  double performer_m = kNone, avatar_m = kNone;
+  for (const auto& leg : now) {
+    for (std::size_t p = 0; p < kPoints; ++p) {
+      if (!leg[p].known) continue;
+      performer_m = std::min(performer_m, leg[p].performer_m.y() - contacts.ground_m(p));
+      avatar_m = std::min(avatar_m, leg[p].avatar_m.y() - contacts.ground_m(p));
+    }
+  }
+  return performer_m < kNone ? performer_m - avatar_m : offset_m_.y();
+}
+
+// RT-safe.
+OfPoints<RootMotion::Placed> RootMotion::placed(const PosePair& pair) const noexcept {
+  OfPoints<Placed> now{};
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    if (!pair.performer.measured[leg] || !pair.avatar.measured[leg]) continue;
+    for (std::size_t p = 0; p < kPoints; ++p) {
+      if (!legs_->leg(leg).has(p)) continue;
+      now[leg][p] = {.performer_m = pair.root_m + pair.performer.point_from_root_m[leg][p],
+                     .avatar_m = pair.root_m + pair.avatar.point_from_root_m[leg][p],
+                     .known = true};
+    }
+  }
+  return now;
+}
+
+// Whether the same points are known as in the frame before. RT-safe.
+bool RootMotion::same_points(const OfPoints<Placed>& now) const noexcept {
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    if (now[leg][kAnkle].known != before_[leg][kAnkle].known) return false;
+  }
+  return true;
+}
+
+// RT-safe.
+Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts& contacts, double gone,
+                                   double dt_s, const RootOptions& options) noexcept {
+  const OfPoints<Placed> now = placed(pair);
+  const bool off = options.mode == RootMode::kOff;
+  if (off) {
+    offset_m_.setZero();
+    drift_m_s_.setZero();
+  } else {
+    if (started_) walk(now, contacts, dt_s);
+    come_back(gone, dt_s, options.mode);
+    offset_m_.y() = lift_m(now, contacts);
+    if (options.mode == RootMode::kActor) offset_m_ = shortened(offset_m_, options.limit_m);
+  }
+  const bool jumps = options.mode != mode_ || (started_ && !off && !same_points(now));
+  if (jumps && !fresh_) rest_m_ = emitted_m_ - offset_m_;
+  rest_m_ = approached(rest_m_, dt_s / kReturnTau_s, kReturn_m_s * scale_ * dt_s);
+  emitted_m_ = offset_m_ + rest_m_;
+  mode_ = options.mode;
+  before_ = now;
+  started_ = true;
+  fresh_ = false;
+  return emitted_m_;
+}
+
+}  // namespace posed::feet

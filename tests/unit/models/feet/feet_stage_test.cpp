@@ -1,0 +1,154 @@
+// The feet stage on a synthetic walker: feet stand, at any rate and in any mode.
+#include <catch2/catch.hpp>
+
+#include "models/feet/foot_score.hpp"
+#include "tests/support/allocations.hpp"
+#include "tests/unit/models/feet/standing_walker.hpp"
+
+namespace posed::feet {
+namespace {
+
+using test::feet_stage;
+using test::styled_walk;
+using test::through;
+
+double slide_cm_s(const test::StyledWalk& walk, const motion::Motion& moved) {
+  return 100.0 * slide_m_s(walk.source, moved).value();
+}
+
+double furthest_m(const motion::Motion& a, const motion::Motion& b) {
+  double furthest = 0.0;
+  for (std::size_t t = 0; t < a.frames.size(); ++t) {
+    furthest = std::max(furthest, test::root_apart_m(a.frames[t], b.frames[t]));
+  }
+  return furthest;
+}
+
+}  // namespace
+
+TEST_CASE("standing feet slide without the stage, and stand with it", "[feet]") {
+  for (const double rate_hz : {30.0, 60.0, 120.0}) {
+    INFO(rate_hz);
+    const auto walk = styled_walk(rate_hz, 6.0);
+    const double source_cm_s = slide_cm_s(walk, walk.source);
+    const double before_cm_s = slide_cm_s(walk, walk.styled);
+    CHECK(source_cm_s < 5.0);
+    CHECK(before_cm_s > 20.0);
+    for (const char* root : {"stride", "actor"}) {
+      INFO(root);
+      const auto stage = feet_stage(walk.source, root);
+      const auto moved = through(*stage, walk);
+      CHECK(slide_cm_s(walk, moved) < source_cm_s + 0.2 * before_cm_s);
+      CHECK(sink_m(walk.source, moved).value() < 0.01);
+    }
+  }
+}
+
+TEST_CASE("a root that strides walks as far as the styled legs do; an actor's stays", "[feet]") {
+  const auto walk = styled_walk(60.0, 8.0);
+  const double speed_m_s = root_speed_m_s(walk.source, 1.0);
+  const auto stride = feet_stage(walk.source, "stride");
+  const auto walked = through(*stride, walk);
+  CHECK(root_speed_m_s(walked, 1.0) < 0.85 * speed_m_s);
+  CHECK(root_speed_m_s(walked, 1.0) > 0.5 * speed_m_s);
+  const auto actor = feet_stage(walk.source, "actor");
+  const auto acted = through(*actor, walk);
+  CHECK(furthest_m(acted, walk.source) < 0.0801);
+  CHECK(root_speed_m_s(acted, 1.0) == Approx(speed_m_s).epsilon(0.02));
+}
+
+TEST_CASE("the same walk at another rate gets the same root", "[feet]") {
+  const auto slow = styled_walk(30.0, 6.0);
+  const auto at_30 = feet_stage(slow.source, "stride");
+  const auto slow_out = through(*at_30, slow);
+  for (const double rate_hz : {10.0, 120.0, 1000.0}) {
+    INFO(rate_hz);
+    const auto fast = styled_walk(rate_hz, 6.0);
+    const auto stage = feet_stage(fast.source, "stride");
+    const auto out = through(*stage, fast);
+    const auto gone_m = [](const motion::Motion& motion) {
+      return (test::root_of(motion.frames.back()) - test::root_of(motion.frames.front())).norm();
+    };
+    CHECK(gone_m(out) / gone_m(fast.source) ==
+          Approx(gone_m(slow_out) / gone_m(slow.source)).margin(0.06));
+  }
+}
+
+TEST_CASE("with the root off, and without a style, every bit stays", "[feet]") {
+  const auto walk = styled_walk(60.0, 2.0);
+  const auto off = feet_stage(walk.source, "off");
+  const auto stride = feet_stage(walk.source, "stride");
+  for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
+    const Frame& source = walk.source.frames[t];
+    const Frame& styled = walk.styled.frames[t];
+    CHECK(test::same_pose(through(*off, source, styled), styled));
+    CHECK(test::same_pose(through(*stride, source, source), source));
+  }
+}
+
+TEST_CASE("when the style fades out, the output becomes the input again", "[feet]") {
+  for (const char* root : {"stride", "actor"}) {
+    INFO(root);
+    const auto walk = styled_walk(60.0, 14.0);
+    const auto stage = feet_stage(walk.source, root);
+    double before_m = 0.0;
+    int same_from = -1;
+    for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
+      Frame styled = walk.source.frames[t];
+      const double style = std::clamp((360.0 - static_cast<double>(t)) / 30.0, 0.0, 1.0);
+      if (style > 0.0) test::restyle(*walk.source.skeleton, style, styled);
+      const Frame out = through(*stage, walk.source.frames[t], styled);
+      if (t == 330) before_m = test::root_apart_m(out, walk.source.frames[t]);
+      const bool same = test::same_pose(out, walk.source.frames[t]);
+      if (t < 360 || !same) same_from = -1;
+      if (t >= 360 && same && same_from < 0) same_from = static_cast<int>(t);
+    }
+    CHECK(before_m > 0.02);
+    REQUIRE(same_from > 0);
+    CHECK(same_from < 360 + 60 * 6);  // six seconds after the last of the style
+  }
+}
+
+TEST_CASE("the root can change while it runs, without a jump", "[feet]") {
+  const auto walk = styled_walk(60.0, 12.0);
+  const auto stage = feet_stage(walk.source, "stride");
+  Eigen::Vector3d last_m = test::root_of(walk.source.frames[0]);
+  for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
+    if (t == 240) stage->set(FeetStage::kRoot, static_cast<double>(RootMode::kActor));
+    if (t == 480) stage->set(FeetStage::kRoot, static_cast<double>(RootMode::kOff));
+    const Frame out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
+    const Eigen::Vector3d root_m = test::root_of(out);
+    CHECK((root_m - last_m).norm() < 0.08);
+    last_m = root_m;
+  }
+  CHECK(stage->state(FeetStage::kRoot).now == 0.0);
+  CHECK(test::root_apart_m(walk.styled.frames.back(), walk.source.frames.back()) == 0.0);
+  CHECK((last_m - test::root_of(walk.source.frames.back())).norm() < 0.001);
+}
+
+TEST_CASE("the feet stage allocates nothing", "[feet][rt]") {
+  const auto walk = styled_walk(120.0, 1.0);
+  for (const char* root : {"off", "stride", "actor"}) {
+    const auto stage = feet_stage(walk.source, root);
+    test::LastFrame last;
+    const std::uint64_t before = test::allocations();
+    for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
+      stage->process({.frame = walk.styled.frames[t], .input = &walk.source.frames[t]}, last);
+    }
+    CHECK(test::allocations() == before);
+  }
+}
+
+TEST_CASE("the table names the roots; another word is refused", "[feet]") {
+  const auto& table = feet_type().parameters;
+  const ParameterSpec& root = table[FeetStage::kRoot];
+  CHECK(number_of(root, std::string("actor")) == static_cast<double>(RootMode::kActor));
+  CHECK(people_text(root, 1.0) == "stride");
+  CHECK_FALSE(takes_number(root, 3.0));
+  CHECK_FALSE(takes_number(root, 0.5));
+  const auto refused = complete_parameters(table, {{"root", std::string("walk")}});
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().message.contains("must be off, stride or actor, not 'walk'"));
+}
+
+}  // namespace posed::feet
