@@ -177,7 +177,7 @@ Result<RelayFigures> measure(const RelayBench& bench) {
   return figures;
 }
 
-void print_json(const RelayBench& bench, const RelayFigures& figures) {
+void print_as_json(const RelayBench& bench, const RelayFigures& figures) {
   const auto heard = [](const HeardFrames& one) {
     return nlohmann::ordered_json{{"cpu_percent", one.cpu_percent},
                                   {"send", to_json(figures_of(one.send_us))},
@@ -235,7 +235,7 @@ void add_bench_relay(CLI::App& bench, int& exit_code) {
     if (!figures) {
       exit_code = report(figures.error());
     } else if (options->json) {
-      print_json(*options, *figures);
+      print_as_json(*options, *figures);
     } else {
       print(*options, *figures);
     }

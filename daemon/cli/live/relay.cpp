@@ -86,8 +86,8 @@ void print_line(const nlohmann::ordered_json& line) {
 // What passed in the last second, for people on a terminal, or as JSON.
 class CounterLine {
  public:
-  CounterLine(const relay::Relay& relay, bool json)
-      : relay_(relay), json_(json), shows_(json || isatty(STDERR_FILENO) != 0) {}
+  CounterLine(const relay::Relay& relay, bool as_json)
+      : relay_(relay), json_(as_json), shows_(as_json || isatty(STDERR_FILENO) != 0) {}
   ~CounterLine() {
     if (drawn_) logging::say("");
   }
