@@ -19,7 +19,7 @@ struct PointContact {
 
 class Contacts {
  public:
-  // `length_m`: of the legs; all lengths and speeds scale with it.
+  // All lengths and speeds scale with the legs, which outlive it.
   explicit Contacts(const Legs& legs) noexcept;
 
   // Takes the performer's pose, `dt_s` > 0 after the last one. RT-safe.

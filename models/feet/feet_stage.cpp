@@ -17,6 +17,7 @@ constexpr double kGap_s = 0.25;        // after a longer silence the feet have g
 constexpr double kFastest_m_s = 12.0;  // no person runs faster
 constexpr double kJump = 0.3;          // of a leg's length: what tracking may be off by in a frame
 constexpr double kChangeTau_s = 0.3;
+constexpr double kSink_m = 0.005;     // a foot may sink by so much
 constexpr double kNoChange_m = 0.01;  // a style that moves feet by less is fading out or gone
 
 Eigen::Vector3d vector_of(const Vec3f& v) {
@@ -134,7 +135,6 @@ void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
     contact[p] = contacts_.point(leg, p);
   }
   const FootHold::Change change = hold.update(pair, contact, hold_of(options_.mode), gone, dt_s);
-  if (change.none()) return;
   const Eigen::Quaterniond turn(rotation_exp(change.turn_rad));
   const std::array<Eigen::Vector3d, kPoints>& avatar_m = pair.avatar.point_m;
   double sunk_m = 0.0;
@@ -142,8 +142,10 @@ void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
     if (!bones.has(p)) continue;
     const Eigen::Vector3d at_m =
         avatar_m[kAnkle] + change.ankle_m + turn * (avatar_m[p] - avatar_m[kAnkle]);
-    sunk_m = std::max(sunk_m, lowest_sole_m(root_m) - (at_m.y() - contacts_.ground_m(p)));
+    sunk_m = std::max(sunk_m, lowest_sole_m(root_m) - kSink_m - (at_m.y() - contacts_.ground_m(p)));
   }
+  sunk_m *= 1.0 - gone;
+  if (change.none() && sunk_m < FootHold::Change::kNone) return;
   const Eigen::Vector3d& ankle_m = avatar_.point_from_root_m[leg][kAnkle];
   const Reach bent = reach(*skeleton_, bones, avatar_,
                            ankle_m + change.ankle_m + sunk_m * Eigen::Vector3d::UnitY());

@@ -16,6 +16,10 @@ constexpr double kForgetTau_s = 1.0;        // over which it ends where no foot 
 constexpr double kMaxDrift_m_s = 3.0;       // no style changes the speed of a walk by more
 constexpr double kReturnTau_s = 1.0;        // the offset returns by this share of itself ...
 constexpr double kReturn_m_s = 0.1;         // ... and by this
+constexpr double kStepTau_s = 0.02;         // smooths the change from foot to foot
+constexpr double kSoft_m = 0.02;            // the lowest point counts gradually within so much
+constexpr double kLiftTau_s = 0.03;         // and the height follows it within so long
+constexpr double kSettled_m = 1e-4;         // a height without a style below this is none
 constexpr double kActorTau_s = 0.2;         // the same for a root that stays on the performer
 
 Eigen::Vector3d shortened(const Eigen::Vector3d& v, double length) {
@@ -33,6 +37,7 @@ void RootMotion::forget() noexcept {
   restart();
   offset_m_.setZero();
   drift_m_s_.setZero();
+  velocity_m_s_.setZero();
   rest_m_.setZero();
   emitted_m_.setZero();
   fresh_ = true;
@@ -59,7 +64,8 @@ void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts, dou
   const double trust = weight / (weight + kFlight);
   drift_m_s_ += -std::expm1(-dt_s * trust / kDriftTau_s) * (step_m / dt_s - drift_m_s_);
   drift_m_s_ *= std::exp(-dt_s * (1.0 - trust) / kForgetTau_s);
-  offset_m_ += step_m;
+  velocity_m_s_ += -std::expm1(-dt_s / kStepTau_s) * (step_m / dt_s - velocity_m_s_);
+  offset_m_ += velocity_m_s_ * dt_s;
 }
 
 // The way back to the performer, over the ground. RT-safe.
@@ -72,19 +78,36 @@ void RootMotion::come_back(double gone, double dt_s, RootMode mode) noexcept {
   offset_m_.z() = back.z();
 }
 
-// How much higher the avatar's root must be than the performer's so that the lowest point of its
-// feet is as high above the ground as that of the performer's. RT-safe.
-double RootMotion::lift_m(const OfPoints<Placed>& now, const Contacts& contacts) const noexcept {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
-  double performer_m = kNone, avatar_m = kNone;
+// How high the lowest points of a body are above where such points stand; those within a few
+// centimetres of the lowest count gradually, so that another lowest point is no step. RT-safe.
+double RootMotion::lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
+                            Eigen::Vector3d Placed::*body) const noexcept {
+  double lowest_m = std::numeric_limits<double>::infinity();
+  for (const auto& leg : now) {
+    for (std::size_t p = 0; p < kPoints; ++p) {
+      if (leg[p].known) lowest_m = std::min(lowest_m, (leg[p].*body).y() - contacts.ground_m(p));
+    }
+  }
+  const double soft_m = kSoft_m * scale_;
+  double sum = 0.0;
   for (const auto& leg : now) {
     for (std::size_t p = 0; p < kPoints; ++p) {
       if (!leg[p].known) continue;
-      performer_m = std::min(performer_m, leg[p].performer_m.y() - contacts.ground_m(p));
-      avatar_m = std::min(avatar_m, leg[p].avatar_m.y() - contacts.ground_m(p));
+      sum += std::exp((lowest_m - ((leg[p].*body).y() - contacts.ground_m(p))) / soft_m);
     }
   }
-  return performer_m < kNone ? performer_m - avatar_m : offset_m_.y();
+  return lowest_m - soft_m * std::log(sum);
+}
+
+// The height that brings the avatar's feet as near to the ground as the performer's. RT-safe.
+void RootMotion::lift(const OfPoints<Placed>& now, const Contacts& contacts, double gone,
+                      double dt_s) noexcept {
+  const double wanted_m =
+      lowest_m(now, contacts, &Placed::performer_m) - lowest_m(now, contacts, &Placed::avatar_m);
+  if (!std::isfinite(wanted_m)) return;  // no foot is known
+  const double share = fresh_ ? 1.0 : -std::expm1(-dt_s / kLiftTau_s);
+  offset_m_.y() += share * (wanted_m - offset_m_.y());
+  if (gone >= 1.0 && std::abs(offset_m_.y()) < kSettled_m) offset_m_.y() = 0.0;
 }
 
 // RT-safe.
@@ -118,10 +141,11 @@ Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts& contact
   if (off) {
     offset_m_.setZero();
     drift_m_s_.setZero();
+    velocity_m_s_.setZero();
   } else {
     if (started_) walk(now, contacts, dt_s);
     come_back(gone, dt_s, options.mode);
-    offset_m_.y() = lift_m(now, contacts);
+    lift(now, contacts, gone, dt_s);
     if (options.mode == RootMode::kActor) offset_m_ = shortened(offset_m_, options.limit_m);
   }
   const bool jumps = options.mode != mode_ || (started_ && !off && !same_points(now));

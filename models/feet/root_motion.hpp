@@ -70,17 +70,21 @@ class RootMotion {
   [[nodiscard]] OfPoints<Placed> placed(const PosePair& pair) const noexcept;
   void walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s) noexcept;
   void come_back(double gone, double dt_s, RootMode mode) noexcept;
-  [[nodiscard]] double lift_m(const OfPoints<Placed>& now, const Contacts& contacts) const noexcept;
+  [[nodiscard]] double lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
+                                Eigen::Vector3d Placed::*body) const noexcept;
+  void lift(const OfPoints<Placed>& now, const Contacts& contacts, double gone,
+            double dt_s) noexcept;
   [[nodiscard]] bool same_points(const OfPoints<Placed>& now) const noexcept;
 
   const Legs* legs_;
   double scale_;
   OfPoints<Placed> before_{};
-  RootMode mode_ = RootMode::kOff;                       // of the frame before
-  bool started_ = false;                                 // before_ is of the frame before
-  bool fresh_ = true;                                    // there was no frame
-  Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();   // that the mode asks for
-  Eigen::Vector3d drift_m_s_ = Eigen::Vector3d::Zero();  // of the offset while feet stood
+  RootMode mode_ = RootMode::kOff;                          // of the frame before
+  bool started_ = false;                                    // before_ is of the frame before
+  bool fresh_ = true;                                       // there was no frame
+  Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();      // that the mode asks for
+  Eigen::Vector3d velocity_m_s_ = Eigen::Vector3d::Zero();  // at which it strides now
+  Eigen::Vector3d drift_m_s_ = Eigen::Vector3d::Zero();     // of the offset while feet stood
   // What is left of a jump of offset_m_, by another mode or other joints: it is added, and
   // returns to 0 like the offset.
   Eigen::Vector3d rest_m_ = Eigen::Vector3d::Zero();
