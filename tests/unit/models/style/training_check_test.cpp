@@ -175,7 +175,7 @@ TEST_CASE("a real walk whose pace swings by a quarter within three strides can b
       report_of({lesson(uneven, "from"), lesson(real("2_walk_feminine_001"), "to")});
   const json& clip = report["clips"][0];
   CHECK(clip["stride_score"] < 0.2);
-  CHECK(clip["residual_deg"] <= 5.0);
+  CHECK(clip["residual_deg"] <= 4.2);  // of the even walk: 3.0
   CHECK(report["usable"] == true);
 }
 
