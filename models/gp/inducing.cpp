@@ -12,7 +12,7 @@ namespace {
 // A pose whose unexplained variance is below this adds nothing in single precision.
 constexpr double kResidualMin = 1e-6;
 // Unexplained variance over noise below which more poses do not change a prediction visibly.
-constexpr double kOfNoise = 0.03;
+constexpr double kOfNoise = 0.01;
 
 }  // namespace
 

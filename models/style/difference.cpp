@@ -44,29 +44,22 @@ MatrixXd grid_inputs(const TrainingPairs& pairs) {
   return inputs;
 }
 
-MatrixXd grid_outputs(const TrainingPairs& pairs) {
+MatrixXd grid_outputs(const Outputs& outputs) {
   const MatrixXd basis = grid_basis();
-  MatrixXd outputs =
-      MatrixXd::Zero(kGridFrames * std::ssize(pairs.inputs), pairs.inputs.front().cols());
-  for (Eigen::Index i = 0; i < std::ssize(pairs.inputs); ++i) {
-    const int d = pairs.difference[static_cast<std::size_t>(i)];
+  MatrixXd Y = MatrixXd::Zero(kGridFrames * std::ssize(outputs.of_input), outputs.offset.size());
+  for (Eigen::Index i = 0; i < std::ssize(outputs.of_input); ++i) {
+    const int d = outputs.of_input[static_cast<std::size_t>(i)];
     if (d == kNoDifference) continue;
-    outputs.middleRows(i * kGridFrames, kGridFrames) =
-        basis * pairs.differences[static_cast<std::size_t>(d)];
+    Y.middleRows(i * kGridFrames, kGridFrames) =
+        basis * outputs.differences[static_cast<std::size_t>(d)];
   }
-  return outputs;
-}
-
-Eigen::RowVectorXd mean_offset(const std::vector<MatrixXd>& differences) {
-  Eigen::RowVectorXd offset = Eigen::RowVectorXd::Zero(differences.front().cols());
-  for (const MatrixXd& delta : differences) offset += delta.row(0);
-  return offset / static_cast<double>(differences.size());
+  return Y;
 }
 
 Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& kernel) {
   const MatrixXd X = grid_inputs(pairs);
-  const MatrixXd Y = grid_outputs(pairs);
-  const VectorXd offset = mean_offset(pairs.differences).transpose();
+  const MatrixXd Y = grid_outputs(pairs.outputs);
+  const VectorXd offset = pairs.outputs.offset.transpose();
   // The signal variance does not change the mean, because the noise is relative to it. It is set to
   // the residual's variance, so that the process's variance is meaningful.
   const MatrixXd residual = Y.rowwise() - offset.transpose();

@@ -16,16 +16,22 @@ inline constexpr int kCycleHarmonics =
 inline constexpr int kGridFrames = 28;  // points of a cycle that the process is trained on
 
 // The most poses that a process keeps; above it they are inducing poses (models/gp/inducing.hpp).
-inline constexpr int kMostPoses = 400;
+inline constexpr int kMostPoses = 600;
 
 inline constexpr int kNoDifference = -1;
 
-// What a process learns from: cycles, and what to add to each at the same phase. Cycles and
-// differences are harmonic coefficients [2 * kCycleHarmonics + 1 x D].
-struct TrainingPairs {
-  std::vector<Eigen::MatrixXd> inputs;
-  std::vector<int> difference;  // of each input: an index, or kNoDifference to add nothing
+// What to add to each input at the same phase. Cycles and differences are harmonic coefficients
+// [2 * kCycleHarmonics + 1 x D].
+struct Outputs {
+  std::vector<int> of_input;  // an index into `differences`, or kNoDifference to add nothing
   std::vector<Eigen::MatrixXd> differences;
+  Eigen::RowVectorXd offset;  // [D] the process's prior mean, which it gives far from all poses
+};
+
+// What a process learns from.
+struct TrainingPairs {
+  std::vector<Eigen::MatrixXd> inputs;  // cycles
+  Outputs outputs;
 };
 
 // Length of the kernel [rad] and noise over signal variance.
@@ -55,14 +61,10 @@ struct Way {
 
 // The inputs' poses on the cycle's grid [kGridFrames * inputs x D], and what to add to each.
 [[nodiscard]] Eigen::MatrixXd grid_inputs(const TrainingPairs& pairs);
-[[nodiscard]] Eigen::MatrixXd grid_outputs(const TrainingPairs& pairs);
+[[nodiscard]] Eigen::MatrixXd grid_outputs(const Outputs& outputs);
 
-// The process's prior mean, which it gives far from all poses: the mean of the differences over
-// phases and sources, each with equal weight.
-[[nodiscard]] Eigen::RowVectorXd mean_offset(const std::vector<Eigen::MatrixXd>& differences);
-
-// The default model: that prior mean, an RBF of this length on the residual, b = 0, the noise
-// relative to the signal variance; at most kMostPoses poses.
+// The default model: the offset as prior mean, an RBF of this length on the residual, b = 0, the
+// noise relative to the signal variance; at most kMostPoses poses.
 [[nodiscard]] Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& kernel);
 
 // The method of Sato et al. (--mode paper; README.md, "What differs from the paper, measured"):

@@ -23,80 +23,53 @@ constexpr double kWiden = 1.5;          // from one length to the next beyond th
 constexpr double kShortest_deg = 10.0;  // a frame's own noise is of this size
 constexpr double kLongest_deg = 400.0;  // a straight line over all poses
 constexpr double kExplained = 1e-5;     // unexplained variance of a pose that needs no more poses
+constexpr int kFoldPoses = 320;         // enough to compare kernels; the model itself has more
 constexpr std::size_t kChunk = 8;  // folds a task; fixed, so that every machine has the same tasks
 constexpr std::size_t kNumbers = 4;  // that a task gives for a fold and a noise
-constexpr int kRow = 2 * kCycleHarmonics + 1;
-
-// The outputs are a few differences seen at many phases: Y - offset = S [differences; -offset] with
-// S [poses x columns], so that only S is carried through the solution.
-MatrixXd selector_of(const TrainingPairs& pairs) {
-  const MatrixXd basis = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
-  const auto columns = kRow * std::ssize(pairs.differences) + 1;
-  MatrixXd S = MatrixXd::Zero(kGridFrames * std::ssize(pairs.inputs), columns);
-  for (Eigen::Index i = 0; i < std::ssize(pairs.inputs); ++i) {
-    const int d = pairs.difference[static_cast<std::size_t>(i)];
-    if (d != kNoDifference) S.block(i * kGridFrames, kRow * d, kGridFrames, kRow) = basis;
-  }
-  S.rightCols(1).setOnes();
-  return S;
-}
-
-MatrixXd stacked(const std::vector<MatrixXd>& differences) {
-  const Eigen::RowVectorXd offset = mean_offset(differences);
-  MatrixXd all(kRow * std::ssize(differences) + 1, offset.size());
-  for (Eigen::Index d = 0; d < std::ssize(differences); ++d) {
-    all.middleRows(kRow * d, kRow) = differences[static_cast<std::size_t>(d)];
-  }
-  all.bottomRows(1) = -offset;
-  return all;
-}
 
 // The process of one length on its inducing poses, ready to be asked without some of its inputs.
 class Folded {
  public:
-  Folded(const TrainingPairs& pairs, const MatrixXd& X, double length_rad)
-      : selector_(selector_of(pairs)), mu_(1.0 / (length_rad * length_rad)) {
-    gp::Inducing chosen = gp::choose_inducing(X, mu_, kMostPoses,
+  Folded(const MatrixXd& X, double length_rad) : mu_(1.0 / (length_rad * length_rad)) {
+    gp::Inducing chosen = gp::choose_inducing(X, mu_, kFoldPoses,
                                               [](int, double worst) { return worst < kExplained; });
     poses_ = X(chosen.chosen(), Eigen::all);
     root_ = chosen.root();
     factor_ = std::move(chosen.factor);
     gram_ = factor_.transpose() * factor_;
-    moments_ = factor_.transpose() * selector_;
   }
 
   // For each noise: squared error a frame, then the three sums of Way.
   void ask(const Fold& fold, TaskResult& numbers) const {
     MatrixXd gram = gram_;
-    MatrixXd moments = moments_;
+    MatrixXd residual = grid_outputs(fold.outputs).rowwise() - fold.outputs.offset;
     for (const int input : fold.left_out) {
       const auto rows = factor_.middleRows(input * kGridFrames, kGridFrames);
       gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose(), -1.0);
-      moments -= rows.transpose() * selector_.middleRows(input * kGridFrames, kGridFrames);
+      residual.middleRows(input * kGridFrames, kGridFrames).setZero();
     }
+    const MatrixXd moments = factor_.transpose() * residual;
     const MatrixXd near = gp::rbf(fold.q, poses_, 0.0, mu_);
-    const MatrixXd all = stacked(fold.differences);
-    const MatrixXd& asked = fold.differences[static_cast<std::size_t>(fold.asked)];
-    const MatrixXd truth = harmonic_basis(fold.phase, kCycleHarmonics) * asked;
+    const MatrixXd truth = harmonic_basis(fold.phase, kCycleHarmonics) * fold.truth;
     for (const double noise : kNoises) {
       MatrixXd ridged = gram;
       ridged.diagonal().array() += noise;
       const MatrixXd solved = ridged.llt().solve(moments);
       const MatrixXd weights = root_.transpose().triangularView<Eigen::Upper>().solve(solved);
-      const MatrixXd change =
-          ((near * weights) * all).rowwise() + Eigen::RowVectorXd(-all.bottomRows(1));
+      const MatrixXd change = (near * weights).rowwise() + fold.outputs.offset;
       Way way;
-      if (fold.goal.size() > 0) way = way_of(fold.q, fold.phase, fold.goal, change, asked.row(0));
+      if (fold.goal.size() > 0) {
+        way = way_of(fold.q, fold.phase, fold.goal, change, fold.truth.row(0));
+      }
       const double error = (change - truth).squaredNorm() / static_cast<double>(fold.q.rows());
       numbers.insert(numbers.end(), {error, way.before, way.after, way.constant});
     }
   }
 
  private:
-  MatrixXd selector_;
   double mu_;
   MatrixXd poses_, root_, factor_;
-  MatrixXd gram_, moments_;  // of all inputs
+  MatrixXd gram_;  // of all inputs
 };
 
 double scaled_rad(double length_deg, Eigen::Index dims) {
@@ -116,7 +89,7 @@ class Search {
   // False when it was stopped.
   bool try_lengths(const std::vector<double>& lengths_deg) {
     const Task task = [&](std::size_t t) {
-      const Folded process(leave_out_.pairs, X_, rad(lengths_deg[t / chunks_]));
+      const Folded process(X_, rad(lengths_deg[t / chunks_]));
       TaskResult numbers;
       const std::size_t first = t % chunks_ * kChunk;
       const std::size_t end = std::min(first + kChunk, leave_out_.folds.size());

@@ -1,6 +1,6 @@
 // The choice of the kernel by what held-out walkers say: each fold asks a process that was learnt
 // without some takes for the difference on a take's own frames. All folds of one length share the
-// kernel's factor (README.md, "Length of the kernel"). Cold; thread-safe.
+// kernel's factor (README.md, "Choice of the kernel"). Cold; thread-safe.
 #pragma once
 
 #include <functional>
@@ -15,12 +15,12 @@
 namespace posed::style {
 
 struct Fold {
-  std::vector<int> left_out;                 // inputs that are not learnt from
-  std::vector<Eigen::MatrixXd> differences;  // as the others show them, one for each of the pairs'
-  int asked = 0;                             // the difference that the frames should get
-  Eigen::MatrixXd q;                         // the walker's frames [T x D]
-  Eigen::VectorXd phase;                     // of these frames
-  Eigen::MatrixXd goal;  // the cycle that these frames should reach; empty: Way is not measured
+  std::vector<int> left_out;  // inputs that are not learnt from
+  Outputs outputs;            // as the other inputs show them; those of `left_out` do not count
+  Eigen::MatrixXd truth;      // harmonic coefficients of the difference that the frames should get
+  Eigen::MatrixXd q;          // the walker's frames [T x D]
+  Eigen::VectorXd phase;      // of these frames
+  Eigen::MatrixXd goal{};     // the cycle that they should reach; empty: Way is not measured
 };
 
 struct LeaveOut {

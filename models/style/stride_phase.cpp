@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 
 constexpr double kFullTurn = 2.0 * std::numbers::pi;
 constexpr int kCadences = 40;          // candidates, 2.7 % apart
-constexpr double kWindow = 2.0;        // strides of the candidate that its window holds
+constexpr double kWindow = 1.5;        // strides of the candidate that its window holds
 constexpr double kHop_s = 0.1;         // between windows
 constexpr int kMostSteps = 2;          // of cadence from one window to the next
 constexpr double kStepCost = 0.02;     // of one such step

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "models/style/days.hpp"
 #include "models/style/harmonics.hpp"
 #include "models/style/leave_out.hpp"
 #include "models/style/training_check.hpp"
@@ -31,6 +32,7 @@ struct Learnt {
   gp::Trained process;
   MatrixXd differences;  // all differences in the training pairs [N x D]
   json kernel;
+  bool follows_days = false;
   Way way{};  // of walkers held out; not measured where none could be held out
 };
 
@@ -79,7 +81,8 @@ Result<Learnt> learn_default(const Dataset& dataset, const std::string& target, 
   if (!chosen) return stopped();
   auto process = fit_difference(pairs, chosen->kernel);
   if (!process) return std::unexpected(process.error());
-  Learnt learnt{std::move(*process), grid_outputs(pairs), {}, chosen->way};
+  Learnt learnt{std::move(*process), grid_outputs(pairs.outputs), {}, false, chosen->way};
+  learnt.follows_days = follows_days(dataset, target);
   learnt.kernel["length_chosen_by"] = leave_out.folds.empty() ? "default" : "leave-out";
   return learnt;
 }
@@ -211,6 +214,7 @@ json report_of(const Dataset& dataset, const Learnt& learnt) {
   report["kernel"]["mu"] = p.mu;
   report["kernel"]["b"] = p.b;
   report["kernel"]["length_deg"] = 1.0 / (kDegree * std::sqrt(p.mu));
+  report["follows_days"] = learnt.follows_days;
   report["noise"] = p.noise;
   if (p.inputs.rows() == learnt.differences.rows()) {  // with inducing poses there is no evidence
     const MatrixXd residual = learnt.differences.rowwise() - p.offset.transpose();

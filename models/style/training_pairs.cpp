@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "models/style/days.hpp"
 #include "models/style/harmonics.hpp"
 
 namespace posed::style {
@@ -63,12 +64,6 @@ int index_of(const std::vector<Difference>& differences, const AlignedClip& clip
   return kNoDifference;
 }
 
-std::vector<MatrixXd> deltas_of(const std::vector<Difference>& differences) {
-  std::vector<MatrixXd> deltas;
-  for (const Difference& d : differences) deltas.push_back(d.delta);
-  return deltas;
-}
-
 // The takes without those at these indices.
 Takes without(const Takes& takes, const std::vector<int>& left_out) {
   Takes kept;
@@ -86,16 +81,19 @@ bool same_differences(const std::vector<Difference>& a, const std::vector<Differ
   });
 }
 
-// The fold that asks for the difference on this clip's frames, learnt without some takes.
-Fold fold_of(const Dataset& dataset, const Takes& takes, const AlignedClip& clip,
-             std::vector<int> left_out, const std::string& target) {
+// The fold that asks for the difference on the frames of one take, learnt without some. What it
+// should get is what the others show; where days are followed, what it shows itself.
+Fold fold_of(const Dataset& dataset, const Takes& takes, std::size_t asked,
+             std::vector<int> left_out, const TrainingPairs& all, const std::string& target) {
+  const AlignedClip& clip = clip_of(dataset, takes[asked]);
   const auto differences = differences_of(dataset, without(takes, left_out), target);
+  const Difference& shown = differences[static_cast<std::size_t>(index_of(differences, clip))];
+  const auto own = static_cast<std::size_t>(all.outputs.of_input[asked]);
   Fold fold;
-  fold.asked = index_of(differences, clip);
-  fold.goal =
-      goal_of(dataset, takes, clip, differences[static_cast<std::size_t>(fold.asked)], target);
+  fold.truth = own < differences.size() ? shown.delta : all.outputs.differences[own];
+  fold.goal = goal_of(dataset, takes, clip, shown, target);
+  fold.outputs = make_training_pairs(dataset, takes, target, left_out).outputs;
   fold.left_out = std::move(left_out);
-  fold.differences = deltas_of(differences);
   fold.q = clip.q;
   fold.phase = clip.phase();
   return fold;
@@ -119,7 +117,7 @@ std::vector<int> leave_out_for(const Dataset& dataset, const Takes& takes,
   return {};
 }
 
-std::vector<Fold> take_folds(const Dataset& dataset, const Takes& takes,
+std::vector<Fold> take_folds(const Dataset& dataset, const Takes& takes, const TrainingPairs& pairs,
                              const std::string& target) {
   const auto all = differences_of(dataset, takes, target);
   std::vector<Fold> folds;
@@ -128,7 +126,7 @@ std::vector<Fold> take_folds(const Dataset& dataset, const Takes& takes,
     if (index_of(all, clip) == kNoDifference) continue;
     std::vector<int> left_out = leave_out_for(dataset, takes, target, i, all);
     if (left_out.empty()) continue;
-    folds.push_back(fold_of(dataset, takes, clip, std::move(left_out), target));
+    folds.push_back(fold_of(dataset, takes, i, std::move(left_out), pairs, target));
   }
   return folds;
 }
@@ -168,8 +166,9 @@ LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
   LeaveOut result{make_training_pairs(parts, takes, target), {}};
   for (const auto& tested : halves) {
     for (const int part : tested) {
-      const AlignedClip& clip = parts.clips[static_cast<std::size_t>(part)];
-      result.folds.push_back(fold_of(parts, takes, clip, tested, target));
+      const auto i = static_cast<std::size_t>(part);
+      if (result.pairs.outputs.of_input[i] == kNoDifference) continue;
+      result.folds.push_back(fold_of(parts, takes, i, tested, result.pairs, target));
     }
   }
   return result;
@@ -230,22 +229,34 @@ MatrixXd goal_of(const Dataset& dataset, const Takes& takes, const AlignedClip& 
 }
 
 TrainingPairs make_training_pairs(const Dataset& dataset, const Takes& takes,
-                                  const std::string& target) {
-  const auto differences = differences_of(dataset, takes, target);
+                                  const std::string& target, const std::vector<int>& left_out) {
+  const auto differences = differences_of(dataset, without(takes, left_out), target);
   TrainingPairs pairs;
-  pairs.differences = deltas_of(differences);
+  Outputs& outputs = pairs.outputs;
+  outputs.offset = Eigen::RowVectorXd::Zero(takes.front().coefficients.cols());
+  for (const Difference& d : differences) {
+    outputs.differences.push_back(d.delta);
+    outputs.offset += d.delta.row(0) / static_cast<double>(differences.size());
+  }
   for (const TakeCycle& take : takes) {
     pairs.inputs.push_back(take.coefficients);
-    pairs.difference.push_back(index_of(differences, clip_of(dataset, take)));
+    outputs.of_input.push_back(index_of(differences, clip_of(dataset, take)));
+  }
+  for (auto& [take, day] : day_changes(dataset, takes, left_out, target)) {
+    int& index = outputs.of_input[static_cast<std::size_t>(take)];
+    day += outputs.differences[static_cast<std::size_t>(index)];
+    index = static_cast<int>(std::ssize(outputs.differences));
+    outputs.differences.push_back(std::move(day));
   }
   return pairs;
 }
 
 LeaveOut make_folds(const Dataset& dataset, const std::string& target) {
   const Takes takes = take_cycles(dataset);
-  auto folds = take_folds(dataset, takes, target);
+  auto pairs = make_training_pairs(dataset, takes, target);
+  auto folds = take_folds(dataset, takes, pairs, target);
   if (folds.empty()) return half_folds(dataset, target);
-  return {make_training_pairs(dataset, takes, target), std::move(folds)};
+  return {std::move(pairs), std::move(folds)};
 }
 
 }  // namespace posed::style

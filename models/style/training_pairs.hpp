@@ -46,10 +46,12 @@ struct Difference {
                                       const AlignedClip& clip, const Difference& difference,
                                       const std::string& target);
 
-// The pairs that the process learns from: an input for each take.
+// The pairs that the process learns from: an input for each take. The takes at `left_out` show
+// nothing, but keep their place among the inputs.
 [[nodiscard]] TrainingPairs make_training_pairs(const Dataset& dataset,
                                                 const std::vector<TakeCycle>& takes,
-                                                const std::string& target);
+                                                const std::string& target,
+                                                const std::vector<int>& left_out = {});
 
 // Folds for the choice of the kernel: a person left out where others show the difference, else a
 // take where its person has several, else one half of each source clip against the other half; none

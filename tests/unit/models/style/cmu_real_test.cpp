@@ -66,14 +66,17 @@ style::LeaveOut lesson_of(const style::Dataset& dataset,
                           const std::vector<style::TakeCycle>& cycles,
                           const std::vector<int>& people, const MatrixXd& delta) {
   style::LeaveOut lesson;
-  lesson.pairs.differences = {delta};
+  style::Outputs& outputs = lesson.pairs.outputs;
+  outputs.differences = {delta};
+  outputs.offset = delta.row(0);
   for (const int s : people) {
     const auto& clip = dataset.clips[static_cast<std::size_t>(s)];
     lesson.folds.push_back(
-        {{static_cast<int>(lesson.pairs.inputs.size())}, {delta}, 0, clip.q, clip.phase(), {}});
+        {{static_cast<int>(lesson.pairs.inputs.size())}, {}, delta, clip.q, clip.phase(), {}});
     lesson.pairs.inputs.push_back(cycles[static_cast<std::size_t>(s)].coefficients);
-    lesson.pairs.difference.push_back(0);
+    outputs.of_input.push_back(0);
   }
+  for (style::Fold& fold : lesson.folds) fold.outputs = outputs;
   return lesson;
 }
 
@@ -94,7 +97,7 @@ gp::Trained paper_process(const style::TrainingPairs& pairs) {
   mean /= static_cast<double>(pairs.inputs.size());
   const MatrixXd basis =
       style::harmonic_basis(style::cycle_phases(style::kGridFrames), style::kCycleHarmonics);
-  return style::fit_paper(basis * mean, basis * pairs.differences.front()).value();
+  return style::fit_paper(basis * mean, basis * pairs.outputs.differences.front()).value();
 }
 
 // Person a's cycle minus person b's, trained on the others without `asked`, and evaluated on

@@ -3,6 +3,8 @@
 
 #include <catch2/catch.hpp>
 
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "models/motion/synthetic_walker.hpp"
@@ -138,6 +140,43 @@ TEST_CASE("styles of real walks and runs pass, useless ones do not", "[style][ch
   CHECK(has_problem(
       real_report("2_wave-right-hand_normal_001", "2_raise-up-left-hand_normal_001", "walk"),
       "is no walk"));
+}
+
+TEST_CASE("real walks and runs show strides, a jump shows none", "[style][check][real]") {
+  if (!test::shared("data/cmu/02_04.bvh")) SKIP_WITHOUT_SHARED();
+  const auto cmu = [](const std::string& name) {
+    return clip::read_clip(*test::shared("data/cmu/" + name + ".bvh")).value();
+  };
+  CHECK(has_problem(report_of({lesson(cmu("02_04"), "from"), lesson(cmu("07_01"), "to")}),
+                    "02_04.bvh is no walk"));
+  for (const auto* name : {"02_03", "09_01"}) {
+    const json report = report_of({lesson(cmu(name), "from"), lesson(cmu("07_01"), "to")});
+    CHECK(report["clips"][0]["stride_score"] < 0.2);
+  }
+}
+
+TEST_CASE("a real walk whose pace swings by a quarter within three strides can be learnt from",
+          "[style][check][real]") {
+  if (!test::shared("data/styles/dataset-2_walk_masculine_001.bvh")) SKIP_WITHOUT_SHARED();
+  const auto even = real("2_walk_masculine_002");
+  auto uneven = even;  // the same walk, a quarter faster and slower in turns of 4 s
+  double at = 0.0;
+  for (Eigen::Index t = 0; t < uneven.channels.rows(); ++t) {
+    const auto frame = static_cast<Eigen::Index>(at);
+    if (frame + 1 >= even.channels.rows()) {
+      uneven.channels.conservativeResize(t, Eigen::NoChange);
+      break;
+    }
+    uneven.channels.row(t) = even.channels.row(frame);
+    at += 1.0 + 0.25 * std::sin(static_cast<double>(t) * 6.28 / 120.0);
+  }
+  uneven.path = "uneven.bvh";
+  const json report =
+      report_of({lesson(uneven, "from"), lesson(real("2_walk_feminine_001"), "to")});
+  const json& clip = report["clips"][0];
+  CHECK(clip["stride_score"] < 0.2);
+  CHECK(clip["residual_deg"] <= 4.2);  // of the even walk: 3.0
+  CHECK(report["usable"] == true);
 }
 
 TEST_CASE("a real walker of the training is near, another actor far", "[style][check][real]") {

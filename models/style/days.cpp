@@ -1,0 +1,158 @@
+#include "models/style/days.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "models/style/harmonics.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Widths of the likeness of two takes, in median distances between takes.
+constexpr std::array kWidths{0.35, 0.5, 0.7};
+// Following days must lower the squared error on held-out takes at least to this share of the
+// error of one mean, because few takes always show some chance pattern.
+constexpr double kWorth = 0.93;
+constexpr std::size_t kFewestTakes = 3;  // with fewer, a held-out take has one other to ask
+
+using Key = std::tuple<std::string, std::string, std::string>;  // motion, group, person
+
+std::map<Key, std::vector<int>> takes_by_person(const Dataset& dataset,
+                                                const std::vector<TakeCycle>& takes,
+                                                const std::vector<int>& left_out) {
+  std::map<Key, std::vector<int>> found;
+  for (int i = 0; i < std::ssize(takes); ++i) {
+    if (std::ranges::find(left_out, i) != left_out.end()) continue;
+    const auto c = static_cast<std::size_t>(takes[static_cast<std::size_t>(i)].clip);
+    const AlignedClip& clip = dataset.clips[c];
+    const auto& person = dataset.subjects[static_cast<std::size_t>(clip.subject)].name;
+    found[{clip.motion, clip.group, person}].push_back(i);
+  }
+  return found;
+}
+
+// Row i: how much of each target take lies at the place of source take i in the two lists, as a
+// share. With equal numbers the first belongs to the first, the last to the last.
+MatrixXd same_places(Eigen::Index sources, Eigen::Index targets) {
+  MatrixXd shares(sources, targets);
+  const auto n = static_cast<double>(sources);
+  const auto m = static_cast<double>(targets);
+  for (Eigen::Index i = 0; i < sources; ++i) {
+    for (Eigen::Index j = 0; j < targets; ++j) {
+      const auto a = static_cast<double>(i);
+      const auto b = static_cast<double>(j);
+      const double overlap = std::min((a + 1) / n, (b + 1) / m) - std::max(a / n, b / m);
+      shares(i, j) = n * std::max(0.0, overlap);
+    }
+  }
+  return shares;
+}
+
+// One row a take: its cycle on the grid.
+MatrixXd stacked_cycles(const std::vector<TakeCycle>& takes, const std::vector<int>& members) {
+  const MatrixXd grid = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const auto dims = takes.front().coefficients.cols();
+  MatrixXd rows(std::ssize(members), kGridFrames * dims);
+  for (Eigen::Index i = 0; i < std::ssize(members); ++i) {
+    const auto at = static_cast<std::size_t>(members[static_cast<std::size_t>(i)]);
+    rows.row(i) = (grid * takes[at].coefficients).reshaped().transpose();
+  }
+  return rows;
+}
+
+MatrixXd distances_between(const MatrixXd& rows) {
+  MatrixXd distances(rows.rows(), rows.rows());
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    distances.col(i) = (rows.rowwise() - rows.row(i)).rowwise().norm();
+  }
+  return distances;
+}
+
+double median_distance(const MatrixXd& distances) {
+  std::vector<double> values;
+  for (Eigen::Index i = 0; i < distances.rows(); ++i) {
+    for (Eigen::Index k = 0; k < i; ++k) values.push_back(distances(i, k));
+  }
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Squared error of each take's partner, predicted from the other takes' by these weights.
+double left_out_error(MatrixXd weights, const MatrixXd& partners) {
+  weights.diagonal().setZero();
+  const VectorXd sums = weights.rowwise().sum().cwiseMax(1e-12);
+  return (sums.cwiseInverse().asDiagonal() * weights * partners - partners).squaredNorm();
+}
+
+// How much takes k count for take i, rows of sum 1; empty where one mean does as well.
+MatrixXd day_weights(const MatrixXd& sources, const MatrixXd& partners) {
+  const MatrixXd distances = distances_between(sources);
+  const double median = median_distance(distances);
+  double best = kWorth * left_out_error(MatrixXd::Ones(sources.rows(), sources.rows()), partners);
+  MatrixXd chosen;
+  for (const double width : kWidths) {
+    const double scale = 1.0 / std::max(width * median, 1e-12);
+    // The floor asks all takes where none is alike.
+    const MatrixXd likeness = (-0.5 * (scale * distances).array().square()).exp() + 1e-6;
+    const double error = left_out_error(likeness, partners);
+    if (!(error < best)) continue;
+    best = error;
+    chosen = likeness.rowwise().sum().cwiseInverse().asDiagonal() * likeness;
+  }
+  return chosen;
+}
+
+MatrixXd mean_of(const std::vector<TakeCycle>& takes, const std::vector<int>& members,
+                 const Eigen::RowVectorXd& weights) {
+  MatrixXd sum =
+      MatrixXd::Zero(takes.front().coefficients.rows(), takes.front().coefficients.cols());
+  for (Eigen::Index i = 0; i < std::ssize(members); ++i) {
+    const auto at = static_cast<std::size_t>(members[static_cast<std::size_t>(i)]);
+    sum += weights[i] * takes[at].coefficients;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<std::pair<int, MatrixXd>> day_changes(const Dataset& dataset,
+                                                  const std::vector<TakeCycle>& takes,
+                                                  const std::vector<int>& left_out,
+                                                  const std::string& target) {
+  std::vector<std::pair<int, MatrixXd>> changes;
+  const auto people = takes_by_person(dataset, takes, left_out);
+  for (const auto& [key, sources] : people) {
+    const auto& [motion, group, person] = key;
+    if (group == target || sources.size() < kFewestTakes) continue;
+    const auto goals = people.find({motion, target, person});
+    if (goals == people.end() || goals->second.size() < kFewestTakes) continue;
+    const std::vector<int>& targets = goals->second;
+    const MatrixXd places = same_places(std::ssize(sources), std::ssize(targets));
+    const MatrixXd weights =
+        day_weights(stacked_cycles(takes, sources), places * stacked_cycles(takes, targets));
+    if (weights.size() == 0) continue;
+    const auto even = 1.0 / static_cast<double>(sources.size());
+    const Eigen::RowVectorXd all = Eigen::RowVectorXd::Constant(std::ssize(sources), even);
+    const MatrixXd mean = mean_of(takes, targets, all * places) - mean_of(takes, sources, all);
+    for (Eigen::Index i = 0; i < std::ssize(sources); ++i) {
+      const Eigen::RowVectorXd alike = weights.row(i);
+      changes.emplace_back(
+          sources[static_cast<std::size_t>(i)],
+          mean_of(takes, targets, alike * places) - mean_of(takes, sources, alike) - mean);
+    }
+  }
+  return changes;
+}
+
+bool follows_days(const Dataset& dataset, const std::string& target) {
+  return !day_changes(dataset, take_cycles(dataset), {}, target).empty();
+}
+
+}  // namespace posed::style
