@@ -25,8 +25,8 @@ struct StageFrame {
   // Posterior variance of the pose, one a rotation channel in the order of Frame::angle_rad
   // [rad^2]; infinite where nothing is known. Empty: no stage so far estimates it.
   std::span<const double> variance_rad2{};
-  // The same frame as the source gave it. Null behind a stage that holds frames back or makes its
-  // own: the source's frame is gone by then.
+  // The same frame before its style was changed: as the source gave it, or as merge joined it. Null
+  // behind a stage that holds frames back or makes its own: the source's frame is gone by then.
   const Frame* input = nullptr;
 };
 
