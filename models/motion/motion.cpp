@@ -6,9 +6,8 @@
 #include <string>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "models/motion/low_pass.hpp"
+#include "models/motion/symmetric_eigen.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::motion {
@@ -188,8 +187,8 @@ Result<> set_mean_rotations(std::span<const Motion* const> motions, PoseSpaceSpe
     }
   }
   for (std::size_t j = 0; j < spec.mean.size(); ++j) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sums[j]);
-    spec.mean[j] = Quaterniond(Eigen::Vector4d(solver.eigenvectors().col(3))).normalized();
+    spec.mean[j] =
+        Quaterniond(Eigen::Vector4d(symmetric_eigen(sums[j]).vectors.col(3))).normalized();
   }
   return {};
 }
