@@ -12,7 +12,6 @@ namespace posed::style {
 namespace {
 
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 // Widths of the likeness of two takes, in median distances between takes.
 constexpr std::array kWidths{0.35, 0.5, 0.7};
@@ -84,24 +83,37 @@ double median_distance(const MatrixXd& distances) {
   return *middle;
 }
 
-// Squared error of each take's partner, predicted from the other takes' by these weights.
-double left_out_error(MatrixXd weights, const MatrixXd& partners) {
-  weights.diagonal().setZero();
-  const VectorXd sums = weights.rowwise().sum().cwiseMax(1e-12);
-  return (sums.cwiseInverse().asDiagonal() * weights * partners - partners).squaredNorm();
+// 1 where source take k may tell of source take i: not itself, and no other that lies beside the
+// same target take, whose partner is the answer or a part of it.
+MatrixXd may_tell(const MatrixXd& places) {
+  constexpr double kRounding = 1e-9;
+  return ((places * places.transpose()).array() < kRounding).cast<double>();
+}
+
+// Squared error of each take's partner, predicted by these weights from the other takes'. Who has
+// no other is not asked.
+double left_out_error(const MatrixXd& weights, const MatrixXd& partners) {
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < weights.rows(); ++i) {
+    const double all = weights.row(i).sum();
+    if (all > 0.0) sum += (weights.row(i) * partners / all - partners.row(i)).squaredNorm();
+  }
+  return sum;
 }
 
 // How much takes k count for take i, rows of sum 1; empty where one mean does as well.
-MatrixXd day_weights(const MatrixXd& sources, const MatrixXd& partners) {
+MatrixXd day_weights(const MatrixXd& sources, const MatrixXd& targets, const MatrixXd& places) {
+  const MatrixXd partners = places * targets;
+  const MatrixXd others = may_tell(places);
   const MatrixXd distances = distances_between(sources);
   const double median = median_distance(distances);
-  double best = kWorth * left_out_error(MatrixXd::Ones(sources.rows(), sources.rows()), partners);
+  double best = kWorth * left_out_error(others, partners);
   MatrixXd chosen;
   for (const double width : kWidths) {
     const double scale = 1.0 / std::max(width * median, 1e-12);
     // The floor asks all takes where none is alike.
     const MatrixXd likeness = (-0.5 * (scale * distances).array().square()).exp() + 1e-6;
-    const double error = left_out_error(likeness, partners);
+    const double error = left_out_error(likeness.cwiseProduct(others), partners);
     if (!(error < best)) continue;
     best = error;
     chosen = likeness.rowwise().sum().cwiseInverse().asDiagonal() * likeness;
@@ -136,7 +148,7 @@ std::vector<std::pair<int, MatrixXd>> day_changes(const Dataset& dataset,
     const std::vector<int>& targets = goals->second;
     const MatrixXd places = same_places(std::ssize(sources), std::ssize(targets));
     const MatrixXd weights =
-        day_weights(stacked_cycles(takes, sources), places * stacked_cycles(takes, targets));
+        day_weights(stacked_cycles(takes, sources), stacked_cycles(takes, targets), places);
     if (weights.size() == 0) continue;
     const auto even = 1.0 / static_cast<double>(sources.size());
     const Eigen::RowVectorXd all = Eigen::RowVectorXd::Constant(std::ssize(sources), even);
