@@ -23,6 +23,7 @@ constexpr double kHop_s = 0.1;         // between windows
 constexpr int kMostSteps = 2;          // of cadence from one window to the next
 constexpr double kStepCost = 0.02;     // of one such step
 constexpr double kMismatchCost = 0.5;  // of phases that do not follow from one another
+constexpr double kLeastAdvance = 0.5;  // of the slowest cadence's
 constexpr double kQuiet = 0.05;        // of the signal's variance: a quieter window says little
 
 // Least squares of [1, 3 harmonics] of one cadence on a window with Hann weights.
@@ -75,14 +76,17 @@ class Chain {
     }
   }
 
-  // The phase at each place, unwrapped.
+  // The phase at each place, unwrapped and increasing.
   [[nodiscard]] std::vector<double> phases() const {
     const std::vector<int> chosen = cheapest();
+    // Where the legs show no stride the fits' phases may stand still or go back.
+    const double least = kLeastAdvance * candidates_.back().dtheta * static_cast<double>(hop_);
     std::vector<double> phase{fits_[0][at(chosen[0])].phase};
     for (std::size_t k = 1; k < fits_.size(); ++k) {
       const double expected = advance(chosen[k - 1], chosen[k]);
       const double measured = fits_[k][at(chosen[k])].phase - phase.back();
-      phase.push_back(phase.back() + expected + std::remainder(measured - expected, kFullTurn));
+      const double turned = expected + std::remainder(measured - expected, kFullTurn);
+      phase.push_back(phase.back() + std::max(turned, least));
     }
     return phase;
   }

@@ -88,3 +88,20 @@ TEST_CASE("the shortest clip, a constant and 20,000 frames have a phase for ever
   CHECK(still.phase.allFinite());
   CHECK(std::isfinite(still.score));
 }
+
+TEST_CASE("phases advance even where the legs do nothing", "[stride_phase]") {
+  std::mt19937 bits(5);
+  std::normal_distribution<double> normal;
+  for (const double size : {0.0, 1e-12, 1e-3}) {
+    for (int tried = 0; tried < 20; ++tried) {
+      VectorXd legs = VectorXd::Constant(30 + 10 * tried, 0.2);
+      for (double& value : legs) value += size * normal(bits);
+      const StridePhase found = follow_strides(legs, kRate_hz);
+      const auto steps = legs.size() - 1;
+      INFO("noise " << size << ", frames " << legs.size());
+      CHECK(std::isfinite(found.score));
+      CHECK(kTurn / found.dtheta < 4.0 * kRate_hz);  // the period: twice the slowest one
+      CHECK(((found.phase.tail(steps) - found.phase.head(steps)).array() > 0.0).all());
+    }
+  }
+}
