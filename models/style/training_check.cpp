@@ -52,10 +52,11 @@ void measure_cycles(const Dataset& dataset, const std::string& target, TrainingC
   int companions = 0;
   for (const TakeCycle& take : takes) {
     const AlignedClip& clip = dataset.clips[static_cast<std::size_t>(take.clip)];
-    const double from_group = difference_squares(
-        dataset, take.coefficients - group_cycle(dataset, takes, clip.group, clip.motion));
-    if (from_group == 0.0) continue;
-    scatter += from_group;
+    const std::string& person = dataset.subjects[static_cast<std::size_t>(clip.subject)].name;
+    const double from_own = difference_squares(
+        dataset, take.coefficients - group_cycle(dataset, takes, clip.group, clip.motion, person));
+    if (from_own == 0.0) continue;  // the person's only take
+    scatter += from_own;
     ++companions;
   }
   const auto differences = differences_of(dataset, takes, target);
@@ -120,7 +121,7 @@ void check_closing(const std::string& target, TrainingCheck& check) {
     return;
   }
   if (check.scatter_deg > check.difference_deg) {
-    check.warnings.push_back("the clips of one group differ more (" +
+    check.warnings.push_back("one person's clips of one group differ more (" +
                              with_digits(check.scatter_deg, 1) + " deg rms) than the groups do (" +
                              with_digits(check.difference_deg, 1) + " deg)");
   }

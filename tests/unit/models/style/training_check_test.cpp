@@ -75,6 +75,22 @@ TEST_CASE("two styles are learnt, and the verdict states how much of the distanc
   CHECK(verdict.contains("a constant offset "));
 }
 
+TEST_CASE("what sets two actors apart is no scatter of their takes", "[style][check]") {
+  const auto by = [](const char* who, WalkerFamily family, std::uint32_t person) {
+    const std::string group = family == WalkerFamily::kMarch ? "from" : "to";
+    return style::TrainingClip{walker_file(family, person), group, who, "walk"};
+  };
+  std::vector<style::TrainingClip> clips;
+  for (const std::uint32_t person : {1U, 2U}) {
+    const char* who = person == 1 ? "ann" : "bob";
+    clips.push_back(by(who, WalkerFamily::kMarch, person));
+    clips.push_back(by(who, WalkerFamily::kSway, person));
+  }
+  CHECK(report_of(clips)["scatter_deg"] == 0.0);
+  clips.push_back(by("bob", WalkerFamily::kMarch, 3));
+  CHECK(report_of(clips)["scatter_deg"] > 0.0);
+}
+
 TEST_CASE("one recording in two groups is refused by name", "[style][check]") {
   const auto march = walker_file(WalkerFamily::kMarch, 1);
   const auto model = trained({lesson(march, "from"), lesson(march, "to")});
