@@ -25,6 +25,7 @@ constexpr double kLongest_deg = 400.0;  // a straight line over all poses
 constexpr double kExplained = 1e-5;     // unexplained variance of a pose that needs no more poses
 constexpr int kFoldPoses = 320;         // enough to compare kernels; the model itself has more
 constexpr std::size_t kChunk = 8;  // folds a task; fixed, so that every machine has the same tasks
+constexpr double kRoundShare = 0.8;  // of the progress that is left: another round may follow
 constexpr std::size_t kNumbers = 4;  // that a task gives for a fold and a noise
 
 // The process of one length on its inducing poses, ready to be asked without some of its inputs.
@@ -99,10 +100,10 @@ class Search {
     const std::size_t total = lengths_deg.size() * chunks_;
     const auto found = tasks_.run(total, task, [&](std::size_t done) {
       const double share = static_cast<double>(done) / static_cast<double>(total);
-      return !progress_ || progress_(first_round_ ? 0.8 * share : 0.8 + 0.2 * share);
+      return !progress_ || progress_(told_ + kRoundShare * share * (1.0 - told_));
     });
     if (!found) return false;
-    first_round_ = false;
+    told_ += kRoundShare * (1.0 - told_);
     for (std::size_t l = 0; l < lengths_deg.size(); ++l) {
       TaskResult numbers;
       for (std::size_t c = 0; c < chunks_; ++c) {
@@ -139,7 +140,7 @@ class Search {
   const FoldProgress& progress_;
   MatrixXd X_;
   std::size_t chunks_;
-  bool first_round_ = true;
+  double told_ = 0.0;  // progress at the end of the last round
   double best_deg_ = 0.0;
   ChosenKernel best_{{}, std::numeric_limits<double>::infinity(), {}};
 };

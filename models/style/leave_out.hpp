@@ -1,6 +1,7 @@
 // The choice of the kernel by what held-out walkers say: each fold asks a process that was learnt
-// without some takes for the difference on a take's own frames. All folds of one length share the
-// kernel's factor (README.md, "Choice of the kernel"). Cold; thread-safe.
+// without some takes for the difference on a take's own frames. The folds of one task, up
+// to 8 of one length, share the kernel's factor (README.md, "Choice of the kernel"). Cold;
+// thread-safe.
 #pragma once
 
 #include <functional>
