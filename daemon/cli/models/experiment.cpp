@@ -1,5 +1,6 @@
 #include "daemon/cli/models/experiment.hpp"
 
+#include <system_error>
 #include <utility>
 
 #include "proto/clip/clip.hpp"
@@ -72,6 +73,21 @@ Result<Experiment> read_experiment(const std::filesystem::path& path) {
   Experiment experiment;
   read_tables(*root, path.parent_path(), findings, experiment);
   return findings.result(std::move(experiment));
+}
+
+ExperimentClip named_clip(const std::string& argument, const std::string& group,
+                          const std::string& motion) {
+  ExperimentClip clip{argument, group, kOnePerson, motion, 0};
+  const auto colon = argument.find(':');
+  std::error_code ignored;
+  if (colon == std::string::npos || colon == 0 || std::filesystem::exists(argument, ignored)) {
+    return clip;
+  }
+  const std::string person = argument.substr(0, colon);
+  if (person.contains('/')) return clip;
+  clip.subject = person;
+  clip.file = argument.substr(colon + 1);
+  return clip;
 }
 
 Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment) {

@@ -1,4 +1,5 @@
-// The experiment file of `posed train style`: the group, person and motion of each clip.
+// The clips of `posed train style`, from an experiment file or the command line: the group, person
+// and motion of each.
 #pragma once
 
 #include <filesystem>
@@ -30,6 +31,12 @@ struct Experiment {
 
 // Errors name file and line; the error for an unknown key names the nearest known one.
 [[nodiscard]] Result<Experiment> read_experiment(const std::filesystem::path& path);
+
+// A clip named on the command line, [PERSON:]FILE. The person is the part before the first colon
+// where no file has the whole name and that part holds no '/', which only a file's name does;
+// without one it is the same person as every other clip without one.
+[[nodiscard]] ExperimentClip named_clip(const std::string& argument, const std::string& group,
+                                        const std::string& motion);
 
 // Reads the clips themselves.
 [[nodiscard]] Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment);

@@ -58,21 +58,6 @@ struct TrainStyleOptions {
   bool overwrite = false, force = false, json = false;
 };
 
-// A file of --from or --to, with its person: the part before a colon where no file has the whole
-// name. Without one it is the same person as every other file without one.
-ExperimentClip named_clip(const std::string& argument, const std::string& group,
-                          const std::string& motion) {
-  ExperimentClip clip{argument, group, kOnePerson, motion, 0};
-  const auto colon = argument.find(':');
-  std::error_code ignored;
-  if (colon == std::string::npos || colon == 0 || std::filesystem::exists(argument, ignored)) {
-    return clip;
-  }
-  clip.subject = argument.substr(0, colon);
-  clip.file = argument.substr(colon + 1);
-  return clip;
-}
-
 // The clips: from the experiment file, or from --from and --to.
 Result<Experiment> clips_of(const TrainStyleOptions& options) {
   if (!options.experiment.empty()) {
