@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kUnknownRate_hz = 60.0;
 constexpr double kMaxStep_s = 0.1;     // a frame of the slowest stream
+constexpr double kLeastStep = 0.5;     // of the nominal one: frames that arrive together are not
 constexpr double kGap_s = 0.25;        // after a longer silence the feet have gone on unseen
 constexpr double kFastest_m_s = 12.0;  // no person runs faster
 constexpr double kJump = 0.3;          // of a leg's length: what tracking may be off by in a frame
@@ -22,6 +23,16 @@ constexpr double kNoChange_m = 0.01;  // a style that moves feet by less is fadi
 
 Eigen::Vector3d vector_of(const Vec3f& v) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+// RT-safe.
+void move_root(const Eigen::Vector3d& root_m, const Eigen::Vector3d& offset_m,
+               Frame& frame) noexcept {
+  if (offset_m.isZero(0.0)) return;  // every bit stays
+  const Eigen::Vector3d moved_m = root_m + offset_m;
+  for (int i = 0; i < 3; ++i) {
+    frame.root_position_m[static_cast<std::size_t>(i)] = static_cast<float>(moved_m[i]);
+  }
 }
 
 // A root that strides leaves little to hold, and a half is enough of it: more would cost style.
@@ -37,6 +48,7 @@ FeetStage::FeetStage(std::shared_ptr<const Skeleton> skeleton, Legs legs, double
     : skeleton_(std::move(skeleton)),
       legs_(std::move(legs)),
       nominal_s_(1.0 / (rate_hz > 0.0 ? rate_hz : kUnknownRate_hz)),
+      least_s_(rate_hz > 0.0 ? kLeastStep / rate_hz : 0.0),
       options_(options),
       contacts_(legs_),
       root_(legs_) {}
@@ -63,18 +75,15 @@ bool FeetStage::serves(const StageFrame& in) const noexcept {
 // somewhere else all at once, begins anew. RT-safe.
 double FeetStage::step_s(const Frame& frame, const Eigen::Vector3d& root_m) noexcept {
   const double gap_s = elapsed_.next_s(frame.header);
-  const double dt_s = gap_s > 0.0 ? std::min(gap_s, kMaxStep_s) : nominal_s_;
+  const double dt_s = gap_s > 0.0 ? std::min(std::max(gap_s, least_s_), kMaxStep_s) : nominal_s_;
   const double moved_m = (root_m - last_root_m_).norm();
-  const bool teleports = seen_ && moved_m > kJump * legs_.length_m() + kFastest_m_s * dt_s;
+  const double fastest_m = kFastest_m_s * std::max(gap_s, dt_s);
+  const bool teleports = seen_ && moved_m > kJump * legs_.length_m() + fastest_m;
   if (teleports) {
     root_.forget();
     holds_ = {};
   }
-  if (teleports || gap_s > kGap_s) {
-    contacts_.restart();
-    root_.restart();
-    for (FootHold& hold : holds_) hold.restart();
-  }
+  if (teleports || gap_s > kGap_s) restart();
   last_root_m_ = root_m;
   seen_ = true;
   return dt_s;
@@ -93,6 +102,13 @@ double FeetStage::gone(double dt_s) noexcept {
     }
   }
   return std::clamp(1.0 - change_m_ / kNoChange_m, 0.0, 1.0);
+}
+
+// RT-safe.
+void FeetStage::restart() noexcept {
+  contacts_.restart();
+  root_.restart();
+  for (FootHold& hold : holds_) hold.restart();
 }
 
 // RT-safe.
@@ -123,7 +139,7 @@ void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
                      Frame& frame) noexcept {
   const Leg& bones = legs_.leg(leg);
   FootHold& hold = holds_[leg];
-  if (!performer_.measured[leg] || !avatar_.measured[leg]) return hold.forget();
+  if (!performer_.measured[leg] || !avatar_.measured[leg]) return hold.restart();
   const auto foot = static_cast<std::size_t>(bones.foot);
   FootPair pair{.performer = {.rotation = performer_.world_rotation[foot]},
                 .avatar = {.rotation = avatar_.world_rotation[foot]}};
@@ -156,9 +172,17 @@ void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
 // RT-safe.
 void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
   const Eigen::Vector3d root_m = vector_of(in.frame.root_position_m);
-  if (!serves(in) || !root_m.allFinite()) {
+  if (!serves(in)) {
     forget();
     return out.frame(in);
+  }
+  // Without a root nothing is known of the feet, but the avatar stays where it was.
+  const bool rooted = in.frame.valid[static_cast<std::size_t>(skeleton_->root_joint)];
+  if (!rooted || !root_m.allFinite()) {
+    restart();
+    Frame frame = in.frame;
+    move_root(root_m, root_.offset_m(), frame);
+    return out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
   }
   legs_.pose(*in.input, performer_);
   legs_.pose(in.frame, avatar_);
@@ -168,12 +192,7 @@ void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
   const PosePair pair{.performer = performer_, .avatar = avatar_, .root_m = root_m};
   const Eigen::Vector3d offset_m = root_.update(pair, contacts_, gone_now, dt_s, options_);
   Frame frame = in.frame;
-  if (!offset_m.isZero(0.0)) {
-    const Eigen::Vector3d moved_m = root_m + offset_m;
-    for (int i = 0; i < 3; ++i) {
-      frame.root_position_m[static_cast<std::size_t>(i)] = static_cast<float>(moved_m[i]);
-    }
-  }
+  move_root(root_m, offset_m, frame);
   const double let_go = options_.mode == RootMode::kOff ? 1.0 : gone_now;
   for (std::size_t leg = 0; leg < kLegs; ++leg) hold(leg, root_m, offset_m, let_go, dt_s, frame);
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});

@@ -36,6 +36,7 @@ class FeetStage final : public Stage {
   [[nodiscard]] bool serves(const StageFrame& in) const noexcept;
   [[nodiscard]] double step_s(const Frame& frame, const Eigen::Vector3d& root_m) noexcept;
   [[nodiscard]] double gone(double dt_s) noexcept;
+  void restart() noexcept;
   void forget() noexcept;
   [[nodiscard]] double lowest_sole_m(const Eigen::Vector3d& root_m) const noexcept;
   void hold(std::size_t leg, const Eigen::Vector3d& root_m, const Eigen::Vector3d& offset_m,
@@ -44,6 +45,7 @@ class FeetStage final : public Stage {
   std::shared_ptr<const Skeleton> skeleton_;
   Legs legs_;
   double nominal_s_;
+  double least_s_;  // 0 where the rate is not known
   RootOptions options_;
   Elapsed elapsed_;
   LegPose performer_, avatar_;

@@ -48,10 +48,8 @@ class FootHold {
                        const HoldOptions& options, double gone, double dt_s) noexcept;
   // The ankle got no further than this. RT-safe.
   void reached(const Eigen::Vector3d& ankle_m) noexcept { change_.ankle_m = ankle_m; }
-  // The next frame does not continue the last one. RT-safe.
+  // The next frame does not continue the last one. The change stays. RT-safe.
   void restart() noexcept { started_ = false; }
-  // The foot is where the style puts it. RT-safe.
-  void forget() noexcept { *this = {}; }
 
  private:
   void stand(const FootPair& pair, const std::array<PointContact, kPoints>& contact,

@@ -21,14 +21,18 @@ struct FootPoints {
   FootPoints(const Legs& legs, const Frame& frame) {
     legs.pose(frame, pose);
     const Eigen::Vector3d root_m = root_of(frame);
-    for (auto& leg : pose.point_from_root_m) {
-      for (Eigen::Vector3d& at_m : leg) at_m += root_m;
+    for (std::size_t leg = 0; leg < kLegs; ++leg) {
+      for (std::size_t p = 0; p < kPoints; ++p) {
+        known[leg][p] = pose.measured[leg] && legs.leg(leg).has(p);
+        if (known[leg][p]) pose.point_from_root_m[leg][p] += root_m;
+      }
     }
   }
   [[nodiscard]] const Eigen::Vector3d& at_m(std::size_t leg, std::size_t point) const {
     return pose.point_from_root_m[leg][point];
   }
   LegPose pose;
+  OfPoints<bool> known{};  // points of a leg that is not measured are none
 };
 
 double over_ground_m(const Eigen::Vector3d& step_m) { return std::hypot(step_m.x(), step_m.z()); }
@@ -48,7 +52,9 @@ std::optional<double> slide_m_s(const motion::Motion& source, const motion::Moti
     const FootPoints moved_now(*legs, moved.frames[static_cast<std::size_t>(t)]);
     for (std::size_t leg = 0; leg < kLegs; ++leg) {
       for (const std::size_t p : {kAnkle, kToe}) {
-        if (!legs->leg(leg).has(p)) continue;
+        const auto knows = [&](const FootPoints& points) { return points.known[leg][p]; };
+        if (!knows(source_now) || !knows(source_before)) continue;
+        if (!knows(moved_now) || !knows(moved_before)) continue;
         const Eigen::Vector3d step_m = source_now.at_m(leg, p) - source_before.at_m(leg, p);
         if (step_m.norm() * source.rate_hz >= kStill_m_s) continue;
         sum_m_s +=
@@ -71,7 +77,7 @@ std::optional<double> sink_m(const motion::Motion& source, const motion::Motion&
     for (const Frame& frame : motion.frames) {
       const FootPoints points(*legs, frame);
       for (std::size_t leg = 0; leg < kLegs; ++leg) {
-        if (legs->leg(leg).has(kToe)) lowest = std::min(lowest, points.at_m(leg, kToe).y());
+        if (points.known[leg][kToe]) lowest = std::min(lowest, points.at_m(leg, kToe).y());
       }
     }
     return lowest;

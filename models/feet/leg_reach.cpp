@@ -12,6 +12,8 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kStraight = 0.1;    // below this sine of the knee's bend its hinge leads
+constexpr double kReversed = 0.35;   // a knee that is bent backwards by more is built that way
+constexpr double kEase = 0.15;       // of the leg's length and rad: over it a knee turns forward
 constexpr double kSoftFrom = 0.97;   // of the leg's length: beyond, it straightens ever slower
 constexpr double kLongest = 0.9995;  // a leg is never quite straight
 constexpr double kShortest = 0.3;
@@ -28,16 +30,42 @@ double reachable_m(double wanted_m, double now_m, double length_m) {
   return longest_m - room_m * std::exp(-(wanted_m - soft_m) / room_m);
 }
 
-// The world axis about which the knee bends: that of its bend, or of its hinge where it is
-// straight.
-Vector3d knee_axis(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
-                   const Vector3d& thigh, const Vector3d& shin) {
-  const Vector3d bend = thigh.normalized().cross(shin.normalized());
+// How a knee is bent: about its own bend, or near straight, where that is noise, about its hinge.
+struct Knee {
+  Vector3d axis;         // in the world, normalized
+  double now_rad;        // about the axis; negative where the knee is over-straight
+  double sideways_rad2;  // squared angle of the bend that is not about the axis
+};
+
+Knee knee_of(const Vector3d& bend, const Vector3d& hinge, double angle_rad) {
+  const double sine = bend.norm();
+  const double forward = bend.dot(hinge);
+  if (forward < -kReversed) return {.axis = bend / sine, .now_rad = angle_rad, .sideways_rad2 = 0};
+  if (sine < 1e-9) return {.axis = hinge, .now_rad = 0.0, .sideways_rad2 = 0.0};
+  const double own = std::clamp(forward / kStraight, 0.0, 1.0);
+  const double share = forward / sine;
+  const double sideways_rad2 =
+      angle_rad * angle_rad * std::max(0.0, 1.0 - share * share) * (1.0 - own);
+  const double about_rad = std::sqrt(std::max(0.0, angle_rad * angle_rad - sideways_rad2));
+  return {.axis = (own * bend / sine + (1.0 - own) * hinge).normalized(),
+          .now_rad = std::copysign(about_rad, forward),
+          .sideways_rad2 = sideways_rad2};
+}
+
+// The turn of a knee that bends the leg by `angle_rad` in all: forward only. `shorter` [of the
+// leg's length] is what that takes off it. An over-straight knee comes forward the further the more
+// is asked of it; until then the foot is let go by millimetres.
+double turn_rad(const Knee& knee, double angle_rad, double shorter) {
+  const double about_rad = std::sqrt(std::max(0.0, angle_rad * angle_rad - knee.sideways_rad2));
+  if (knee.now_rad >= 0.0) return about_rad - knee.now_rad;
+  if (shorter <= 0.0) return -about_rad - knee.now_rad;
+  return std::min(1.0, shorter / (kEase * -knee.now_rad)) * (about_rad - knee.now_rad);
+}
+
+// The world axis of the knee's hinge.
+Vector3d hinge_of(const Skeleton& skeleton, const Leg& leg, const LegPose& pose) {
   const Joint& joint = skeleton.joints[at(leg.shin)];
-  const Vector3d hinge =
-      pose.world_rotation[at(leg.shin)] * (joint.T_world_joint.conjugate() * Vector3d::UnitX());
-  const Vector3d axis = bend + std::max(0.0, kStraight - bend.norm()) * hinge;
-  return axis.norm() > 1e-9 ? Vector3d(axis.normalized()) : hinge;
+  return pose.world_rotation[at(leg.shin)] * (joint.T_world_joint.conjugate() * Vector3d::UnitX());
 }
 
 }  // namespace
@@ -57,8 +85,10 @@ Reach reach(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
     return std::acos(
         std::clamp((distance_m * distance_m - a * a - b * b) / (2.0 * a * b), -1.0, 1.0));
   };
-  const Vector3d axis = knee_axis(skeleton, leg, pose, thigh_m, shin_m);
-  const Quaterniond knee(rotation_exp(Vector3d(axis * (bend_rad(far_m) - bend_rad(now_m)))));
+  const Vector3d bend = thigh_m.normalized().cross(shin_m.normalized());
+  const Knee bent = knee_of(bend, hinge_of(skeleton, leg, pose), bend_rad(now_m));
+  const double angle_rad = turn_rad(bent, bend_rad(far_m), (now_m - far_m) / (a + b));
+  const Quaterniond knee(rotation_exp(Vector3d(bent.axis * angle_rad)));
   const Vector3d bent_m = thigh_m + knee * shin_m;
   const Quaterniond turn = minimal_rotation(bent_m, wanted_m);
   return {.ankle_m = hip_m + turn * bent_m, .leg_turn = turn, .knee_turn = knee};

@@ -37,7 +37,7 @@ void RootMotion::forget() noexcept {
   restart();
   offset_m_.setZero();
   drift_m_s_.setZero();
-  velocity_m_s_.setZero();
+  pending_m_.setZero();
   rest_m_.setZero();
   emitted_m_.setZero();
   fresh_ = true;
@@ -64,8 +64,11 @@ void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts, dou
   const double trust = weight / (weight + kFlight);
   drift_m_s_ += -std::expm1(-dt_s * trust / kDriftTau_s) * (step_m / dt_s - drift_m_s_);
   drift_m_s_ *= std::exp(-dt_s * (1.0 - trust) / kForgetTau_s);
-  velocity_m_s_ += -std::expm1(-dt_s / kStepTau_s) * (step_m / dt_s - velocity_m_s_);
-  offset_m_ += velocity_m_s_ * dt_s;
+  // A share of what is pending, so that frames at uneven times still add up to every step.
+  pending_m_ += step_m;
+  const Eigen::Vector3d smooth_m = -std::expm1(-dt_s / kStepTau_s) * pending_m_;
+  offset_m_ += smooth_m;
+  pending_m_ -= smooth_m;
 }
 
 // The way back to the performer, over the ground. RT-safe.
@@ -141,18 +144,20 @@ Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts& contact
   if (off) {
     offset_m_.setZero();
     drift_m_s_.setZero();
-    velocity_m_s_.setZero();
+    pending_m_.setZero();
   } else {
     if (started_) walk(now, contacts, dt_s);
     come_back(gone, dt_s, options.mode);
     lift(now, contacts, gone, dt_s);
     if (options.mode == RootMode::kActor) offset_m_ = shortened(offset_m_, options.limit_m);
   }
-  const bool jumps = options.mode != mode_ || (started_ && !off && !same_points(now));
+  const bool limited = options.mode == RootMode::kActor && options.limit_m != last_.limit_m;
+  const bool jumps =
+      options.mode != last_.mode || limited || (started_ && !off && !same_points(now));
   if (jumps && !fresh_) rest_m_ = emitted_m_ - offset_m_;
   rest_m_ = approached(rest_m_, dt_s / kReturnTau_s, kReturn_m_s * scale_ * dt_s);
   emitted_m_ = offset_m_ + rest_m_;
-  mode_ = options.mode;
+  last_ = options;
   before_ = now;
   started_ = true;
   fresh_ = false;

@@ -55,6 +55,8 @@ class RootMotion {
   // while the poses differ and 1 where they do not: then the offset returns to 0. RT-safe.
   Eigen::Vector3d update(const PosePair& pair, const Contacts& contacts, double gone, double dt_s,
                          const RootOptions& options) noexcept;
+  // The offset of the last frame [m]. RT-safe.
+  [[nodiscard]] const Eigen::Vector3d& offset_m() const noexcept { return emitted_m_; }
   // The next frame does not continue the last one. The offset stays. RT-safe.
   void restart() noexcept { started_ = false; }
   // The avatar is where the performer is. RT-safe.
@@ -79,14 +81,14 @@ class RootMotion {
   const Legs* legs_;
   double scale_;
   OfPoints<Placed> before_{};
-  RootMode mode_ = RootMode::kOff;                          // of the frame before
-  bool started_ = false;                                    // before_ is of the frame before
-  bool fresh_ = true;                                       // there was no frame
-  Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();      // that the mode asks for
-  Eigen::Vector3d velocity_m_s_ = Eigen::Vector3d::Zero();  // at which it strides now
-  Eigen::Vector3d drift_m_s_ = Eigen::Vector3d::Zero();     // of the offset while feet stood
-  // What is left of a jump of offset_m_, by another mode or other joints: it is added, and
-  // returns to 0 like the offset.
+  RootOptions last_{.mode = RootMode::kOff};             // of the frame before
+  bool started_ = false;                                 // before_ is of the frame before
+  bool fresh_ = true;                                    // there was no frame
+  Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();   // that the mode asks for
+  Eigen::Vector3d pending_m_ = Eigen::Vector3d::Zero();  // of its steps, still to be made
+  Eigen::Vector3d drift_m_s_ = Eigen::Vector3d::Zero();  // of the offset while feet stood
+  // What is left of a jump of offset_m_, by another mode or limit or other joints: it is added,
+  // and returns to 0 like the offset.
   Eigen::Vector3d rest_m_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d emitted_m_ = Eigen::Vector3d::Zero();
 };

@@ -101,6 +101,100 @@ TEST_CASE("a silence does not move the avatar beside its performer", "[feet]") {
   CHECK(level_m(offset_of(out, pair.source) - before_m) < 0.02);
 }
 
+TEST_CASE("who walks on through a silence is not taken for a teleport", "[feet]") {
+  const auto walk = styled_walk(60.0, 6.0);
+  const auto stage = feet_stage(walk.source, "stride");
+  Frame out;
+  for (std::size_t t = 0; t < 200; ++t) {
+    out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
+  }
+  const Eigen::Vector3d before_m = offset_of(out, walk.source.frames[199]);
+  CHECK(level_m(before_m) > 0.2);
+  const MovedPair pair = moved(walk, 200, {0.0, 0.0, 3.0}, 2'000'000'000);
+  out = through(*stage, pair.source, pair.styled);
+  CHECK(level_m(offset_of(out, pair.source) - before_m) < 0.02);
+}
+
+TEST_CASE("one frame without its root does not end the offset", "[feet]") {
+  const auto walk = styled_walk(60.0, 6.0);
+  const auto root = static_cast<std::size_t>(walk.source.skeleton->root_joint);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const int kind : {0, 1, 2}) {
+    INFO(kind);
+    const auto stage = feet_stage(walk.source, "stride");
+    Frame out;
+    for (std::size_t t = 0; t < 200; ++t) {
+      out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
+    }
+    const Eigen::Vector3d before_m = offset_of(out, walk.source.frames[199]);
+    MovedPair bad = moved(walk, 200, Eigen::Vector3d::Zero());
+    for (Frame* frame : {&bad.source, &bad.styled}) {
+      if (kind != 1) frame->valid[root] = false;
+      if (kind == 1) test::set_root(*frame, {nan, 1.0, 0.0});
+      if (kind == 2) test::set_root(*frame, Eigen::Vector3d::Zero());
+    }
+    out = through(*stage, bad.source, bad.styled);
+    if (kind != 1) CHECK((offset_of(out, bad.source) - before_m).norm() < 1e-6);
+    out = through(*stage, walk.source.frames[201], walk.styled.frames[201]);
+    CHECK(level_m(offset_of(out, walk.source.frames[201]) - before_m) < 0.02);
+  }
+}
+
+TEST_CASE("frames that arrive in pairs give the same root", "[feet]") {
+  const auto walk = styled_walk(60.0, 6.0);
+  const auto even = feet_stage(walk.source, "stride");
+  const auto paired = feet_stage(walk.source, "stride");
+  Frame even_out, paired_out;
+  for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
+    even_out = through(*even, walk.source.frames[t], walk.styled.frames[t]);
+    // An odd frame comes 50 us after the one before it.
+    const MovedPair pair = moved(walk, t, Eigen::Vector3d::Zero(), t % 2 == 0 ? 0 : -16'616'000);
+    paired_out = through(*paired, pair.source, pair.styled);
+  }
+  const double even_m = level_m(offset_of(even_out, walk.source.frames.back()));
+  CHECK(even_m > 0.5);
+  CHECK(level_m(test::root_of(paired_out) - test::root_of(even_out)) < 0.1 * even_m);
+}
+
+TEST_CASE("a joint that is lost for a frame does not end the hold", "[feet]") {
+  const auto walk = styled_walk(60.0, 6.0);
+  const Legs legs = Legs::find(*walk.source.skeleton).value();
+  const auto foot = static_cast<std::size_t>(legs.leg(0).foot);
+  const auto ankle_m = [&](const Frame& frame) {
+    LegPose pose;
+    legs.pose(frame, pose);
+    return pose.point_from_root_m[0][kAnkle];
+  };
+  double furthest_m = 0.0;
+  for (std::size_t lost = 180; lost < 240; lost += 6) {
+    const auto stage = feet_stage(walk.source, "actor");
+    const auto twin = feet_stage(walk.source, "actor");
+    for (std::size_t t = 0; t <= lost + 1; ++t) {
+      MovedPair pair = moved(walk, t, Eigen::Vector3d::Zero());
+      const Frame whole = through(*twin, pair.source, pair.styled);
+      if (t == lost) pair.source.valid[foot] = pair.styled.valid[foot] = false;
+      const Frame out = through(*stage, pair.source, pair.styled);
+      if (t > lost) furthest_m = std::max(furthest_m, (ankle_m(out) - ankle_m(whole)).norm());
+    }
+  }
+  CHECK(furthest_m < 0.05);  // half of what the hold makes; the joint comes back without a contact
+}
+
+TEST_CASE("the slide of a clip leaves out what is not measured", "[feet]") {
+  const auto walk = styled_walk(60.0, 3.0);
+  const Legs legs = Legs::find(*walk.source.skeleton).value();
+  const auto foot = static_cast<std::size_t>(legs.leg(0).foot);
+  const double whole_m_s = slide_m_s(walk.source, walk.styled).value();
+  auto torn = walk.source;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  torn.frames[60].rotation_xyzw[foot] = {0.0F, 0.0F, nan, 0.0F};
+  CHECK(slide_m_s(torn, walk.styled).value() == Approx(whole_m_s).epsilon(0.05));
+  auto lost = walk.styled;
+  lost.frames[60].valid[foot] = false;
+  test::set_leg(*lost.skeleton, legs.leg(0), -0.2, 0.5, lost.frames[60]);
+  CHECK(slide_m_s(walk.source, lost).value() == Approx(whole_m_s).epsilon(0.05));
+}
+
 TEST_CASE("feet that never stand leave the root with the performer", "[feet]") {
   const auto walk = styled_walk(60.0, 4.0);
   const auto stage = feet_stage(walk.source, "stride");

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "models/feet/foot_score.hpp"
+#include "models/feet/leg_reach.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/models/feet/standing_walker.hpp"
 
@@ -40,6 +41,7 @@ TEST_CASE("standing feet slide without the stage, and stand with it", "[feet]") 
       const auto moved = through(*stage, walk);
       CHECK(slide_cm_s(walk, moved) < source_cm_s + 0.2 * before_cm_s);
       CHECK(sink_m(walk.source, moved).value() < 0.01);
+      CHECK(sink_m(moved, walk.source).value() < 0.01);  // nor does it float
     }
   }
 }
@@ -124,6 +126,49 @@ TEST_CASE("the root can change while it runs, without a jump", "[feet]") {
   CHECK(stage->state(FeetStage::kRoot).now == 0.0);
   CHECK(test::root_apart_m(walk.styled.frames.back(), walk.source.frames.back()) == 0.0);
   CHECK((last_m - test::root_of(walk.source.frames.back())).norm() < 0.001);
+}
+
+TEST_CASE("the limit of the root can change while it runs, without a jump", "[feet]") {
+  const auto walk = styled_walk(60.0, 8.0);
+  const auto stage = feet_stage(walk.source, "actor");
+  Eigen::Vector3d last_m = Eigen::Vector3d::Zero();
+  for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
+    if (t == 240) stage->set(FeetStage::kLimit, 0.005);
+    if (t == 360) stage->set(FeetStage::kLimit, 0.08);
+    const Frame out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
+    const Eigen::Vector3d offset_m = test::root_of(out) - test::root_of(walk.source.frames[t]);
+    INFO(t);
+    if (t > 0) CHECK((offset_m - last_m).norm() < 0.02);
+    if (t == 359) CHECK(offset_m.norm() < 0.01);
+    last_m = offset_m;
+  }
+}
+
+TEST_CASE("a knee that is bent backwards bends forward, without a flip", "[feet]") {
+  const auto walk = styled_walk(60.0, 0.1);
+  const Skeleton& skeleton = *walk.source.skeleton;
+  const Legs legs = Legs::find(skeleton).value();
+  const Leg& leg = legs.leg(0);
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  for (const double lift_m : {0.001, 0.03}) {
+    double before_rad = 0.0;
+    for (double bent = 8.0; bent >= -6.0; bent -= 0.25) {
+      INFO(bent);
+      Frame frame = walk.source.frames[0];
+      set_rotation(skeleton, leg.thigh, Eigen::Quaterniond::Identity(), frame);
+      set_rotation(skeleton, leg.shin, axis_rotation(Axis::kX, bent * kDegree), frame);
+      LegPose pose;
+      legs.pose(frame, pose);
+      const Eigen::Vector3d up_m = lift_m * Eigen::Vector3d::UnitY();
+      const Reach bend = reach(skeleton, leg, pose, pose.point_from_root_m[0][kAnkle] + up_m);
+      const Eigen::Vector3d turn_rad = rotation_log(bend.knee_turn);
+      const double knee_rad = bent * kDegree + turn_rad.x();
+      CHECK(turn_rad.x() > -1e-9);
+      if (lift_m > 0.02) CHECK(knee_rad > 0.0);
+      if (bent < 8.0) CHECK(std::abs(knee_rad - before_rad) < 2.0 * kDegree);
+      before_rad = knee_rad;
+    }
+  }
 }
 
 TEST_CASE("the feet stage allocates nothing", "[feet][rt]") {
