@@ -171,7 +171,8 @@ TEST_CASE("the golden logs' frames are reproduced on any machine", "[replay]") {
 }
 
 // tests/golden/replay/feet.plog: a synthetic walker of two seconds, styled, whose root stays on the
-// performer; recorded with `posed record --frames`. A new one needs its reason in the commit message.
+// performer; recorded with `posed record --frames`. A new one needs its reason in the commit
+// message.
 TEST_CASE("the golden log's feet stand where they stood, on any machine", "[replay]") {
   const TempFolder dir;
   const auto copy = dir.path() / "feet.plog";
