@@ -84,7 +84,7 @@ void RootMotion::come_back(double gone, double dt_s, RootMode mode) noexcept {
 // How high the lowest points of a body are above where such points stand; those within a few
 // centimetres of the lowest count gradually, so that another lowest point is no step. RT-safe.
 double RootMotion::lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
-                            Eigen::Vector3d Placed::*body) const noexcept {
+                            Eigen::Vector3d Placed::* body) const noexcept {
   double lowest_m = std::numeric_limits<double>::infinity();
   for (const auto& leg : now) {
     for (std::size_t p = 0; p < kPoints; ++p) {

@@ -73,7 +73,7 @@ class RootMotion {
   void walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s) noexcept;
   void come_back(double gone, double dt_s, RootMode mode) noexcept;
   [[nodiscard]] double lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
-                                Eigen::Vector3d Placed::*body) const noexcept;
+                                Eigen::Vector3d Placed::* body) const noexcept;
   void lift(const OfPoints<Placed>& now, const Contacts& contacts, double gone,
             double dt_s) noexcept;
   [[nodiscard]] bool same_points(const OfPoints<Placed>& now) const noexcept;
