@@ -222,7 +222,7 @@ std::vector<Difference> differences_of(const Dataset& dataset, const Takes& take
 
 MatrixXd goal_of(const Dataset& dataset, const Takes& takes, const AlignedClip& clip,
                  const Difference& difference, const std::string& target) {
-  const MatrixXd own = group_cycle(dataset, takes, target, clip.motion, person_of(dataset, clip));
+  MatrixXd own = group_cycle(dataset, takes, target, clip.motion, person_of(dataset, clip));
   if (own.size() > 0) return own;
   if (difference.people == 0) return group_cycle(dataset, takes, target, clip.motion);
   return fit_harmonics(clip.phase(), clip.q, kCycleHarmonics) + difference.delta;
