@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/feet/approach.hpp"
+
 namespace posed::feet {
 namespace {
 
-// For a leg of kLeg_m; other legs scale them.
-constexpr double kLeg_m = 0.83;
+// For a leg of kReferenceLeg_m; other legs scale them.
 constexpr double kStand_m_s = 0.25;   // a slower point begins to stand
 constexpr double kLeave_m_s = 0.5;    // a faster one no longer stands
 constexpr double kWeight_m_s = 0.2;   // at this speed the weight has fallen to 1 / e
@@ -16,12 +17,11 @@ constexpr double kPatience_s = 0.15;  // above that only after it has been slow 
 constexpr double kSpeedTau_s = 0.012;  // smooths the speed at high rates
 constexpr double kGroundTau_s = 0.2;   // how fast the ground becomes the height where one stands
 
-double smoothing(double dt_s, double tau_s) { return -std::expm1(-dt_s / tau_s); }
 double bell(double x) { return std::exp(-x * x); }
 
 }  // namespace
 
-Contacts::Contacts(const Legs& legs) noexcept : legs_(&legs), scale_(legs.length_m() / kLeg_m) {}
+Contacts::Contacts(const Legs& legs) noexcept : legs_(&legs), scale_(legs.scale()) {}
 
 // RT-safe.
 void Contacts::forget() noexcept {

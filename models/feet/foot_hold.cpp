@@ -63,7 +63,7 @@ const FootHold::Change& FootHold::update(const FootPair& pair,
     home_.ankle_m = half * (begun_.ankle_m - change_.ankle_m);
     home_.turn_rad = half * (begun_.turn_rad - change_.turn_rad);
   }
-  const double swing = -std::expm1(-(1.0 - hold) * dt_s / kSwingTau_s) * (1.0 - gone);
+  const double swing = smoothing((1.0 - hold) * dt_s, kSwingTau_s) * (1.0 - gone);
   change_.ankle_m += swing * (home_.ankle_m - change_.ankle_m);
   change_.turn_rad += swing * (home_.turn_rad - change_.turn_rad);
   const double creep_m = (hold * kCreep_m_s + gone * kGone_m_s) * dt_s;

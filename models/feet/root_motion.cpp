@@ -9,18 +9,17 @@
 namespace posed::feet {
 namespace {
 
-constexpr double kLegOfReference_m = 0.83;  // an adult's; speeds scale with the leg
-constexpr double kFlight = 1e-3;            // weight of going on as before where no foot stands
-constexpr double kDriftTau_s = 0.3;         // over which the offset's own speed is averaged
-constexpr double kForgetTau_s = 1.0;        // over which it ends where no foot stands
-constexpr double kMaxDrift_m_s = 3.0;       // no style changes the speed of a walk by more
-constexpr double kReturnTau_s = 1.0;        // the offset returns by this share of itself ...
-constexpr double kReturn_m_s = 0.1;         // ... and by this
-constexpr double kStepTau_s = 0.02;         // smooths the change from foot to foot
-constexpr double kSoft_m = 0.02;            // the lowest point counts gradually within so much
-constexpr double kLiftTau_s = 0.03;         // and the height follows it within so long
-constexpr double kSettled_m = 1e-4;         // a height without a style below this is none
-constexpr double kActorTau_s = 0.2;         // the same for a root that stays on the performer
+constexpr double kFlight = 1e-3;       // weight of going on as before where no foot stands
+constexpr double kDriftTau_s = 0.3;    // over which the offset's own speed is averaged
+constexpr double kForgetTau_s = 1.0;   // over which it ends where no foot stands
+constexpr double kMaxDrift_m_s = 3.0;  // no style changes the speed of a walk by more
+constexpr double kReturnTau_s = 1.0;   // the offset returns by this share of itself ...
+constexpr double kReturn_m_s = 0.1;    // ... and by this
+constexpr double kStepTau_s = 0.02;    // smooths the change from foot to foot
+constexpr double kSoft_m = 0.02;       // the lowest point counts gradually within so much
+constexpr double kLiftTau_s = 0.03;    // and the height follows it within so long
+constexpr double kSettled_m = 1e-4;    // a height without a style below this is none
+constexpr double kActorTau_s = 0.2;    // the same for a root that stays on the performer
 
 Eigen::Vector3d shortened(const Eigen::Vector3d& v, double length) {
   const double norm = v.norm();
@@ -29,8 +28,7 @@ Eigen::Vector3d shortened(const Eigen::Vector3d& v, double length) {
 
 }  // namespace
 
-RootMotion::RootMotion(const Legs& legs) noexcept
-    : legs_(&legs), scale_(legs.length_m() / kLegOfReference_m) {}
+RootMotion::RootMotion(const Legs& legs) noexcept : legs_(&legs), scale_(legs.scale()) {}
 
 // RT-safe.
 void RootMotion::forget() noexcept {
@@ -62,11 +60,11 @@ void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts, dou
   step_m.y() = 0.0;
   step_m = shortened(step_m, kMaxDrift_m_s * scale_ * dt_s);
   const double trust = weight / (weight + kFlight);
-  drift_m_s_ += -std::expm1(-dt_s * trust / kDriftTau_s) * (step_m / dt_s - drift_m_s_);
+  drift_m_s_ += smoothing(dt_s * trust, kDriftTau_s) * (step_m / dt_s - drift_m_s_);
   drift_m_s_ *= std::exp(-dt_s * (1.0 - trust) / kForgetTau_s);
   // A share of what is pending, so that frames at uneven times still add up to every step.
   pending_m_ += step_m;
-  const Eigen::Vector3d smooth_m = -std::expm1(-dt_s / kStepTau_s) * pending_m_;
+  const Eigen::Vector3d smooth_m = smoothing(dt_s, kStepTau_s) * pending_m_;
   offset_m_ += smooth_m;
   pending_m_ -= smooth_m;
 }
@@ -108,7 +106,7 @@ void RootMotion::lift(const OfPoints<Placed>& now, const Contacts& contacts, dou
   const double wanted_m =
       lowest_m(now, contacts, &Placed::performer_m) - lowest_m(now, contacts, &Placed::avatar_m);
   if (!std::isfinite(wanted_m)) return;  // no foot is known
-  const double share = fresh_ ? 1.0 : -std::expm1(-dt_s / kLiftTau_s);
+  const double share = fresh_ ? 1.0 : smoothing(dt_s, kLiftTau_s);
   offset_m_.y() += share * (wanted_m - offset_m_.y());
   if (gone >= 1.0 && std::abs(offset_m_.y()) < kSettled_m) offset_m_.y() = 0.0;
 }

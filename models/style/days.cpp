@@ -55,7 +55,7 @@ MatrixXd same_places(Eigen::Index sources, Eigen::Index targets) {
 
 // One row a take: its cycle on the grid.
 MatrixXd stacked_cycles(const std::vector<TakeCycle>& takes, const std::vector<int>& members) {
-  const MatrixXd grid = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const MatrixXd grid = grid_basis();
   const auto dims = takes.front().coefficients.cols();
   MatrixXd rows(std::ssize(members), kGridFrames * dims);
   for (Eigen::Index i = 0; i < std::ssize(members); ++i) {
@@ -161,10 +161,6 @@ std::vector<std::pair<int, MatrixXd>> day_changes(const Dataset& dataset,
     }
   }
   return changes;
-}
-
-bool follows_days(const Dataset& dataset, const std::string& target) {
-  return !day_changes(dataset, take_cycles(dataset), {}, target).empty();
 }
 
 }  // namespace posed::style

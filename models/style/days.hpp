@@ -17,7 +17,4 @@ namespace posed::style {
     const Dataset& dataset, const std::vector<TakeCycle>& takes, const std::vector<int>& left_out,
     const std::string& target);
 
-// Whether the days of anybody are followed when all takes are learnt from.
-[[nodiscard]] bool follows_days(const Dataset& dataset, const std::string& target);
-
 }  // namespace posed::style

@@ -30,9 +30,9 @@ gp::Hyper paper_start(const MatrixXd& Y) {
           .log_noise = std::log(1e-2 * std::max(variance, 1e-9))};
 }
 
-MatrixXd grid_basis() { return harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics); }
-
 }  // namespace
+
+MatrixXd grid_basis() { return harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics); }
 
 MatrixXd grid_inputs(const TrainingPairs& pairs) {
   const MatrixXd basis = grid_basis();
@@ -90,7 +90,7 @@ void Way::add(const Way& other) {
 
 Way way_of(const MatrixXd& q, const VectorXd& phase, const MatrixXd& goal, const MatrixXd& change,
            const Eigen::RowVectorXd& constant) {
-  const MatrixXd grid = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const MatrixXd grid = grid_basis();
   const auto squares = [&](const MatrixXd& frames) {
     return (grid * (fit_harmonics(phase, frames, kCycleHarmonics) - goal)).squaredNorm();
   };

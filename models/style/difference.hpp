@@ -15,6 +15,9 @@ inline constexpr int kCycleHarmonics =
     4;                                  // mean and 4 harmonics describe a cycle down to its noise
 inline constexpr int kGridFrames = 28;  // points of a cycle that the process is trained on
 
+// Harmonic coefficients of a cycle to its kGridFrames points.
+[[nodiscard]] Eigen::MatrixXd grid_basis();
+
 // The most poses that a process keeps; above it they are inducing poses (models/gp/inducing.hpp).
 inline constexpr int kMostPoses = 600;
 
@@ -32,6 +35,7 @@ struct Outputs {
 struct TrainingPairs {
   std::vector<Eigen::MatrixXd> inputs;  // cycles
   Outputs outputs;
+  bool follows_days = false;  // some outputs are those of a take's own day (days.hpp)
 };
 
 // Length of the kernel [rad] and noise over signal variance.

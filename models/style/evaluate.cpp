@@ -107,7 +107,7 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
   const auto after = view_of(*styled_motion, *spec, styled.path);
   if (!after) return std::unexpected(after.error());
 
-  const MatrixXd grid = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const MatrixXd grid = grid_basis();
   const MatrixXd goal_coefficients = goal->coefficients();
   const MatrixXd goal_cycle = grid * goal_coefficients;
   const auto at = [&](const View& view) {

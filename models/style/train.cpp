@@ -9,7 +9,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "models/style/days.hpp"
 #include "models/style/harmonics.hpp"
 #include "models/style/leave_out.hpp"
 #include "models/style/training_check.hpp"
@@ -81,8 +80,8 @@ Result<Learnt> learn_default(const Dataset& dataset, const std::string& target, 
   if (!chosen) return stopped();
   auto process = fit_difference(pairs, chosen->kernel);
   if (!process) return std::unexpected(process.error());
-  Learnt learnt{std::move(*process), grid_outputs(pairs.outputs), {}, false, chosen->way};
-  learnt.follows_days = follows_days(dataset, target);
+  Learnt learnt{
+      std::move(*process), grid_outputs(pairs.outputs), {}, pairs.follows_days, chosen->way};
   learnt.kernel["length_chosen_by"] = leave_out.folds.empty() ? "default" : "leave-out";
   return learnt;
 }

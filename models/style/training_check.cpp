@@ -36,7 +36,7 @@ std::string percent(double share) { return with_digits(100.0 * share, 0) + " %";
 // Rms over phases and joints of the rotation between two cycles, given as the difference of their
 // harmonic coefficients.
 double difference_squares(const Dataset& dataset, const MatrixXd& coefficients) {
-  const MatrixXd grid = harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics);
+  const MatrixXd grid = grid_basis();
   return (grid * coefficients).squaredNorm() /
          static_cast<double>(kGridFrames * std::ssize(dataset.spec.joints));
 }

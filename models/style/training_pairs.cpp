@@ -243,6 +243,7 @@ TrainingPairs make_training_pairs(const Dataset& dataset, const Takes& takes,
     outputs.of_input.push_back(index_of(differences, clip_of(dataset, take)));
   }
   for (auto& [take, day] : day_changes(dataset, takes, left_out, target)) {
+    pairs.follows_days = true;
     int& index = outputs.of_input[static_cast<std::size_t>(take)];
     day += outputs.differences[static_cast<std::size_t>(index)];
     index = static_cast<int>(std::ssize(outputs.differences));

@@ -13,6 +13,7 @@ namespace {
 
 using test::feet_stage;
 using test::styled_walk;
+using test::StyledWalk;
 using test::through;
 
 Eigen::Vector3d offset_of(const Frame& out, const Frame& source) {
@@ -48,6 +49,15 @@ std::shared_ptr<const Skeleton> without(const Skeleton& skeleton, std::vector<st
 }
 
 }  // namespace
+
+// What the stage makes of the last of the first `count` frames of a walk.
+Frame after(Stage& stage, const StyledWalk& walk, std::size_t count) {
+  Frame out;
+  for (std::size_t t = 0; t < count; ++t) {
+    out = through(stage, walk.source.frames[t], walk.styled.frames[t]);
+  }
+  return out;
+}
 
 TEST_CASE("after a teleport the avatar is where the performer is", "[feet]") {
   const auto walk = styled_walk(60.0, 6.0);
@@ -90,10 +100,7 @@ TEST_CASE("a file that loops gives the same walk again and again", "[feet]") {
 TEST_CASE("a silence does not move the avatar beside its performer", "[feet]") {
   const auto walk = styled_walk(60.0, 6.0);
   const auto stage = feet_stage(walk.source, "stride");
-  Frame out;
-  for (std::size_t t = 0; t < 200; ++t) {
-    out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
-  }
+  Frame out = after(*stage, walk, 200);
   const Eigen::Vector3d before_m = offset_of(out, walk.source.frames[199]);
   // A second later, a quarter of a metre on.
   const MovedPair pair = moved(walk, 201, {0.0, 0.0, 0.25}, 1'000'000'000);
@@ -104,10 +111,7 @@ TEST_CASE("a silence does not move the avatar beside its performer", "[feet]") {
 TEST_CASE("who walks on through a silence is not taken for a teleport", "[feet]") {
   const auto walk = styled_walk(60.0, 6.0);
   const auto stage = feet_stage(walk.source, "stride");
-  Frame out;
-  for (std::size_t t = 0; t < 200; ++t) {
-    out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
-  }
+  Frame out = after(*stage, walk, 200);
   const Eigen::Vector3d before_m = offset_of(out, walk.source.frames[199]);
   CHECK(level_m(before_m) > 0.2);
   const MovedPair pair = moved(walk, 200, {0.0, 0.0, 3.0}, 2'000'000'000);

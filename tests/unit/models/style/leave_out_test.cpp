@@ -24,7 +24,8 @@ Eigen::MatrixXd some_cycle(std::mt19937& bits) {
 style::LeaveOut walkers() {
   std::mt19937 bits(3);
   style::LeaveOut found;
-  auto& [inputs, outputs] = found.pairs;
+  auto& inputs = found.pairs.inputs;
+  auto& outputs = found.pairs.outputs;
   outputs.offset = Eigen::RowVectorXd::Constant(kDims, 0.1);
   for (int w = 0; w < kWalkers; ++w) {
     inputs.push_back(some_cycle(bits));
