@@ -14,6 +14,7 @@
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/stream_name.hpp"
 
 namespace posed::replay {
 namespace {
@@ -33,8 +34,10 @@ std::map<std::string, Parts> parts_by_name(const Replay& replay) {
   return parts;
 }
 
-const Skeleton& skeleton_of(const Replay& replay, std::uint32_t id) {
-  return *replay.stream(id).published;
+// Of the frames that the stream published, or of its unstyled ones.
+std::shared_ptr<const Skeleton> skeleton_of(const Replay& replay, std::uint32_t id, bool raw) {
+  const ReplayStream& stream = replay.stream(id);
+  return raw ? stream.description.skeleton : stream.published;
 }
 
 // The part that "walker#2" names; empty if there is none.
@@ -49,14 +52,14 @@ Parts part_named(const std::map<std::string, Parts>& parts, const std::string& w
 
 // A clip has one skeleton.
 Result<> check_same_skeleton(const Replay& replay, const std::string& name, const Parts& ids,
-                             const std::string& path) {
-  const auto id_of = [&](std::uint32_t id) { return skeleton_of(replay, id).id; };
+                             const std::string& path, bool raw = false) {
+  const auto id_of = [&](std::uint32_t id) { return skeleton_of(replay, id, raw)->id; };
   const auto differs = [&](std::uint32_t id) { return id_of(id) != id_of(ids.front()); };
   if (std::ranges::none_of(ids, differs)) return {};
   std::string list;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     list += (i == 0 ? "" : ", ") + name + "#" + std::to_string(i + 1) + " (" +
-            std::to_string(skeleton_of(replay, ids[i]).joints.size()) + " joints)";
+            std::to_string(skeleton_of(replay, ids[i], raw)->joints.size()) + " joints)";
   }
   return misuse("stream " + in_quotes(name) +
                     " changed its skeleton, so its parts are clips of their own; name one by"
@@ -65,24 +68,39 @@ Result<> check_same_skeleton(const Replay& replay, const std::string& name, cons
                 path);
 }
 
-Result<Parts> choose(const Replay& replay, const std::string& wanted, const std::string& path) {
+// The streams that become one clip.
+struct Chosen {
+  Parts ids;
+  bool raw = false;  // the unstyled frames of them
+};
+
+Result<Chosen> choose(const Replay& replay, const std::string& wanted, const std::string& path) {
   const auto parts = parts_by_name(replay);
   if (parts.empty()) return fail("has no stream with a skeleton", path);
   std::string names;
   for (const auto& [name, ids] : parts) names += (names.empty() ? "" : ", ") + name;
-  if (wanted.empty() && parts.size() > 1) {
+  const bool raw = wanted.ends_with(kRawSuffix) && !parts.contains(wanted);
+  const std::string stream = raw ? wanted.substr(0, wanted.size() - kRawSuffix.size()) : wanted;
+  if (stream.empty() && parts.size() > 1) {
     return misuse("has the streams " + names + "; name one by --stream", path);
   }
-  const auto found = wanted.empty() ? parts.begin() : parts.find(wanted);
-  if (found == parts.end()) {
-    const Parts one = part_named(parts, wanted);
-    if (!one.empty()) return one;
-    return misuse("has no stream " + in_quotes(wanted) + " with a skeleton, but " + names, path);
+  const auto found = stream.empty() ? parts.begin() : parts.find(stream);
+  Chosen chosen{.ids = found == parts.end() ? part_named(parts, stream) : found->second,
+                .raw = raw};
+  if (chosen.ids.empty()) {
+    return misuse("has no stream " + in_quotes(stream) + " with a skeleton, but " + names, path);
   }
-  if (auto same = check_same_skeleton(replay, found->first, found->second, path); !same) {
+  if (raw && !replay.stream(chosen.ids.front()).settings.publish_raw) {
+    return fail(
+        "stream " + in_quotes(replay.stream(chosen.ids.front()).name) +
+            " was recorded without `publish_raw = true`, so its unstyled motion is not in the log",
+        path);
+  }
+  const std::string& name = replay.stream(chosen.ids.front()).name;
+  if (auto same = check_same_skeleton(replay, name, chosen.ids, path, raw); !same) {
     return std::unexpected(same.error());
   }
-  return found->second;
+  return chosen;
 }
 
 // Collects the frames of a stream's parts as they were published, each once.
@@ -211,13 +229,14 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   auto opened = Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   Replay& replay = **opened;
-  const auto ids = choose(replay, stream, path.string());
-  if (!ids) return std::unexpected(ids.error());
-  const ReplayStream& first = replay.stream(ids->front());
-  Collector collector(first.published);
+  const auto chosen = choose(replay, stream, path.string());
+  if (!chosen) return std::unexpected(chosen.error());
+  const ReplayStream& first = replay.stream(chosen->ids.front());
+  Collector collector(skeleton_of(replay, chosen->ids.front(), chosen->raw));
+  const auto kind = chosen->raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
   const auto take = [&](const pipeline::Item& item) {
-    if (item.kind == pipeline::Item::Kind::kFrame && holds(interval, replay.position()) &&
-        std::ranges::find(*ids, item.frame.header.stream) != ids->end()) {
+    if (item.kind == kind && holds(interval, replay.position()) &&
+        std::ranges::find(chosen->ids, item.frame.header.stream) != chosen->ids.end()) {
       collector.take(item.frame);
     }
   };
@@ -232,7 +251,7 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   }
   auto clip = collector.finish(path.string(), first.description.rate_hz);
   if (!clip) return clip;
-  for (const std::uint32_t id : *ids) {
+  for (const std::uint32_t id : chosen->ids) {
     const auto broken = replay.broken_at(id);
     if (!broken) continue;
     clip->warnings.push_back("the log is known to lack data from frame " + std::to_string(*broken) +

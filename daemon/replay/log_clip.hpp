@@ -13,9 +13,10 @@ namespace posed::replay {
 
 // The stream named `stream`; the only one if that is empty. A body that came several times has
 // several parts, which become one clip; "walker#2" is the second part alone, for a body that
-// changed its skeleton. Times are those of the device if it has them, otherwise those of arrival,
-// starting from 0. `take`: only what was published during this take of the log, by its number or
-// its name; empty: all. `warnings` describes what the log or the run left out.
+// changed its skeleton. "walker-raw" is its unstyled motion, if it was published. Times are those
+// of the device if it has them, otherwise those of arrival, starting from 0. `take`: only what was
+// published during this take of the log, by its number or its name; empty: all. `warnings`
+// describes what the log or the run left out.
 [[nodiscard]] Result<clip::Clip> clip_of_log(const std::filesystem::path& path,
                                              const std::string& stream,
                                              const std::string& take = {});

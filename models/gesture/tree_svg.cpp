@@ -1,12 +1,11 @@
 // The SVG drawing of the trees: leaves are side by side, every other node is above the middle of
 // its children, and the trees are stacked.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "models/gesture/drawn_tree.hpp"
 #include "models/gesture/tree_drawing.hpp"
+#include "proto/text/svg.hpp"
 
 namespace posed::gesture {
 namespace {
@@ -17,28 +16,6 @@ constexpr double kBoxHeight = 40.0, kLevel = 84.0, kGap = 14.0, kTitle = 34.0, k
 struct Placed {
   double x = 0.0, width = 0.0;  // of the box: centre and width
 };
-
-std::string number(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.1f", value);
-  return text.data();
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else if (c == '>') {
-      out += "&gt;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
 
 class Picture {
  public:
@@ -59,14 +36,12 @@ class Picture {
   }
 
   [[nodiscard]] std::string svg() const {
-    const std::string size = number(width_ + kMargin) + " " + number(top_ + kMargin);
-    return "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + size + "\" width=\"" +
-           number(width_ + kMargin) + "\" height=\"" + number(top_ + kMargin) +
-           "\">\n<style>text{font:12px sans-serif;text-anchor:middle}"
-           ".title{font:bold 14px sans-serif;text-anchor:start}.reach{fill:#666}"
-           "line{stroke:#888}.ask{fill:#fff;stroke:#444}.leaf{fill:#e4f0e0;stroke:#5a8a4a}"
-           "</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n" +
-           body_ + "</svg>\n";
+    return svg_document(width_ + kMargin, top_ + kMargin,
+                        "text{font:12px sans-serif;text-anchor:middle}"
+                        ".title{font:bold 14px sans-serif;text-anchor:start}.reach{fill:#666}"
+                        "line{stroke:#888}.ask{fill:#fff;stroke:#444}"
+                        ".leaf{fill:#e4f0e0;stroke:#5a8a4a}",
+                        body_);
   }
 
  private:
@@ -91,8 +66,8 @@ class Picture {
   }
 
   void text(double x, double y, const std::string& words, const std::string& kind) {
-    body_ += "<text class=\"" + kind + "\" x=\"" + number(x) + "\" y=\"" + number(y) + "\">" +
-             escaped(words) + "</text>\n";
+    body_ += "<text class=\"" + kind + "\" x=\"" + svg_number(x) + "\" y=\"" + svg_number(y) +
+             "\">" + svg_text(words) + "</text>\n";
   }
 
   void branches(const DrawnTree& tree, std::size_t i, const std::vector<Placed>& placed) {
@@ -101,8 +76,8 @@ class Picture {
       if (child < 0) continue;
       const double from = y_of(node) + kBoxHeight;
       const double to = y_of(tree.nodes[child]);
-      body_ += "<line x1=\"" + number(placed[i].x) + "\" y1=\"" + number(from) + "\" x2=\"" +
-               number(placed[child].x) + "\" y2=\"" + number(to) + "\"/>\n";
+      body_ += "<line x1=\"" + svg_number(placed[i].x) + "\" y1=\"" + svg_number(from) +
+               "\" x2=\"" + svg_number(placed[child].x) + "\" y2=\"" + svg_number(to) + "\"/>\n";
       const bool yes = child == node.yes;
       text(0.35 * placed[i].x + 0.65 * placed[child].x + (yes ? -16.0 : 14.0),
            0.35 * from + 0.65 * to - 4.0, yes ? "yes" : "no", "answer");
@@ -112,8 +87,8 @@ class Picture {
   void box(const DrawnNode& node, const Placed& place) {
     const double y = y_of(node);
     body_ += "<rect class=\"" + std::string(node.yes < 0 ? "leaf" : "ask") + "\" x=\"" +
-             number(place.x - place.width / 2.0) + "\" y=\"" + number(y) + "\" width=\"" +
-             number(place.width) + "\" height=\"" + number(kBoxHeight) + "\" rx=\"5\"/>\n";
+             svg_number(place.x - place.width / 2.0) + "\" y=\"" + svg_number(y) + "\" width=\"" +
+             svg_number(place.width) + "\" height=\"" + svg_number(kBoxHeight) + "\" rx=\"5\"/>\n";
     text(place.x, y + 17.0, node.words, "words");
     text(place.x, y + 33.0, node.reach, "reach");
   }

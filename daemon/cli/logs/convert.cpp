@@ -184,7 +184,8 @@ void add_convert(CLI::App& app, int& exit_code) {
                       "Skeleton profile (default: found by the joints' names)");
   auto* stream = command->add_option(
       "--stream", convert->stream,
-      "Which of a log's streams (default: the only one); NAME#2: its second part");
+      "Which of a log's streams (default: the only one); NAME#2: its second part, "
+      "NAME-raw: its unstyled motion");
   auto* take =
       command->add_option("--take", convert->take,
                           "Only this take of a log: its number, or its name if that is unique");

@@ -1,0 +1,90 @@
+// `posed render`: strips of clips and of a log with its unstyled motion.
+#include <catch2/catch.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include "models/motion/synthetic_walker.hpp"
+#include "tests/e2e/served.hpp"
+#include "tests/support/file_text.hpp"
+#include "tests/support/has.hpp"
+
+namespace posed::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class Gallery : public Stage {
+ public:
+  Gallery() {
+    const auto walk = motion::make_walker({.seconds = 2.0, .rate_hz = 60.0}).value();
+    REQUIRE(clip::write_bvh(walk, folder.path() / "walk.bvh"));
+  }
+
+  [[nodiscard]] ProgramOutcome render(const std::string& in, const std::string& out,
+                                      std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"render", path(in), "--out", path(out)});
+    return posed(std::move(more));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("render draws a clip as a strip, as a pose and refuses what it cannot draw") {
+  const Gallery gallery;
+  const ProgramOutcome strip =
+      gallery.render("walk.bvh", "strip.svg", {"--view", "side", "--count", "5", "--json"});
+  INFO(strip.err);
+  REQUIRE(strip.code == 0);
+  CHECK(nlohmann::json::parse(strip.out).at("frames") == 120);
+  const std::string svg = file_text(gallery.path("strip.svg"));
+  CHECK(has(svg, "5 poses seen from the side"));
+  CHECK(has(svg, "walk.bvh"));
+
+  REQUIRE(gallery.render("walk.bvh", "pose.svg", {"--frame", "60"}).code == 0);
+  CHECK(has(file_text(gallery.path("pose.svg")), "1.00 s"));
+
+  const auto refused = [&](const std::string& out, const std::vector<std::string>& more,
+                           const std::string& sentence) {
+    const ProgramOutcome outcome = gallery.render("walk.bvh", out, more);
+    INFO(outcome.err);
+    CHECK(outcome.code == 2);
+    CHECK(has(outcome.err, sentence));
+  };
+  refused("no.svg", {"--frame", "120"}, "has the frames 0 to 119, not 120");
+  refused("no.mp4", {}, "add --video");
+  refused("no.svg", {"--video"}, "a video is an .mp4");
+  refused("no.svg", {"--raw-beside"}, "is a clip");
+  refused("no.svg", {"--from", "7"}, "has no frame from 7");
+  refused("strip.svg", {}, "--overwrite");
+}
+
+TEST_CASE("render draws a log's motion beside the unstyled one, where the log has it") {
+  Gallery gallery;
+  std::string config = Stage::kEndpoints;
+  for (const std::string raw : {"true", "false"}) {
+    config += "[[stream]]\nname = \"raw_" + raw + "\"\npublish_raw = " + raw +
+              "\ndriver = \"file\"\n[stream.file]\npath = \"walk.bvh\"\nloop = false\npace = 0.0\n";
+  }
+  gallery.folder.write("posed.toml", config);
+  gallery.record();
+  for (int i = 0; i < 50 && !has(gallery.ctl({"status"}).out, "ended"); ++i) {
+    std::this_thread::sleep_for(50ms);
+  }
+  gallery.daemon->send(SIGTERM);
+  REQUIRE(gallery.daemon->exit_code() == 0);
+  const ProgramOutcome both =
+      gallery.render("take.plog", "both.svg", {"--stream", "raw_true", "--raw-beside"});
+  INFO(both.err);
+  REQUIRE(both.code == 0);
+  const std::string svg = file_text(gallery.path("both.svg"));
+  CHECK(has(svg, "as it came in"));
+  CHECK(has(svg, "as posed published it"));
+  const ProgramOutcome without =
+      gallery.render("take.plog", "no.svg", {"--stream", "raw_false", "--raw-beside"});
+  CHECK(without.code == 1);
+  CHECK(has(without.err, "without `publish_raw = true`"));
+}
+
+}  // namespace posed::test
