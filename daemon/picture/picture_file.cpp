@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <ostream>
 #include <system_error>
@@ -11,6 +10,7 @@
 
 #include "daemon/picture/program.hpp"
 #include "proto/frame/whole_file.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::picture {
 namespace {
@@ -46,9 +46,9 @@ Result<> write_text(const std::string& text, const std::filesystem::path& path) 
 
 // So that the file at `to` appears only when it is whole.
 Result<> copy_whole(const std::string& from, const std::filesystem::path& to) {
-  std::ifstream file(from, std::ios::binary);
-  if (!file) return fail("cannot be read: " + errno_text(), from);
-  return write_whole_file(to, [&](std::ostream& out) { out << file.rdbuf(); });
+  const auto bytes = load_file(from, {.what = "picture", .max_bytes = 1U << 30});
+  if (!bytes) return std::unexpected(bytes.error());
+  return write_text(*bytes, to);
 }
 
 std::string frame_name(int frame) {
