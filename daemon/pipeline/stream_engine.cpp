@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "models/live_text.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
@@ -16,7 +17,7 @@ StreamEngine::StreamEngine(EngineOptions options) : options_(std::move(options))
   for (const EngineStage& stage : options_.stages) {
     const auto& table = stage.type->parameters;
     for (std::size_t i = 0; i < table.size(); ++i) {
-      if (table[i].live) live_.push_back({stage.stage.get(), i});
+      if (table[i].live && has_number(table[i])) live_.push_back({stage.stage.get(), i});
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/pipeline/counters.hpp"
+#include "models/live_text.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::pipeline {
@@ -127,8 +128,8 @@ Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings&
     if (!stage) return std::unexpected(stage.error());
     options.stages.push_back({&type, std::move(*stage)});
     add_feeds(settings.stages[i], i, options.feeds);
-    live +=
-        static_cast<std::size_t>(std::ranges::count(type.parameters, true, &ParameterSpec::live));
+    live += static_cast<std::size_t>(std::ranges::count_if(
+        type.parameters, [](const ParameterSpec& spec) { return spec.live && has_number(spec); }));
   }
   if (options.stages.size() > kMaxStages || live > kMaxLiveParameters) {
     return misuse("a stream has at most " + std::to_string(kMaxStages) + " stages, with " +

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "daemon/publish/frame_output.hpp"
+#include "models/live_text.hpp"
 #include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
@@ -42,7 +43,7 @@ void fill_stages(const std::vector<const StageType*>& stages,
     stage.set_name(std::string(stages[i]->name));
     stage.clear_parameter();
     for (const ParameterSpec& spec : stages[i]->parameters) {
-      if (!spec.live) continue;
+      if (!spec.live || !has_number(spec)) continue;
       const pipeline::ParameterCounter& counter = counters.parameter[live++];
       v1::ParameterStats& parameter = *stage.add_parameter();
       parameter.set_name(std::string(spec.shown_name()));

@@ -171,6 +171,9 @@ Result<PoseSpace> PoseSpace::bind(const PoseSpaceSpec& spec, const Skeleton& ske
 
 int PoseSpace::dims() const noexcept { return static_cast<int>(joint_of_dim_.size()); }
 int PoseSpace::joint_of_dim(int d) const noexcept { return joint_of_dim_[d]; }
+int PoseSpace::skeleton_joint_of_dim(int d) const noexcept {
+  return items_[joint_of_dim_[d]].joint;
+}
 
 // RT-safe
 bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {

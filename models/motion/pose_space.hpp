@@ -58,6 +58,8 @@ class PoseSpace {
   [[nodiscard]] int dims() const noexcept;
   // Which joint of `spec.joints` dimension d belongs to.
   [[nodiscard]] int joint_of_dim(int d) const noexcept;
+  // The joint of the skeleton that it is.
+  [[nodiscard]] int skeleton_joint_of_dim(int d) const noexcept;
 
   // Turn about +Y that brings the training mean of the root nearest to this frame's root [rad].
   // RT-safe.

@@ -40,8 +40,12 @@ void drop_broken_joints(Frame& frame) noexcept {
 }
 
 Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
+  const bool more_fit = std::ranges::all_of(model.more, [&](const MoreStyle& style) {
+    return style.function.weights.cols() == dims && style.limit_rad.size() == dims &&
+           (style.limit_rad.array() >= 0.0).all() && model.limit_rad.size() == dims;
+  });
   const bool process_fits =
-      model.process.inputs.cols() == dims && model.process.weights.cols() == dims;
+      more_fit && model.process.inputs.cols() == dims && model.process.weights.cols() == dims;
   const auto fits = [dims](const Eigen::VectorXd& v) {
     return v.size() == 0 || (v.size() == dims && v.allFinite());
   };
@@ -58,6 +62,21 @@ Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
 
 }  // namespace
 
+BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
+                       gp::Predictor bound_predictor, std::string file)
+    : StageModel(std::move(file)),
+      space(std::move(bound_space)),
+      predictor(std::move(bound_predictor)),
+      limit_rad(model.limit_rad.cast<float>()),
+      input_mean(model.input_mean.cast<float>()),
+      input_sd(model.input_sd.cast<float>()),
+      styles(model.names()),
+      parts(parts_of(space)) {
+  for (const MoreStyle& style : model.more) {
+    more_limits_rad.emplace_back(style.limit_rad.cast<float>());
+  }
+}
+
 Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
                                                      const Skeleton& skeleton,
                                                      const FilterOptions& options,
@@ -71,7 +90,9 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
   if (auto fits = check_fit(model, space->dims(), name); !fits) {
     return std::unexpected(fits.error());
   }
-  auto predictor = gp::Predictor::build(model.process, options.gate);
+  std::vector<gp::Function> more;
+  for (const MoreStyle& style : model.more) more.push_back(style.function);
+  auto predictor = gp::Predictor::build(model.process, options.gate, more);
   if (!predictor) {
     Error error = predictor.error();
     error.file = name;
@@ -85,6 +106,13 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
     : model_(model), options_(options) {
   options_.alpha_slew_per_s = std::clamp(options.alpha_slew_per_s, 1e-3, 1e6);
   set_alpha(static_cast<float>(options.alpha));
+  mask_.begin(options.mask);
+  if (model == nullptr) return;
+  weights_.begin(
+      shares_of(options.weights, model->styles).value_or(first_alone(model->styles.size())));
+  for (int i = 0; i < gp::Predictor::kSettleCalls; ++i) {
+    static_cast<void>(model->predictor.settle(weights_.shares()));
+  }
 }
 
 // RT-safe
@@ -94,8 +122,20 @@ void StyleFilter::set_alpha(float alpha) noexcept {
 }
 
 // RT-safe
+bool StyleFilter::set_shares(const Shares& shares) noexcept {
+  if (model_ == nullptr || shares.count != model_->styles.size()) return false;
+  weights_.aim(shares);
+  return true;
+}
+
+// RT-safe
 const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   discontinuity_ = true;
+  if (model_ == nullptr) {
+    weights_.begin(first_alone(model->styles.size()));
+  } else {
+    weights_.rename(model_->styles, model->styles);
+  }
   return std::exchange(model_, model);
 }
 
@@ -142,6 +182,23 @@ void StyleFilter::use(const StageModel& model) noexcept {
   static_cast<void>(set_model(static_cast<const BoundModel*>(&model)));
 }
 
+// RT-safe
+bool StyleFilter::command(std::size_t index, const StageCommand& command) noexcept {
+  if (index == kWeights) return set_shares(command.as<Shares>());
+  if (index != kMask) return false;
+  set_mask(command.as<Mask>());
+  return true;
+}
+
+// RT-safe
+void StyleFilter::describe(std::size_t index, const StageCommand& command,
+                           ShortText& text) const noexcept {
+  if (index == kMask) describe_mask(command.as<Mask>(), text);
+  if (index == kWeights && model_ != nullptr) {
+    describe_shares(command.as<Shares>(), model_->styles, text);
+  }
+}
+
 float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
 
 void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
@@ -158,6 +215,8 @@ void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   const double slew = options_.alpha_slew_per_s * dt_s;
   alpha_ += std::clamp(alpha_target_ - alpha_, -slew, slew);
   blend_weight_ = std::max(0.0, blend_weight_ - slew);
+  weights_.move(slew);
+  mask_.move(slew);
   const bool served = model_ != nullptr && frame.skeleton == model_->space.skeleton().id;
   if (served) {
     style(frame, dt_s);
@@ -194,7 +253,25 @@ void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   last_out_ = frame.rotation_xyzw;
 }
 
-// The model delta a f(q), gated and clamped. RT-safe
+// Empty while the predictor has the mixture ready. RT-safe
+std::span<const float> StyleFilter::shares_to_ask() noexcept {
+  if (weights_.moving() || !model_->predictor.settle(weights_.shares())) return weights_.shares();
+  return {};
+}
+
+// Of the mixture. RT-safe
+float StyleFilter::limit_rad(std::size_t dim) const noexcept {
+  const auto d = static_cast<Eigen::Index>(dim);
+  if (model_->more_limits_rad.empty()) return model_->limit_rad[d];
+  const std::span<const float> shares = weights_.shares();
+  float limit = shares[0] * model_->limit_rad[d];
+  for (std::size_t s = 1; s < shares.size(); ++s) {
+    limit += shares[s] * model_->more_limits_rad[s - 1][d];
+  }
+  return limit;
+}
+
+// The model delta: alpha times the mixture of styles, gated, clamped and masked. RT-safe
 void StyleFilter::answer(const Dims& q, const Flags& available, double dt_s, Dims& delta) noexcept {
   const gp::Predictor& predictor = model_->predictor;
   const auto dims = static_cast<std::size_t>(predictor.inputs());
@@ -204,17 +281,20 @@ void StyleFilter::answer(const Dims& q, const Flags& available, double dt_s, Dim
   const std::span<const float> input((clips ? clipped : q).data(), dims);
   const std::span<const std::uint8_t> flags(available.data(), dims);
   const std::span<float> out(delta.data(), dims);
+  const std::span<const float> shares = shares_to_ask();
   if (options_.gate && predictor.has_confidence()) {
-    const float g = smoothed_gate(predictor.mean_and_confidence(input, flags, out), dt_s);
+    const float g = smoothed_gate(predictor.mean_and_confidence(input, flags, out, shares), dt_s);
     const float rest = (1.0F - g) * static_cast<float>(options_.gate_fallback);
-    for (std::size_t d = 0; d < dims; ++d) out[d] = g * out[d] + rest * predictor.constant()[d];
+    Dims constant;
+    predictor.constant(weights_.shares(), {constant.data(), dims});
+    for (std::size_t d = 0; d < dims; ++d) out[d] = g * out[d] + rest * constant[d];
   } else {
-    predictor.mean(input, flags, out);
+    predictor.mean(input, flags, out, shares);
   }
-  const Eigen::VectorXf& limit = model_->limit_rad;
+  const bool limited = model_->limit_rad.size() > 0;
   for (std::size_t d = 0; d < dims; ++d) {
-    if (limit.size() > 0) out[d] = std::clamp(out[d], -limit[d], limit[d]);
-    out[d] *= static_cast<float>(alpha_);
+    if (limited) out[d] = std::clamp(out[d], -limit_rad(d), limit_rad(d));
+    out[d] *= static_cast<float>(alpha_) * mask_.factor(model_->parts[d]);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -15,6 +16,15 @@
 #include "proto/frame/result.hpp"
 
 namespace posed::style {
+
+inline constexpr std::size_t kMaxStyles = gp::kMaxFunctions;  // of one model
+
+// A style after a model's first one: another function of the same inputs.
+struct MoreStyle {
+  std::string name;  // of its group
+  gp::Function function;
+  Eigen::VectorXd limit_rad;
+};
 
 struct StyleModel {
   motion::PoseSpaceSpec space;
@@ -26,7 +36,14 @@ struct StyleModel {
   double rate_hz = 30.0;       // of training; the filter has no memory and is correct at any rate
   std::string from, to;        // group names, for people
   std::string report_json;     // what `train --json` printed
+  std::vector<MoreStyle> more{};  // `process`, `limit_rad` and `to` are the first style's
+
+  [[nodiscard]] std::size_t styles() const { return 1 + more.size(); }
+  [[nodiscard]] std::vector<std::string> names() const;  // of its styles, in order
 };
+
+// The model with one style alone: the sum of all, each times its share [styles()].
+[[nodiscard]] StyleModel mixture_of(const StyleModel& model, std::span<const double> shares);
 
 [[nodiscard]] Result<StyleModel> load_model(const std::filesystem::path& path);
 // The same from bytes (control message, device log). `name` is only for error messages. Any bytes

@@ -1,7 +1,12 @@
 #include "models/style/style_type.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
 #include "models/style/style_filter.hpp"
 #include "models/style/style_model.hpp"
+#include "posed/v1/log.pb.h"
 #include "posed/v1/model.pb.h"
 
 namespace posed::style {
@@ -12,12 +17,31 @@ FilterOptions options_of(const Parameters& parameters) {
           .alpha_slew_per_s = parameter<double>(parameters, "alpha_slew_per_s"),
           .gate = parameter<bool>(parameters, "gate"),
           .gate_fallback = parameter<double>(parameters, "gate_fallback"),
-          .calibrate = parameter<bool>(parameters, "calibrate")};
+          .calibrate = parameter<bool>(parameters, "calibrate"),
+          .weights = parameter<std::string>(parameters, "weights"),
+          .mask = mask_of(parameter<std::string>(parameters, "mask")).value_or(whole_body())};
+}
+
+const BoundModel* style_of(const StageModel* model) {
+  return static_cast<const BoundModel*>(model);
+}
+
+// What does not depend on the model.
+std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_model*/) {
+  const auto weights = check_weights(parameter<std::string>(parameters, "weights"));
+  if (!weights) return ParameterFault{"weights", weights.error().message};
+  const auto mask = mask_of(parameter<std::string>(parameters, "mask"));
+  if (!mask) return ParameterFault{"mask", mask.error().message};
+  return std::nullopt;
 }
 
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* model) {
-  return std::make_unique<StyleFilter>(static_cast<const BoundModel*>(model),
-                                       options_of(context.parameters));
+  FilterOptions options = options_of(context.parameters);
+  if (model != nullptr) {
+    const auto shares = shares_of(options.weights, style_of(model)->styles);
+    if (!shares) return fail(shares.error().message, model->name);
+  }
+  return std::make_unique<StyleFilter>(style_of(model), options);
 }
 
 bool takes(const v1::ModelFile& file) { return file.has_style(); }
@@ -28,6 +52,85 @@ Result<std::unique_ptr<const StageModel>> bind(std::span<const std::byte> file,
   const auto model = parse_model(file, name);
   if (!model) return std::unexpected(model.error());
   return bind_model(*model, *context.skeleton, options_of(context.parameters), name);
+}
+
+// A live text comes in pieces that end at its commas.
+std::string joined(std::span<const std::string> words) {
+  std::string text;
+  for (const std::string& word : words) text += (&word == words.data() ? "" : ",") + word;
+  return text;
+}
+
+Result<StageCommand> set_weights(const StageModel* model, std::span<const std::string> words,
+                                 const Parameters& /*options*/) {
+  if (model == nullptr) {
+    return fail("there is no style model; send one with `posed ctl model STREAM M.style`");
+  }
+  const auto shares = shares_of(joined(words), style_of(model)->styles);
+  if (!shares) return std::unexpected(shares.error());
+  return StageCommand::of(*shares);
+}
+
+Result<StageCommand> set_mask(const StageModel* /*model*/, std::span<const std::string> words,
+                              const Parameters& /*options*/) {
+  const auto mask = mask_of(joined(words));
+  if (!mask) return std::unexpected(mask.error());
+  return StageCommand::of(*mask);
+}
+
+void write_numbers(std::span<const double> numbers, v1::DecisionValue& value) {
+  for (const double number : numbers) value.mutable_weights()->add_weight(number);
+}
+
+// Numbers from 0 to 1; empty if there are none or others.
+std::vector<double> read_numbers(const v1::DecisionValue& value, std::size_t most) {
+  const auto& list = value.weights().weight();
+  const bool sound = value.has_weights() && static_cast<std::size_t>(list.size()) <= most &&
+                     std::ranges::all_of(list, [](double n) { return n >= 0.0 && n <= 1.0; });
+  return sound ? std::vector<double>(list.begin(), list.end()) : std::vector<double>();
+}
+
+void weights_to_log(const StageCommand& command, v1::DecisionValue& value) {
+  const auto shares = command.as<Shares>();
+  write_numbers(shares.all(), value);
+}
+
+std::optional<StageCommand> weights_from_log(const v1::DecisionValue& value) {
+  constexpr double kRounding = 1e-9;
+  const auto numbers = read_numbers(value, kMaxStyles);
+  const double sum = std::accumulate(numbers.begin(), numbers.end(), 0.0);
+  if (numbers.empty() || std::abs(sum - 1.0) > kRounding) return std::nullopt;
+  Shares shares{.count = static_cast<std::uint16_t>(numbers.size())};
+  std::ranges::copy(numbers, shares.of.begin());
+  return StageCommand::of(shares);
+}
+
+void mask_to_log(const StageCommand& command, v1::DecisionValue& value) {
+  write_numbers(command.as<Mask>(), value);
+}
+
+std::optional<StageCommand> mask_from_log(const v1::DecisionValue& value) {
+  const auto numbers = read_numbers(value, kBodyParts);
+  if (numbers.size() != kBodyParts) return std::nullopt;
+  Mask mask{};
+  std::ranges::copy(numbers, mask.begin());
+  return StageCommand::of(mask);
+}
+
+// In the order of StyleFilter::Command: what sets the live texts (models/live_text.hpp).
+std::vector<StageCommandType> commands() {
+  return {{.name = "weights",
+           .help = "mixes the model's styles",
+           .refusal = "the weights are for the model before the one that has just come; send them"
+                      " again",
+           .encode = set_weights,
+           .to_log = weights_to_log,
+           .from_log = weights_from_log},
+          {.name = "mask",
+           .help = "styles parts of the body less",
+           .encode = set_mask,
+           .to_log = mask_to_log,
+           .from_log = mask_from_log}};
 }
 
 // In the order of StyleFilter::Parameter.
@@ -57,6 +160,15 @@ std::vector<ParameterSpec> parameters() {
           {.name = "calibrate",
            .default_value = defaults.calibrate,
            .help = "remove the performer's own mean posture before the model sees the pose",
+           .live = true},
+          {.name = "weights",
+           .default_value = std::string(),
+           .help = "how much of each style of the model: \"feminine=0.6,elderly=0.4\"; empty: the"
+                   " first alone",
+           .live = true},
+          {.name = "mask",
+           .default_value = std::string(),
+           .help = "how much of the style parts of the body get: \"arms=0.5,head=0\"; the rest 1",
            .live = true}};
 }
 
@@ -66,10 +178,12 @@ const StageType& style_type() {
   static const StageType type{.name = "style",
                               .summary = "changes the style of every pose, as a trained model says",
                               .parameters = parameters(),
+                              .check = check,
                               .make = make,
                               .model_required = true,
                               .takes = takes,
-                              .bind_model = bind};
+                              .bind_model = bind,
+                              .commands = commands()};
   return type;
 }
 

@@ -24,6 +24,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
+#include "models/live_text.hpp"
 #include "models/stages/registry.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
@@ -319,6 +320,7 @@ std::string live_parameters() {
       std::string range = flag ? "true or false"
                                : fmt::format("{:g} to {:g}", spec.min * spec.people_scale,
                                              spec.max * spec.people_scale);
+      if (!has_number(spec)) range = "a=0.6,b=0.4";
       if (!spec.words.empty()) range = fmt::format("{}", fmt::join(spec.words, ", "));
       lines += fmt::format("  {:<26} {:<14} {}\n",
                            fmt::format("{}.{}", stage->name, spec.shown_name()), range, spec.help);
@@ -334,6 +336,7 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
                              "  posed ctl set walker alpha 0.5          # half the "
                              "style; alpha moves there slowly\n"
                              "  posed ctl set walker style.calibrate true\n"
+                             "  posed ctl set walker style.weights feminine=0.6,elderly=0.4\n"
                              "Parameters that a running daemon can change:\n" +
                                  live_parameters());
   set->add_option("parameter", options.parameter,

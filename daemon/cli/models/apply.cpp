@@ -25,6 +25,7 @@ struct ApplyArguments {
   std::filesystem::path model, in, out;
   clip::ReadOptions read;
   style::ApplyOptions apply;
+  std::string mask;
   bool overwrite = false, json = false;
 };
 
@@ -40,10 +41,19 @@ Result<> check_files(const ApplyArguments& options) {
       .check();
 }
 
-// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say.
+// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say,
+// as where it has several styles.
 double training_difference_deg(const style::StyleModel& model) {
   const auto report = nlohmann::json::parse(model.report_json, nullptr, false);
   return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;
+}
+
+// {"feminine": 0.6, "elderly": 0.4}
+nlohmann::json shares_json(const style::StyleModel& model, const style::Shares& shares) {
+  nlohmann::json json = nlohmann::json::object();
+  const std::vector<std::string> names = model.names();
+  for (std::size_t s = 0; s < names.size(); ++s) json[names[s]] = shares.of[s];
+  return json;
 }
 
 std::string verdict(const style::WalkerFit& fit, double rms_deg, double training_deg) {
@@ -67,6 +77,11 @@ Result<> run(ApplyArguments options) {
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
+  const auto shares = style::shares_of(options.apply.filter.weights, model->names());
+  if (!shares) return std::unexpected(shares.error());
+  const auto mask = style::mask_of(options.mask);
+  if (!mask) return std::unexpected(mask.error());
+  options.apply.filter.mask = *mask;
   const auto clip = clip::read_clip(options.in, options.read);
   if (!clip) return std::unexpected(clip.error());
   for (const std::string& warning : clip->warnings) {
@@ -92,6 +107,8 @@ Result<> run(ApplyArguments options) {
                                 {"rate_hz", clip->frame_rate_hz},
                                 {"from", model->from},
                                 {"to", model->to},
+                                {"weights", shares_json(*model, *shares)},
+                                {"mask", options.mask},
                                 {"alpha", options.apply.filter.alpha},
                                 {"cold", options.apply.cold},
                                 {"root", root_text(options.apply.feet)},
@@ -126,6 +143,10 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--alpha", filter.alpha, "How much: 0 none, 1 the target, negative away")
       ->check(CLI::Range(-style::kMaxAlpha, style::kMaxAlpha))
       ->capture_default_str();
+  command->add_option("--weights", filter.weights, "Mixes the model's styles: A=0.6,B=0.4")
+      ->type_name("WEIGHTS");
+  command->add_option("--mask", options->mask, "Styles parts of the body less: arms=0.5,head=0")
+      ->type_name("MASK");
   add_root_option(*command, options->apply.feet);
   command->add_option("--skeleton", options->read.asf, "NN.asf of an AMC (default: beside it)")
       ->type_name("NN.asf");
@@ -140,6 +161,11 @@ void add_apply(CLI::App& app, int& exit_code) {
   posed apply --model walk.style --root stride walk_03.bvh --out styled.bvh   # feet stand
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
+  posed apply --model two.style --weights feminine=0.6,elderly=0.4 --mask arms=0.5 \
+      walk_03.bvh --out mixed.bvh
+Weights count as shares of their sum; without them the model's first style has all. A mask leaves
+parts that it does not name at 1; it has arms, legs, trunk, head and left-arm, right-arm, left-leg,
+right-leg.
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
 rotations. Without --cold the style has its full strength from the first frame. The last line says
 how far the walker is from those in the training data. "deg rms" is the angle between the

@@ -27,6 +27,7 @@ constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --root stride
+  posed eval style --model two.style --weights sad=1 --source plain_3.bvh --target sad_3.bvh
 
 The source goes through the same stage as live, and is compared in the model's pose space.
 cycle_ratio: how far the styled walk's average cycle
@@ -45,7 +46,7 @@ constexpr double kCentimetres = 100.0;  // of a metre
 constexpr double kRough = 1.5;          // a jerk_ratio above this is visible
 
 struct EvalOptions {
-  std::string model, source, target, skeleton;
+  std::string model, source, target, skeleton, weights;
   double alpha = 1.0;
   std::optional<feet::RootOptions> feet;
   bool json = false;
@@ -118,6 +119,7 @@ json report_of(const Evaluation& e, const EvalOptions& options) {
               {"root_speed_m_s", of_clips(score.root_speed_m_s, 1.0)},
               {"root", root_text(options.feet)},
               {"alpha", options.alpha},
+              {"weights", options.weights},
               {"helps", e.helps()},
               {"verdict", verdict(e)}};
 }
@@ -132,14 +134,18 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
   if (!source) return std::unexpected(source.error());
   const auto target = read(options.target, options.skeleton);
   if (!target) return std::unexpected(target.error());
-  const auto fit = style::fit_of_walker(*model, options.model, *source);
+  const auto shares = style::shares_of(options.weights, model->names());
+  if (!shares) return std::unexpected(shares.error());
+  const style::StyleModel mixture = style::mixture_of(*model, shares->all());
+  const auto fit = style::fit_of_walker(mixture, options.model, *source);
   if (!fit) return std::unexpected(fit.error());
-  const style::StyleModel constant = style::with_constant_change(*model, fit->mean_change);
+  const style::StyleModel constant = style::with_constant_change(mixture, fit->mean_change);
   ProgressBar bar(kQuietFor_s);
   Evaluation evaluation{.score = {}, .constant = {}, .fit = *fit};
   for (const bool full : {false, true}) {
     style::ApplyOptions apply;
     apply.filter.alpha = options.alpha;
+    if (full) apply.filter.weights = options.weights;
     apply.feet = options.feet;
     apply.progress = [&](int done, int total) {
       return bar.show("styling", 0.5 * full + 0.5 * done / total);
@@ -189,6 +195,8 @@ void add_eval(CLI::App& app, int& exit_code) {
   style->add_option("--source", options->source, "Clip to be styled")->required();
   style->add_option("--target", options->target, "Clip in the target style")->required();
   style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
+  style->add_option("--weights", options->weights, "Mixes the model's styles: A=0.6,B=0.4")
+      ->type_name("WEIGHTS");
   style->add_option("--alpha", options->alpha, "How much style")
       ->check(CLI::Range(-2.0, 2.0))
       ->capture_default_str();
