@@ -113,6 +113,7 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
   for (int i = 0; i < gp::Predictor::kSettleCalls; ++i) {
     static_cast<void>(model->predictor.settle(weights_.shares()));
   }
+  mix_limits();
 }
 
 // RT-safe
@@ -136,7 +137,9 @@ const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   } else {
     weights_.rename(model_->styles, model->styles);
   }
-  return std::exchange(model_, model);
+  const BoundModel* const before = std::exchange(model_, model);
+  mix_limits();
+  return before;
 }
 
 // RT-safe
@@ -215,8 +218,11 @@ void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   const double slew = options_.alpha_slew_per_s * dt_s;
   alpha_ += std::clamp(alpha_target_ - alpha_, -slew, slew);
   blend_weight_ = std::max(0.0, blend_weight_ - slew);
-  weights_.move(slew);
   mask_.move(slew);
+  if (weights_.moving()) {
+    weights_.move(slew);
+    mix_limits();
+  }
   const bool served = model_ != nullptr && frame.skeleton == model_->space.skeleton().id;
   if (served) {
     style(frame, dt_s);
@@ -259,16 +265,17 @@ std::span<const float> StyleFilter::shares_to_ask() noexcept {
   return {};
 }
 
-// Of the mixture. RT-safe
-float StyleFilter::limit_rad(std::size_t dim) const noexcept {
-  const auto d = static_cast<Eigen::Index>(dim);
-  if (model_->more_limits_rad.empty()) return model_->limit_rad[d];
+// RT-safe
+void StyleFilter::mix_limits() noexcept {
+  const Eigen::VectorXf& first = model_->limit_rad;
   const std::span<const float> shares = weights_.shares();
-  float limit = shares[0] * model_->limit_rad[d];
-  for (std::size_t s = 1; s < shares.size(); ++s) {
-    limit += shares[s] * model_->more_limits_rad[s - 1][d];
+  for (Eigen::Index d = 0; d < first.size(); ++d) {
+    float limit = shares[0] * first[d];
+    for (std::size_t s = 1; s < shares.size(); ++s) {
+      limit += shares[s] * model_->more_limits_rad[s - 1][d];
+    }
+    limit_rad_[static_cast<std::size_t>(d)] = limit;
   }
-  return limit;
 }
 
 // The model delta: alpha times the mixture of styles, gated, clamped and masked. RT-safe
@@ -293,7 +300,7 @@ void StyleFilter::answer(const Dims& q, const Flags& available, double dt_s, Dim
   }
   const bool limited = model_->limit_rad.size() > 0;
   for (std::size_t d = 0; d < dims; ++d) {
-    if (limited) out[d] = std::clamp(out[d], -limit_rad(d), limit_rad(d));
+    if (limited) out[d] = std::clamp(out[d], -limit_rad_[d], limit_rad_[d]);
     out[d] *= static_cast<float>(alpha_) * mask_.factor(model_->parts[d]);
   }
 }

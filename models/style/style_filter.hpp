@@ -120,7 +120,7 @@ class StyleFilter final : public Stage {
 
   void style(Frame& frame, double dt_s) noexcept;
   [[nodiscard]] std::span<const float> shares_to_ask() noexcept;
-  [[nodiscard]] float limit_rad(std::size_t dim) const noexcept;
+  void mix_limits() noexcept;
   void answer(const Dims& q, const Flags& available, double dt_s, Dims& delta) noexcept;
   float smoothed_gate(float confidence, double dt_s) noexcept;
   void kernel_input(const Dims& q, const Flags& available, double dt_s, Dims& input) noexcept;
@@ -133,6 +133,7 @@ class StyleFilter final : public Stage {
   double alpha_target_ = 0.0;
   StyleWeights weights_;
   BodyMask mask_;
+  Dims limit_rad_{};  // of the mixture
   Elapsed elapsed_;
   Heading heading_;
   float gate_ = -1.0F;  // smoothed confidence; negative before the first value

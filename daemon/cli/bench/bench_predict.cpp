@@ -41,8 +41,9 @@ constexpr const char* kBenchPredictFooter =
 hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
 frames of a 120 Hz stream. The reference sums as many floats as the process logically reads
 (N x 2D; gate rows are also compared with the confidence's triangle added), with eight vector
-accumulators; four_at_rest, four_moving and four_settling are four styles in one model, with weights
-that rest, that move at every call and that have just come to rest; variants take turns, so that they run under the same conditions.
+accumulators. four_at_rest, four_moving and four_settling are four styles in one model, with
+weights that rest, that move at every call and that have just come to rest. Variants take turns, so
+that they run under the same conditions.
 
   posed bench predict
   posed bench predict --samples 500 --json)";
