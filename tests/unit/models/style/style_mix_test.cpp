@@ -121,6 +121,7 @@ TEST_CASE("weights on their way are between the styles, and take 1 / slew from o
   Still still;
   static_cast<void>(styled(filter, still.next()));  // time runs from here
   const double begin = filter.weights().now().of[1];
+  CHECK(begin < 0.1);
   for (int i = 1; i <= 60; ++i) {
     static_cast<void>(styled(filter, still.next()));
     CHECK(filter.weights().now().of[1] == Approx(std::min(1.0, begin + i / 60.0)));
@@ -130,27 +131,34 @@ TEST_CASE("weights on their way are between the styles, and take 1 / slew from o
 }
 
 // angle(D(t-1), D(t)) <= |c| slew dt + the change of the model delta (style_filter.hpp). With one
-// frame repeated the model delta of a joint is at most L = sqrt(3) times the limit, so that per
-// frame alpha changes it by L slew dt, weights (at alpha 2, from one style to the opposite one) by
-// 2 (2 L) slew dt and the mask by 2 L slew dt.
+// frame repeated and L the largest angle that a style alone gives a joint at alpha 1, that change
+// is at most L slew dt by alpha, and at alpha 2 another 2 (2 L) slew dt by weights (from one style
+// to the opposite one) and 2 L slew dt by the mask; |c| is at most 4 L.
 TEST_CASE("swaps, alpha, weights and masks together never step above the slew", "[style]") {
   constexpr double kSlew = 2.0;
-  constexpr double kSize = 0.4;
+  constexpr double kStep = kSlew / kRate;
   std::vector<std::unique_ptr<const style::BoundModel>> models;
+  double reach = 0.0;
   for (const auto& seeds : {std::vector{0U, 1U, 2U}, {2U, 3U}, {4U}, {1U, 2U, 5U, 6U}, {6U, 0U}}) {
-    models.push_back(bound(toy_styles(seeds, kSize)));
+    models.push_back(bound(toy_styles(seeds, 0.2)));
+    for (const std::string& name : models.back()->styles) {
+      style::FilterOptions alone;
+      alone.weights = name + "=1";
+      reach = std::max(reach, largest_rad(Still().next(), rested(*models.back(), alone)));
+    }
   }
-  const double most = std::sqrt(3.0) * 1.5 * kSize;
-  const double bound_rad = (4.0 * most + most + 4.0 * most + 2.0 * most) * kSlew / kRate + 1e-5;
+  const double bound_rad = 1.05 * (4.0 + 1.0 + 4.0 + 2.0) * reach * kStep;
   std::mt19937 random(11);
   const style::BoundModel* model = models[0].get();
   style::StyleFilter filter(model, {});
   Still still;
   Frame before = still.next();
+  static_cast<void>(styled(filter, before));
   double largest = 0.0;
   int moving = 0;
   for (int i = 0; i < 6000; ++i) {
-    if (random() % 40 == 0) {
+    const bool swaps = random() % 40 == 0;
+    if (swaps) {
       model = models[random() % models.size()].get();
       static_cast<void>(filter.set_model(model));
     }
@@ -168,8 +176,18 @@ TEST_CASE("swaps, alpha, weights and masks together never step above the slew", 
       for (double& factor : mask) factor = static_cast<double>(random() % 5) / 4.0;
       filter.set_mask(mask);
     }
+    const Shares shares_before = filter.weights().now();
+    const style::Mask mask_before = filter.mask().now();
     const Frame in = still.next();
     const Frame out = styled(filter, in);
+    double mixed = 0.0;
+    for (std::size_t s = 0; s < style::kMaxStyles; ++s) {
+      mixed += 0.5 * std::abs(filter.weights().now().of[s] - shares_before.of[s]);
+    }
+    CHECK(mixed <= kStep + 1e-8);
+    for (std::size_t p = 0; p < style::kBodyParts; ++p) {
+      CHECK(std::abs(filter.mask().now()[p] - mask_before[p]) <= kStep + 1e-8);
+    }
     moving += filter.weights().moving() ? 1 : 0;
     for (int j = 0; j < kJoints; ++j) {
       largest = std::max(largest, angle_between_rad(delta_of(in, before, j), delta_of(in, out, j)));
@@ -178,7 +196,7 @@ TEST_CASE("swaps, alpha, weights and masks together never step above the slew", 
   }
   INFO("largest step " << largest << " rad, bound " << bound_rad);
   CHECK(largest <= bound_rad);
-  CHECK(largest > 0.1 * bound_rad);
+  CHECK(largest > 0.2 * bound_rad);
   CHECK(moving > 1000);
 }
 
