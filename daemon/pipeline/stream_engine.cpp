@@ -18,6 +18,9 @@ StreamEngine::StreamEngine(EngineOptions options) : options_(std::move(options))
     for (std::size_t i = 0; i < table.size(); ++i) {
       if (table[i].live) live_.push_back({stage.stage.get(), i});
     }
+    for (std::size_t i = 0; i < stage.type->readings.size(); ++i) {
+      readings_.push_back({stage.stage.get(), i});
+    }
   }
 }
 
