@@ -118,7 +118,8 @@ class StreamEngine final {
   void run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept;
   void emit(const Frame& frame, EngineOut& out) noexcept;
   std::size_t time_stage(std::size_t stage) noexcept;
-  void report_played(std::int64_t time_ns, EngineOut& out) noexcept;
+  void tell(std::int64_t time_ns, EngineOut& out) noexcept;
+  void report_stages(std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_until(std::uint64_t sequence, std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_samples_until(std::uint64_t sequence, EngineOut& out) noexcept;
   [[nodiscard]] std::int64_t stale_due_ns() const noexcept;

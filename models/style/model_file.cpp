@@ -84,6 +84,21 @@ gp::Trained read_process(const v1::GaussianProcess& from, int dims, Reader& read
   return process;
 }
 
+GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
+  GateData gate;
+  gate.neutral = reader.vector(from.neutral(), dims, "the neutral pose");
+  gate.swing_rad = reader.number(from.swing_rad(), 0.0, 10.0, "the legs' swing");
+  gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.0, 100.0, "the fastest stride");
+  return gate;
+}
+
+StyleAxis read_axis(const v1::StyleAxis& from, int dims, Reader& reader) {
+  StyleAxis axis;
+  axis.direction = reader.vector(from.direction(), dims, "the style's axis");
+  axis.offset = reader.number(from.offset(), -kMaxNumber, kMaxNumber, "the style's offset");
+  return axis;
+}
+
 StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   StyleModel model;
   model.space = read_space(from.space(), reader);
@@ -100,6 +115,8 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   model.from = from.from();
   model.to = from.to();
   model.report_json = from.report_json();
+  if (from.has_gate()) model.gate = read_gate(from.gate(), dims, reader);
+  if (from.has_axis()) model.axis = read_axis(from.axis(), dims, reader);
   return model;
 }
 
@@ -159,6 +176,15 @@ std::string serialize_model(const StyleModel& model) {
   style.set_from(model.from);
   style.set_to(model.to);
   style.set_report_json(model.report_json);
+  if (model.gate.present()) {
+    write_vector(model.gate.neutral, *style.mutable_gate()->mutable_neutral());
+    style.mutable_gate()->set_swing_rad(model.gate.swing_rad);
+    style.mutable_gate()->set_fastest_stride_s(model.gate.fastest_stride_s);
+  }
+  if (model.axis.present()) {
+    write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
+    style.mutable_axis()->set_offset(model.axis.offset);
+  }
   return model_file::wrap(std::move(file));
 }
 

@@ -13,6 +13,7 @@
 #include "models/style/leave_out.hpp"
 #include "models/style/training_check.hpp"
 #include "models/style/training_pairs.hpp"
+#include "models/style/walker_data.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/text/json_text.hpp"
 
@@ -299,6 +300,8 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   model.report_json = json_text(report);
   model.limit_rad = kLimitFactor * learnt->differences.cwiseAbs().colwise().maxCoeff().transpose();
   set_input_statistics(*dataset, model);
+  model.gate = gate_data_of(*dataset, options.target);
+  model.axis = style_axis_of(*dataset, options.target);
   model.space = std::move(dataset->spec);
   model.process = std::move(learnt->process);
   if (!progress(1.0)) return stopped();

@@ -275,8 +275,8 @@ const char* const kColumnsHelp = R"(Columns, one row a stream:
            second; microseconds, with m milliseconds, with s seconds; - where no frame passed
   ALPHA    how much style, -2 to 2; below the row its target, while it moves
   MODEL    the style model in use, or the gesture model
-Below the rows, of a style: gate, 1 where the model knows the motion to 0 where it is passed through;
-style, what the input has of the model's style already, 0 like its source to 1 like its target)";
+Below the rows, of a style: gate, 1 where the model knows the motion to 0 where it is passed
+through; style, what the input shows of it already, 0 like its source to 1 like its target)";
 
 std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {
   Widths widths = widths_for(stats, options.width);
