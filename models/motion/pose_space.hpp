@@ -73,6 +73,11 @@ class PoseSpace {
   void to_vector(const Frame& frame, double heading_rad, std::span<float> q,
                  std::span<std::uint8_t> available) const noexcept;
 
+  // The q of this space for the pose that is `from_q` in another; both have `kMaxPoseDims` values.
+  // False, and nothing is written, where the two do not describe the same joints. RT-safe.
+  [[nodiscard]] bool take_over(const PoseSpace& from, std::span<const float> from_q,
+                               std::span<float> q) const noexcept;
+
   // Replaces the pose of `frame` by q + delta in the space's own sense, channel angles included;
   // joints that are not available and joints outside the space are unchanged; a zero delta leaves
   // every bit of the frame unchanged. RT-safe.

@@ -97,6 +97,21 @@ MoreStyle read_style(const v1::StyleTarget& from, Eigen::Index points, int dims,
   return style;
 }
 
+GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
+  GateData gate;
+  gate.neutral = reader.vector(from.neutral(), dims, "the neutral pose");
+  gate.swing_rad = reader.number(from.swing_rad(), 0.0, 10.0, "the legs' swing");
+  gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.0, 100.0, "the fastest stride");
+  return gate;
+}
+
+StyleAxis read_axis(const v1::StyleAxis& from, int dims, Reader& reader) {
+  StyleAxis axis;
+  axis.direction = reader.vector(from.direction(), dims, "the style's axis");
+  axis.offset = reader.number(from.offset(), -kMaxNumber, kMaxNumber, "the style's offset");
+  return axis;
+}
+
 StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   StyleModel model;
   model.space = read_space(from.space(), reader);
@@ -121,6 +136,8 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   model.rate_hz = reader.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
   model.from = from.from();
   model.report_json = from.report_json();
+  if (from.has_gate()) model.gate = read_gate(from.gate(), dims, reader);
+  if (from.has_axis()) model.axis = read_axis(from.axis(), dims, reader);
   return model;
 }
 
@@ -186,6 +203,15 @@ std::string serialize_model(const StyleModel& model) {
     write_matrix(one.function.weights, *target.mutable_weights());
     write_vector(one.function.offset, *target.mutable_offset());
     write_vector(one.limit_rad, *target.mutable_limit_rad());
+  }
+  if (model.gate.present()) {
+    write_vector(model.gate.neutral, *style.mutable_gate()->mutable_neutral());
+    style.mutable_gate()->set_swing_rad(model.gate.swing_rad);
+    style.mutable_gate()->set_fastest_stride_s(model.gate.fastest_stride_s);
+  }
+  if (model.axis.present()) {
+    write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
+    style.mutable_axis()->set_offset(model.axis.offset);
   }
   return model_file::wrap(std::move(file));
 }

@@ -1,6 +1,6 @@
-// StyleFilter: the style stage of one stream, y = q + alpha f(q) (README.md, "Filter"), with the
-// same code live, offline (`apply`) and in replay. It has no memory of the pose; its only state is
-// the heading low-pass, alpha, weights and mask on their way, the gate's smoothing and the blend
+// StyleFilter: the style stage of one stream, y = q + alpha g f(q) (README.md, "Filter"), with the
+// same code live, offline (`apply`) and in replay. The change has no memory of the pose; its only
+// state is the heading low-pass, alpha, weights and mask on their way, the gate g and the blend
 // after a model swap, which allow changes while it runs.
 //
 // Continuity bound (README.md, "Bound on the step"): let D(t) = R_in^T R_out be what the filter
@@ -23,55 +23,37 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "models/elapsed.hpp"
-#include "models/gp/predictor.hpp"
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
 #include "models/style/body_mask.hpp"
+#include "models/style/bound_model.hpp"
 #include "models/style/heading.hpp"
-#include "models/style/style_model.hpp"
 #include "models/style/style_weights.hpp"
+#include "models/style/walker_watch.hpp"
 
 namespace posed::style {
-
-// A model bound to one skeleton, ready for the hot path. Built cold, then const; the hot side holds
-// a plain pointer and returns the old one to be freed by the cold side.
-struct BoundModel final : StageModel {
-  BoundModel(const StyleModel& model, motion::PoseSpace bound_space, gp::Predictor bound_predictor,
-             std::string file);
-
-  motion::PoseSpace space;
-  // Mutable, because it keeps the mixture of styles ready that the filter asks for. With several
-  // styles a model therefore serves one filter at a time at its full speed.
-  mutable gp::Predictor predictor;
-  Eigen::VectorXf limit_rad, input_mean, input_sd;  // [dims]
-  std::vector<std::string> styles;                  // their names, the first one's limits above
-  std::vector<Eigen::VectorXf> more_limits_rad;     // of the others
-  std::vector<BodyPart> parts;                      // [dims]
-};
 
 struct FilterOptions {
   double alpha = 1.0;  // -2..2
   double alpha_slew_per_s = 2.0;
-  bool gate = false;           // fade towards fallback * constant far from the training poses
-  double gate_fallback = 1.0;  // kappa_c (README.md, "Filter")
-  bool calibrate = false;      // remove the walker's own mean offset from the kernel's input
+  bool gate = true;            // fade out where the model does not know the motion
+  double gate_fallback = 0.0;  // how much of the model's constant part is left there
+  bool calibrate = false;      // the older name of a warm-up at the start
+  bool auto_alpha = false;     // less style for who shows it already (README.md, "Auto-alpha")
   std::string weights{};       // of the styles (shares_of()); empty: the first one alone
   Mask mask = whole_body();    // of the parts of the body
 };
+inline constexpr double kUsualWarmUp_s = 10.0;
+inline constexpr double kShortestWarmUp_s = 2.0;
+inline constexpr double kLongestWarmUp_s = 600.0;
 inline constexpr double kMaxAlpha = 2.0;
-
-// Returns an error for a skeleton that lacks joints of the model's pose space (it names them) and
-// for a model whose parts do not fit each other. The weights are not looked at.
-[[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
-                                                                   const Skeleton& skeleton,
-                                                                   const FilterOptions& options,
-                                                                   std::string name);
 
 class StyleFilter final : public Stage {
  public:
@@ -92,19 +74,38 @@ class StyleFilter final : public Stage {
   void set_mask(const Mask& mask) noexcept { mask_.aim(mask); }
   [[nodiscard]] const BoundModel* set_model(const BoundModel* model) noexcept;
 
-  // Starts in the settled state for this frame (offline use): full alpha, known heading.
+  // Starts in the settled state for this frame (offline use): full alpha, known heading, and the
+  // gate of what preview() has seen.
   void settle(const Frame& frame, double heading_rad) noexcept;
+  // Lets the gate and the estimate see a frame `dt_s` from the one before, in either direction of
+  // time.
+  void preview(const Frame& frame, double heading_rad, double dt_s) noexcept;
+
+  // How much the gate passes, 0 to 1; NaN while it is off or the model has no data for it. RT-safe.
+  [[nodiscard]] double gate() const noexcept;
+  // How much of the style the walker shows already; NaN: unknown. RT-safe.
+  [[nodiscard]] double estimate() const noexcept { return watch_.estimate(); }
+  // Offline: the walker is known from elsewhere; what a warm-up has found.
+  void set_walker(const Walker& walker) noexcept { watch_.set_walker(walker); }
+  [[nodiscard]] const std::optional<Walker>& walker() const noexcept { return watch_.walker(); }
+
+  // Readings, notices and commands, as style_type() numbers them (notices: WalkerWatch). RT-safe.
+  enum Reading : std::size_t { kStyleEstimate, kStyleGate };
+  [[nodiscard]] double reading(std::size_t reading) const noexcept override;
+  [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override {
+    return watch_.take_notice();
+  }
+  enum Command : std::size_t { kWarmUp, kWeights, kMask };
+  [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
+  void flush(StageOut& /*out*/) noexcept override { watch_.interrupt(); }
 
   // The parameters, as style_type() numbers them. RT-safe.
-  enum Parameter : std::size_t { kAlpha, kAlphaSlew, kGate, kGateFallback, kCalibrate };
+  enum Parameter : std::size_t { kAlpha, kAlphaSlew, kGate, kGateFallback, kCalibrate, kAutoAlpha };
   void set(std::size_t parameter, double value) noexcept override;
   [[nodiscard]] ParameterState state(std::size_t parameter) const noexcept override;
   void use(const StageModel& model) noexcept override;
   [[nodiscard]] const BoundModel* model() const noexcept override { return model_; }
 
-  // Weights and mask, as commands.
-  enum Command : std::size_t { kWeights, kMask };
-  [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
   void describe(std::size_t index, const StageCommand& command,
                 ShortText& text) const noexcept override;
 
@@ -118,12 +119,19 @@ class StyleFilter final : public Stage {
   using Flags = std::array<std::uint8_t, motion::kMaxPoseDims>;
   using Rotations = std::array<Quatf, kMaxJoints>;
 
+  // A frame in the model's pose space, and as its kernel sees it.
+  struct Pose {
+    Dims q, input;
+    Flags available;
+  };
+
   void style(Frame& frame, double dt_s) noexcept;
   [[nodiscard]] std::span<const float> shares_to_ask() noexcept;
   void mix_limits() noexcept;
-  void answer(const Dims& q, const Flags& available, double dt_s, Dims& delta) noexcept;
-  float smoothed_gate(float confidence, double dt_s) noexcept;
-  void kernel_input(const Dims& q, const Flags& available, double dt_s, Dims& input) noexcept;
+  bool read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept;
+  void answer(const Pose& pose, Dims& delta) noexcept;
+  [[nodiscard]] double wanted_alpha() const noexcept;
+  void set_calibrate(bool on) noexcept;
   void begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept;
   void blend(Frame& styled) const noexcept;
 
@@ -136,8 +144,8 @@ class StyleFilter final : public Stage {
   Dims limit_rad_{};  // of the mixture
   Elapsed elapsed_;
   Heading heading_;
-  float gate_ = -1.0F;  // smoothed confidence; negative before the first value
-  Dims offset_{};       // of the walker's mean pose from the training mean, for `calibrate`
+  double gap_s_ = 0.0;  // between the last two frames
+  WalkerWatch watch_;
 
   // The blend: R_out = R_styled exp(weight c) per joint.
   bool discontinuity_ = false;  // the next frame begins a blend

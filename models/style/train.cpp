@@ -8,6 +8,7 @@
 #include "models/style/lessons.hpp"
 #include "models/style/train_report.hpp"
 #include "models/style/training_check.hpp"
+#include "models/style/walker_data.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
@@ -175,8 +176,13 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   if (!learnt) return std::unexpected(learnt.error());
 
   const std::string report = json_text(whole_report(*dataset, lessons, *learnt));
+  GateData gate = gate_data_of(*lessons.front().data, options.target);
+  StyleAxis axis;  // of a mixture there is none
+  if (targets.size() == 1) axis = style_axis_of(*dataset, options.target);
   StyleModel model = model_of(std::move(*dataset), targets, std::move(*learnt));
   model.report_json = report;
+  model.gate = std::move(gate);
+  model.axis = std::move(axis);
   if (!progress(1.0)) return stopped();
   return model;
 }

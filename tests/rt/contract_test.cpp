@@ -79,9 +79,8 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   CountingRecordSink record_sink;
   const auto device = open_device("file", {{"path", path.string()}});
   const Skeleton& skeleton = *device.description.skeleton;
-  const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
-  const auto second =
-      style::bind_model(test::toy_styles({2, 3, 4}), skeleton, {}, "second").value();
+  const auto first = style::bind_model(test::toy_model(1), skeleton, "first").value();
+  const auto second = style::bind_model(test::toy_styles({2, 3, 4}), skeleton, "second").value();
   const auto change = [](std::size_t command, const StageCommand& payload, std::uint64_t ticket) {
     return Command{.change = {.kind = pipeline::StageChange::Kind::kCommand,
                               .index = static_cast<std::uint8_t>(command),
@@ -126,7 +125,7 @@ TEST_CASE("a styled body whose feet stand keeps the real-time contract", "[rt]")
   style::StyleModel model;
   model.space = motion::describe_space(motion::Space::kNative, skeleton).value();
   model.process = gp::synthetic(56, motion::space_dims(model.space)).process;
-  const auto bound = style::bind_model(model, skeleton, {}, "walker").value();
+  const auto bound = style::bind_model(model, skeleton, "walker").value();
   std::vector<RigStream> streams;
   streams.push_back({.device = std::move(device), .style = bound.get(), .feet = true});
   Rig rig(std::move(streams), &record_sink);

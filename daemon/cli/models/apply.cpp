@@ -1,8 +1,11 @@
 // `posed apply`: sends a clip through the style stage and writes a BVH file.
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
@@ -16,6 +19,7 @@
 #include "models/style/apply.hpp"
 #include "models/style/walker_fit.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -26,8 +30,33 @@ struct ApplyArguments {
   clip::ReadOptions read;
   style::ApplyOptions apply;
   std::string mask;
+  std::filesystem::path neutral;
+  std::string alpha = "1", gate = "on";
   bool overwrite = false, json = false;
 };
+
+// A number, or "auto": as much as the walker does not show already.
+Result<> take_alpha(ApplyArguments& options) {
+  style::FilterOptions& filter = options.apply.filter;
+  filter.auto_alpha = options.alpha == "auto";
+  if (filter.auto_alpha) return {};
+  const bool number = CLI::detail::lexical_cast(options.alpha, filter.alpha);
+  if (number && std::abs(filter.alpha) <= style::kMaxAlpha) return {};
+  return misuse("--alpha takes a number from -2 to 2, or auto, not " + in_quotes(options.alpha));
+}
+
+// `--gate IN` is `--gate on IN`: the library takes the next word for the option's.
+Result<> take_gate(ApplyArguments& options) {
+  if (options.gate != "on" && options.gate != "off") {
+    if (!options.in.empty()) {
+      return misuse("--gate takes on or off, not " + in_quotes(options.gate));
+    }
+    options.in = std::exchange(options.gate, "on");
+  }
+  options.apply.filter.gate = options.gate == "on";
+  if (!options.in.empty()) return {};
+  return misuse("no clip to style: posed apply --model FILE.style IN --out OUT.bvh");
+}
 
 Result<> check_files(const ApplyArguments& options) {
   if (!options.read.asf.empty() && !is_amc(options.in)) {
@@ -37,6 +66,7 @@ Result<> check_files(const ApplyArguments& options) {
       .reads(options.model)
       .reads(options.in)
       .reads(options.read.asf)
+      .reads(options.neutral)
       .writes(options.out, {".bvh"})
       .check();
 }
@@ -73,10 +103,24 @@ std::string verdict(const style::WalkerFit& fit, double rms_deg, double training
   return text;
 }
 
+nlohmann::json or_null(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json();
+}
+
 Result<> run(ApplyArguments options) {
+  if (auto ok = take_gate(options); !ok) return ok;
+  if (auto ok = take_alpha(options); !ok) return ok;
+  if (options.apply.filter.calibrate) {
+    std::fprintf(stderr, "posed: --calibrate is the older name of --neutral IN\n");
+    if (options.neutral.empty()) options.neutral = options.in;
+    options.apply.filter.calibrate = false;
+  }
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
+  if (options.apply.filter.auto_alpha && !model->more.empty()) {
+    return misuse("--alpha auto needs a model of one style; give a number", options.model.string());
+  }
   const auto shares = style::shares_of(options.apply.filter.weights, model->names());
   if (!shares) return std::unexpected(shares.error());
   const auto mask = style::mask_of(options.mask);
@@ -86,6 +130,13 @@ Result<> run(ApplyArguments options) {
   if (!clip) return std::unexpected(clip.error());
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+  }
+  if (!options.neutral.empty()) {
+    const auto neutral = clip::read_clip(options.neutral, options.read);
+    if (!neutral) return std::unexpected(neutral.error());
+    const auto walker = style::measure_walker(*model, options.model.string(), *neutral);
+    if (!walker) return std::unexpected(walker.error());
+    options.apply.walker = *walker;
   }
   ProgressBar bar(kQuietFor_s);
   options.apply.progress = [&bar](int done, int total) {
@@ -110,9 +161,12 @@ Result<> run(ApplyArguments options) {
                                 {"weights", shares_json(*model, *shares)},
                                 {"mask", options.mask},
                                 {"alpha", options.apply.filter.alpha},
+                                {"auto_alpha", options.apply.filter.auto_alpha},
+                                {"style_estimate", or_null(applied->estimate_mean)},
                                 {"cold", options.apply.cold},
                                 {"root", root_text(options.apply.feet)},
                                 {"max_root_offset_cm", applied->max_root_offset_m * 100.0},
+                                {"gate_mean", or_null(applied->gate_mean)},
                                 {"joints_changed", applied->joints_changed},
                                 {"rms_change_deg", rms_deg},
                                 {"max_change_deg", max_deg},
@@ -138,10 +192,12 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--model", options->model, "What `posed train style` wrote")
       ->required()
       ->type_name("FILE.style");
-  command->add_option("in", options->in, "The clip: .bvh or .amc")->required()->type_name("IN");
+  command->add_option("in", options->in, "The clip: .bvh or .amc")->type_name("IN");
   command->add_option("--out", options->out, "The BVH to write")->required()->type_name("OUT.bvh");
-  command->add_option("--alpha", filter.alpha, "How much: 0 none, 1 the target, negative away")
-      ->check(CLI::Range(-style::kMaxAlpha, style::kMaxAlpha))
+  command
+      ->add_option("--alpha", options->alpha,
+                   "How much: 0 none, 1 the target, negative away; auto: as much as is missing")
+      ->type_name("A|auto")
       ->capture_default_str();
   command->add_option("--weights", filter.weights, "Mixes the model's styles: A=0.6,B=0.4")
       ->type_name("WEIGHTS");
@@ -151,15 +207,21 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--skeleton", options->read.asf, "NN.asf of an AMC (default: beside it)")
       ->type_name("NN.asf");
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
-  command->add_flag("--gate", filter.gate, "Fade to the mean change where the model knows nothing");
-  command->add_flag("--calibrate", filter.calibrate,
-                    "First learn how the walker usually holds itself");
+  command
+      ->add_option("--gate", options->gate,
+                   "on (the default) or off: fade out where the model does not know the motion")
+      ->type_name("[on|off]")
+      ->expected(0, 1);
+  command->add_option("--neutral", options->neutral, "How this walker usually walks: .bvh or .amc")
+      ->type_name("N.bvh");
+  command->add_flag("--calibrate", filter.calibrate, "The older name of --neutral IN");
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
   posed apply --model walk.style walk_03.bvh --out styled.bvh
   posed apply --model walk.style --root stride walk_03.bvh --out styled.bvh   # feet stand
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
+  posed apply --model walk.style --neutral bob_1.bvh bob_2.bvh --out bob.bvh   # a new walker
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
   posed apply --model two.style --weights feminine=0.6,elderly=0.4 --mask arms=0.5 \
       walk_03.bvh --out mixed.bvh

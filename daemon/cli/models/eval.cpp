@@ -37,6 +37,7 @@ cycle_ratio frame by frame; jerk_ratio: roughness of the styled walk over the un
 moved_rms_deg: the angle between the rotations before and after, rms over frames and changed joints,
 as `apply` reports it; component_rms_deg: the same change per component of the rotation vectors,
 source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure;
+gate_mean: how far the model knows the motion, 1 all of it, 0 nothing, which is not styled;
 slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 cm/s in the
 unstyled walk; of the target: in itself); sink_cm: how far the lowest styled toe is below the
 lowest unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
@@ -61,6 +62,7 @@ Result<clip::Clip> read(const std::string& path, const std::string& skeleton) {
 struct Evaluation {
   style::StyleScore score, constant;
   double moved_rms_deg = 0.0;
+  std::optional<double> gate_mean{};
   style::WalkerFit fit;
 
   [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0; }
@@ -114,6 +116,7 @@ json report_of(const Evaluation& e, const EvalOptions& options) {
               {"target_period_s", score.target_period_s},
               {"distance_deg", e.fit.distance_deg},
               {"far_from_training", e.fit.is_far()},
+              {"gate_mean", scaled(e.gate_mean, 1.0)},
               {"slide_cm_s", of_clips(score.slide_m_s, kCentimetres)},
               {"sink_cm", scaled(score.sink_m, kCentimetres)},
               {"root_speed_m_s", of_clips(score.root_speed_m_s, 1.0)},
@@ -156,6 +159,7 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
     const auto score = style::evaluate_style(*source, styled->clip, *target, model->space);
     if (!score) return std::unexpected(score.error());
     (full ? evaluation.score : evaluation.constant) = *score;
+    evaluation.gate_mean = styled->gate_mean;
     evaluation.moved_rms_deg = styled->rms_change_rad * kDegrees;
   }
   return evaluation;

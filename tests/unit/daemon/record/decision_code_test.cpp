@@ -47,7 +47,8 @@ TEST_CASE("weights and masks that no pipeline can have written are refused") {
     v1::DecisionValue value;
     value.mutable_weights();
     for (const double number : numbers) value.mutable_weights()->add_weight(number);
-    auto row = row_of(decision(0, StageCommand::of(style::first_alone(1))));
+    auto row =
+        row_of(decision(style::StyleFilter::kWeights, StageCommand::of(style::first_alone(1))));
     row.name = name;
     row.value = value.SerializeAsString();
     return !decision_of(row, "a.plog").has_value();

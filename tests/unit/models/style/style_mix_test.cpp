@@ -25,9 +25,8 @@ using test::toy_walk;
 constexpr int kJoints = 5;
 constexpr double kRate = 120.0;
 
-std::unique_ptr<const style::BoundModel> bound(const style::StyleModel& model,
-                                               const style::FilterOptions& options = {}) {
-  return style::bind_model(model, toy_skeleton(), options, "toy").value();
+std::unique_ptr<const style::BoundModel> bound(const style::StyleModel& model) {
+  return style::bind_model(model, toy_skeleton(), "toy").value();
 }
 
 Frame styled(style::StyleFilter& filter, const Frame& in) {
@@ -252,11 +251,9 @@ TEST_CASE("weights stay with their styles when the model changes", "[style]") {
 }
 
 TEST_CASE("a filter does not allocate while its weights and mask move", "[style]") {
-  style::FilterOptions options;
-  options.gate = true;
-  const auto a = bound(toy_styles({1, 2, 3}), options);
-  const auto b = bound(toy_styles({3, 4}), options);
-  style::StyleFilter filter(a.get(), options);
+  const auto a = bound(toy_styles({1, 2, 3}));
+  const auto b = bound(toy_styles({3, 4}));
+  style::StyleFilter filter(a.get(), {});
   const Shares towards = shares("s2=0.5,s3=0.5", *a);
   const auto command = StageCommand::of(towards);
   const auto mask = StageCommand::of(style::mask_of("arms=0.5").value());
