@@ -17,7 +17,6 @@
 namespace posed::gp {
 namespace {
 
-using kernel::kLanes;
 using kernel::kMaxDims;
 using kernel::kMaxGate;
 using kernel::kTile;

@@ -89,6 +89,7 @@ BodyPart part_of_joint(const Skeleton& skeleton, int joint) {
 
 std::vector<BodyPart> parts_of(const motion::PoseSpace& space) {
   std::vector<BodyPart> parts;
+  parts.reserve(static_cast<std::size_t>(space.dims()));
   for (int d = 0; d < space.dims(); ++d) {
     parts.push_back(part_of_joint(space.skeleton(), space.skeleton_joint_of_dim(d)));
   }

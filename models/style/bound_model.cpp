@@ -57,6 +57,7 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
     return std::unexpected(fits.error());
   }
   std::vector<gp::Function> more;
+  more.reserve(model.more.size());
   for (const MoreStyle& style : model.more) more.push_back(style.function);
   auto predictor = gp::Predictor::build(model.process, false, more);
   if (!predictor) {

@@ -24,6 +24,7 @@ Result<std::vector<gp::Trained>> fit_styles(const Dataset& all, const std::vecto
     return std::vector{std::move(*process)};
   }
   std::vector<StylePairs> styles;
+  styles.reserve(lessons.size());
   for (std::size_t i = 0; i < lessons.size(); ++i) {
     styles.push_back({std::move(pairs[i]), lessons[i].takes});
   }
@@ -102,6 +103,7 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
   if (!chosen) return fail("training was stopped before it was done");
   const std::string how = held_out ? "leave-out" : "default";
   std::vector<Learnt> learnt;
+  learnt.reserve(lessons.size());
   for (std::size_t i = 0; i < lessons.size(); ++i) {
     learnt.push_back(
         {{}, grid_outputs(pairs[i].outputs), how, pairs[i].follows_days, chosen->ways[i]});

@@ -2,8 +2,8 @@
 // the continuity bound while they move, and clear sentences for what makes no sense.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <random>
 
@@ -75,8 +75,8 @@ double largest_rad(const Frame& a, const Frame& b) {
 }
 
 bool same_rotations(const Frame& a, const Frame& b) {
-  return std::memcmp(a.rotation_xyzw.data(), b.rotation_xyzw.data(),
-                     kJoints * sizeof(a.rotation_xyzw[0])) == 0;
+  return std::equal(a.rotation_xyzw.begin(), a.rotation_xyzw.begin() + kJoints,
+                    b.rotation_xyzw.begin());
 }
 
 std::string refusal(const Result<Shares>& result) {
