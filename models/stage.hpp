@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -56,6 +58,13 @@ struct StageModel {
 struct ParameterState {
   double now = 0.0;
   double target = 0.0;  // differs from `now` while the stage changes it gradually
+};
+
+// Something that a stage tells people by itself, once. RT-safe.
+struct StageNotice {
+  std::size_t index = 0;  // in StageType::notices
+  // What it has measured, if that is worth a file; valid until the next call of the stage.
+  std::span<const float> values{};
 };
 
 // A command to a stage, with whatever belongs to it, small enough for a ring.
@@ -115,6 +124,12 @@ class Stage {
   [[nodiscard]] virtual ParameterState state(std::size_t /*parameter*/) const noexcept {
     return {};
   }
+  // A number that the stage measures, numbered as in StageType::readings; NaN: unknown.
+  [[nodiscard]] virtual double reading(std::size_t /*reading*/) const noexcept {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  // The oldest thing that it has to tell and has not told yet; asked after each call above.
+  [[nodiscard]] virtual std::optional<StageNotice> take_notice() noexcept { return std::nullopt; }
   // `model` is one that the StageType bound; it outlives its use. The one before is no longer read.
   virtual void use(const StageModel& /*model*/) noexcept {}
   [[nodiscard]] virtual const StageModel* model() const noexcept { return nullptr; }

@@ -60,6 +60,19 @@ struct StageCommandType {
   std::optional<StageCommand> (*from_log)(const v1::DecisionValue& value) = nullptr;
 };
 
+// A number that a stage measures while it runs. It goes into the field of posed.v1.StreamStats that
+// has its name, which no other stage's reading has.
+struct StageReadingType {
+  std::string_view name;
+  std::string_view help;
+};
+
+// Something that a stage tells people by itself, as an event of its stream.
+struct StageNoticeType {
+  std::string_view sentence;  // without a full stop
+  bool is_warning = true;     // else a calibration that took effect
+};
+
 struct StageType {
   std::string_view name;  // no other stage or driver has it; the name of its table in the config
   std::string_view summary;
@@ -91,6 +104,8 @@ struct StageType {
                                                           const StageContext& context,
                                                           const std::string& name) = nullptr;
 
+  std::vector<StageReadingType> readings{};
+  std::vector<StageNoticeType> notices{};
   std::vector<StageCommandType> commands{};
   // The command that the parameters ask for at the start of a live run (index in `commands`), if
   // any; null: never.

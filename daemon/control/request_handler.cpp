@@ -134,6 +134,9 @@ Result<> RequestHandler::set_parameter(const v1::ControlRequest& request,
   const auto& wanted = request.set_parameter();
   const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
+  const auto text = text_change((*stream)->settings, wanted);
+  if (!text) return of_stream(wanted.stream(), text.error());
+  if (*text) return stage_command(**text, requester);
   const auto change = parameter_change((*stream)->settings, wanted);
   if (!change) return of_stream(wanted.stream(), change.error());
   return send(**stream, {.change = *change}, {.requester = requester});

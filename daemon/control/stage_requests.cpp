@@ -9,6 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "models/live_text.hpp"
 #include "models/stages/registry.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/text/clean.hpp"
@@ -117,14 +118,18 @@ Result<Parameters> options_of(const StageCommandType& type,
   return complete_parameters(type.options, given);
 }
 
+Result<Place> find_parameter_place(const StreamSettings& settings, const std::string& name) {
+  const auto names = [](const StageType& type) {
+    return names_of(type.parameters, &ParameterSpec::shown_name);
+  };
+  return find_place(settings, name, "parameter", names);
+}
+
 }  // namespace
 
 Result<StageChange> parameter_change(const StreamSettings& settings,
                                      const v1::ControlRequest::SetParameter& wanted) {
-  const auto names = [](const StageType& type) {
-    return names_of(type.parameters, &ParameterSpec::shown_name);
-  };
-  const auto place = find_place(settings, wanted.name(), "parameter", names);
+  const auto place = find_parameter_place(settings, wanted.name());
   if (!place) return std::unexpected(place.error());
   const StageType& type = *settings.stages[place->stage].type;
   const ParameterSpec& spec = type.parameters[place->index];
@@ -140,6 +145,29 @@ Result<StageChange> parameter_change(const StreamSettings& settings,
                      .index = static_cast<std::uint8_t>(place->index),
                      .type = &type,
                      .value = number_of(spec, *value)};
+}
+
+Result<std::optional<v1::ControlRequest>> text_change(
+    const StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted) {
+  const auto place = find_parameter_place(settings, wanted.name());
+  if (!place) return std::unexpected(place.error());
+  const StageType& type = *settings.stages[place->stage].type;
+  const ParameterSpec& spec = type.parameters[place->index];
+  if (!text_command(type, spec)) return std::nullopt;
+  const auto value = from_people(spec, value_in(wanted), spec.shown_name());
+  if (!value) return std::unexpected(value.error());
+  v1::ControlRequest request;
+  auto& command = *request.mutable_stage_command();
+  command.set_stream(wanted.stream());
+  command.set_name(fmt::format("{}.{}", type.name, spec.name));
+  std::string_view rest = std::get<std::string>(*value);
+  while (!rest.empty()) {
+    const auto comma = rest.find(',');
+    command.add_word(std::string(rest.substr(0, comma)));
+    if (comma + 1 == rest.size()) command.add_word("");  // it ends in a comma
+    rest.remove_prefix(comma == std::string_view::npos ? rest.size() : comma + 1);
+  }
+  return request;
 }
 
 Result<FoundCommand> find_command(const StreamSettings& settings, const std::string& name) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -15,6 +16,11 @@ namespace posed::control {
 
 // The change that a SetParameter asks for, checked against the parameter's type and range.
 [[nodiscard]] Result<pipeline::StageChange> parameter_change(
+    const pipeline::StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted);
+
+// The same as a request for the stage's command, where the parameter is a live text
+// (models/live_text.hpp): the pieces between its commas are the words. Nothing for another one.
+[[nodiscard]] Result<std::optional<v1::ControlRequest>> text_change(
     const pipeline::StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted);
 
 struct FoundCommand {

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "proto/frame/sink.hpp"
 
@@ -40,6 +41,13 @@ struct ParameterCounter {
   std::atomic<double> target{0.0};
 };
 
+inline constexpr std::size_t kMaxReadings = 8;  // of one stream
+
+struct ReadingCounter {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  std::atomic<double> now{kUnknown};
+};
+
 struct alignas(64) PipelineCounters {
   std::atomic<std::uint64_t> consumed{0};  // sequence of the last frame taken from the ring
   std::atomic<std::uint64_t> taken{0};     // items taken from the ring
@@ -48,6 +56,8 @@ struct alignas(64) PipelineCounters {
   std::atomic<StreamState> state{StreamState::kWaiting};
   // The live parameters of the stream's stages, in their order.
   std::array<ParameterCounter, kMaxLiveParameters> parameter{};
+  // What the stages measure, in their order; NaN: unknown.
+  std::array<ReadingCounter, kMaxReadings> reading{};
 };
 
 struct alignas(64) PublisherCounters {
@@ -86,6 +96,7 @@ inline void restart(StreamCounters& counters, const NextNumbers& first) noexcept
     parameter.now = 0.0;
     parameter.target = 0.0;
   }
+  for (ReadingCounter& reading : counters.pipeline.reading) reading.now = ReadingCounter::kUnknown;
 }
 
 // The part of a shared ring that one stream may fill, in items or in bytes. Because of it no stream

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <type_traits>
 
 #include "drivers/glove/calibration_file.hpp"
@@ -37,6 +38,7 @@ struct StreamEvent {
   // The old and the new value, so that the event can name both.
   double value_before = 0.0;    // StageChange::kSet: the target until now
   ShortText before{}, after{};  // names of models and calibrations; what a stage's command does
+  std::string_view notice{};    // of a stage: the sentence in its StageType
 };
 
 // reader -> pipeline -> publisher

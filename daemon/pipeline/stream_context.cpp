@@ -116,7 +116,7 @@ void StreamContext::decision(const Decision& decision) noexcept {
 
 void StreamContext::publish_state() noexcept {
   counters_.pipeline.state.store(engine_.state(), std::memory_order_relaxed);
-  publish_parameters(engine_, counters_.pipeline);
+  publish_values(engine_, counters_.pipeline);
 }
 
 }  // namespace posed::pipeline

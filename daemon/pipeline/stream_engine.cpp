@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "models/live_text.hpp"
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
@@ -16,7 +17,10 @@ StreamEngine::StreamEngine(EngineOptions options) : options_(std::move(options))
   for (const EngineStage& stage : options_.stages) {
     const auto& table = stage.type->parameters;
     for (std::size_t i = 0; i < table.size(); ++i) {
-      if (table[i].live) live_.push_back({stage.stage.get(), i});
+      if (table[i].live && has_number(table[i])) live_.push_back({stage.stage.get(), i});
+    }
+    for (std::size_t i = 0; i < stage.type->readings.size(); ++i) {
+      readings_.push_back({stage.stage.get(), i});
     }
   }
 }
@@ -73,7 +77,7 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   }
   stage_us_.fill(0.0F);
   run(0, {.frame = frame, .input = &frame}, out);
-  report_played(header.arrival_ns, out);
+  report_stages(header.arrival_ns, out);
 }
 
 // Frames before this sequence that have not come by now are counted as skipped.
@@ -135,7 +139,7 @@ void StreamEngine::on_partner(const PartnerFeed& feed, const Frame& frame,
   const std::size_t before = time_stage(feed.stage);
   options_.stages[feed.stage].stage->partner(feed.partner, {.frame = frame}, rest);
   time_stage(before);
-  report_played(last_arrival_ns_, out);
+  report_stages(last_arrival_ns_, out);
 }
 
 // Data arrived: a stream that was silent has recovered.
@@ -205,7 +209,7 @@ void StreamEngine::tick_now(std::int64_t now_ns, EngineOut& out) noexcept {
       stage.tick(now_ns, rest);
       time_stage(before);
     }
-    report_played(now_ns, out);
+    report_stages(now_ns, out);
   }
   if (!stale) return;
   if (state_ == StreamState::kLive) {
@@ -240,6 +244,7 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   other_.kind = Item::Kind::kEvent;
   other_.stream_event = event;
   out.item(other_);
+  tell(last_arrival_ns_, out);
   return ack;
 }
 
@@ -271,9 +276,27 @@ void StreamEngine::flush(EngineOut& out) noexcept {
     Chain rest(*this, i + 1, out);
     options_.stages[i].stage->flush(rest);
   }
+  tell(last_arrival_ns_, out);
 }
 
-void StreamEngine::report_played(std::int64_t time_ns, EngineOut& out) noexcept {
+// What the stages have to tell people.
+void StreamEngine::tell(std::int64_t time_ns, EngineOut& out) noexcept {
+  for (const EngineStage& stage : options_.stages) {
+    while (const auto notice = stage.stage->take_notice()) {
+      const StageNoticeType& type = stage.type->notices[notice->index];
+      const int kind = type.is_warning ? v1::Event::KIND_WARNING : v1::Event::KIND_CALIBRATED;
+      other_.kind = Item::Kind::kEvent;
+      other_.stream_event = {options_.stream, static_cast<std::uint8_t>(kind), time_ns,
+                             last_sequence_, 0.0};
+      other_.stream_event.notice = type.sentence;
+      out.item(other_);
+    }
+  }
+}
+
+// What has come of the stages' work: what they tell, and that a performance is over.
+void StreamEngine::report_stages(std::int64_t time_ns, EngineOut& out) noexcept {
+  tell(time_ns, out);
   const bool performed = performs_;
   performs_ = any_performs();
   if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);

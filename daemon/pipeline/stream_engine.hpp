@@ -99,7 +99,12 @@ class StreamEngine final {
   // The live parameters of all stages, in their order.
   [[nodiscard]] std::size_t live_parameters() const noexcept { return live_.size(); }
   [[nodiscard]] ParameterState live_parameter(std::size_t i) const noexcept {
-    return live_[i].stage->state(live_[i].parameter);
+    return live_[i].stage->state(live_[i].index);
+  }
+  // What the stages measure, in their order.
+  [[nodiscard]] std::size_t readings() const noexcept { return readings_.size(); }
+  [[nodiscard]] double reading(std::size_t i) const noexcept {
+    return readings_[i].stage->reading(readings_[i].index);
   }
   // Null if the stream does not have it.
   [[nodiscard]] Stage* find(const StageType& type) const noexcept;
@@ -113,7 +118,8 @@ class StreamEngine final {
   void run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept;
   void emit(const Frame& frame, EngineOut& out) noexcept;
   std::size_t time_stage(std::size_t stage) noexcept;
-  void report_played(std::int64_t time_ns, EngineOut& out) noexcept;
+  void tell(std::int64_t time_ns, EngineOut& out) noexcept;
+  void report_stages(std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_until(std::uint64_t sequence, std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_samples_until(std::uint64_t sequence, EngineOut& out) noexcept;
   [[nodiscard]] std::int64_t stale_due_ns() const noexcept;
@@ -124,13 +130,15 @@ class StreamEngine final {
              EngineOut& out) noexcept;
   [[nodiscard]] bool change(Stage& stage, const Command& command, StreamEvent& event) noexcept;
 
-  struct LiveParameter {
+  // A live parameter or a reading of a stage, by its number in the StageType.
+  struct StageValue {
     const Stage* stage;
-    std::size_t parameter;
+    std::size_t index;
   };
 
   EngineOptions options_;
-  std::vector<LiveParameter> live_;
+  std::vector<StageValue> live_;
+  std::vector<StageValue> readings_;
   StreamState state_ = StreamState::kWaiting;
   std::uint64_t last_sequence_ = 0;  // of the last frame that entered
   std::uint64_t last_out_ = 0;       // of the last frame that left
@@ -147,12 +155,15 @@ class StreamEngine final {
   Item other_;             // the sample or event on its way out
 };
 
-// Copies the engine's live parameters to where `stats` reads them. RT-safe.
-inline void publish_parameters(const StreamEngine& engine, PipelineCounters& counters) noexcept {
+// Copies the engine's live parameters and readings to where `stats` reads them. RT-safe.
+inline void publish_values(const StreamEngine& engine, PipelineCounters& counters) noexcept {
   for (std::size_t i = 0; i < engine.live_parameters(); ++i) {
     const ParameterState state = engine.live_parameter(i);
     counters.parameter[i].now.store(state.now, std::memory_order_relaxed);
     counters.parameter[i].target.store(state.target, std::memory_order_relaxed);
+  }
+  for (std::size_t i = 0; i < engine.readings(); ++i) {
+    counters.reading[i].now.store(engine.reading(i), std::memory_order_relaxed);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/pipeline/counters.hpp"
+#include "models/live_text.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::pipeline {
@@ -111,6 +112,7 @@ Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings&
                         .stale_after_ns = nanoseconds(settings.stale_after_s),
                         .publish_raw = settings.publish_raw};
   std::size_t live = 0;
+  std::size_t readings = 0;
   for (std::size_t i = 0; i < settings.stages.size(); ++i) {
     const StageType& type = *settings.stages[i].type;
     if (!skeleton) {
@@ -127,12 +129,14 @@ Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings&
     if (!stage) return std::unexpected(stage.error());
     options.stages.push_back({&type, std::move(*stage)});
     add_feeds(settings.stages[i], i, options.feeds);
-    live +=
-        static_cast<std::size_t>(std::ranges::count(type.parameters, true, &ParameterSpec::live));
+    live += static_cast<std::size_t>(std::ranges::count_if(
+        type.parameters, [](const ParameterSpec& spec) { return spec.live && has_number(spec); }));
+    readings += type.readings.size();
   }
-  if (options.stages.size() > kMaxStages || live > kMaxLiveParameters) {
+  if (options.stages.size() > kMaxStages || live > kMaxLiveParameters || readings > kMaxReadings) {
     return misuse("a stream has at most " + std::to_string(kMaxStages) + " stages, with " +
-                  std::to_string(kMaxLiveParameters) + " live parameters");
+                  std::to_string(kMaxLiveParameters) + " live parameters and " +
+                  std::to_string(kMaxReadings) + " readings");
   }
   return options;
 }

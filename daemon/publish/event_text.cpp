@@ -43,6 +43,7 @@ std::string changed(const StreamEvent& event) {
 }  // namespace
 
 std::string sentence(const StreamEvent& event) {
+  if (!event.notice.empty()) return std::string(event.notice);
   switch (event.kind) {
     case v1::Event::KIND_STARTED:
       return "the first data came";

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "daemon/publish/frame_output.hpp"
+#include "models/live_text.hpp"
 #include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
@@ -42,7 +44,7 @@ void fill_stages(const std::vector<const StageType*>& stages,
     stage.set_name(std::string(stages[i]->name));
     stage.clear_parameter();
     for (const ParameterSpec& spec : stages[i]->parameters) {
-      if (!spec.live) continue;
+      if (!spec.live || !has_number(spec)) continue;
       const pipeline::ParameterCounter& counter = counters.parameter[live++];
       v1::ParameterStats& parameter = *stage.add_parameter();
       parameter.set_name(std::string(spec.shown_name()));
@@ -51,6 +53,20 @@ void fill_stages(const std::vector<const StageType*>& stages,
       if (spec.name != "alpha") continue;
       stats.set_alpha(static_cast<float>(parameter.value()));
       stats.set_alpha_target(static_cast<float>(parameter.target()));
+    }
+  }
+}
+
+// Each reading into the field that has its name, where it is known.
+void fill_readings(const std::vector<const StageType*>& stages,
+                   const pipeline::PipelineCounters& counters, v1::StreamStats& stats) {
+  std::size_t next = 0;
+  for (const StageType* stage : stages) {
+    for (const StageReadingType& reading : stage->readings) {
+      const auto* field = v1::StreamStats::descriptor()->FindFieldByName(std::string(reading.name));
+      const auto value = static_cast<float>(counters.reading[next++].now.load());
+      v1::StreamStats::GetReflection()->ClearField(&stats, field);
+      if (!std::isnan(value)) v1::StreamStats::GetReflection()->SetFloat(&stats, field, value);
     }
   }
 }
@@ -152,6 +168,7 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   stats.set_dropped(info.counters->reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
   fill_stages(info.stages, pipeline, stats);
+  fill_readings(info.stages, pipeline, stats);
   fill_device(stats);
   const std::scoped_lock lock(mutex_);
   stats.set_frames(now_.published.frames);

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <variant>
 
+#include "models/live_text.hpp"
 #include "models/stages/registry.hpp"
 #include "posed/v1/log.pb.h"
 #include "proto/log/reader.hpp"
@@ -100,6 +101,7 @@ bool read_change(const StageType& type, std::string_view name, const Value& valu
   }
   for (std::size_t i = 0; i < type.parameters.size(); ++i) {
     if (type.parameters[i].name != name) continue;
+    if (text_command(type, type.parameters[i])) break;
     change.index = static_cast<std::uint8_t>(i);
     return read_set(type.parameters[i], value, decision);
   }

@@ -86,7 +86,7 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
     // the publisher numbers its first streams from 0 on
     if (!replay.stream(id).body.empty() || infos.size() < id) continue;
     self->presence_[id] = Presence::kHere;
-    self->publish_parameters(id);
+    self->publish_values(id);
     infos.push_back(self->info_of(id));
   }
   auto context = net::open_context();
@@ -139,7 +139,7 @@ void Broadcast::come(std::uint32_t stream) {
       leave(id);
   }
   presence_[stream] = Presence::kHere;
-  publish_parameters(stream);
+  publish_values(stream);
   publisher_->add(info_of(stream));
 }
 
@@ -148,9 +148,9 @@ void Broadcast::leave(std::uint32_t stream) {
   publisher_->remove(stream);
 }
 
-void Broadcast::publish_parameters(std::uint32_t stream) {
+void Broadcast::publish_values(std::uint32_t stream) {
   const pipeline::StreamEngine* const engine = replay_.engine(stream);
-  if (engine != nullptr) pipeline::publish_parameters(*engine, counters_[stream].pipeline);
+  if (engine != nullptr) pipeline::publish_values(*engine, counters_[stream].pipeline);
 }
 
 void Broadcast::add(const pipeline::Item& item) {
@@ -159,7 +159,7 @@ void Broadcast::add(const pipeline::Item& item) {
   if (presence_[stream] == Presence::kGone) return;
   const bool is_event = item.kind == pipeline::Item::Kind::kEvent;
   if (is_event) note(item.stream_event);
-  if (item.kind == pipeline::Item::Kind::kFrame) publish_parameters(stream);
+  if (item.kind == pipeline::Item::Kind::kFrame) publish_values(stream);
   while (!ring_.push(item)) std::this_thread::sleep_for(kLookAgain);
   wake_->notify();
   const bool ends = is_event && item.stream_event.kind == v1::Event::KIND_ENDED;
@@ -185,7 +185,7 @@ void Broadcast::note(const pipeline::StreamEvent& event) {
       pipeline::count(counters.shed, static_cast<std::uint64_t>(event.value));
       break;
     case v1::Event::KIND_CONTROL:
-      publish_parameters(event.stream);
+      publish_values(event.stream);
       if (event.change.kind == pipeline::StageChange::Kind::kModel) {
         pipeline::StreamSettings& settings = settings_[event.stream];
         for (pipeline::StageSettings& stage : settings.stages) {

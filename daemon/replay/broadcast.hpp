@@ -75,7 +75,7 @@ class Broadcast {
   [[nodiscard]] publish::StreamInfo info_of(std::uint32_t stream);
   void come(std::uint32_t stream);
   void leave(std::uint32_t stream);
-  void publish_parameters(std::uint32_t stream);
+  void publish_values(std::uint32_t stream);
   void note(const pipeline::StreamEvent& event);
 
   const Replay& replay_;

@@ -1,8 +1,10 @@
 #include "models/gp/inducing.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -45,32 +47,49 @@ Inducing choose_inducing(const Eigen::MatrixXd& X, double mu, int limit,
   return chosen;
 }
 
-Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
-                             const Eigen::VectorXd& offset, const Hyper& hyper, int limit) {
-  if (!X.allFinite() || !Y.allFinite()) {
-    return fail("a training value is not finite: look for broken frames in the clips");
-  }
+Result<std::vector<Trained>> fit_functions(const Eigen::MatrixXd& X,
+                                           std::span<const FunctionData> functions,
+                                           const Hyper& hyper, int limit) {
   Trained trained;
-  trained.offset = offset;
   trained.lambda = hyper.lambda;
   trained.mu = std::exp(hyper.log_mu);
   trained.b = 0.0;
   trained.noise = std::exp(hyper.log_noise);
+  const auto is_finite = [](const FunctionData& f) { return f.Y.allFinite(); };
+  if (!X.allFinite() || !std::ranges::all_of(functions, is_finite)) {
+    return fail("a training value is not finite: look for broken frames in the clips");
+  }
   const double noise = trained.noise / std::exp(trained.lambda);
   const Inducing chosen = choose_inducing(
       X, trained.mu, limit, [&](int, double worst) { return worst < kOfNoise * noise; });
   trained.inputs = X(chosen.chosen(), Eigen::all);
-  Eigen::MatrixXd gram = chosen.factor.transpose() * chosen.factor;
-  gram.diagonal().array() += noise;
-  const Eigen::MatrixXd moments = chosen.factor.transpose() * (Y.rowwise() - offset.transpose());
   const Eigen::MatrixXd root = chosen.root();
-  trained.weights =
-      root.transpose().triangularView<Eigen::Upper>().solve(gram.llt().solve(moments)) /
-      std::exp(trained.lambda);
-  if (!trained.weights.allFinite()) {
-    return fail("the covariance of the training poses is singular: raise the noise");
+  std::vector<Trained> learnt;
+  for (const FunctionData& function : functions) {
+    const Eigen::MatrixXd factor = chosen.factor(function.rows, Eigen::all);
+    Eigen::MatrixXd gram = factor.transpose() * factor;
+    gram.diagonal().array() += noise;
+    const Eigen::MatrixXd moments =
+        factor.transpose() * (function.Y.rowwise() - function.offset.transpose());
+    trained.offset = function.offset;
+    trained.weights =
+        root.transpose().triangularView<Eigen::Upper>().solve(gram.llt().solve(moments)) /
+        std::exp(trained.lambda);
+    if (!trained.weights.allFinite()) {
+      return fail("the covariance of the training poses is singular: raise the noise");
+    }
+    learnt.push_back(trained);
   }
-  return trained;
+  return learnt;
+}
+
+Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                             const Eigen::VectorXd& offset, const Hyper& hyper, int limit) {
+  std::vector<int> all(static_cast<std::size_t>(X.rows()));
+  std::iota(all.begin(), all.end(), 0);
+  auto learnt = fit_functions(X, std::array{FunctionData{std::move(all), Y, offset}}, hyper, limit);
+  if (!learnt) return std::unexpected(learnt.error());
+  return std::move(learnt->front());
 }
 
 }  // namespace posed::gp

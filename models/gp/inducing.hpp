@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -32,5 +33,17 @@ struct Inducing {
 [[nodiscard]] Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                            const Eigen::VectorXd& offset, const Hyper& hyper,
                                            int limit);
+
+// What one of several functions that share their poses is learnt from.
+struct FunctionData {
+  std::vector<int> rows;   // of X
+  Eigen::MatrixXd Y;       // outputs at these rows
+  Eigen::VectorXd offset;  // prior mean
+};
+
+// As fit_inducing(), for several functions on the same poses, which are chosen among all of X.
+[[nodiscard]] Result<std::vector<Trained>> fit_functions(const Eigen::MatrixXd& X,
+                                                         std::span<const FunctionData> functions,
+                                                         const Hyper& hyper, int limit);
 
 }  // namespace posed::gp

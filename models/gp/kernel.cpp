@@ -134,7 +134,10 @@ HWY_INLINE void accumulate_tile(const float* A, int stride, int width, const flo
   }
 }
 
-void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) {
+// The kernel's values tile by tile; `add(tile, width, k, even, odd)` adds what they weigh.
+template <typename Add>
+HWY_INLINE void sum_tiles(const Tiles& tiles, const Query& query, int keep, float* k, float* out,
+                          const Add& add) {
   HWY_ALIGN std::array<float, kMaxDims> even;
   HWY_ALIGN std::array<float, kMaxDims> odd;
   HWY_ALIGN std::array<float, kTile> passing;
@@ -147,13 +150,40 @@ void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, fl
     float* const here = point < keep ? k + point : passing.data();
     kernel_tile(tile, width, query, here);
     const float* const A = tile + static_cast<std::ptrdiff_t>(tiles.dims) * width;
-    accumulate_tile(A, padded_outputs, width, here, even.data(), odd.data());
+    add(A, width, here, even.data(), odd.data());
     tile = A + static_cast<std::ptrdiff_t>(padded_outputs) * width;
   }
   const Floats d;
   for (int o = 0; o < padded_outputs; o += kWide) {
     hn::Store(hn::Add(hn::Load(d, even.data() + o), hn::Load(d, odd.data() + o)), d, out + o);
   }
+}
+
+void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) {
+  sum_tiles(tiles, query, keep, k, out,
+            [&](const float* A, int width, const float* here, float* even, float* odd) {
+              accumulate_tile(A, tiles.outputs_padded, width, here, even, odd);
+            });
+}
+
+void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, int keep, float* k,
+                 float* out) {
+  const Floats d;
+  const float* block = blocks.data;
+  sum_tiles(tiles, query, keep, k, out,
+            [&](const float* /*A*/, int width, const float* here, float* even, float* odd) {
+              HWY_ALIGN std::array<float, kTile> scaled;
+              for (int s = 0; s < blocks.count; ++s) {
+                if (blocks.shares[s] != 0.0F) {
+                  const auto share = hn::Set(d, blocks.shares[s]);
+                  for (int i = 0; i < width; i += kWide) {
+                    hn::Store(hn::Mul(share, hn::Load(d, here + i)), d, scaled.data() + i);
+                  }
+                  accumulate_tile(block, tiles.outputs_padded, width, scaled.data(), even, odd);
+                }
+                block += static_cast<std::ptrdiff_t>(tiles.outputs_padded) * width;
+              }
+            });
 }
 
 float triangle_norm2(const float* triangle, int rows, const float* k) {
@@ -205,12 +235,17 @@ namespace posed::gp {
 namespace kernel {
 
 HWY_EXPORT(weighted_sum);
+HWY_EXPORT(blended_sum);
 HWY_EXPORT(triangle_norm2);
 HWY_EXPORT(exp2_of);
 HWY_EXPORT(target);
 
 void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) noexcept {
   HWY_DYNAMIC_DISPATCH(weighted_sum)(tiles, query, keep, k, out);
+}
+void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, int keep, float* k,
+                 float* out) noexcept {
+  HWY_DYNAMIC_DISPATCH(blended_sum)(tiles, blocks, query, keep, k, out);
 }
 float triangle_norm2(const float* triangle, int rows, const float* k) noexcept {
   return HWY_DYNAMIC_DISPATCH(triangle_norm2)(triangle, rows, k);

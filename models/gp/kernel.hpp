@@ -47,9 +47,22 @@ struct Tiles {
   int outputs_padded;
 };
 
+// Several sets of weights for the points of Tiles, tile by tile [count][width][padded], 64-byte
+// aligned, and how much each counts [count].
+struct Blocks {
+  const float* data;
+  const float* shares;
+  int count;
+};
+
 // sum_i k_i A_i into out [outputs_padded], where k_i = exp2(exponent * |q - x_i|^2). The first
 // `keep` (at most kMaxGate) k_i are left in k [padded(keep) rounded up to a tile].
 void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) noexcept;
+
+// The same with sum_s shares_s A_s for A; blocks without a share are not read. One block of share 1
+// gives the bits of weighted_sum() with these weights. RT-safe.
+void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, int keep, float* k,
+                 float* out) noexcept;
 
 // |L k|^2 over `rows` (a multiple of 16).
 [[nodiscard]] float triangle_norm2(const float* triangle, int rows, const float* k) noexcept;

@@ -17,7 +17,6 @@
 namespace posed::gp {
 namespace {
 
-using kernel::kLanes;
 using kernel::kMaxDims;
 using kernel::kMaxGate;
 using kernel::kTile;
@@ -49,11 +48,38 @@ Result<> validate(const Trained& t) {
   return {};
 }
 
+Result<> validate_more(const Trained& t, std::span<const Function> more) {
+  if (more.size() >= kMaxFunctions) {
+    return fail("the model has more than " + std::to_string(kMaxFunctions) + " functions");
+  }
+  for (const Function& one : more) {
+    const Trained other{t.inputs, one.weights, one.offset, t.lambda, t.mu, t.b, t.noise};
+    if (one.weights.cols() != t.weights.cols()) {
+      return fail("the model's functions differ in their number of outputs");
+    }
+    if (auto valid = validate(other); !valid) return valid;
+  }
+  return {};
+}
+
+// Writes one row a point of the tile that begins at `first`: its weights.
+float* lay_out_weights(const Eigen::MatrixXd& weights, double signal, const std::vector<int>& order,
+                       int first, int width, int outputs_padded, float* out) {
+  const auto outputs = static_cast<int>(weights.cols());
+  const auto real = static_cast<int>(order.size());
+  for (int i = 0; i < width; ++i) {
+    for (int o = 0; o < outputs_padded; ++o) {
+      const bool is_weight = first + i < real && o < outputs;
+      *out++ = is_weight ? static_cast<float>(signal * weights(order[first + i], o)) : 0.0F;
+    }
+  }
+  return out;
+}
+
 // Writes the tiles of kernel.hpp with the points in `order`.
 void lay_out(const Trained& t, const std::vector<int>& order, int points, int outputs_padded,
              float* out) {
   const auto dims = static_cast<int>(t.inputs.cols());
-  const auto outputs = static_cast<int>(t.weights.cols());
   const auto real = static_cast<int>(order.size());
   const double signal = std::exp(t.lambda);
   for (int first = 0; first < points; first += kTile) {
@@ -64,13 +90,32 @@ void lay_out(const Trained& t, const std::vector<int>& order, int points, int ou
         *out++ = is_point ? static_cast<float>(t.inputs(order[first + i], d)) : 0.0F;
       }
     }
-    for (int i = 0; i < width; ++i) {
-      for (int o = 0; o < outputs_padded; ++o) {
-        const bool is_weight = first + i < real && o < outputs;
-        *out++ = is_weight ? static_cast<float>(signal * t.weights(order[first + i], o)) : 0.0F;
-      }
+    out = lay_out_weights(t.weights, signal, order, first, width, outputs_padded, out);
+  }
+}
+
+// Writes the blocks of kernel.hpp.
+void lay_out_blocks(const Trained& t, std::span<const Function> more, const std::vector<int>& order,
+                    int points, int outputs_padded, float* out) {
+  const double signal = std::exp(t.lambda);
+  for (int first = 0; first < points; first += kTile) {
+    const int width = std::min(kTile, points - first);
+    out = lay_out_weights(t.weights, signal, order, first, width, outputs_padded, out);
+    for (const Function& one : more) {
+      out = lay_out_weights(one.weights, signal, order, first, width, outputs_padded, out);
     }
   }
+}
+
+// k = e^lambda exp(.) + b: e^lambda is multiplied into the weights, b sum w is a constant.
+std::array<float, kMaxDims> constant_of(const Eigen::MatrixXd& weights,
+                                        const Eigen::VectorXd& offset, double b) {
+  std::array<float, kMaxDims> constant{};
+  const Eigen::VectorXd sum = offset + b * weights.colwise().sum().transpose();
+  for (Eigen::Index o = 0; o < sum.size(); ++o) {
+    constant[static_cast<std::size_t>(o)] = static_cast<float>(sum[o]);
+  }
+  return constant;
 }
 
 }  // namespace
@@ -84,10 +129,18 @@ struct Predictor::Parts {
   std::array<float, kMaxDims> constant{};
   const float* triangle = nullptr;
   hwy::AlignedFreeUniquePtr<float[]> data;  // the tiles, then the triangle, in reading order
+  // With several functions: the weights of each, and the constants. The tiles and `constant` hold
+  // those of the mixture, as soon as all points have its weights.
+  hwy::AlignedFreeUniquePtr<float[]> blocks;
+  std::vector<std::array<float, kMaxDims>> constants;
+  std::array<float, kMaxFunctions> mixture{1.0F};
+  int mixed_points = 0;
 
+  void mix_weights(int point) noexcept;
+  void mixed_constant(std::span<const float> shares, std::span<float> out) const noexcept;
   // k is written only where the confidence needs it. Returns false when no dimension is available.
-  bool sum(std::span<const float> q, std::span<const std::uint8_t> available, int keep, float* k,
-           std::span<float> out) const noexcept;
+  bool sum(std::span<const float> q, std::span<const std::uint8_t> available,
+           std::span<const float> shares, int keep, float* k, std::span<float> out) const noexcept;
 };
 
 Predictor::Predictor(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -95,8 +148,10 @@ Predictor::Predictor(Predictor&&) noexcept = default;
 Predictor& Predictor::operator=(Predictor&&) noexcept = default;
 Predictor::~Predictor() = default;
 
-Result<Predictor> Predictor::build(const Trained& trained, bool gate) {
+Result<Predictor> Predictor::build(const Trained& trained, bool gate,
+                                   std::span<const Function> more) {
   if (auto valid = validate(trained); !valid) return std::unexpected(valid.error());
+  if (auto valid = validate_more(trained, more); !valid) return std::unexpected(valid.error());
   auto parts = std::make_unique<Parts>();
   parts->dims = static_cast<int>(trained.inputs.cols());
   parts->outputs = static_cast<int>(trained.weights.cols());
@@ -119,10 +174,18 @@ Result<Predictor> Predictor::build(const Trained& trained, bool gate) {
   lay_out(trained, order, parts->points, outputs_padded, parts->data.get());
   std::ranges::copy(triangle, parts->data.get() + tile_floats);
   parts->triangle = parts->data.get() + tile_floats;
-  // k = e^lambda exp(.) + b: e^lambda is multiplied into the weights, b sum w is a constant.
-  const Eigen::VectorXd constant =
-      trained.offset + trained.b * trained.weights.colwise().sum().transpose();
-  for (int o = 0; o < parts->outputs; ++o) parts->constant[o] = static_cast<float>(constant[o]);
+  parts->constant = constant_of(trained.weights, trained.offset, trained.b);
+  if (!more.empty()) {
+    const auto block_floats = static_cast<std::size_t>(parts->points) *
+                              static_cast<std::size_t>(outputs_padded) * (1 + more.size());
+    parts->blocks = hwy::AllocateAligned<float>(block_floats);
+    parts->mixed_points = parts->points;
+    lay_out_blocks(trained, more, order, parts->points, outputs_padded, parts->blocks.get());
+    parts->constants.push_back(parts->constant);
+    for (const Function& one : more) {
+      parts->constants.push_back(constant_of(one.weights, one.offset, trained.b));
+    }
+  }
   static_cast<void>(
       kernel::target());  // Highway detects the CPU here and not in the first hot call
   return Predictor(std::move(parts));
@@ -130,14 +193,66 @@ Result<Predictor> Predictor::build(const Trained& trained, bool gate) {
 
 int Predictor::inputs() const noexcept { return parts_->dims; }
 int Predictor::outputs() const noexcept { return parts_->outputs; }
+int Predictor::functions() const noexcept {
+  return std::max(1, static_cast<int>(parts_->constants.size()));
+}
 bool Predictor::has_confidence() const noexcept { return parts_->gate_rows > 0; }
 std::span<const float> Predictor::constant() const noexcept {
   return {parts_->constant.data(), static_cast<std::size_t>(parts_->outputs)};
 }
 
 // RT-safe.
+void Predictor::Parts::mixed_constant(std::span<const float> shares,
+                                      std::span<float> out) const noexcept {
+  for (int o = 0; o < outputs; ++o) {
+    out[o] = constants.empty() ? constant[o] : 0.0F;
+    for (std::size_t s = 0; s < constants.size(); ++s) out[o] += shares[s] * constants[s][o];
+  }
+}
+
+// RT-safe.
+void Predictor::constant(std::span<const float> shares, std::span<float> out) const noexcept {
+  parts_->mixed_constant(shares, out);
+}
+
+// RT-safe.
+void Predictor::Parts::mix_weights(int point) noexcept {
+  const int row = padded(outputs);
+  const auto functions = static_cast<int>(constants.size());
+  const int first = point / kTile * kTile;  // of its tile
+  const int width = std::min(kTile, points - first);
+  float* const mixed = data.get() + static_cast<std::ptrdiff_t>(first) * (dims + row) +
+                       dims * width + (point - first) * row;
+  const float* one =
+      blocks.get() + static_cast<std::ptrdiff_t>(first) * row * functions + (point - first) * row;
+  std::fill_n(mixed, row, 0.0F);
+  for (int s = 0; s < functions; ++s, one += width * row) {
+    const float share = mixture[s];
+    if (share == 0.0F) continue;
+    for (int o = 0; o < row; ++o) mixed[o] += share * one[o];
+  }
+}
+
+// RT-safe.
+bool Predictor::settle(std::span<const float> shares) noexcept {
+  Parts& p = *parts_;
+  if (p.constants.empty()) return true;
+  if (!std::ranges::equal(shares, std::span(p.mixture).first(shares.size()))) {
+    std::ranges::copy(shares, p.mixture.begin());
+    p.mixed_points = 0;
+  }
+  if (p.mixed_points == p.points) return true;
+  const int end = std::min(p.points, p.mixed_points + (p.points + kSettleCalls - 1) / kSettleCalls);
+  while (p.mixed_points < end) p.mix_weights(p.mixed_points++);
+  if (end < p.points) return false;
+  p.mixed_constant(p.mixture, {p.constant.data(), static_cast<std::size_t>(p.outputs)});
+  return true;
+}
+
+// RT-safe.
 bool Predictor::Parts::sum(std::span<const float> q, std::span<const std::uint8_t> available,
-                           int keep, float* k, std::span<float> out) const noexcept {
+                           std::span<const float> shares, int keep, float* k,
+                           std::span<float> out) const noexcept {
   std::array<std::uint16_t, kMaxDims> present;
   kernel::Query query{q.data(), nullptr, dims, exponent};
   if (!available.empty()) {
@@ -154,24 +269,37 @@ bool Predictor::Parts::sum(std::span<const float> q, std::span<const std::uint8_
     }
   }
   alignas(64) std::array<float, kMaxDims> raw;
-  kernel::weighted_sum({data.get(), points, dims, padded(outputs)}, query, keep, k, raw.data());
-  for (int o = 0; o < outputs; ++o) out[o] = constant[o] + raw[o];
+  const kernel::Tiles tiles{data.get(), points, dims, padded(outputs)};
+  if (shares.empty() || constants.empty()) {
+    kernel::weighted_sum(tiles, query, keep, k, raw.data());
+    for (int o = 0; o < outputs; ++o) out[o] = constant[o] + raw[o];
+    return true;
+  }
+  const auto functions = static_cast<int>(constants.size());
+  kernel::blended_sum(tiles, {blocks.get(), shares.data(), functions}, query, keep, k, raw.data());
+  mixed_constant(shares, out);
+  for (int o = 0; o < outputs; ++o) out[o] += raw[o];
   return true;
 }
 
 // RT-safe.
 void Predictor::mean(std::span<const float> q, std::span<const std::uint8_t> available,
-                     std::span<float> out) const noexcept {
-  if (!parts_->sum(q, available, 0, nullptr, out)) std::ranges::copy(constant(), out.begin());
+                     std::span<float> out, std::span<const float> shares) const noexcept {
+  if (parts_->sum(q, available, shares, 0, nullptr, out)) return;
+  if (shares.empty()) {
+    std::ranges::copy(constant(), out.begin());
+  } else {
+    constant(shares, out);
+  }
 }
 
 // RT-safe.
 float Predictor::mean_and_confidence(std::span<const float> q,
-                                     std::span<const std::uint8_t> available,
-                                     std::span<float> out) const noexcept {
+                                     std::span<const std::uint8_t> available, std::span<float> out,
+                                     std::span<const float> shares) const noexcept {
   alignas(64) std::array<float, kMaxGate> k;
-  if (!parts_->sum(q, available, parts_->gate_rows, k.data(), out)) {
-    std::ranges::copy(constant(), out.begin());
+  if (!parts_->sum(q, available, shares, parts_->gate_rows, k.data(), out)) {
+    mean(q, available, out, shares);  // the constant
     return 0.0F;
   }
   const float g = kernel::triangle_norm2(parts_->triangle, parts_->gate_rows, k.data());

@@ -1,9 +1,13 @@
 // Predictor: the trained Gaussian process in a form for the hot path: float32, precomputed weights,
 // tiles that fit the caches, SIMD chosen at run time (AVX2 and AVX-512 give the same bits). Const
-// and shareable between threads after build().
+// and shareable between threads after build(), but for settle().
 //
 //   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (README.md,
 //   "Kernel")
+//
+// Several functions f_s that share inputs and kernel are evaluated in one pass over the kernel, as
+// their mixture sum_s share_s f_s (README.md, "Mixtures"): for any shares, which costs one sum a
+// function, or for those that settle() has put together, at the cost of one function.
 //
 // Missing dimensions are left out: the distance runs over the available ones and is scaled by D /
 // D_avail (README.md, "Missing dimensions").
@@ -18,10 +22,15 @@
 
 namespace posed::gp {
 
+inline constexpr std::size_t kMaxFunctions = 16;  // of one predictor
+
 class Predictor {
  public:
   // Checks shapes and values; precomputes tiles and, with `gate`, the confidence's matrices. Cold.
-  [[nodiscard]] static Result<Predictor> build(const Trained& trained, bool gate);
+  // `more`: further functions, in the shapes of `trained`, at most kMaxFunctions in all. At first
+  // the mixture is the function of `trained` alone.
+  [[nodiscard]] static Result<Predictor> build(const Trained& trained, bool gate,
+                                               std::span<const Function> more = {});
   Predictor(Predictor&&) noexcept;
   Predictor& operator=(Predictor&&) noexcept;
   ~Predictor();
@@ -30,19 +39,31 @@ class Predictor {
   [[nodiscard]] int outputs() const noexcept;          // D_out
   [[nodiscard]] bool has_confidence() const noexcept;  // built with `gate`
 
+  [[nodiscard]] int functions() const noexcept;  // 1 without `more`
+
   // The limit of f far from all training poses: offset + b sum w [D_out]. RT-safe.
   [[nodiscard]] std::span<const float> constant() const noexcept;
+  // The same for other shares [functions] into out [D_out]. RT-safe.
+  void constant(std::span<const float> shares, std::span<float> out) const noexcept;
+
+  // Works towards the mixture of these shares [functions] and returns whether mean() without shares
+  // gives it. A call puts the weights of one part in kSettleCalls together; until all are, ask with
+  // shares. Not for a predictor that another thread uses. RT-safe.
+  [[nodiscard]] bool settle(std::span<const float> shares) noexcept;
+  static constexpr int kSettleCalls = 64;
 
   // f(q) into out [D_out]; constant() where nothing is available. q must be finite; its missing
-  // values are not read. `available` is empty (all) or D flags. RT-safe.
-  void mean(std::span<const float> q, std::span<const std::uint8_t> available,
-            std::span<float> out) const noexcept;
+  // values are not read. `available` is empty (all) or D flags. `shares` is empty (those of the
+  // mixture) or [functions]. RT-safe.
+  void mean(std::span<const float> q, std::span<const std::uint8_t> available, std::span<float> out,
+            std::span<const float> shares = {}) const noexcept;
 
   // The same, and returns the confidence g = 1 - v_E(q) / e^lambda in 0..1 (README.md,
   // "Confidence"). RT-safe. Needs build(..., gate = true).
   [[nodiscard]] float mean_and_confidence(std::span<const float> q,
                                           std::span<const std::uint8_t> available,
-                                          std::span<float> out) const noexcept;
+                                          std::span<float> out,
+                                          std::span<const float> shares = {}) const noexcept;
 
  private:
   struct Parts;

@@ -19,4 +19,10 @@ struct Trained {
   double noise = 1e-3;      // sigma^2
 };
 
+// Another function of the same inputs and kernel as a Trained.
+struct Function {
+  Eigen::MatrixXd weights;  // [N x D_out], rad
+  Eigen::VectorXd offset;   // [D_out], rad
+};
+
 }  // namespace posed::gp

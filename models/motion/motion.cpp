@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "models/motion/leg_signal.hpp"
 #include "models/motion/low_pass.hpp"
 #include "models/motion/symmetric_eigen.hpp"
 #include "proto/frame/rotation.hpp"
@@ -194,25 +195,10 @@ Result<> set_mean_rotations(std::span<const Motion* const> motions, PoseSpaceSpe
 }
 
 std::optional<VectorXd> leg_signal(const Motion& motion) {
-  const Skeleton& skeleton = *motion.skeleton;
-  const int left = skeleton.joint_of(Bone::kLeftUpperLeg);
-  const int right = skeleton.joint_of(Bone::kRightUpperLeg);
-  if (left < 0 || right < 0) return std::nullopt;
-  // The thigh points down in the T-pose; its flexion is how far forward it points in the pelvis
-  // frame.
-  const auto flexion = [&](const Frame& frame, int joint) {
-    const int parent = skeleton.joints[joint].parent;
-    const Quaterniond T_parent =
-        parent < 0 ? Quaterniond::Identity() : skeleton.joints[parent].T_world_joint;
-    const Quaterniond canonical =
-        T_parent * rotation(frame, joint) * skeleton.joints[joint].T_world_joint.conjugate();
-    const Vector3d thigh = canonical * -Vector3d::UnitY();
-    return std::atan2(thigh.z(), -thigh.y());
-  };
+  const auto legs = LegSignal::find(*motion.skeleton);
+  if (!legs) return std::nullopt;
   VectorXd signal(motion.size());
-  for (int t = 0; t < motion.size(); ++t) {
-    signal[t] = flexion(motion.frames[t], right) - flexion(motion.frames[t], left);
-  }
+  for (int t = 0; t < motion.size(); ++t) signal[t] = legs->value_rad(motion.frames[t]);
   return signal;
 }
 

@@ -54,8 +54,7 @@ void drop_first_frame(Motion& motion);
 [[nodiscard]] Result<> set_mean_rotations(std::span<const Motion* const> motions,
                                           PoseSpaceSpec& spec);
 
-// Right minus left flexion of the thigh [rad], forward positive, one value per frame. Empty when
-// the skeleton names no upper legs.
+// LegSignal of every frame [rad]. Empty when the skeleton names no upper legs.
 [[nodiscard]] std::optional<Eigen::VectorXd> leg_signal(const Motion& motion);
 
 // d/dt of each column: central differences, one-sided at the ends.

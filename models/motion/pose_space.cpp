@@ -171,6 +171,9 @@ Result<PoseSpace> PoseSpace::bind(const PoseSpaceSpec& spec, const Skeleton& ske
 
 int PoseSpace::dims() const noexcept { return static_cast<int>(joint_of_dim_.size()); }
 int PoseSpace::joint_of_dim(int d) const noexcept { return joint_of_dim_[d]; }
+int PoseSpace::skeleton_joint_of_dim(int d) const noexcept {
+  return items_[joint_of_dim_[d]].joint;
+}
 
 // RT-safe
 bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {
@@ -223,6 +226,31 @@ void PoseSpace::to_vector(const Frame& frame, double heading_rad, std::span<floa
       ++d;
     }
   }
+}
+
+// RT-safe
+bool PoseSpace::take_over(const PoseSpace& from, std::span<const float> from_q,
+                          std::span<float> q) const noexcept {
+  const auto same = [](const Item& a, const Item& b) {
+    return a.joint == b.joint && a.axes == b.axes && a.before.coeffs() == b.before.coeffs();
+  };
+  if (euler_ != from.euler_ || root_ != from.root_ ||
+      !std::ranges::equal(items_, from.items_, same)) {
+    return false;
+  }
+  if (euler_) {
+    std::ranges::copy(from_q.first(joint_of_dim_.size()), q.begin());
+    return true;
+  }
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    const auto d = static_cast<std::size_t>(items_[i].first_dim);
+    const Vector3d v(from_q[d], from_q[d + 1], from_q[d + 2]);
+    const Vector3d w = rotation_log(
+        Quaterniond(items_[i].mean.conjugate() * from.items_[i].mean * rotation_exp(v)));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      q[d + axis] = static_cast<float>(w[static_cast<int>(axis)]);
+  }
+  return true;
 }
 
 // V after the change; `rotation` is V as the frame has it. RT-safe

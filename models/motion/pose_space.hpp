@@ -58,6 +58,8 @@ class PoseSpace {
   [[nodiscard]] int dims() const noexcept;
   // Which joint of `spec.joints` dimension d belongs to.
   [[nodiscard]] int joint_of_dim(int d) const noexcept;
+  // The joint of the skeleton that it is.
+  [[nodiscard]] int skeleton_joint_of_dim(int d) const noexcept;
 
   // Turn about +Y that brings the training mean of the root nearest to this frame's root [rad].
   // RT-safe.
@@ -70,6 +72,11 @@ class PoseSpace {
   // (q is then 0, the training mean). RT-safe.
   void to_vector(const Frame& frame, double heading_rad, std::span<float> q,
                  std::span<std::uint8_t> available) const noexcept;
+
+  // The q of this space for the pose that is `from_q` in another; both have `kMaxPoseDims` values.
+  // False, and nothing is written, where the two do not describe the same joints. RT-safe.
+  [[nodiscard]] bool take_over(const PoseSpace& from, std::span<const float> from_q,
+                               std::span<float> q) const noexcept;
 
   // Replaces the pose of `frame` by q + delta in the space's own sense, channel angles included;
   // joints that are not available and joints outside the space are unchanged; a zero delta leaves

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -14,6 +15,7 @@ namespace posed::style {
 namespace {
 
 constexpr int kProgressEvery = 1000;  // frames
+constexpr double kBeginning_s = 1.5;
 
 // Keeps what the stage emits.
 class Catch final : public StageOut {
@@ -46,6 +48,15 @@ double settled_heading_rad(const clip::Clip& clip, const motion::PoseSpace& spac
     heading.update(space.heading_rad(frame), 1.0 / clip.frame_rate_hz);
   }
   return heading.value_rad();
+}
+
+// The gate sees the clip's beginning backwards, so that it knows the motion at the first frame.
+void settle(StyleFilter& filter, const clip::Clip& clip, double heading_rad) {
+  const auto seen = static_cast<int>(std::lround(kBeginning_s * clip.frame_rate_hz));
+  for (int i = std::min(seen, clip.frames() - 1); i >= 0; --i) {
+    filter.preview(clip.frame(i), heading_rad, 1.0 / clip.frame_rate_hz);
+  }
+  filter.settle(clip.frame(0), heading_rad);
 }
 
 // The feet stage behind the style; without one, frames pass through.
@@ -152,14 +163,40 @@ class ChannelWriter {
 
 }  // namespace
 
+Result<Walker> measure_walker(const StyleModel& model, const std::string& model_name,
+                              const clip::Clip& clip) {
+  if (auto sound = check_clip(clip); !sound) return std::unexpected(sound.error());
+  const auto bound = bind_model(model, *clip.skeleton, model_name);
+  if (!bound) return std::unexpected(bound.error());
+  if (!(*bound)->known) {
+    return fail("the model has no data for a warm-up: train it again with this version of posed",
+                model_name);
+  }
+  StyleFilter filter(bound->get(), {.alpha = 0.0});
+  settle(filter, clip, settled_heading_rad(clip, (*bound)->space));
+  const double seconds = (clip.frames() - 1.5) / clip.frame_rate_hz;  // ends at the last frame
+  Catch ignored;
+  for (int i = 0; i < clip.frames(); ++i) {
+    const Frame in = clip.frame(i);
+    if (i == 1) static_cast<void>(filter.command(StyleFilter::kWarmUp, StageCommand::of(seconds)));
+    filter.process({.frame = in, .input = &in}, ignored);
+  }
+  if (filter.walker()) return *filter.walker();
+  return fail(
+      "shows no walk for most of its time, so it does not say how the walker holds itself;"
+      " give a clip of the walker's usual walk",
+      clip.path);
+}
+
 Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
                               const clip::Clip& clip, const ApplyOptions& options) {
   if (auto sound = check_clip(clip); !sound) return std::unexpected(sound.error());
-  const auto bound = bind_model(model, *clip.skeleton, options.filter, model_name);
+  const auto bound = bind_model(model, *clip.skeleton, model_name);
   if (!bound) return std::unexpected(bound.error());
   const BoundModel& ready = **bound;
   StyleFilter filter(&ready, options.filter);
-  if (!options.cold) filter.settle(clip.frame(0), settled_heading_rad(clip, ready.space));
+  if (options.walker) filter.set_walker(*options.walker);
+  if (!options.cold) settle(filter, clip, settled_heading_rad(clip, ready.space));
 
   auto feet = feet_stage(clip, options);
   if (!feet) return std::unexpected(feet.error());
@@ -169,9 +206,17 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   if (options.feet && !root) return std::unexpected(root.error());
   motion::TurnSum turned;
   ThroughFeet out(std::move(*feet));
+  double gates = 0.0;
+  double estimates = 0.0;
+  int estimated = 0;
   for (int i = 0; i < clip.frames(); ++i) {
     const Frame in = clip.frame(i);
     filter.process({.frame = in, .input = &in}, out);
+    gates += filter.gate();
+    if (!std::isnan(filter.estimate())) {
+      estimates += filter.estimate();
+      ++estimated;
+    }
     for (std::size_t j = 0; j < in.joint_count; ++j) {
       const Quatf& styled = out.get().rotation_xyzw[j];
       if (styled == in.rotation_xyzw[j]) continue;
@@ -186,6 +231,8 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
       return fail("stopped before its end", clip.path);
     }
   }
+  if (estimated > 0) applied.estimate_mean = estimates / estimated;
+  if (!std::isnan(gates)) applied.gate_mean = gates / clip.frames();
   applied.joints_changed = turned.joints();
   applied.rms_change_rad = turned.rms_rad();
   applied.max_change_rad = turned.max_rad();

@@ -19,6 +19,7 @@ struct ApplyOptions {
   bool cold = false;
   // What the feet stage behind the style does with the root; empty: there is no such stage.
   std::optional<feet::RootOptions> feet{};
+  std::optional<Walker> walker{};  // measured before (measure_walker)
   std::function<bool(int done, int total)>
       progress;  // may be empty; returning false stops the work
 };
@@ -31,8 +32,16 @@ struct Applied {
   int joints_changed = 0;
   double rms_change_rad = 0.0;  // motion::TurnSum: over frames and changed joints
   double max_change_rad = 0.0;
-  double max_root_offset_m = 0.0;  // of the root from the input's, by the feet stage
+  std::optional<double> gate_mean{};      // over the frames; empty where there is no gate
+  std::optional<double> estimate_mean{};  // of the style that it shows already, where known
+  double max_root_offset_m = 0.0;         // of the root from the input's, by the feet stage
 };
+
+// The walker's own neutral pose and cadence by a warm-up over the whole clip (README.md,
+// "Warm-up"). Returns the errors of apply_to_clip(), and one for a model without data for it and
+// for a clip that shows no walk.
+[[nodiscard]] Result<Walker> measure_walker(const StyleModel& model, const std::string& model_name,
+                                            const clip::Clip& clip);
 
 // Returns an error for a clip without frames or with a value that is not finite, and for a skeleton
 // that lacks joints of the model or, with `feet`, has no leg or no position channels; the error

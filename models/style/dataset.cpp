@@ -270,7 +270,8 @@ std::vector<int> Dataset::clips_of(const std::string& motion) const {
   return found;
 }
 
-Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips, const std::string& target,
+Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
+                             const std::vector<std::string>& targets,
                              const DatasetOptions& options) {
   if (clips.empty()) return misuse("there is no clip to learn from");
   auto sources = read_sources(clips, options.rate_hz, options.space);
@@ -283,7 +284,8 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips, const std::
   // The mean rotations are those of the filter's input, that is of the sources.
   std::vector<const motion::Motion*> source_motions;
   for (const Source& source : *sources) {
-    if (source.clip->group != target) source_motions.push_back(&source.motion);
+    if (std::ranges::find(targets, source.clip->group) != targets.end()) continue;
+    source_motions.push_back(&source.motion);
   }
   if (auto set = motion::set_mean_rotations(source_motions, dataset.spec); !set) {
     return std::unexpected(set.error());

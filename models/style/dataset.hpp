@@ -77,9 +77,9 @@ struct Dataset {
 };
 
 // Reads poses and strides. Phases have no common origin yet: theta0 is each clip's own leg phase.
-// The training mean of the pose space is over the clips of every group but `target`.
+// The training mean of the pose space is over the clips of every group but `targets`.
 [[nodiscard]] Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
-                                           const std::string& target,
+                                           const std::vector<std::string>& targets,
                                            const DatasetOptions& options);
 
 // Gives all clips of a motion phases with a common origin: each clip's own strides, shifted so that

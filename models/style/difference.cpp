@@ -17,6 +17,26 @@ using Eigen::VectorXd;
 // no noise of their own.
 constexpr double kMinNoise_rad2 = 3.05e-7;
 
+// Cycles as harmonic coefficients to their poses, one below the other.
+MatrixXd on_grid(const std::vector<MatrixXd>& cycles) {
+  const MatrixXd basis = grid_basis();
+  MatrixXd poses(kGridFrames * std::ssize(cycles), cycles.front().cols());
+  for (Eigen::Index i = 0; i < std::ssize(cycles); ++i) {
+    poses.middleRows(i * kGridFrames, kGridFrames) = basis * cycles[static_cast<std::size_t>(i)];
+  }
+  return poses;
+}
+
+// The signal variance does not change the mean, because the noise is relative to it. It is set to
+// the residual's variance, so that the process's variance is meaningful.
+gp::Hyper hyper_of(const Kernel& kernel, double residual_variance) {
+  const double variance = std::max(1e-12, residual_variance);
+  return {.lambda = std::log(variance),
+          .log_mu = -2.0 * std::log(kernel.length_rad),
+          .log_b = -std::numeric_limits<double>::infinity(),
+          .log_noise = std::log(kernel.noise * variance)};
+}
+
 // Start of the search for the kernel values of --mode paper: the data's own variance, length 50
 // degrees, little noise.
 gp::Hyper paper_start(const MatrixXd& Y) {
@@ -34,15 +54,7 @@ gp::Hyper paper_start(const MatrixXd& Y) {
 
 MatrixXd grid_basis() { return harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics); }
 
-MatrixXd grid_inputs(const TrainingPairs& pairs) {
-  const MatrixXd basis = grid_basis();
-  MatrixXd inputs(kGridFrames * std::ssize(pairs.inputs), pairs.inputs.front().cols());
-  for (Eigen::Index i = 0; i < std::ssize(pairs.inputs); ++i) {
-    inputs.middleRows(i * kGridFrames, kGridFrames) =
-        basis * pairs.inputs[static_cast<std::size_t>(i)];
-  }
-  return inputs;
-}
+MatrixXd grid_inputs(const TrainingPairs& pairs) { return on_grid(pairs.inputs); }
 
 MatrixXd grid_outputs(const Outputs& outputs) {
   const MatrixXd basis = grid_basis();
@@ -60,17 +72,33 @@ Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& ker
   const MatrixXd X = grid_inputs(pairs);
   const MatrixXd Y = grid_outputs(pairs.outputs);
   const VectorXd offset = pairs.outputs.offset.transpose();
-  // The signal variance does not change the mean, because the noise is relative to it. It is set to
-  // the residual's variance, so that the process's variance is meaningful.
   const MatrixXd residual = Y.rowwise() - offset.transpose();
-  const double variance =
-      std::max(1e-12, residual.squaredNorm() / static_cast<double>(residual.size()));
-  const gp::Hyper hyper{.lambda = std::log(variance),
-                        .log_mu = -2.0 * std::log(kernel.length_rad),
-                        .log_b = -std::numeric_limits<double>::infinity(),
-                        .log_noise = std::log(kernel.noise * variance)};
+  const gp::Hyper hyper =
+      hyper_of(kernel, residual.squaredNorm() / static_cast<double>(residual.size()));
   return X.rows() <= kMostPoses ? gp::fit(X, Y, offset, hyper)
                                 : gp::fit_inducing(X, Y, offset, hyper, kMostPoses);
+}
+
+Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> styles,
+                                                 const std::vector<MatrixXd>& cycles,
+                                                 const Kernel& kernel) {
+  std::vector<gp::FunctionData> functions;
+  double squares = 0.0;
+  double count = 0.0;
+  std::size_t poses = 0;
+  for (const StylePairs& style : styles) {
+    gp::FunctionData& function = functions.emplace_back();
+    for (const int take : style.takes) {
+      for (int i = 0; i < kGridFrames; ++i) function.rows.push_back(take * kGridFrames + i);
+    }
+    function.Y = grid_outputs(style.pairs.outputs);
+    function.offset = style.pairs.outputs.offset.transpose();
+    squares += (function.Y.rowwise() - function.offset.transpose()).squaredNorm();
+    count += static_cast<double>(function.Y.size());
+    poses = std::max(poses, function.rows.size());
+  }
+  return gp::fit_functions(on_grid(cycles), functions, hyper_of(kernel, squares / count),
+                           std::min(static_cast<int>(poses), kMostPoses));
 }
 
 Result<gp::Trained> fit_paper(const MatrixXd& X, const MatrixXd& Y) {

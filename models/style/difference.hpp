@@ -2,6 +2,7 @@
 // cycle, its difference to the target), and the fit (README.md, "Training pairs"). Cold.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -70,6 +71,18 @@ struct Way {
 // The default model: the offset as prior mean, an RBF of this length on the residual, b = 0, the
 // noise relative to the signal variance; at most kMostPoses poses.
 [[nodiscard]] Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& kernel);
+
+// What one of several styles in one model is learnt from.
+struct StylePairs {
+  TrainingPairs pairs;
+  std::vector<int> takes;  // whose cycles are its inputs, among all takes
+};
+
+// The same for several styles that share kernel and poses: each is learnt from its own pairs. The
+// poses are chosen among the `cycles` of all takes, as many as the largest style alone would have.
+[[nodiscard]] Result<std::vector<gp::Trained>> fit_differences(
+    std::span<const StylePairs> styles, const std::vector<Eigen::MatrixXd>& cycles,
+    const Kernel& kernel);
 
 // The method of Sato et al. (--mode paper; README.md, "What differs from the paper, measured"):
 // differences Y [N x D] at the mean cycle X [N x D], all kernel values by evidence (SCG).

@@ -77,27 +77,43 @@ double scaled_rad(double length_deg, Eigen::Index dims) {
   return length_deg * kDegree * std::sqrt(static_cast<double>(dims) / 63.0);
 }
 
+// Folds of one style that share a task.
+struct Chunk {
+  std::size_t style;
+  std::size_t first, end;  // of its folds
+};
+
+std::vector<Chunk> chunks_of(std::span<const LeaveOut> styles) {
+  std::vector<Chunk> chunks;
+  for (std::size_t s = 0; s < styles.size(); ++s) {
+    const std::size_t folds = styles[s].folds.size();
+    for (std::size_t first = 0; first < folds; first += kChunk) {
+      chunks.push_back({s, first, std::min(first + kChunk, folds)});
+    }
+  }
+  return chunks;
+}
+
 // Tries lengths on all folds and keeps the best kernel.
 class Search {
  public:
-  Search(const LeaveOut& leave_out, TaskRunner& tasks, const FoldProgress& progress)
-      : leave_out_(leave_out),
-        tasks_(tasks),
-        progress_(progress),
-        X_(grid_inputs(leave_out.pairs)),
-        chunks_((leave_out.folds.size() + kChunk - 1) / kChunk) {}
+  Search(std::span<const LeaveOut> styles, TaskRunner& tasks, const FoldProgress& progress)
+      : styles_(styles), tasks_(tasks), progress_(progress), chunks_(chunks_of(styles)) {
+    for (const LeaveOut& style : styles) X_.push_back(grid_inputs(style.pairs));
+  }
 
   // False when it was stopped.
   bool try_lengths(const std::vector<double>& lengths_deg) {
     const Task task = [&](std::size_t t) {
-      const Folded process(X_, rad(lengths_deg[t / chunks_]));
+      const Chunk& chunk = chunks_[t % chunks_.size()];
+      const Folded process(X_[chunk.style], rad(lengths_deg[t / chunks_.size()]));
       TaskResult numbers;
-      const std::size_t first = t % chunks_ * kChunk;
-      const std::size_t end = std::min(first + kChunk, leave_out_.folds.size());
-      for (std::size_t f = first; f < end; ++f) process.ask(leave_out_.folds[f], numbers);
+      for (std::size_t f = chunk.first; f < chunk.end; ++f) {
+        process.ask(styles_[chunk.style].folds[f], numbers);
+      }
       return numbers;
     };
-    const std::size_t total = lengths_deg.size() * chunks_;
+    const std::size_t total = lengths_deg.size() * chunks_.size();
     const auto found = tasks_.run(total, task, [&](std::size_t done) {
       const double share = static_cast<double>(done) / static_cast<double>(total);
       return !progress_ || progress_(told_ + kRoundShare * share * (1.0 - told_));
@@ -105,12 +121,7 @@ class Search {
     if (!found) return false;
     told_ += kRoundShare * (1.0 - told_);
     for (std::size_t l = 0; l < lengths_deg.size(); ++l) {
-      TaskResult numbers;
-      for (std::size_t c = 0; c < chunks_; ++c) {
-        const TaskResult& part = (*found)[l * chunks_ + c];
-        numbers.insert(numbers.end(), part.begin(), part.end());
-      }
-      keep_best(lengths_deg[l], numbers);
+      keep_best(lengths_deg[l], std::span(*found).subspan(l * chunks_.size(), chunks_.size()));
     }
     return true;
   }
@@ -119,15 +130,23 @@ class Search {
   [[nodiscard]] const ChosenKernel& best() const { return best_; }
 
  private:
-  [[nodiscard]] double rad(double length_deg) const { return scaled_rad(length_deg, X_.cols()); }
+  [[nodiscard]] double rad(double length_deg) const {
+    return scaled_rad(length_deg, X_.front().cols());
+  }
 
-  void keep_best(double length_deg, const TaskResult& numbers) {
-    const auto folds = static_cast<double>(leave_out_.folds.size());
+  // `found`: one result a chunk.
+  void keep_best(double length_deg, std::span<const TaskResult> found) {
+    std::size_t folds = 0;
+    for (const LeaveOut& style : styles_) folds += style.folds.size();
     for (std::size_t n = 0; n < kNoises.size(); ++n) {
-      ChosenKernel tried{{rad(length_deg), kNoises[n]}, 0.0, {}};
-      for (std::size_t k = n * kNumbers; k < numbers.size(); k += kNumbers * kNoises.size()) {
-        tried.error += numbers[k] / folds;  // each fold has equal weight, whatever its length
-        tried.way.add({numbers[k + 1], numbers[k + 2], numbers[k + 3]});
+      ChosenKernel tried{{rad(length_deg), kNoises[n]}, 0.0, std::vector<Way>(styles_.size())};
+      for (std::size_t c = 0; c < found.size(); ++c) {
+        const TaskResult& numbers = found[c];
+        for (std::size_t k = n * kNumbers; k < numbers.size(); k += kNumbers * kNoises.size()) {
+          // Each fold has equal weight, whatever its length.
+          tried.error += numbers[k] / static_cast<double>(folds);
+          tried.ways[chunks_[c].style].add({numbers[k + 1], numbers[k + 2], numbers[k + 3]});
+        }
       }
       if (!(tried.error < best_.error)) continue;
       best_ = tried;
@@ -135,25 +154,26 @@ class Search {
     }
   }
 
-  const LeaveOut& leave_out_;
+  std::span<const LeaveOut> styles_;
   TaskRunner& tasks_;
   const FoldProgress& progress_;
-  MatrixXd X_;
-  std::size_t chunks_;
-  double told_ = 0.0;  // progress at the end of the last round
+  std::vector<Chunk> chunks_;
+  std::vector<MatrixXd> X_;  // of each style
+  double told_ = 0.0;        // progress at the end of the last round
   double best_deg_ = 0.0;
   ChosenKernel best_{{}, std::numeric_limits<double>::infinity(), {}};
 };
 
 }  // namespace
 
-std::optional<ChosenKernel> choose_kernel(const LeaveOut& leave_out, TaskRunner& tasks,
+std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles, TaskRunner& tasks,
                                           const FoldProgress& progress) {
-  if (leave_out.folds.empty()) {
-    const auto dims = leave_out.pairs.inputs.front().cols();
-    return ChosenKernel{{scaled_rad(50.0, dims), kNoises.front()}, 0.0, {}};
+  if (std::ranges::all_of(styles, [](const LeaveOut& style) { return style.folds.empty(); })) {
+    const auto dims = styles.front().pairs.inputs.front().cols();
+    return ChosenKernel{
+        {scaled_rad(50.0, dims), kNoises.front()}, 0.0, std::vector<Way>(styles.size())};
   }
-  Search search(leave_out, tasks, progress);
+  Search search(styles, tasks, progress);
   std::vector<double> lengths_deg(kFirstLengths_deg.begin(), kFirstLengths_deg.end());
   double shortest = lengths_deg.front();
   double longest = lengths_deg.back();

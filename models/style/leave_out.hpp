@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -33,17 +34,23 @@ struct LeaveOut {
 struct ChosenKernel {
   Kernel kernel;
   double error = 0.0;  // mean squared error of a frame's difference, rad^2 summed over dimensions
-  Way way;             // of the walkers held out
+  std::vector<Way> ways{};  // of the walkers held out, for each style
 };
 
 // Receives the fraction done; returning false stops the work.
 using FoldProgress = std::function<bool(double fraction)>;
 
 // The best of all combinations of lengths and noises: 30 to 100 degrees, and on while the best is
-// at an edge; noise over signal 1e-3 to 0.1. Without folds, 50 degrees and 1e-3. Nothing when
-// `progress` asked to stop.
-[[nodiscard]] std::optional<ChosenKernel> choose_kernel(const LeaveOut& leave_out,
+// at an edge; noise over signal 1e-3 to 0.1. `styles` share the kernel: each asks its own folds,
+// all of which count alike. Without folds, 50 degrees and 1e-3. Nothing when `progress` asked to
+// stop.
+[[nodiscard]] std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles,
                                                         TaskRunner& tasks,
                                                         const FoldProgress& progress);
+[[nodiscard]] inline std::optional<ChosenKernel> choose_kernel(const LeaveOut& style,
+                                                               TaskRunner& tasks,
+                                                               const FoldProgress& progress) {
+  return choose_kernel(std::span(&style, 1), tasks, progress);
+}
 
 }  // namespace posed::style

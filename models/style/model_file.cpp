@@ -2,7 +2,9 @@
 #include <cmath>
 #include <cstdint>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "models/style/style_model.hpp"
 #include "proto/model/model_file.hpp"
@@ -84,6 +86,32 @@ gp::Trained read_process(const v1::GaussianProcess& from, int dims, Reader& read
   return process;
 }
 
+MoreStyle read_style(const v1::StyleTarget& from, Eigen::Index points, int dims, Reader& reader) {
+  MoreStyle style;
+  style.name = from.name();
+  style.function.weights = reader.matrix(from.weights(), dims, "a style's weights");
+  reader.want(style.function.weights.rows() == points, "the number of a style's weights");
+  style.function.offset = reader.vector(from.offset(), dims, "a style's prior mean");
+  style.limit_rad = reader.vector(from.limit_rad(), dims, "a style's limits");
+  if (reader.sound()) reader.want((style.limit_rad.array() >= 0.0).all(), "a limit below zero");
+  return style;
+}
+
+GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
+  GateData gate;
+  gate.neutral = reader.vector(from.neutral(), dims, "the neutral pose");
+  gate.swing_rad = reader.number(from.swing_rad(), 0.0, 10.0, "the legs' swing");
+  gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.0, 100.0, "the fastest stride");
+  return gate;
+}
+
+StyleAxis read_axis(const v1::StyleAxis& from, int dims, Reader& reader) {
+  StyleAxis axis;
+  axis.direction = reader.vector(from.direction(), dims, "the style's axis");
+  axis.offset = reader.number(from.offset(), -kMaxNumber, kMaxNumber, "the style's offset");
+  return axis;
+}
+
 StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   StyleModel model;
   model.space = read_space(from.space(), reader);
@@ -96,10 +124,20 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
     reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
     reader.want((model.input_sd.array() >= 0.0).all(), "a deviation below zero");
   }
+  model.to = from.to();
+  for (const v1::StyleTarget& style : from.more()) {
+    if (!reader.sound()) break;
+    model.more.push_back(read_style(style, model.process.inputs.rows(), dims, reader));
+  }
+  const auto names = model.names();
+  reader.want(names.size() <= kMaxStyles, "the number of styles");
+  reader.want(std::set<std::string>(names.begin(), names.end()).size() == names.size(),
+              "the styles' names");
   model.rate_hz = reader.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
   model.from = from.from();
-  model.to = from.to();
   model.report_json = from.report_json();
+  if (from.has_gate()) model.gate = read_gate(from.gate(), dims, reader);
+  if (from.has_axis()) model.axis = read_axis(from.axis(), dims, reader);
   return model;
 }
 
@@ -159,6 +197,22 @@ std::string serialize_model(const StyleModel& model) {
   style.set_from(model.from);
   style.set_to(model.to);
   style.set_report_json(model.report_json);
+  for (const MoreStyle& one : model.more) {
+    v1::StyleTarget& target = *style.add_more();
+    target.set_name(one.name);
+    write_matrix(one.function.weights, *target.mutable_weights());
+    write_vector(one.function.offset, *target.mutable_offset());
+    write_vector(one.limit_rad, *target.mutable_limit_rad());
+  }
+  if (model.gate.present()) {
+    write_vector(model.gate.neutral, *style.mutable_gate()->mutable_neutral());
+    style.mutable_gate()->set_swing_rad(model.gate.swing_rad);
+    style.mutable_gate()->set_fastest_stride_s(model.gate.fastest_stride_s);
+  }
+  if (model.axis.present()) {
+    write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
+    style.mutable_axis()->set_offset(model.axis.offset);
+  }
   return model_file::wrap(std::move(file));
 }
 

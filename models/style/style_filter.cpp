@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
-#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -16,13 +16,8 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kMaxStep_s = 0.1;
-constexpr double kGateTau_s = 0.2;
-constexpr double kCalibrationTau_s = 10.0;
-constexpr float kCalibrationMax_rad = static_cast<float>(20.0 * kDegree);
+constexpr double kUnknownReading = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoTurn_rad = 1e-6;  // too small for single precision
-constexpr float kInputSpread = 3.0F;  // standard deviations of the training inputs
-
-double smoothing(double dt_s, double tau_s) { return -std::expm1(-dt_s / tau_s); }
 
 bool usable(const Quatf& q) noexcept {
   const float norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -39,52 +34,22 @@ void drop_broken_joints(Frame& frame) noexcept {
   }
 }
 
-Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
-  const bool process_fits =
-      model.process.inputs.cols() == dims && model.process.weights.cols() == dims;
-  const auto fits = [dims](const Eigen::VectorXd& v) {
-    return v.size() == 0 || (v.size() == dims && v.allFinite());
-  };
-  const bool spread =
-      (model.limit_rad.array() >= 0.0).all() && (model.input_sd.array() >= 0.0).all();
-  if (process_fits && spread && fits(model.limit_rad) && fits(model.input_mean) &&
-      fits(model.input_sd)) {
-    return {};
-  }
-  return fail("the model's process, limits and input range do not fit the " + std::to_string(dims) +
-                  " dimensions of its pose space: train it again",
-              name);
-}
-
 }  // namespace
-
-Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
-                                                     const Skeleton& skeleton,
-                                                     const FilterOptions& options,
-                                                     std::string name) {
-  auto space = motion::PoseSpace::bind(model.space, skeleton);
-  if (!space) {
-    Error error = space.error();
-    if (error.file.empty()) error.file = name;
-    return std::unexpected(std::move(error));
-  }
-  if (auto fits = check_fit(model, space->dims(), name); !fits) {
-    return std::unexpected(fits.error());
-  }
-  auto predictor = gp::Predictor::build(model.process, options.gate);
-  if (!predictor) {
-    Error error = predictor.error();
-    error.file = name;
-    return std::unexpected(std::move(error));
-  }
-  return std::make_unique<const BoundModel>(model, std::move(*space), std::move(*predictor),
-                                            std::move(name));
-}
 
 StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept
     : model_(model), options_(options) {
   options_.alpha_slew_per_s = std::clamp(options.alpha_slew_per_s, 1e-3, 1e6);
   set_alpha(static_cast<float>(options.alpha));
+  watch_.set_gate(options.gate);
+  if (options.calibrate) watch_.tell(WalkerWatch::kOldKey);
+  mask_.begin(options.mask);
+  if (model == nullptr) return;
+  weights_.begin(
+      shares_of(options.weights, model->styles).value_or(first_alone(model->styles.size())));
+  for (int i = 0; i < gp::Predictor::kSettleCalls; ++i) {
+    static_cast<void>(model->predictor.settle(weights_.shares()));
+  }
+  mix_limits();
 }
 
 // RT-safe
@@ -94,9 +59,24 @@ void StyleFilter::set_alpha(float alpha) noexcept {
 }
 
 // RT-safe
+bool StyleFilter::set_shares(const Shares& shares) noexcept {
+  if (model_ == nullptr || shares.count != model_->styles.size()) return false;
+  weights_.aim(shares);
+  return true;
+}
+
+// RT-safe
 const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   discontinuity_ = true;
-  return std::exchange(model_, model);
+  watch_.exchange(model_, *model);
+  if (model_ == nullptr) {
+    weights_.begin(first_alone(model->styles.size()));
+  } else {
+    weights_.rename(model_->styles, model->styles);
+  }
+  const BoundModel* const before = std::exchange(model_, model);
+  mix_limits();
+  return before;
 }
 
 // RT-safe
@@ -107,16 +87,20 @@ void StyleFilter::set(std::size_t parameter, double value) noexcept {
     case kAlphaSlew:
       options_.alpha_slew_per_s = value;
       return;
+    case kGate:
+      options_.gate = value != 0.0;
+      return watch_.set_gate(options_.gate);
     case kGateFallback:
       discontinuity_ = discontinuity_ || value != options_.gate_fallback;
       options_.gate_fallback = value;
       return;
     case kCalibrate:
-      discontinuity_ = discontinuity_ || (value != 0.0) != options_.calibrate;
-      options_.calibrate = value != 0.0;
+      return set_calibrate(value != 0.0);
+    case kAutoAlpha:
+      options_.auto_alpha = value != 0.0;
       return;
     default:
-      return;  // a predictor is built with or without a gate
+      return;
   }
 }
 
@@ -125,13 +109,15 @@ ParameterState StyleFilter::state(std::size_t parameter) const noexcept {
   const auto settled = [](double value) { return ParameterState{value, value}; };
   switch (parameter) {
     case kAlpha:
-      return {alpha_, alpha_target_};
+      return {alpha_, wanted_alpha()};
     case kAlphaSlew:
       return settled(options_.alpha_slew_per_s);
     case kGateFallback:
       return settled(options_.gate_fallback);
     case kCalibrate:
       return settled(options_.calibrate ? 1.0 : 0.0);
+    case kAutoAlpha:
+      return settled(options_.auto_alpha ? 1.0 : 0.0);
     default:
       return settled(options_.gate ? 1.0 : 0.0);
   }
@@ -142,22 +128,93 @@ void StyleFilter::use(const StageModel& model) noexcept {
   static_cast<void>(set_model(static_cast<const BoundModel*>(&model)));
 }
 
+// RT-safe
+void StyleFilter::describe(std::size_t index, const StageCommand& command,
+                           ShortText& text) const noexcept {
+  if (index == kMask) describe_mask(command.as<Mask>(), text);
+  if (index == kWeights && model_ != nullptr) {
+    describe_shares(command.as<Shares>(), model_->styles, text);
+  }
+}
+
 float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
 
+// Off: the walker is forgotten. RT-safe
+void StyleFilter::set_calibrate(bool on) noexcept {
+  watch_.tell(WalkerWatch::kOldKey);
+  options_.calibrate = on;
+  if (on) {
+    static_cast<void>(watch_.warm_up(model_, kUsualWarmUp_s));
+  } else if (watch_.walker()) {
+    watch_.set_walker({});
+    discontinuity_ = true;
+  }
+}
+
+// RT-safe
+bool StyleFilter::command(std::size_t index, const StageCommand& command) noexcept {
+  switch (index) {
+    case kWarmUp:
+      return watch_.warm_up(model_, command.as<double>());
+    case kWeights:
+      return set_shares(command.as<Shares>());
+    case kMask:
+      set_mask(command.as<Mask>());
+      return true;
+    default:
+      return false;
+  }
+}
+
+// Who shows the style already gets the rest of it. RT-safe
+double StyleFilter::wanted_alpha() const noexcept {
+  if (!options_.auto_alpha || model_ == nullptr || model_->axis.size() == 0) return alpha_target_;
+  const double shown = watch_.estimate();
+  if (std::isnan(shown)) return alpha_;
+  return alpha_target_ * std::clamp(1.0 - shown, 0.0, 1.0);
+}
+
+// RT-safe
+double StyleFilter::gate() const noexcept {
+  const bool gated = options_.gate && model_ != nullptr && model_->known;
+  return gated ? static_cast<double>(watch_.open()) : kUnknownReading;
+}
+
+// RT-safe
+double StyleFilter::reading(std::size_t reading) const noexcept {
+  return reading == kStyleGate ? gate() : estimate();
+}
+
 void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
-  alpha_ = alpha_target_;
+  watch_.settle();
+  alpha_ = wanted_alpha();
   const bool has_heading = model_ != nullptr && model_->space.has_heading(frame);
   heading_.settle(heading_rad, has_heading ? model_->space.heading_rad(frame) : heading_rad);
+}
+
+// RT-safe
+void StyleFilter::preview(const Frame& frame, double heading_rad, double dt_s) noexcept {
+  if (model_ == nullptr || frame.skeleton != model_->space.skeleton().id) return;
+  heading_.settle(heading_rad, heading_rad);
+  gap_s_ = dt_s;
+  Pose pose;
+  static_cast<void>(read_pose(frame, dt_s, pose));
 }
 
 // RT-safe
 void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   Frame frame = in.frame;
   drop_broken_joints(frame);
-  const double dt_s = std::min(elapsed_.next_s(frame.header), kMaxStep_s);
+  gap_s_ = elapsed_.next_s(frame.header);
+  const double dt_s = std::min(gap_s_, kMaxStep_s);
   const double slew = options_.alpha_slew_per_s * dt_s;
-  alpha_ += std::clamp(alpha_target_ - alpha_, -slew, slew);
+  alpha_ += std::clamp(wanted_alpha() - alpha_, -slew, slew);
   blend_weight_ = std::max(0.0, blend_weight_ - slew);
+  mask_.move(slew);
+  if (weights_.moving()) {
+    weights_.move(slew);
+    mix_limits();
+  }
   const bool served = model_ != nullptr && frame.skeleton == model_->space.skeleton().id;
   if (served) {
     style(frame, dt_s);
@@ -167,25 +224,29 @@ void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
 }
 
+// What the model sees of a frame. Returns whether that has changed suddenly. RT-safe
+bool StyleFilter::read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept {
+  const auto dims = static_cast<std::size_t>(model_->space.dims());
+  model_->space.to_vector(frame, heading_.value_rad(), {pose.q.data(), dims},
+                          {pose.available.data(), dims});
+  return watch_.see(*model_, frame, {pose.q.data(), dims}, {pose.available.data(), dims}, gap_s_,
+                    dt_s, {pose.input.data(), dims});
+}
+
 // RT-safe
 void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   const motion::PoseSpace& space = model_->space;
   if (space.has_heading(frame) && heading_.update(space.heading_rad(frame), dt_s)) {
     discontinuity_ = true;
   }
-  if (discontinuity_) {
-    gate_ = -1.0F;
-    offset_.fill(0.0F);
-  }
   const Rotations in = frame.rotation_xyzw;
+  Pose pose;
+  if (read_pose(frame, dt_s, pose)) discontinuity_ = true;
   if (alpha_ != 0.0) {
-    Dims q;
     Dims delta;
-    Flags available;
     const auto dims = static_cast<std::size_t>(space.dims());
-    space.to_vector(frame, heading_.value_rad(), {q.data(), dims}, {available.data(), dims});
-    answer(q, available, dt_s, delta);
-    space.add(frame, heading_.value_rad(), {q.data(), dims}, {delta.data(), dims});
+    answer(pose, delta);
+    space.add(frame, heading_.value_rad(), {pose.q.data(), dims}, {delta.data(), dims});
   }
   if (std::exchange(discontinuity_, false)) begin_blend(in, frame, dt_s);
   blend(frame);
@@ -194,55 +255,42 @@ void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   last_out_ = frame.rotation_xyzw;
 }
 
-// The model delta a f(q), gated and clamped. RT-safe
-void StyleFilter::answer(const Dims& q, const Flags& available, double dt_s, Dims& delta) noexcept {
-  const gp::Predictor& predictor = model_->predictor;
-  const auto dims = static_cast<std::size_t>(predictor.inputs());
-  Dims clipped;
-  const bool clips = options_.calibrate || options_.gate;
-  if (clips) kernel_input(q, available, dt_s, clipped);
-  const std::span<const float> input((clips ? clipped : q).data(), dims);
-  const std::span<const std::uint8_t> flags(available.data(), dims);
-  const std::span<float> out(delta.data(), dims);
-  if (options_.gate && predictor.has_confidence()) {
-    const float g = smoothed_gate(predictor.mean_and_confidence(input, flags, out), dt_s);
-    const float rest = (1.0F - g) * static_cast<float>(options_.gate_fallback);
-    for (std::size_t d = 0; d < dims; ++d) out[d] = g * out[d] + rest * predictor.constant()[d];
-  } else {
-    predictor.mean(input, flags, out);
-  }
-  const Eigen::VectorXf& limit = model_->limit_rad;
-  for (std::size_t d = 0; d < dims; ++d) {
-    if (limit.size() > 0) out[d] = std::clamp(out[d], -limit[d], limit[d]);
-    out[d] *= static_cast<float>(alpha_);
-  }
+// Empty while the predictor has the mixture ready. RT-safe
+std::span<const float> StyleFilter::shares_to_ask() noexcept {
+  if (weights_.moving() || !model_->predictor.settle(weights_.shares())) return weights_.shares();
+  return {};
 }
 
 // RT-safe
-float StyleFilter::smoothed_gate(float confidence, double dt_s) noexcept {
-  if (gate_ < 0.0F) gate_ = confidence;
-  gate_ += static_cast<float>(smoothing(dt_s, kGateTau_s)) * (confidence - gate_);
-  return gate_;
+void StyleFilter::mix_limits() noexcept {
+  const Eigen::VectorXf& first = model_->limit_rad;
+  const std::span<const float> shares = weights_.shares();
+  for (Eigen::Index d = 0; d < first.size(); ++d) {
+    float limit = shares[0] * first[d];
+    for (std::size_t s = 1; s < shares.size(); ++s) {
+      limit += shares[s] * model_->more_limits_rad[s - 1][d];
+    }
+    limit_rad_[static_cast<std::size_t>(d)] = limit;
+  }
 }
 
-// The kernel's input: q without the walker's own mean offset where calibration is on, clipped to
-// the range of the training poses (README.md, "Filter", Calibration). RT-safe
-void StyleFilter::kernel_input(const Dims& q, const Flags& available, double dt_s,
-                               Dims& input) noexcept {
-  const Eigen::VectorXf& mean = model_->input_mean;
-  const Eigen::VectorXf& sd = model_->input_sd;
-  const auto dims = static_cast<std::size_t>(model_->predictor.inputs());
-  const auto rate = static_cast<float>(smoothing(dt_s, kCalibrationTau_s));
+// The model delta: alpha times the mixture of styles, gated, clamped and masked. RT-safe
+void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
+  const gp::Predictor& predictor = model_->predictor;
+  const auto dims = static_cast<std::size_t>(predictor.inputs());
+  predictor.mean({pose.input.data(), dims}, {pose.available.data(), dims}, {delta.data(), dims},
+                 shares_to_ask());
+  const float open = watch_.open();
+  if (open < 1.0F) {
+    const float rest = (1.0F - open) * static_cast<float>(options_.gate_fallback);
+    Dims constant;
+    predictor.constant(weights_.shares(), {constant.data(), dims});
+    for (std::size_t d = 0; d < dims; ++d) delta[d] = open * delta[d] + rest * constant[d];
+  }
+  const bool limited = model_->limit_rad.size() > 0;
   for (std::size_t d = 0; d < dims; ++d) {
-    input[d] = q[d];
-    if (mean.size() == 0) continue;
-    if (options_.calibrate) {
-      if (available[d] != 0) offset_[d] += rate * (q[d] - mean[d] - offset_[d]);
-      input[d] -= std::clamp(offset_[d], -kCalibrationMax_rad, kCalibrationMax_rad);
-    }
-    if (sd.size() == 0) continue;
-    const float reach = kInputSpread * sd[d];
-    input[d] = std::clamp(input[d], mean[d] - reach, mean[d] + reach);
+    if (limited) delta[d] = std::clamp(delta[d], -limit_rad_[d], limit_rad_[d]);
+    delta[d] *= static_cast<float>(alpha_) * mask_.factor(model_->parts[d]);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -16,17 +17,53 @@
 
 namespace posed::style {
 
+inline constexpr std::size_t kMaxStyles = gp::kMaxFunctions;  // of one model
+
+// A style after a model's first one: another function of the same inputs.
+struct MoreStyle {
+  std::string name;  // of its group
+  gp::Function function;
+  Eigen::VectorXd limit_rad;
+};
+
+// What tells a motion that the model knows from another: README.md, "Gate" and "Warm-up".
+struct GateData {
+  Eigen::VectorXd neutral{};  // mean pose of the source's neutral walk [dims]; empty: no gate data
+  double swing_rad = 0.0;     // LiveStride's, the least mean of a training clip
+  double fastest_stride_s = 0.0;  // period of the fastest clip; 0: the training shows no strides
+
+  [[nodiscard]] bool present() const { return neutral.size() > 0; }
+  [[nodiscard]] bool strides() const { return fastest_stride_s > 0.0; }
+};
+
+// How much of the style a mean pose shows, direction . q + offset: 0 the source's, 1 the target's
+// (README.md, "Auto-alpha").
+struct StyleAxis {
+  Eigen::VectorXd direction{};  // [dims]; empty: not known
+  double offset = 0.0;
+
+  [[nodiscard]] bool present() const { return direction.size() > 0; }
+};
+
 struct StyleModel {
   motion::PoseSpaceSpec space;
   gp::Trained process;        // q -> difference of q at alpha = 1
   Eigen::VectorXd limit_rad;  // clamp of |difference| per dimension (1.5 x the largest in training)
-  Eigen::VectorXd input_mean;  // of q over the training data; input calibration and range check
-  Eigen::VectorXd input_sd;    // inputs are clipped to mean +- 3 sd before the kernel with gate or
-                               // calibration
+  Eigen::VectorXd input_mean;  // of q over the training data
+  Eigen::VectorXd input_sd;    // its standard deviation
   double rate_hz = 30.0;       // of training; the filter has no memory and is correct at any rate
   std::string from, to;        // group names, for people
   std::string report_json;     // what `train --json` printed
+  GateData gate{};
+  StyleAxis axis{};
+  std::vector<MoreStyle> more{};  // `process`, `limit_rad` and `to` are the first style's
+
+  [[nodiscard]] std::size_t styles() const { return 1 + more.size(); }
+  [[nodiscard]] std::vector<std::string> names() const;  // of its styles, in order
 };
+
+// The model with one style alone: the sum of all, each times its share [styles()].
+[[nodiscard]] StyleModel mixture_of(const StyleModel& model, std::span<const double> shares);
 
 [[nodiscard]] Result<StyleModel> load_model(const std::filesystem::path& path);
 // The same from bytes (control message, device log). `name` is only for error messages. Any bytes

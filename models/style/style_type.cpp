@@ -1,7 +1,12 @@
 #include "models/style/style_type.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
 #include "models/style/style_filter.hpp"
 #include "models/style/style_model.hpp"
+#include "posed/v1/log.pb.h"
 #include "posed/v1/model.pb.h"
 
 namespace posed::style {
@@ -12,12 +17,37 @@ FilterOptions options_of(const Parameters& parameters) {
           .alpha_slew_per_s = parameter<double>(parameters, "alpha_slew_per_s"),
           .gate = parameter<bool>(parameters, "gate"),
           .gate_fallback = parameter<double>(parameters, "gate_fallback"),
-          .calibrate = parameter<bool>(parameters, "calibrate")};
+          .calibrate = parameter<bool>(parameters, "calibrate"),
+          .auto_alpha = parameter<bool>(parameters, "auto_alpha"),
+          .weights = parameter<std::string>(parameters, "weights"),
+          .mask = mask_of(parameter<std::string>(parameters, "mask")).value_or(whole_body())};
+}
+
+const BoundModel* style_of(const StageModel* model) {
+  return static_cast<const BoundModel*>(model);
+}
+
+// What does not depend on the model.
+std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_model*/) {
+  const double seconds = parameter<double>(parameters, "warm_up_s");
+  if (seconds != 0.0 && seconds < kShortestWarmUp_s) {
+    return ParameterFault{
+        "warm_up_s", "warm_up_s is too short to measure a walk: give at least 2, or 0 for none"};
+  }
+  const auto weights = check_weights(parameter<std::string>(parameters, "weights"));
+  if (!weights) return ParameterFault{"weights", weights.error().message};
+  const auto mask = mask_of(parameter<std::string>(parameters, "mask"));
+  if (!mask) return ParameterFault{"mask", mask.error().message};
+  return std::nullopt;
 }
 
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* model) {
-  return std::make_unique<StyleFilter>(static_cast<const BoundModel*>(model),
-                                       options_of(context.parameters));
+  FilterOptions options = options_of(context.parameters);
+  if (model != nullptr) {
+    const auto shares = shares_of(options.weights, style_of(model)->styles);
+    if (!shares) return fail(shares.error().message, model->name);
+  }
+  return std::make_unique<StyleFilter>(style_of(model), options);
 }
 
 bool takes(const v1::ModelFile& file) { return file.has_style(); }
@@ -27,7 +57,70 @@ Result<std::unique_ptr<const StageModel>> bind(std::span<const std::byte> file,
                                                const std::string& name) {
   const auto model = parse_model(file, name);
   if (!model) return std::unexpected(model.error());
-  return bind_model(*model, *context.skeleton, options_of(context.parameters), name);
+  return bind_model(*model, *context.skeleton, name);
+}
+
+// A live text comes in pieces that end at its commas.
+std::string joined(std::span<const std::string> words) {
+  std::string text;
+  for (const std::string& word : words) text += (&word == words.data() ? "" : ",") + word;
+  return text;
+}
+
+Result<StageCommand> set_weights(const StageModel* model, std::span<const std::string> words,
+                                 const Parameters& /*options*/) {
+  if (model == nullptr) {
+    return fail("there is no style model; send one with `posed ctl model STREAM M.style`");
+  }
+  const auto shares = shares_of(joined(words), style_of(model)->styles);
+  if (!shares) return std::unexpected(shares.error());
+  return StageCommand::of(*shares);
+}
+
+Result<StageCommand> set_mask(const StageModel* /*model*/, std::span<const std::string> words,
+                              const Parameters& /*options*/) {
+  const auto mask = mask_of(joined(words));
+  if (!mask) return std::unexpected(mask.error());
+  return StageCommand::of(*mask);
+}
+
+void write_numbers(std::span<const double> numbers, v1::DecisionValue& value) {
+  for (const double number : numbers) value.mutable_weights()->add_weight(number);
+}
+
+// Numbers from 0 to 1; empty if there are none or others.
+std::vector<double> read_numbers(const v1::DecisionValue& value, std::size_t most) {
+  const auto& list = value.weights().weight();
+  const bool sound = value.has_weights() && static_cast<std::size_t>(list.size()) <= most &&
+                     std::ranges::all_of(list, [](double n) { return n >= 0.0 && n <= 1.0; });
+  return sound ? std::vector<double>(list.begin(), list.end()) : std::vector<double>();
+}
+
+void weights_to_log(const StageCommand& command, v1::DecisionValue& value) {
+  const auto shares = command.as<Shares>();
+  write_numbers(shares.all(), value);
+}
+
+std::optional<StageCommand> weights_from_log(const v1::DecisionValue& value) {
+  constexpr double kRounding = 1e-9;
+  const auto numbers = read_numbers(value, kMaxStyles);
+  const double sum = std::accumulate(numbers.begin(), numbers.end(), 0.0);
+  if (numbers.empty() || std::abs(sum - 1.0) > kRounding) return std::nullopt;
+  Shares shares{.count = static_cast<std::uint16_t>(numbers.size())};
+  std::ranges::copy(numbers, shares.of.begin());
+  return StageCommand::of(shares);
+}
+
+void mask_to_log(const StageCommand& command, v1::DecisionValue& value) {
+  write_numbers(command.as<Mask>(), value);
+}
+
+std::optional<StageCommand> mask_from_log(const v1::DecisionValue& value) {
+  const auto numbers = read_numbers(value, kBodyParts);
+  if (numbers.size() != kBodyParts) return std::nullopt;
+  Mask mask{};
+  std::ranges::copy(numbers, mask.begin());
+  return StageCommand::of(mask);
 }
 
 // In the order of StyleFilter::Parameter.
@@ -47,17 +140,113 @@ std::vector<ParameterSpec> parameters() {
            .live = true},
           {.name = "gate",
            .default_value = defaults.gate,
-           .help = "fade the style out far from the poses that the model was trained on"},
+           .help = "fade the style out where the model does not know the motion",
+           .live = true},
           {.name = "gate_fallback",
            .default_value = defaults.gate_fallback,
-           .help = "what the gate fades to: 0 nothing, 1 the model's constant part",
+           .help = "what the gate fades to: 0 the input, 1 the model's constant part",
            .min = 0.0,
            .max = 1.0,
            .live = true},
           {.name = "calibrate",
            .default_value = defaults.calibrate,
-           .help = "remove the performer's own mean posture before the model sees the pose",
+           .help = "the older name of warm_up_s = 10",
+           .live = true},
+          {.name = "auto_alpha",
+           .default_value = defaults.auto_alpha,
+           .help = "less style for a walker who shows it already",
+           .live = true},
+          {.name = "warm_up_s",
+           .default_value = 0.0,
+           .help = "measure the walker's own neutral pose so long at the start; 0: do not",
+           .min = 0.0,
+           .max = kLongestWarmUp_s},
+          {.name = "weights",
+           .default_value = std::string(),
+           .help = "how much of each style of the model: \"feminine=0.6,elderly=0.4\"; empty: the"
+                   " first alone",
+           .live = true},
+          {.name = "mask",
+           .default_value = std::string(),
+           .help = "how much of the style parts of the body get: \"arms=0.5,head=0\"; the rest 1",
            .live = true}};
+}
+
+// In the order of StyleFilter::Reading.
+std::vector<StageReadingType> readings() {
+  return {{.name = "style_estimate", .help = "how much of the style the walker shows already"},
+          {.name = "style_gate", .help = "1 where the model knows the motion, 0 passed through"}};
+}
+
+// In the order of WalkerWatch::Notice.
+std::vector<StageNoticeType> notices() {
+  return {
+      {.sentence = "the model has no data for gate, warm-up and auto-alpha, so any motion is "
+                   "styled in full: train it again with this version of posed, or set gate = "
+                   "false"},
+      {.sentence = "the warm-up is over: the walker's own neutral pose is known",
+       .is_warning = false},
+      {.sentence = "the walker stood for more than half of the warm-up, so all stays as it was: "
+                   "walk, and start it again"},
+      {.sentence = "the warm-up was interrupted, so all stays as it was: start it again"},
+      {.sentence = "the new model sees other joints, so what is known of the walker does not "
+                   "serve it: start a warm-up"},
+      {.sentence = "calibrate is the older name of a warm-up: use warm_up_s = 10, or `posed ctl "
+                   "warm-up STREAM`"}};
+}
+
+Result<StageCommand> warm_up(const StageModel* model, std::span<const std::string> words,
+                             const Parameters& options) {
+  if (model == nullptr) return fail("there is no style model to warm up for");
+  if (!words.empty()) return misuse("warm-up takes --seconds only");
+  return StageCommand::of(parameter<double>(options, "seconds"));
+}
+
+void warm_up_to_log(const StageCommand& command, v1::DecisionValue& value) {
+  value.set_number(command.as<double>());
+}
+
+std::optional<StageCommand> warm_up_from_log(const v1::DecisionValue& value) {
+  const double seconds = value.number();
+  if (!(seconds >= kShortestWarmUp_s && seconds <= kLongestWarmUp_s)) return std::nullopt;
+  return StageCommand::of(seconds);
+}
+
+// In the order of StyleFilter::Command.
+std::vector<StageCommandType> commands() {
+  return {{.name = "warm-up",
+           .help = "measures the walker's own neutral pose while it walks",
+           .options = {{.name = "seconds",
+                        .default_value = kUsualWarmUp_s,
+                        .help = "how long it walks",
+                        .min = kShortestWarmUp_s,
+                        .max = kLongestWarmUp_s}},
+           .refusal = "the model has no data for a warm-up: train it again with this version of "
+                      "posed",
+           .encode = warm_up,
+           .to_log = warm_up_to_log,
+           .from_log = warm_up_from_log},
+          // What sets the live texts (models/live_text.hpp).
+          {.name = "weights",
+           .help = "mixes the model's styles",
+           .refusal = "the weights are for the model before the one that has just come; send them"
+                      " again",
+           .encode = set_weights,
+           .to_log = weights_to_log,
+           .from_log = weights_from_log},
+          {.name = "mask",
+           .help = "styles parts of the body less",
+           .encode = set_mask,
+           .to_log = mask_to_log,
+           .from_log = mask_from_log}};
+}
+
+Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& parameters,
+                                                             const StageModel* /*model*/) {
+  double seconds = parameter<double>(parameters, "warm_up_s");
+  if (seconds == 0.0 && parameter<bool>(parameters, "calibrate")) seconds = kUsualWarmUp_s;
+  if (seconds == 0.0) return std::nullopt;
+  return StageType::FirstCommand{StyleFilter::kWarmUp, StageCommand::of(seconds)};
 }
 
 }  // namespace
@@ -66,10 +255,15 @@ const StageType& style_type() {
   static const StageType type{.name = "style",
                               .summary = "changes the style of every pose, as a trained model says",
                               .parameters = parameters(),
+                              .check = check,
                               .make = make,
                               .model_required = true,
                               .takes = takes,
-                              .bind_model = bind};
+                              .bind_model = bind,
+                              .readings = readings(),
+                              .notices = notices(),
+                              .commands = commands(),
+                              .first_command = first_command};
   return type;
 }
 

@@ -18,11 +18,13 @@ enum class TrainMode : std::uint8_t {
 [[nodiscard]] Result<TrainMode> mode_from_name(std::string_view name);
 
 struct TrainOptions {
-  std::string target;  // the group whose style is learnt; every other group is a source
+  std::string target;  // the group whose style is learnt; every group that is no target is a source
+  std::vector<std::string> more_targets{};  // whose styles the same model has, too
   TrainMode mode = TrainMode::kDefault;
   DatasetOptions dataset;
 };
 
+// Several styles share the sources, the kernel and the poses; each is otherwise learnt as alone.
 // Clips that cannot be learnt from give an error of one sentence that names the clip. The report
 // (what `train --json` prints, without the seconds) is in the model; its `usable`, `problems`,
 // `warnings` and `verdict` state whether the model is fit for use (training_check.hpp).

@@ -145,6 +145,8 @@ double cycle_residual_deg(const Dataset& dataset, const AlignedClip& clip) {
   return std::sqrt((clip.q - cycle).squaredNorm() / static_cast<double>(count)) / kDegree;
 }
 
+bool shows_strides(const AlignedClip& clip) { return clip.has_legs && no_strides(clip).empty(); }
+
 bool is_gait(std::string_view motion) {
   constexpr std::array<std::string_view, 5> kGaits{"walk", "run", "jog", "march", "gait"};
   return std::ranges::any_of(kGaits,

@@ -36,6 +36,9 @@ struct TrainingCheck {
 // Whether a motion of this name is expected to have strides: walks and runs of all kinds.
 [[nodiscard]] bool is_gait(std::string_view motion);
 
+// Whether the clip's legs stride: they swing far enough, in a rhythm.
+[[nodiscard]] bool shows_strides(const AlignedClip& clip);
+
 // How far the clip's frames are from its own cycle at their phases: rms over frames and joints.
 [[nodiscard]] double cycle_residual_deg(const Dataset& dataset, const AlignedClip& clip);
 

@@ -31,7 +31,8 @@ struct WalkerFit {
                                               const std::string& model_name,
                                               const clip::Clip& clip);
 
-// A copy of the model that gives the same change for every pose, that is, a constant offset.
+// A copy of the model, of one style, that gives the same change for every pose, that is, a constant
+// offset.
 [[nodiscard]] StyleModel with_constant_change(StyleModel model, const Eigen::VectorXd& change);
 
 }  // namespace posed::style

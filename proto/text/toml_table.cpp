@@ -1,6 +1,7 @@
 #include "proto/text/toml_table.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <limits>
 #include <utility>
@@ -49,6 +50,22 @@ std::optional<std::vector<std::byte>> bytes_of(std::string_view digits) {
     digits.remove_prefix(2);
   }
   return bytes;
+}
+
+// "a=0.6,b=0.4" of the table {a = 0.6, b = 0.4}; nothing for a node that is none.
+std::optional<std::string> named_numbers(const toml::node& node) {
+  const toml::table* table = node.as_table();
+  if (table == nullptr || table->empty()) return std::nullopt;
+  std::string text;
+  for (const auto& [name, entry] : *table) {
+    const auto number = entry.value<double>();
+    if (!number || !entry.is_number()) return std::nullopt;
+    std::array<char, 32> digits{};
+    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), *number).ptr;
+    text +=
+        (text.empty() ? "" : ",") + std::string(name.str()) + "=" + std::string(digits.data(), end);
+  }
+  return text;
 }
 
 }  // namespace
@@ -159,6 +176,12 @@ void TableReader::read(const ParameterSpec& spec, ParameterValue& value) {
   const std::string key(spec.shown_name());
   const toml::node* node = find(key);
   if (node == nullptr) return;
+  const bool is_live_text =
+      spec.live && spec.words.empty() && std::holds_alternative<std::string>(spec.default_value);
+  if (const auto text = is_live_text ? named_numbers(*node) : std::nullopt) {
+    value = *text;
+    return;
+  }
   ParameterValue given;
   if (const auto* flag = node->as_boolean()) given = flag->get();
   if (const auto* integer = node->as_integer()) given = integer->get();

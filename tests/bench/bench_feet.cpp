@@ -67,7 +67,7 @@ nlohmann::json measure(int points) {
   style::StyleModel model;
   model.space = motion::describe_space(motion::Space::kNative, *walk.skeleton).value();
   model.process = gp::synthetic(points, motion::space_dims(model.space)).process;
-  const auto bound = style::bind_model(model, *walk.skeleton, {}, "synthetic").value();
+  const auto bound = style::bind_model(model, *walk.skeleton, "synthetic").value();
   nlohmann::json report{{"joints", walk.skeleton->joints.size()}, {"points", points}};
   for (const char* root : {"off", "stride", "actor"}) {
     style::StyleFilter style(bound.get(), {});

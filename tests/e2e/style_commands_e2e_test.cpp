@@ -98,6 +98,51 @@ TEST_CASE("command line options beside an experiment file override it or are ref
   }
 }
 
+TEST_CASE("several targets make one model, whose styles weights mix and a mask takes from parts",
+          "[train_style]") {
+  const WalkerStudio studio;
+  const auto done =
+      studio.train({"--from", studio.path("march_1.bvh"), studio.path("march_2.bvh"), "--to",
+                    "sway=" + studio.path("sway_1.bvh"), "other=ann:" + studio.path("sway_2.bvh")},
+                   "two.style");
+  INFO(done.err);
+  REQUIRE(done.code == 0);
+  const json report = json::parse(done.out);
+  REQUIRE(report["targets"].size() == 2);
+  CHECK(report["targets"][0]["name"] == "sway");
+  CHECK(report["targets"][1]["name"] == "other");
+  CHECK(has(done.err, "other: "));
+
+  const auto apply = [&](std::vector<std::string> more, const std::string& out) {
+    more.insert(more.begin(), {"apply", "--model", studio.path("two.style"), "--json",
+                               studio.path("march_1.bvh"), "--out", studio.path(out)});
+    return posed(std::move(more));
+  };
+  REQUIRE(apply({}, "plain.bvh").code == 0);
+  REQUIRE(apply({"--weights", "sway=2"}, "first.bvh").code == 0);
+  const auto mixed = apply({"--weights", "sway=3,other=1", "--mask", "arms=0"}, "mixed.bvh");
+  REQUIRE(mixed.code == 0);
+  CHECK(json::parse(mixed.out)["weights"]["sway"] == 0.75);
+  CHECK(json::parse(mixed.out)["weights"]["other"] == 0.25);
+  CHECK(studio.bytes("plain.bvh") == studio.bytes("first.bvh"));
+  CHECK(studio.bytes("plain.bvh") != studio.bytes("mixed.bvh"));
+
+  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
+    const auto tried = apply(std::move(more), "x.bvh");
+    INFO(tried.err);
+    CHECK(has(tried.err, why));
+    return tried.code == 2 && !studio.there("x.bvh");
+  };
+  CHECK(refused({"--weights", "sad=1"}, "the model has no style 'sad'; it has: sway, other"));
+  CHECK(refused({"--weights", "sway=0"}, "all are 0"));
+  CHECK(refused({"--mask", "tail=1"}, "the body has no part 'tail'; it has: arms, legs"));
+  const auto early = studio.train({"--from", studio.path("march_1.bvh"), "--to",
+                                   studio.path("sway_1.bvh"), "sway=" + studio.path("sway_2.bvh")},
+                                  "x.style");
+  CHECK(early.code == 2);
+  CHECK(has(early.err, "before the first NAME="));
+}
+
 TEST_CASE("files are takes of one person unless a name before a colon tells them apart",
           "[train_style]") {
   const WalkerStudio studio;

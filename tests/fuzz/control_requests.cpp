@@ -171,12 +171,20 @@ void send_other(FuzzedDataProvider& data, Fixture& fixture, const std::string& c
       break;
     case 1:
       request.mutable_set_parameter()->set_stream(stream_name(data));
-      request.mutable_set_parameter()->set_name(data.PickValueInArray(
-          {"alpha", "style.alpha", "style.gate", "calibrate", "lag_ms", "generate.labels", "."}));
-      if (data.ConsumeBool()) {
-        request.mutable_set_parameter()->set_number(data.ConsumeFloatingPoint<double>());
-      } else {
-        request.mutable_set_parameter()->set_flag(data.ConsumeBool());
+      request.mutable_set_parameter()->set_name(
+          data.PickValueInArray({"alpha", "style.alpha", "style.gate", "calibrate", "lag_ms",
+                                 "generate.labels", "style.weights", "mask", "."}));
+      switch (data.ConsumeIntegralInRange(0, 2)) {
+        case 0:
+          request.mutable_set_parameter()->set_number(data.ConsumeFloatingPoint<double>());
+          break;
+        case 1:
+          request.mutable_set_parameter()->set_flag(data.ConsumeBool());
+          break;
+        default:
+          request.mutable_set_parameter()->set_text(
+              data.PickValueInArray({"arms=", "legs=1,", "other=", ""}) +
+              data.ConsumeRandomLengthString(40));
       }
       break;
     case 2:

@@ -79,8 +79,17 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   CountingRecordSink record_sink;
   const auto device = open_device("file", {{"path", path.string()}});
   const Skeleton& skeleton = *device.description.skeleton;
-  const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
-  const auto second = style::bind_model(test::toy_model(2), skeleton, {}, "second").value();
+  const auto first = style::bind_model(test::toy_model(1), skeleton, "first").value();
+  const auto second = style::bind_model(test::toy_styles({2, 3, 4}), skeleton, "second").value();
+  const auto change = [](std::size_t command, const StageCommand& payload, std::uint64_t ticket) {
+    return Command{.change = {.kind = pipeline::StageChange::Kind::kCommand,
+                              .index = static_cast<std::uint8_t>(command),
+                              .type = &style::style_type()},
+                   .ticket = ticket,
+                   .command = payload};
+  };
+  const auto weights = style::shares_of("s3=0.5,s4=0.5", second->styles).value();
+  const auto mask = style::mask_of("legs=0.5").value();
   std::vector<RigStream> streams;
   streams.push_back(
       {.device = open_device("file", {{"path", path.string()}}), .style = first.get()});
@@ -95,8 +104,10 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   REQUIRE(rig.take_frames(200) == 200);
   rig.command(test::alpha_command(0, 0.5, 1));
   rig.command(test::model_command(0, style::style_type(), second.get(), 2));
+  rig.command(change(style::StyleFilter::kWeights, StageCommand::of(weights), 3));
+  rig.command(change(style::StyleFilter::kMask, StageCommand::of(mask), 4));
   REQUIRE(rig.take_frames(200) == 200);
-  CHECK(rig.take_acks() == 2);
+  CHECK(rig.take_acks() == 4);
   CHECK(record_sink.chunks > 0);
   CHECK(record_sink.decisions >= 2);
   if (!rig.system_calls_watched()) WARN("SKIPPED: this kernel has no syscall user dispatch");
@@ -114,7 +125,7 @@ TEST_CASE("a styled body whose feet stand keeps the real-time contract", "[rt]")
   style::StyleModel model;
   model.space = motion::describe_space(motion::Space::kNative, skeleton).value();
   model.process = gp::synthetic(56, motion::space_dims(model.space)).process;
-  const auto bound = style::bind_model(model, skeleton, {}, "walker").value();
+  const auto bound = style::bind_model(model, skeleton, "walker").value();
   std::vector<RigStream> streams;
   streams.push_back({.device = std::move(device), .style = bound.get(), .feet = true});
   Rig rig(std::move(streams), &record_sink);

@@ -261,7 +261,7 @@ void add_bench_pipeline(CLI::App& bench, int& exit_code) {
   command->add_option("--seconds", options->seconds, "How long, both turns together")
       ->check(CLI::Range(4, 86400))
       ->capture_default_str();
-  command->add_flag("--gate", options->gate, "With the confidence gate");
+  command->add_flag("--gate", options->gate, "With the style's gate");
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchPipelineFooter);
   command->callback([options, &exit_code] {

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -40,7 +41,9 @@ constexpr const char* kBenchPredictFooter =
 hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
 frames of a 120 Hz stream. The reference sums as many floats as the process logically reads
 (N x 2D; gate rows are also compared with the confidence's triangle added), with eight vector
-accumulators; variants take turns, so that they run under the same conditions.
+accumulators. four_at_rest, four_moving and four_settling are four styles in one model, with
+weights that rest, that move at every call and that have just come to rest. Variants take turns, so
+that they run under the same conditions.
 
   posed bench predict
   posed bench predict --samples 500 --json)";
@@ -102,11 +105,14 @@ Floats ones(int count) {
 
 int to_yardstick(int floats) { return (floats + 127) / 128 * 128; }
 
-// A Gaussian process, the two ways to call it, and the queries as the hot path has them.
+constexpr int kStyles = 4;  // of the mixture
+
+// A Gaussian process, the ways to call it, and the queries as the hot path has them.
 struct Subject {
   gp::SyntheticProcess made;
   gp::Predictor plain, gated;
-  Eigen::MatrixXf queries;  // [dims x queries]
+  mutable gp::Predictor resting, moving;  // kStyles functions on the same poses
+  Eigen::MatrixXf queries;                // [dims x queries]
   mutable std::vector<float> out;
 
   [[nodiscard]] std::span<const float> query(int i) const {
@@ -117,6 +123,26 @@ struct Subject {
     plain.mean(query(i), {}, out);
     return out[0];
   }
+  // The mixture has been put together.
+  float rest(int i) const {
+    static_cast<void>(resting.settle(shares(0)));
+    resting.mean(query(i), {}, out);
+    return out[0];
+  }
+  // Other shares at every call.
+  float move(int i) const {
+    moving.mean(query(i), {}, out, shares(i));
+    return out[0];
+  }
+  // The same, and the mixture is begun anew for them.
+  float settle(int i) const {
+    static_cast<void>(moving.settle(shares(i)));
+    return move(i);
+  }
+  static std::array<float, kStyles> shares(int i) {
+    const float first = 0.25F + 0.2F * static_cast<float>(i % 97) / 97.0F;
+    return {first, 0.5F - first, 0.3F, 0.2F};
+  }
   float gate(int i) const { return gated.mean_and_confidence(query(i), {}, out); }
 };
 
@@ -124,8 +150,22 @@ Subject subject(int poses, int dims) {
   gp::SyntheticProcess made = gp::synthetic(poses, dims);
   auto plain = gp::Predictor::build(made.process, false).value();
   auto gated = gp::Predictor::build(made.process, true).value();
+  std::vector<gp::Function> more;
+  for (int s = 1; s < kStyles; ++s) {
+    more.push_back({made.process.weights / s, made.process.offset / s});
+  }
+  auto resting = gp::Predictor::build(made.process, false, more).value();
+  auto moving = gp::Predictor::build(made.process, false, more).value();
+  for (int i = 0; i < gp::Predictor::kSettleCalls; ++i) {
+    static_cast<void>(resting.settle(Subject::shares(0)));
+  }
   Eigen::MatrixXf queries = made.queries.transpose().cast<float>();
-  return {std::move(made), std::move(plain), std::move(gated), std::move(queries),
+  return {std::move(made),
+          std::move(plain),
+          std::move(gated),
+          std::move(resting),
+          std::move(moving),
+          std::move(queries),
           std::vector<float>(static_cast<std::size_t>(dims))};
 }
 
@@ -170,7 +210,10 @@ json run_case(int poses, int dims, int samples, const Evictor& evictor) {
       {"sum", [&](int) { return stream_sum(data.get(), read); }},
       {"sum_with_triangle", [&](int) { return stream_sum(data.get(), read_gate); }},
       {"mean", [&](int i) { return s.mean(i); }},
-      {"mean_and_gate", [&](int i) { return s.gate(i); }}};
+      {"mean_and_gate", [&](int i) { return s.gate(i); }},
+      {"four_at_rest", [&](int i) { return s.rest(i); }},
+      {"four_moving", [&](int i) { return s.move(i); }},
+      {"four_settling", [&](int i) { return s.settle(i); }}};
   measure(variants, samples, evictor);
   json report{{"poses", poses}, {"dims", dims}, {"gate_rows", rows}, {"accuracy", accuracy(s)}};
   for (const Variant& variant : variants) {
@@ -185,6 +228,13 @@ json run_case(int poses, int dims, int samples, const Evictor& evictor) {
               : json(nullptr);
     }
   }
+  for (const auto* mixture : {"four_at_rest", "four_moving", "four_settling"}) {
+    for (const auto* heat : {"hot", "cold"}) {
+      json& entry = report[mixture][heat];
+      entry["times_one_style"] =
+          entry["p50_us"].get<double>() / report["mean"][heat]["p50_us"].get<double>();
+    }
+  }
   return report;
 }
 
@@ -193,7 +243,8 @@ void print_case(const json& report) {
               report["dims"].get<int>(), report["gate_rows"].get<int>());
   std::printf("  %-18s %-5s %8s %8s %8s %8s %7s %10s\n", "", "", "p50 us", "p99", "p99.9", "max",
               "x sum", "x sum+tri");
-  for (const auto* name : {"sum", "sum_with_triangle", "mean", "mean_and_gate"}) {
+  for (const auto* name : {"sum", "sum_with_triangle", "mean", "mean_and_gate", "four_at_rest",
+                           "four_moving", "four_settling"}) {
     for (const auto* heat : {"hot", "cold"}) {
       const json& row = report[name][heat];
       std::printf("  %-18s %-5s %8.2f %8.2f %8.2f %8.2f %7.2f", name, heat,
@@ -202,6 +253,9 @@ void print_case(const json& report) {
                   row["ratio"].get<double>());
       const json& with = row["ratio_with_triangle"];
       if (with.is_number()) std::printf(" %10.2f", with.get<double>());
+      if (row.contains("times_one_style")) {
+        std::printf("   %.2f times mean", row["times_one_style"].get<double>());
+      }
       std::printf("\n");
     }
   }

@@ -67,7 +67,7 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   std::fprintf(stderr, "2/4 learning the style march -> sway from %zu clips\n",
                clips->from.size() + clips->to.size());
   Experiment experiment;
-  experiment.target = "sway";
+  experiment.targets = {"sway"};
   // The same number is the same person in both families.
   for (std::size_t i = 0; i < clips->from.size(); ++i) {
     const std::string person = std::to_string(i + 1);

@@ -24,6 +24,7 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
+#include "models/live_text.hpp"
 #include "models/stages/registry.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
@@ -43,6 +44,7 @@ struct CtlOptions {
   std::vector<float> force, vibration;
   std::string labels;
   double tempo = 1.0;
+  double seconds = 10.0;  // of a warm-up
   bool loop = false;
   std::string take;  // name
 };
@@ -193,6 +195,15 @@ int play(const CtlOptions& options) {
   return change(options, request, "performs " + options.labels + " (after those that wait)");
 }
 
+int warm_up(const CtlOptions& options) {
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_stage_command();
+  wanted.set_stream(options.stream);
+  wanted.set_name("style.warm-up");
+  (*wanted.mutable_number())["seconds"] = options.seconds;
+  return change(options, request, fmt::format("walk as usual for {:g} s", options.seconds));
+}
+
 int stop_playing(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_stage_command()->set_stream(options.stream);
@@ -319,6 +330,7 @@ std::string live_parameters() {
       std::string range = flag ? "true or false"
                                : fmt::format("{:g} to {:g}", spec.min * spec.people_scale,
                                              spec.max * spec.people_scale);
+      if (!has_number(spec)) range = "a=0.6,b=0.4";
       if (!spec.words.empty()) range = fmt::format("{}", fmt::join(spec.words, ", "));
       lines += fmt::format("  {:<26} {:<14} {}\n",
                            fmt::format("{}.{}", stage->name, spec.shown_name()), range, spec.help);
@@ -333,13 +345,21 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
                              "Examples:\n"
                              "  posed ctl set walker alpha 0.5          # half the "
                              "style; alpha moves there slowly\n"
-                             "  posed ctl set walker style.calibrate true\n"
+                             "  posed ctl set walker style.weights feminine=0.6,elderly=0.4\n"
+                             "  posed ctl set walker auto_alpha true    # less "
+                             "for who shows the style already\n"
                              "Parameters that a running daemon can change:\n" +
                                  live_parameters());
   set->add_option("parameter", options.parameter,
                   "STAGE.PARAMETER; the parameter alone where only one stage has it")
       ->required();
   set->add_option("value", options.value, "The new value, as in the config")->required();
+  CLI::App* warm =
+      actions.add_for_stream("warm-up", "Measure how a new walker usually walks", warm_up,
+                             R"(Example:
+  posed ctl warm-up walker --seconds 10   # it walks as usual meanwhile; an event tells the end)");
+  warm->add_option("--seconds", options.seconds, "How long it walks, 2 to 600")
+      ->capture_default_str();
   CLI::App* model = actions.add_for_stream("model", "Give a stream another style or gesture model",
                                            send_model, R"(Examples:
   posed ctl model walker march.style   # another style, from the next frame on

@@ -117,6 +117,8 @@ std::string stages_row(const v1::StreamStats& stream) {
                       people_text(*spec, parameter.value() / spec->people_scale)));
     }
   }
+  if (stream.has_style_gate()) add(fmt::format("gate {:.2f}", stream.style_gate()));
+  if (stream.has_style_estimate()) add(fmt::format("style {:.2f}", stream.style_estimate()));
   // As far as the column shows, alpha has reached its target.
   if (std::abs(stream.alpha_target() - stream.alpha()) >= 0.005F) {
     add(fmt::format("alpha slides to {:.2f}", stream.alpha_target()));
@@ -272,7 +274,9 @@ const char* const kColumnsHelp = R"(Columns, one row a stream:
            out: 50 % of the frames of the last second took at most the first figure, 99 % the
            second; microseconds, with m milliseconds, with s seconds; - where no frame passed
   ALPHA    how much style, -2 to 2; below the row its target, while it moves
-  MODEL    the style model in use, or the gesture model)";
+  MODEL    the style model in use, or the gesture model
+Below the rows, of a style: gate, 1 where the model knows the motion to 0 where it is passed
+through; style, what the input shows of it already, 0 like its source to 1 like its target)";
 
 std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {
   Widths widths = widths_for(stats, options.width);

@@ -1,8 +1,11 @@
 // `posed apply`: sends a clip through the style stage and writes a BVH file.
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
@@ -16,6 +19,7 @@
 #include "models/style/apply.hpp"
 #include "models/style/walker_fit.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -25,8 +29,34 @@ struct ApplyArguments {
   std::filesystem::path model, in, out;
   clip::ReadOptions read;
   style::ApplyOptions apply;
+  std::string mask;
+  std::filesystem::path neutral;
+  std::string alpha = "1", gate = "on";
   bool overwrite = false, json = false;
 };
+
+// A number, or "auto": as much as the walker does not show already.
+Result<> take_alpha(ApplyArguments& options) {
+  style::FilterOptions& filter = options.apply.filter;
+  filter.auto_alpha = options.alpha == "auto";
+  if (filter.auto_alpha) return {};
+  const bool number = CLI::detail::lexical_cast(options.alpha, filter.alpha);
+  if (number && std::abs(filter.alpha) <= style::kMaxAlpha) return {};
+  return misuse("--alpha takes a number from -2 to 2, or auto, not " + in_quotes(options.alpha));
+}
+
+// `--gate IN` is `--gate on IN`: the library takes the next word for the option's.
+Result<> take_gate(ApplyArguments& options) {
+  if (options.gate != "on" && options.gate != "off") {
+    if (!options.in.empty()) {
+      return misuse("--gate takes on or off, not " + in_quotes(options.gate));
+    }
+    options.in = std::exchange(options.gate, "on");
+  }
+  options.apply.filter.gate = options.gate == "on";
+  if (!options.in.empty()) return {};
+  return misuse("no clip to style: posed apply --model FILE.style IN --out OUT.bvh");
+}
 
 Result<> check_files(const ApplyArguments& options) {
   if (!options.read.asf.empty() && !is_amc(options.in)) {
@@ -36,14 +66,24 @@ Result<> check_files(const ApplyArguments& options) {
       .reads(options.model)
       .reads(options.in)
       .reads(options.read.asf)
+      .reads(options.neutral)
       .writes(options.out, {".bvh"})
       .check();
 }
 
-// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say.
+// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say,
+// as where it has several styles.
 double training_difference_deg(const style::StyleModel& model) {
   const auto report = nlohmann::json::parse(model.report_json, nullptr, false);
   return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;
+}
+
+// {"feminine": 0.6, "elderly": 0.4}
+nlohmann::json shares_json(const style::StyleModel& model, const style::Shares& shares) {
+  nlohmann::json json = nlohmann::json::object();
+  const std::vector<std::string> names = model.names();
+  for (std::size_t s = 0; s < names.size(); ++s) json[names[s]] = shares.of[s];
+  return json;
 }
 
 std::string verdict(const style::WalkerFit& fit, double rms_deg, double training_deg) {
@@ -63,14 +103,40 @@ std::string verdict(const style::WalkerFit& fit, double rms_deg, double training
   return text;
 }
 
+nlohmann::json or_null(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json();
+}
+
 Result<> run(ApplyArguments options) {
+  if (auto ok = take_gate(options); !ok) return ok;
+  if (auto ok = take_alpha(options); !ok) return ok;
+  if (options.apply.filter.calibrate) {
+    std::fprintf(stderr, "posed: --calibrate is the older name of --neutral IN\n");
+    if (options.neutral.empty()) options.neutral = options.in;
+    options.apply.filter.calibrate = false;
+  }
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
+  if (options.apply.filter.auto_alpha && !model->more.empty()) {
+    return misuse("--alpha auto needs a model of one style; give a number", options.model.string());
+  }
+  const auto shares = style::shares_of(options.apply.filter.weights, model->names());
+  if (!shares) return std::unexpected(shares.error());
+  const auto mask = style::mask_of(options.mask);
+  if (!mask) return std::unexpected(mask.error());
+  options.apply.filter.mask = *mask;
   const auto clip = clip::read_clip(options.in, options.read);
   if (!clip) return std::unexpected(clip.error());
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+  }
+  if (!options.neutral.empty()) {
+    const auto neutral = clip::read_clip(options.neutral, options.read);
+    if (!neutral) return std::unexpected(neutral.error());
+    const auto walker = style::measure_walker(*model, options.model.string(), *neutral);
+    if (!walker) return std::unexpected(walker.error());
+    options.apply.walker = *walker;
   }
   ProgressBar bar(kQuietFor_s);
   options.apply.progress = [&bar](int done, int total) {
@@ -92,10 +158,15 @@ Result<> run(ApplyArguments options) {
                                 {"rate_hz", clip->frame_rate_hz},
                                 {"from", model->from},
                                 {"to", model->to},
+                                {"weights", shares_json(*model, *shares)},
+                                {"mask", options.mask},
                                 {"alpha", options.apply.filter.alpha},
+                                {"auto_alpha", options.apply.filter.auto_alpha},
+                                {"style_estimate", or_null(applied->estimate_mean)},
                                 {"cold", options.apply.cold},
                                 {"root", root_text(options.apply.feet)},
                                 {"max_root_offset_cm", applied->max_root_offset_m * 100.0},
+                                {"gate_mean", or_null(applied->gate_mean)},
                                 {"joints_changed", applied->joints_changed},
                                 {"rms_change_deg", rms_deg},
                                 {"max_change_deg", max_deg},
@@ -121,25 +192,42 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--model", options->model, "What `posed train style` wrote")
       ->required()
       ->type_name("FILE.style");
-  command->add_option("in", options->in, "The clip: .bvh or .amc")->required()->type_name("IN");
+  command->add_option("in", options->in, "The clip: .bvh or .amc")->type_name("IN");
   command->add_option("--out", options->out, "The BVH to write")->required()->type_name("OUT.bvh");
-  command->add_option("--alpha", filter.alpha, "How much: 0 none, 1 the target, negative away")
-      ->check(CLI::Range(-style::kMaxAlpha, style::kMaxAlpha))
+  command
+      ->add_option("--alpha", options->alpha,
+                   "How much: 0 none, 1 the target, negative away; auto: as much as is missing")
+      ->type_name("A|auto")
       ->capture_default_str();
+  command->add_option("--weights", filter.weights, "Mixes the model's styles: A=0.6,B=0.4")
+      ->type_name("WEIGHTS");
+  command->add_option("--mask", options->mask, "Styles parts of the body less: arms=0.5,head=0")
+      ->type_name("MASK");
   add_root_option(*command, options->apply.feet);
   command->add_option("--skeleton", options->read.asf, "NN.asf of an AMC (default: beside it)")
       ->type_name("NN.asf");
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
-  command->add_flag("--gate", filter.gate, "Fade to the mean change where the model knows nothing");
-  command->add_flag("--calibrate", filter.calibrate,
-                    "First learn how the walker usually holds itself");
+  command
+      ->add_option("--gate", options->gate,
+                   "on (the default) or off: fade out where the model does not know the motion")
+      ->type_name("[on|off]")
+      ->expected(0, 1);
+  command->add_option("--neutral", options->neutral, "How this walker usually walks: .bvh or .amc")
+      ->type_name("N.bvh");
+  command->add_flag("--calibrate", filter.calibrate, "The older name of --neutral IN");
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
   posed apply --model walk.style walk_03.bvh --out styled.bvh
   posed apply --model walk.style --root stride walk_03.bvh --out styled.bvh   # feet stand
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
+  posed apply --model walk.style --neutral bob_1.bvh bob_2.bvh --out bob.bvh   # a new walker
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
+  posed apply --model two.style --weights feminine=0.6,elderly=0.4 --mask arms=0.5 \
+      walk_03.bvh --out mixed.bvh
+Weights count as shares of their sum; without them the model's first style has all. A mask leaves
+parts that it does not name at 1; it has arms, legs, trunk, head and left-arm, right-arm, left-leg,
+right-leg.
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
 rotations. Without --cold the style has its full strength from the first frame. The last line says
 how far the walker is from those in the training data. "deg rms" is the angle between the

@@ -27,6 +27,7 @@ constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --root stride
+  posed eval style --model two.style --weights sad=1 --source plain_3.bvh --target sad_3.bvh
 
 The source goes through the same stage as live, and is compared in the model's pose space.
 cycle_ratio: how far the styled walk's average cycle
@@ -36,6 +37,7 @@ cycle_ratio frame by frame; jerk_ratio: roughness of the styled walk over the un
 moved_rms_deg: the angle between the rotations before and after, rms over frames and changed joints,
 as `apply` reports it; component_rms_deg: the same change per component of the rotation vectors,
 source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure;
+gate_mean: how far the model knows the motion, 1 all of it, 0 nothing, which is not styled;
 slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 cm/s in the
 unstyled walk; of the target: in itself); sink_cm: how far the lowest styled toe is below the
 lowest unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
@@ -45,7 +47,7 @@ constexpr double kCentimetres = 100.0;  // of a metre
 constexpr double kRough = 1.5;          // a jerk_ratio above this is visible
 
 struct EvalOptions {
-  std::string model, source, target, skeleton;
+  std::string model, source, target, skeleton, weights;
   double alpha = 1.0;
   std::optional<feet::RootOptions> feet;
   bool json = false;
@@ -60,6 +62,7 @@ Result<clip::Clip> read(const std::string& path, const std::string& skeleton) {
 struct Evaluation {
   style::StyleScore score, constant;
   double moved_rms_deg = 0.0;
+  std::optional<double> gate_mean{};
   style::WalkerFit fit;
 
   [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0; }
@@ -113,11 +116,13 @@ json report_of(const Evaluation& e, const EvalOptions& options) {
               {"target_period_s", score.target_period_s},
               {"distance_deg", e.fit.distance_deg},
               {"far_from_training", e.fit.is_far()},
+              {"gate_mean", scaled(e.gate_mean, 1.0)},
               {"slide_cm_s", of_clips(score.slide_m_s, kCentimetres)},
               {"sink_cm", scaled(score.sink_m, kCentimetres)},
               {"root_speed_m_s", of_clips(score.root_speed_m_s, 1.0)},
               {"root", root_text(options.feet)},
               {"alpha", options.alpha},
+              {"weights", options.weights},
               {"helps", e.helps()},
               {"verdict", verdict(e)}};
 }
@@ -132,14 +137,18 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
   if (!source) return std::unexpected(source.error());
   const auto target = read(options.target, options.skeleton);
   if (!target) return std::unexpected(target.error());
-  const auto fit = style::fit_of_walker(*model, options.model, *source);
+  const auto shares = style::shares_of(options.weights, model->names());
+  if (!shares) return std::unexpected(shares.error());
+  const style::StyleModel mixture = style::mixture_of(*model, shares->all());
+  const auto fit = style::fit_of_walker(mixture, options.model, *source);
   if (!fit) return std::unexpected(fit.error());
-  const style::StyleModel constant = style::with_constant_change(*model, fit->mean_change);
+  const style::StyleModel constant = style::with_constant_change(mixture, fit->mean_change);
   ProgressBar bar(kQuietFor_s);
   Evaluation evaluation{.score = {}, .constant = {}, .fit = *fit};
   for (const bool full : {false, true}) {
     style::ApplyOptions apply;
     apply.filter.alpha = options.alpha;
+    if (full) apply.filter.weights = options.weights;
     apply.feet = options.feet;
     apply.progress = [&](int done, int total) {
       return bar.show("styling", 0.5 * full + 0.5 * done / total);
@@ -150,6 +159,7 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
     const auto score = style::evaluate_style(*source, styled->clip, *target, model->space);
     if (!score) return std::unexpected(score.error());
     (full ? evaluation.score : evaluation.constant) = *score;
+    evaluation.gate_mean = styled->gate_mean;
     evaluation.moved_rms_deg = styled->rms_change_rad * kDegrees;
   }
   return evaluation;
@@ -189,6 +199,8 @@ void add_eval(CLI::App& app, int& exit_code) {
   style->add_option("--source", options->source, "Clip to be styled")->required();
   style->add_option("--target", options->target, "Clip in the target style")->required();
   style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
+  style->add_option("--weights", options->weights, "Mixes the model's styles: A=0.6,B=0.4")
+      ->type_name("WEIGHTS");
   style->add_option("--alpha", options->alpha, "How much style")
       ->check(CLI::Range(-2.0, 2.0))
       ->capture_default_str();

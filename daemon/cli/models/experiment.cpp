@@ -1,5 +1,6 @@
 #include "daemon/cli/models/experiment.hpp"
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -43,10 +44,17 @@ void read_clip_table(TableReader& table, const std::filesystem::path& folder,
   experiment.clips.push_back(std::move(clip));
 }
 
+// A name, or a list of names.
+void read_targets(TableReader& reader, std::vector<std::string>& targets) {
+  if (!reader.need("target", "give it the name of a group, or a list of names")) return;
+  if (!reader.has_text("target")) return reader.read("target", targets);
+  reader.read("target", targets.emplace_back());
+}
+
 void read_tables(const toml::table& root, const std::filesystem::path& folder, Findings& findings,
                  Experiment& experiment) {
   TableReader reader(root, "", findings);
-  reader.require("target", experiment.target);
+  read_targets(reader, experiment.targets);
   reader.read("rate_hz", experiment.rate_hz, {10.0, 1000.0});
   read_choice(reader, "pose_space", experiment.space, motion::space_from_name);
   read_choice(reader, "mode", experiment.mode, style::mode_from_name);
@@ -57,6 +65,9 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder, F
   for (TableReader& clip : clips) {
     read_clip_table(clip, folder, experiment);
     clip.finish();
+  }
+  if (experiment.targets.empty() && findings.errors.empty()) {
+    reader.add_error("target", "target is an empty list; name the groups whose styles to learn");
   }
   if (clips.empty() && findings.errors.empty()) {
     findings.add_error(1, "the experiment names no [[clip]]; list the clips to learn from");
@@ -88,6 +99,39 @@ ExperimentClip named_clip(const std::string& argument, const std::string& group,
   clip.subject = person;
   clip.file = argument.substr(colon + 1);
   return clip;
+}
+
+Result<> add_target_clips(const std::vector<std::string>& arguments, const std::string& motion,
+                          Experiment& experiment) {
+  std::string group;
+  for (const std::string& argument : arguments) {
+    const auto equals = argument.find('=');
+    std::error_code ignored;
+    const bool named = equals != std::string::npos && equals > 0 &&
+                       !std::filesystem::exists(argument, ignored) &&
+                       !argument.substr(0, equals).contains('/');
+    if (named) group = argument.substr(0, equals);
+    experiment.clips.push_back(
+        named_clip(named ? argument.substr(equals + 1) : argument, group, motion));
+    if (named && std::ranges::find(experiment.targets, group) == experiment.targets.end()) {
+      experiment.targets.push_back(group);
+    }
+  }
+  if (experiment.targets.empty()) {
+    experiment.targets.emplace_back("to");
+    for (ExperimentClip& clip : experiment.clips) {
+      if (clip.group.empty()) clip.group = "to";
+    }
+    return {};
+  }
+  for (const ExperimentClip& clip : experiment.clips) {
+    if (!clip.group.empty()) continue;
+    return misuse(
+        "this clip of --to stands before the first NAME=; say which style it shows, as in"
+        " --to feminine=a.bvh elderly=b.bvh",
+        clip.file.string());
+  }
+  return {};
 }
 
 Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment) {

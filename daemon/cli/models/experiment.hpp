@@ -21,7 +21,7 @@ struct ExperimentClip {
 };
 
 struct Experiment {
-  std::string target;
+  std::vector<std::string> targets;  // at least one
   double rate_hz = 30.0;
   motion::Space space = motion::Space::kNative;
   style::TrainMode mode = style::TrainMode::kDefault;
@@ -37,6 +37,13 @@ struct Experiment {
 // without one it is the same person as every other clip without one.
 [[nodiscard]] ExperimentClip named_clip(const std::string& argument, const std::string& group,
                                         const std::string& motion);
+
+// The target clips of the command line, [NAME=][PERSON:]FILE. A NAME is the part before the first
+// '=' where no file has the whole name and that part holds no '/'; it is the group of its clip and
+// of those after it, up to the next NAME. Without any, all are the group "to". Adds the clips and
+// the targets. The error is for clips before the first NAME.
+[[nodiscard]] Result<> add_target_clips(const std::vector<std::string>& arguments,
+                                        const std::string& motion, Experiment& experiment);
 
 // Reads the clips themselves.
 [[nodiscard]] Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment);

@@ -28,19 +28,24 @@ constexpr const char* kTrainStyleFooter = R"(Examples:
       --out eight.style
   posed train style --experiment styles.toml --out styles.style --json
 
+Several styles in one model, mixed live by weights: NAME= begins the clips of each.
+  posed train style --from plain_1.bvh plain_2.bvh --to feminine=f_1.bvh f_2.bvh \
+      elderly=e_1.bvh e_2.bvh --out two.style
+  posed apply --model two.style --weights feminine=0.6,elderly=0.4 plain_3.bvh --out mixed.bvh
+
 Several files are takes of one person, unless PERSON: before a name tells them apart. Differences
 are learnt within people who show both styles; who shows one adds walks to start from only.
 
 An experiment file lists clips with their group, subject and motion; several sources and motions
 make one model:
-  target = "proud"
+  target = "proud"           # or several: ["proud", "sad"]
   mode = "default"           # or "paper"; --mode overrides it
   rate_hz = 30               # --rate overrides it
   pose_space = "native"      # or "cmu43", "humanoid"; --pose-space overrides it
   skeleton = "02.asf"        # of AMC clips, if not beside them; --skeleton overrides it
   [[clip]]
   file = "plain_1.bvh"       # relative to the experiment file
-  group = "plain"            # every group but the target is a source
+  group = "plain"            # every group that is no target is a source
   subject = "ann"            # who it is, in any group; without it, one person shows all
   motion = "walk"
 
@@ -73,12 +78,12 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
     return misuse("name the clips: --from A.bvh ... --to B.bvh ..., or --experiment FILE.toml");
   }
   Experiment experiment;
-  experiment.target = "to";
-  for (const auto* files : {&options.from, &options.to}) {
-    for (const std::string& file : *files) {
-      experiment.clips.push_back(named_clip(file, files == &options.from ? "from" : "to",
-                                            options.motion.value_or("walk")));
-    }
+  const std::string motion = options.motion.value_or("walk");
+  for (const std::string& file : options.from) {
+    experiment.clips.push_back(named_clip(file, "from", motion));
+  }
+  if (auto added = add_target_clips(options.to, motion, experiment); !added) {
+    return std::unexpected(added.error());
   }
   return experiment;
 }
@@ -185,7 +190,8 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   auto clips = load_clips(experiment);
   if (!clips) return std::unexpected(clips.error());
   style::TrainOptions options;
-  options.target = experiment.target;
+  options.target = experiment.targets.front();
+  options.more_targets.assign(experiment.targets.begin() + 1, experiment.targets.end());
   options.mode = experiment.mode;
   options.dataset.space = experiment.space;
   options.dataset.rate_hz = experiment.rate_hz;
@@ -213,7 +219,7 @@ void add_train_style(CLI::App& train_command, int& exit_code) {
   style->footer(kTrainStyleFooter);
   const auto options = std::make_shared<TrainStyleOptions>();
   style->add_option("--from", options->from, "Clips of the style to change: [PERSON:]FILE");
-  style->add_option("--to", options->to, "Clips of the style to give: [PERSON:]FILE");
+  style->add_option("--to", options->to, "Clips of the style to give: [NAME=][PERSON:]FILE");
   style->add_option("--motion", options->motion, "What all clips show (default: walk)");
   style->add_option("--experiment", options->experiment,
                     "TOML file that lists the clips and may set mode, rate_hz and pose_space");

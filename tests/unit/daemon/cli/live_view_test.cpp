@@ -225,6 +225,11 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   CHECK_FALSE(below().contains("gate_fallback"));  // as usual
   parameter.set_value(0.25);
   CHECK(below() == "  walker0   performs g, style.gate_fallback 0.25, alpha slides to 1.00");
+  stream.set_style_gate(0.0F);
+  stream.set_style_estimate(0.4F);
+  CHECK(below().ends_with("gate_fallback 0.25, gate 0.00, style 0.40, alpha slides to 1.00"));
+  stream.clear_style_gate();
+  stream.clear_style_estimate();
   stats.set_replay_file("take1.plog");
   stats.set_replay_speed(1.0);
   CHECK(below() == "  a replay of take1.plog, 1 x its pace; all times are the recording's");

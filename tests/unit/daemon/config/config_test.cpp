@@ -209,6 +209,15 @@ TEST_CASE("each mistake is one sentence with file and line") {
   CHECK(complaint("[stream.style]\nmodel = \"m\"\nalpha = 3\n") ==
         "stage/posed.toml:9: stream.style.alpha = 3 is out of range: it takes a number from -2 to"
         " 2");
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\nweights = {sad = 0, old = 0.0}\n")
+            .find("stage/posed.toml:9: weights: all are 0") != std::string::npos);
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\nweights = {sad = \"much\"}\n").find("must be") !=
+        std::string::npos);
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\nweights = \"sad=0\"\n")
+            .find("stage/posed.toml:9: weights: all are 0") != std::string::npos);
+  CHECK(complaint("[stream.style]\nmodel = \"m\"\nmask = \"tail=1\"\n")
+            .find("stage/posed.toml:9: mask: the body has no part 'tail'; it has: arms") !=
+        std::string::npos);
   CHECK(complaint("[stream.style]\nmodel = \"m\"\nalpha = nan\n").find("out of range") !=
         std::string::npos);
   CHECK(complaint("[stream.style]\nalpha = 1\n").find("stream.style.model is missing") !=

@@ -248,12 +248,45 @@ TEST_CASE("any live parameter of any stage can be set, by its name or with the s
   CHECK(has(fixture.refused(ask("alpha", flag)), "alpha must be a number, not true or false"));
   CHECK(has(fixture.refused(ask("alpha", text)), "alpha must be a number, not text"));
   CHECK(has(fixture.refused(ask("calibrate", number(1.0))), "calibrate must be true or false"));
-  CHECK(has(fixture.refused(ask("gate", flag)), "gate cannot change while the daemon runs"));
+  CHECK(has(fixture.refused(ask("warm_up_s", number(10.0))),
+            "warm_up_s cannot change while the daemon runs"));
   CHECK(has(fixture.refused(ask("lag_ms", number(1.0))), "[stream.generate] table"));
   CHECK(has(fixture.refused(ask("beta", number(1.0))),
             "there is no parameter 'beta'; there is: style.alpha"));
   CHECK(has(fixture.refused(ask("feet.alpha", number(1.0))), "there is no parameter"));
   CHECK(has(fixture.refused(ask("", number(1.0))), "there is no parameter ''"));
+}
+
+TEST_CASE("a live text is sent as its stage's command, made for the model that will be there") {
+  Fixture fixture;
+  const auto ask = [&](const std::string& name, const std::string& text) {
+    v1::ControlRequest request;
+    request.mutable_set_parameter()->set_stream("walker");
+    request.mutable_set_parameter()->set_name(name);
+    request.mutable_set_parameter()->set_text(text);
+    return request;
+  };
+  CHECK(has(fixture.refused(ask("weights", "s1=1")), "there is no style model"));
+  const std::string model = style::serialize_model(test::toy_styles({1, 2}));
+  CHECK_FALSE(fixture.ask(model_request("walker", model)));
+  CHECK_FALSE(fixture.ask(ask("style.weights", "s1=1,s2=3")));
+  CHECK_FALSE(fixture.ask(ask("mask", "arms=0.5")));
+  const auto& sent = fixture.daemon_control.sent;
+  REQUIRE(sent.size() == 3);
+  CHECK(sent[1].change.kind == pipeline::StageChange::Kind::kCommand);
+  CHECK(sent[1].change.index == style::StyleFilter::kWeights);
+  CHECK(sent[1].command.as<style::Shares>().of[1] == 0.75);
+  CHECK(sent[2].change.index == style::StyleFilter::kMask);
+  CHECK(sent[2].command.as<style::Mask>()[2] == 0.5);
+  fixture.daemon_control.sent.clear();
+  CHECK(has(fixture.refused(ask("weights", "sad=1")), "no style 'sad'; it has: s1, s2"));
+  CHECK(has(fixture.refused(ask("weights", "s1=0")), "all are 0"));
+  CHECK(has(fixture.refused(ask("weights", "s1=1,")), "is not NAME=NUMBER"));
+  CHECK(has(fixture.refused(ask("weights", "s1=1," + std::string(70, 'x') + "=1")), "too long"));
+  CHECK(has(fixture.refused(ask("mask", "tail=1")), "no part 'tail'"));
+  auto number = ask("weights", "");
+  number.mutable_set_parameter()->set_number(0.5);
+  CHECK(has(fixture.refused(number), "weights must be text"));
 }
 
 TEST_CASE("a refusal repeats an untrusted name cleaned and cut") {

@@ -138,7 +138,7 @@ std::vector<HeardPose> styled(const style::StyleModel& model, std::vector<HeardP
     Frame now;
   } last;
   const style::FilterOptions options;
-  const auto bound = style::bind_model(model, *walker[0].skeleton, options, "sway");
+  const auto bound = style::bind_model(model, *walker[0].skeleton, "sway");
   if (!bound) return {};
   style::StyleFilter filter(bound->get(), options);
   for (HeardPose& heard : walker) {

@@ -83,8 +83,8 @@ TEST_CASE("the event of a change names the old and the new value") {
   const auto model = test::toy_model(1);
   const auto skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
   EngineOptions options = plain();
-  const auto one = style::bind_model(model, *skeleton, {}, "one.style").value();
-  const auto two = style::bind_model(model, *skeleton, {}, "two.style").value();
+  const auto one = style::bind_model(model, *skeleton, "one.style").value();
+  const auto two = style::bind_model(model, *skeleton, "two.style").value();
   options.stages.push_back(test::style_stage(one.get()));
   StreamEngine engine(std::move(options));
   CollectedItems out;
@@ -175,8 +175,8 @@ TEST_CASE("samples keep a stream alive and pass through") {
 
 TEST_CASE("alpha and model take effect at the next frame; the old model comes back") {
   const Skeleton skeleton = test::toy_skeleton();
-  const auto first = style::bind_model(test::toy_model(1), skeleton, {}, "first").value();
-  const auto second = style::bind_model(test::toy_model(2), skeleton, {}, "second").value();
+  const auto first = style::bind_model(test::toy_model(1), skeleton, "first").value();
+  const auto second = style::bind_model(test::toy_model(2), skeleton, "second").value();
   EngineOptions options = plain();
   options.stages.push_back(test::style_stage(first.get()));
   StreamEngine engine(std::move(options));

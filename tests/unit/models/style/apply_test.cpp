@@ -42,7 +42,7 @@ double furthest_rad(const Frame& a, const Frame& b) {
 TEST_CASE("apply --cold gives the live filter's frames", "[style][apply]") {
   const clip::Clip walk = toy_walk(200, 60.0, 1.0);
   const style::Applied cold = applied(walk, 1.0, true);
-  const auto ready = style::bind_model(toy_model(1), *walk.skeleton, {}, "toy").value();
+  const auto ready = style::bind_model(toy_model(1), *walk.skeleton, "toy").value();
   style::StyleFilter live(ready.get(), {});
   Keep keep;
   for (int i = 0; i < walk.frames(); ++i) {

@@ -36,7 +36,7 @@ style::Dataset walks() {
   }
   style::DatasetOptions options;
   options.space = motion::Space::kCmu43;
-  return style::make_dataset(clips, "nobody", options).value();
+  return style::make_dataset(clips, {"nobody"}, options).value();
 }
 
 // The walks in common phase, from one start of the MGPM.

@@ -65,8 +65,8 @@ TEST_CASE("folds count alike in one task and in several", "[style][people]") {
   CHECK(many.kernel.length_rad == few.kernel.length_rad);
   CHECK(many.kernel.noise == few.kernel.noise);
   CHECK(many.error == Approx(few.error));
-  CHECK(many.way.before == Approx(3.0 * few.way.before));
-  CHECK(many.way.after == Approx(3.0 * few.way.after));
+  CHECK(many.ways[0].before == Approx(3.0 * few.ways[0].before));
+  CHECK(many.ways[0].after == Approx(3.0 * few.ways[0].after));
 }
 
 TEST_CASE("progress never goes back when lengths are added", "[style][people]") {

@@ -52,6 +52,27 @@ TEST_CASE("A model reads back as it was written", "[model_file]") {
   CHECK(serialize_model(*parsed) == serialize_model(model));
 }
 
+TEST_CASE("A model of several styles reads back as it was written", "[model_file]") {
+  StyleModel model = small_model();
+  const StyleModel other = small_model();
+  model.more.push_back({"elderly", {other.process.weights, other.process.offset}, other.limit_rad});
+  const auto parsed = parse(serialize_model(model));
+  REQUIRE(parsed.has_value());
+  CHECK(parsed->names() == std::vector<std::string>{"feminine", "elderly"});
+  CHECK(parsed->more[0].function.weights == other.process.weights);
+  CHECK(parsed->more[0].function.offset == other.process.offset);
+  CHECK(serialize_model(*parsed) == serialize_model(model));
+  model.more[0].name = "feminine";
+  refused(model, "styles' names");
+  model.more[0].name = "elderly";
+  model.more[0].function.weights.conservativeResize(4, 6);
+  refused(model, "number of a style's weights");
+  model.more[0] = {"elderly", {other.process.weights, other.process.offset}, -other.limit_rad};
+  refused(model, "limit below zero");
+  model.more[0] = {"elderly", {other.process.weights, other.process.offset.head(3)}, {}};
+  refused(model, "a style's prior mean");
+}
+
 TEST_CASE("A model is saved whole or not at all", "[model_file]") {
   const auto folder = std::filesystem::temp_directory_path() / "posed_model_file_test";
   std::filesystem::create_directories(folder);

@@ -27,7 +27,7 @@ style::TrainingClip walk_of(std::uint32_t person, WalkerFamily family, double se
 }
 
 style::Dataset dataset_of(const std::vector<style::TrainingClip>& clips) {
-  auto dataset = style::make_dataset(clips, "sway", {}).value();
+  auto dataset = style::make_dataset(clips, {"sway"}, {}).value();
   REQUIRE(style::align(dataset, {}));
   return dataset;
 }

@@ -24,10 +24,12 @@ Frame run(style::StyleFilter& filter, const Frame& in) {
   return last.out;
 }
 
-std::unique_ptr<const style::BoundModel> bound(unsigned seed,
-                                               const style::FilterOptions& options = {},
-                                               double size_rad = 0.3) {
-  return style::bind_model(toy_model(seed, size_rad), toy_skeleton(), options, "toy").value();
+std::unique_ptr<const style::BoundModel> bound(const style::StyleModel& model) {
+  return style::bind_model(model, toy_skeleton(), "toy").value();
+}
+
+std::unique_ptr<const style::BoundModel> bound(unsigned seed, double size_rad = 0.3) {
+  return style::bind_model(toy_model(seed, size_rad), toy_skeleton(), "toy").value();
 }
 
 style::FilterOptions with_alpha(double alpha, style::FilterOptions options = {}) {
@@ -132,7 +134,7 @@ TEST_CASE("a live start ramps alpha from 0 by the slew", "[style]") {
 TEST_CASE("the clamp holds |a f| within |a| times the limit", "[style]") {
   style::StyleModel model = toy_model(1);
   model.limit_rad.setConstant(0.05);
-  const auto ready = style::bind_model(model, toy_skeleton(), {}, "toy").value();
+  const auto ready = style::bind_model(model, toy_skeleton(), "toy").value();
   const Frame in = toy_walk(50).frame(12);
   for (const double alpha : {1.0, -2.0}) {
     Settled filter(ready.get(), in, alpha);
@@ -230,7 +232,7 @@ TEST_CASE("a thousand swaps and alpha changes never step above the slew", "[styl
   constexpr double kRate = 120.0;
   constexpr double kSize = 0.4;
   std::vector<std::unique_ptr<const style::BoundModel>> models;
-  for (unsigned seed = 0; seed < 8; ++seed) models.push_back(bound(seed, {}, kSize));
+  for (unsigned seed = 0; seed < 8; ++seed) models.push_back(bound(seed, kSize));
   // No model delta turns a joint by more than its three dimensions' limits, times alpha 2.
   const double answer = std::sqrt(3.0) * 1.5 * kSize;
   const double c = 2 * answer + 2 * answer;  // both ends of a blend
@@ -262,11 +264,11 @@ TEST_CASE("a thousand swaps and alpha changes never step above the slew", "[styl
 
 TEST_CASE("the filter does not allocate", "[style]") {
   style::FilterOptions options;
-  options.gate = true;
-  options.calibrate = true;
-  const auto a = bound(1, options);
-  const auto b = bound(2, options);
+  options.auto_alpha = true;
+  const auto a = bound(gated_toy_model(1));
+  const auto b = bound(gated_toy_model(2));
   style::StyleFilter filter(a.get(), options);
+  REQUIRE(filter.command(style::StyleFilter::kWarmUp, StageCommand::of(0.3)));
   const clip::Clip walk = toy_walk(60);
   test::LastFrame last;
   std::uint64_t taken = 0;
@@ -324,61 +326,17 @@ TEST_CASE("a source that jumps causes no jump of the style", "[style]") {
   CHECK(moved < 1.1 * walking);
 }
 
-TEST_CASE("the gate fades to the fallback far from the training poses", "[style]") {
-  style::FilterOptions options;
-  options.gate = true;
-  options.gate_fallback = 0.0;
-  style::StyleModel model = toy_model(1);
-  model.input_mean.resize(0);  // no clipping to the training range
-  model.process.mu = 400.0;
-  const auto ready = style::bind_model(model, toy_skeleton(), options, "toy").value();
-  Frame in = toy_walk(50).frame(10);
-  for (std::size_t j = 1; j < kJoints; ++j) in.rotation_xyzw[j] = {0.6F, 0.0F, 0.0F, 0.8F};
-  Settled filter(ready.get(), in, 1.0, options);
-  CHECK(largest_delta_rad(in, run(filter, in)) < 1e-4);
-  options.gate_fallback = 1.0;
-  Settled constant(ready.get(), in, 1.0, options);
-  CHECK(largest_delta_rad(in, run(constant, in)) > 0.1);
-}
-
-TEST_CASE("calibration removes the walker's own mean offset from the kernel's input", "[style]") {
-  style::FilterOptions options;
-  options.calibrate = true;
-  const auto ready = bound(1, options);
-  const auto plain_model = bound(1);
-  const clip::Clip walk = toy_walk(60 * 40);
-  clip::Clip bent = walk;
-  bent.channels.rightCols(12).array() += 0.15;
-  style::StyleFilter calibrated(ready.get(), options);
-  style::StyleFilter plain(plain_model.get(), {});
-  style::StyleFilter reference(plain_model.get(), {});
-  double error = 0.0;
-  double error_plain = 0.0;
-  for (int i = 0; i < walk.frames(); ++i) {
-    const Frame in = bent.frame(i);
-    const Frame a = run(calibrated, in);
-    const Frame b = run(plain, in);
-    const Frame normal = walk.frame(i);
-    const Frame wanted = run(reference, normal);
-    if (i < 60 * 30) continue;
-    const Eigen::VectorXd right = change(plain_model->space, normal, wanted);
-    error += (change(plain_model->space, in, a) - right).tail(12).norm();
-    error_plain += (change(plain_model->space, in, b) - right).tail(12).norm();
-  }
-  CHECK(error < 0.5 * error_plain);
-}
-
 TEST_CASE("a model that does not fit the body is refused with the missing joints", "[style]") {
   style::StyleModel model = toy_model(1);
   model.space.joints[2] = "Tail";
-  const auto refused = style::bind_model(model, toy_skeleton(), {}, "fox.style");
+  const auto refused = style::bind_model(model, toy_skeleton(), "fox.style");
   REQUIRE_FALSE(refused);
   CHECK(refused.error().text().find("Tail") != std::string::npos);
   CHECK(refused.error().text().find("fox.style") != std::string::npos);
   model = toy_model(1);
   model.limit_rad.conservativeResize(3);
-  CHECK_FALSE(style::bind_model(model, toy_skeleton(), {}, "fox.style"));
+  CHECK_FALSE(style::bind_model(model, toy_skeleton(), "fox.style"));
   model = toy_model(1);
   model.process.weights = model.process.weights.leftCols(14).eval();
-  CHECK_FALSE(style::bind_model(model, toy_skeleton(), {}, "fox.style"));
+  CHECK_FALSE(style::bind_model(model, toy_skeleton(), "fox.style"));
 }

@@ -144,7 +144,7 @@ TEST_CASE("a model trained at 30 Hz works on the same walk at 120 Hz, frame by f
   CHECK(score(model, fast, target).cycle_ratio ==
         Approx(score(model, walk, target).cycle_ratio).margin(0.01));
 
-  const auto bound = style::bind_model(model, *fast.skeleton, {}, "taught").value();
+  const auto bound = style::bind_model(model, *fast.skeleton, "taught").value();
   style::StyleFilter filter(bound.get(), {});
   test::LastFrame last;
   for (int t = 0; t < fast.frames(); ++t) {

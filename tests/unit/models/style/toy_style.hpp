@@ -92,6 +92,29 @@ inline style::StyleModel toy_model(unsigned seed, double size_rad = 0.3) {
   return model;
 }
 
+// The style of toy_model(seeds[0]), named "s<seed>", and on the same poses those of the other
+// seeds.
+inline style::StyleModel toy_styles(const std::vector<unsigned>& seeds, double size_rad = 0.3) {
+  style::StyleModel model = toy_model(seeds.front(), size_rad);
+  model.to = "s" + std::to_string(seeds.front());
+  for (std::size_t i = 1; i < seeds.size(); ++i) {
+    style::StyleModel other = toy_model(seeds[i], size_rad);
+    model.more.push_back({"s" + std::to_string(seeds[i]),
+                          {std::move(other.process.weights), std::move(other.process.offset)},
+                          std::move(other.limit_rad)});
+  }
+  return model;
+}
+
+// The same with what the gate, the warm-up and auto-alpha need. The toy names no upper legs, so
+// that its poses alone tell what is known.
+inline style::StyleModel gated_toy_model(unsigned seed, double size_rad = 0.3) {
+  style::StyleModel model = toy_model(seed, size_rad);
+  model.gate.neutral = model.input_mean;
+  model.axis = {Eigen::VectorXd::Unit(15, 4), -model.input_mean[4]};
+  return model;
+}
+
 inline Eigen::Quaterniond delta_of(const Frame& in, const Frame& out, int joint) {
   const auto j = static_cast<std::size_t>(joint);
   return to_eigen_double(in.rotation_xyzw[j]).conjugate() * to_eigen_double(out.rotation_xyzw[j]);

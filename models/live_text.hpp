@@ -1,0 +1,31 @@
+// Live parameters that are text of no fixed words, such as the weights of styles: what they mean
+// may depend on the stage's model, and the stage gets it in a form of its own. So the stage's type
+// has a command of the same name, whose only word is the text; control, device log and replay
+// handle the parameter as that command. Cold.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "models/stage_type.hpp"
+
+namespace posed {
+
+// Whether a number stands for the values of this parameter, as for all live ones but these texts.
+[[nodiscard]] inline bool has_number(const ParameterSpec& spec) noexcept {
+  return !std::holds_alternative<std::string>(spec.default_value) || !spec.words.empty();
+}
+
+// The command that sets this live text (index in StageType::commands); nothing for a parameter that
+// is not one.
+[[nodiscard]] inline std::optional<std::size_t> text_command(const StageType& type,
+                                                             const ParameterSpec& spec) noexcept {
+  if (!spec.live || has_number(spec)) return std::nullopt;
+  const auto found = std::ranges::find(type.commands, spec.name, &StageCommandType::name);
+  if (found == type.commands.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - type.commands.begin());
+}
+
+}  // namespace posed

@@ -1,0 +1,50 @@
+// Gate: fades the style out where the model does not know the motion, and in again where it does
+// (README.md, "Gate"). State of one stream. RT-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "models/style/known_motion.hpp"
+#include "models/style/live_stride.hpp"
+#include "models/style/warm_up.hpp"
+#include "proto/frame/frame.hpp"
+
+namespace posed::style {
+
+class Gate {
+ public:
+  // Takes a frame `dt_s` after the last one. `q` is what the kernel sees of it; `walker`: seen from
+  // its own neutral pose. Where the gate is not `on`, or the model has no data for it (`known` is
+  // null), it opens: at once if it has never been on.
+  void update(const KnownMotion* known, bool on, const Frame& frame, std::span<const float> q,
+              std::span<const std::uint8_t> available, const std::optional<Walker>& walker,
+              double dt_s) noexcept;
+
+  // How much style passes: 1 all, exactly, to 0 none, exactly; 0 before the first frame. It takes
+  // about 0.17 s half of the way, and its third derivative is finite.
+  [[nodiscard]] float open() const noexcept { return static_cast<float>(stage_.back()); }
+  // Whether the legs stride as in training, or nobody can tell.
+  [[nodiscard]] bool strides() const noexcept { return of_legs_ >= 0.5; }
+  [[nodiscard]] double cadence_rad_s() const noexcept { return stride_.cadence_rad_s(); }
+  // The next frame is the first of a clip, whose beginning it has seen backwards; open if it has
+  // seen nothing.
+  void settle() noexcept;
+
+ private:
+  void see_legs(const KnownMotion& known, const Frame& frame, const std::optional<Walker>& walker,
+                double dt_s) noexcept;
+  void follow(double dt_s) noexcept;
+
+  bool fresh_ = true;  // was never on
+  LiveStride stride_;
+  double cadence_rad_s_ = 0.0;  // smoothed; 0: not known
+  // The last evidence; it stays where a frame has none.
+  double of_pose_ = 0.0, of_cadence_ = 0.0, of_legs_ = 1.0;
+  double wanted_ = 0.0;
+  std::array<double, 4> stage_{};  // low-passes in a row, the first follows wanted_
+};
+
+}  // namespace posed::style

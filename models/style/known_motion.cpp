@@ -1,0 +1,55 @@
+#include "models/style/known_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "models/gp/inducing.hpp"
+#include "proto/frame/degree.hpp"
+
+namespace posed::style {
+namespace {
+
+Eigen::MatrixXd kept_poses(const gp::Trained& process, int limit) {
+  if (process.inputs.rows() <= limit) return process.inputs;
+  const auto kept = gp::choose_inducing(process.inputs, process.mu, limit,
+                                        [](int /*chosen*/, double /*worst*/) { return false; });
+  return process.inputs(kept.chosen(), Eigen::all);
+}
+
+}  // namespace
+
+KnownMotion::KnownMotion(const StyleModel& model, const Skeleton& skeleton)
+    : poses_(kept_poses(model.process, kPoses).cast<float>()),
+      joints_(static_cast<double>(model.space.joints.size())),
+      swing_rad_(model.gate.swing_rad),
+      cadence_rad_s_(model.gate.strides() ? 2.0 * std::numbers::pi / model.gate.fastest_stride_s
+                                          : 0.0) {
+  if (model.gate.strides()) legs_ = motion::LegSignal::find(skeleton);
+}
+
+// RT-safe
+double KnownMotion::distance_deg(std::span<const float> q,
+                                 std::span<const std::uint8_t> available) const noexcept {
+  const auto dims = static_cast<Eigen::Index>(q.size());
+  Eigen::Index there = 0;
+  for (const std::uint8_t one : available) there += one != 0 ? 1 : 0;
+  if (there == 0) return std::numeric_limits<double>::quiet_NaN();
+  float nearest = std::numeric_limits<float>::infinity();
+  for (Eigen::Index i = 0; i < poses_.rows(); ++i) {
+    const float* pose = poses_.data() + i * dims;
+    float sum = 0.0F;
+    for (Eigen::Index d = 0; d < dims && sum < nearest; ++d) {
+      if (available[static_cast<std::size_t>(d)] == 0) continue;
+      const float away = q[static_cast<std::size_t>(d)] - pose[d];
+      sum += away * away;
+    }
+    nearest = std::min(nearest, sum);
+  }
+  const double whole =
+      static_cast<double>(nearest) * static_cast<double>(dims) / static_cast<double>(there);
+  return std::sqrt(whole / joints_) / kDegree;
+}
+
+}  // namespace posed::style

@@ -1,0 +1,41 @@
+// KnownMotion: what a model knows of motion, bound to one skeleton: how far a pose is from the
+// nearest one of training, and how the legs strode there (README.md, "Gate"). Const and shareable.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "models/motion/leg_signal.hpp"
+#include "models/style/style_model.hpp"
+
+namespace posed::style {
+
+class KnownMotion {
+ public:
+  // For a model with gate data (GateData::present()) whose parts fit each other. Cold.
+  KnownMotion(const StyleModel& model, const Skeleton& skeleton);
+
+  // From q [dims] to the nearest of the kept training poses: the rotation, rms over joints [deg].
+  // Missing dimensions count as those that are there; NaN where none is. RT-safe.
+  [[nodiscard]] double distance_deg(std::span<const float> q,
+                                    std::span<const std::uint8_t> available) const noexcept;
+
+  // Empty where the training showed no strides or the skeleton names no upper legs.
+  [[nodiscard]] const std::optional<motion::LegSignal>& legs() const noexcept { return legs_; }
+  [[nodiscard]] double swing_rad() const noexcept { return swing_rad_; }
+  [[nodiscard]] double cadence_rad_s() const noexcept { return cadence_rad_s_; }
+
+ private:
+  // At most this many poses, those that stand best for all: the others are within a few degrees.
+  static constexpr int kPoses = 128;
+
+  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> poses_;
+  double joints_;
+  std::optional<motion::LegSignal> legs_;
+  double swing_rad_, cadence_rad_s_;
+};
+
+}  // namespace posed::style

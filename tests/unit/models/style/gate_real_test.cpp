@@ -1,0 +1,110 @@
+// Gate, warm-up and auto-alpha on real recordings: known and unknown walkers, and what is no walk.
+#include <catch2/catch.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "models/motion/motion.hpp"
+#include "models/style/apply.hpp"
+#include "models/style/train.hpp"
+#include "proto/frame/degree.hpp"
+#include "tests/support/shared.hpp"
+
+using namespace posed;
+
+namespace {
+
+clip::Clip recording_of(const std::string& name) {
+  const auto path = test::shared("data/" + name);
+  INFO(name);
+  REQUIRE(path);
+  return clip::read_clip(*path).value();
+}
+
+clip::Clip acted(const std::string& name) {
+  return recording_of("styles/dataset-2_" + name + ".bvh");
+}
+
+bool gate_recordings() {
+  return test::shared("data/styles/dataset-2_walk_normal_001.bvh").has_value();
+}
+
+style::StyleModel taught(const std::string& source) {
+  std::vector<style::TrainingClip> clips;
+  for (const std::string& group : {source, std::string("feminine")}) {
+    for (const char* number : {"001", "002"}) {
+      clips.push_back({acted("walk_" + group + "_" + number), group, "actor", "walk"});
+    }
+  }
+  style::TrainOptions options;
+  options.target = "feminine";
+  options.dataset.space = motion::Space::kHumanoid;
+  return style::train_style(clips, options).value();
+}
+
+style::Applied applied(const style::StyleModel& model, const clip::Clip& clip,
+                       const style::ApplyOptions& options = {}) {
+  auto result = style::apply_to_clip(model, "taught.style", clip, options);
+  REQUIRE(result);
+  return *std::move(result);
+}
+
+double gate_mean(const style::StyleModel& model, const clip::Clip& clip,
+                 const std::optional<style::Walker>& walker = {}, bool cold = false) {
+  style::ApplyOptions options;
+  options.cold = cold;
+  options.walker = walker;
+  return applied(model, clip, options).gate_mean.value();
+}
+
+}  // namespace
+
+TEST_CASE("the gate knows known and unknown walkers and nothing else", "[style][real]") {
+  if (!gate_recordings()) SKIP_WITHOUT_SHARED();
+  const auto model = taught("normal");
+  CHECK(gate_mean(model, acted("walk_normal_004")) > 0.98);
+  CHECK(gate_mean(model, acted("walk_feminine_004")) > 0.98);
+  for (const char* name : {"cmu/02_02.amc", "cmu/07_01.amc", "cmu/08_01.amc", "cmu/16_15.amc",
+                           "cmu/35_01.amc", "cmu/39_01.amc"}) {
+    INFO(name);
+    const clip::Clip walk = recording_of(name);
+    const auto walker = style::measure_walker(model, "taught.style", walk);
+    REQUIRE(walker);
+    CHECK(gate_mean(model, walk, {}, true) >= 0.8);
+    CHECK(gate_mean(model, walk, *walker) >= 0.9);
+  }
+  const auto actor = style::measure_walker(model, "taught.style", acted("walk_normal_001"));
+  REQUIRE(actor);
+  for (const char* name : {"run_normal_001", "raise-up-left-hand_normal_001",
+                           "wave-left-hand_normal_001", "wave-right-hand_feminine_001"}) {
+    INFO(name);
+    CHECK(gate_mean(model, acted(name), {}, true) <= 0.2);
+    CHECK(gate_mean(model, acted(name), *actor) <= 0.1);
+  }
+  CHECK(gate_mean(model, recording_of("cmu/02_04.bvh"), {}, true) <= 0.2);
+  CHECK(gate_mean(model, recording_of("cmu/09_01.bvh"), {}, true) <= 0.2);
+}
+
+TEST_CASE("a clip that shows no walk measures no walker", "[style][real]") {
+  if (!gate_recordings()) SKIP_WITHOUT_SHARED();
+  const auto model = taught("normal");
+  const auto stood =
+      style::measure_walker(model, "taught.style", acted("wave-left-hand_normal_001"));
+  REQUIRE_FALSE(stood);
+  CHECK(stood.error().message.contains("shows no walk"));
+}
+
+TEST_CASE("auto-alpha leaves a walk in the style alone and styles the source", "[style][real]") {
+  if (!gate_recordings()) SKIP_WITHOUT_SHARED();
+  const auto model = taught("masculine");
+  style::ApplyOptions options;
+  const auto full = applied(model, acted("walk_masculine_004"));
+  options.filter.auto_alpha = true;
+  const auto source = applied(model, acted("walk_masculine_004"), options);
+  CHECK(source.rms_change_rad > 0.9 * full.rms_change_rad);
+  const auto already = applied(model, acted("walk_feminine_004"), options);
+  CHECK(already.rms_change_rad < 1.0 * kDegree);
+  CHECK(already.estimate_mean.value() > 0.9);
+  CHECK(source.estimate_mean.value() < 0.1);
+}

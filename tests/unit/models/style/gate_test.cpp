@@ -1,0 +1,118 @@
+// The gate: what counts as known, how fast and how smoothly it opens and closes.
+#include "models/style/gate.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "models/motion/leg_signal.hpp"
+#include "models/style/live_stride.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+using namespace posed;
+using namespace posed::test;
+
+namespace {
+
+constexpr double kGateRate_hz = 60.0;
+constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+
+// The toy names no upper legs, so that its poses alone count.
+class ToyGate {
+ public:
+  // The pose of training, `away_rad` off in every dimension.
+  float step(double away_rad, double dt_s = 1.0 / kGateRate_hz) {
+    std::vector<float> q(15);
+    for (std::size_t d = 0; d < q.size(); ++d) {
+      q[d] = static_cast<float>(model.process.inputs(3, static_cast<Eigen::Index>(d)) + away_rad);
+    }
+    gate.update(&known, true, {}, q, std::vector<std::uint8_t>(15, 1), {}, dt_s);
+    return gate.open();
+  }
+  style::StyleModel model = gated_toy_model(1);
+  style::KnownMotion known{model, toy_skeleton()};
+  style::Gate gate;
+};
+
+}  // namespace
+
+TEST_CASE("the nearest training pose is found, also with missing joints", "[style]") {
+  const auto model = gated_toy_model(1);
+  const style::KnownMotion known(model, toy_skeleton());
+  std::vector<float> q(15);
+  std::vector<std::uint8_t> all(15, 1);
+  for (std::size_t d = 0; d < 15; ++d)
+    q[d] = static_cast<float>(model.process.inputs(7, static_cast<Eigen::Index>(d)));
+  CHECK(known.distance_deg(q, all) == Approx(0.0).margin(1e-3));
+  q[4] += 0.1F;
+  CHECK(known.distance_deg(q, all) == Approx(0.1 / std::sqrt(5.0) * 180.0 / kPi).epsilon(1e-4));
+  all[4] = 0;
+  CHECK(known.distance_deg(q, all) == Approx(0.0).margin(1e-3));
+  CHECK(std::isnan(known.distance_deg(q, std::vector<std::uint8_t>(15, 0))));
+}
+
+TEST_CASE("the gate is exactly open on known poses and exactly closed far from them", "[style]") {
+  ToyGate toy;
+  for (int i = 0; i < 120; ++i) toy.step(0.0);
+  CHECK(toy.gate.open() == 1.0F);
+  for (int i = 0; i < 120; ++i) toy.step(1.0);
+  CHECK(toy.gate.open() == 0.0F);
+}
+
+TEST_CASE("the gate is half open or closed within 0.3 s, at any rate, without a jerk", "[style]") {
+  for (const double rate_hz : {25.0, 60.0, 240.0}) {
+    ToyGate toy;
+    CHECK(toy.step(1.0, 1.0 / rate_hz) == 0.0F);
+    std::vector<double> open;
+    double half_s = -1.0;
+    for (int i = 0; i < 2.0 * rate_hz; ++i) {
+      open.push_back(toy.step(0.0, 1.0 / rate_hz));
+      if (half_s < 0.0 && open.back() >= 0.5) half_s = (i + 1) / rate_hz;
+    }
+    CHECK(half_s > 0.1);
+    CHECK(half_s <= 0.3);
+    double jerk = 0.0;  // per s^3
+    for (std::size_t i = 3; i < open.size(); ++i) {
+      jerk = std::max(jerk, std::abs(open[i] - 3 * open[i - 1] + 3 * open[i - 2] - open[i - 3]) *
+                                std::pow(rate_hz, 3));
+      CHECK(open[i] >= open[i - 1]);
+    }
+    CHECK(jerk < 2300.0);
+  }
+}
+
+TEST_CASE("a gate that was never on is open at once, one that is switched off opens", "[style]") {
+  ToyGate toy;
+  style::Gate never;
+  never.update(nullptr, true, {}, {}, {}, {}, 0.0);
+  CHECK(never.open() == 1.0F);
+  for (int i = 0; i < 60; ++i) toy.step(1.0);
+  toy.gate.update(nullptr, true, {}, {}, {}, {}, 1.0 / kGateRate_hz);
+  CHECK(toy.gate.open() < 0.1F);
+  for (int i = 0; i < 120; ++i) toy.gate.update(nullptr, true, {}, {}, {}, {}, 1.0 / kGateRate_hz);
+  CHECK(toy.gate.open() == 1.0F);
+}
+
+TEST_CASE("live strides: swing and cadence of a walk, none of rest, held steps or small sways",
+          "[style]") {
+  const double cadence = kTurn_rad / 1.1;
+  for (const double rate_hz : {30.0, 120.0}) {
+    style::LiveStride walk;
+    style::LiveStride held;
+    double least = 10.0;
+    for (int i = 0; i < 4 * rate_hz; ++i) {
+      const double t = i / rate_hz;
+      walk.update(0.6 * std::cos(kTurn_rad * t / 0.8), 1.0 / rate_hz, cadence);
+      held.update(0.6, 1.0 / rate_hz, cadence);
+      if (t > 0.5) least = std::min(least, walk.swing_rad());
+    }
+    CHECK(least > 0.4);
+    CHECK(walk.swing_rad() < 0.9);
+    CHECK(walk.cadence_rad_s() * 0.8 == Approx(kTurn_rad).epsilon(0.1));
+    CHECK(held.swing_rad() == 0.0);
+    walk.forget_cadence();
+    CHECK(std::isnan(walk.cadence_rad_s()));
+  }
+}

@@ -1,0 +1,224 @@
+// The warm-up: what it measures, what the kernel then sees, and what ends it badly.
+#include "models/style/warm_up.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "models/style/style_estimate.hpp"
+#include "models/style/style_filter.hpp"
+#include "models/style/style_type.hpp"
+#include "posed/v1/log.pb.h"
+#include "tests/support/last_frame.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+using namespace posed;
+using namespace posed::test;
+using style::WalkerWatch;
+using style::WarmUp;
+
+namespace {
+
+std::unique_ptr<const style::BoundModel> warm_bound(const style::StyleModel& model) {
+  return style::bind_model(model, toy_skeleton(), "toy").value();
+}
+
+// A stage that styles the toy's walk, `bend_rad` added to every joint but the root.
+class WarmedToy {
+ public:
+  explicit WarmedToy(const style::BoundModel* model, const style::FilterOptions& options = {})
+      : filter(model, options) {}
+
+  bool warm_up(double seconds) {
+    return filter.command(style::StyleFilter::kWarmUp, StageCommand::of(seconds));
+  }
+  Frame walk(int frames, double bend_rad = 0.0, std::int64_t later_ns = 0) {
+    clip::Clip clip = toy_walk(next_ + frames);
+    clip.channels.rightCols(12).array() += bend_rad;
+    for (int i = 0; i < frames; ++i) {
+      Frame in = clip.frame(next_++);
+      in.header.device_ns += later_ns;
+      filter.process({.frame = in}, last);
+    }
+    return last.out;
+  }
+  std::vector<std::size_t> notices() {
+    std::vector<std::size_t> told;
+    while (const auto notice = filter.take_notice()) told.push_back(notice->index);
+    return told;
+  }
+  style::StyleFilter filter;
+  test::LastFrame last;
+
+ private:
+  int next_ = 0;
+};
+
+}  // namespace
+
+TEST_CASE("a warm-up is the mean of the frames on which the walker walks", "[style]") {
+  WarmUp warm_up;
+  const std::vector<std::uint8_t> available{1, 1, 0};
+  warm_up.begin(1.0);
+  for (int i = 0; i < 9; ++i) {
+    const bool walks = i % 3 != 0;
+    const std::vector<float> q{walks ? 2.0F : 100.0F, static_cast<float>(i), 7.0F};
+    REQUIRE(warm_up.update(q, available, walks, 6.0, 0.1) == WarmUp::Outcome::kNone);
+  }
+  CHECK(warm_up.update(std::vector<float>(3, 2.0F), available, true, 6.0, 0.11) ==
+        WarmUp::Outcome::kDone);
+  const style::Walker walker = warm_up.walker();
+  CHECK(walker.neutral[0] == Approx(2.0F));
+  CHECK(walker.measured[1] == 1);
+  CHECK(walker.measured[2] == 0);
+  CHECK(walker.cadence_rad_s == Approx(6.0));
+  CHECK_FALSE(warm_up.running());
+  warm_up.begin(0.5);
+  CHECK(warm_up.update(available.size() == 3 ? std::vector<float>(3) : std::vector<float>(),
+                       available, false, 6.0, 0.6) == WarmUp::Outcome::kStood);
+}
+
+TEST_CASE("after a warm-up the kernel sees the walker as if its neutral pose were the training's",
+          "[style]") {
+  const auto ready = warm_bound(gated_toy_model(1));
+  WarmedToy plain(ready.get());
+  WarmedToy warmed(ready.get());
+  REQUIRE(warmed.warm_up(4.0));
+  const Frame wanted = plain.walk(600);
+  const Frame got = warmed.walk(600, 0.15);
+  CHECK(warmed.notices() == std::vector<std::size_t>{WalkerWatch::kWarmedUp});
+  REQUIRE(warmed.filter.walker());
+  WarmedToy unwarmed(ready.get());
+  const Frame without = unwarmed.walk(600, 0.15);
+  const clip::Clip walk = toy_walk(600);
+  clip::Clip bent = walk;
+  bent.channels.rightCols(12).array() += 0.15;
+  double error = 0.0;
+  double error_without = 0.0;
+  for (int j = 1; j < 5; ++j) {
+    const auto right = delta_of(walk.frame(599), wanted, j);
+    error += angle_between_rad(delta_of(bent.frame(599), got, j), right);
+    error_without += angle_between_rad(delta_of(bent.frame(599), without, j), right);
+  }
+  CHECK(error < 0.6 * error_without);
+}
+
+TEST_CASE("an interrupted warm-up leaves what was known", "[style]") {
+  const auto ready = warm_bound(gated_toy_model(1));
+  WarmedToy toy(ready.get());
+  REQUIRE(toy.warm_up(2.0));
+  toy.walk(180);
+  REQUIRE(toy.filter.walker());
+  const auto before = toy.filter.walker()->neutral;
+  REQUIRE(toy.warm_up(2.0));
+  toy.walk(60, 0.2);
+  toy.walk(120, 0.2, 2'000'000'000);  // a gap of two seconds
+  CHECK(toy.notices() ==
+        std::vector<std::size_t>{WalkerWatch::kWarmedUp, WalkerWatch::kInterrupted});
+  REQUIRE(toy.filter.walker());
+  CHECK(toy.filter.walker()->neutral == before);
+  REQUIRE(toy.warm_up(2.0));
+  toy.filter.flush(toy.last);
+  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kInterrupted});
+}
+
+TEST_CASE("a model of an older posed has neither gate nor warm-up, and says so once", "[style]") {
+  const auto old = warm_bound(toy_model(1));
+  WarmedToy toy(old.get());
+  CHECK_FALSE(toy.warm_up(2.0));
+  const Frame out = toy.walk(90);
+  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kNoGateData});
+  CHECK(std::isnan(toy.filter.reading(style::StyleFilter::kStyleGate)));
+  WarmedToy ungated(old.get(), {.gate = false});
+  CHECK(delta_of(ungated.walk(90), out, 2).angularDistance(Eigen::Quaterniond::Identity()) < 1e-6);
+  CHECK(ungated.notices().empty());
+}
+
+TEST_CASE("a walker stays known when a model with other mean rotations is swapped in", "[style]") {
+  const auto first = warm_bound(gated_toy_model(1));
+  style::StyleModel turned = gated_toy_model(1);
+  const Eigen::Quaterniond turn = rotation_exp(Eigen::Vector3d(0.1, -0.2, 0.3));
+  turned.space.mean[2] = turned.space.mean[2] * turn;
+  const auto second = warm_bound(turned);
+  WarmedToy toy(first.get());
+  REQUIRE(toy.warm_up(2.0));
+  toy.walk(180);
+  const auto before = toy.filter.walker()->neutral;
+  toy.filter.use(*second);
+  REQUIRE(toy.filter.walker());
+  const auto& after = toy.filter.walker()->neutral;
+  const auto of = [](const auto& q, std::size_t d) {
+    return rotation_exp(Eigen::Vector3d(q[d], q[d + 1], q[d + 2]));
+  };
+  CHECK(after[3] == before[3]);
+  CHECK(angle_between_rad(turn * of(after, 6), of(before, 6)) < 1e-5);
+  const auto old = warm_bound(toy_model(2));
+  toy.filter.use(*old);
+  CHECK_FALSE(toy.filter.walker());
+  CHECK(toy.notices().back() == WalkerWatch::kOtherJoints);
+}
+
+TEST_CASE("calibrate is a warm-up by an older name", "[style]") {
+  const auto ready = warm_bound(gated_toy_model(1));
+  WarmedToy toy(ready.get());
+  toy.filter.set(style::StyleFilter::kCalibrate, 1.0);
+  toy.walk(60 * 11);
+  REQUIRE(toy.filter.walker());
+  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kWarmedUp, WalkerWatch::kOldKey});
+  toy.filter.set(style::StyleFilter::kCalibrate, 0.0);
+  CHECK_FALSE(toy.filter.walker());
+}
+
+TEST_CASE("the warm-up command goes into the log and back; what it cannot be is refused",
+          "[style]") {
+  const StageCommandType& type = style::style_type().commands[style::StyleFilter::kWarmUp];
+  const auto ready = warm_bound(gated_toy_model(1));
+  const auto options = complete_parameters(type.options, {{"seconds", 7.5}}).value();
+  const auto command = type.encode(ready.get(), {}, options);
+  REQUIRE(command);
+  v1::DecisionValue value;
+  type.to_log(*command, value);
+  const auto back = type.from_log(value);
+  REQUIRE(back);
+  CHECK(back->as<double>() == 7.5);
+  for (const double wrong : {0.0, -3.0, 1e9, std::nan("")}) {
+    value.set_number(wrong);
+    CHECK_FALSE(type.from_log(value));
+  }
+  CHECK_FALSE(type.encode(nullptr, {}, options));
+  const std::vector<std::string> words{"now"};
+  CHECK_FALSE(type.encode(ready.get(), words, options));
+  const auto short_one = complete_parameters(style::style_type().parameters, {{"warm_up_s", 1.0}});
+  CHECK(style::style_type().check(*short_one, true)->parameter == "warm_up_s");
+}
+
+TEST_CASE("the estimate is the mean of the last second, at any rate", "[style]") {
+  for (const double rate_hz : {24.0, 30.0, 500.0}) {
+    style::StyleEstimate estimate;
+    CHECK(std::isnan(estimate.value()));
+    for (int i = 0; i < 3.0 * rate_hz; ++i) {
+      const double wave = std::sin(2.0 * kPi * i / rate_hz);
+      estimate.update((i < rate_hz ? 5.0 : 0.7) + wave, 1.0 / rate_hz);
+    }
+    CHECK(estimate.value() == Approx(0.7).margin(0.08));
+  }
+}
+
+TEST_CASE("auto-alpha gives the style that the walker does not show yet", "[style]") {
+  style::StyleModel model = gated_toy_model(1);
+  const auto alpha_for = [&](double shown) {
+    model.axis = {Eigen::VectorXd::Zero(15), shown};
+    const auto ready = warm_bound(model);
+    WarmedToy toy(ready.get(), {.alpha = 0.8, .auto_alpha = true});
+    toy.walk(20);
+    CHECK(toy.filter.alpha() == 0.0F);  // not known yet
+    toy.walk(160);
+    CHECK(toy.filter.reading(style::StyleFilter::kStyleEstimate) == Approx(shown));
+    return static_cast<double>(toy.filter.alpha());
+  };
+  CHECK(alpha_for(0.0) == Approx(0.8));
+  CHECK(alpha_for(-0.4) == Approx(0.8));
+  CHECK(alpha_for(0.25) == Approx(0.6));
+  CHECK(alpha_for(1.3) == 0.0);
+}
