@@ -248,7 +248,8 @@ TEST_CASE("any live parameter of any stage can be set, by its name or with the s
   CHECK(has(fixture.refused(ask("alpha", flag)), "alpha must be a number, not true or false"));
   CHECK(has(fixture.refused(ask("alpha", text)), "alpha must be a number, not text"));
   CHECK(has(fixture.refused(ask("calibrate", number(1.0))), "calibrate must be true or false"));
-  CHECK(has(fixture.refused(ask("gate", flag)), "gate cannot change while the daemon runs"));
+  CHECK(has(fixture.refused(ask("warm_up_s", number(10.0))),
+            "warm_up_s cannot change while the daemon runs"));
   CHECK(has(fixture.refused(ask("lag_ms", number(1.0))), "[stream.generate] table"));
   CHECK(has(fixture.refused(ask("beta", number(1.0))),
             "there is no parameter 'beta'; there is: style.alpha"));
