@@ -67,6 +67,9 @@ nlohmann::json measure(int points) {
   style::StyleModel model;
   model.space = motion::describe_space(motion::Space::kNative, *walk.skeleton).value();
   model.process = gp::synthetic(points, motion::space_dims(model.space)).process;
+  const Eigen::VectorXd neutral = model.process.inputs.colwise().mean();
+  model.gate = {.neutral = neutral, .swing_rad = 0.1, .fastest_stride_s = 1.0};
+  model.axis = {.direction = neutral, .offset = 0.0};
   const auto bound = style::bind_model(model, *walk.skeleton, "synthetic").value();
   nlohmann::json report{{"joints", walk.skeleton->joints.size()}, {"points", points}};
   for (const char* root : {"off", "stride", "actor"}) {

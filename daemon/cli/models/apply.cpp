@@ -138,6 +138,12 @@ Result<> run(ApplyArguments options) {
     if (!walker) return std::unexpected(walker.error());
     options.apply.walker = *walker;
   }
+  if (options.apply.filter.gate && !model->gate.present()) {
+    std::fprintf(stderr,
+                 "posed: %s: has no data for the gate, so any motion is styled; train it "
+                 "again, or use --gate off\n",
+                 options.model.c_str());
+  }
   ProgressBar bar(kQuietFor_s);
   options.apply.progress = [&bar](int done, int total) {
     return bar.show("styling", static_cast<double>(done) / total);

@@ -221,7 +221,7 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   style.set_name("style");
   v1::ParameterStats& parameter = *style.add_parameter();
   parameter.set_name("gate_fallback");
-  parameter.set_value(1.0);
+  parameter.set_value(0.0);
   CHECK_FALSE(below().contains("gate_fallback"));  // as usual
   parameter.set_value(0.25);
   CHECK(below() == "  walker0   performs g, style.gate_fallback 0.25, alpha slides to 1.00");
