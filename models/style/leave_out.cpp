@@ -85,7 +85,7 @@ class Search {
         tasks_(tasks),
         progress_(progress),
         X_(grid_inputs(leave_out.pairs)),
-        chunks_((leave_out.folds.size() + kChunk - 1) / kChunk) {}
+        chunks_((leave_out.folds + kChunk - 1) / kChunk) {}
 
   // False when it was stopped.
   bool try_lengths(const std::vector<double>& lengths_deg) {
@@ -93,8 +93,10 @@ class Search {
       const Folded process(X_, rad(lengths_deg[t / chunks_]));
       TaskResult numbers;
       const std::size_t first = t % chunks_ * kChunk;
-      const std::size_t end = std::min(first + kChunk, leave_out_.folds.size());
-      for (std::size_t f = first; f < end; ++f) process.ask(leave_out_.folds[f], numbers);
+      const std::size_t end = std::min(first + kChunk, leave_out_.folds);
+      for (std::size_t f = first; f < end && !tasks_.stopping(); ++f) {
+        process.ask(leave_out_.fold(f), numbers);
+      }
       return numbers;
     };
     const std::size_t total = lengths_deg.size() * chunks_;
@@ -122,7 +124,7 @@ class Search {
   [[nodiscard]] double rad(double length_deg) const { return scaled_rad(length_deg, X_.cols()); }
 
   void keep_best(double length_deg, const TaskResult& numbers) {
-    const auto folds = static_cast<double>(leave_out_.folds.size());
+    const auto folds = static_cast<double>(leave_out_.folds);
     for (std::size_t n = 0; n < kNoises.size(); ++n) {
       ChosenKernel tried{{rad(length_deg), kNoises[n]}, 0.0, {}};
       for (std::size_t k = n * kNumbers; k < numbers.size(); k += kNumbers * kNoises.size()) {
@@ -149,7 +151,7 @@ class Search {
 
 std::optional<ChosenKernel> choose_kernel(const LeaveOut& leave_out, TaskRunner& tasks,
                                           const FoldProgress& progress) {
-  if (leave_out.folds.empty()) {
+  if (leave_out.folds == 0) {
     const auto dims = leave_out.pairs.inputs.front().cols();
     return ChosenKernel{{scaled_rad(50.0, dims), kNoises.front()}, 0.0, {}};
   }

@@ -75,14 +75,14 @@ Result<Learnt> learn_default(const Dataset& dataset, const std::string& target, 
                              const FoldProgress& progress) {
   const auto pairs = make_training_pairs(dataset, take_cycles(dataset), target);
   const LeaveOut leave_out = make_folds(dataset, target);
-  const auto chosen = leave_out.folds.empty() ? choose_kernel({pairs, {}}, tasks, progress)
-                                              : choose_kernel(leave_out, tasks, progress);
+  const auto chosen = leave_out.folds == 0 ? choose_kernel({.pairs = pairs}, tasks, progress)
+                                           : choose_kernel(leave_out, tasks, progress);
   if (!chosen) return stopped();
   auto process = fit_difference(pairs, chosen->kernel);
   if (!process) return std::unexpected(process.error());
   Learnt learnt{
       std::move(*process), grid_outputs(pairs.outputs), {}, pairs.follows_days, chosen->way};
-  learnt.kernel["length_chosen_by"] = leave_out.folds.empty() ? "default" : "leave-out";
+  learnt.kernel["length_chosen_by"] = leave_out.folds == 0 ? "default" : "leave-out";
   return learnt;
 }
 
