@@ -63,8 +63,6 @@ struct ParameterState {
 // Something that a stage tells people by itself, once. RT-safe.
 struct StageNotice {
   std::size_t index = 0;  // in StageType::notices
-  // What it has measured, if that is worth a file; valid until the next call of the stage.
-  std::span<const float> values{};
 };
 
 // A command to a stage, with whatever belongs to it, small enough for a ring.

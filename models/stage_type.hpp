@@ -108,13 +108,14 @@ struct StageType {
   std::vector<StageNoticeType> notices{};
   std::vector<StageCommandType> commands{};
   // The command that the parameters ask for at the start of a live run (index in `commands`), if
-  // any; null: never.
+  // any; null: never. `file` is the model's, which `model` was bound from; empty without a model.
   struct FirstCommand {
     std::size_t index;
     StageCommand command;
   };
   Result<std::optional<FirstCommand>> (*first_command)(const Parameters& parameters,
-                                                       const StageModel* model) = nullptr;
+                                                       const StageModel* model,
+                                                       std::span<const std::byte> file) = nullptr;
 
   [[nodiscard]] bool has_model() const noexcept { return bind_model != nullptr; }
 };

@@ -73,16 +73,17 @@ Result<BoundStages> bind_stages(const LoadedStages& stages) {
   for (std::size_t i = 0; i < stages.settings.stages.size(); ++i) {
     const pipeline::StageSettings& stage = stages.settings.stages[i];
     auto& model = bound.models.emplace_back();
+    std::span<const std::byte> file;
     if (stages.skeleton && stages.model_files[i]) {
+      file = std::as_bytes(std::span(*stages.model_files[i]));
       const auto context = pipeline::stage_context(stages.settings, i, stages.skeleton);
       if (!context) return std::unexpected(context.error());
-      auto ready = stage.type->bind_model(std::as_bytes(std::span(*stages.model_files[i])),
-                                          *context, stage.model_name);
+      auto ready = stage.type->bind_model(file, *context, stage.model_name);
       if (!ready) return std::unexpected(ready.error());
       model = std::move(*ready);
     }
     if (stage.type->first_command == nullptr) continue;
-    const auto first = stage.type->first_command(stage.parameters, model.get());
+    const auto first = stage.type->first_command(stage.parameters, model.get(), file);
     if (!first) return std::unexpected(first.error());
     if (!*first) continue;
     bound.first_commands.push_back({.change = {.kind = pipeline::StageChange::Kind::kCommand,

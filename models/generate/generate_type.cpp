@@ -164,7 +164,8 @@ std::vector<StageCommandType> commands() {
 }
 
 Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& parameters,
-                                                             const StageModel* model) {
+                                                             const StageModel* model,
+                                                             std::span<const std::byte> /*file*/) {
   const auto labels = gesture::split_labels(parameter<std::string>(parameters, "labels"));
   if (labels.empty()) return std::nullopt;
   const auto command = play(model, labels, parameters);

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "models/style/walker_command.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -161,6 +162,10 @@ bool StyleFilter::command(std::size_t index, const StageCommand& command) noexce
       return set_shares(command.as<Shares>());
     case kMask:
       set_mask(command.as<Mask>());
+      return true;
+    case kNeutral:
+      if (!watch_.know(model_, walker_of(command))) return false;
+      discontinuity_ = true;
       return true;
     default:
       return false;

@@ -94,7 +94,7 @@ class StyleFilter final : public Stage {
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override {
     return watch_.take_notice();
   }
-  enum Command : std::size_t { kWarmUp, kWeights, kMask };
+  enum Command : std::size_t { kWarmUp, kWeights, kMask, kNeutral };
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
   void flush(StageOut& /*out*/) noexcept override { watch_.interrupt(); }
 

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "models/style/apply.hpp"
 #include "models/style/style_filter.hpp"
 #include "models/style/style_model.hpp"
+#include "models/style/walker_command.hpp"
 #include "posed/v1/log.pb.h"
 #include "posed/v1/model.pb.h"
+#include "proto/clip/clip.hpp"
 
 namespace posed::style {
 namespace {
@@ -33,6 +36,11 @@ std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_mod
   if (seconds != 0.0 && seconds < kShortestWarmUp_s) {
     return ParameterFault{
         "warm_up_s", "warm_up_s is too short to measure a walk: give at least 2, or 0 for none"};
+  }
+  const bool warms_up = seconds != 0.0 || parameter<bool>(parameters, "calibrate");
+  if (warms_up && !parameter<std::string>(parameters, "neutral").empty()) {
+    return ParameterFault{
+        "neutral", "neutral and a warm-up at the start both tell how the walker walks: give one"};
   }
   const auto weights = check_weights(parameter<std::string>(parameters, "weights"));
   if (!weights) return ParameterFault{"weights", weights.error().message};
@@ -161,6 +169,10 @@ std::vector<ParameterSpec> parameters() {
            .help = "measure the walker's own neutral pose so long at the start; 0: do not",
            .min = 0.0,
            .max = kLongestWarmUp_s},
+          {.name = "neutral",
+           .default_value = std::string(),
+           .is_path = true,
+           .help = "a clip of the walker's usual walk, in the place of a warm-up: .bvh or .amc"},
           {.name = "weights",
            .default_value = std::string(),
            .help = "how much of each style of the model: \"feminine=0.6,elderly=0.4\"; empty: the"
@@ -214,6 +226,14 @@ std::optional<StageCommand> warm_up_from_log(const v1::DecisionValue& value) {
   return StageCommand::of(seconds);
 }
 
+Result<StageCommand> refuse_neutral(const StageModel* /*model*/,
+                                    std::span<const std::string> /*words*/,
+                                    const Parameters& /*options*/) {
+  return misuse(
+      "a walker's clip is named in the config (neutral = \"N.bvh\"), because nothing from "
+      "the network names a file; or use `posed ctl warm-up STREAM`");
+}
+
 // In the order of StyleFilter::Command.
 std::vector<StageCommandType> commands() {
   return {{.name = "warm-up",
@@ -240,11 +260,36 @@ std::vector<StageCommandType> commands() {
            .help = "styles parts of the body less",
            .encode = set_mask,
            .to_log = mask_to_log,
-           .from_log = mask_from_log}};
+           .from_log = mask_from_log},
+          // What the parameter `neutral` asks for; a name of its own, as the log tells them apart.
+          {.name = "know-walker",
+           .help = "makes the walker known from a clip",
+           .encode = refuse_neutral,
+           .to_log = walker_to_log,
+           .from_log = walker_from_log}};
+}
+
+// A clip of the walker's usual walk stands for a warm-up.
+Result<StageCommand> neutral_of_clip(const std::string& path, const StageModel& model,
+                                     std::span<const std::byte> file) {
+  const auto style = parse_model(file, model.name);
+  if (!style) return std::unexpected(style.error());
+  const auto clip = clip::read_clip(path);
+  if (!clip) return std::unexpected(clip.error());
+  const auto walker = measure_walker(*style, model.name, *clip);
+  if (!walker) return std::unexpected(walker.error());
+  return command_of(*walker);
 }
 
 Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& parameters,
-                                                             const StageModel* /*model*/) {
+                                                             const StageModel* model,
+                                                             std::span<const std::byte> file) {
+  const auto neutral = parameter<std::string>(parameters, "neutral");
+  if (!neutral.empty() && model != nullptr) {
+    const auto command = neutral_of_clip(neutral, *model, file);
+    if (!command) return std::unexpected(command.error());
+    return StageType::FirstCommand{StyleFilter::kNeutral, *command};
+  }
   double seconds = parameter<double>(parameters, "warm_up_s");
   if (seconds == 0.0 && parameter<bool>(parameters, "calibrate")) seconds = kUsualWarmUp_s;
   if (seconds == 0.0) return std::nullopt;

@@ -70,15 +70,26 @@ bool WalkerWatch::measure(const BoundModel& model, std::span<const float> q,
   return true;
 }
 
+// Whether a walker can be known with this model. RT-safe
+bool WalkerWatch::serves(const BoundModel* model) noexcept {
+  if (model == nullptr) return false;
+  // Nobody hears the answer to what the config asks for.
+  if (!model->known && !std::exchange(told_no_gate_, true)) tell(kNoGateData);
+  return model->known.has_value();
+}
+
 // RT-safe
 bool WalkerWatch::warm_up(const BoundModel* model, double seconds) noexcept {
-  if (model == nullptr) return false;
-  if (!model->known) {
-    // Nobody hears the answer to a warm-up that the config asks for.
-    if (!std::exchange(told_no_gate_, true)) tell(kNoGateData);
-    return false;
-  }
+  if (!serves(model)) return false;
   warm_up_.begin(seconds);
+  return true;
+}
+
+// RT-safe
+bool WalkerWatch::know(const BoundModel* model, const Walker& walker) noexcept {
+  if (!serves(model)) return false;
+  warm_up_.stop();
+  walker_ = walker;
   return true;
 }
 

@@ -48,6 +48,8 @@ class WalkerWatch {
   // Starts a warm-up of so many seconds, in the place of one that runs. False for a model that has
   // no data for it.
   [[nodiscard]] bool warm_up(const BoundModel* model, double seconds) noexcept;
+  // The walker is known from elsewhere, in the model's pose space. False as above.
+  [[nodiscard]] bool know(const BoundModel* model, const Walker& walker) noexcept;
   // Nothing more comes to measure on.
   void interrupt() noexcept;
   // In the place of a warm-up; empty: none.
@@ -61,6 +63,7 @@ class WalkerWatch {
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept;
 
  private:
+  [[nodiscard]] bool serves(const BoundModel* model) noexcept;
   void tell_what_is_missing(const BoundModel& model) noexcept;
   void relate(const BoundModel& model, std::span<const float> q,
               std::span<float> input) const noexcept;

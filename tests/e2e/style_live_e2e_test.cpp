@@ -2,6 +2,7 @@
 // the same bits, whatever was changed on the way.
 #include <catch2/catch.hpp>
 
+#include <filesystem>
 #include <string>
 #include <thread>
 
@@ -48,6 +49,31 @@ TEST_CASE("a warm-up, the gate and auto-alpha are told of and replayed") {
   CHECK(has(refused.err, "train it again"));
   served.daemon->send(SIGTERM);
   REQUIRE(served.daemon->exit_code() == 0);
+  const ProgramOutcome replay =
+      posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
+  INFO(replay.err);
+  CHECK(replay.code == 0);
+}
+
+TEST_CASE("a performer is known from a clip of another day, also in a replay without the clip") {
+  Served served;
+  REQUIRE(style::save_model(gated_toy_model(1), served.folder.path() / "gated.style"));
+  REQUIRE(clip::write_bvh(toy_walk(600), served.folder.path() / "ann.bvh"));
+  const std::string style = "[stream.style]\nmodel = \"gated.style\"\nneutral = ";
+  const auto config = [&](const std::string& clip) {
+    return std::string(Stage::kEndpoints) + Stage::kWalker + style + "\"" + clip + "\"\n";
+  };
+  served.folder.write("posed.toml", config("nobody.bvh"));
+  const auto missing = posed({"check", "--config", served.path("posed.toml")});
+  CHECK(missing.code != 0);
+  CHECK(has(missing.err + missing.out, "nobody.bvh"));
+  served.folder.write("posed.toml", config("ann.bvh"));
+  served.record();
+  std::this_thread::sleep_for(500ms);
+  CHECK(served.ctl({"set", "walker", "alpha", "0.6"}).code == 0);
+  served.daemon->send(SIGTERM);
+  REQUIRE(served.daemon->exit_code() == 0);
+  std::filesystem::remove(served.path("ann.bvh"));
   const ProgramOutcome replay =
       posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
   INFO(replay.err);

@@ -2,6 +2,8 @@
 #include "models/style/warm_up.hpp"
 
 #include <cmath>
+#include <span>
+#include <string>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -9,8 +11,10 @@
 #include "models/style/style_estimate.hpp"
 #include "models/style/style_filter.hpp"
 #include "models/style/style_type.hpp"
+#include "models/style/walker_command.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/last_frame.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 using namespace posed;
@@ -22,6 +26,12 @@ namespace {
 
 std::unique_ptr<const style::BoundModel> warm_bound(const style::StyleModel& model) {
   return style::bind_model(model, toy_skeleton(), "toy").value();
+}
+
+Parameters completed(const std::vector<ParameterSpec>& specs, const Parameters& given) {
+  auto all = complete_parameters(specs, given);
+  REQUIRE(all);
+  return *std::move(all);
 }
 
 // A stage that styles the toy's walk, `bend_rad` added to every joint but the root.
@@ -140,6 +150,78 @@ TEST_CASE("a model of an older posed has neither gate nor warm-up, and says so o
   CHECK(unheard.notices() == std::vector<std::size_t>{WalkerWatch::kNoGateData});
 }
 
+TEST_CASE("a walker goes into a command, into the log and back within half of 1e-4 rad",
+          "[style]") {
+  style::Walker walker;
+  for (std::size_t d = 0; d < 15; d += 2) {
+    walker.neutral[d] = 0.37F * static_cast<float>(d) - 3.0F;
+    walker.measured[d] = 1;
+  }
+  const StageCommandType& type = style::style_type().commands[style::StyleFilter::kNeutral];
+  for (const double cadence_rad_s : {6.5, std::nan("")}) {
+    walker.cadence_rad_s = cadence_rad_s;
+    const StageCommand command = style::command_of(walker);
+    v1::DecisionValue value;
+    type.to_log(command, value);
+    const auto back = type.from_log(value);
+    REQUIRE(back);
+    CHECK(back->bytes == command.bytes);
+    const style::Walker found = style::walker_of(*back);
+    CHECK(found.measured == walker.measured);
+    for (std::size_t d = 0; d < 15; ++d) {
+      CHECK(std::abs(found.neutral[d] - walker.neutral[d]) <= 0.51e-4F);
+    }
+    CHECK(std::isnan(found.cadence_rad_s) == std::isnan(cadence_rad_s));
+    v1::DecisionValue broken = value;
+    broken.mutable_walker()->add_dimension(3);
+    CHECK_FALSE(type.from_log(broken));  // without an angle
+    broken.mutable_walker()->add_angle(40'000);
+    CHECK_FALSE(type.from_log(broken));
+    broken.mutable_walker()->set_angle(broken.walker().angle_size() - 1, 1);
+    CHECK(type.from_log(broken));
+    broken.mutable_walker()->set_dimension(0, 3);  // twice
+    CHECK_FALSE(type.from_log(broken));
+    broken.mutable_walker()->set_dimension(0, 288);
+    CHECK_FALSE(type.from_log(broken));
+  }
+  CHECK_FALSE(type.from_log({}));
+  CHECK_FALSE(type.encode(nullptr, {}, {}));
+}
+
+TEST_CASE("a clip of the usual walk stands for a warm-up", "[style]") {
+  const TempFolder folder;
+  clip::Clip usual = toy_walk(600);
+  usual.channels.rightCols(12).array() += 0.15;
+  REQUIRE(clip::write_bvh(usual, folder.path() / "ann.bvh"));
+  const style::StyleModel model = gated_toy_model(1);
+  const std::string file = style::serialize_model(model);
+  const auto ready = warm_bound(model);
+  const auto& type = style::style_type();
+  const auto first = [&](const std::string& name) {
+    Parameters given = completed(type.parameters, {});
+    given["neutral"] = (folder.path() / name).string();
+    return type.first_command(given, ready.get(), std::as_bytes(std::span(file)));
+  };
+  const auto command = first("ann.bvh");
+  REQUIRE(command);
+  REQUIRE(*command);
+  WarmedToy known(ready.get());
+  REQUIRE(known.filter.command((*command)->index, (*command)->command));
+  WarmedToy warmed(ready.get());
+  REQUIRE(warmed.warm_up(4.0));
+  const Frame wanted = warmed.walk(600, 0.15);
+  CHECK(delta_of(wanted, known.walk(600, 0.15), 2).angularDistance(Eigen::Quaterniond::Identity()) <
+        0.02);
+  const auto missing = first("none.bvh");
+  REQUIRE_FALSE(missing);
+  CHECK(missing.error().file.ends_with("none.bvh"));
+  Parameters both = completed(type.parameters, {});
+  both["neutral"] = std::string("a.bvh");
+  both["warm_up_s"] = 5.0;
+  REQUIRE(type.check(both, true));
+  CHECK(type.check(both, true)->parameter == "neutral");
+}
+
 TEST_CASE("alpha acts while auto-alpha does not know how much the walker shows", "[style]") {
   const auto ready = warm_bound(gated_toy_model(1));
   WarmedToy toy(ready.get());
@@ -196,7 +278,7 @@ TEST_CASE("the warm-up command goes into the log and back; what it cannot be is 
           "[style]") {
   const StageCommandType& type = style::style_type().commands[style::StyleFilter::kWarmUp];
   const auto ready = warm_bound(gated_toy_model(1));
-  const auto options = complete_parameters(type.options, {{"seconds", 7.5}}).value();
+  const auto options = completed(type.options, {{"seconds", 7.5}});
   const auto command = type.encode(ready.get(), {}, options);
   REQUIRE(command);
   v1::DecisionValue value;
