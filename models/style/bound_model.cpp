@@ -59,7 +59,7 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
   std::vector<gp::Function> more;
   more.reserve(model.more.size());
   for (const MoreStyle& style : model.more) more.push_back(style.function);
-  auto predictor = gp::Predictor::build(model.process, false, more);
+  auto predictor = gp::Predictor::build(model.process, more);
   if (!predictor) {
     Error error = predictor.error();
     error.file = name;
