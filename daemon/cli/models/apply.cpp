@@ -112,13 +112,30 @@ nlohmann::json or_null(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
+// Measures how the walker of --neutral usually walks. A script that says --calibrate goes on
+// without, because that was good for any clip and model.
+Result<> take_walker(const style::StyleModel& model, bool calibrates, ApplyArguments& options) {
+  if (options.neutral.empty()) return {};
+  const auto neutral = clip::read_clip(options.neutral, options.read);
+  if (!neutral) return std::unexpected(neutral.error());
+  const auto walker = style::measure_walker(model, options.model.string(), *neutral);
+  if (!walker && !calibrates) return std::unexpected(walker.error());
+  if (walker) {
+    options.apply.walker = *walker;
+  } else {
+    std::fprintf(stderr, "posed: %s; --calibrate does nothing\n", walker.error().text().c_str());
+  }
+  return {};
+}
+
 Result<> run(ApplyArguments options) {
   if (auto ok = take_gate(options); !ok) return ok;
   if (auto ok = take_alpha(options); !ok) return ok;
-  if (options.apply.filter.calibrate) {
+  bool calibrates = std::exchange(options.apply.filter.calibrate, false);
+  if (calibrates) {
     std::fprintf(stderr, "posed: --calibrate is the older name of --neutral IN\n");
-    if (options.neutral.empty()) options.neutral = options.in;
-    options.apply.filter.calibrate = false;
+    calibrates = options.neutral.empty();
+    if (calibrates) options.neutral = options.in;
   }
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
@@ -139,13 +156,7 @@ Result<> run(ApplyArguments options) {
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
   }
-  if (!options.neutral.empty()) {
-    const auto neutral = clip::read_clip(options.neutral, options.read);
-    if (!neutral) return std::unexpected(neutral.error());
-    const auto walker = style::measure_walker(*model, options.model.string(), *neutral);
-    if (!walker) return std::unexpected(walker.error());
-    options.apply.walker = *walker;
-  }
+  if (auto ok = take_walker(*model, calibrates, options); !ok) return ok;
   if (options.apply.filter.gate && !model->gate.present()) {
     std::fprintf(stderr,
                  "posed: %s: has no data for the gate, so any motion is styled; train it "
