@@ -112,6 +112,29 @@ nlohmann::json or_null(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
+// What was done, without the verdict.
+nlohmann::json report_of(const ApplyArguments& options, const style::StyleModel& model,
+                         const style::Shares& shares, const clip::Clip& clip,
+                         const style::Applied& applied) {
+  return {{"out", options.out.string()},
+          {"frames", clip.frames()},
+          {"rate_hz", clip.frame_rate_hz},
+          {"from", model.from},
+          {"to", model.to},
+          {"weights", shares_json(model, shares)},
+          {"mask", options.mask},
+          {"alpha", options.apply.filter.alpha},
+          {"auto_alpha", options.apply.filter.auto_alpha},
+          {"style_estimate", or_null(applied.estimate_mean)},
+          {"cold", options.apply.cold},
+          {"root", root_text(options.apply.feet)},
+          {"max_root_offset_cm", applied.max_root_offset_m * 100.0},
+          {"gate_mean", or_null(applied.gate_mean)},
+          {"joints_changed", applied.joints_changed},
+          {"rms_change_deg", applied.rms_change_rad * kDegrees},
+          {"max_change_deg", applied.max_change_rad * kDegrees}};
+}
+
 // Measures how the walker of --neutral usually walks. A script that says --calibrate goes on
 // without, because that was good for any clip and model.
 Result<> take_walker(const style::StyleModel& model, bool calibrates, ApplyArguments& options) {
@@ -178,26 +201,10 @@ Result<> run(ApplyArguments options) {
   const double max_deg = applied->max_change_rad * kDegrees;
   const std::string sentence = verdict(*fit, rms_deg, training_difference_deg(*model));
   if (options.json) {
-    const nlohmann::json report{{"out", options.out.string()},
-                                {"frames", clip->frames()},
-                                {"rate_hz", clip->frame_rate_hz},
-                                {"from", model->from},
-                                {"to", model->to},
-                                {"weights", shares_json(*model, *shares)},
-                                {"mask", options.mask},
-                                {"alpha", options.apply.filter.alpha},
-                                {"auto_alpha", options.apply.filter.auto_alpha},
-                                {"style_estimate", or_null(applied->estimate_mean)},
-                                {"cold", options.apply.cold},
-                                {"root", root_text(options.apply.feet)},
-                                {"max_root_offset_cm", applied->max_root_offset_m * 100.0},
-                                {"gate_mean", or_null(applied->gate_mean)},
-                                {"joints_changed", applied->joints_changed},
-                                {"rms_change_deg", rms_deg},
-                                {"max_change_deg", max_deg},
-                                {"distance_deg", fit->distance_deg},
-                                {"far_from_training", fit->is_far()},
-                                {"verdict", sentence}};
+    nlohmann::json report = report_of(options, *model, *shares, *clip, *applied);
+    report["distance_deg"] = fit->distance_deg;
+    report["far_from_training"] = fit->is_far();
+    report["verdict"] = sentence;
     std::printf("%s\n", json_text(report, 2).c_str());
   } else {
     std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f deg at most\n",
