@@ -13,11 +13,6 @@
 
 namespace posed {
 
-// Whether a number stands for the values of this parameter, as for all live ones but these texts.
-[[nodiscard]] inline bool has_number(const ParameterSpec& spec) noexcept {
-  return !std::holds_alternative<std::string>(spec.default_value) || !spec.words.empty();
-}
-
 // The command that sets this live text (index in StageType::commands); nothing for a parameter that
 // is not one.
 [[nodiscard]] inline std::optional<std::size_t> text_command(const StageType& type,

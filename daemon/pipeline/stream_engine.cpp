@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "models/live_text.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/text/parameter.hpp"
 
 namespace posed::pipeline {
 namespace {

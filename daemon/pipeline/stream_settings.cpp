@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "daemon/pipeline/counters.hpp"
-#include "models/live_text.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/parameter.hpp"
 
 namespace posed::pipeline {
 namespace {

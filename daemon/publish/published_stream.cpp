@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "daemon/publish/frame_output.hpp"
-#include "models/live_text.hpp"
 #include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/parameter.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::publish {

@@ -23,7 +23,7 @@ Eigen::MatrixXd Inducing::root() const {
 }
 
 Inducing choose_inducing(const Eigen::MatrixXd& X, double mu, int limit,
-                         const std::function<bool(int, double)>& enough) {
+                         const std::function<bool(double)>& enough) {
   const auto points = static_cast<int>(X.rows());
   Inducing chosen;
   chosen.order.resize(static_cast<std::size_t>(points));
@@ -34,7 +34,7 @@ Inducing choose_inducing(const Eigen::MatrixXd& X, double mu, int limit,
   for (; m < chosen.factor.cols(); ++m) {
     Eigen::Index pivot = 0;
     const double worst = residual.maxCoeff(&pivot);
-    if (worst < kResidualMin || enough(m, worst)) break;
+    if (worst < kResidualMin || enough(worst)) break;
     Eigen::VectorXd column = rbf(X, X.row(pivot), 0.0, mu);
     column -= chosen.factor.leftCols(m) * chosen.factor.row(pivot).head(m).transpose();
     chosen.factor.col(m) = column / std::sqrt(worst);
@@ -60,8 +60,8 @@ Result<std::vector<Trained>> fit_functions(const Eigen::MatrixXd& X,
     return fail("a training value is not finite: look for broken frames in the clips");
   }
   const double noise = trained.noise / std::exp(trained.lambda);
-  const Inducing chosen = choose_inducing(
-      X, trained.mu, limit, [&](int, double worst) { return worst < kOfNoise * noise; });
+  const Inducing chosen =
+      choose_inducing(X, trained.mu, limit, [&](double worst) { return worst < kOfNoise * noise; });
   trained.inputs = X(chosen.chosen(), Eigen::all);
   const Eigen::MatrixXd root = chosen.root();
   std::vector<Trained> learnt;

@@ -24,9 +24,9 @@ struct Inducing {
 };
 
 // Each step adds the pose that the chosen ones explain least, until there are `limit`, `enough` is
-// true of their number and the largest unexplained variance (of 1), or none is left.
+// true of the largest unexplained variance (of 1), or none is left.
 [[nodiscard]] Inducing choose_inducing(const Eigen::MatrixXd& X, double mu, int limit,
-                                       const std::function<bool(int, double)>& enough);
+                                       const std::function<bool(double)>& enough);
 
 // As fit() (regression.hpp) with b = 0, but with at most `limit` poses, fitted to all pairs by
 // least squares with the noise as ridge (subset of regressors).

@@ -136,21 +136,19 @@ HWY_INLINE void accumulate_tile(const float* A, int stride, int width, const flo
 
 // The kernel's values tile by tile; `add(tile, width, k, even, odd)` adds what they weigh.
 template <typename Add>
-HWY_INLINE void sum_tiles(const Tiles& tiles, const Query& query, int keep, float* k, float* out,
-                          const Add& add) {
+HWY_INLINE void sum_tiles(const Tiles& tiles, const Query& query, float* out, const Add& add) {
   HWY_ALIGN std::array<float, kMaxDims> even;
   HWY_ALIGN std::array<float, kMaxDims> odd;
-  HWY_ALIGN std::array<float, kTile> passing;
+  HWY_ALIGN std::array<float, kTile> k;
   const int padded_outputs = tiles.outputs_padded;
   std::fill_n(even.begin(), padded_outputs, 0.0F);
   std::fill_n(odd.begin(), padded_outputs, 0.0F);
   const float* tile = tiles.data;
   for (int point = 0; point < tiles.points; point += kTile) {
     const int width = std::min(kTile, tiles.points - point);
-    float* const here = point < keep ? k + point : passing.data();
-    kernel_tile(tile, width, query, here);
+    kernel_tile(tile, width, query, k.data());
     const float* const A = tile + static_cast<std::ptrdiff_t>(tiles.dims) * width;
-    add(A, width, here, even.data(), odd.data());
+    add(A, width, k.data(), even.data(), odd.data());
     tile = A + static_cast<std::ptrdiff_t>(padded_outputs) * width;
   }
   const Floats d;
@@ -159,63 +157,30 @@ HWY_INLINE void sum_tiles(const Tiles& tiles, const Query& query, int keep, floa
   }
 }
 
-void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) {
-  sum_tiles(tiles, query, keep, k, out,
-            [&](const float* A, int width, const float* here, float* even, float* odd) {
-              accumulate_tile(A, tiles.outputs_padded, width, here, even, odd);
+void weighted_sum(const Tiles& tiles, const Query& query, float* out) {
+  sum_tiles(tiles, query, out,
+            [&](const float* A, int width, const float* k, float* even, float* odd) {
+              accumulate_tile(A, tiles.outputs_padded, width, k, even, odd);
             });
 }
 
-void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, int keep, float* k,
-                 float* out) {
+void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, float* out) {
   const Floats d;
   const float* block = blocks.data;
-  sum_tiles(tiles, query, keep, k, out,
-            [&](const float* /*A*/, int width, const float* here, float* even, float* odd) {
+  sum_tiles(tiles, query, out,
+            [&](const float* /*A*/, int width, const float* k, float* even, float* odd) {
               HWY_ALIGN std::array<float, kTile> scaled;
               for (int s = 0; s < blocks.count; ++s) {
                 if (blocks.shares[s] != 0.0F) {
                   const auto share = hn::Set(d, blocks.shares[s]);
                   for (int i = 0; i < width; i += kWide) {
-                    hn::Store(hn::Mul(share, hn::Load(d, here + i)), d, scaled.data() + i);
+                    hn::Store(hn::Mul(share, hn::Load(d, k + i)), d, scaled.data() + i);
                   }
                   accumulate_tile(block, tiles.outputs_padded, width, scaled.data(), even, odd);
                 }
                 block += static_cast<std::ptrdiff_t>(tiles.outputs_padded) * width;
               }
             });
-}
-
-float triangle_norm2(const float* triangle, int rows, const float* k) {
-  const Floats d;
-  constexpr int kParts = kLanes / kWide;
-  Vec squares[kParts];
-  for (int v = 0; v < kParts; ++v) squares[v] = hn::Zero(d);
-  const float* HWY_RESTRICT column = triangle;
-  for (int row = 0; row < rows; row += kLanes) {
-    Vec sum[4][kParts];
-    for (auto& part : sum) {
-      for (int v = 0; v < kParts; ++v) part[v] = hn::Zero(d);
-    }
-    for (int j = 0; j < row + kLanes; j += 4) {
-      for (int s = 0; s < 4; ++s) {
-        const auto kj = hn::Set(d, k[j + s]);
-        for (int v = 0; v < kParts; ++v) {
-          sum[s][v] = hn::MulAdd(kj, hn::Load(d, column + s * kLanes + v * kWide), sum[s][v]);
-        }
-      }
-      column += 4 * kLanes;
-    }
-    for (int v = 0; v < kParts; ++v) {
-      const auto z = hn::Add(hn::Add(sum[0][v], sum[1][v]), hn::Add(sum[2][v], sum[3][v]));
-      squares[v] = hn::MulAdd(z, z, squares[v]);
-    }
-  }
-  HWY_ALIGN std::array<float, kLanes> lanes;
-  for (int v = 0; v < kParts; ++v) hn::Store(squares[v], d, lanes.data() + v * kWide);
-  float total = 0.0F;
-  for (const float lane : lanes) total += lane;
-  return total;
 }
 
 void exp2_of(const float* x, int count, float* out) {
@@ -236,19 +201,15 @@ namespace kernel {
 
 HWY_EXPORT(weighted_sum);
 HWY_EXPORT(blended_sum);
-HWY_EXPORT(triangle_norm2);
 HWY_EXPORT(exp2_of);
 HWY_EXPORT(target);
 
-void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) noexcept {
-  HWY_DYNAMIC_DISPATCH(weighted_sum)(tiles, query, keep, k, out);
+void weighted_sum(const Tiles& tiles, const Query& query, float* out) noexcept {
+  HWY_DYNAMIC_DISPATCH(weighted_sum)(tiles, query, out);
 }
-void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, int keep, float* k,
+void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query,
                  float* out) noexcept {
-  HWY_DYNAMIC_DISPATCH(blended_sum)(tiles, blocks, query, keep, k, out);
-}
-float triangle_norm2(const float* triangle, int rows, const float* k) noexcept {
-  return HWY_DYNAMIC_DISPATCH(triangle_norm2)(triangle, rows, k);
+  HWY_DYNAMIC_DISPATCH(blended_sum)(tiles, blocks, query, out);
 }
 void exp2_of(const float* x, int count, float* out) noexcept {
   HWY_DYNAMIC_DISPATCH(exp2_of)(x, count, out);

@@ -5,15 +5,12 @@
 //   X [dims][width]        one row a dimension, one column a point
 //   A [width][padded]      one row a point: its weights, padded with zeros to 16 floats
 //
-// A triangle L (for |L k|^2) is cut in blocks of 16 rows; block b holds columns 0 .. 16 b + 15,
-// each 16 floats tall.
-//
 // There is no software prefetch: it makes a call up to a tenth faster with cold caches and a third
 // slower with hot ones.
 //
 // Every sum has one fixed order that does not depend on the vector's length: distances run by
-// dimension, outputs in two partial sums (even and odd points), triangle rows in four partial sums
-// by column. With fused multiply-adds AVX2 and AVX-512 therefore give the same bits.
+// dimension, outputs in two partial sums (even and odd points). With fused multiply-adds AVX2 and
+// AVX-512 therefore give the same bits.
 #pragma once
 
 #include <cstdint>
@@ -21,15 +18,10 @@
 namespace posed::gp::kernel {
 
 inline constexpr int kTile = 64;      // points in a full tile
-inline constexpr int kLanes = 16;     // floats: rows and blocks are padded to this
+inline constexpr int kLanes = 16;     // floats: points and outputs are padded to this
 inline constexpr int kMaxDims = 288;  // inputs and outputs
-inline constexpr int kMaxGate = 256;  // most points that the confidence may use
 
 [[nodiscard]] constexpr int padded(int n) noexcept { return (n + kLanes - 1) / kLanes * kLanes; }
-[[nodiscard]] constexpr int triangle_floats(int rows) noexcept {
-  const int blocks = padded(rows) / kLanes;
-  return kLanes * kLanes * blocks * (blocks + 1) / 2;
-}
 
 // A query. `present` lists the `present_count` available dimensions; null means that all are
 // available.
@@ -55,17 +47,12 @@ struct Blocks {
   int count;
 };
 
-// sum_i k_i A_i into out [outputs_padded], where k_i = exp2(exponent * |q - x_i|^2). The first
-// `keep` (at most kMaxGate) k_i are left in k [padded(keep) rounded up to a tile].
-void weighted_sum(const Tiles& tiles, const Query& query, int keep, float* k, float* out) noexcept;
+// sum_i k_i A_i into out [outputs_padded], where k_i = exp2(exponent * |q - x_i|^2).
+void weighted_sum(const Tiles& tiles, const Query& query, float* out) noexcept;
 
 // The same with sum_s shares_s A_s for A; blocks without a share are not read. One block of share 1
 // gives the bits of weighted_sum() with these weights. RT-safe.
-void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, int keep, float* k,
-                 float* out) noexcept;
-
-// |L k|^2 over `rows` (a multiple of 16).
-[[nodiscard]] float triangle_norm2(const float* triangle, int rows, const float* k) noexcept;
+void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, float* out) noexcept;
 
 // out = 2^x for x <= 0, exactly 0 below -125. count: a multiple of 16. For tests.
 void exp2_of(const float* x, int count, float* out) noexcept;

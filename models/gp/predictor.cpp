@@ -6,19 +6,16 @@
 #include <cstring>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <vector>
 
 #include <hwy/aligned_allocator.h>
 
-#include "models/gp/confidence.hpp"
 #include "models/gp/kernel.hpp"
 
 namespace posed::gp {
 namespace {
 
 using kernel::kMaxDims;
-using kernel::kMaxGate;
 using kernel::kTile;
 using kernel::padded;
 
@@ -63,46 +60,45 @@ Result<> validate_more(const Trained& t, std::span<const Function> more) {
 }
 
 // Writes one row a point of the tile that begins at `first`: its weights.
-float* lay_out_weights(const Eigen::MatrixXd& weights, double signal, const std::vector<int>& order,
-                       int first, int width, int outputs_padded, float* out) {
+float* lay_out_weights(const Eigen::MatrixXd& weights, double signal, int first, int width,
+                       int outputs_padded, float* out) {
   const auto outputs = static_cast<int>(weights.cols());
-  const auto real = static_cast<int>(order.size());
+  const auto real = static_cast<int>(weights.rows());
   for (int i = 0; i < width; ++i) {
     for (int o = 0; o < outputs_padded; ++o) {
       const bool is_weight = first + i < real && o < outputs;
-      *out++ = is_weight ? static_cast<float>(signal * weights(order[first + i], o)) : 0.0F;
+      *out++ = is_weight ? static_cast<float>(signal * weights(first + i, o)) : 0.0F;
     }
   }
   return out;
 }
 
-// Writes the tiles of kernel.hpp with the points in `order`.
-void lay_out(const Trained& t, const std::vector<int>& order, int points, int outputs_padded,
-             float* out) {
+// Writes the tiles of kernel.hpp.
+void lay_out(const Trained& t, int points, int outputs_padded, float* out) {
   const auto dims = static_cast<int>(t.inputs.cols());
-  const auto real = static_cast<int>(order.size());
+  const auto real = static_cast<int>(t.inputs.rows());
   const double signal = std::exp(t.lambda);
   for (int first = 0; first < points; first += kTile) {
     const int width = std::min(kTile, points - first);
     for (int d = 0; d < dims; ++d) {
       for (int i = 0; i < width; ++i) {
         const bool is_point = first + i < real;
-        *out++ = is_point ? static_cast<float>(t.inputs(order[first + i], d)) : 0.0F;
+        *out++ = is_point ? static_cast<float>(t.inputs(first + i, d)) : 0.0F;
       }
     }
-    out = lay_out_weights(t.weights, signal, order, first, width, outputs_padded, out);
+    out = lay_out_weights(t.weights, signal, first, width, outputs_padded, out);
   }
 }
 
 // Writes the blocks of kernel.hpp.
-void lay_out_blocks(const Trained& t, std::span<const Function> more, const std::vector<int>& order,
-                    int points, int outputs_padded, float* out) {
+void lay_out_blocks(const Trained& t, std::span<const Function> more, int points,
+                    int outputs_padded, float* out) {
   const double signal = std::exp(t.lambda);
   for (int first = 0; first < points; first += kTile) {
     const int width = std::min(kTile, points - first);
-    out = lay_out_weights(t.weights, signal, order, first, width, outputs_padded, out);
+    out = lay_out_weights(t.weights, signal, first, width, outputs_padded, out);
     for (const Function& one : more) {
-      out = lay_out_weights(one.weights, signal, order, first, width, outputs_padded, out);
+      out = lay_out_weights(one.weights, signal, first, width, outputs_padded, out);
     }
   }
 }
@@ -125,10 +121,8 @@ struct Predictor::Parts {
   int outputs = 0;
   int points = 0;  // padded
   float exponent = 0.0F;
-  int gate_rows = 0;
   std::array<float, kMaxDims> constant{};
-  const float* triangle = nullptr;
-  hwy::AlignedFreeUniquePtr<float[]> data;  // the tiles, then the triangle, in reading order
+  hwy::AlignedFreeUniquePtr<float[]> data;  // the tiles
   // With several functions: the weights of each, and the constants. The tiles and `constant` hold
   // those of the mixture, as soon as all points have its weights.
   hwy::AlignedFreeUniquePtr<float[]> blocks;
@@ -138,9 +132,6 @@ struct Predictor::Parts {
 
   void mix_weights(int point) noexcept;
   void mixed_constant(std::span<const float> shares, std::span<float> out) const noexcept;
-  // k is written only where the confidence needs it. Returns false when no dimension is available.
-  bool sum(std::span<const float> q, std::span<const std::uint8_t> available,
-           std::span<const float> shares, int keep, float* k, std::span<float> out) const noexcept;
 };
 
 Predictor::Predictor(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -148,39 +139,26 @@ Predictor::Predictor(Predictor&&) noexcept = default;
 Predictor& Predictor::operator=(Predictor&&) noexcept = default;
 Predictor::~Predictor() = default;
 
-Result<Predictor> Predictor::build(const Trained& trained, bool gate,
-                                   std::span<const Function> more) {
+Result<Predictor> Predictor::build(const Trained& trained, std::span<const Function> more) {
   if (auto valid = validate(trained); !valid) return std::unexpected(valid.error());
   if (auto valid = validate_more(trained, more); !valid) return std::unexpected(valid.error());
   auto parts = std::make_unique<Parts>();
   parts->dims = static_cast<int>(trained.inputs.cols());
   parts->outputs = static_cast<int>(trained.weights.cols());
-  const auto points = static_cast<int>(trained.inputs.rows());
-  parts->points = padded(points);
+  parts->points = padded(static_cast<int>(trained.inputs.rows()));
   parts->exponent = static_cast<float>(-0.5 * trained.mu * std::numbers::log2e);
-  std::vector<int> order(static_cast<std::size_t>(points));
-  std::iota(order.begin(), order.end(), 0);
-  std::vector<float> triangle;
-  if (gate) {
-    Confidence confidence = confidence_of(trained, kMaxGate);
-    order = std::move(confidence.order);
-    triangle = std::move(confidence.triangle);
-    parts->gate_rows = confidence.rows;
-  }
   const int outputs_padded = padded(parts->outputs);
   const auto tile_floats = static_cast<std::size_t>(parts->points) *
                            static_cast<std::size_t>(parts->dims + outputs_padded);
-  parts->data = hwy::AllocateAligned<float>(tile_floats + triangle.size());
-  lay_out(trained, order, parts->points, outputs_padded, parts->data.get());
-  std::ranges::copy(triangle, parts->data.get() + tile_floats);
-  parts->triangle = parts->data.get() + tile_floats;
+  parts->data = hwy::AllocateAligned<float>(tile_floats);
+  lay_out(trained, parts->points, outputs_padded, parts->data.get());
   parts->constant = constant_of(trained.weights, trained.offset, trained.b);
   if (!more.empty()) {
     const auto block_floats = static_cast<std::size_t>(parts->points) *
                               static_cast<std::size_t>(outputs_padded) * (1 + more.size());
     parts->blocks = hwy::AllocateAligned<float>(block_floats);
     parts->mixed_points = parts->points;
-    lay_out_blocks(trained, more, order, parts->points, outputs_padded, parts->blocks.get());
+    lay_out_blocks(trained, more, parts->points, outputs_padded, parts->blocks.get());
     parts->constants.push_back(parts->constant);
     for (const Function& one : more) {
       parts->constants.push_back(constant_of(one.weights, one.offset, trained.b));
@@ -196,7 +174,6 @@ int Predictor::outputs() const noexcept { return parts_->outputs; }
 int Predictor::functions() const noexcept {
   return std::max(1, static_cast<int>(parts_->constants.size()));
 }
-bool Predictor::has_confidence() const noexcept { return parts_->gate_rows > 0; }
 std::span<const float> Predictor::constant() const noexcept {
   return {parts_->constant.data(), static_cast<std::size_t>(parts_->outputs)};
 }
@@ -204,9 +181,12 @@ std::span<const float> Predictor::constant() const noexcept {
 // RT-safe.
 void Predictor::Parts::mixed_constant(std::span<const float> shares,
                                       std::span<float> out) const noexcept {
+  const bool mixed = shares.empty() || constants.empty();  // `constant` is the mixture's
   for (int o = 0; o < outputs; ++o) {
-    out[o] = constants.empty() ? constant[o] : 0.0F;
-    for (std::size_t s = 0; s < constants.size(); ++s) out[o] += shares[s] * constants[s][o];
+    out[o] = mixed ? constant[o] : 0.0F;
+    for (std::size_t s = 0; !mixed && s < constants.size(); ++s) {
+      out[o] += shares[s] * constants[s][o];
+    }
   }
 }
 
@@ -250,60 +230,34 @@ bool Predictor::settle(std::span<const float> shares) noexcept {
 }
 
 // RT-safe.
-bool Predictor::Parts::sum(std::span<const float> q, std::span<const std::uint8_t> available,
-                           std::span<const float> shares, int keep, float* k,
-                           std::span<float> out) const noexcept {
+void Predictor::mean(std::span<const float> q, std::span<const std::uint8_t> available,
+                     std::span<float> out, std::span<const float> shares) const noexcept {
+  const Parts& p = *parts_;
   std::array<std::uint16_t, kMaxDims> present;
-  kernel::Query query{q.data(), nullptr, dims, exponent};
+  kernel::Query query{q.data(), nullptr, p.dims, p.exponent};
   if (!available.empty()) {
     int count = 0;
-    for (int d = 0; d < dims; ++d) {
+    for (int d = 0; d < p.dims; ++d) {
       present[count] = static_cast<std::uint16_t>(d);
       count += available[d] != 0 ? 1 : 0;
     }
-    if (count == 0) return false;
-    if (count < dims) {
+    if (count == 0) return p.mixed_constant(shares, out);
+    if (count < p.dims) {
       query.present = present.data();
       query.present_count = count;
-      query.exponent = exponent * static_cast<float>(dims) / static_cast<float>(count);
+      query.exponent = p.exponent * static_cast<float>(p.dims) / static_cast<float>(count);
     }
   }
   alignas(64) std::array<float, kMaxDims> raw;
-  const kernel::Tiles tiles{data.get(), points, dims, padded(outputs)};
-  if (shares.empty() || constants.empty()) {
-    kernel::weighted_sum(tiles, query, keep, k, raw.data());
-    for (int o = 0; o < outputs; ++o) out[o] = constant[o] + raw[o];
-    return true;
-  }
-  const auto functions = static_cast<int>(constants.size());
-  kernel::blended_sum(tiles, {blocks.get(), shares.data(), functions}, query, keep, k, raw.data());
-  mixed_constant(shares, out);
-  for (int o = 0; o < outputs; ++o) out[o] += raw[o];
-  return true;
-}
-
-// RT-safe.
-void Predictor::mean(std::span<const float> q, std::span<const std::uint8_t> available,
-                     std::span<float> out, std::span<const float> shares) const noexcept {
-  if (parts_->sum(q, available, shares, 0, nullptr, out)) return;
-  if (shares.empty()) {
-    std::ranges::copy(constant(), out.begin());
+  const kernel::Tiles tiles{p.data.get(), p.points, p.dims, padded(p.outputs)};
+  if (shares.empty() || p.constants.empty()) {
+    kernel::weighted_sum(tiles, query, raw.data());
   } else {
-    constant(shares, out);
+    const auto functions = static_cast<int>(p.constants.size());
+    kernel::blended_sum(tiles, {p.blocks.get(), shares.data(), functions}, query, raw.data());
   }
-}
-
-// RT-safe.
-float Predictor::mean_and_confidence(std::span<const float> q,
-                                     std::span<const std::uint8_t> available, std::span<float> out,
-                                     std::span<const float> shares) const noexcept {
-  alignas(64) std::array<float, kMaxGate> k;
-  if (!parts_->sum(q, available, shares, parts_->gate_rows, k.data(), out)) {
-    mean(q, available, out, shares);  // the constant
-    return 0.0F;
-  }
-  const float g = kernel::triangle_norm2(parts_->triangle, parts_->gate_rows, k.data());
-  return std::clamp(g, 0.0F, 1.0F);
+  p.mixed_constant(shares, out);
+  for (int o = 0; o < p.outputs; ++o) out[o] += raw[o];
 }
 
 }  // namespace posed::gp

@@ -26,19 +26,17 @@ inline constexpr std::size_t kMaxFunctions = 16;  // of one predictor
 
 class Predictor {
  public:
-  // Checks shapes and values; precomputes tiles and, with `gate`, the confidence's matrices. Cold.
+  // Checks shapes and values; precomputes the tiles. Cold.
   // `more`: further functions, in the shapes of `trained`, at most kMaxFunctions in all. At first
   // the mixture is the function of `trained` alone.
-  [[nodiscard]] static Result<Predictor> build(const Trained& trained, bool gate,
+  [[nodiscard]] static Result<Predictor> build(const Trained& trained,
                                                std::span<const Function> more = {});
   Predictor(Predictor&&) noexcept;
   Predictor& operator=(Predictor&&) noexcept;
   ~Predictor();
 
-  [[nodiscard]] int inputs() const noexcept;           // D
-  [[nodiscard]] int outputs() const noexcept;          // D_out
-  [[nodiscard]] bool has_confidence() const noexcept;  // built with `gate`
-
+  [[nodiscard]] int inputs() const noexcept;     // D
+  [[nodiscard]] int outputs() const noexcept;    // D_out
   [[nodiscard]] int functions() const noexcept;  // 1 without `more`
 
   // The limit of f far from all training poses: offset + b sum w [D_out]. RT-safe.
@@ -57,13 +55,6 @@ class Predictor {
   // mixture) or [functions]. RT-safe.
   void mean(std::span<const float> q, std::span<const std::uint8_t> available, std::span<float> out,
             std::span<const float> shares = {}) const noexcept;
-
-  // The same, and returns the confidence g = 1 - v_E(q) / e^lambda in 0..1 (README.md,
-  // "Confidence"). RT-safe. Needs build(..., gate = true).
-  [[nodiscard]] float mean_and_confidence(std::span<const float> q,
-                                          std::span<const std::uint8_t> available,
-                                          std::span<float> out,
-                                          std::span<const float> shares = {}) const noexcept;
 
  private:
   struct Parts;

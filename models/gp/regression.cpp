@@ -115,15 +115,10 @@ Posterior posterior(const Trained& process, const Eigen::MatrixXd& queries) {
   const Eigen::MatrixXd E = rbf(process.inputs, queries, process.lambda, process.mu);
   const Eigen::MatrixXd k = E.array() + process.b;
   const Eigen::MatrixXd E_xx = rbf(process.inputs, process.inputs, process.lambda, process.mu);
-  const auto variance = [&](const Eigen::MatrixXd& cross, double b) -> Eigen::VectorXd {
-    const Eigen::MatrixXd v = factorise(E_xx, b, process.noise).matrixL().solve(cross);
-    return std::exp(process.lambda) + b - v.colwise().squaredNorm().transpose().array();
-  };
-  Posterior result;
-  result.mean = posterior_mean(process, queries);
-  result.variance = variance(k, process.b);
-  result.variance_rbf = variance(E, 0.0);
-  return result;
+  const Eigen::MatrixXd v = factorise(E_xx, process.b, process.noise).matrixL().solve(k);
+  const double prior = std::exp(process.lambda) + process.b;
+  return {.mean = posterior_mean(process, queries),
+          .variance = prior - v.colwise().squaredNorm().transpose().array()};
 }
 
 }  // namespace posed::gp

@@ -55,9 +55,8 @@ struct Evidence {
                                   const Eigen::VectorXd& offset, const Hyper& hyper);
 
 struct Posterior {
-  Eigen::MatrixXd mean;          // [Q x D_out], offset included
-  Eigen::VectorXd variance;      // of f [Q], without noise: e^lambda + b - k'C^-1 k
-  Eigen::VectorXd variance_rbf;  // the same for the RBF part alone: e^lambda - E'(E_xx + s2 I)^-1 E
+  Eigen::MatrixXd mean;      // [Q x D_out], offset included
+  Eigen::VectorXd variance;  // of f [Q], without noise: e^lambda + b - k'C^-1 k
 };
 
 // The mean alone at the rows of `queries` [Q x D], offset included: [Q x D_out]. Without the

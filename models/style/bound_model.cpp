@@ -15,13 +15,11 @@ Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
   const auto fits = [dims](const Eigen::VectorXd& v) {
     return v.size() == 0 || (v.size() == dims && v.allFinite());
   };
-  const bool spread =
-      (model.limit_rad.array() >= 0.0).all() && (model.input_sd.array() >= 0.0).all();
-  if (process_fits && spread && fits(model.limit_rad) && fits(model.input_mean) &&
-      fits(model.input_sd) && fits(model.gate.neutral) && fits(model.axis.direction)) {
+  const bool limits_fit = fits(model.limit_rad) && (model.limit_rad.array() >= 0.0).all();
+  if (process_fits && limits_fit && fits(model.gate.neutral) && fits(model.axis.direction)) {
     return {};
   }
-  return fail("the model's process, limits, input range, neutral pose and axis do not fit the " +
+  return fail("the model's process, limits, neutral pose and axis do not fit the " +
                   std::to_string(dims) + " dimensions of its pose space: train it again",
               name);
 }
@@ -59,7 +57,7 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
   std::vector<gp::Function> more;
   more.reserve(model.more.size());
   for (const MoreStyle& style : model.more) more.push_back(style.function);
-  auto predictor = gp::Predictor::build(model.process, false, more);
+  auto predictor = gp::Predictor::build(model.process, more);
   if (!predictor) {
     Error error = predictor.error();
     error.file = name;

@@ -14,7 +14,7 @@ namespace {
 Eigen::MatrixXd kept_poses(const gp::Trained& process, int limit) {
   if (process.inputs.rows() <= limit) return process.inputs;
   const auto kept = gp::choose_inducing(process.inputs, process.mu, limit,
-                                        [](int /*chosen*/, double /*worst*/) { return false; });
+                                        [](double /*worst*/) { return false; });
   return process.inputs(kept.chosen(), Eigen::all);
 }
 

@@ -32,8 +32,8 @@ constexpr std::size_t kNumbers = 4;  // that a task gives for a fold and a noise
 class Folded {
  public:
   Folded(const MatrixXd& X, double length_rad) : mu_(1.0 / (length_rad * length_rad)) {
-    gp::Inducing chosen = gp::choose_inducing(X, mu_, kFoldPoses,
-                                              [](int, double worst) { return worst < kExplained; });
+    gp::Inducing chosen =
+        gp::choose_inducing(X, mu_, kFoldPoses, [](double worst) { return worst < kExplained; });
     poses_ = X(chosen.chosen(), Eigen::all);
     root_ = chosen.root();
     factor_ = std::move(chosen.factor);

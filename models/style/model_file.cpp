@@ -119,12 +119,7 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   const int dims = motion::space_dims(model.space);
   model.process = read_process(from.process(), dims, reader);
   model.limit_rad = reader.vector(from.limit_rad(), dims, "the limits");
-  model.input_mean = reader.vector(from.input_mean(), dims, "the inputs' mean");
-  model.input_sd = reader.vector(from.input_sd(), dims, "the inputs' deviation");
-  if (reader.sound()) {
-    reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
-    reader.want((model.input_sd.array() >= 0.0).all(), "a deviation below zero");
-  }
+  if (reader.sound()) reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
   model.to = from.to();
   for (const v1::StyleTarget& style : from.more()) {
     if (!reader.sound()) break;
@@ -192,8 +187,6 @@ std::string serialize_model(const StyleModel& model) {
   process.set_b(model.process.b);
   process.set_noise(model.process.noise);
   write_vector(model.limit_rad, *style.mutable_limit_rad());
-  write_vector(model.input_mean, *style.mutable_input_mean());
-  write_vector(model.input_sd, *style.mutable_input_sd());
   style.set_rate_hz(model.rate_hz);
   style.set_from(model.from);
   style.set_to(model.to);

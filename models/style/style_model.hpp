@@ -51,11 +51,9 @@ struct StyleModel {
   motion::PoseSpaceSpec space;
   gp::Trained process;        // q -> difference of q at alpha = 1
   Eigen::VectorXd limit_rad;  // clamp of |difference| per dimension (1.5 x the largest in training)
-  Eigen::VectorXd input_mean;  // of q over the training data
-  Eigen::VectorXd input_sd;    // its standard deviation
-  double rate_hz = 30.0;       // of training; the filter has no memory and is correct at any rate
-  std::string from, to;        // group names, for people
-  std::string report_json;     // what `train --json` printed
+  double rate_hz = 30.0;      // of training; the filter has no memory and is correct at any rate
+  std::string from, to;       // group names, for people
+  std::string report_json;    // what `train --json` printed
   GateData gate{};
   StyleAxis axis{};
   std::vector<MoreStyle> more{};  // `process`, `limit_rad` and `to` are the first style's

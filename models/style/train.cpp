@@ -86,21 +86,6 @@ Result<> check_groups(const std::vector<TrainingClip>& all, const std::vector<st
   return {};
 }
 
-void set_input_statistics(const Dataset& dataset, const std::vector<std::string>& targets,
-                          StyleModel& model) {
-  VectorXd sum = VectorXd::Zero(dataset.dims());
-  VectorXd squares = sum;
-  double frames = 0.0;
-  for (const AlignedClip& clip : dataset.clips) {
-    if (is_in(targets, clip.group)) continue;
-    sum += clip.q.colwise().sum().transpose();
-    squares += clip.q.colwise().squaredNorm().transpose();
-    frames += static_cast<double>(clip.q.rows());
-  }
-  model.input_mean = sum / frames;
-  model.input_sd = (squares / frames - model.input_mean.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
-}
-
 std::string joined_sources(const Dataset& dataset, const std::vector<std::string>& targets) {
   std::vector<std::string> names;
   for (const Subject& s : dataset.subjects) {
@@ -122,7 +107,6 @@ StyleModel model_of(Dataset dataset, const std::vector<std::string>& targets,
   model.from = joined_sources(dataset, targets);
   model.rate_hz = dataset.rate_hz;
   model.limit_rad = limit_of(learnt.front());
-  set_input_statistics(dataset, targets, model);
   model.space = std::move(dataset.spec);
   for (std::size_t i = 1; i < learnt.size(); ++i) {
     gp::Trained& process = learnt[i].process;

@@ -118,6 +118,10 @@ Result<Parameters> complete_parameters(std::span<const ParameterSpec> table,
   return complete;
 }
 
+bool has_number(const ParameterSpec& spec) noexcept {
+  return !std::holds_alternative<std::string>(spec.default_value) || !spec.words.empty();
+}
+
 double number_of(const ParameterSpec& spec, const ParameterValue& value) {
   if (const auto* flag = std::get_if<bool>(&value)) return *flag ? 1.0 : 0.0;
   if (const auto* whole = std::get_if<std::int64_t>(&value)) return static_cast<double>(*whole);

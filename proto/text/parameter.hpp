@@ -63,6 +63,8 @@ template <typename T>
   return std::get<T>(parameters.at(name));
 }
 
+// Whether a number stands for the values of this parameter, as for all but texts without words.
+[[nodiscard]] bool has_number(const ParameterSpec& spec) noexcept;
 // A flag as 0 or 1, a number as it is, a word as its place among the parameter's words. Not for
 // other text.
 [[nodiscard]] double number_of(const ParameterSpec& spec, const ParameterValue& value);

@@ -176,8 +176,7 @@ void TableReader::read(const ParameterSpec& spec, ParameterValue& value) {
   const std::string key(spec.shown_name());
   const toml::node* node = find(key);
   if (node == nullptr) return;
-  const bool is_live_text =
-      spec.live && spec.words.empty() && std::holds_alternative<std::string>(spec.default_value);
+  const bool is_live_text = spec.live && !has_number(spec);
   if (const auto text = is_live_text ? named_numbers(*node) : std::nullopt) {
     value = *text;
     return;

@@ -54,9 +54,7 @@ Result<> write_synthetic_model(motion::Space kind, const Skeleton& skeleton, int
   const int dims = space->dims();
   model.process = gp::synthetic(points, dims).process;
   model.limit_rad = Eigen::VectorXd::Constant(dims, 0.5);
-  model.input_mean = Eigen::VectorXd::Zero(dims);
-  model.input_sd = Eigen::VectorXd::Ones(dims);
-  model.gate = {.neutral = model.input_mean, .swing_rad = 0.1, .fastest_stride_s = 1.0};
+  model.gate = {.neutral = Eigen::VectorXd::Zero(dims), .swing_rad = 0.1, .fastest_stride_s = 1.0};
   model.from = "walker";
   model.to = "other";
   return style::save_model(model, path);

@@ -20,9 +20,7 @@
 #include "daemon/cli/bench/stream_sum.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
-#include "models/gp/confidence.hpp"
 #include "models/gp/isa.hpp"
-#include "models/gp/kernel.hpp"
 #include "models/gp/predictor.hpp"
 #include "models/gp/regression.hpp"
 #include "models/gp/synthetic.hpp"
@@ -40,10 +38,9 @@ constexpr const char* kBenchPredictFooter =
     R"(Synthetic walkers; queries from one who is not in the training set.
 hot: everything in L2 before the clock starts. cold: L2 emptied before each call, as between two
 frames of a 120 Hz stream. The reference sums as many floats as the process logically reads
-(N x 2D; gate rows are also compared with the confidence's triangle added), with eight vector
-accumulators. four_at_rest, four_moving and four_settling are four styles in one model, with
-weights that rest, that move at every call and that have just come to rest. Variants take turns, so
-that they run under the same conditions.
+(N x 2D), with eight vector accumulators. four_at_rest, four_moving and four_settling are four
+styles in one model, with weights that rest, that move at every call and that have just come to
+rest. Variants take turns, so that they run under the same conditions.
 
   posed bench predict
   posed bench predict --samples 500 --json)";
@@ -110,7 +107,7 @@ constexpr int kStyles = 4;  // of the mixture
 // A Gaussian process, the ways to call it, and the queries as the hot path has them.
 struct Subject {
   gp::SyntheticProcess made;
-  gp::Predictor plain, gated;
+  gp::Predictor plain;
   mutable gp::Predictor resting, moving;  // kStyles functions on the same poses
   Eigen::MatrixXf queries;                // [dims x queries]
   mutable std::vector<float> out;
@@ -143,57 +140,46 @@ struct Subject {
     const float first = 0.25F + 0.2F * static_cast<float>(i % 97) / 97.0F;
     return {first, 0.5F - first, 0.3F, 0.2F};
   }
-  float gate(int i) const { return gated.mean_and_confidence(query(i), {}, out); }
 };
 
 Subject subject(int poses, int dims) {
   gp::SyntheticProcess made = gp::synthetic(poses, dims);
-  auto plain = gp::Predictor::build(made.process, false).value();
-  auto gated = gp::Predictor::build(made.process, true).value();
+  auto plain = gp::Predictor::build(made.process).value();
   std::vector<gp::Function> more;
   for (int s = 1; s < kStyles; ++s) {
     more.push_back({made.process.weights / s, made.process.offset / s});
   }
-  auto resting = gp::Predictor::build(made.process, false, more).value();
-  auto moving = gp::Predictor::build(made.process, false, more).value();
+  auto resting = gp::Predictor::build(made.process, more).value();
+  auto moving = gp::Predictor::build(made.process, more).value();
   for (int i = 0; i < gp::Predictor::kSettleCalls; ++i) {
     static_cast<void>(resting.settle(Subject::shares(0)));
   }
   Eigen::MatrixXf queries = made.queries.transpose().cast<float>();
-  return {std::move(made),
-          std::move(plain),
-          std::move(gated),
-          std::move(resting),
-          std::move(moving),
-          std::move(queries),
-          std::vector<float>(static_cast<std::size_t>(dims))};
+  return {std::move(made),    std::move(plain),
+          std::move(resting), std::move(moving),
+          std::move(queries), std::vector<float>(static_cast<std::size_t>(dims))};
 }
 
 // The largest errors against a reference in double precision, and whether all instruction sets give
 // the same bits.
 json accuracy(const Subject& subject) {
   const auto& made = subject.made;
-  const gp::Posterior exact = gp::posterior(made.process, made.queries);
+  const Eigen::MatrixXd exact = gp::posterior_mean(made.process, made.queries);
   const std::string isa_before(gp::isa_name());
   std::vector<std::vector<float>> all;
   json report;
   for (const auto* isa : {"avx2", "avx512"}) {
     if (!gp::set_isa(isa)) continue;
     double mean_rad = 0.0;
-    double gate = 0.0;
     auto& bits = all.emplace_back();
     for (int i = 0; i < made.queries.rows(); ++i) {
-      const float g = subject.gate(i);
-      const double g_exact = 1.0 - exact.variance_rbf[i] / std::exp(made.process.lambda);
-      gate = std::max(gate, std::abs(static_cast<double>(g) - g_exact));
-      for (int o = 0; o < subject.gated.outputs(); ++o) {
-        mean_rad = std::max(mean_rad, std::abs(subject.out[o] - exact.mean(i, o)));
+      static_cast<void>(subject.mean(i));
+      for (int o = 0; o < subject.plain.outputs(); ++o) {
+        mean_rad = std::max(mean_rad, std::abs(subject.out[o] - exact(i, o)));
       }
       bits.insert(bits.end(), subject.out.begin(), subject.out.end());
-      bits.push_back(g);
     }
     report["max_mean_error_deg"] = mean_rad * kDegrees;
-    report["max_gate_error"] = gate;
   }
   report["avx2_avx512_same_bits"] = all.size() == 2 ? json(all[0] == all[1]) : json(nullptr);
   if (const auto back = gp::set_isa(isa_before); !back) report["error"] = back.error().message;
@@ -202,30 +188,21 @@ json accuracy(const Subject& subject) {
 
 json run_case(int poses, int dims, int samples, const Evictor& evictor) {
   const Subject s = subject(poses, dims);
-  const int rows = gp::confidence_of(s.made.process, gp::kernel::kMaxGate).rows;
   const int read = to_yardstick(poses * 2 * dims);
-  const int read_gate = to_yardstick(poses * 2 * dims + rows * (rows + 1) / 2);
-  const Floats data = ones(read_gate);
-  std::vector<Variant> variants{
-      {"sum", [&](int) { return stream_sum(data.get(), read); }},
-      {"sum_with_triangle", [&](int) { return stream_sum(data.get(), read_gate); }},
-      {"mean", [&](int i) { return s.mean(i); }},
-      {"mean_and_gate", [&](int i) { return s.gate(i); }},
-      {"four_at_rest", [&](int i) { return s.rest(i); }},
-      {"four_moving", [&](int i) { return s.move(i); }},
-      {"four_settling", [&](int i) { return s.settle(i); }}};
+  const Floats data = ones(read);
+  std::vector<Variant> variants{{"sum", [&](int) { return stream_sum(data.get(), read); }},
+                                {"mean", [&](int i) { return s.mean(i); }},
+                                {"four_at_rest", [&](int i) { return s.rest(i); }},
+                                {"four_moving", [&](int i) { return s.move(i); }},
+                                {"four_settling", [&](int i) { return s.settle(i); }}};
   measure(variants, samples, evictor);
-  json report{{"poses", poses}, {"dims", dims}, {"gate_rows", rows}, {"accuracy", accuracy(s)}};
+  json report{{"poses", poses}, {"dims", dims}, {"accuracy", accuracy(s)}};
   for (const Variant& variant : variants) {
     json& entry = report[variant.name];
     entry = {{"hot", percentiles(variant.hot_us)}, {"cold", percentiles(variant.cold_us)}};
     for (const auto* heat : {"hot", "cold"}) {
       const double p50 = entry[heat]["p50_us"];
       entry[heat]["ratio"] = p50 / report["sum"][heat]["p50_us"].get<double>();
-      entry[heat]["ratio_with_triangle"] =
-          report.contains("sum_with_triangle")
-              ? json(p50 / report["sum_with_triangle"][heat]["p50_us"].get<double>())
-              : json(nullptr);
     }
   }
   for (const auto* mixture : {"four_at_rest", "four_moving", "four_settling"}) {
@@ -239,20 +216,16 @@ json run_case(int poses, int dims, int samples, const Evictor& evictor) {
 }
 
 void print_case(const json& report) {
-  std::printf("\nN = %d, D = %d (confidence from %d rows)\n", report["poses"].get<int>(),
-              report["dims"].get<int>(), report["gate_rows"].get<int>());
-  std::printf("  %-18s %-5s %8s %8s %8s %8s %7s %10s\n", "", "", "p50 us", "p99", "p99.9", "max",
-              "x sum", "x sum+tri");
-  for (const auto* name : {"sum", "sum_with_triangle", "mean", "mean_and_gate", "four_at_rest",
-                           "four_moving", "four_settling"}) {
+  std::printf("\nN = %d, D = %d\n", report["poses"].get<int>(), report["dims"].get<int>());
+  std::printf("  %-13s %-5s %8s %8s %8s %8s %7s\n", "", "", "p50 us", "p99", "p99.9", "max",
+              "x sum");
+  for (const auto* name : {"sum", "mean", "four_at_rest", "four_moving", "four_settling"}) {
     for (const auto* heat : {"hot", "cold"}) {
       const json& row = report[name][heat];
-      std::printf("  %-18s %-5s %8.2f %8.2f %8.2f %8.2f %7.2f", name, heat,
+      std::printf("  %-13s %-5s %8.2f %8.2f %8.2f %8.2f %7.2f", name, heat,
                   row["p50_us"].get<double>(), row["p99_us"].get<double>(),
                   row["p99_9_us"].get<double>(), row["max_us"].get<double>(),
                   row["ratio"].get<double>());
-      const json& with = row["ratio_with_triangle"];
-      if (with.is_number()) std::printf(" %10.2f", with.get<double>());
       if (row.contains("times_one_style")) {
         std::printf("   %.2f times mean", row["times_one_style"].get<double>());
       }
@@ -260,9 +233,8 @@ void print_case(const json& report) {
     }
   }
   const json& accuracy = report["accuracy"];
-  std::printf("  mean within %.1e degree of double, confidence within %.4f of the exact one\n",
-              accuracy["max_mean_error_deg"].get<double>(),
-              accuracy["max_gate_error"].get<double>());
+  std::printf("  mean within %.1e degree of double\n",
+              accuracy["max_mean_error_deg"].get<double>());
   const json& same = accuracy["avx2_avx512_same_bits"];
   std::printf("  AVX2 and AVX-512 bits: %s\n",
               same.is_null() ? "not compared, this CPU lacks one" : (same ? "the same" : "DIFFER"));

@@ -7,7 +7,9 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <variant>
 
 #include <unistd.h>
 
@@ -24,13 +26,14 @@
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
-#include "models/live_text.hpp"
 #include "models/stages/registry.hpp"
+#include "models/style/style_type.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/nearest_word.hpp"
+#include "proto/text/parameter.hpp"
 
 namespace posed::cli {
 namespace {
@@ -44,7 +47,7 @@ struct CtlOptions {
   std::vector<float> force, vibration;
   std::string labels;
   double tempo = 1.0;
-  double seconds = 10.0;  // of a warm-up
+  double seconds = 0.0;  // of a warm-up
   bool loop = false;
   std::string take;  // name
 };
@@ -195,11 +198,20 @@ int play(const CtlOptions& options) {
   return change(options, request, "performs " + options.labels + " (after those that wait)");
 }
 
+constexpr std::string_view kWarmUp = "warm-up";  // of the style stage
+
+// The stage says how long a warm-up may take and usually takes.
+const ParameterSpec& warm_up_seconds() {
+  const auto& commands = style::style_type().commands;
+  const auto found = std::ranges::find(commands, kWarmUp, &StageCommandType::name);
+  return *find_parameter(found->options, "seconds");
+}
+
 int warm_up(const CtlOptions& options) {
   v1::ControlRequest request;
   auto& wanted = *request.mutable_stage_command();
   wanted.set_stream(options.stream);
-  wanted.set_name("style.warm-up");
+  wanted.set_name(fmt::format("{}.{}", style::style_type().name, kWarmUp));
   (*wanted.mutable_number())["seconds"] = options.seconds;
   return change(options, request, fmt::format("walk as usual for {:g} s", options.seconds));
 }
@@ -358,7 +370,10 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
       actions.add_for_stream("warm-up", "Measure how a new walker usually walks", warm_up,
                              R"(Example:
   posed ctl warm-up walker --seconds 10   # it walks as usual meanwhile; an event tells the end)");
-  warm->add_option("--seconds", options.seconds, "How long it walks, 2 to 600")
+  const ParameterSpec& seconds = warm_up_seconds();
+  options.seconds = std::get<double>(seconds.default_value);
+  warm->add_option("--seconds", options.seconds,
+                   fmt::format("How long it walks, {:g} to {:g}", seconds.min, seconds.max))
       ->capture_default_str();
   CLI::App* model = actions.add_for_stream("model", "Give a stream another style or gesture model",
                                            send_model, R"(Examples:

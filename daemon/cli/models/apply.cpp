@@ -112,13 +112,53 @@ nlohmann::json or_null(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json();
 }
 
+// What was done, without the verdict.
+nlohmann::json report_of(const ApplyArguments& options, const style::StyleModel& model,
+                         const style::Shares& shares, const clip::Clip& clip,
+                         const style::Applied& applied) {
+  return {{"out", options.out.string()},
+          {"frames", clip.frames()},
+          {"rate_hz", clip.frame_rate_hz},
+          {"from", model.from},
+          {"to", model.to},
+          {"weights", shares_json(model, shares)},
+          {"mask", options.mask},
+          {"alpha", options.apply.filter.alpha},
+          {"auto_alpha", options.apply.filter.auto_alpha},
+          {"style_estimate", or_null(applied.estimate_mean)},
+          {"cold", options.apply.cold},
+          {"root", root_text(options.apply.feet)},
+          {"max_root_offset_cm", applied.max_root_offset_m * 100.0},
+          {"gate_mean", or_null(applied.gate_mean)},
+          {"joints_changed", applied.joints_changed},
+          {"rms_change_deg", applied.rms_change_rad * kDegrees},
+          {"max_change_deg", applied.max_change_rad * kDegrees}};
+}
+
+// Measures how the walker of --neutral usually walks. A script that says --calibrate goes on
+// without, because that was good for any clip and model.
+Result<> take_walker(const style::StyleModel& model, bool calibrates, ApplyArguments& options) {
+  if (options.neutral.empty()) return {};
+  const auto neutral = clip::read_clip(options.neutral, options.read);
+  if (!neutral) return std::unexpected(neutral.error());
+  const auto walker = style::measure_walker(model, options.model.string(), *neutral);
+  if (!walker && !calibrates) return std::unexpected(walker.error());
+  if (walker) {
+    options.apply.walker = *walker;
+  } else {
+    std::fprintf(stderr, "posed: %s; --calibrate does nothing\n", walker.error().text().c_str());
+  }
+  return {};
+}
+
 Result<> run(ApplyArguments options) {
   if (auto ok = take_gate(options); !ok) return ok;
   if (auto ok = take_alpha(options); !ok) return ok;
-  if (options.apply.filter.calibrate) {
+  bool calibrates = std::exchange(options.apply.filter.calibrate, false);
+  if (calibrates) {
     std::fprintf(stderr, "posed: --calibrate is the older name of --neutral IN\n");
-    if (options.neutral.empty()) options.neutral = options.in;
-    options.apply.filter.calibrate = false;
+    calibrates = options.neutral.empty();
+    if (calibrates) options.neutral = options.in;
   }
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
@@ -139,13 +179,7 @@ Result<> run(ApplyArguments options) {
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
   }
-  if (!options.neutral.empty()) {
-    const auto neutral = clip::read_clip(options.neutral, options.read);
-    if (!neutral) return std::unexpected(neutral.error());
-    const auto walker = style::measure_walker(*model, options.model.string(), *neutral);
-    if (!walker) return std::unexpected(walker.error());
-    options.apply.walker = *walker;
-  }
+  if (auto ok = take_walker(*model, calibrates, options); !ok) return ok;
   if (options.apply.filter.gate && !model->gate.present()) {
     std::fprintf(stderr,
                  "posed: %s: has no data for the gate, so any motion is styled; train it "
@@ -167,26 +201,10 @@ Result<> run(ApplyArguments options) {
   const double max_deg = applied->max_change_rad * kDegrees;
   const std::string sentence = verdict(*fit, rms_deg, training_difference_deg(*model));
   if (options.json) {
-    const nlohmann::json report{{"out", options.out.string()},
-                                {"frames", clip->frames()},
-                                {"rate_hz", clip->frame_rate_hz},
-                                {"from", model->from},
-                                {"to", model->to},
-                                {"weights", shares_json(*model, *shares)},
-                                {"mask", options.mask},
-                                {"alpha", options.apply.filter.alpha},
-                                {"auto_alpha", options.apply.filter.auto_alpha},
-                                {"style_estimate", or_null(applied->estimate_mean)},
-                                {"cold", options.apply.cold},
-                                {"root", root_text(options.apply.feet)},
-                                {"max_root_offset_cm", applied->max_root_offset_m * 100.0},
-                                {"gate_mean", or_null(applied->gate_mean)},
-                                {"joints_changed", applied->joints_changed},
-                                {"rms_change_deg", rms_deg},
-                                {"max_change_deg", max_deg},
-                                {"distance_deg", fit->distance_deg},
-                                {"far_from_training", fit->is_far()},
-                                {"verdict", sentence}};
+    nlohmann::json report = report_of(options, *model, *shares, *clip, *applied);
+    report["distance_deg"] = fit->distance_deg;
+    report["far_from_training"] = fit->is_far();
+    report["verdict"] = sentence;
     std::printf("%s\n", json_text(report, 2).c_str());
   } else {
     std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f deg at most\n",

@@ -35,7 +35,7 @@ TEST_CASE("inducing poses predict within 0.1 degrees of all poses", "[gp][induci
 TEST_CASE("as many inducing poses as there are poses give back their kernel", "[gp][inducing]") {
   const Eigen::MatrixXd X = gp::synthetic(40, 12).process.inputs;
   const double mu = 4.0;
-  const auto chosen = gp::choose_inducing(X, mu, 40, [](int, double) { return false; });
+  const auto chosen = gp::choose_inducing(X, mu, 40, [](double) { return false; });
   const Eigen::MatrixXd kernel = gp::rbf(X, X, 0.0, mu);
   CHECK((chosen.factor * chosen.factor.transpose() - kernel).cwiseAbs().maxCoeff() < 1e-5);
   const Eigen::MatrixXd root = chosen.root();

@@ -69,7 +69,7 @@ TEST_CASE("a mixture is the sum of its functions, on its way and at rest", "[gp]
   std::mt19937 random(3);
   for (const auto& [poses, dims] : {std::pair{200, 63}, {56, 43}, {65, 17}, {1, 3}, {130, 288}}) {
     const Case made = make_case(poses, dims);
-    auto predictor = gp::Predictor::build(made.first, true, made.more).value();
+    auto predictor = gp::Predictor::build(made.first, made.more).value();
     CHECK(predictor.functions() == kFunctions);
     for (int round = 0; round < 8; ++round) {
       std::array<float, kFunctions> shares{};
@@ -82,7 +82,7 @@ TEST_CASE("a mixture is the sum of its functions, on its way and at rest", "[gp]
         sum.weights += shares[f] * made.more[f - 1].weights;
         sum.offset += shares[f] * made.more[f - 1].offset;
       }
-      const auto wanted = answer(gp::Predictor::build(sum, false).value(), q);
+      const auto wanted = answer(gp::Predictor::build(sum).value(), q);
       CHECK(apart(answer(predictor, q, shares), wanted) < 2e-5);
       settle(predictor, shares);
       CHECK(apart(answer(predictor, q), wanted) < 2e-5);
@@ -96,26 +96,24 @@ TEST_CASE("a mixture is the sum of its functions, on its way and at rest", "[gp]
 
 TEST_CASE("one function alone gives the bits of its own predictor", "[gp][predictor]") {
   const Case made = make_case(200, 63);
-  for (const bool gate : {false, true}) {
-    auto predictor = gp::Predictor::build(made.first, gate, made.more).value();
-    for (std::size_t f = 0; f < kFunctions; ++f) {
-      gp::Trained own = made.first;
-      if (f > 0) own.weights = made.more[f - 1].weights;
-      if (f > 0) own.offset = made.more[f - 1].offset;
-      const auto alone = gp::Predictor::build(own, gate).value();
-      std::array<float, kFunctions> shares{};
-      shares[f] = 1.0F;
-      const std::vector<float> q = query(made, 7);
-      CHECK(answer(predictor, q, shares) == answer(alone, q));
-      settle(predictor, shares);
-      CHECK(answer(predictor, q) == answer(alone, q));
-    }
+  auto predictor = gp::Predictor::build(made.first, made.more).value();
+  for (std::size_t f = 0; f < kFunctions; ++f) {
+    gp::Trained own = made.first;
+    if (f > 0) own.weights = made.more[f - 1].weights;
+    if (f > 0) own.offset = made.more[f - 1].offset;
+    const auto alone = gp::Predictor::build(own).value();
+    std::array<float, kFunctions> shares{};
+    shares[f] = 1.0F;
+    const std::vector<float> q = query(made, 7);
+    CHECK(answer(predictor, q, shares) == answer(alone, q));
+    settle(predictor, shares);
+    CHECK(answer(predictor, q) == answer(alone, q));
   }
 }
 
 TEST_CASE("a mixture is put together in bounded steps, without allocation", "[gp][predictor]") {
   const Case made = make_case(200, 63);
-  auto predictor = gp::Predictor::build(made.first, false, made.more).value();
+  auto predictor = gp::Predictor::build(made.first, made.more).value();
   const std::array<float, kFunctions> shares{0.25F, 0.25F, 0.5F, 0.0F};
   const std::uint64_t before = test::allocations();
   int calls = 1;
@@ -129,13 +127,13 @@ TEST_CASE("a mixture is put together in bounded steps, without allocation", "[gp
 TEST_CASE("functions that do not fit the process are refused", "[gp][predictor]") {
   Case made = make_case(20, 5);
   made.more[1].weights.conservativeResize(19, 5);
-  CHECK_FALSE(gp::Predictor::build(made.first, false, made.more));
+  CHECK_FALSE(gp::Predictor::build(made.first, made.more));
   made = make_case(20, 5);
   made.more[2].offset.conservativeResize(4);
-  CHECK_FALSE(gp::Predictor::build(made.first, false, made.more));
+  CHECK_FALSE(gp::Predictor::build(made.first, made.more));
   made = make_case(20, 5);
   made.more.resize(gp::kMaxFunctions, made.more[0]);
-  CHECK_FALSE(gp::Predictor::build(made.first, false, made.more));
+  CHECK_FALSE(gp::Predictor::build(made.first, made.more));
 }
 
 TEST_CASE("functions learnt on shared poses are those learnt alone", "[gp]") {

@@ -9,7 +9,6 @@
 
 #include <catch2/catch.hpp>
 
-#include "models/gp/confidence.hpp"
 #include "models/gp/isa.hpp"
 #include "models/gp/kernel.hpp"
 #include "models/gp/regression.hpp"
@@ -31,30 +30,20 @@ std::vector<float> floats(const Eigen::MatrixXd& row) {
   return {f.begin(), f.end()};
 }
 
-struct Output {
-  Eigen::MatrixXf mean;
-  Eigen::VectorXf confidence;
-};
-
-Output predict(const gp::Predictor& predictor, const Eigen::MatrixXd& queries,
-               const std::vector<std::uint8_t>& available = {}) {
-  Output out{Eigen::MatrixXf(predictor.outputs(), queries.rows()), Eigen::VectorXf(queries.rows())};
+// Of each query (a row), one column.
+Eigen::MatrixXf predict(const gp::Predictor& predictor, const Eigen::MatrixXd& queries,
+                        const std::vector<std::uint8_t>& available = {}) {
+  Eigen::MatrixXf out(predictor.outputs(), queries.rows());
   for (Eigen::Index i = 0; i < queries.rows(); ++i) {
     const std::vector<float> q = floats(queries.row(i));
-    const std::span<float> column(out.mean.col(i).data(),
-                                  static_cast<std::size_t>(predictor.outputs()));
-    out.confidence[i] = predictor.mean_and_confidence(q, available, column);
+    predictor.mean(q, available,
+                   {out.col(i).data(), static_cast<std::size_t>(predictor.outputs())});
   }
   return out;
 }
 
-double worst_deg(const Output& out, const Eigen::MatrixXd& expected) {
-  return (out.mean.transpose().cast<double>() - expected).cwiseAbs().maxCoeff() * kDegrees;
-}
-
-// 1 - v / e^lambda of the exact process.
-Eigen::VectorXd exact_confidence(const gp::Trained& process, const Eigen::MatrixXd& queries) {
-  return 1.0 - gp::posterior(process, queries).variance_rbf.array() / std::exp(process.lambda);
+double worst_deg(const Eigen::MatrixXf& out, const Eigen::MatrixXd& expected) {
+  return (out.transpose().cast<double>() - expected).cwiseAbs().maxCoeff() * kDegrees;
 }
 
 }  // namespace
@@ -72,7 +61,7 @@ TEST_CASE("the float32 mean is within 1e-3 degree of the double one", "[gp][pred
                                     {65, 17}}) {
     const gp::SyntheticProcess made = gp::synthetic(poses, dims);
     const auto expected = gp::posterior(made.process, made.queries).mean;
-    const auto predictor = gp::Predictor::build(made.process, true);
+    const auto predictor = gp::Predictor::build(made.process);
     REQUIRE(predictor);
     for (const auto* isa : {"portable", "avx2", "avx512"}) {
       if (!gp::set_isa(isa)) {
@@ -95,57 +84,24 @@ TEST_CASE("AVX2 and AVX-512 give the same bits", "[gp][predictor]") {
   for (const auto& [poses, dims] :
        {std::pair{200, 43}, {1000, 43}, {1000, 63}, {250, 288}, {100, 7}, {40, 100}}) {
     const gp::SyntheticProcess made = gp::synthetic(poses, dims);
-    const auto predictor = gp::Predictor::build(made.process, true);
+    const auto predictor = gp::Predictor::build(made.process);
     REQUIRE(predictor);
     std::vector<std::uint8_t> available(static_cast<std::size_t>(dims), 1);
     available[2] = 0;
     for (const auto& flags : {std::vector<std::uint8_t>{}, available}) {
       REQUIRE(gp::set_isa("avx2"));
-      const Output a = predict(*predictor, made.queries, flags);
+      const Eigen::MatrixXf a = predict(*predictor, made.queries, flags);
       REQUIRE(gp::set_isa("avx512"));
-      const Output b = predict(*predictor, made.queries, flags);
+      const Eigen::MatrixXf b = predict(*predictor, made.queries, flags);
       INFO(poses << " poses, " << dims << " dims");
-      CHECK(std::memcmp(a.mean.data(), b.mean.data(), sizeof(float) * a.mean.size()) == 0);
-      CHECK(std::memcmp(a.confidence.data(), b.confidence.data(),
-                        sizeof(float) * a.confidence.size()) == 0);
+      CHECK(std::memcmp(a.data(), b.data(), sizeof(float) * a.size()) == 0);
     }
   }
 }
 
-TEST_CASE("the confidence is the exact one up to 256 poses and near it above", "[gp][predictor]") {
-  for (const auto& [poses, tolerance] :
-       {std::pair{200, 1e-4}, {256, 1e-4}, {257, 0.02}, {1000, 0.02}}) {
-    const gp::SyntheticProcess made = gp::synthetic(poses, 43);
-    const auto predictor = gp::Predictor::build(made.process, true);
-    REQUIRE(predictor);
-    Eigen::MatrixXd queries(made.queries.rows() + poses + 1, 43);
-    queries << made.queries, made.process.inputs, Eigen::RowVectorXd::Constant(43, 9.0);
-    const Eigen::VectorXd exact = exact_confidence(made.process, queries);
-    const Output out = predict(*predictor, queries);
-    INFO(poses << " poses");
-    CHECK((out.confidence.cast<double>() - exact).cwiseAbs().maxCoeff() < tolerance);
-    CHECK(out.confidence.tail(1)[0] == 0.0F);
-    CHECK(out.confidence.maxCoeff() <= 1.0F);
-  }
-}
-
-TEST_CASE("asking for the confidence does not change the mean's bits up to 256 poses",
-          "[gp][predictor]") {
-  const gp::SyntheticProcess made = gp::synthetic(200, 43);
-  const auto gated = gp::Predictor::build(made.process, true);
-  const auto plain = gp::Predictor::build(made.process, false);
-  REQUIRE((gated && plain));
-  const std::vector<float> q = floats(made.queries.row(7));
-  std::vector<float> a(43);
-  std::vector<float> b(43);
-  plain->mean(q, {}, a);
-  static_cast<void>(gated->mean_and_confidence(q, {}, b));
-  CHECK(a == b);
-}
-
 TEST_CASE("missing dimensions are left out of the distance", "[gp][predictor]") {
   const gp::SyntheticProcess made = gp::synthetic(300, 43);
-  const auto predictor = gp::Predictor::build(made.process, true);
+  const auto predictor = gp::Predictor::build(made.process);
   REQUIRE(predictor);
   std::vector<std::uint8_t> available(43, 1);
   Eigen::MatrixXd seen(300, 40);
@@ -168,21 +124,19 @@ TEST_CASE("missing dimensions are left out of the distance", "[gp][predictor]") 
   queries.col(20).setConstant(std::numeric_limits<double>::quiet_NaN());  // must not be read
   CHECK(worst_deg(predict(*predictor, queries, available), expected) < 1e-3);
 
-  const Output none = predict(*predictor, queries, std::vector<std::uint8_t>(43, 0));
-  CHECK(none.mean.col(0) == made.process.offset.cast<float>());
-  CHECK(none.confidence.maxCoeff() == 0.0F);
+  const Eigen::MatrixXf none = predict(*predictor, queries, std::vector<std::uint8_t>(43, 0));
+  CHECK(none.col(0) == made.process.offset.cast<float>());
 }
 
 TEST_CASE("far from all poses the result is the constant", "[gp][predictor]") {
   gp::SyntheticProcess made = gp::synthetic(100, 43);
   made.process.b = 0.02;
-  const auto predictor = gp::Predictor::build(made.process, true);
+  const auto predictor = gp::Predictor::build(made.process);
   REQUIRE(predictor);
   const Eigen::MatrixXd far = Eigen::MatrixXd::Constant(2, 43, 1e6);
   CHECK(worst_deg(predict(*predictor, far), gp::posterior(made.process, far).mean) < 1e-3);
-  const Output out = predict(*predictor, far);
-  CHECK(std::equal(predictor->constant().begin(), predictor->constant().end(),
-                   out.mean.col(1).data()));
+  const Eigen::MatrixXf out = predict(*predictor, far);
+  CHECK(std::equal(predictor->constant().begin(), predictor->constant().end(), out.col(1).data()));
 }
 
 TEST_CASE("the kernel's exponential is right to an ulp and reaches exactly zero",
@@ -213,7 +167,7 @@ TEST_CASE("the kernel's exponential is right to an ulp and reaches exactly zero"
 
 TEST_CASE("a prediction does not allocate", "[gp][predictor]") {
   const gp::SyntheticProcess made = gp::synthetic(300, 43);
-  const auto predictor = gp::Predictor::build(made.process, true).value();
+  const auto predictor = gp::Predictor::build(made.process).value();
   const std::vector<float> q = floats(made.queries.row(0));
   std::vector<std::uint8_t> available(43, 1);
   available[5] = 0;
@@ -221,7 +175,6 @@ TEST_CASE("a prediction does not allocate", "[gp][predictor]") {
   const std::uint64_t before = test::allocations();
   predictor.mean(q, {}, out);
   predictor.mean(q, available, out);
-  static_cast<void>(predictor.mean_and_confidence(q, {}, out));
   CHECK(test::allocations() == before);
 }
 
@@ -230,7 +183,7 @@ TEST_CASE("an invalid process is refused with an error message", "[gp][predictor
   const auto refused = [&](auto&& spoil) {
     gp::Trained bad = good;
     spoil(bad);
-    return !gp::Predictor::build(bad, true).has_value();
+    return !gp::Predictor::build(bad).has_value();
   };
   const double nan = std::nan("");
   CHECK_FALSE(refused([](gp::Trained&) {}));

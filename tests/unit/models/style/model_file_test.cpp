@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "models/style/style_model.hpp"
+#include "proto/model/model_file.hpp"
 
 using namespace posed;
 using namespace posed::style;
@@ -19,8 +20,7 @@ StyleModel small_model() {
   model.process.inputs = Eigen::MatrixXd::Random(5, 6);
   model.process.weights = Eigen::MatrixXd::Random(5, 6);
   model.process.offset = Eigen::VectorXd::Random(6);
-  model.limit_rad = model.input_sd = Eigen::VectorXd::Constant(6, 0.2);
-  model.input_mean = Eigen::VectorXd::Zero(6);
+  model.limit_rad = Eigen::VectorXd::Constant(6, 0.2);
   model.from = "masculine";
   model.to = "feminine";
   model.report_json = "{}";
@@ -71,6 +71,21 @@ TEST_CASE("A model of several styles reads back as it was written", "[model_file
   refused(model, "limit below zero");
   model.more[0] = {"elderly", {other.process.weights, other.process.offset.head(3)}, {}};
   refused(model, "a style's prior mean");
+}
+
+TEST_CASE("A model with the fields of older versions reads back without them", "[model_file]") {
+  const std::string written = serialize_model(small_model());
+  auto file = model_file::open(std::as_bytes(std::span(written)), "test.style").value();
+  v1::StyleModel& style = *file.mutable_style();
+  const std::string six_numbers(6 * sizeof(double), '\0');
+  for (const int reserved : {4, 5}) {
+    style.GetReflection()->MutableUnknownFields(&style)->AddLengthDelimited(reserved, six_numbers);
+  }
+  const std::string older = model_file::wrap(std::move(file));
+  REQUIRE(older.size() > written.size() + 2 * six_numbers.size());
+  const auto parsed = parse(older);
+  REQUIRE(parsed.has_value());
+  CHECK(serialize_model(*parsed) == written);
 }
 
 TEST_CASE("A model is saved whole or not at all", "[model_file]") {

@@ -85,8 +85,6 @@ inline style::StyleModel toy_model(unsigned seed, double size_rad = 0.3) {
   const gp::Hyper hyper{0.0, 0.0, -std::numeric_limits<double>::infinity(), std::log(1e-3)};
   model.process = gp::fit(X, Y, Y.colwise().mean(), hyper).value();
   model.limit_rad = 1.5 * Y.cwiseAbs().colwise().maxCoeff().transpose();
-  model.input_mean = X.colwise().mean();
-  model.input_sd = (X.rowwise() - X.colwise().mean()).colwise().norm() / std::sqrt(20.0);
   model.from = "toy";
   model.to = "other";
   return model;
@@ -110,8 +108,8 @@ inline style::StyleModel toy_styles(const std::vector<unsigned>& seeds, double s
 // that its poses alone tell what is known.
 inline style::StyleModel gated_toy_model(unsigned seed, double size_rad = 0.3) {
   style::StyleModel model = toy_model(seed, size_rad);
-  model.gate.neutral = model.input_mean;
-  model.axis = {Eigen::VectorXd::Unit(15, 4), -model.input_mean[4]};
+  model.gate.neutral = model.process.inputs.colwise().mean();
+  model.axis = {Eigen::VectorXd::Unit(15, 4), -model.gate.neutral[4]};
   return model;
 }
 
