@@ -275,9 +275,9 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->footer(
       R"(Nothing but the log is needed: it holds what the devices sent, the models, the settings
 and every decision. On one instruction set the same log gives the same bits. --expect ends
-with 1 and names stream, sequence and field of the first difference. A published replay says
-in its stats that it is one; its times are the recording's, on the recording's clock. Nobody
-can control it. Examples:
+with 1 and names stream, sequence and field of the first difference; also where nothing could
+be compared, as after a gap at the log's start. A published replay says in its stats that it is
+one; its times are the recording's, on the recording's clock. Nobody can control it. Examples:
   posed replay take1.plog --speed max --expect
   posed replay --expect takes/*.plog --json   # all at once, on all cores; 1 if one differs
   posed replay take1.plog --speed max --out FRAMES.bin

@@ -189,6 +189,7 @@ nlohmann::ordered_json json_of(const FarmLog& log, const Outcome& outcome) {
 
 int replay_farm(const FarmOptions& options) {
   std::vector<FarmLog> logs;
+  logs.reserve(options.logs.size());
   for (const std::string& path : options.logs) logs.push_back(look_at(path));
   const auto outcomes = replay_all(logs, options.isa);
   if (!outcomes) return report(outcomes.error());
