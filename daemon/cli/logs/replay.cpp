@@ -83,7 +83,7 @@ class ReplayProgress {
 
   void show(std::int64_t arrival_ns) {
     const auto now = std::chrono::steady_clock::now();
-    if (!extent_ || now - shown_ < kEvery || now - start_ < kQuiet) return;
+    if (!extent_ || now - shown_ < every_ || now - start_ < kQuiet) return;
     shown_ = now;
     const double whole_s = seconds(extent_->last_ns - extent_->first_ns);
     const double done_s = seconds(arrival_ns - extent_->first_ns);
@@ -93,7 +93,7 @@ class ReplayProgress {
 
  private:
   static constexpr std::chrono::milliseconds kQuiet{1000};
-  const std::chrono::milliseconds kEvery{isatty(STDERR_FILENO) == 1 ? 200 : 5000};
+  const std::chrono::milliseconds every_{isatty(STDERR_FILENO) == 1 ? 200 : 5000};
   std::optional<log::Reader::Extent> extent_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point shown_{};

@@ -188,8 +188,9 @@ Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunne
           return !progress || progress(share);
         });
     if (!found) return fail("stopped");
-    for (std::size_t i = 0; i < found->size(); ++i)
+    for (std::size_t i = 0; i < found->size(); ++i) {
       add_clip((*files)[first + i], (*found)[i], clips);
+    }
   }
   if (auto enough = check_enough(clips, options.corpus); !enough) {
     return std::unexpected(enough.error());
