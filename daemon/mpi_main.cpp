@@ -2,6 +2,7 @@
 // speaks for them.
 #include <algorithm>
 #include <csignal>
+#include <exception>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -11,12 +12,9 @@
 #include <unistd.h>
 
 #include "daemon/cli/cli.hpp"
-#include "daemon/logging/log_output.hpp"
 #include "daemon/mpi/mpi_ranks.hpp"
 
 namespace {
-
-using posed::logging::write_within;
 
 // A terminal shows what rank 0 prints, once. What another rank has to say is kept for rank 0.
 class Silence {
@@ -49,11 +47,25 @@ class Silence {
 
 // mpirun ends all ranks when one has died, and on Ctrl-C.
 void ended_by_mpirun(int /*signal*/) {
-  constexpr std::string_view kWhy =
-      "posed-mpi: ended by mpirun, because a rank has died or somebody asked for it; "
-      "no model was written\n";
-  static_cast<void>(::write(STDERR_FILENO, kWhy.data(), kWhy.size()));
+  const auto say = [](std::string_view words) {
+    static_cast<void>(::write(STDERR_FILENO, words.data(), words.size()));
+  };
+  say("posed-mpi: ended by mpirun, because a rank has died or somebody asked for it; ");
+  say(posed::mpi::g_model_is_there != 0 ? "the model had been written before\n"
+                                        : "no model was written\n");
   _exit(1);
+}
+
+// What a follower leaves with: what it printed last, or what it has thrown, which would otherwise
+// end it without a word.
+std::string follow(int argc, char** argv, const std::shared_ptr<posed::cli::Ranks>& ranks) {
+  const Silence silence;
+  try {
+    static_cast<void>(posed::cli::train_main_of(argc, argv, ranks));
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return silence.words();
 }
 
 }  // namespace
@@ -63,13 +75,11 @@ int main(int argc, char** argv) {
   std::string command_line;
   for (int i = 1; i < argc; ++i) command_line += std::string(i > 1 ? " " : "") + argv[i];
   if (link.rank() != 0) {
-    const Silence silence;
     const auto ranks = std::make_shared<posed::mpi::Follower>(link, command_line);
-    static_cast<void>(posed::cli::train_main_of(argc, argv, ranks));
-    ranks->leave(silence.words());
+    ranks->leave(follow(argc, argv, ranks));
     return 0;
   }
-  std::signal(SIGTERM, ended_by_mpirun);
+  if (link.size() > 1) std::signal(SIGTERM, ended_by_mpirun);
   const auto ranks = std::make_shared<posed::mpi::Leader>(link, command_line);
   const int exit_code = posed::cli::train_main_of(argc, argv, ranks);
   ranks->leave({});

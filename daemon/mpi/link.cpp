@@ -6,6 +6,8 @@
 
 #include <mpi.h>
 
+#include "proto/frame/whole_file.hpp"
+
 namespace posed::mpi {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr std::chrono::milliseconds kLook{1};  // MPI's own waiting keeps a core
 
 // MPI's errors end the process (its default), so no call's return value is looked at.
 Link::Link() {
+  const HeldSignals held;  // MPI's threads begin here and leave signals to those that can hold them
   int threads = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &threads);
   MPI_Comm_rank(MPI_COMM_WORLD, &rank_);

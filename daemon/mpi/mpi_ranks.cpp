@@ -25,6 +25,8 @@ std::unexpected<Error> ended() { return fail("the ranks have ended"); }
 
 }  // namespace
 
+volatile std::sig_atomic_t g_model_is_there = 0;
+
 unsigned threads_here(const Link& link) {
   cpu_set_t bound;
   CPU_ZERO(&bound);
@@ -96,6 +98,7 @@ Result<> Follower::check_same(const std::vector<std::filesystem::path>& inputs) 
     if (!std::getline(text, value)) value.clear();
     if (value == fact.value) continue;
     difference = fact.value.empty() ? " cannot read " + fact.what + ", which rank 0 reads"
+                 : value.empty()    ? " reads " + fact.what + ", which rank 0 cannot read"
                                     : " has another " + fact.what + " than rank 0";
     break;
   }

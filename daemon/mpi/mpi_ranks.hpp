@@ -3,6 +3,7 @@
 // results go through the leader to all, so every rank goes on with the same bits. Cold.
 #pragma once
 
+#include <csignal>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,9 @@ namespace posed::mpi {
 // How many threads compute in each rank: its share of the machine's cores, but not more than mpirun
 // has bound it to.
 [[nodiscard]] unsigned threads_here(const Link& link);
+
+// Whether the leader has written the model; for a signal handler.
+extern volatile std::sig_atomic_t g_model_is_there;
 
 class MpiRanks : public cli::Ranks, protected TaskRunner {
  public:
@@ -58,6 +62,7 @@ class Leader final : public MpiRanks {
  private:
   [[nodiscard]] std::optional<std::vector<TaskResult>> run(std::size_t count, const Task& task,
                                                            const TaskProgress& progress) override;
+  void model_is_there() override { g_model_is_there = 1; }
   void send_all(Kind kind, std::span<const std::byte> bytes = {});
   void stop();
   // Takes what has come; false where a rank has left.

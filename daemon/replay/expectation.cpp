@@ -181,6 +181,26 @@ Result<> Expectation::finish(std::uint32_t id, std::optional<std::uint64_t> brok
   return {};
 }
 
+Result<> Expectation::check_compared() const {
+  if (counts_.compared > 0) return {};
+  const std::string why = counts_.not_compared();
+  return fail("nothing could be compared" + (why.empty() ? why : ": " + why), file_);
+}
+
+Expectation::Counts& Expectation::Counts::operator+=(const Counts& other) {
+  compared += other.compared;
+  lost += other.lost;
+  after_gap += other.after_gap;
+  past_end += other.past_end;
+  return *this;
+}
+
+std::string Expectation::Counts::not_compared() const {
+  if (lost + after_gap + past_end == 0) return {};
+  return fmt::format("{} frames that the log lacks, {} after a gap, {} past its end", lost,
+                     after_gap, past_end);
+}
+
 Result<> Expectation::differs(const Stream& stream, bool raw, std::uint64_t sequence,
                               const std::string& how) const {
   return fail(fmt::format("stream {}, sequence {}, {}", raw ? raw_name(stream.name) : stream.name,

@@ -30,6 +30,8 @@ class Expectation {
                                  std::optional<std::uint64_t> broken_at);
   // Call after the replay: an error if a published frame was not replayed.
   [[nodiscard]] Result<> finish(std::uint32_t stream, std::optional<std::uint64_t> broken_at);
+  // Call after all streams have finished: an error if not one frame could be compared.
+  [[nodiscard]] Result<> check_compared() const;
 
   struct Counts {
     std::uint64_t compared = 0;
@@ -38,6 +40,10 @@ class Expectation {
     std::uint64_t after_gap = 0;
     // replayed, but after the last frame in the log (recording was killed)
     std::uint64_t past_end = 0;
+
+    Counts& operator+=(const Counts& other);
+    // "2 frames that the log lacks, 40 after a gap, 0 past its end"; empty if there are none.
+    [[nodiscard]] std::string not_compared() const;
   };
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
 

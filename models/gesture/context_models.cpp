@@ -194,16 +194,21 @@ class Trainer {
     return frames;
   }
 
+  [[nodiscard]] Fit fit_of(const std::vector<Frames>& frames, StateModel start, int rounds) const {
+    return baum_welch(frames, std::move(start), rounds, out_.floor,
+                      [this] { return options_.tasks->stopping(); });
+  }
+
   // The model of a label; nothing where it was not recorded.
   [[nodiscard]] TaskResult label_task(std::size_t label) const {
     const auto frames = frames_where(
         [&](int context) { return out_.contexts[context].current == static_cast<int>(label); });
     if (frames.empty()) return {};
     StateModel model = estimate(flat_start(frames, kStates), out_.floor, {});
-    for (int round = 0; round < options_.segmental_rounds; ++round) {
+    for (int round = 0; round < options_.segmental_rounds && !options_.tasks->stopping(); ++round) {
       model = estimate(align_hard(frames, model), out_.floor, model);
     }
-    const Fit fit = baum_welch(frames, std::move(model), options_.rounds, out_.floor);
+    const Fit fit = fit_of(frames, std::move(model), options_.rounds);
     NumberWriter numbers;
     write(estimate(fit.sums, out_.floor, fit.model), numbers);
     return numbers.take();
@@ -214,7 +219,7 @@ class Trainer {
     const auto frames = frames_where([&](int context) { return context == static_cast<int>(c); });
     const StateModel& start = label_models_[out_.contexts[c].current];
     const bool few = static_cast<double>(frames.size()) < kOwnModelFrom;
-    const Fit fit = baum_welch(frames, start, few ? 0 : options_.rounds, out_.floor);
+    const Fit fit = fit_of(frames, start, few ? 0 : options_.rounds);
     NumberWriter numbers;
     write(fit.sums, numbers);
     if (!few) write(estimate(fit.sums, out_.floor, fit.model), numbers);

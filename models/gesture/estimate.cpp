@@ -104,13 +104,13 @@ Durations durations_of(const Statistics& sums) {
 }
 
 Fit baum_welch(const std::vector<Frames>& examples, StateModel start, int rounds,
-               const VectorXd& floor) {
+               const VectorXd& floor, const std::function<bool()>& stop) {
   Fit fit;
   fit.model = std::move(start);
   for (int round = 0;; ++round) {
     fit.sums = align_soft(examples, fit.model);
     fit.log_likelihood.push_back(fit.sums.log_likelihood);
-    if (round == rounds) return fit;
+    if (round == rounds || (stop && stop())) return fit;
     fit.model = estimate(fit.sums, floor, fit.model);
   }
 }

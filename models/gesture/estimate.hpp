@@ -3,6 +3,7 @@
 // Cold.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "models/gesture/hmm.hpp"
@@ -45,13 +46,14 @@ struct Durations {
 };
 [[nodiscard]] Durations durations_of(const Statistics& sums);
 
-// Runs estimate and align `rounds` times; `model` is the one of the last alignment.
+// Runs estimate and align `rounds` times, fewer where `stop` (may be empty) says so; `model` is the
+// one of the last alignment.
 struct Fit {
   StateModel model;
   Statistics sums;
   std::vector<double> log_likelihood;  // before each round and after the last
 };
 [[nodiscard]] Fit baum_welch(const std::vector<Frames>& examples, StateModel start, int rounds,
-                             const Eigen::VectorXd& floor);
+                             const Eigen::VectorXd& floor, const std::function<bool()>& stop = {});
 
 }  // namespace posed::gesture

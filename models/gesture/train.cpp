@@ -21,6 +21,7 @@ using Eigen::VectorXd;
 constexpr double kMinDurationExamples = 5.0;
 constexpr double kTreesFrom =
     0.95;  // of the progress, because the alignments take nearly all of the time
+constexpr int kTrees = kStates * kFingers;
 
 // Checks that the label of every segment has classes, and marks the recorded labels.
 Result<> mark_trained(const std::vector<Recording>& recordings, std::vector<Label>& labels) {
@@ -160,17 +161,17 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   }
   const auto contexts = train_contexts(recordings, model.labels, context_options);
   if (!contexts) return std::unexpected(contexts.error());
-  if (options.progress && !options.progress("growing trees", kTreesFrom)) {
-    return fail("the training was stopped; nothing was written");
-  }
   TrainReport report(recordings, *contexts, model.labels);
-  for (int state = 0; state < kStates; ++state) {
-    for (int finger = 0; finger < kFingers; ++finger) {
-      const GrownTree grown =
-          grow_finger(*contexts, model.labels, state, finger, options.mdl_factor);
-      report.add_tree(state, finger, grown);
-      model.trees[state][finger] = tree_of<FingerGaussian>(grown);
+  for (int tree = 0; tree < kTrees; ++tree) {
+    const double fraction = kTreesFrom + (1.0 - kTreesFrom) * tree / kTrees;
+    if (options.progress && !options.progress("growing trees", fraction)) {
+      return fail("the training was stopped; nothing was written");
     }
+    const int state = tree / kFingers;
+    const int finger = tree % kFingers;
+    const GrownTree grown = grow_finger(*contexts, model.labels, state, finger, options.mdl_factor);
+    report.add_tree(state, finger, grown);
+    model.trees[state][finger] = tree_of<FingerGaussian>(grown);
   }
   model.durations =
       tree_of<DurationGaussian>(grow_durations(*contexts, model.labels, options.mdl_factor));

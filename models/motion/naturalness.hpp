@@ -62,10 +62,9 @@ struct WindowSums {
 // both together; both have at least two windows.
 [[nodiscard]] double window_distance(const WindowSums& a, const WindowSums& b, int dimensions);
 
-// Frechet distance between features of two motions. Those of WindowSums, on the first
-// `dimensions` principal components. Fewer dimensions are used where the
-// motions are too short for ten windows per dimension; an error is returned where even one
-// dimension is too many.
+// Frechet distance between the features (those of WindowSums) of two motions, on the first
+// `dimensions` principal components. Fewer dimensions are used where the motions are too short for
+// ten windows per dimension; an error is returned where even one dimension is too many.
 [[nodiscard]] Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions = 20);
 
 }  // namespace posed::motion

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "models/feet/foot_score.hpp"
-#include "models/task_numbers.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::natural {
@@ -56,32 +55,24 @@ Result<Figures> figures_of(const motion::Motion& motion, const motion::PoseSpace
   return figures;
 }
 
-TaskResult numbers_of(const Figures& figures) {
-  return NumberWriter()
-      .add(figures.jerk)
-      .add(figures.sparc)
-      .add(figures.windows.count)
-      .add(figures.windows.first)
-      .add(figures.windows.second)
-      .add(figures.low_deg)
-      .add(figures.high_deg)
-      .add(figures.slide_cm_s.value_or(kNone))
-      .add(figures.sink_cm.value_or(kNone))
-      .take();
+void write(const Figures& figures, NumberWriter& numbers) {
+  numbers.add(figures.jerk).add(figures.sparc);
+  numbers.add(figures.windows.count).add(figures.windows.first).add(figures.windows.second);
+  numbers.add(figures.low_deg).add(figures.high_deg);
+  numbers.add(figures.slide_cm_s.value_or(kNone)).add(figures.sink_cm.value_or(kNone));
 }
 
-Figures figures_from(const TaskResult& numbers) {
-  NumberReader reader(numbers);
+Figures figures_from(NumberReader& numbers) {
   Figures figures;
-  figures.jerk = reader.number();
-  figures.sparc = reader.number();
-  figures.windows.count = reader.number();
-  figures.windows.first = reader.vector();
-  figures.windows.second = reader.matrix();
-  figures.low_deg = reader.vector();
-  figures.high_deg = reader.vector();
-  figures.slide_cm_s = there(reader.number());
-  figures.sink_cm = there(reader.number());
+  figures.jerk = numbers.number();
+  figures.sparc = numbers.number();
+  figures.windows.count = numbers.number();
+  figures.windows.first = numbers.vector();
+  figures.windows.second = numbers.matrix();
+  figures.low_deg = numbers.vector();
+  figures.high_deg = numbers.vector();
+  figures.slide_cm_s = there(numbers.number());
+  figures.sink_cm = there(numbers.number());
   return figures;
 }
 

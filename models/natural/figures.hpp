@@ -9,7 +9,7 @@
 
 #include "models/motion/motion.hpp"
 #include "models/motion/naturalness.hpp"
-#include "models/tasks.hpp"
+#include "models/task_numbers.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::natural {
@@ -31,8 +31,8 @@ struct Figures {
 [[nodiscard]] Result<Figures> figures_of(const motion::Motion& motion,
                                          const motion::PoseSpaceSpec& spec);
 
-// As a task's numbers, and back.
-[[nodiscard]] TaskResult numbers_of(const Figures& figures);
-[[nodiscard]] Figures figures_from(const TaskResult& numbers);
+// As a task's numbers, behind those that `numbers` has, and back from where the reader is.
+void write(const Figures& figures, NumberWriter& numbers);
+[[nodiscard]] Figures figures_from(NumberReader& numbers);
 
 }  // namespace posed::natural

@@ -2,30 +2,12 @@
 
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 #include <string>
 #include <system_error>
 
 namespace posed {
 namespace {
-
-// Blocks the signals that end the process in this thread; they are delivered afterwards.
-class HeldSignals {
- public:
-  HeldSignals() {
-    sigset_t set;
-    sigemptyset(&set);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, signal);
-    pthread_sigmask(SIG_BLOCK, &set, &before_);
-  }
-  HeldSignals(const HeldSignals&) = delete;
-  HeldSignals& operator=(const HeldSignals&) = delete;
-  ~HeldSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-
- private:
-  sigset_t before_{};
-};
 
 std::filesystem::path target_of(const std::filesystem::path& path) {
   std::error_code error;
@@ -35,6 +17,15 @@ std::filesystem::path target_of(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+HeldSignals::HeldSignals() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, signal);
+  pthread_sigmask(SIG_BLOCK, &set, &before_);
+}
+
+HeldSignals::~HeldSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
 
 Result<> write_whole_file(const std::filesystem::path& path,
                           const std::function<void(std::ostream&)>& write) {

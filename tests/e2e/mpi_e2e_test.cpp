@@ -9,6 +9,8 @@
 #include <thread>
 #include <vector>
 
+#include <sys/resource.h>
+
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/hand_clip.hpp"
@@ -16,6 +18,7 @@
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
+#include "tests/support/pipe.hpp"
 #include "tests/support/temp_folder.hpp"
 
 #define SKIP_WITHOUT_MPI()                                                                \
@@ -64,6 +67,18 @@ std::vector<pid_t> ranks_below(pid_t mpirun) {
     }
   }
   return found;
+}
+
+// The one of two ranks that does not lead, whose stdout goes nowhere.
+pid_t follower_of(pid_t mpirun) {
+  for (const pid_t rank : ranks_below(mpirun)) {
+    std::error_code ignored;
+    const auto out =
+        std::filesystem::read_symlink("/proc/" + std::to_string(rank) + "/fd/1", ignored);
+    if (out == "/dev/null") return rank;
+  }
+  FAIL("no rank follows");
+  return 0;
 }
 
 // Whether it still computes; nobody may have asked yet how it ended.
@@ -144,7 +159,9 @@ TEST_CASE("any number of ranks writes the model file of posed train", "[mpi]") {
     REQUIRE(done.code == 0);
     CHECK(file_text(studio.path("mpi.style")) == alone);
     // Only one of them speaks.
-    CHECK(done.out.find("written after") == done.out.rfind("written after"));
+    const auto spoken = done.out.find("written after");
+    CHECK(spoken != std::string::npos);
+    CHECK(spoken == done.out.rfind("written after"));
     std::filesystem::remove(studio.path("mpi.style"));
   }
 }
@@ -204,6 +221,13 @@ TEST_CASE("ranks that read different files say which one and write nothing", "[m
   const auto missing = differ();
   CHECK(missing.code == 1);
   CHECK(has(missing.err, "cannot read sway_1.bvh, which rank 0 reads"));
+  std::filesystem::rename(studio.path("sway_1.bvh"), other.path() / "sway_1.bvh");
+  const auto reversed = differ();
+  CHECK(reversed.code == 1);
+  CHECK(has(reversed.err, "reads sway_1.bvh, which rank 0 cannot read"));
+  // What nobody can read is posed's own error.
+  std::filesystem::remove(other.path() / "sway_1.bvh");
+  CHECK(has(differ().err, "posed: sway_1.bvh: cannot read"));
   CHECK(studio.nothing_written("x.style"));
 }
 
@@ -228,6 +252,48 @@ TEST_CASE("a rank that dies ends the run, which says so and writes nothing", "[m
   CHECK(done.code != 0);
   CHECK(has(done.err, "ended by mpirun, because a rank has died"));
   CHECK(training.studio.nothing_written("long.style"));
+}
+
+TEST_CASE("a rank that has no memory left says so", "[mpi]") {
+  if (!std::filesystem::exists(posed_mpi())) SKIP_WITHOUT_MPI();
+  LongTraining training;
+  const rlimit nothing_more{1, 1};
+  REQUIRE(prlimit(follower_of(training.mpirun.pid()), RLIMIT_AS, &nothing_more, nullptr) == 0);
+  const auto done = finished(training.mpirun);
+  CHECK(done.code != 0);
+  CHECK(has(done.err, "posed-mpi: rank 1 on "));
+  CHECK(has(done.err, "has ended: std::bad_alloc"));
+  CHECK(training.studio.nothing_written("long.style"));
+}
+
+TEST_CASE("a rank that dies when the model is there is not said to have prevented it", "[mpi]") {
+  if (!std::filesystem::exists(posed_mpi())) SKIP_WITHOUT_MPI();
+  const MpiStudio studio;
+  // Rank 0 waits where it tells its result, because nobody reads.
+  const Pipe pipe;
+  pipe.fill();
+  const std::string full =
+      "/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(pipe.write_end());
+  const auto arguments = studio.train("kept.style");
+  std::vector<std::string> command{
+      "mpirun", "--allow-run-as-root",         "--oversubscribe",   "-n", "1", "sh",
+      "-c",     "exec \"$0\" \"$@\" >" + full, posed_mpi().string()};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  command.insert(command.end(), {":", "-n", "1", posed_mpi().string()});
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  Process mpirun(Command{std::move(command)});
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!std::filesystem::exists(studio.path("kept.style")) &&
+         std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  kill(follower_of(mpirun.pid()), SIGKILL);
+  const auto done = finished(mpirun);
+  CHECK(done.code != 0);
+  CHECK(has(done.err, "ended by mpirun, because a rank has died"));
+  CHECK(has(done.err, "the model had been written before"));
+  CHECK_FALSE(has(done.err, "no model was written"));
+  CHECK(std::filesystem::file_size(studio.path("kept.style")) > 0);
 }
 
 TEST_CASE("Ctrl-C ends all ranks and writes nothing", "[mpi]") {

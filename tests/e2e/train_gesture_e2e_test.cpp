@@ -2,6 +2,10 @@
 // the same bytes each time; labels are proposed; every mistake gives one error message and an exit
 // code.
 
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
 #include <nlohmann/json.hpp>
 
 #include "models/gesture/model_file.hpp"
@@ -9,6 +13,7 @@
 #include "proto/clip/hand_clip.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/file_text.hpp"
+#include "tests/support/has.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -22,8 +27,8 @@ struct Glove {
   std::string labels = (folder.path() / "take.lab").string();
   std::string few = (folder.path() / "few.lab").string();
 
-  Glove() {
-    const auto performance = gesture::make_performance({.gestures = 40});
+  explicit Glove(int gestures = 40) {
+    const auto performance = gesture::make_performance({.gestures = gestures});
     REQUIRE(clip::write_hand_csv(performance->clip, clip));
     REQUIRE(clip::write_labels(performance->labels, labels));
     const auto& all = performance->labels;
@@ -123,6 +128,21 @@ TEST_CASE("Labels are proposed from a few", "[train_gesture]") {
   const auto labels = clip::read_labels(glove.file("all.lab"));
   REQUIRE(labels.has_value());
   CHECK(labels->size() == 40);
+}
+
+TEST_CASE("Ctrl-C ends the training and writes nothing", "[train_gesture]") {
+  const Glove glove(400);
+  Process training({"train", "gesture", "--clip", glove.clip, "--labels", glove.labels,
+                    "--embedded-rounds", "20", "--out", glove.file("x.gesture")});
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!has(training.errors(), "aligning gestures") && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  training.send(SIGINT);
+  CHECK(training.rest().empty());
+  CHECK(training.exit_code() == 1);
+  CHECK(has(training.errors(), "posed: the training was stopped; nothing was written"));
+  CHECK_FALSE(std::filesystem::exists(glove.file("x.gesture")));
 }
 
 TEST_CASE("What cannot be trained from is refused", "[train_gesture]") {

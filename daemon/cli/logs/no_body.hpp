@@ -10,8 +10,10 @@
 namespace posed::cli {
 
 // It may have named some that nobody wanted or that were refused.
-inline void warn_of_no_body(const std::string& source) {
-  spdlog::warn("source {} named no body that became a stream", in_quotes(source));
+[[nodiscard]] inline std::string no_body_of(const std::string& source) {
+  return "source " + in_quotes(source) + " named no body that became a stream";
 }
+
+inline void warn_of_no_body(const std::string& source) { spdlog::warn("{}", no_body_of(source)); }
 
 }  // namespace posed::cli

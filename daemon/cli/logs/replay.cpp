@@ -17,7 +17,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/live/client.hpp"
-#include "daemon/cli/logs/no_body.hpp"
+#include "daemon/cli/logs/missing_from_log.hpp"
 #include "daemon/cli/logs/replay_farm.hpp"
 #include "daemon/cli/logs/replay_outputs.hpp"
 #include "daemon/cli/output_files.hpp"
@@ -27,7 +27,6 @@
 #include "daemon/replay/replay.hpp"
 #include "models/gp/isa.hpp"
 #include "proto/log/reader.hpp"
-#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -84,7 +83,7 @@ class ReplayProgress {
 
   void show(std::int64_t arrival_ns) {
     const auto now = std::chrono::steady_clock::now();
-    if (!extent_ || now - shown_ < kEvery || now - start_ < kQuiet) return;
+    if (!extent_ || now - shown_ < every_ || now - start_ < kQuiet) return;
     shown_ = now;
     const double whole_s = seconds(extent_->last_ns - extent_->first_ns);
     const double done_s = seconds(arrival_ns - extent_->first_ns);
@@ -94,7 +93,7 @@ class ReplayProgress {
 
  private:
   static constexpr std::chrono::milliseconds kQuiet{1000};
-  const std::chrono::milliseconds kEvery{isatty(STDERR_FILENO) == 1 ? 200 : 5000};
+  const std::chrono::milliseconds every_{isatty(STDERR_FILENO) == 1 ? 200 : 5000};
   std::optional<log::Reader::Extent> extent_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point shown_{};
@@ -121,41 +120,6 @@ Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
   return {};
 }
 
-void warn_of_gaps(const log::Reader& reader) {
-  constexpr std::array<const char*, 3> kNames{"chunks", "decisions", "published frames"};
-  const auto gaps = reader.gaps();
-  if (!gaps) return;  // cannot happen: open() has read the gaps already
-  for (const log::GapRow& gap : *gaps) {
-    const bool chunks = gap.kind == log::GapRow::Kind::kChunks;
-    const auto owner =
-        chunks ? std::ranges::find(reader.sources(), gap.owner, &log::SourceRow::id)->name
-               : reader.streams()[*reader.place_of_stream(gap.owner)].name;
-    const auto kind = std::min<std::size_t>(static_cast<std::size_t>(gap.kind), 2);
-    spdlog::warn("{} {}: the log lacks {} {} after chunk {}", chunks ? "source" : "stream", owner,
-                 gap.lost, kNames[kind], gap.after_chunk);
-  }
-}
-
-void warn_of_undescribed(const replay::Replay& replay) {
-  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
-    const replay::ReplayStream& stream = replay.stream(id);
-    if (stream.described) continue;
-    spdlog::warn(
-        "stream {}: the log lacks the description of {}'s body {}, so nothing of it is"
-        " replayed",
-        clean_name(stream.name), clean_name(stream.source), clean_name(stream.body));
-  }
-}
-
-void warn_of_sources_without_body(const log::Reader& reader) {
-  for (const log::SourceRow& source : reader.sources()) {
-    const auto& streams = reader.streams();
-    if (std::ranges::find(streams, source.id, &log::StreamRow::source) == streams.end()) {
-      warn_of_no_body(source.name);
-    }
-  }
-}
-
 // Each once: a body that comes back is another stream of the same name.
 std::vector<std::string> stream_names(const log::Reader& reader) {
   std::vector<std::string> names;
@@ -174,9 +138,8 @@ void print_summary(const ReplayOptions& options, const ReplayOutputs& outputs, d
     line["lost"] = counts.lost;
     line["after_gap"] = counts.after_gap;
     line["past_end"] = counts.past_end;
-    if (counts.lost + counts.after_gap + counts.past_end > 0) {
-      spdlog::warn("not compared: {} frames that the log lacks, {} after a gap, {} past its end",
-                   counts.lost, counts.after_gap, counts.past_end);
+    if (const std::string rest = counts.not_compared(); !rest.empty()) {
+      spdlog::warn("not compared: {}", rest);
     }
     spdlog::info("{} frames are as published, bit for bit", counts.compared);
   }
@@ -246,9 +209,7 @@ Result<> replay(const ReplayOptions& options) {
   auto opened = replay::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   replay::Replay& replay = **opened;
-  warn_of_gaps(*reader);
-  warn_of_undescribed(replay);
-  warn_of_sources_without_body(*reader);
+  for (const std::string& missing : missing_from(*reader, replay)) spdlog::warn("{}", missing);
   ReplayOutputs outputs(replay);
   if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
   const auto extent = reader->extent();
@@ -314,9 +275,9 @@ void add_replay(CLI::App& app, int& exit_code) {
   command->footer(
       R"(Nothing but the log is needed: it holds what the devices sent, the models, the settings
 and every decision. On one instruction set the same log gives the same bits. --expect ends
-with 1 and names stream, sequence and field of the first difference. A published replay says
-in its stats that it is one; its times are the recording's, on the recording's clock. Nobody
-can control it. Examples:
+with 1 and names stream, sequence and field of the first difference; also where nothing could
+be compared, as after a gap at the log's start. A published replay says in its stats that it is
+one; its times are the recording's, on the recording's clock. Nobody can control it. Examples:
   posed replay take1.plog --speed max --expect
   posed replay --expect takes/*.plog --json   # all at once, on all cores; 1 if one differs
   posed replay take1.plog --speed max --out FRAMES.bin

@@ -9,12 +9,15 @@
 #include <string_view>
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/logs/missing_from_log.hpp"
 #include "daemon/cli/logs/replay_outputs.hpp"
 #include "daemon/cli/models/thread_tasks.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/logging/log_output.hpp"
 #include "models/gp/isa.hpp"
 #include "models/task_numbers.hpp"
 #include "proto/log/reader.hpp"
@@ -35,6 +38,7 @@ struct Outcome {
   replay::Expectation::Counts counts;
   std::string isa;      // on which it was replayed
   std::string problem;  // empty: all as published
+  std::vector<std::string> missing;
 };
 
 // The whole farm's progress, and whether to go on; shared by the threads.
@@ -64,6 +68,7 @@ Result<> compare(const FarmLog& log, Together& together, Outcome& outcome) {
   if (!opened) return std::unexpected(opened.error());
   auto expectation = replay::Expectation::open(*reader);
   if (!expectation) return std::unexpected(expectation.error());
+  outcome.missing = missing_from(*reader, **opened);
   ReplayOutputs outputs(**opened);
   outputs.expectation = std::move(*expectation);
   std::int64_t told_ns = 0;
@@ -91,7 +96,9 @@ TaskResult numbers_of(const Outcome& outcome) {
                            outcome.counts.after_gap, outcome.counts.past_end}) {
     numbers.add(static_cast<double>(count));
   }
-  return numbers.add(outcome.problem).take();
+  numbers.add(outcome.problem);
+  for (const std::string& missing : outcome.missing) numbers.add(missing);
+  return numbers.take();
 }
 
 Outcome outcome_of(const TaskResult& numbers) {
@@ -104,6 +111,7 @@ Outcome outcome_of(const TaskResult& numbers) {
   outcome.counts.after_gap = count();
   outcome.counts.past_end = count();
   outcome.problem = reader.text();
+  while (!reader.at_end()) outcome.missing.push_back(reader.text());
   outcome.isa = gp::isa_name();
   return outcome;
 }
@@ -149,14 +157,11 @@ Result<std::vector<Outcome>> replay_all(const std::vector<FarmLog>& logs, const 
 }
 
 std::string what_happened(const FarmLog& log, const Outcome& outcome) {
-  const auto& counts = outcome.counts;
   std::string text = outcome.problem;
   if (text.empty()) {
-    text = fmt::format("{}: {} frames are as published", log.path, counts.compared);
-  }
-  if (const auto not_compared = counts.lost + counts.after_gap + counts.past_end;
-      not_compared > 0) {
-    text += fmt::format(", {} are not in the log", not_compared);
+    text = fmt::format("{}: {} frames are as published", log.path, outcome.counts.compared);
+    const std::string rest = outcome.counts.not_compared();
+    if (!rest.empty()) text += "; not compared: " + rest;
   }
   if (log.recorded_isa != "auto" && log.recorded_isa != outcome.isa) {
     text += fmt::format(" (recorded on {}, replayed on {}: the last bits may differ)",
@@ -174,7 +179,8 @@ nlohmann::ordered_json json_of(const FarmLog& log, const Outcome& outcome) {
                               {"after_gap", outcome.counts.after_gap},
                               {"past_end", outcome.counts.past_end},
                               {"isa", outcome.isa},
-                              {"recorded_isa", log.recorded_isa}};
+                              {"recorded_isa", log.recorded_isa},
+                              {"missing", outcome.missing}};
   if (!outcome.problem.empty()) line["problem"] = outcome.problem;
   return line;
 }
@@ -183,25 +189,34 @@ nlohmann::ordered_json json_of(const FarmLog& log, const Outcome& outcome) {
 
 int replay_farm(const FarmOptions& options) {
   std::vector<FarmLog> logs;
+  logs.reserve(options.logs.size());
   for (const std::string& path : options.logs) logs.push_back(look_at(path));
   const auto outcomes = replay_all(logs, options.isa);
   if (!outcomes) return report(outcomes.error());
   std::size_t differ = 0;
+  replay::Expectation::Counts all;
   for (std::size_t i = 0; i < logs.size(); ++i) {
     const Outcome& outcome = (*outcomes)[i];
     differ += outcome.problem.empty() ? 0 : 1;
+    all += outcome.counts;
+    for (const std::string& missing : outcome.missing) {
+      if (!options.json) spdlog::warn("{}: {}", logs[i].path, missing);
+    }
     const std::string line =
         options.json ? json_text(json_of(logs[i], outcome)) : what_happened(logs[i], outcome);
     std::printf("%s\n", line.c_str());
   }
   std::fflush(stdout);
   if (differ == 0) {
-    std::fprintf(stderr, "posed: all %zu logs give what was published, bit for bit\n", logs.size());
+    const std::string rest = all.not_compared();
+    logging::say(fmt::format("posed: all {} logs give what was published, bit for bit{}",
+                             logs.size(), rest.empty() ? rest : "; not compared: " + rest));
     return static_cast<int>(ExitCode::kDone);
   }
-  return report(
-      fail(fmt::format("{} of {} logs do not give what was published", differ, logs.size()))
-          .error());
+  return report(fail(fmt::format("{} of {} logs do not give what was published, or nothing of them "
+                                 "could be compared",
+                                 differ, logs.size()))
+                    .error());
 }
 
 }  // namespace posed::cli

@@ -34,7 +34,7 @@ Result<> ReplayOutputs::finish() {
     if (!same) difference = same.error();
   }
   if (difference) return std::unexpected(*difference);
-  return {};
+  return expectation ? expectation->check_compared() : Result<>{};
 }
 
 std::string recorded_isa(const log::Reader& reader) {

@@ -142,7 +142,8 @@ void add_eval_natural(CLI::App& eval, int& exit_code) {
   command->add_option("--corpus", options->corpus, "Folder of clips of people")->required();
   command->add_option("--hand", options->hand, "left or right: judge this hand of clips of bodies")
       ->check(CLI::IsMember({"left", "right"}));
-  command->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
+  command->add_option("--skeleton", options->skeleton,
+                      "NN.asf of an AMC clip, and of those of the corpus without one beside them");
   command->add_option("--rate", options->rate_hz, "Frames per second at which to compare")
       ->check(CLI::Range(10.0, 1000.0))
       ->capture_default_str();

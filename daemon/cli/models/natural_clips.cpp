@@ -21,6 +21,9 @@ namespace {
 
 using Path = std::filesystem::path;
 
+// A body's numbers are half a megabyte and stand twice while a task's result is taken over.
+constexpr std::size_t kBatch = 32;
+
 // Measures the files of one comparison.
 class Measure {
  public:
@@ -59,9 +62,13 @@ class Measure {
  private:
   explicit Measure(const NaturalOptions& options) : options_(options) {}
 
+  // A subject's clips have bones of their own, so a skeleton beside a clip of the corpus is right
+  // for it and the named one is not.
   [[nodiscard]] clip::ReadOptions how(const Path& path) const {
     clip::ReadOptions read;
-    if (is_amc(path)) read.asf = options_.skeleton;
+    std::error_code ignored;
+    const bool other = path != options_.clip && exists(clip::skeleton_beside(path), ignored);
+    if (is_amc(path) && !other) read.asf = options_.skeleton;
     if (!options_.hand.empty()) read.hand = options_.hand == "left" ? Side::kLeft : Side::kRight;
     return read;
   }
@@ -98,9 +105,16 @@ Result<std::vector<Path>> files_of(const Path& folder, const Measure& measure) {
     return misuse("is no folder that can be read: " + error.message(), folder.string());
   }
   std::vector<Path> files;
+  Path last;  // where a folder cannot be entered, the iterator has ended
+  std::error_code ignored;
   for (; at != std::filesystem::recursive_directory_iterator(); at.increment(error)) {
-    if (error) return fail("cannot be read: " + error.message(), folder.string());
-    if (at->is_regular_file(error) && measure.may_be_clip(at->path())) files.push_back(at->path());
+    last = at->path();
+    if (at->is_regular_file(ignored) && measure.may_be_clip(last)) files.push_back(last);
+  }
+  if (error) {
+    return fail("cannot be read: " + error.message() +
+                    "; a part of a corpus has another spread, so make it readable or take it away",
+                last.string());
   }
   std::ranges::sort(files);
   if (files.empty()) {
@@ -129,6 +143,29 @@ Result<> check_enough(const NaturalClips& clips, const Path& corpus) {
   return fail(why, corpus.string());
 }
 
+// A text, empty where the figures follow.
+TaskResult numbers_of(const Path& file, const Path& own, const Measure& measure) {
+  NumberWriter numbers;
+  std::error_code ignored;
+  if (std::filesystem::equivalent(file, own, ignored)) {
+    return numbers.add("it is the clip itself").take();
+  }
+  const auto figures = measure(file);
+  if (!figures) return numbers.add(figures.error().message).take();
+  natural::write(*figures, numbers.add(""));
+  return numbers.take();
+}
+
+void add_clip(const Path& file, const TaskResult& numbers, NaturalClips& clips) {
+  NumberReader reader(numbers);
+  std::string why = reader.text();
+  if (why.empty()) {
+    clips.corpus.push_back(natural::figures_from(reader));
+  } else {
+    clips.left_out.push_back({file.string(), std::move(why)});
+  }
+}
+
 }  // namespace
 
 Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunner& tasks,
@@ -141,29 +178,18 @@ Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunne
   clips.clip = std::move(*own);
   const auto files = files_of(options.corpus, *measure);
   if (!files) return std::unexpected(files.error());
-  // A text, empty where the figures follow.
-  const Task task = [&](std::size_t i) {
-    std::error_code ignored;
-    if (std::filesystem::equivalent((*files)[i], options.clip, ignored)) {
-      return NumberWriter().add("it is the clip itself").take();
-    }
-    const auto figures = (*measure)((*files)[i]);
-    if (!figures) return NumberWriter().add(figures.error().message).take();
-    TaskResult numbers = natural::numbers_of(*figures);
-    numbers.insert(numbers.begin(), 0.0);
-    return numbers;
-  };
-  const auto found = tasks.run(files->size(), task, [&](std::size_t done) {
-    return !progress || progress(static_cast<double>(done) / static_cast<double>(files->size()));
-  });
-  if (!found) return fail("stopped");
-  for (std::size_t i = 0; i < files->size(); ++i) {
-    const TaskResult& numbers = (*found)[i];
-    std::string why = NumberReader(numbers).text();
-    if (why.empty()) {
-      clips.corpus.push_back(natural::figures_from({numbers.begin() + 1, numbers.end()}));
-    } else {
-      clips.left_out.push_back({(*files)[i].string(), std::move(why)});
+  for (std::size_t first = 0; first < files->size(); first += kBatch) {
+    const auto task = [&](std::size_t i) {
+      return numbers_of((*files)[first + i], options.clip, *measure);
+    };
+    const auto found =
+        tasks.run(std::min(kBatch, files->size() - first), task, [&](std::size_t done) {
+          const auto share = static_cast<double>(first + done) / static_cast<double>(files->size());
+          return !progress || progress(share);
+        });
+    if (!found) return fail("stopped");
+    for (std::size_t i = 0; i < found->size(); ++i) {
+      add_clip((*files)[first + i], (*found)[i], clips);
     }
   }
   if (auto enough = check_enough(clips, options.corpus); !enough) {

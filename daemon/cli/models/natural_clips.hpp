@@ -14,8 +14,8 @@ namespace posed::cli {
 
 struct NaturalOptions {
   std::filesystem::path clip, corpus;  // a file, a folder
-  std::filesystem::path skeleton;      // of AMC clips; empty: beside them
-  std::string hand;                    // "left" or "right": the hand of clips with bodies
+  std::filesystem::path skeleton;  // of the AMC clip, and of the corpus' without one beside them
+  std::string hand;                // "left" or "right": the hand of clips with bodies
   double rate_hz = 30.0;
 };
 
@@ -33,9 +33,9 @@ struct NaturalClips {
 // Receives the fraction done; returning false stops.
 using ReadProgress = std::function<bool(double fraction)>;
 
-// Every file of the corpus is a task. Errors: the clip itself cannot be measured, the folder has no
-// clips, fewer than natural::kLeastClips can be compared with, or a stop. Clips with other joints,
-// too short ones and the clip itself are left out.
+// Every file of the corpus is a task. Errors: the clip itself cannot be measured, a part of the
+// folder cannot be read, it has no clips, fewer than natural::kLeastClips can be compared with, or
+// a stop. Clips with other joints, too short ones and the clip itself are left out.
 [[nodiscard]] Result<NaturalClips> read_natural_clips(const NaturalOptions& options,
                                                       TaskRunner& tasks,
                                                       const ReadProgress& progress);

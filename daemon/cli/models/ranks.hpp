@@ -10,6 +10,7 @@
 #include "daemon/cli/models/thread_tasks.hpp"
 #include "models/tasks.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/frame/whole_file.hpp"
 
 namespace posed::cli {
 
@@ -29,6 +30,20 @@ class Ranks {
   // Call before the work, with every file that it reads: an error in all ranks where one of them
   // reads other bytes than the first.
   [[nodiscard]] virtual Result<> check_same(const std::vector<std::filesystem::path>& inputs) = 0;
+
+  // Lets the one that leads write the model. A signal that ends the process comes before that, or
+  // when it is known that the model is there.
+  template <typename Write>
+  [[nodiscard]] Result<> write_model(const Write& write) {
+    if (!leads()) return {};
+    const HeldSignals held;
+    auto written = write();
+    if (written) model_is_there();
+    return written;
+  }
+
+ protected:
+  virtual void model_is_there() {}
 };
 
 // This process alone, on the machine's cores.

@@ -244,7 +244,7 @@ Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Record
   auto model = gesture::train_gesture(recordings, options);
   if (!model) return std::unexpected(model.error());
   const double seconds = bar.elapsed_s();
-  const auto saved = ranks.leads() ? gesture::save_model(*model, out) : Result<>{};
+  const auto saved = ranks.write_model([&] { return gesture::save_model(*model, out); });
   if (!saved) return std::unexpected(saved.error());
   return GestureTraining{std::move(*model), seconds};
 }

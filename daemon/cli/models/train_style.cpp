@@ -222,9 +222,9 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   if (!model) return std::unexpected(model.error());
   json report = json::parse(model->report_json);
   const bool written = report["usable"].get<bool>() || force;
-  if (written && ranks.leads()) {
-    if (auto saved = style::save_model(*model, out); !saved) return std::unexpected(saved.error());
-  }
+  const auto saved =
+      written ? ranks.write_model([&] { return style::save_model(*model, out); }) : Result<>{};
+  if (!saved) return std::unexpected(saved.error());
   report["mode"] = experiment.mode == style::TrainMode::kPaper ? "paper" : "default";
   report["written"] = written;
   report["seconds"] = bar.elapsed_s();

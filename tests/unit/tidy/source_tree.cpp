@@ -185,6 +185,11 @@ std::vector<Finding> check_references(const std::string& path, const std::string
   return findings;
 }
 
+std::vector<Finding> check_title(const std::string& path, const std::string& text) {
+  if (!path.ends_with("README.md") || text.starts_with("# ")) return {};
+  return {{path, 1, "a README whose first line is no title (\"# \")"}};
+}
+
 std::vector<Finding> check_sizes(const SourceFile& file) {
   std::vector<Finding> findings;
   if (file.lines.size() > kMaxLines) {

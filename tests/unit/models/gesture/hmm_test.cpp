@@ -98,6 +98,15 @@ TEST_CASE_METHOD(HmmFixture, "Eight rounds of Baum-Welch with durations", "[hmm]
   CHECK(off(durations.variance, vector(after["dur_var"])) < kHmmTolerance);
 }
 
+TEST_CASE_METHOD(HmmFixture, "Baum-Welch ends early where it is asked to", "[hmm]") {
+  int asked = 0;
+  const Fit fit = baum_welch(examples, start, 8, floor, [&asked] { return ++asked == 3; });
+  REQUIRE(fit.log_likelihood.size() == 3);
+  const Fit brief = baum_welch(examples, start, 2, floor);
+  CHECK(fit.model.mean == brief.model.mean);
+  CHECK(fit.sums.log_likelihood == brief.sums.log_likelihood);
+}
+
 TEST_CASE_METHOD(HmmFixture, "Viterbi finds the fixture's paths", "[hmm]") {
   const Fit fit = baum_welch(examples, start, 8, floor);
   for (std::size_t i = 0; i < examples.size(); ++i) {

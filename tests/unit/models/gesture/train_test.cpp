@@ -40,6 +40,23 @@ bool sound(const GestureModel& model) {
   return parsed.has_value();
 }
 
+// Counts how often its tasks ask whether to stop, and says so from then on.
+class AskedTasks final : public TaskRunner {
+ public:
+  explicit AskedTasks(int patience) : patience_(patience) {}
+  [[nodiscard]] int asked() const { return asked_; }
+  [[nodiscard]] bool stopping() const override { return ++asked_ > patience_; }
+  [[nodiscard]] std::optional<std::vector<TaskResult>> run(std::size_t count, const Task& task,
+                                                           const TaskProgress& progress) override {
+    auto results = SerialTasks().run(count, task, progress);
+    return asked_ > patience_ ? std::nullopt : std::move(results);
+  }
+
+ private:
+  int patience_;
+  mutable int asked_ = 0;
+};
+
 }  // namespace
 
 TEST_CASE("A synthetic signer performs the requested corpus", "[signer]") {
@@ -187,4 +204,29 @@ TEST_CASE("The order of the tasks does not change a bit of a gesture model", "[t
   test::BackwardTasks backward;
   options.tasks = &backward;
   CHECK(serialize_model(train_gesture(recordings, options).value()) == forward);
+}
+
+TEST_CASE("Training asks in every round of its tasks, and at every tree, whether to stop",
+          "[train]") {
+  const auto recording = performed({.gestures = 20});
+  const TrainOptions defaults;
+  const auto trained_by = [&](AskedTasks& tasks, int trees) {
+    int grown = 0;
+    TrainOptions options;
+    options.tasks = &tasks;
+    options.progress = [&](std::string_view step, double /*fraction*/) {
+      return step != "growing trees" || ++grown <= trees;
+    };
+    return train_gesture({recording}, options);
+  };
+  AskedTasks patient(100'000);
+  CHECK(trained_by(patient, 1000));
+  CHECK(patient.asked() >= 3 * (defaults.segmental_rounds + defaults.rounds));  // three labels
+  AskedTasks hasty(5);
+  const auto stopped = trained_by(hasty, 1000);
+  REQUIRE_FALSE(stopped);
+  CHECK(stopped.error().message.find("stopped") != std::string::npos);
+  CHECK(hasty.asked() < 20);
+  AskedTasks again(100'000);
+  CHECK_FALSE(trained_by(again, 7));
 }

@@ -79,7 +79,16 @@ TEST_CASE("figures keep their bits as a task's numbers, in any order of tasks", 
   Figures figures = figures_of(motion, spec_of(motion)).value();
   figures.slide_cm_s = 2.5;
   figures.sink_cm = 0.25;
-  CHECK(numbers_of(figures_from(numbers_of(figures))) == numbers_of(figures));
+  const auto numbers_of = [](const Figures& some) {
+    NumberWriter numbers;
+    write(some, numbers.add("first"));
+    return numbers.add("last").take();
+  };
+  const TaskResult numbers = numbers_of(figures);
+  NumberReader reader(numbers);
+  CHECK(reader.text() == "first");
+  CHECK(numbers_of(figures_from(reader)) == numbers);
+  CHECK(reader.text() == "last");
   test::BackwardTasks backward;
   const auto once = beside_marchers(motion);
   const auto again = beside_marchers(motion, backward);
