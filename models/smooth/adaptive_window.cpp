@@ -14,14 +14,15 @@ namespace {
 constexpr double kDegree2 = kDegree * kDegree;  // [rad^2]
 
 // The constants of models/smooth/README.md, "Speed-adaptive prior".
-constexpr double kLooseCurve = 8000.0 * kDegree2;  // variance of the first solve [rad^2/s^3]
-constexpr double kCurveBase = 5.0 * kDegree2;      // [rad^2/s^3]
-constexpr double kCurveSlope = 20.0;               // [1/s], times the squared speed
-constexpr double kDeltaBase = 0.002 * kDegree2;    // [rad^2/s]
-constexpr double kDeltaSlope = 0.1;                // [s], times the squared speed
-constexpr double kSpeedReach_s = 0.067;  // the speed is averaged over this time on each side
-constexpr double kHandShare = 0.1;       // of the mean speed of all channels
+constexpr double kFirstDensity = 8000.0 * kDegree2;  // of the first solve [rad^2/s^3]
+constexpr double kDensityBase = 5.0 * kDegree2;      // [rad^2/s^3]
+constexpr double kDensitySlope = 15.0;               // [1/s], times the squared speed
+constexpr double kDeltaBase = 0.03 * kDegree2;       // [rad^2/s]
+constexpr double kDeltaSlope = 0.13;                 // [s], times the squared speed
+constexpr double kSpeedReach_s = 0.08;  // the speed is averaged over this time on each side
+constexpr double kHandShare = 0.1;      // of the mean speed of all channels
 constexpr int kPasses = 2;
+constexpr double kRepeats = 4.0;  // variance of a value equal to the one before, per variance
 
 constexpr double kEven = 1e-3;  // frames whose skew is below this count as evenly spaced
 
@@ -41,13 +42,15 @@ AdaptiveWindow::AdaptiveWindow(int channels)
       information_(channels, kMaxWindow),
       sensed_(static_cast<std::size_t>(2 * kMaxWindow * information_.stride()), 1.0),
       window_(channels, kMaxWindow),
+      past_(information_.stride()),
+      steady_(channels, information_.stride(), kMaxWindow),
       whole_(kMaxWindow),
       ring_time_s_(kMaxWindow),
       last_measured_(static_cast<std::size_t>(channels)),
       held_rad_(static_cast<std::size_t>(channels)),
-      active_(hwy::AllocateAligned<double>(static_cast<std::size_t>(information_.stride()))),
-      speeds_(hwy::AllocateAligned<double>(static_cast<std::size_t>(kMaxWindow + 1) *
-                                           static_cast<std::size_t>(information_.stride()))),
+      active_(trajectory::make_rows(1, information_.stride())),
+      speeds_(trajectory::make_rows(kMaxWindow + 1, information_.stride())),
+      density_(trajectory::make_rows(1, information_.stride())),
       hand_speeds_(kMaxWindow + 1),
       time_s_(kMaxWindow),
       step_s_(kMaxWindow),
@@ -62,7 +65,10 @@ void AdaptiveWindow::reset() noexcept {
   frames_ = 0;
   std::ranges::fill(last_measured_, -1);
   std::ranges::fill(held_rad_, 0.0);
-  std::fill_n(active_.get(), information_.stride(), 0.0);
+  std::fill_n(active_.get(), stride(), 0.0);
+  std::fill_n(density_.get(), stride(), kDensityBase);
+  past_.forget();
+  steady_.reset();
 }
 
 // RT-safe.
@@ -88,19 +94,24 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
   const double precision = 1.0 / (noise_rad * noise_rad);
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c) {
     const bool measured = std::isfinite(measured_rad[c]);
+    // A sensor with a dead band repeats its value while the joint moves on within the band.
+    const bool repeats = last_measured_[c] >= 0 && measured_rad[c] == held_rad_[c];
     if (!measured) whole_[static_cast<std::size_t>(at)] = 0;
     if (measured) {
       if (last_measured_[c] < 0 && pushed_ > 0) adopt(c, measured_rad[c]);
-      if (last_measured_[c] >= 0 && measured_rad[c] != held_rad_[c]) active_[c] = 1.0;
+      if (last_measured_[c] >= 0 && !repeats) active_[c] = 1.0;
       held_rad_[c] = measured_rad[c];
       last_measured_[c] = pushed_;
     }
     // With zero precision, a channel that is missing in the whole window would have no value.
-    position[c] = measured ? precision : kNothing;
+    position[c] = measured ? precision / (repeats ? kRepeats : 1.0) : kNothing;
     mean[c] = position[c] * held_rad_[c];
   }
   take_sensed(at);
   ++pushed_;
+  steady_.push(
+      time_s, measured_rad,
+      {.variance_rad2 = 1.0 / precision, .density = density_.get(), .active = active_.get()});
 }
 
 // RT-safe.
@@ -124,6 +135,7 @@ void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
 void AdaptiveWindow::begin(double period_s) noexcept {
   period_s_ = period_s > 0.0 ? period_s : 1.0 / kEvenRate_hz;
   frames_ = static_cast<int>(std::min<long>(pushed_, window_frames(period_s)));
+  past_.begin(pushed_ - frames_);
   for (int i = 0; i < frames_; ++i) {
     const auto index = static_cast<std::size_t>(i);
     rows_[index] = information_.frame(slot(i));
@@ -154,7 +166,7 @@ void AdaptiveWindow::forget_extra() noexcept {
 // RT-safe.
 void AdaptiveWindow::loose_prior() noexcept {
   for (int i = 1; i + 1 < frames_; ++i) {
-    const double curve = 1.0 / (kLooseCurve * delta_delta_time_s3(i));
+    const double curve = 1.0 / (kFirstDensity * delta_delta_time_s3(i));
     std::fill_n(information_.row(slot(i), trajectory::kDelta), 2 * stride(), 0.0);
     std::fill_n(information_.row(slot(i), trajectory::kDeltaDelta), stride(), curve);
     std::fill_n(information_.row(slot(i), trajectory::kDeltaDeltaMean), stride(), 0.0);
@@ -181,33 +193,36 @@ void AdaptiveWindow::speed_prior() noexcept {
         hand_speeds_[static_cast<std::size_t>(to)] - hand_speeds_[static_cast<std::size_t>(from)];
     const double delta_s =
         0.5 * (step_s_[static_cast<std::size_t>(i)] + step_s_[static_cast<std::size_t>(i) + 1]);
-    const double curve_s3 = delta_delta_time_s3(i);
-    const kernel::Spread spread{.per_s = (1.0 - kHandShare) * per_s,
-                                .hand = active > 0.0 ? kHandShare * hand * per_s / active : 0.0,
-                                .delta_base = kDeltaBase * delta_s,
+    const kernel::Speed speed{.per_s = (1.0 - kHandShare) * per_s,
+                              .hand = active > 0.0 ? kHandShare * hand * per_s / active : 0.0};
+    const kernel::Spread spread{.delta_base = kDeltaBase * delta_s,
                                 .delta_slope = kDeltaSlope * delta_s,
-                                .delta_delta_base = kCurveBase * curve_s3,
-                                .delta_delta_slope = kCurveSlope * curve_s3};
+                                .density_base = kDensityBase,
+                                .density_slope = kDensitySlope,
+                                .delta_delta_s3 = delta_delta_time_s3(i)};
+    const kernel::Steady steady{.loose = steady_.loose(frames_ - 1 - i),
+                                .root = SteadyMotion::kDensityRoot};
     const auto row = [this](int index) {
       return speeds_.get() + static_cast<std::ptrdiff_t>(index) * stride();
     };
-    kernel::set_precision(row(from), row(to), stride(), spread,
-                          information_.row(slot(i), trajectory::kDelta),
-                          information_.row(slot(i), trajectory::kDeltaDelta));
+    kernel::set_precision(row(from), row(to), stride(), speed, spread, steady,
+                          {.delta = information_.row(slot(i), trajectory::kDelta),
+                           .delta_delta = information_.row(slot(i), trajectory::kDeltaDelta),
+                           .density = density_.get()});
   }
 }
 
 // RT-safe.
-void AdaptiveWindow::run() noexcept {
+void AdaptiveWindow::run(const trajectory::Carry& carry) noexcept {
   window_.solve({rows_.data(), static_cast<std::size_t>(frames_)}, trajectory::Boundary::kDrop,
-                even_ ? nullptr : skew_.data());
+                even_ ? nullptr : skew_.data(), carry);
 }
 
 // RT-safe.
 void AdaptiveWindow::solve_once(double period_s) noexcept {
   begin(period_s);
   loose_prior();
-  run();
+  run(past_.taken());
 }
 
 // RT-safe.
@@ -221,7 +236,7 @@ void AdaptiveWindow::solve(double period_s, InformationSource* extra) noexcept {
       extra->add(*this);
       extra_ = true;
     }
-    run();
+    run(pass + 1 < kPasses ? past_.taken() : past_.taken_and_left());
   }
   forget_extra();
 }

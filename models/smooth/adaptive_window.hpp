@@ -1,7 +1,8 @@
 // AdaptiveWindow: the windowed solve with the speed-adaptive prior (models/smooth/README.md,
 // "Speed-adaptive prior") for a row of channels; it needs no gesture model. The window is solved
 // once under a loose prior for the acceleration, then twice more under priors whose variances
-// follow the speed found by the previous solve.
+// follow the speed found by the previous solve, and are small where the motion is steady. What left
+// the window is carried on into the solve.
 //
 // Units: radians and seconds; frames may be evenly spaced or not. Hot parts are RT-safe and never
 // allocate; one thread.
@@ -11,6 +12,8 @@
 #include <span>
 #include <vector>
 
+#include "models/smooth/steady_motion.hpp"
+#include "models/trajectory/carried_past.hpp"
 #include "models/trajectory/information_form.hpp"
 #include "models/trajectory/sliding_window.hpp"
 
@@ -87,7 +90,7 @@ class AdaptiveWindow {
   void begin(double period_s) noexcept;
   void loose_prior() noexcept;
   void speed_prior() noexcept;
-  void run() noexcept;
+  void run(const trajectory::Carry& carry) noexcept;
   [[nodiscard]] double delta_delta_time_s3(int index) const noexcept;
 
   static constexpr double kNothing = 3.3e-6;  // precision of a value that was not measured [rad^-2]
@@ -101,12 +104,15 @@ class AdaptiveWindow {
   trajectory::InformationForm information_;  // ring
   std::vector<double> sensed_;  // the same ring: kPosition and kPositionMean as measured
   trajectory::SlidingWindow window_;
+  trajectory::CarriedPast past_;
+  SteadyMotion steady_;
   std::vector<std::uint8_t> whole_;             // [kMaxWindow] ring
   std::vector<double> ring_time_s_;             // [kMaxWindow]
   std::vector<long> last_measured_;             // [channels] number of the frame; -1: never
   std::vector<double> held_rad_;                // [channels] the last measured value
-  hwy::AlignedFreeUniquePtr<double[]> active_;  // [stride] 1 for channels that have ever changed
-  hwy::AlignedFreeUniquePtr<double[]> speeds_;  // [kMaxWindow + 1][stride]
+  trajectory::Rows active_;                     // [stride] 1 for channels that have ever changed
+  trajectory::Rows speeds_;                     // [kMaxWindow + 1][stride]
+  trajectory::Rows density_;                    // [stride] of the newest frames, see Prior
   std::vector<double> hand_speeds_;             // [kMaxWindow + 1]
   std::vector<double> time_s_, step_s_, skew_;  // [kMaxWindow] of the window's frames
   std::vector<const double*> rows_;             // [kMaxWindow]

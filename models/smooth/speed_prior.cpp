@@ -52,21 +52,27 @@ void sum_speeds(const double* x, int frames, int stride, const double* step_s, c
   }
 }
 
-void set_precision(const double* sum_from, const double* sum_to, int stride, const Spread& spread,
-                   double* delta, double* curve) {
+void set_precision(const double* sum_from, const double* sum_to, int stride, const Speed& speed,
+                   const Spread& spread, const Steady& steady, const Prior& out) {
   const Doubles d;
   const Vec one = hn::Set(d, 1.0);
-  const Vec hand = hn::Set(d, spread.hand);
-  const Vec per_s = hn::Set(d, spread.per_s);
+  const Vec hand = hn::Set(d, speed.hand);
+  const Vec per_s = hn::Set(d, speed.per_s);
+  const Vec tight = hn::Set(d, steady.root);
   for (int column = 0; column < stride; column += kWide) {
     const Vec passed = hn::Sub(hn::Load(d, sum_to + column), hn::Load(d, sum_from + column));
     const Vec s = hn::MulAdd(passed, per_s, hand);
+    const Vec loose = hn::Load(d, steady.loose + column);
     const Vec delta_variance =
         hn::MulAdd(hn::Set(d, spread.delta_slope), s, hn::Set(d, spread.delta_base));
-    const Vec curve_variance =
-        hn::MulAdd(hn::Set(d, spread.delta_delta_slope), s, hn::Set(d, spread.delta_delta_base));
-    hn::Store(hn::Div(one, delta_variance), d, delta + column);
-    hn::Store(hn::Div(one, curve_variance), d, curve + column);
+    const Vec density =
+        hn::MulAdd(hn::Set(d, spread.density_slope), s, hn::Set(d, spread.density_base));
+    const Vec root = hn::MulAdd(loose, hn::Sub(hn::Sqrt(hn::Sqrt(density)), tight), tight);
+    const Vec root2 = hn::Mul(root, root);
+    const Vec variance = hn::Mul(hn::Set(d, spread.delta_delta_s3), hn::Mul(root2, root2));
+    hn::Store(hn::Div(loose, delta_variance), d, out.delta + column);
+    hn::Store(hn::Div(one, variance), d, out.delta_delta + column);
+    hn::Store(density, d, out.density + column);
   }
 }
 
@@ -86,9 +92,9 @@ void sum_speeds(const double* x, int frames, int stride, const double* step_s, c
 }
 
 // RT-safe.
-void set_precision(const double* sum_from, const double* sum_to, int stride, const Spread& spread,
-                   double* delta, double* curve) noexcept {
-  HWY_DYNAMIC_DISPATCH(set_precision)(sum_from, sum_to, stride, spread, delta, curve);
+void set_precision(const double* sum_from, const double* sum_to, int stride, const Speed& speed,
+                   const Spread& spread, const Steady& steady, const Prior& out) noexcept {
+  HWY_DYNAMIC_DISPATCH(set_precision)(sum_from, sum_to, stride, speed, spread, steady, out);
 }
 
 }  // namespace posed::smooth::kernel

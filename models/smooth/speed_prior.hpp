@@ -14,15 +14,29 @@ namespace posed::smooth::kernel {
 void sum_speeds(const double* x, int frames, int stride, const double* step_s, const double* active,
                 double* sum, double* hand) noexcept;
 
-// Sets the precisions of one frame's delta and delta-delta (mean zero) to 1 / (base + slope * s),
-// where s is the mean squared speed between two rows of `sum`, mixed with the hand's mean.
-struct Spread {
+// The mean squared speed s between two rows of `sum`, mixed with the hand's mean.
+struct Speed {
   double per_s;  // 1 / time between the two rows, times the share of the channel's own speed
   double hand;   // the hand's mean squared speed, times the share of the hand
-  double delta_base, delta_slope;              // variance of the delta window, per frame
-  double delta_delta_base, delta_delta_slope;  // variance of the delta-delta window
 };
-void set_precision(const double* sum_from, const double* sum_to, int stride, const Spread& spread,
-                   double* delta, double* curve) noexcept;
+// Both base + slope * s.
+struct Spread {
+  double delta_base, delta_slope;      // variance of the delta window
+  double density_base, density_slope;  // of the acceleration
+  double delta_delta_s3;               // variance of the delta-delta window for a density of 1
+};
+// Where the motion is steady (SteadyMotion), the density becomes
+// (loose density^(1/4) + (1 - loose) root)^4 and the delta's precision is multiplied by loose.
+struct Steady {
+  const double* loose;  // [stride] 0 to 1
+  double root;          // the steady motion's density^(1/4)
+};
+// Rows of one frame.
+struct Prior {
+  double *delta, *delta_delta;  // precisions; the means are zero
+  double* density;              // as expected of the speed alone
+};
+void set_precision(const double* sum_from, const double* sum_to, int stride, const Speed& speed,
+                   const Spread& spread, const Steady& steady, const Prior& out) noexcept;
 
 }  // namespace posed::smooth::kernel

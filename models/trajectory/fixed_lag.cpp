@@ -3,22 +3,14 @@
 #include <algorithm>
 
 namespace posed::trajectory {
-namespace {
-
-hwy::AlignedFreeUniquePtr<double[]> rows(int count, int stride) {
-  return hwy::AllocateAligned<double>(static_cast<std::size_t>(count) *
-                                      static_cast<std::size_t>(stride));
-}
-
-}  // namespace
 
 FixedLag::FixedLag(int channels, int lag)
     : lag_(lag),
       recent_(channels, kOpen),
-      carry_(rows(kernel::kCarryRows, recent_.stride())),
-      x_(rows(lag + 1, recent_.stride())) {
+      carry_(make_rows(kernel::kCarryRows, recent_.stride())),
+      x_(make_rows(lag + 1, recent_.stride())) {
   const int kept = std::max(lag + 1, kOpen);
-  factor_rows_ = rows(kept * kernel::kFactorRows, stride());
+  factor_rows_ = make_rows(kept * kernel::kFactorRows, stride());
   for (int i = 0; i < kept; ++i) {
     factors_.push_back(factor_rows_.get() +
                        static_cast<std::ptrdiff_t>(i) * kernel::kFactorRows * stride());

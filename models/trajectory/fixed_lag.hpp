@@ -37,7 +37,7 @@ class FixedLag {
   long pushed_ = 0;
   InformationForm recent_;                 // ring of kOpen frames
   std::array<const double*, kOpen> tail_;  // the same frames, oldest first
-  hwy::AlignedFreeUniquePtr<double[]> carry_, factor_rows_, x_;
+  Rows carry_, factor_rows_, x_;
   std::vector<double*> factors_;  // the last frames' factors, oldest first
 };
 

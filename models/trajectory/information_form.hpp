@@ -20,6 +20,13 @@ inline constexpr int kLanes = 8;  // rows are padded to this many doubles, one c
   return (channels + kLanes - 1) / kLanes * kLanes;
 }
 
+// `count` rows of padded(channels) doubles, not initialised, 64-byte aligned.
+using Rows = hwy::AlignedFreeUniquePtr<double[]>;
+[[nodiscard]] inline Rows make_rows(int count, int stride) {
+  return hwy::AllocateAligned<double>(static_cast<std::size_t>(count) *
+                                      static_cast<std::size_t>(stride));
+}
+
 enum Row : int {
   kPosition,      // precision of the position
   kPositionMean,  // precision times mean

@@ -18,9 +18,10 @@ SlidingWindow::SlidingWindow(int channels, int max_frames)
 
 // RT-safe.
 void SlidingWindow::solve(std::span<const double* const> information, Boundary boundary,
-                          const double* skew) noexcept {
+                          const double* skew, const Carry& carry) noexcept {
   frames_ = static_cast<int>(information.size());
-  kernel::eliminate({information.data(), frames_, stride_, boundary, skew}, factors_.data());
+  kernel::eliminate({information.data(), frames_, stride_, boundary, skew, carry.in, carry.out},
+                    factors_.data());
   kernel::substitute(factors_.data(), frames_, 0, stride_, x_.get());
 }
 

@@ -1,7 +1,8 @@
 // SlidingWindow: the most likely trajectory of all channels over some frames, and its variance, in
 // one solve (models/trajectory/README.md, "Sliding window"). Nothing is kept between solves, so the
-// information may change at any time. Used by the live smoother (a window that slides and is solved
-// again) and, with many frames, for a whole label sequence. One thread.
+// information may change at any time; CarriedPast keeps what left the window. Used by the live
+// smoother (a window that slides and is solved again) and, with many frames, for a whole label
+// sequence. One thread.
 #pragma once
 
 #include <span>
@@ -12,6 +13,14 @@
 
 namespace posed::trajectory {
 
+// What the frames before a window say about it (kernel::System::carry_in), and where to put what
+// its first frame leaves for the window that begins one frame later (carry_out); either may be
+// null.
+struct Carry {
+  const double* in = nullptr;
+  double* out = nullptr;
+};
+
 class SlidingWindow {
  public:
   SlidingWindow(int channels, int max_frames);
@@ -20,7 +29,7 @@ class SlidingWindow {
   // (InformationForm::frame() of this many channels). `skew`: [frames] for uneven frames
   // (kernel::System::skew), else null. RT-safe.
   void solve(std::span<const double* const> information, Boundary boundary = Boundary::kDrop,
-             const double* skew = nullptr) noexcept;
+             const double* skew = nullptr, const Carry& carry = {}) noexcept;
 
   // Results of the last solve. [channels], padded; RT-safe.
   [[nodiscard]] const double* x(int frame) const noexcept {

@@ -33,7 +33,7 @@ using nlohmann::json;
 constexpr const char* kBenchSmoothFooter =
     R"(Without --clip the truth is a synthetic signer of 20 gestures at 60 Hz. White noise is
 added, and every baseline is tuned on the very data it is judged by; errors are rms in degrees over
-the channels that move. "Where not" is what the live stage is not made for: a glove's own dead band,
+the channels that move. "Where not" is where simple filters are strongest: a glove's own dead band,
 and slow steady ramps under noise. Costs are ratios to one bare solve of the same window in the same
 run.
 

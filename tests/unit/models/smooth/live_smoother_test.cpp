@@ -49,7 +49,7 @@ double angle_deg(const Frame& frame, int channel) {
 TEST_CASE("each frame is emitted once, with exactly the lag", "[live]") {
   const Skeleton skeleton = finished(6);
   const int lag = GENERATE(0, 1, 3, 5);
-  smooth::LiveSmoother smoother(skeleton, lagging({.frames = lag}));
+  smooth::LiveSmoother smoother(skeleton, lagging({.frames = lag}, 0.3));
   Frames out;
   for (long i = 0; i < 50; ++i) {
     const Frame frame = wave_frame(skeleton, i);
