@@ -1,4 +1,5 @@
-// What people see: the screens of `posed top` and `posed demo` on a real terminal, and their keys.
+// What people see: the screens of `posed top` and `posed calibrate` on a real terminal, and their
+// keys.
 #include <pty.h>
 #include <sys/wait.h>
 
@@ -11,6 +12,8 @@
 
 #include "tests/e2e/served.hpp"
 #include "tests/support/has.hpp"
+#include "tests/support/posing_glove.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
 namespace {
@@ -153,6 +156,27 @@ TEST_CASE("top on a terminal keeps alpha within its limits, and says when the da
   CHECK_FALSE(has(top.screen(), "LATENCY"));
   served.daemon->send(SIGCONT);
   CHECK(top.comes_to_show("LATENCY"));
+}
+
+TEST_CASE("calibrate on a terminal ends with a verdict and the calibrated hand", "[terminal]") {
+  const TempFolder folder;
+  PosingGlove glove;
+  const std::string out = (folder.path() / "ann.toml").string();
+  OnTerminal calibrate({"calibrate", "--driver", "cyberglove", "--port", glove.port(), "--user",
+                        "ann", "--seconds", "0.5", "--ready", "1", "--out", out},
+                       80, 24);
+  for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
+    REQUIRE(calibrate.comes_to_show("[" + std::string(drivers::glove::kPoseNames[p]) + "]"));
+    glove.hold(static_cast<drivers::glove::Pose>(p));
+  }
+  CHECK(calibrate.end() == 0);
+  const std::string& text = calibrate.text();
+  const std::string after = text.substr(text.rfind("\x1b[?1049l"));
+  INFO(after);
+  CHECK(has(after, "posed: good"));
+  CHECK(has(after, "\xe2\xa1"));  // a pattern of braille
+  CHECK(has(after, "    flat           fist           thumb         spread    "));
+  CHECK(has(after, "sensors calibrated: "));
 }
 
 }  // namespace posed::test

@@ -42,7 +42,7 @@ struct Column {
   std::function<const char*(const v1::StreamStats&)> colour = nullptr;
 };
 
-std::string cell(const Column& column, const std::string& text) {
+std::string fitted(const Column& column, const std::string& text) {
   if (column.width == 0) return text;
   return column.right ? fmt::format("{:>{}}", cut(text, column.width), column.width)
                       : fmt::format("{:<{}}", cut(text, column.width), column.width);
@@ -128,7 +128,8 @@ std::string row_of(const std::vector<Column>& columns, const LiveTableOptions& o
   for (const Column& column : columns) {
     if (&column != &columns.front()) row += " ";
     const char* const colour = column.colour ? column.colour(stream) : chosen ? kBold : "";
-    row += paint(options.colour, options.silent ? kDim : colour, cell(column, column.text(stream)));
+    row +=
+        paint(options.colour, options.silent ? kDim : colour, fitted(column, column.text(stream)));
   }
   return options.width == 0 ? row.substr(0, row.find_last_not_of(' ') + 1) : row;
 }
@@ -156,7 +157,7 @@ std::vector<std::string> live_table(const v1::Stats& stats, const LiveTableOptio
   const std::vector<Column> columns = columns_of(stats, options);
   std::string heading = options.chosen.empty() ? "" : "  ";
   for (const Column& column : columns) {
-    heading += (&column == &columns.front() ? "" : " ") + cell(column, column.title);
+    heading += (&column == &columns.front() ? "" : " ") + fitted(column, column.title);
   }
   if (options.width > 0) heading = cut(heading, options.width);
   std::vector<std::string> lines{paint(options.colour, kDim, heading)};
