@@ -158,6 +158,21 @@ TEST_CASE("top on a terminal keeps alpha within its limits, and says when the da
   CHECK(top.comes_to_show("LATENCY"));
 }
 
+TEST_CASE("top on a terminal says why alpha stays", "[terminal]") {
+  Served served;
+  served.start();
+  OnTerminal watching({"top", "--connect", served.publish}, 80, 24);
+  REQUIRE(watching.comes_to_show("> walker "));
+  CHECK_FALSE(has(watching.screen(), "left/right"));
+  watching.press(kRightKey);
+  CHECK(watching.comes_to_show("add --control, "));
+  OnTerminal lost({"top", "--connect", served.publish, "--control", "tcp://127.0.0.1:9"}, 80, 24);
+  REQUIRE(lost.comes_to_show("> walker "));
+  lost.press(kRightKey);
+  CHECK(lost.comes_to_show("alpha stays: "));
+  CHECK(lost.comes_to_show("tcp://127.0.0.1:9"));
+}
+
 TEST_CASE("calibrate on a terminal ends with a verdict and the calibrated hand", "[terminal]") {
   const TempFolder folder;
   PosingGlove glove;

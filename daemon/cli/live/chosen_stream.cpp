@@ -19,6 +19,7 @@ namespace {
 constexpr std::size_t kSecondsKept = 60;
 constexpr int kFigureColumns = 36, kFewestRows = 6, kMostRows = 16;
 constexpr double kMaxAlpha = 2.0, kAlphaStep = 0.1;
+constexpr std::chrono::seconds kAnswerWithin{3};  // with an answer
 
 }  // namespace
 
@@ -29,16 +30,22 @@ const v1::StreamStats* ChosenStream::stats_of(const v1::Stats& stats) const {
   return nullptr;
 }
 
-void ChosenStream::follow(const std::string& stream) {
-  const auto subscribe = [&](int option, const std::string& name) {
-    for (const char* kind : {"skeleton/", "pose/"}) {
-      static_cast<void>(net::set_option(data_.socket(), option, kind + name));
-    }
-  };
+void ChosenStream::subscribe(int option, const std::string& stream) const {
+  for (const char* kind : {"skeleton/", "pose/"}) {
+    static_cast<void>(net::set_option(data_.socket(), option, kind + stream));
+  }
+}
+
+void ChosenStream::unfollow() {
   if (figure_) subscribe(ZMQ_UNSUBSCRIBE, figure_->stream());
+  figure_.reset();
+  asked_alpha_.reset();
+}
+
+void ChosenStream::follow(const std::string& stream) {
+  unfollow();
   subscribe(ZMQ_SUBSCRIBE, stream);
   figure_.emplace(stream);
-  asked_alpha_.reset();
 }
 
 void ChosenStream::take(const v1::Stats& stats) {
@@ -54,7 +61,7 @@ void ChosenStream::take(const v1::Stats& stats) {
   });
   const v1::StreamStats* chosen = stats_of(stats);
   if (chosen == nullptr && stats.stream_size() > 0) follow(stats.stream(0).stream());
-  if (chosen == nullptr && stats.stream_size() == 0) figure_.reset();
+  if (chosen == nullptr && stats.stream_size() == 0) unfollow();
   asked_alpha_.reset();
 }
 
@@ -86,6 +93,10 @@ void ChosenStream::change_alpha(const v1::Stats& stats, double by) {
     note_ = clean_name(chosen->stream()) + " has no style stage, so it has no alpha";
     return;
   }
+  if (control_options_.endpoint.empty()) {
+    note_ = "add --control, with the daemon's control endpoint, to change alpha from here";
+    return;
+  }
   if (!control_) {
     auto opened = Connection::open(control_options_, ZMQ_DEALER);
     if (!opened) {
@@ -95,32 +106,50 @@ void ChosenStream::change_alpha(const v1::Stats& stats, double by) {
     control_.emplace(std::move(*opened));
   }
   const double now = asked_alpha_.value_or(chosen->alpha_target());
-  const double wanted = std::clamp(std::round((now + by) * 10.0) / 10.0, -kMaxAlpha, kMaxAlpha);
+  ask(chosen->stream(), std::clamp(std::round((now + by) * 10.0) / 10.0, -kMaxAlpha, kMaxAlpha));
+}
+
+void ChosenStream::ask(const std::string& stream, double alpha) {
   v1::ControlRequest request;
   auto& set = *request.mutable_set_parameter();
-  set.set_stream(chosen->stream());
+  set.set_stream(stream);
   set.set_name("alpha");
-  set.set_number(wanted);
+  set.set_number(alpha);
   if (net::send_part(control_->socket(), request.SerializeAsString(), false)) {
-    asked_alpha_ = wanted;
+    asked_alpha_ = alpha;
+    if (!asked_at_) asked_at_ = std::chrono::steady_clock::now();
   } else {
     note_ = "the request for another alpha cannot be sent to " + control_options_.endpoint;
   }
 }
 
-std::optional<std::string> ChosenStream::note() {
-  if (control_ && !note_) {
-    if (const auto refused = control_->refusal()) note_ = refused->text();
-    net::Message message;
-    if (message.receive(control_->socket())) {
-      v1::ControlReply reply;
-      const auto bytes = message.bytes();
-      const bool sound = reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-      if (!sound || !reply.ok()) {
-        note_ = "alpha stays: " + (sound ? clean(reply.error()) : "the answer cannot be read");
-      }
+// A connection without an answer is closed, so that no old request takes effect when the daemon is
+// back.
+void ChosenStream::read_answer() {
+  net::Message message;
+  if (message.receive(control_->socket())) {
+    asked_at_.reset();
+    v1::ControlReply reply;
+    const auto bytes = message.bytes();
+    const bool sound = reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+    if (!sound || !reply.ok()) {
+      note_ = "alpha stays: " + (sound ? clean(reply.error()) : "the answer cannot be read");
+      asked_alpha_.reset();
     }
+    return;
   }
+  std::optional<Error> failed = control_->refusal();
+  const bool late = asked_at_ && std::chrono::steady_clock::now() - *asked_at_ > kAnswerWithin;
+  if (!failed && late) failed = control_->no_answer();
+  if (!failed) return;
+  note_ = "alpha stays: " + failed->text();
+  control_.reset();
+  asked_at_.reset();
+  asked_alpha_.reset();
+}
+
+std::optional<std::string> ChosenStream::note() {
+  if (control_ && !note_) read_answer();
   return std::exchange(note_, std::nullopt);
 }
 
@@ -146,7 +175,7 @@ std::vector<std::string> ChosenStream::lines(const v1::Stats& stats, int columns
     out.push_back(std::move(line));
   }
   std::string keys = stats.stream_size() > 1 ? "up/down: stream   " : "";
-  if (has_alpha(*chosen)) keys += "left/right: alpha   ";
+  if (has_alpha(*chosen) && !control_options_.endpoint.empty()) keys += "left/right: alpha   ";
   const int figure_rows = std::min(rows - static_cast<int>(out.size()) - 1, kMostRows);
   if (figure_rows >= kFewestRows) {
     for (std::string& row : figure_->lines(std::min(columns, kFigureColumns), figure_rows)) {

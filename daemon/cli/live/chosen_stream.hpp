@@ -2,10 +2,10 @@
 // its latency over the last minute, and its alpha, which the keys change.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <deque>
 #include <map>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -26,7 +26,7 @@ namespace posed::cli {
 class ChosenStream {
  public:
   // `data` is the connection that receives the daemon's messages; it outlives the object.
-  // `control`: where changes of alpha go.
+  // `control`: where changes of alpha go; without an endpoint alpha cannot be changed.
   ChosenStream(const Connection& data, ClientOptions control)
       : data_(data), control_options_(std::move(control)) {}
 
@@ -48,9 +48,13 @@ class ChosenStream {
   [[nodiscard]] std::vector<std::string> lines(const v1::Stats& stats, int columns, int rows);
 
  private:
+  void subscribe(int option, const std::string& stream) const;
   void follow(const std::string& stream);
+  void unfollow();
   void choose(const v1::Stats& stats, int step);
   void change_alpha(const v1::Stats& stats, double by);
+  void ask(const std::string& stream, double alpha);
+  void read_answer();
   [[nodiscard]] std::string latency_line(const std::string& stream, int columns) const;
   [[nodiscard]] const v1::StreamStats* stats_of(const v1::Stats& stats) const;
 
@@ -58,8 +62,9 @@ class ChosenStream {
   ClientOptions control_options_;
   std::optional<Connection> control_;
   std::optional<StreamFigure> figure_;
-  std::map<std::string, std::deque<double>> latency_us_;  // p99 of each second, by stream
-  std::optional<double> asked_alpha_;                     // not yet in the stats
+  std::map<std::string, std::deque<double>> latency_us_;           // p99 of each second, by stream
+  std::optional<double> asked_alpha_;                              // not yet in the stats
+  std::optional<std::chrono::steady_clock::time_point> asked_at_;  // not answered yet
   std::optional<std::string> note_;
 };
 

@@ -23,12 +23,14 @@ namespace posed::cli {
 namespace {
 
 constexpr std::size_t kNotesKept = 50;
+constexpr const char* kOwnDaemon = "tcp://127.0.0.1:5570";
+constexpr const char* kOwnControl = "tcp://127.0.0.1:5571";
 
 constexpr std::chrono::milliseconds kFigurePeriod{100};
 
 struct TopOptions {
   ClientOptions client;
-  std::string control;  // endpoint; the keys are those of `client`
+  std::string control;  // endpoint, or empty; the keys are those of `client`
   int count = 0;
   double timeout_s = 0.0;
   bool json = false;
@@ -162,14 +164,18 @@ Result<> top(const TopOptions& options) {
 void add_top(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("top", "Watch a running daemon: rates, stage times, drops");
   auto options = std::make_shared<TopOptions>();
-  add_client_options(*command, options->client, "tcp://127.0.0.1:5570");
+  add_client_options(*command, options->client, kOwnDaemon);
   command->add_option("--count", options->count, "End after so many updates (one a second)")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
-  command->add_option("--control", options->control, "Where the keys that change alpha send to")
-      ->default_val("tcp://127.0.0.1:5571");
+  auto* const control =
+      command->add_option("--control", options->control,
+                          std::string("The daemon's control endpoint, to change alpha (default: ") +
+                              kOwnControl + " for the daemon of this computer, otherwise none)");
+  control->type_name("ENDPOINT");
   add_timeout_option(*command, options->timeout_s);
-  command->add_flag("--json", options->json, "One proto3 JSON object (posed.v1.Stats) a line");
+  command->add_flag("--json", options->json, "One proto3 JSON object (posed.v1.Stats) a line")
+      ->excludes(control);
   command->footer(std::string(R"(Examples:
   posed top
   posed top --connect tcp://127.0.0.1:5570 --count 1 | cat
@@ -180,6 +186,10 @@ took at most this. When stdout is no terminal it prints plain lines. A daemon th
 shown in red with the time since then, and values that may be outdated are hidden.
 )") + kColumnsHelp);
   command->callback([options, &exit_code] {
+    // Another daemon's streams may have the same names.
+    if (options->control.empty() && options->client.endpoint == kOwnDaemon) {
+      options->control = kOwnControl;
+    }
     if (auto done = top(*options); !done) exit_code = report(done.error());
   });
 }
