@@ -33,9 +33,13 @@ class TaskRunner {
   // asked to stop. A task's exception reaches the caller.
   [[nodiscard]] virtual std::optional<std::vector<TaskResult>> run(
       std::size_t count, const Task& task, const TaskProgress& progress) = 0;
+
+  // Whether `progress` has asked to stop. A task that takes seconds looks at it from time to time
+  // and may then return anything; any thread may ask.
+  [[nodiscard]] virtual bool stopping() const { return false; }
 };
 
-// One after another on the caller's thread.
+// One after another on the caller's thread, so a stop waits for the end of a task.
 class SerialTasks final : public TaskRunner {
  public:
   [[nodiscard]] std::optional<std::vector<TaskResult>> run(std::size_t count, const Task& task,

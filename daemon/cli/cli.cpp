@@ -26,6 +26,16 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_emulate, add_keygen, add_completion, add_bench,
 });
 
+constexpr const char* kMpiFooter = R"(Examples:
+  mpirun -n 8 posed-mpi train style --experiment styles.toml --out styles.style
+  mpirun --hostfile hosts --map-by node --bind-to none posed-mpi train style ...
+
+All ranks read the same files (a shared folder, or copies) and must be the same build on CPUs of
+the same kind; what differs is named, and nothing is written. The model is the same file, bit for
+bit, as that of `posed train`, whatever the number of ranks and threads. A rank has as many threads
+as its share of the machine's cores, at most those that mpirun binds it to (--bind-to none: all).
+Rank 0 prints and writes.)";
+
 // Whether the reader of stdout has gone (`posed monitor | head`).
 bool reader_of_stdout_has_gone() {
   pollfd out{.fd = STDOUT_FILENO, .events = 0, .revents = 0};
@@ -43,14 +53,12 @@ int with_stdout_written(int exit_code) {
       fail("the output cannot be written to stdout" + why + "; it is not complete").error());
 }
 
-int parse_and_run(int argc, char** argv) {
+// `exit_code` is what the command stores.
+int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
   // Untrusted bytes are refused with posed's own messages; protobuf would print a line for each.
   google::protobuf::SetLogHandler(nullptr);
-  CLI::App app{"posed: live poses in, another style out", "posed"};
-  app.set_version_flag("--version", "posed " POSED_VERSION);
+  app.set_version_flag("--version", app.get_name() + " " POSED_VERSION);
   app.require_subcommand(1);
-  int exit_code = 0;
-  for (const AddCommand add : kCommands) add(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -70,7 +78,20 @@ int report(const Error& error) {
 int main_of(int argc, char** argv) {
   logging::protect_standard_descriptors();
   const logging::LogOutput log;
-  return with_stdout_written(parse_and_run(argc, argv));
+  CLI::App app{"posed: live poses in, another style out", "posed"};
+  int exit_code = 0;
+  for (const AddCommand add : kCommands) add(app, exit_code);
+  return with_stdout_written(parse_and_run(argc, argv, app, exit_code));
+}
+
+int train_main_of(int argc, char** argv, const std::shared_ptr<Ranks>& ranks) {
+  logging::protect_standard_descriptors();
+  const logging::LogOutput log;
+  CLI::App app{"posed-mpi: posed train on the cores of many machines", "posed-mpi"};
+  app.footer(kMpiFooter);
+  int exit_code = 0;
+  add_train_for(app, exit_code, ranks);
+  return with_stdout_written(parse_and_run(argc, argv, app, exit_code));
 }
 
 }  // namespace posed::cli

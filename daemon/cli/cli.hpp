@@ -3,6 +3,7 @@
 // daemon/cli/<folder>/<name>.cpp, declare it here, list it in cli.cpp.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "proto/frame/result.hpp"
@@ -13,9 +14,14 @@ class App;
 
 namespace posed::cli {
 
+class Ranks;
+
 // Parses the arguments and runs the command; returns the process's exit code (0 done, 1 failed, 2
 // wrong use).
 [[nodiscard]] int main_of(int argc, char** argv);
+
+// The same for `posed-mpi`, which has `train` only: `ranks` train together.
+[[nodiscard]] int train_main_of(int argc, char** argv, const std::shared_ptr<Ranks>& ranks);
 
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.
 [[nodiscard]] int report(const Error& error);
@@ -38,8 +44,9 @@ void add_keygen(CLI::App& app, int& exit_code);
 void add_emulate(CLI::App& app, int& exit_code);
 void add_completion(CLI::App& app, int& exit_code);
 void add_train(CLI::App& app, int& exit_code);
-void add_train_gesture(CLI::App& train, int& exit_code);
-void add_train_style(CLI::App& train, int& exit_code);
+void add_train_for(CLI::App& app, int& exit_code, const std::shared_ptr<Ranks>& ranks);
+void add_train_gesture(CLI::App& train, int& exit_code, const std::shared_ptr<Ranks>& ranks);
+void add_train_style(CLI::App& train, int& exit_code, const std::shared_ptr<Ranks>& ranks);
 void add_apply(CLI::App& app, int& exit_code);
 void add_smooth(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app, int& exit_code);

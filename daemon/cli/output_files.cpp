@@ -7,8 +7,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "proto/clip/text.hpp"
-
 namespace posed::cli {
 namespace {
 
@@ -55,7 +53,7 @@ Result<> check_place(const fs::path& path) {
 
 }  // namespace
 
-bool is_amc(const fs::path& path) { return clip::lower(path.extension().string()) == ".amc"; }
+bool is_amc(const fs::path& path) { return clip::extension_of(path) == ".amc"; }
 
 CLI::Option* add_overwrite_option(CLI::App& command, bool& overwrite) {
   return command.add_flag("--overwrite", overwrite, "Replace files that are there already");
@@ -89,7 +87,7 @@ Result<> OutputFiles::check() const {
 }
 
 Result<> OutputFiles::check(const Output& output) const {
-  const std::string extension = clip::lower(output.path.extension().string());
+  const std::string extension = clip::extension_of(output.path);
   const bool right = std::ranges::find(output.extensions, extension) != output.extensions.end();
   const bool other = std::ranges::find(kFormats, extension) != kFormats.end();
   if (!right && (output.strict || other)) {

@@ -22,6 +22,7 @@ const char* name_of(log::GapRow::Kind kind) { return kKindNames[static_cast<std:
 void LogWriterLoop::count_lost(Tally& tally, std::uint64_t count) {
   tally.lost += count;
   if (tally.kind == GapKind::kChunks) lost_to_errors_ += count;
+  if (tally.kind == GapKind::kFrames) lost_frames_ += count;
 }
 
 // Everything written since the last commit is lost. The writer is closed, too, because after an I/O
@@ -92,6 +93,7 @@ void LogWriterLoop::report_overflows(std::int64_t now_ns) {
     const std::uint64_t total = tally.in_rings->total.load(std::memory_order_relaxed);
     const std::uint64_t news = total - std::exchange(tally.reported, total);
     if (news == 0) return;
+    if (tally.kind == GapKind::kFrames) lost_frames_ += news;
     const std::string text = "the recorder's ring was full: the log lacks " + std::to_string(news) +
                              " " + name_of(tally.kind);
     spdlog::warn("{}", text);

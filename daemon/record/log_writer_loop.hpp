@@ -45,8 +45,10 @@ class LogWriterLoop {
   // Call after the producers have stopped: writes the rest and leaves a single file.
   [[nodiscard]] Result<> finish(std::int64_t now_ns);
 
-  // Any thread. The number of chunks missing in the log, and of failed attempts to write.
+  // Any thread. The number of chunks missing in the log, of published frames that it should have,
+  // and of failed attempts to write.
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept;
+  [[nodiscard]] std::uint64_t lost_frames() const noexcept { return lost_frames_.load(); }
   [[nodiscard]] std::uint64_t errors() const noexcept { return errors_.load(); }
 
  private:
@@ -131,7 +133,7 @@ class LogWriterLoop {
   std::int64_t retry_after_ns_ = 0;  // grows while attempts fail
   std::int64_t resumed_ns_ = kNoTime_ns / 2;
   std::atomic<std::uint64_t> errors_{0};
-  std::atomic<std::uint64_t> lost_to_errors_{0};
+  std::atomic<std::uint64_t> lost_to_errors_{0}, lost_frames_{0};
 };
 
 }  // namespace posed::record

@@ -60,6 +60,7 @@ class Recorder {
   // Any thread.
   [[nodiscard]] std::optional<pipeline::Take> running_take() const { return rings_.running_take(); }
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return log_writer_.lost_chunks(); }
+  [[nodiscard]] std::uint64_t lost_frames() const noexcept { return log_writer_.lost_frames(); }
   [[nodiscard]] std::uint64_t errors() const noexcept { return log_writer_.errors(); }
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }
 

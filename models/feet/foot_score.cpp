@@ -35,6 +35,13 @@ struct FootPoints {
   OfPoints<bool> known{};  // points of a leg that is not measured are none
 };
 
+// Reorders the values, of which there is one at least.
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
 double over_ground_m(const Eigen::Vector3d& step_m) { return std::hypot(step_m.x(), step_m.z()); }
 
 }  // namespace
@@ -87,6 +94,28 @@ std::optional<double> sink_m(const motion::Motion& source, const motion::Motion&
   return std::max(0.0, sunk_m);
 }
 
+std::optional<double> below_standing_m(const motion::Motion& motion) {
+  const auto legs = Legs::find(*motion.skeleton);
+  if (!legs || motion.size() < 2) return std::nullopt;
+  std::vector<double> standing_m;
+  double lowest_m = std::numeric_limits<double>::infinity();
+  FootPoints before(*legs, motion.frames[0]);
+  for (const Frame& frame : motion.frames) {
+    const FootPoints now(*legs, frame);
+    for (std::size_t leg = 0; leg < kLegs; ++leg) {
+      if (!now.known[leg][kToe]) continue;
+      const Eigen::Vector3d& toe_m = now.at_m(leg, kToe);
+      lowest_m = std::min(lowest_m, toe_m.y());
+      if (&frame == motion.frames.data() || !before.known[leg][kToe]) continue;
+      const double speed_m_s = (toe_m - before.at_m(leg, kToe)).norm() * motion.rate_hz;
+      if (speed_m_s < kStill_m_s) standing_m.push_back(toe_m.y());
+    }
+    before = now;
+  }
+  if (standing_m.empty()) return std::nullopt;
+  return std::max(0.0, median(standing_m) - lowest_m);
+}
+
 double root_speed_m_s(const motion::Motion& motion, double period_s) {
   const int apart = std::max(1, static_cast<int>(std::lround(period_s * motion.rate_hz)));
   std::vector<double> far_m;
@@ -95,9 +124,7 @@ double root_speed_m_s(const motion::Motion& motion, double period_s) {
                                   root_of(motion.frames[static_cast<std::size_t>(t - apart)])));
   }
   if (far_m.empty()) return 0.0;
-  const auto middle = far_m.begin() + std::ssize(far_m) / 2;
-  std::ranges::nth_element(far_m, middle);
-  return *middle * motion.rate_hz / apart;
+  return median(far_m) * motion.rate_hz / apart;
 }
 
 }  // namespace posed::feet

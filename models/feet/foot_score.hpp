@@ -18,6 +18,11 @@ namespace posed::feet {
 [[nodiscard]] std::optional<double> sink_m(const motion::Motion& source,
                                            const motion::Motion& moved);
 
+// How far the lowest toe of a motion is below the height at which its toes stand: the median over
+// the frames in which they are slower than 0.1 m/s [m]. Empty where none stands or the skeleton has
+// no toes.
+[[nodiscard]] std::optional<double> below_standing_m(const motion::Motion& motion);
+
 // Speed of the root over the ground [m/s]: the median of how far it gets within `period_s`, a
 // stride, over that time; so neither its sway nor a stand at either end counts. 0 for a clip that
 // is shorter.

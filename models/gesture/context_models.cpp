@@ -3,15 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <tuple>
 
 #include "models/gesture/embedded.hpp"
+#include "models/task_numbers.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::gesture {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kFloorShare = 0.01;           // of each feature's variance over all recordings
@@ -31,6 +34,37 @@ struct ByIndices {
   }
 };
 
+void write(const StateModel& model, NumberWriter& numbers) {
+  numbers.add(model.mean).add(model.variance).add(model.stay);
+}
+
+StateModel model_from(NumberReader& numbers) {
+  StateModel model;
+  model.mean = numbers.matrix();
+  model.variance = numbers.matrix();
+  model.stay = numbers.vector();
+  return model;
+}
+
+void write(const Statistics& sums, NumberWriter& numbers) {
+  numbers.add(sums.occupancy).add(sums.first).add(sums.second).add(sums.stays);
+  numbers.add(sums.duration_first).add(sums.duration_second);
+  numbers.add(sums.examples).add(sums.log_likelihood);
+}
+
+Statistics statistics_from(NumberReader& numbers) {
+  Statistics sums;
+  sums.occupancy = numbers.vector();
+  sums.first = numbers.matrix();
+  sums.second = numbers.matrix();
+  sums.stays = numbers.vector();
+  sums.duration_first = numbers.vector();
+  sums.duration_second = numbers.vector();
+  sums.examples = numbers.number();
+  sums.log_likelihood = numbers.number();
+  return sums;
+}
+
 class Trainer {
  public:
   Trainer(const std::vector<Recording>& recordings, const std::vector<Label>& labels,
@@ -48,28 +82,33 @@ class Trainer {
   }
 
   bool train_isolated() {
-    for (std::size_t label = 0; label < label_models_.size(); ++label) {
-      if (!report_progress(0.5 * static_cast<double>(label) /
-                           static_cast<double>(label_models_.size()))) {
-        return false;
-      }
-      train_label(static_cast<int>(label));
+    const auto labels = label_models_.size();
+    const auto of_labels = run(labels, 0.0, 0.5, [this](std::size_t l) { return label_task(l); });
+    if (!of_labels) return false;
+    for (std::size_t l = 0; l < labels; ++l) {
+      NumberReader numbers((*of_labels)[l]);
+      if (!numbers.at_end()) label_models_[l] = model_from(numbers);
     }
+    const auto contexts = out_.contexts.size();
+    const auto of_contexts =
+        run(contexts, 0.5, 1.0, [this](std::size_t c) { return context_task(c); });
+    if (!of_contexts) return false;
     out_.log_likelihood = 0.0;
-    for (std::size_t c = 0; c < out_.contexts.size(); ++c) {
-      if (!report_progress(0.5 + 0.5 * static_cast<double>(c) /
-                                     static_cast<double>(out_.contexts.size()))) {
-        return false;
-      }
-      train_context(c);
+    for (std::size_t c = 0; c < contexts; ++c) {
+      NumberReader numbers((*of_contexts)[c]);
+      out_.sums[c] = statistics_from(numbers);
+      out_.log_likelihood += out_.sums[c].log_likelihood;
+      if (!numbers.at_end()) context_models_[c] = model_from(numbers);
     }
     return true;
   }
 
   bool train_embedded() {
     for (int round = 0; round < options_.embedded_rounds; ++round) {
-      if (!report_progress(1.0)) return false;
-      embedded_round();
+      const auto parts = run(recordings_.size(), 1.0, 1.0,
+                             [this](std::size_t recording) { return embedded_task(recording); });
+      if (!parts) return false;
+      embedded_round(*parts);
     }
     return true;
   }
@@ -77,8 +116,13 @@ class Trainer {
   ContextModels finish() { return std::move(out_); }
 
  private:
-  bool report_progress(double fraction) const {
-    return !options_.progress || options_.progress(fraction);
+  // Runs tasks whose progress goes from one fraction of the whole to another.
+  std::optional<std::vector<TaskResult>> run(std::size_t count, double from, double to,
+                                             const Task& task) const {
+    return options_.tasks->run(count, task, [&](std::size_t done) {
+      const double share = static_cast<double>(done) / static_cast<double>(count);
+      return !options_.progress || options_.progress(from + (to - from) * share);
+    });
   }
 
   void list_examples(const std::vector<Label>& labels) {
@@ -150,26 +194,31 @@ class Trainer {
     return frames;
   }
 
-  void train_label(int label) {
-    const auto frames =
-        frames_where([&](int context) { return out_.contexts[context].current == label; });
-    if (frames.empty()) return;
+  // The model of a label; nothing where it was not recorded.
+  [[nodiscard]] TaskResult label_task(std::size_t label) const {
+    const auto frames = frames_where(
+        [&](int context) { return out_.contexts[context].current == static_cast<int>(label); });
+    if (frames.empty()) return {};
     StateModel model = estimate(flat_start(frames, kStates), out_.floor, {});
     for (int round = 0; round < options_.segmental_rounds; ++round) {
       model = estimate(align_hard(frames, model), out_.floor, model);
     }
     const Fit fit = baum_welch(frames, std::move(model), options_.rounds, out_.floor);
-    label_models_[label] = estimate(fit.sums, out_.floor, fit.model);
+    NumberWriter numbers;
+    write(estimate(fit.sums, out_.floor, fit.model), numbers);
+    return numbers.take();
   }
 
-  void train_context(std::size_t c) {
+  // The statistics of a context and, where it has enough examples, its own model.
+  [[nodiscard]] TaskResult context_task(std::size_t c) const {
     const auto frames = frames_where([&](int context) { return context == static_cast<int>(c); });
     const StateModel& start = label_models_[out_.contexts[c].current];
     const bool few = static_cast<double>(frames.size()) < kOwnModelFrom;
-    Fit fit = baum_welch(frames, start, few ? 0 : options_.rounds, out_.floor);
-    out_.log_likelihood += fit.sums.log_likelihood;
-    out_.sums[c] = std::move(fit.sums);
-    if (!few) context_models_[c] = estimate(out_.sums[c], out_.floor, fit.model);
+    const Fit fit = baum_welch(frames, start, few ? 0 : options_.rounds, out_.floor);
+    NumberWriter numbers;
+    write(fit.sums, numbers);
+    if (!few) write(estimate(fit.sums, out_.floor, fit.model), numbers);
+    return numbers.take();
   }
 
   [[nodiscard]] const StateModel& model_of(int context) const {
@@ -177,29 +226,45 @@ class Trainer {
     return own.stay.size() > 0 ? own : label_models_[out_.contexts[context].current];
   }
 
-  void embedded_round() {
+  // Where each segment of a recording lies: the log likelihood, then the arguments of TakePart.
+  [[nodiscard]] TaskResult embedded_task(std::size_t r) const {
+    const Recording& recording = recordings_[r];
+    std::vector<const StateModel*> models;
+    for (const Example& example : examples_) {
+      if (example.recording == r) models.push_back(&model_of(example.context));
+    }
+    const int slack = static_cast<int>(std::lround(options_.embedded_slack_s * recording.rate_hz));
+    NumberWriter parts;
+    const double log_likelihood = align_embedded(
+        features_[r], recording.segments, models, slack,
+        [&](std::size_t segment, Index first, const MatrixXd& gamma, const VectorXd& stays) {
+          parts.add(static_cast<double>(segment)).add(static_cast<double>(first));
+          parts.add(gamma).add(stays);
+        });
+    return parts.add(log_likelihood).take();
+  }
+
+  // Adds up in the order of recordings and segments, whoever aligned them.
+  void embedded_round(const std::vector<TaskResult>& parts) {
     const Index dims = out_.floor.size();
     std::vector<Statistics> contexts(out_.contexts.size(), Statistics(kStates, dims));
     std::vector<Statistics> labels(label_models_.size(), Statistics(kStates, dims));
     out_.log_likelihood = 0.0;
-    auto example = examples_.cbegin();
+    auto first = examples_.cbegin();
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
-      const Recording& recording = recordings_[r];
-      const auto first = example;
-      std::vector<const StateModel*> models;
-      for (; example != examples_.cend() && example->recording == r; ++example) {
-        models.push_back(&model_of(example->context));
+      NumberReader numbers(parts[r]);
+      for (std::size_t s = 0; s < recordings_[r].segments.size(); ++s) {
+        const Index segment = numbers.index();
+        const Index from = numbers.index();
+        const MatrixXd gamma = numbers.matrix();
+        const VectorXd stays = numbers.vector();
+        const Frames frames = features_[r].middleRows(from, gamma.rows());
+        const int context = first[segment].context;
+        contexts[context].add(frames, gamma, stays);
+        labels[out_.contexts[context].current].add(frames, gamma, stays);
       }
-      const int slack =
-          static_cast<int>(std::lround(options_.embedded_slack_s * recording.rate_hz));
-      out_.log_likelihood +=
-          align_embedded(features_[r], recording.segments, models, slack,
-                         [&](std::size_t segment, const Frames& frames,
-                             const Eigen::MatrixXd& gamma, const VectorXd& stays) {
-                           const int context = first[static_cast<std::ptrdiff_t>(segment)].context;
-                           contexts[context].add(frames, gamma, stays);
-                           labels[out_.contexts[context].current].add(frames, gamma, stays);
-                         });
+      out_.log_likelihood += numbers.number();
+      first += std::ssize(recordings_[r].segments);
     }
     for (std::size_t l = 0; l < labels.size(); ++l) {
       if (labels[l].examples > 0.0) {

@@ -10,12 +10,14 @@
 #include "models/gesture/estimate.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/recording.hpp"
+#include "models/tasks.hpp"
 
 namespace posed::gesture {
 
 struct ContextOptions {
   int segmental_rounds, rounds, embedded_rounds;
   double embedded_slack_s;
+  TaskRunner* tasks;                              // labels, contexts and recordings are its tasks
   std::function<bool(double fraction)> progress;  // returning false stops
 };
 

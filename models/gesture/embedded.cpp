@@ -43,7 +43,7 @@ class Chain {
       for (int t = from; t < to; ++t) {
         gamma.row(t - from) = posterior.gamma.row(t).segment(column(s, t), kStates);
       }
-      take(first_ + s, rows(from, to), gamma, posterior.stays.segment(s * kStates, kStates));
+      take(first_ + s, begin_ + from, gamma, posterior.stays.segment(s * kStates, kStates));
     }
     return posterior.log_likelihood;
   }

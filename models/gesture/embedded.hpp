@@ -11,9 +11,9 @@
 
 namespace posed::gesture {
 
-// Receives the frames that one segment was aligned with, their state probabilities and expected
-// stays.
-using TakePart = std::function<void(std::size_t segment, const Frames& frames,
+// Receives the first of the frames that one segment was aligned with, the state probabilities of
+// each of them, and the expected stays.
+using TakePart = std::function<void(std::size_t segment, Eigen::Index first_frame,
                                     const Eigen::MatrixXd& gamma, const Eigen::VectorXd& stays)>;
 
 // `models` has one model per segment; a border moves by at most `slack` frames. Segments that do

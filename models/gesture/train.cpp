@@ -149,11 +149,10 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   if (auto marked = mark_trained(recordings, model.labels); !marked) {
     return std::unexpected(marked.error());
   }
-  ContextOptions context_options{options.segmental_rounds,
-                                 options.rounds,
-                                 options.embedded_rounds,
-                                 options.embedded_slack_s,
-                                 {}};
+  SerialTasks serial;
+  TaskRunner& tasks = options.tasks != nullptr ? *options.tasks : serial;
+  ContextOptions context_options{options.segmental_rounds, options.rounds, options.embedded_rounds,
+                                 options.embedded_slack_s, &tasks,         {}};
   if (options.progress) {
     context_options.progress = [&](double fraction) {
       return options.progress("aligning gestures", kTreesFrom * fraction);

@@ -10,6 +10,7 @@
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/questions.hpp"
 #include "models/gesture/recording.hpp"
+#include "models/tasks.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::gesture {
@@ -21,6 +22,7 @@ struct TrainOptions {
   int embedded_rounds = 0;        // over whole recordings, for labels with imprecise borders
   double embedded_slack_s = 0.5;  // how far a border may then move from its label
   double mdl_factor = 1.0;        // factor on the trees' stopping threshold
+  TaskRunner* tasks = nullptr;    // not owned; null: one task after another
   // Called with the step and how much of it is done; false stops the training.
   std::function<bool(std::string_view step, double fraction)> progress;
 };

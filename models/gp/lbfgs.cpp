@@ -158,6 +158,7 @@ LbfgsResult lbfgs_minimise(const Objective& objective, VectorXd x0, const LbfgsO
         now.gradient.lpNorm<Eigen::Infinity>() <= options.max_gradient) {
       break;
     }
+    if (options.stop && options.stop()) break;
     VectorXd direction = history.direction(now.gradient);
     now.step = 0.0;
     now.slope = now.gradient.dot(direction);

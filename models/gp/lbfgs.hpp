@@ -18,6 +18,7 @@ struct LbfgsOptions {
   int memory = 30;
   double relative_change = 1e-10;  // stop when one step lowers f by less than this, relative to |f|
   double max_gradient = 1e-3;      // or when no gradient component is larger than this
+  std::function<bool()> stop{};    // asked in every iteration; true: the best so far will do
 };
 
 struct LbfgsResult {

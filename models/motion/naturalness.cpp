@@ -53,6 +53,15 @@ Rows windows_of(const Rows& rows) {
   return features;
 }
 
+// Over count - 1.
+Gaussian gaussian_of(const WindowSums& sums) {
+  Gaussian out;
+  out.mean = sums.first / sums.count;
+  out.covariance =
+      (sums.second - sums.count * out.mean * out.mean.transpose()) / (sums.count - 1.0);
+  return out;
+}
+
 Eigen::MatrixXd square_root(const Eigen::MatrixXd& symmetric) {
   const SymmetricEigen eigen = symmetric_eigen(symmetric);
   const Eigen::VectorXd roots = eigen.values.cwiseMax(0.0).cwiseSqrt();
@@ -129,26 +138,56 @@ double frechet_distance(const Gaussian& a, const Gaussian& b) {
   return std::max(0.0, (a.mean - b.mean).squaredNorm() + spread);
 }
 
+void WindowSums::add(const WindowSums& other) {
+  if (first.size() == 0) {
+    *this = other;
+    return;
+  }
+  count += other.count;
+  first += other.first;
+  second += other.second;
+}
+
+void WindowSums::take_away(const WindowSums& other) {
+  count -= other.count;
+  first -= other.first;
+  second -= other.second;
+}
+
+WindowSums window_sums(const Rows& rows) {
+  const Rows windows = windows_of(rows);
+  return {static_cast<double>(windows.rows()), windows.colwise().sum().transpose(),
+          windows.transpose() * windows};
+}
+
+int most_dimensions(double windows) {
+  return static_cast<int>(windows) / static_cast<int>(kWindowsPerDimension);
+}
+
+double window_distance(const WindowSums& a, const WindowSums& b, int dimensions) {
+  WindowSums both = a;
+  both.add(b);
+  const Eigen::MatrixXd axes =
+      symmetric_eigen(gaussian_of(both).covariance).vectors.rightCols(dimensions);
+  const auto projected = [&](const WindowSums& sums) {
+    const Gaussian all = gaussian_of(sums);
+    return Gaussian{axes.transpose() * all.mean, axes.transpose() * all.covariance * axes};
+  };
+  return frechet_distance(projected(a), projected(b));
+}
+
 Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions) {
   if (a.cols() != b.cols()) return fail("the motions have different channels");
-  const Rows one = windows_of(a);
-  const Rows other = windows_of(b);
-  const Eigen::Index room = std::min(one.rows(), other.rows()) / kWindowsPerDimension;
-  const Eigen::Index kept = std::min({static_cast<Eigen::Index>(dimensions), room, one.cols()});
+  const Eigen::RowVectorXd middle = a.colwise().mean();  // near the data: sums of squares cancel
+  const WindowSums one = window_sums(a.rowwise() - middle);
+  const WindowSums other = window_sums(b.rowwise() - middle);
+  const int kept = std::min({dimensions, most_dimensions(std::min(one.count, other.count)),
+                             static_cast<int>(one.first.size())});
   if (kept < 1) {
     return fail("the motions are too short for a distance of their features: at least " +
                 std::to_string(kWindow + 2 * kWindowsPerDimension) + " frames are needed");
   }
-  Rows both(one.rows() + other.rows(), one.cols());
-  both << one, other;
-  const auto pooled = gaussian_of(both);
-  if (!pooled) return std::unexpected(pooled.error());
-  const Eigen::MatrixXd axes = symmetric_eigen(pooled->covariance).vectors.rightCols(kept);
-  const auto first = gaussian_of(one * axes);
-  const auto second = gaussian_of(other * axes);
-  if (!first) return std::unexpected(first.error());
-  if (!second) return std::unexpected(second.error());
-  return frechet_distance(*first, *second);
+  return window_distance(one, other, kept);
 }
 
 }  // namespace posed::motion

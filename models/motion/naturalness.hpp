@@ -42,9 +42,28 @@ struct Gaussian {
 // |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), at least 0.
 [[nodiscard]] double frechet_distance(const Gaussian& a, const Gaussian& b);
 
-// Frechet distance between features of two motions. Features are taken over windows of 30 frames:
-// each channel's mean, and the mean size of its change per frame, projected on the first
-// `dimensions` principal components of both motions together. Fewer dimensions are used where the
+// Sums over the features of a motion, from which those of several motions are added up or taken
+// away. Features are taken over windows of 30 frames, one at every second frame: each channel's
+// mean, and the mean size of its change per frame.
+struct WindowSums {
+  double count = 0.0;      // windows
+  Eigen::VectorXd first;   // sum of the features [2 x channels]
+  Eigen::MatrixXd second;  // sum of their products
+
+  void add(const WindowSums& other);
+  void take_away(const WindowSums& other);
+};
+[[nodiscard]] WindowSums window_sums(const Rows& rows);
+
+// The most principal components that so many windows determine: one for every ten of them.
+[[nodiscard]] int most_dimensions(double windows);
+
+// Frechet distance of the features, projected on the first `dimensions` principal components of
+// both together; both have at least two windows.
+[[nodiscard]] double window_distance(const WindowSums& a, const WindowSums& b, int dimensions);
+
+// Frechet distance between features of two motions. Those of WindowSums, on the first
+// `dimensions` principal components. Fewer dimensions are used where the
 // motions are too short for ten windows per dimension; an error is returned where even one
 // dimension is too many.
 [[nodiscard]] Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions = 20);

@@ -41,7 +41,7 @@ void Gate::update(const KnownMotion* known, bool on, const Frame& frame, std::sp
     if (on) wanted_ = of_pose_ * of_legs_;
   }
   fresh_ = fresh_ && (known == nullptr || !on);
-  if (fresh_) return settle();
+  if (fresh_) return stage_.fill(1.0);
   follow(dt_s);
 }
 

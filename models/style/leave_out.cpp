@@ -86,7 +86,7 @@ struct Chunk {
 std::vector<Chunk> chunks_of(std::span<const LeaveOut> styles) {
   std::vector<Chunk> chunks;
   for (std::size_t s = 0; s < styles.size(); ++s) {
-    const std::size_t folds = styles[s].folds.size();
+    const std::size_t folds = styles[s].folds;
     for (std::size_t first = 0; first < folds; first += kChunk) {
       chunks.push_back({s, first, std::min(first + kChunk, folds)});
     }
@@ -108,8 +108,9 @@ class Search {
       const Chunk& chunk = chunks_[t % chunks_.size()];
       const Folded process(X_[chunk.style], rad(lengths_deg[t / chunks_.size()]));
       TaskResult numbers;
-      for (std::size_t f = chunk.first; f < chunk.end; ++f) {
-        process.ask(styles_[chunk.style].folds[f], numbers);
+      const LeaveOut& style = styles_[chunk.style];
+      for (std::size_t f = chunk.first; f < chunk.end && !tasks_.stopping(); ++f) {
+        process.ask(style.fold(f), numbers);
       }
       return numbers;
     };
@@ -137,7 +138,7 @@ class Search {
   // `found`: one result a chunk.
   void keep_best(double length_deg, std::span<const TaskResult> found) {
     std::size_t folds = 0;
-    for (const LeaveOut& style : styles_) folds += style.folds.size();
+    for (const LeaveOut& style : styles_) folds += style.folds;
     for (std::size_t n = 0; n < kNoises.size(); ++n) {
       ChosenKernel tried{{rad(length_deg), kNoises[n]}, 0.0, std::vector<Way>(styles_.size())};
       for (std::size_t c = 0; c < found.size(); ++c) {
@@ -168,7 +169,7 @@ class Search {
 
 std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles, TaskRunner& tasks,
                                           const FoldProgress& progress) {
-  if (std::ranges::all_of(styles, [](const LeaveOut& style) { return style.folds.empty(); })) {
+  if (std::ranges::all_of(styles, [](const LeaveOut& style) { return style.folds == 0; })) {
     const auto dims = styles.front().pairs.inputs.front().cols();
     return ChosenKernel{
         {scaled_rad(50.0, dims), kNoises.front()}, 0.0, std::vector<Way>(styles.size())};

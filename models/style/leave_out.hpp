@@ -27,7 +27,10 @@ struct Fold {
 
 struct LeaveOut {
   TrainingPairs pairs;
-  std::vector<Fold> folds;
+  std::size_t folds = 0;  // how many
+  // Fold `index`. Built where it is used, because all together may take gigabytes; called from any
+  // thread.
+  std::function<Fold(std::size_t index)> fold{};
 };
 
 // A kernel and how it did on the folds.

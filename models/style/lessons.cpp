@@ -96,8 +96,8 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
   for (const Lesson& lesson : lessons) {
     pairs.push_back(make_training_pairs(*lesson.data, take_cycles(*lesson.data), lesson.target));
     leave_outs.push_back(make_folds(*lesson.data, lesson.target));
-    held_out = held_out || !leave_outs.back().folds.empty();
-    if (leave_outs.back().folds.empty()) leave_outs.back().pairs = pairs.back();
+    held_out = held_out || leave_outs.back().folds > 0;
+    if (leave_outs.back().folds == 0) leave_outs.back().pairs = pairs.back();
   }
   const auto chosen = choose_kernel(leave_outs, tasks, progress);
   if (!chosen) return fail("training was stopped before it was done");

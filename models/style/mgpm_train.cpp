@@ -12,6 +12,7 @@
 #include "models/gp/lbfgs.hpp"
 #include "models/motion/symmetric_eigen.hpp"
 #include "models/style/harmonics.hpp"
+#include "models/task_numbers.hpp"
 
 namespace posed::style {
 namespace {
@@ -119,7 +120,10 @@ class Variables {
   double xi_unit_ = 1.0;
 };
 
-void optimise(const MgpmData& data, bool phases_free, int iterations, MgpmFit& fit) {
+using Stop = std::function<bool()>;
+
+void optimise(const MgpmData& data, bool phases_free, int iterations, const Stop& stop,
+              MgpmFit& fit) {
   fit.harmonics = harmonics_for(fit.params.log_gamma);
   const Variables variables(data, fit.params, phases_free);
   const gp::Objective objective = [&](const VectorXd& z, VectorXd& gradient) {
@@ -133,7 +137,7 @@ void optimise(const MgpmData& data, bool phases_free, int iterations, MgpmFit& f
     return value.nlp;
   };
   const gp::LbfgsResult found = gp::lbfgs_minimise(objective, VectorXd::Zero(variables.size()),
-                                                   {.max_iterations = iterations});
+                                                   {.max_iterations = iterations, .stop = stop});
   fit.params = variables.params(found.x);
   fit.nlp = found.value;
   fit.evaluations += found.evaluations;
@@ -182,16 +186,17 @@ MatrixXd random_styles(int subjects, int q, std::uint64_t seed) {
   return xi;
 }
 
-// Optimises from one start.
-void run_start(const MgpmData& data, MgpmFit& fit) {
+// Optimises from one start, until `stop` says that nobody wants it any more.
+void run_start(const MgpmData& data, const Stop& stop, MgpmFit& fit) {
   for (int round = 0; round < kStageOneRounds; ++round) {
     regauge(fit.params);
-    optimise(data, false, kStageOneIterations, fit);
+    optimise(data, false, kStageOneIterations, stop, fit);
   }
   double previous = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kStageTwoRounds; ++round) {
     regauge(fit.params);
-    optimise(data, true, kStageTwoIterations, fit);
+    optimise(data, true, kStageTwoIterations, stop, fit);
+    if (stop()) return;
     if (previous - fit.nlp < kSettled * std::abs(fit.nlp)) break;
     previous = fit.nlp;
   }
@@ -199,31 +204,29 @@ void run_start(const MgpmData& data, MgpmFit& fit) {
 
 // What a start ends with, as a task's numbers and back.
 TaskResult numbers_of(const MgpmFit& fit) {
-  TaskResult numbers{fit.nlp, static_cast<double>(fit.harmonics),
-                     static_cast<double>(fit.evaluations), fit.params.log_gamma,
-                     fit.params.log_noise};
-  const auto append = [&](const auto& values) {
-    numbers.insert(numbers.end(), values.begin(), values.end());
-  };
-  append(fit.params.theta0);
-  append(fit.params.dtheta);
-  append(fit.params.xi.reshaped());
-  return numbers;
+  const MgpmParams& params = fit.params;
+  return NumberWriter()
+      .add(fit.nlp)
+      .add(fit.harmonics)
+      .add(fit.evaluations)
+      .add(params.log_gamma)
+      .add(params.log_noise)
+      .add(params.theta0)
+      .add(params.dtheta)
+      .add(params.xi)
+      .take();
 }
 
 void take_numbers(const TaskResult& numbers, MgpmFit& fit) {
-  fit.nlp = numbers[0];
-  fit.harmonics = static_cast<int>(numbers[1]);
-  fit.evaluations = static_cast<int>(numbers[2]);
-  fit.params.log_gamma = numbers[3];
-  fit.params.log_noise = numbers[4];
-  const double* next = numbers.data() + 5;
-  const auto take = [&](auto&& values) {
-    for (auto& value : values) value = *next++;
-  };
-  take(fit.params.theta0);
-  take(fit.params.dtheta);
-  take(fit.params.xi.reshaped());
+  NumberReader reader(numbers);
+  fit.nlp = reader.number();
+  fit.harmonics = static_cast<int>(reader.index());
+  fit.evaluations = static_cast<int>(reader.index());
+  fit.params.log_gamma = reader.number();
+  fit.params.log_noise = reader.number();
+  fit.params.theta0 = reader.vector();
+  fit.params.dtheta = reader.vector();
+  fit.params.xi = reader.matrix();
 }
 
 }  // namespace
@@ -242,17 +245,17 @@ Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data, const VectorXd& th
                         ? svd_styles(data, theta0, dtheta, q)
                         : random_styles(data.subjects(), q, options.seed * 1'000'003 + k);
   }
+  SerialTasks serial;
+  TaskRunner& tasks = options.tasks != nullptr ? *options.tasks : serial;
   const Task task = [&](std::size_t k) {
     MgpmFit fit = fits[k];
-    run_start(data, fit);
+    run_start(data, [&tasks] { return tasks.stopping(); }, fit);
     return numbers_of(fit);
   };
   const TaskProgress progress = [&](std::size_t done) {
     const double fraction = static_cast<double>(done) / static_cast<double>(fits.size());
     return !options.progress || options.progress(fraction);
   };
-  SerialTasks serial;
-  TaskRunner& tasks = options.tasks != nullptr ? *options.tasks : serial;
   const auto found = tasks.run(fits.size(), task, progress);
   if (!found) return fail("training was stopped before it was done");
   for (std::size_t k = 0; k < fits.size(); ++k) {

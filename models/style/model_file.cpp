@@ -100,8 +100,9 @@ MoreStyle read_style(const v1::StyleTarget& from, Eigen::Index points, int dims,
 GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
   GateData gate;
   gate.neutral = reader.vector(from.neutral(), dims, "the neutral pose");
-  gate.swing_rad = reader.number(from.swing_rad(), 0.0, 10.0, "the legs' swing");
-  gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.0, 100.0, "the fastest stride");
+  if (from.swing_rad() == 0.0 && from.fastest_stride_s() == 0.0) return gate;
+  gate.swing_rad = reader.number(from.swing_rad(), 1e-3, 10.0, "the legs' swing");
+  gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.05, 100.0, "the fastest stride");
   return gate;
 }
 

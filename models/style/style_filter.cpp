@@ -40,6 +40,8 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
     : model_(model), options_(options) {
   options_.alpha_slew_per_s = std::clamp(options.alpha_slew_per_s, 1e-3, 1e6);
   set_alpha(static_cast<float>(options.alpha));
+  set_auto_alpha(options.auto_alpha);
+  missing_ = options.auto_alpha ? 0.0 : 1.0;
   watch_.set_gate(options.gate);
   if (options.calibrate) watch_.tell(WalkerWatch::kOldKey);
   mask_.begin(options.mask);
@@ -97,8 +99,7 @@ void StyleFilter::set(std::size_t parameter, double value) noexcept {
     case kCalibrate:
       return set_calibrate(value != 0.0);
     case kAutoAlpha:
-      options_.auto_alpha = value != 0.0;
-      return;
+      return set_auto_alpha(value != 0.0);
     default:
       return;
   }
@@ -166,12 +167,20 @@ bool StyleFilter::command(std::size_t index, const StageCommand& command) noexce
   }
 }
 
+// RT-safe
+void StyleFilter::set_auto_alpha(bool on) noexcept {
+  options_.auto_alpha = on;
+  watch_.set_auto_alpha(on);
+}
+
 // Who shows the style already gets the rest of it. RT-safe
-double StyleFilter::wanted_alpha() const noexcept {
-  if (!options_.auto_alpha || model_ == nullptr || model_->axis.size() == 0) return alpha_target_;
-  const double shown = watch_.estimate();
-  if (std::isnan(shown)) return alpha_;
-  return alpha_target_ * std::clamp(1.0 - shown, 0.0, 1.0);
+double StyleFilter::wanted_alpha() const noexcept { return alpha_target_ * missing_; }
+
+// While nothing is known of how much the walker shows, it stays as it was. RT-safe
+void StyleFilter::find_missing() noexcept {
+  const bool told = options_.auto_alpha && model_ != nullptr && model_->axis.size() > 0;
+  const double shown = told ? watch_.estimate() : 0.0;
+  if (!std::isnan(shown)) missing_ = std::clamp(1.0 - shown, 0.0, 1.0);
 }
 
 // RT-safe
@@ -187,6 +196,7 @@ double StyleFilter::reading(std::size_t reading) const noexcept {
 
 void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
   watch_.settle();
+  find_missing();
   alpha_ = wanted_alpha();
   const bool has_heading = model_ != nullptr && model_->space.has_heading(frame);
   heading_.settle(heading_rad, has_heading ? model_->space.heading_rad(frame) : heading_rad);
@@ -208,6 +218,7 @@ void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   gap_s_ = elapsed_.next_s(frame.header);
   const double dt_s = std::min(gap_s_, kMaxStep_s);
   const double slew = options_.alpha_slew_per_s * dt_s;
+  find_missing();
   alpha_ += std::clamp(wanted_alpha() - alpha_, -slew, slew);
   blend_weight_ = std::max(0.0, blend_weight_ - slew);
   mask_.move(slew);

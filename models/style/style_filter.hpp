@@ -10,11 +10,10 @@
 //
 // where per frame alpha in the model delta moves by at most slew dt, at most slew dt of the mixture
 // of styles changes (style_weights.hpp) and each part's factor moves by at most slew dt
-// (body_mask.hpp), and c is the rotation vector
-// between the rotation emitted at the last swap and the one that the new model would have given
-// there (|c| <= pi; 0 when the last swap was more than 1 / slew ago). So no swap, no swap within
-// the blend of another, no change of alpha, weights or mask and no jump of the source makes the
-// pose jump.
+// (body_mask.hpp), and c is the rotation vector between the rotation emitted at the last swap and
+// the one that the new model would have given there (|c| <= pi; 0 when the last swap was more than
+// 1 / slew ago). So no swap, no swap within the blend of another, no change of alpha, weights or
+// mask and no jump of the source makes the pose jump.
 //
 // Time is taken from the frames: their device time where they have one, else their arrival time. A
 // step back in time counts as 0 s, a gap as at most 0.1 s.
@@ -130,6 +129,8 @@ class StyleFilter final : public Stage {
   void mix_limits() noexcept;
   bool read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept;
   void answer(const Pose& pose, Dims& delta) noexcept;
+  void set_auto_alpha(bool on) noexcept;
+  void find_missing() noexcept;
   [[nodiscard]] double wanted_alpha() const noexcept;
   void set_calibrate(bool on) noexcept;
   void begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept;
@@ -139,6 +140,8 @@ class StyleFilter final : public Stage {
   FilterOptions options_;
   double alpha_ = 0.0;
   double alpha_target_ = 0.0;
+  double missing_ =
+      1.0;  // share of the style that the walker does not show already; 1: no auto_alpha
   StyleWeights weights_;
   BodyMask mask_;
   Dims limit_rad_{};  // of the mixture

@@ -29,11 +29,13 @@ struct MoreStyle {
 // What tells a motion that the model knows from another: README.md, "Gate" and "Warm-up".
 struct GateData {
   Eigen::VectorXd neutral{};  // mean pose of the source's neutral walk [dims]; empty: no gate data
-  double swing_rad = 0.0;     // LiveStride's, the least mean of a training clip
-  double fastest_stride_s = 0.0;  // period of the fastest clip; 0: the training shows no strides
+  // LiveStride's, the least mean of a training clip, and the period of the fastest clip. Both are
+  // 0 where the training shows no strides.
+  double swing_rad = 0.0;
+  double fastest_stride_s = 0.0;
 
   [[nodiscard]] bool present() const { return neutral.size() > 0; }
-  [[nodiscard]] bool strides() const { return fastest_stride_s > 0.0; }
+  [[nodiscard]] bool strides() const { return swing_rad > 0.0; }
 };
 
 // How much of the style a mean pose shows, direction . q + offset: 0 the source's, 1 the target's

@@ -192,7 +192,9 @@ std::vector<StageNoticeType> notices() {
       {.sentence = "the new model sees other joints, so what is known of the walker does not "
                    "serve it: start a warm-up"},
       {.sentence = "calibrate is the older name of a warm-up: use warm_up_s = 10, or `posed ctl "
-                   "warm-up STREAM`"}};
+                   "warm-up STREAM`"},
+      {.sentence = "the model has no style axis, so auto_alpha does nothing: train a model of one "
+                   "style with this version of posed, or set auto_alpha = false"}};
 }
 
 Result<StageCommand> warm_up(const StageModel* model, std::span<const std::string> words,

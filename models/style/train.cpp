@@ -71,9 +71,11 @@ Result<> check_groups(const std::vector<TrainingClip>& all, const std::vector<st
       return fail("the clip is in no group; say which style it shows", clip->clip.path);
     }
     if (!has(clip->motion, true)) {
-      return fail("motion " + clip->motion + " has no clip of the target group '" + target +
-                      "'; add one or leave this clip out",
-                  clip->clip.path);
+      const std::string remedy = targets.size() == 1 ? "; add one or leave this clip out"
+                                                     : "; add one: every target needs each motion";
+      return fail(
+          "motion " + clip->motion + " has no clip of the target group '" + target + "'" + remedy,
+          clip->clip.path);
     }
     if (!has(clip->motion, false)) {
       return fail("motion " + clip->motion + " has clips of the target group '" + target +
@@ -176,7 +178,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   if (!learnt) return std::unexpected(learnt.error());
 
   const std::string report = json_text(whole_report(*dataset, lessons, *learnt));
-  GateData gate = gate_data_of(*lessons.front().data, options.target);
+  GateData gate = gate_data_of(*dataset, targets);
   StyleAxis axis;  // of a mixture there is none
   if (targets.size() == 1) axis = style_axis_of(*dataset, options.target);
   StyleModel model = model_of(std::move(*dataset), targets, std::move(*learnt));

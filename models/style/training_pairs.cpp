@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <utility>
 
@@ -117,18 +118,35 @@ std::vector<int> leave_out_for(const Dataset& dataset, const Takes& takes,
   return {};
 }
 
-std::vector<Fold> take_folds(const Dataset& dataset, const Takes& takes, const TrainingPairs& pairs,
-                             const std::string& target) {
+// What one fold asks for and leaves out; the fold itself is built from it.
+struct FoldPlan {
+  std::size_t asked;  // index of a take
+  std::vector<int> left_out;
+};
+
+std::vector<FoldPlan> take_folds(const Dataset& dataset, const Takes& takes,
+                                 const std::string& target) {
   const auto all = differences_of(dataset, takes, target);
-  std::vector<Fold> folds;
+  std::vector<FoldPlan> folds;
   for (std::size_t i = 0; i < takes.size(); ++i) {
     const AlignedClip& clip = clip_of(dataset, takes[i]);
     if (index_of(all, clip) == kNoDifference) continue;
     std::vector<int> left_out = leave_out_for(dataset, takes, target, i, all);
     if (left_out.empty()) continue;
-    folds.push_back(fold_of(dataset, takes, i, std::move(left_out), pairs, target));
+    folds.push_back({i, std::move(left_out)});
   }
   return folds;
+}
+
+LeaveOut planned(std::shared_ptr<const Dataset> dataset, Takes takes, TrainingPairs pairs,
+                 std::vector<FoldPlan> plans, const std::string& target) {
+  LeaveOut result{std::move(pairs), plans.size(), {}};
+  result.fold = [dataset = std::move(dataset), takes = std::move(takes), pairs = result.pairs,
+                 plans = std::move(plans), target](std::size_t index) {
+    const FoldPlan& plan = plans[index];
+    return fold_of(*dataset, takes, plan.asked, plan.left_out, pairs, target);
+  };
+  return result;
 }
 
 // The clip's rows [first, first + count), with their phases.
@@ -144,34 +162,34 @@ AlignedClip part_of(const AlignedClip& clip, Eigen::Index first, Eigen::Index co
 
 // Trained on one half of every source clip, tested on the other halves.
 LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
-  Dataset parts;
-  parts.motions = dataset.motions;
-  parts.subjects = dataset.subjects;
+  const auto parts = std::make_shared<Dataset>();
+  parts->motions = dataset.motions;
+  parts->subjects = dataset.subjects;
   std::vector<int> halves[2];  // of the source clips: which parts are first and second ones
   for (const AlignedClip& clip : dataset.clips) {
     const Eigen::Index frames = clip.q.rows();
     if (clip.group == target) {
-      parts.clips.push_back(part_of(clip, 0, frames));
+      parts->clips.push_back(part_of(clip, 0, frames));
       continue;
     }
     const Eigen::Index middle = frames / 2;
     const VectorXd phase = clip.phase();
     if (phase[middle] - phase[0] < 2.0 * std::numbers::pi) return {};
-    halves[0].push_back(static_cast<int>(std::ssize(parts.clips)));
-    parts.clips.push_back(part_of(clip, 0, middle));
-    halves[1].push_back(static_cast<int>(std::ssize(parts.clips)));
-    parts.clips.push_back(part_of(clip, middle, frames - middle));
+    halves[0].push_back(static_cast<int>(std::ssize(parts->clips)));
+    parts->clips.push_back(part_of(clip, 0, middle));
+    halves[1].push_back(static_cast<int>(std::ssize(parts->clips)));
+    parts->clips.push_back(part_of(clip, middle, frames - middle));
   }
-  const Takes takes = take_cycles(parts);
-  LeaveOut result{make_training_pairs(parts, takes, target), {}};
+  Takes takes = take_cycles(*parts);
+  auto pairs = make_training_pairs(*parts, takes, target);
+  std::vector<FoldPlan> folds;
   for (const auto& tested : halves) {
     for (const int part : tested) {
       const auto i = static_cast<std::size_t>(part);
-      if (result.pairs.outputs.of_input[i] == kNoDifference) continue;
-      result.folds.push_back(fold_of(parts, takes, i, tested, result.pairs, target));
+      if (pairs.outputs.of_input[i] != kNoDifference) folds.push_back({i, tested});
     }
   }
-  return result;
+  return planned(parts, std::move(takes), std::move(pairs), std::move(folds), target);
 }
 
 }  // namespace
@@ -253,11 +271,13 @@ TrainingPairs make_training_pairs(const Dataset& dataset, const Takes& takes,
 }
 
 LeaveOut make_folds(const Dataset& dataset, const std::string& target) {
-  const Takes takes = take_cycles(dataset);
-  auto pairs = make_training_pairs(dataset, takes, target);
-  auto folds = take_folds(dataset, takes, pairs, target);
+  Takes takes = take_cycles(dataset);
+  auto folds = take_folds(dataset, takes, target);
   if (folds.empty()) return half_folds(dataset, target);
-  return {std::move(pairs), std::move(folds)};
+  auto pairs = make_training_pairs(dataset, takes, target);
+  // The caller owns it.
+  const std::shared_ptr<const Dataset> borrowed(std::shared_ptr<const Dataset>{}, &dataset);
+  return planned(borrowed, std::move(takes), std::move(pairs), std::move(folds), target);
 }
 
 }  // namespace posed::style

@@ -55,7 +55,7 @@ struct Difference {
 
 // Folds for the choice of the kernel: a person left out where others show the difference, else a
 // take where its person has several, else one half of each source clip against the other half; none
-// where clips are too short.
+// where clips are too short. They refer to `dataset`.
 [[nodiscard]] LeaveOut make_folds(const Dataset& dataset, const std::string& target);
 
 }  // namespace posed::style

@@ -10,6 +10,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "models/style/lessons.hpp"
 #include "models/style/live_stride.hpp"
 #include "models/style/training_check.hpp"
 #include "models/style/training_pairs.hpp"
@@ -26,12 +27,11 @@ constexpr double kSettled_s = 0.3;  // of LiveStride
 constexpr double kWindow_s = 1.0, kStep_s = 1.0 / 3.0;
 constexpr double kShrink = 0.9;  // of the scatter within groups, towards a sphere
 
-std::vector<std::string> sources_of(const Dataset& dataset, const std::string& target) {
+std::vector<std::string> sources_of(const Dataset& dataset,
+                                    const std::vector<std::string>& targets) {
   std::vector<std::string> groups;
   for (const AlignedClip& clip : dataset.clips) {
-    if (clip.group != target && std::ranges::find(groups, clip.group) == groups.end()) {
-      groups.push_back(clip.group);
-    }
+    if (!is_in(targets, clip.group) && !is_in(groups, clip.group)) groups.push_back(clip.group);
   }
   const auto neutral = std::ranges::find_first_of(groups, kNeutralNames);
   if (neutral != groups.end()) return {*neutral};
@@ -39,11 +39,11 @@ std::vector<std::string> sources_of(const Dataset& dataset, const std::string& t
 }
 
 // The mean pose of the source in the first motion that has it.
-VectorXd neutral_of(const Dataset& dataset, const std::string& target) {
+VectorXd neutral_of(const Dataset& dataset, const std::vector<std::string>& targets) {
   const auto takes = take_cycles(dataset);
   VectorXd sum = VectorXd::Zero(dataset.dims());
   int count = 0;
-  for (const std::string& group : sources_of(dataset, target)) {
+  for (const std::string& group : sources_of(dataset, targets)) {
     for (const std::string& motion : dataset.motions) {
       const MatrixXd cycle = group_cycle(dataset, takes, group, motion);
       if (cycle.size() == 0) continue;
@@ -107,8 +107,8 @@ GroupMean mean_of_group(const Dataset& dataset, const std::string& group) {
 
 }  // namespace
 
-GateData gate_data_of(const Dataset& dataset, const std::string& target) {
-  GateData gate{.neutral = neutral_of(dataset, target)};
+GateData gate_data_of(const Dataset& dataset, const std::vector<std::string>& targets) {
+  GateData gate{.neutral = neutral_of(dataset, targets)};
   double swing_rad = std::numeric_limits<double>::infinity();
   double fastest_s = std::numeric_limits<double>::infinity();
   for (const AlignedClip& clip : dataset.clips) {
@@ -128,7 +128,7 @@ StyleAxis style_axis_of(const Dataset& dataset, const std::string& target) {
   VectorXd source = VectorXd::Zero(dataset.dims());
   std::vector<std::string> groups;
   for (const AlignedClip& clip : dataset.clips) {
-    if (clip.group == target || std::ranges::find(groups, clip.group) != groups.end()) continue;
+    if (clip.group == target || is_in(groups, clip.group)) continue;
     groups.push_back(clip.group);
     const GroupMean one = mean_of_group(dataset, clip.group);
     source += one.mean;

@@ -3,13 +3,15 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "models/style/dataset.hpp"
 #include "models/style/style_model.hpp"
 
 namespace posed::style {
 
-[[nodiscard]] GateData gate_data_of(const Dataset& dataset, const std::string& target);
+[[nodiscard]] GateData gate_data_of(const Dataset& dataset,
+                                    const std::vector<std::string>& targets);
 [[nodiscard]] StyleAxis style_axis_of(const Dataset& dataset, const std::string& target);
 
 }  // namespace posed::style

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace posed::style {
 namespace {
@@ -15,16 +16,20 @@ constexpr double kInterruption_s = 1.0;  // of the frames
 bool WalkerWatch::see(const BoundModel& model, const Frame& frame, std::span<const float> q,
                       std::span<const std::uint8_t> available, double gap_s, double dt_s,
                       std::span<float> input) noexcept {
+  tell_what_is_missing(model);
   const KnownMotion* const known = model.known ? &*model.known : nullptr;
-  if (gate_on_ && known == nullptr && !told_no_gate_) {
-    told_no_gate_ = true;
-    tell(kNoGateData);
-  }
   relate(model, q, input);
   gate_.update(known, gate_on_, frame, input, available, walker_, dt_s);
   const bool jumped = measure(model, q, available, gap_s, dt_s);
   if (jumped) relate(model, q, input);
   return jumped;
+}
+
+// Once a model. RT-safe
+void WalkerWatch::tell_what_is_missing(const BoundModel& model) noexcept {
+  if (gate_on_ && !model.known && !std::exchange(told_no_gate_, true)) tell(kNoGateData);
+  const bool no_axis = model.axis.size() == 0;
+  if (auto_alpha_ && no_axis && !std::exchange(told_no_axis_, true)) tell(kNoAxis);
 }
 
 // RT-safe
@@ -67,7 +72,12 @@ bool WalkerWatch::measure(const BoundModel& model, std::span<const float> q,
 
 // RT-safe
 bool WalkerWatch::warm_up(const BoundModel* model, double seconds) noexcept {
-  if (model == nullptr || !model->known) return false;
+  if (model == nullptr) return false;
+  if (!model->known) {
+    // Nobody hears the answer to a warm-up that the config asks for.
+    if (!std::exchange(told_no_gate_, true)) tell(kNoGateData);
+    return false;
+  }
   warm_up_.begin(seconds);
   return true;
 }
@@ -83,9 +93,11 @@ void WalkerWatch::exchange(const BoundModel* from, const BoundModel& to) noexcep
   interrupt();
   estimate_.forget();
   told_no_gate_ = false;
+  told_no_axis_ = false;
   if (!walker_ || from == nullptr) return;
+  if (!to.known) return walker_.reset();  // kNoGateData says why
   Walker moved = *walker_;
-  if (to.known && to.space.take_over(from->space, walker_->neutral, moved.neutral)) {
+  if (to.space.take_over(from->space, walker_->neutral, moved.neutral)) {
     walker_ = moved;
   } else {
     walker_.reset();

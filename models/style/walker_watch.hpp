@@ -19,7 +19,15 @@ namespace posed::style {
 class WalkerWatch {
  public:
   // What people are told, as style_type() numbers it.
-  enum Notice : std::size_t { kNoGateData, kWarmedUp, kStood, kInterrupted, kOtherJoints, kOldKey };
+  enum Notice : std::size_t {
+    kNoGateData,
+    kWarmedUp,
+    kStood,
+    kInterrupted,
+    kOtherJoints,
+    kOldKey,
+    kNoAxis
+  };
 
   // Takes a frame's q, `gap_s` after the last one, of which `dt_s` count, and writes what the
   // kernel shall see of it: q as if the walker's neutral pose were the training's. Returns whether
@@ -29,6 +37,7 @@ class WalkerWatch {
            std::span<float> input) noexcept;
 
   void set_gate(bool on) noexcept { gate_on_ = on; }
+  void set_auto_alpha(bool on) noexcept { auto_alpha_ = on; }
   [[nodiscard]] float open() const noexcept { return gate_.open(); }
   // See Gate::settle().
   void settle() noexcept { gate_.settle(); }
@@ -52,18 +61,19 @@ class WalkerWatch {
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept;
 
  private:
+  void tell_what_is_missing(const BoundModel& model) noexcept;
   void relate(const BoundModel& model, std::span<const float> q,
               std::span<float> input) const noexcept;
   bool measure(const BoundModel& model, std::span<const float> q,
                std::span<const std::uint8_t> available, double gap_s, double dt_s) noexcept;
 
-  bool gate_on_ = true;
+  bool gate_on_ = true, auto_alpha_ = false;
   Gate gate_;
   WarmUp warm_up_;
   std::optional<Walker> walker_;
   StyleEstimate estimate_;
   std::uint32_t untold_ = 0;
-  bool told_no_gate_ = false;
+  bool told_no_gate_ = false, told_no_axis_ = false;
 };
 
 }  // namespace posed::style

@@ -1,5 +1,6 @@
 #include "proto/clip/files.hpp"
 
+#include "proto/clip/file_names.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/load_file.hpp"
 
@@ -9,18 +10,12 @@ namespace {
 constexpr FileRule kClip{.what = "clip", .max_bytes = 2'000'000'000};
 constexpr std::uintmax_t kMaxSkeletonFile = 16'000'000;  // bytes; real files have about 10 KB
 
-// Returns the path of NN.asf beside NN_MM.amc.
-std::filesystem::path asf_beside(const std::filesystem::path& amc) {
-  const std::string stem = amc.stem().string();
-  return amc.parent_path() / (stem.substr(0, stem.find('_')) + ".asf");
-}
-
 }  // namespace
 
 Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOptions& options) {
   ClipFiles files;
   files.name = path.string();
-  const std::string extension = lower(path.extension().string());
+  const std::string extension = extension_of(path);
   if (extension == ".amc") {
     files.kind = ClipKind::kAmc;
   } else if (extension == ".csv") {
@@ -33,7 +28,7 @@ Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOption
   files.text = std::move(*text);
   if (files.kind != ClipKind::kAmc) return files;
 
-  const std::filesystem::path asf = options.asf.empty() ? asf_beside(path) : options.asf;
+  const std::filesystem::path asf = options.asf.empty() ? skeleton_beside(path) : options.asf;
   if (options.asf.empty() && !std::filesystem::exists(asf)) {
     return fail("needs its skeleton: " + asf.string() + " is not there; name it with --skeleton",
                 files.name);

@@ -1,12 +1,19 @@
-// The key under which a log stores a file's bytes: their SHA-256 in lower-case hex.
+// The SHA-256 of bytes in lower-case hex: the key under which a log stores a file, and what tells
+// whether two machines have the same file. Cold.
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <span>
 #include <string>
+
+#include "proto/frame/result.hpp"
 
 namespace posed::log {
 
 [[nodiscard]] std::string sha256_hex(std::span<const std::byte> bytes);
+
+// Of a file of any size, read piece by piece.
+[[nodiscard]] Result<std::string> sha256_of_file(const std::filesystem::path& path);
 
 }  // namespace posed::log

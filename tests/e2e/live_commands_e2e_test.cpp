@@ -201,6 +201,7 @@ TEST_CASE("a recording ends with what was written") {
   CHECK(summary.at("frames") > 10);
   CHECK(summary.at("streams").at(0).at("stream") == "walker");
   CHECK(summary.at("missing_chunks") == 0);
+  CHECK(summary.at("missing_frames") == 0);
   CHECK(summary.at("seconds") >= 0.5);
   CHECK(has(served.daemon->errors(), "take.plog: "));
   CHECK(has(served.daemon->errors(), "nothing is missing"));

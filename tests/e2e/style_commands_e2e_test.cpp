@@ -229,6 +229,29 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
   CHECK(has(worse.err, "worse than nothing"));
 }
 
+TEST_CASE("apply --gate stands anywhere, alone or with on or off", "[apply]") {
+  const WalkerStudio studio;
+  REQUIRE(studio
+              .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
+                     "m.style")
+              .code == 0);
+  const std::string model = studio.path("m.style");
+  const std::string in = studio.path("march_2.bvh");
+  const std::string out = studio.path("out.bvh");
+  const std::vector<std::vector<std::string>> orders{
+      {in, "--out", out, "--gate"},         {in, "--gate", "--out", out},
+      {"--gate", "--out", out, in},         {"--out", out, "--gate", in},
+      {"--gate=on", in, "--out", out},      {in, "--out", out, "--gate", "off"},
+      {in, "--out", out, "--gate", "ajar"},
+  };
+  std::vector<int> codes;
+  for (std::vector<std::string> order : orders) {
+    order.insert(order.begin(), {"apply", "--model", model, "--overwrite", "--json"});
+    codes.push_back(posed(order).code);
+  }
+  CHECK(codes == std::vector<int>{0, 0, 0, 0, 0, 0, 2});
+}
+
 TEST_CASE("apply says that a walker is far from the training", "[apply]") {
   const WalkerStudio studio;
   REQUIRE(studio

@@ -1,5 +1,5 @@
-// Runs the real binary as a child process and gives its output lines and exit code; the destructor
-// ends the child.
+// Runs the real binary, or another program, as a child process and gives its output lines and exit
+// code; the destructor ends the child.
 #pragma once
 
 #include <chrono>
@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -29,19 +30,23 @@ struct ChildStderr {
   int descriptor = kFile;
 };
 
+// A program, found on the PATH, with its arguments.
+struct Command {
+  explicit Command(std::vector<std::string> all) : words(std::move(all)) {}
+  std::vector<std::string> words;
+};
+
 class Process {
  public:
   // Starts `posed` with these arguments; stdin is empty. `stdout_descriptor` replaces the pipe that
   // line() reads. The child may open `most_files` files (0: the limit of this process).
   explicit Process(std::vector<std::string> arguments, ChildStderr err = {},
-                   int stdout_descriptor = -1, int most_files = 0) {
-    arguments.insert(arguments.begin(), posed_binary().string());
-    if (most_files > 0) {
-      const std::string limit = "ulimit -n " + std::to_string(most_files);
-      arguments.insert(arguments.begin(), {"/bin/sh", "-c", limit + "; exec \"$0\" \"$@\""});
-    }
+                   int stdout_descriptor = -1, int most_files = 0)
+      : Process(of_posed(std::move(arguments), most_files), err, stdout_descriptor) {}
+  // Starts any program.
+  explicit Process(Command command, ChildStderr err = {}, int stdout_descriptor = -1) {
     std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
+    for (std::string& word : command.words) argv.push_back(word.data());
     argv.push_back(nullptr);
     int out[2];
     if (pipe2(out, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
@@ -58,11 +63,11 @@ class Process {
     } else {
       posix_spawn_file_actions_adddup2(&actions, err.descriptor, 2);
     }
-    const int failed = posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ);
+    const int failed = posix_spawnp(&pid_, argv[0], &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     close(out[1]);
     out_ = out[0];
-    if (failed != 0) throw std::runtime_error("cannot start " + arguments[0]);
+    if (failed != 0) throw std::runtime_error("cannot start " + command.words[0]);
   }
   ~Process() {
     if (!exit_code_) {
@@ -144,6 +149,15 @@ class Process {
 
  private:
   static constexpr std::chrono::seconds kPatience{30};  // for sanitizers on a busy machine
+
+  static Command of_posed(std::vector<std::string> arguments, int most_files) {
+    arguments.insert(arguments.begin(), posed_binary().string());
+    if (most_files > 0) {
+      const std::string limit = "ulimit -n " + std::to_string(most_files);
+      arguments.insert(arguments.begin(), {"/bin/sh", "-c", limit + "; exec \"$0\" \"$@\""});
+    }
+    return Command(std::move(arguments));
+  }
 
   TempFolder folder_;
   pid_t pid_ = -1;

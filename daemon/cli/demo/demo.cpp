@@ -67,7 +67,8 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
     experiment.clips.push_back({clips->from[i], "march", person, "walk", 0});
     experiment.clips.push_back({clips->to[i], "sway", person, "walk", 0});
   }
-  const auto report = train_and_save(experiment, 0, folder / kDemoModel, false);
+  OneRank alone;
+  const auto report = train_and_save(experiment, 0, folder / kDemoModel, false, alone);
   if (!report) return std::unexpected(report.error());
   const std::string verdict = (*report)["verdict"].get<std::string>();
   if (!(*report)["written"].get<bool>()) return fail("the demo's own model is " + verdict);
@@ -75,7 +76,7 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
   const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);
   if (!recording) return std::unexpected(recording.error());
-  const auto hand = train_gesture_and_save({*recording}, {}, folder / kDemoHand);
+  const auto hand = train_gesture_and_save({*recording}, {}, folder / kDemoHand, alone);
   if (!hand) return std::unexpected(hand.error());
   return kept.finish();
 }

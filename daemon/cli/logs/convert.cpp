@@ -17,10 +17,10 @@
 #include "daemon/replay/log_clip.hpp"
 #include "models/motion/vrm_animation.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/file_names.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -42,7 +42,7 @@ struct Convert {
 };
 
 bool ends_in(const std::string& path, const std::string& extension) {
-  return clip::lower(std::filesystem::path(path).extension().string()) == extension;
+  return clip::extension_of(path) == extension;
 }
 
 bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }

@@ -44,11 +44,16 @@ std::uint64_t kernel_dropped(const v1::Stats& stats) {
   return dropped;
 }
 
-std::string missing_words(std::uint64_t lost, std::uint64_t errors, std::uint64_t dropped) {
+std::string missing_words(const record::Recorder& recorder, std::uint64_t dropped) {
+  const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
   std::string words;
   if (lost + errors > 0) {
     words = fmt::format("{} chunks are missing after {} write errors; `posed replay` says where",
                         lost, errors);
+  }
+  if (recorder.lost_frames() > 0) {
+    words += fmt::format("{}{} published frames are missing, which `posed replay` makes again",
+                         words.empty() ? "" : "; ", recorder.lost_frames());
   }
   if (dropped > 0) {
     words += fmt::format("{}the kernel dropped {} datagrams before posed could read them",
@@ -71,7 +76,7 @@ void print_result(const RecordingPlan& options, const v1::Stats& stats,
     streams.push_back(
         {{"stream", stream.stream()}, {"frames", stream.frames()}, {"samples", stream.samples()}});
   }
-  const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
+  const std::uint64_t lost = recorder.lost_chunks() + recorder.lost_frames();
   const std::uint64_t dropped = kernel_dropped(stats);
   if (options.json) {
     const nlohmann::ordered_json line{{"file", options.out},
@@ -82,17 +87,18 @@ void print_result(const RecordingPlan& options, const v1::Stats& stats,
                                       {"streams", streams},
                                       {"left_frames", stats.left_frames()},
                                       {"left_samples", stats.left_samples()},
-                                      {"missing_chunks", lost},
+                                      {"missing_chunks", recorder.lost_chunks()},
+                                      {"missing_frames", recorder.lost_frames()},
                                       {"kernel_dropped", dropped},
-                                      {"write_errors", errors}};
+                                      {"write_errors", recorder.errors()}};
     std::printf("%s\n", json_text(line).c_str());
     std::fflush(stdout);
   }
-  spdlog::log(lost + errors + dropped > 0 ? spdlog::level::warn : spdlog::level::info,
+  spdlog::log(lost + recorder.errors() + dropped > 0 ? spdlog::level::warn : spdlog::level::info,
               "{}: {:.1f} s of {} stream{}{}, {} frames and {} samples published, {:.1f} MB; {}",
               options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
               some_left ? " and those that have left" : "", frames, samples,
-              static_cast<double>(bytes) / 1e6, missing_words(lost, errors, dropped));
+              static_cast<double>(bytes) / 1e6, missing_words(recorder, dropped));
 }
 
 void add_models(OutputFiles& files, const config::StreamConfig& stream) {

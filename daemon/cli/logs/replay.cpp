@@ -18,25 +18,24 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/logs/no_body.hpp"
+#include "daemon/cli/logs/replay_farm.hpp"
+#include "daemon/cli/logs/replay_outputs.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/replay/broadcast.hpp"
-#include "daemon/replay/expectation.hpp"
-#include "daemon/replay/frame_file.hpp"
 #include "daemon/replay/pace.hpp"
 #include "daemon/replay/replay.hpp"
 #include "models/gp/isa.hpp"
 #include "proto/log/reader.hpp"
-#include "proto/message/frame_message.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
-#include "proto/text/stream_name.hpp"
 
 namespace posed::cli {
 namespace {
 
 struct ReplayOptions {
-  std::string log;
+  std::vector<std::string> logs;  // several: replay_farm
+  std::string log;                // the first
   std::string speed = "1";
   std::string out;
   std::string endpoint;
@@ -102,53 +101,6 @@ class ReplayProgress {
   ProgressBar bar_;
 };
 
-// The outputs for the frames of a replay: the file, the comparison, the network.
-class Outputs {
- public:
-  explicit Outputs(const replay::Replay& replay) : replay_(replay) {
-    for (std::uint32_t id = 0; id < replay.streams(); ++id) {
-      const std::string& name = replay.stream(id).name;
-      encoders_.push_back({message::FrameEncoder(name), message::FrameEncoder(raw_name(name))});
-    }
-  }
-
-  void take(const pipeline::Item& item) {
-    if (broadcast) broadcast->add(item);
-    const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
-    if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
-    ++frames;
-    const std::uint32_t stream = item.frame.header.stream;
-    const v1::Frame& frame = encoders_[stream][raw].encode(item.frame);
-    if (file) file->add(frame);
-    if (!expectation || difference) return;
-    auto same = expectation->compare(stream, raw, frame, replay_.broken_at(stream));
-    if (!same) difference = same.error();
-  }
-
-  // Call after the last frame.
-  Result<> finish() {
-    if (file) {
-      if (auto closed = file->close(); !closed) return closed;
-    }
-    for (std::uint32_t id = 0; expectation && !difference && id < encoders_.size(); ++id) {
-      auto same = expectation->finish(id, replay_.broken_at(id));
-      if (!same) difference = same.error();
-    }
-    if (difference) return std::unexpected(*difference);
-    return {};
-  }
-
-  std::optional<replay::FrameFile> file;
-  std::optional<replay::Expectation> expectation;
-  std::unique_ptr<replay::Broadcast> broadcast;
-  std::optional<Error> difference;
-  std::uint64_t frames = 0;
-
- private:
-  const replay::Replay& replay_;
-  std::vector<std::array<message::FrameEncoder, 2>> encoders_;  // styled, raw
-};
-
 Result<double> speed_of(const std::string& text) {
   if (text == "max") return 0.0;
   char* end = nullptr;
@@ -160,13 +112,8 @@ Result<double> speed_of(const std::string& text) {
 
 // Equal bits are guaranteed for one instruction set only: by default that of the log.
 Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
-  const auto meta = reader.meta().find("isa");
-  const std::string recorded = meta == reader.meta().end() ? "auto" : meta->second;
-  if (!options.isa.empty()) {
-    if (auto set = gp::set_isa(options.isa); !set) return set;
-  } else if (!gp::set_isa(recorded)) {
-    if (auto set = gp::set_isa("auto"); !set) return set;
-  }
+  const std::string recorded = recorded_isa(reader);
+  if (auto set = set_isa_or(options.isa, recorded); !set) return set;
   if (recorded != "auto" && recorded != gp::isa_name()) {
     spdlog::warn("recorded on {}, replayed on {}: the last bits may differ", recorded,
                  gp::isa_name());
@@ -218,7 +165,7 @@ std::vector<std::string> stream_names(const log::Reader& reader) {
   return names;
 }
 
-void print_summary(const ReplayOptions& options, const Outputs& outputs, double took_s) {
+void print_summary(const ReplayOptions& options, const ReplayOutputs& outputs, double took_s) {
   nlohmann::ordered_json line{
       {"frames", outputs.frames}, {"isa", gp::isa_name()}, {"took_s", took_s}};
   if (outputs.expectation) {
@@ -241,7 +188,7 @@ void print_summary(const ReplayOptions& options, const Outputs& outputs, double 
 }
 
 Result<> open_outputs(const ReplayOptions& options, double speed, const log::Reader& reader,
-                      const replay::Replay& replay, Outputs& outputs) {
+                      const replay::Replay& replay, ReplayOutputs& outputs) {
   if (options.expect) {
     auto expectation = replay::Expectation::open(reader);
     if (!expectation) return std::unexpected(expectation.error());
@@ -277,7 +224,7 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
 }
 
 // A replay that only publishes may end at any time; an incomplete file or comparison is a failure.
-Result<> ended_early(const ReplayOptions& options, const Outputs& outputs) {
+Result<> ended_early(const ReplayOptions& options, const ReplayOutputs& outputs) {
   const std::string what = fmt::format("interrupted after {} frames", outputs.frames);
   if (options.expect) return fail(what + ": those after them were not compared");
   if (!options.out.empty()) return fail(what + ": " + options.out + " holds only those");
@@ -302,7 +249,7 @@ Result<> replay(const ReplayOptions& options) {
   warn_of_gaps(*reader);
   warn_of_undescribed(replay);
   warn_of_sources_without_body(*reader);
-  Outputs outputs(replay);
+  ReplayOutputs outputs(replay);
   if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
   const auto extent = reader->extent();
   if (!extent) return std::unexpected(extent.error());
@@ -326,16 +273,33 @@ Result<> replay(const ReplayOptions& options) {
   return done;
 }
 
+// Several logs are only compared.
+int replay_several(const ReplayOptions& options, bool speed_given) {
+  if (!options.expect) {
+    return report(
+        misuse("several logs are replayed at once to compare them: add --expect").error());
+  }
+  if (options.publish || !options.out.empty()) {
+    return report(misuse("--publish and --out are for one log; leave them out").error());
+  }
+  if (speed_given && options.speed != "max") {
+    return report(
+        misuse("several logs are replayed as fast as possible; leave out --speed").error());
+  }
+  return replay_farm({options.logs, options.isa, options.json});
+}
+
 }  // namespace
 
 void add_replay(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("replay", "Compute a device log's frames again");
   auto options = std::make_shared<ReplayOptions>();
-  command->add_option("log", options->log, "The device log")->required();
-  command
-      ->add_option("--speed", options->speed,
-                   "Times the recording's pace: 1 as it came; max: as fast as possible")
-      ->capture_default_str();
+  command->add_option("log", options->logs, "The device log, or several with --expect")->required();
+  auto* speed =
+      command
+          ->add_option("--speed", options->speed,
+                       "Times the recording's pace: 1 as it came; max: as fast as possible")
+          ->capture_default_str();
   auto* publish =
       command->add_flag("--publish", options->publish, "Publish where the recorded run did");
   command->add_option("--endpoint", options->endpoint, "With --publish: publish there instead")
@@ -354,9 +318,15 @@ with 1 and names stream, sequence and field of the first difference. A published
 in its stats that it is one; its times are the recording's, on the recording's clock. Nobody
 can control it. Examples:
   posed replay take1.plog --speed max --expect
+  posed replay --expect takes/*.plog --json   # all at once, on all cores; 1 if one differs
   posed replay take1.plog --speed max --out FRAMES.bin
   posed replay take1.plog --publish     # and watch it: posed top)");
-  command->callback([options, &exit_code] {
+  command->callback([options, speed, &exit_code] {
+    if (options->logs.size() > 1) {
+      exit_code = replay_several(*options, speed->count() > 0);
+      return;
+    }
+    options->log = options->logs.front();
     const auto done = replay(*options);
     exit_code = done ? 0 : report(done.error());
   });

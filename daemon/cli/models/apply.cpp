@@ -1,4 +1,5 @@
 // `posed apply`: sends a clip through the style stage and writes a BVH file.
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -40,13 +41,17 @@ Result<> take_alpha(ApplyArguments& options) {
   style::FilterOptions& filter = options.apply.filter;
   filter.auto_alpha = options.alpha == "auto";
   if (filter.auto_alpha) return {};
-  const bool number = CLI::detail::lexical_cast(options.alpha, filter.alpha);
+  const char* const end = options.alpha.data() + options.alpha.size();
+  const auto read = std::from_chars(options.alpha.data(), end, filter.alpha);
+  const bool number = read.ec == std::errc() && read.ptr == end;
   if (number && std::abs(filter.alpha) <= style::kMaxAlpha) return {};
   return misuse("--alpha takes a number from -2 to 2, or auto, not " + in_quotes(options.alpha));
 }
 
-// `--gate IN` is `--gate on IN`: the library takes the next word for the option's.
+// `--gate` alone is `--gate on`, and `--gate IN` is `--gate on IN`: the library takes the next word
+// for the option's.
 Result<> take_gate(ApplyArguments& options) {
+  if (options.gate.empty()) options.gate = "on";
   if (options.gate != "on" && options.gate != "off") {
     if (!options.in.empty()) {
       return misuse("--gate takes on or off, not " + in_quotes(options.gate));
@@ -118,8 +123,11 @@ Result<> run(ApplyArguments options) {
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
-  if (options.apply.filter.auto_alpha && !model->more.empty()) {
-    return misuse("--alpha auto needs a model of one style; give a number", options.model.string());
+  if (options.apply.filter.auto_alpha && !model->axis.present()) {
+    return misuse(
+        "the model has no style axis, so --alpha auto cannot tell how much is missing: "
+        "give a number, or train a model of one style with this version of posed",
+        options.model.string());
   }
   const auto shares = style::shares_of(options.apply.filter.weights, model->names());
   if (!shares) return std::unexpected(shares.error());

@@ -7,6 +7,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/models/eval_natural.hpp"
 #include "daemon/cli/models/root_option.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
@@ -189,9 +190,10 @@ int finish(const Evaluation& evaluation, const EvalOptions& options) {
 }  // namespace
 
 void add_eval(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("eval", "Judge a model on clips");
+  CLI::App* command = app.add_subcommand("eval", "Judge a model, or a clip");
   command->require_subcommand(1);
   add_eval_gesture(*command, exit_code);
+  add_eval_natural(*command, exit_code);
   CLI::App* style = command->add_subcommand("style", "How near a styled clip comes to the target");
   style->footer(kEvalFooter);
   const auto options = std::make_shared<EvalOptions>();

@@ -16,8 +16,8 @@
 #include "models/perform/perform.hpp"
 #include "models/perform/state_duration.hpp"
 #include "proto/clip/bvh.hpp"
+#include "proto/clip/file_names.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/frame/hand_shape.hpp"
 
 namespace posed::cli {
@@ -59,8 +59,7 @@ Result<perform::PerformOptions> perform_options(const SynthOptions& options) {
 }
 
 Result<> write(const clip::HandClip& hand, const SynthOptions& options) {
-  if (clip::lower(std::filesystem::path(options.out).extension().string()) == ".csv")
-    return clip::write_hand_csv(hand, options.out);
+  if (clip::extension_of(options.out) == ".csv") return clip::write_hand_csv(hand, options.out);
   const auto clip = clip::clip_of_hand(hand, options.shape);
   if (!clip) return std::unexpected(clip.error());
   return clip::write_bvh(*clip, options.out);

@@ -50,13 +50,14 @@ void run_tasks(Work& work, const Task& task) {
 }
 
 // Tells progress until all tasks are done, one failed or the caller asked to stop.
-void watch(Work& work, const TaskProgress& progress) {
+void watch(Work& work, const TaskProgress& progress, std::atomic<bool>& stopping) {
   std::unique_lock lock(work.mutex);
   while (work.done < work.results.size() && !work.stop) {
     work.changed.wait_for(lock, kLook);
     const std::size_t done = work.done;
     lock.unlock();
     const bool go_on = !progress || progress(done);
+    stopping = !go_on;
     lock.lock();
     work.stop = work.stop || !go_on;
   }
@@ -69,6 +70,7 @@ ThreadTasks::ThreadTasks(unsigned threads)
 
 std::optional<std::vector<TaskResult>> ThreadTasks::run(std::size_t count, const Task& task,
                                                         const TaskProgress& progress) {
+  stopping_ = false;
   Work work;
   work.results.resize(count);
   {
@@ -77,7 +79,7 @@ std::optional<std::vector<TaskResult>> ThreadTasks::run(std::size_t count, const
     for (std::size_t t = 0; t < threads; ++t) {
       workers.emplace_back([&work, &task] { run_tasks(work, task); });
     }
-    watch(work, progress);
+    watch(work, progress, stopping_);
   }
   if (work.failure) std::rethrow_exception(work.failure);
   if (work.stop) return std::nullopt;

@@ -1,14 +1,21 @@
+#include <memory>
+
 #include <CLI/CLI.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/models/ranks.hpp"
 
 namespace posed::cli {
 
-void add_train(CLI::App& app, int& exit_code) {
+void add_train_for(CLI::App& app, int& exit_code, const std::shared_ptr<Ranks>& ranks) {
   CLI::App* train = app.add_subcommand("train", "Learn a model from clips");
   train->require_subcommand(1);
-  add_train_style(*train, exit_code);
-  add_train_gesture(*train, exit_code);
+  add_train_style(*train, exit_code, ranks);
+  add_train_gesture(*train, exit_code, ranks);
+}
+
+void add_train(CLI::App& app, int& exit_code) {
+  add_train_for(app, exit_code, std::make_shared<OneRank>());
 }
 
 }  // namespace posed::cli

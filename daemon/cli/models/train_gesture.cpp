@@ -13,6 +13,7 @@
 #include "daemon/cli/models/tree_options.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
+#include "models/fixed_products.hpp"
 #include "models/gesture/model_file.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/label.hpp"
@@ -60,6 +61,17 @@ Result<> check_auto_label(const TrainGestureOptions& options) {
   return {};
 }
 
+// Every file that is read.
+std::vector<std::filesystem::path> inputs_of(const TrainGestureOptions& options) {
+  std::vector<std::filesystem::path> inputs(options.clips.begin(), options.clips.end());
+  inputs.insert(inputs.end(), options.labels.begin(), options.labels.end());
+  if (!options.questions.empty()) inputs.emplace_back(options.questions);
+  for (const std::string& show : options.shows) {
+    inputs.emplace_back(show.substr(show.find('=') + 1));
+  }
+  return inputs;
+}
+
 Result<> check(const TrainGestureOptions& options) {
   if (options.clips.size() != options.labels.size()) {
     return misuse("name one label file for each clip: --clip A.csv B.csv --labels A.lab B.lab");
@@ -69,8 +81,7 @@ Result<> check(const TrainGestureOptions& options) {
   }
   OutputFiles files(options.overwrite);
   if (auto trees = check_tree_options(*options.trees, files); !trees) return trees;
-  files.reads_all(options.clips).reads_all(options.labels).reads(options.questions);
-  for (const std::string& show : options.shows) files.reads(show.substr(show.find('=') + 1));
+  files.reads_all(inputs_of(options));
   if (options.auto_label) {
     if (auto useful = check_auto_label(options); !useful) return useful;
     return files.writes_any_but_other(options.out, {".lab"}).check();
@@ -105,7 +116,8 @@ Result<gesture::LabelPose> shown_pose(const std::string& show, const TrainGestur
 
 // The classes of all labels: from the file, proposed, or built in; then the poses given by clips.
 Result<std::vector<gesture::Label>> classes(const TrainGestureOptions& options,
-                                            const std::vector<gesture::Recording>& recordings) {
+                                            const std::vector<gesture::Recording>& recordings,
+                                            const Ranks& ranks) {
   std::vector<gesture::Label> labels = gesture::built_in_labels();
   const auto poses = gesture::label_poses(recordings);
   if (!options.questions.empty()) {
@@ -114,9 +126,8 @@ Result<std::vector<gesture::Label>> classes(const TrainGestureOptions& options,
     labels = std::move(*read);
   } else if (!options.propose.empty()) {
     labels = gesture::propose_labels(poses);
-    if (auto written = write_questions(labels, options.propose); !written) {
-      return std::unexpected(written.error());
-    }
+    const auto written = ranks.leads() ? write_questions(labels, options.propose) : Result<>{};
+    if (!written) return std::unexpected(written.error());
   }
   for (const std::string& show : options.shows) {
     const auto shown = shown_pose(show, options);
@@ -148,7 +159,7 @@ void print_gesture_summary(const json& report, const std::string& out) {
       out.c_str(), report["seconds"].get<double>(), out.c_str());
 }
 
-Result<json> train_gesture(const TrainGestureOptions& options) {
+Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   std::vector<gesture::Recording> recordings;
   for (std::size_t i = 0; i < options.clips.size(); ++i) {
     auto recording = load_recording(options.clips[i], options.labels[i], options.rate_hz,
@@ -156,16 +167,16 @@ Result<json> train_gesture(const TrainGestureOptions& options) {
     if (!recording) return std::unexpected(recording.error());
     recordings.push_back(std::move(*recording));
   }
-  auto labels = classes(options, recordings);
+  auto labels = classes(options, recordings, ranks);
   if (!labels) return std::unexpected(labels.error());
   gesture::TrainOptions train_options;
   train_options.labels = std::move(*labels);
   train_options.embedded_rounds = options.embedded_rounds;
-  const auto training = train_gesture_and_save(recordings, std::move(train_options), options.out);
+  const auto training =
+      train_gesture_and_save(recordings, std::move(train_options), options.out, ranks);
   if (!training) return std::unexpected(training.error());
-  if (auto drawn = draw_trees(training->model, *options.trees); !drawn) {
-    return std::unexpected(drawn.error());
-  }
+  const auto drawn = ranks.leads() ? draw_trees(training->model, *options.trees) : Result<>{};
+  if (!drawn) return std::unexpected(drawn.error());
   json report = json::parse(training->model.report_json);
   report["seconds"] = training->seconds;
   report["out"] = options.out;
@@ -176,13 +187,17 @@ Result<json> train_gesture(const TrainGestureOptions& options) {
   return report;
 }
 
-int train_or_report(const TrainGestureOptions& options) {
-  if (auto checked = check(options); !checked) return report(checked.error());
+int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
+  if (ranks.leads()) {
+    if (auto checked = check(options); !checked) return report(checked.error());
+  }
+  if (auto same = ranks.check_same(inputs_of(options)); !same) return report(same.error());
   if (options.auto_label) {
+    if (!ranks.leads()) return 0;  // there is nothing to share
     return auto_label({options.clips[0], options.labels[0], options.out, options.rate_hz,
                        read_options(options.hand), options.json});
   }
-  const auto trained = train_gesture(options);
+  const auto trained = train_gesture(options, ranks);
   if (!trained) return report(trained.error());
   for (const json& warning : (*trained)["warnings"]) {
     std::fprintf(stderr, "posed: warning: %s\n", warning.get<std::string>().c_str());
@@ -219,21 +234,23 @@ Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
 
 Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Recording>& recordings,
                                                gesture::TrainOptions options,
-                                               const std::filesystem::path& out) {
+                                               const std::filesystem::path& out, Ranks& ranks) {
+  const FixedProducts fixed;
   ProgressBar bar;
+  options.tasks = &ranks.tasks();
   options.progress = [&bar](std::string_view step, double fraction) {
     return bar.show(step, fraction);
   };
   auto model = gesture::train_gesture(recordings, options);
   if (!model) return std::unexpected(model.error());
   const double seconds = bar.elapsed_s();
-  if (auto saved = gesture::save_model(*model, out); !saved) {
-    return std::unexpected(saved.error());
-  }
+  const auto saved = ranks.leads() ? gesture::save_model(*model, out) : Result<>{};
+  if (!saved) return std::unexpected(saved.error());
   return GestureTraining{std::move(*model), seconds};
 }
 
-void add_train_gesture(CLI::App& train_command, int& exit_code) {
+void add_train_gesture(CLI::App& train_command, int& exit_code,
+                       const std::shared_ptr<Ranks>& ranks) {
   CLI::App* command =
       train_command.add_subcommand("gesture", "Learn a hand's gestures from labelled recordings");
   command->footer(kTrainGestureFooter);
@@ -262,7 +279,8 @@ void add_train_gesture(CLI::App& train_command, int& exit_code) {
   command->add_option("--out", options->out, "Where to write the model")->required();
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
-  command->callback([options, &exit_code] { exit_code = train_or_report(*options); });
+  command->callback(
+      [options, ranks, &exit_code] { exit_code = train_or_report(*options, *ranks); });
 }
 
 }  // namespace posed::cli

@@ -7,6 +7,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "daemon/cli/models/ranks.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/train.hpp"
 #include "proto/clip/clip.hpp"
@@ -26,9 +27,9 @@ struct GestureTraining {
 };
 
 // Trains the model and writes it to `out`. Draws progress on stderr; Ctrl-C ends it with an error
-// and without a file.
+// and without a file. `ranks` share the work; one of them writes.
 [[nodiscard]] Result<GestureTraining> train_gesture_and_save(
     const std::vector<gesture::Recording>& recordings, gesture::TrainOptions options,
-    const std::filesystem::path& out);
+    const std::filesystem::path& out, Ranks& ranks);
 
 }  // namespace posed::cli

@@ -9,11 +9,12 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/models/experiment.hpp"
-#include "daemon/cli/models/thread_tasks.hpp"
 #include "daemon/cli/models/train_style.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
+#include "models/fixed_products.hpp"
 #include "models/style/train.hpp"
+#include "proto/clip/file_names.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -115,11 +116,20 @@ Result<Experiment> experiment_of(const TrainStyleOptions& options) {
   return experiment;
 }
 
-Result<> check_output(const TrainStyleOptions& options, const Experiment& experiment) {
-  OutputFiles files(options.overwrite);
-  files.reads(options.experiment).reads(experiment.asf);
-  for (const ExperimentClip& clip : experiment.clips) files.reads(clip.file);
-  return files.writes_any_but_other(options.out, {".style"}).check();
+// Every file that is read.
+std::vector<std::filesystem::path> inputs_of(const TrainStyleOptions& options,
+                                             const Experiment& experiment) {
+  std::vector<std::filesystem::path> inputs;
+  for (const auto& named : {std::filesystem::path(options.experiment), experiment.asf}) {
+    if (!named.empty()) inputs.push_back(named);
+  }
+  for (const ExperimentClip& clip : experiment.clips) {
+    inputs.push_back(clip.file);
+    if (is_amc(clip.file) && experiment.asf.empty()) {
+      inputs.push_back(clip::skeleton_beside(clip.file));
+    }
+  }
+  return inputs;
 }
 
 void print_style_summary(const json& report, const std::string& out) {
@@ -150,11 +160,19 @@ double overall(std::string_view step, double fraction) {
   return 0.3 + 0.7 * fraction;
 }
 
-Result<json> train_style(const TrainStyleOptions& options) {
+Result<json> train_style(const TrainStyleOptions& options, Ranks& ranks) {
   auto experiment = experiment_of(options);
   if (!experiment) return std::unexpected(experiment.error());
-  if (auto ok = check_output(options, *experiment); !ok) return std::unexpected(ok.error());
-  return train_and_save(*experiment, options.seed, options.out, options.force);
+  const auto inputs = inputs_of(options, *experiment);
+  if (ranks.leads()) {
+    const auto ok = OutputFiles(options.overwrite)
+                        .reads_all(inputs)
+                        .writes_any_but_other(options.out, {".style"})
+                        .check();
+    if (!ok) return std::unexpected(ok.error());
+  }
+  if (auto same = ranks.check_same(inputs); !same) return std::unexpected(same.error());
+  return train_and_save(*experiment, options.seed, options.out, options.force, ranks);
 }
 
 // Prints warnings and, last, the verdict on stderr.
@@ -183,9 +201,9 @@ int finish(const json& report, const TrainStyleOptions& options) {
 }  // namespace
 
 Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
-                            const std::filesystem::path& out, bool force) {
+                            const std::filesystem::path& out, bool force, Ranks& ranks) {
+  const FixedProducts fixed;
   ProgressBar bar;
-  ThreadTasks tasks;
   if (!bar.show("reading clips", 0.0)) return fail("stopped");
   auto clips = load_clips(experiment);
   if (!clips) return std::unexpected(clips.error());
@@ -196,7 +214,7 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   options.dataset.space = experiment.space;
   options.dataset.rate_hz = experiment.rate_hz;
   options.dataset.seed = seed;
-  options.dataset.tasks = &tasks;
+  options.dataset.tasks = &ranks.tasks();
   options.dataset.progress = [&bar](std::string_view step, double fraction) {
     return bar.show(step, overall(step, fraction));
   };
@@ -204,7 +222,7 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   if (!model) return std::unexpected(model.error());
   json report = json::parse(model->report_json);
   const bool written = report["usable"].get<bool>() || force;
-  if (written) {
+  if (written && ranks.leads()) {
     if (auto saved = style::save_model(*model, out); !saved) return std::unexpected(saved.error());
   }
   report["mode"] = experiment.mode == style::TrainMode::kPaper ? "paper" : "default";
@@ -214,7 +232,7 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   return report;
 }
 
-void add_train_style(CLI::App& train_command, int& exit_code) {
+void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_ptr<Ranks>& ranks) {
   CLI::App* style = train_command.add_subcommand("style", "Learn what makes one style another");
   style->footer(kTrainStyleFooter);
   const auto options = std::make_shared<TrainStyleOptions>();
@@ -239,8 +257,8 @@ void add_train_style(CLI::App& train_command, int& exit_code) {
   add_overwrite_option(*style, options->overwrite);
   style->add_flag("--force", options->force, "Write the model even if it is unusable");
   style->add_flag("--json", options->json, "One JSON object on stdout");
-  style->callback([options, &exit_code] {
-    const auto trained = train_style(*options);
+  style->callback([options, ranks, &exit_code] {
+    const auto trained = train_style(*options, *ranks);
     exit_code = trained ? finish(*trained, *options) : report(trained.error());
   });
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "daemon/cli/models/experiment.hpp"
+#include "daemon/cli/models/ranks.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::cli {
@@ -14,9 +15,10 @@ namespace posed::cli {
 // Reads the experiment's clips, trains, writes the model to `out` and returns the report that
 // `train --json` prints. A model that is unusable is written only with `force`; see `written` and
 // `verdict` in the report. Draws progress on stderr; Ctrl-C ends it with an error and without a
-// file.
+// file. `ranks` share the work; one of them writes.
 [[nodiscard]] Result<nlohmann::json> train_and_save(const Experiment& experiment,
                                                     std::uint64_t seed,
-                                                    const std::filesystem::path& out, bool force);
+                                                    const std::filesystem::path& out, bool force,
+                                                    Ranks& ranks);
 
 }  // namespace posed::cli

@@ -22,8 +22,8 @@
 #include "daemon/replay/log_clip.hpp"
 #include "models/motion/motion.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/file_names.hpp"
 #include "proto/clip/frames_clip.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/text/json_text.hpp"
 #include "proto/text/stream_name.hpp"
 
@@ -53,11 +53,7 @@ struct Drawn {
   std::unique_ptr<picture::FigureShape> shape;
 };
 
-std::string extension_of(const std::filesystem::path& path) {
-  return clip::lower(path.extension().string());
-}
-
-bool reads_log(const RenderArguments& options) { return extension_of(options.in) == ".plog"; }
+bool reads_log(const RenderArguments& options) { return clip::extension_of(options.in) == ".plog"; }
 
 Result<> check_render(const RenderArguments& options) {
   const bool log = reads_log(options);
@@ -70,7 +66,7 @@ Result<> check_render(const RenderArguments& options) {
         "recorded with `publish_raw = true`",
         options.in);
   }
-  const bool moves = extension_of(options.out) == ".mp4";
+  const bool moves = clip::extension_of(options.out) == ".mp4";
   if (moves != options.video) {
     return misuse(
         moves ? "a .mp4 is a video: add --video" : "a video is an .mp4: name one by --out",

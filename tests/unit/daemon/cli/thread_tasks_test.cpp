@@ -45,6 +45,21 @@ TEST_CASE("after a stop no other task begins and nothing is given back", "[tasks
   CHECK(begun < kCount / 4);
 }
 
+TEST_CASE("a task that takes long sees that it shall stop", "[tasks]") {
+  ThreadTasks tasks(2);
+  const auto found = tasks.run(
+      2,
+      [&](std::size_t) {
+        while (!tasks.stopping()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        return TaskResult{};
+      },
+      [](std::size_t) { return false; });
+  CHECK_FALSE(found);
+  // The next work begins anew.
+  CHECK(tasks.run(1, [&](std::size_t) { return TaskResult{tasks.stopping() ? 1.0 : 0.0}; }, {}) ==
+        std::vector<TaskResult>{{0.0}});
+}
+
 TEST_CASE("a task's exception reaches the caller", "[tasks]") {
   ThreadTasks tasks(2);
   CHECK_THROWS_AS(static_cast<void>(tasks.run(5,

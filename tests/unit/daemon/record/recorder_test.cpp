@@ -71,6 +71,7 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is reported once
   log_writer.turn(2 * kTurn_ns);
   CHECK(events.size() == 3);
   CHECK(log_writer.lost_chunks() == 4);
+  CHECK(log_writer.lost_frames() == 2);
   REQUIRE(log_writer.finish(3 * kTurn_ns));
   CHECK(sequences(path)[0] == std::vector<std::uint64_t>{1, 2, 7});
   const auto rows = gaps(path);

@@ -8,6 +8,7 @@
 #include "models/gesture/model_file.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/gesture/train.hpp"
+#include "tests/support/backward_tasks.hpp"
 
 using namespace posed;
 using namespace posed::gesture;
@@ -175,4 +176,15 @@ TEST_CASE("A faster recording is brought to the model's rate", "[recording]") {
         Approx(static_cast<double>(fast->clip.angles.size()) / 4).margin(1));
   CHECK(recording->angles_rad(50, 9) == Approx(fast->clip.angles[200][9]));
   CHECK(cut(*recording, fast->labels, "fast.lab").has_value());
+}
+
+TEST_CASE("The order of the tasks does not change a bit of a gesture model", "[train]") {
+  const std::vector<Recording> recordings{performed({.gestures = 25}),
+                                          performed({.person = 2, .gestures = 25})};
+  TrainOptions options;
+  options.embedded_rounds = 2;
+  const std::string forward = serialize_model(train_gesture(recordings, options).value());
+  test::BackwardTasks backward;
+  options.tasks = &backward;
+  CHECK(serialize_model(train_gesture(recordings, options).value()) == forward);
 }

@@ -69,14 +69,17 @@ style::LeaveOut lesson_of(const style::Dataset& dataset,
   style::Outputs& outputs = lesson.pairs.outputs;
   outputs.differences = {delta};
   outputs.offset = delta.row(0);
+  std::vector<style::Fold> folds;
   for (const int s : people) {
     const auto& clip = dataset.clips[static_cast<std::size_t>(s)];
-    lesson.folds.push_back(
+    folds.push_back(
         {{static_cast<int>(lesson.pairs.inputs.size())}, {}, delta, clip.q, clip.phase(), {}});
     lesson.pairs.inputs.push_back(cycles[static_cast<std::size_t>(s)].coefficients);
     outputs.of_input.push_back(0);
   }
-  for (style::Fold& fold : lesson.folds) fold.outputs = outputs;
+  for (style::Fold& fold : folds) fold.outputs = outputs;
+  lesson.folds = folds.size();
+  lesson.fold = [folds = std::move(folds)](std::size_t index) { return folds[index]; };
   return lesson;
 }
 

@@ -3,11 +3,13 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
 #include "models/motion/leg_signal.hpp"
+#include "models/motion/synthetic_walker.hpp"
 #include "models/style/live_stride.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -36,7 +38,87 @@ class ToyGate {
   style::Gate gate;
 };
 
+// A gate that knows the poses of a synthetic walk and, in its legs, the stride.
+class WalkingGate {
+ public:
+  WalkingGate() : clip_(motion::make_walker({.seconds = 9.0, .noise_deg = 0.0}).value()) {
+    style::StyleModel model;
+    model.space = motion::describe_space(motion::Space::kNative, *clip_.skeleton).value();
+    const auto space = motion::PoseSpace::bind(model.space, *clip_.skeleton).value();
+    const auto dims = static_cast<std::size_t>(space.dims());
+    q_.resize(dims);
+    available_.resize(dims);
+    model.process.inputs.resize(40, space.dims());
+    model.process.mu = 1.0;
+    for (int i = 0; i < 40; ++i) {
+      space.to_vector(clip_.frame(i), 0.0, q_, available_);
+      for (std::size_t d = 0; d < dims; ++d) {
+        model.process.inputs(i, static_cast<Eigen::Index>(d)) = static_cast<double>(q_[d]);
+      }
+    }
+    model.gate = {Eigen::VectorXd::Zero(space.dims()), 0.4, stride_s()};
+    space_ = space;
+    known_.emplace(model, *clip_.skeleton);
+  }
+
+  // The walk, `speed` times as fast; 0 stands still. How far the gate is open after 5 s.
+  float walk(style::Gate& gate, double speed, bool on = true,
+             const std::optional<style::Walker>& walker = {}) {
+    constexpr double kStep_s = 1.0 / kGateRate_hz;
+    for (int i = 0; i < 5 * kGateRate_hz; ++i) {
+      const double frame = i * kStep_s * speed * clip_.frame_rate_hz;
+      const Frame in = clip_.frame(static_cast<int>(frame));
+      space_->to_vector(in, 0.0, q_, available_);
+      gate.update(&*known_, on, in, q_, available_, walker, kStep_s);
+    }
+    return gate.open();
+  }
+  [[nodiscard]] const style::KnownMotion& known() const { return *known_; }
+
+ private:
+  // From one greatest lead of the right leg to the next.
+  [[nodiscard]] double stride_s() const {
+    const auto legs = motion::LegSignal::find(*clip_.skeleton);
+    std::vector<int> peaks;
+    for (int i = 1; i + 1 < clip_.channels.rows(); ++i) {
+      const double now = legs->value_rad(clip_.frame(i));
+      if (now > legs->value_rad(clip_.frame(i - 1)) && now >= legs->value_rad(clip_.frame(i + 1))) {
+        peaks.push_back(i);
+      }
+    }
+    return static_cast<double>(peaks.back() - peaks.front()) /
+           (static_cast<double>(peaks.size() - 1) * clip_.frame_rate_hz);
+  }
+
+  clip::Clip clip_;
+  std::optional<motion::PoseSpace> space_;
+  std::optional<style::KnownMotion> known_;
+  std::vector<float> q_;
+  std::vector<std::uint8_t> available_;
+};
+
 }  // namespace
+
+TEST_CASE("strides like the training's open the gate, rest and a run close it", "[style]") {
+  WalkingGate walk;
+  REQUIRE(walk.known().legs());
+  style::Gate gate;
+  CHECK(walk.walk(gate, 1.0) == 1.0F);
+  CHECK(gate.strides());
+  CHECK(walk.walk(gate, 0.0) == 0.0F);
+  CHECK_FALSE(gate.strides());
+  CHECK(walk.walk(gate, 1.0) == 1.0F);
+  CHECK(walk.walk(gate, 1.6) < 0.05F);
+  const style::Walker quick{.cadence_rad_s = 1.6 * walk.known().cadence_rad_s()};
+  CHECK(walk.walk(gate, 1.6, true, quick) > 0.95F);
+}
+
+TEST_CASE("a gate that is off is open and still measures the cadence, for warm-ups", "[style]") {
+  WalkingGate walk;
+  style::Gate gate;
+  CHECK(walk.walk(gate, 1.6, false) == 1.0F);
+  CHECK(gate.cadence_rad_s() == Approx(1.6 * walk.known().cadence_rad_s()).epsilon(0.1));
+}
 
 TEST_CASE("the nearest training pose is found, also with missing joints", "[style]") {
   const auto model = gated_toy_model(1);

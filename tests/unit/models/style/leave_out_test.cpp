@@ -20,10 +20,19 @@ Eigen::MatrixXd some_cycle(std::mt19937& bits) {
                                       [&] { return normal(bits); });
 }
 
+struct Walkers {
+  style::TrainingPairs pairs;
+  std::vector<style::Fold> folds;
+
+  [[nodiscard]] style::LeaveOut leave_out() const {
+    return {pairs, folds.size(), [this](std::size_t index) { return folds[index]; }};
+  }
+};
+
 // Walkers with unrelated cycles and differences; each fold asks for one of them without it.
-style::LeaveOut walkers() {
+Walkers walkers() {
   std::mt19937 bits(3);
-  style::LeaveOut found;
+  Walkers found;
   auto& inputs = found.pairs.inputs;
   auto& outputs = found.pairs.outputs;
   outputs.offset = Eigen::RowVectorXd::Constant(kDims, 0.1);
@@ -47,8 +56,8 @@ style::LeaveOut walkers() {
 }
 
 // More folds than one task takes.
-style::LeaveOut thrice(const style::LeaveOut& once) {
-  style::LeaveOut found = once;
+Walkers thrice(const Walkers& once) {
+  Walkers found = once;
   for (int more = 0; more < 2; ++more) {
     found.folds.insert(found.folds.end(), once.folds.begin(), once.folds.end());
   }
@@ -58,10 +67,11 @@ style::LeaveOut thrice(const style::LeaveOut& once) {
 }  // namespace
 
 TEST_CASE("folds count alike in one task and in several", "[style][people]") {
-  const style::LeaveOut once = walkers();
+  const Walkers once = walkers();
+  const Walkers thrice_as_many = thrice(once);
   SerialTasks tasks;
-  const auto few = style::choose_kernel(once, tasks, {}).value();
-  const auto many = style::choose_kernel(thrice(once), tasks, {}).value();
+  const auto few = style::choose_kernel(once.leave_out(), tasks, {}).value();
+  const auto many = style::choose_kernel(thrice_as_many.leave_out(), tasks, {}).value();
   CHECK(many.kernel.length_rad == few.kernel.length_rad);
   CHECK(many.kernel.noise == few.kernel.noise);
   CHECK(many.error == Approx(few.error));
@@ -70,7 +80,7 @@ TEST_CASE("folds count alike in one task and in several", "[style][people]") {
 }
 
 TEST_CASE("progress never goes back when lengths are added", "[style][people]") {
-  style::LeaveOut far = thrice(walkers());
+  Walkers far = thrice(walkers());
   for (style::Fold& fold : far.folds) {
     // Far from all poses, where the truth is the prior mean: the shorter the better.
     fold.q.array() += 0.5;
@@ -80,7 +90,7 @@ TEST_CASE("progress never goes back when lengths are added", "[style][people]") 
   double last = 0.0;
   int told = 0;
   SerialTasks tasks;
-  const auto chosen = style::choose_kernel(far, tasks, [&](double fraction) {
+  const auto chosen = style::choose_kernel(far.leave_out(), tasks, [&](double fraction) {
     CHECK(fraction >= last);
     CHECK(fraction <= 1.0);
     last = fraction;

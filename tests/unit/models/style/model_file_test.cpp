@@ -133,6 +133,11 @@ TEST_CASE("A model whose parts do not fit is refused by name", "[model_file]") {
   model.rate_hz = std::numeric_limits<double>::infinity();
   refused(model, "frame rate");
   model = small_model();
+  model.gate = {Eigen::VectorXd::Zero(small_model().limit_rad.size()), 0.0, 1.0};
+  refused(model, "swing");
+  model.gate = {model.gate.neutral, 0.5, 0.0};
+  refused(model, "fastest stride");
+  model = small_model();
   model.space.joints.assign(97, "");
   refused(model, "number of joints");
 }

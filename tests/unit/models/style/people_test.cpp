@@ -11,6 +11,7 @@
 #include "models/style/evaluate.hpp"
 #include "models/style/train.hpp"
 #include "models/style/training_pairs.hpp"
+#include "tests/support/backward_tasks.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;
@@ -37,17 +38,6 @@ style::Difference only_difference(const style::Dataset& dataset) {
   REQUIRE(found.size() == 1);
   return found.front();
 }
-
-// Runs the tasks from the last to the first.
-class BackwardTasks final : public TaskRunner {
- public:
-  std::optional<std::vector<TaskResult>> run(std::size_t count, const Task& task,
-                                             const TaskProgress& /*progress*/) override {
-    std::vector<TaskResult> results(count);
-    for (std::size_t i = count; i-- > 0;) results[i] = task(i);
-    return results;
-  }
-};
 
 Result<style::StyleModel> model_of(const std::vector<style::TrainingClip>& clips,
                                    TaskRunner* tasks = nullptr) {
@@ -119,7 +109,7 @@ TEST_CASE("the model is the same bits whatever runs the tasks, in whatever order
     clips.push_back(walk_of(person, WalkerFamily::kMarch));
     clips.push_back(walk_of(person, WalkerFamily::kSway));
   }
-  BackwardTasks backward;
+  test::BackwardTasks backward;
   CHECK(style::serialize_model(model_of(clips).value()) ==
         style::serialize_model(model_of(clips, &backward).value()));
 }

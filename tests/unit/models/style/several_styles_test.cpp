@@ -71,6 +71,16 @@ StyleModel corner(const StyleModel& model, std::size_t style) {
 
 }  // namespace
 
+TEST_CASE("the gate of several styles does not depend on their order", "[style]") {
+  const auto clips = walks();
+  const StyleModel one = trained(clips, {"sway", "half"}).value();
+  const StyleModel other = trained(clips, {"half", "sway"}).value();
+  CHECK(one.gate.neutral.isApprox(other.gate.neutral));
+  CHECK(one.gate.swing_rad == other.gate.swing_rad);
+  CHECK(one.gate.fastest_stride_s == other.gate.fastest_stride_s);
+  CHECK(one.gate.swing_rad > 0.0);
+}
+
 TEST_CASE("each of several styles is the one of its own training", "[style]") {
   const auto clips = walks();
   const std::vector<std::string> targets{"sway", "half"};

@@ -133,6 +133,26 @@ TEST_CASE("a model of an older posed has neither gate nor warm-up, and says so o
   WarmedToy ungated(old.get(), {.gate = false});
   CHECK(delta_of(ungated.walk(90), out, 2).angularDistance(Eigen::Quaterniond::Identity()) < 1e-6);
   CHECK(ungated.notices().empty());
+  WarmedToy unheard(old.get(), {.gate = false, .auto_alpha = true});
+  unheard.walk(90);
+  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerWatch::kNoAxis});
+  CHECK_FALSE(unheard.warm_up(2.0));
+  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerWatch::kNoGateData});
+}
+
+TEST_CASE("alpha acts while auto-alpha does not know how much the walker shows", "[style]") {
+  const auto ready = warm_bound(gated_toy_model(1));
+  WarmedToy toy(ready.get());
+  toy.walk(90);
+  REQUIRE(toy.filter.alpha() == 1.0F);
+  toy.filter.set(style::StyleFilter::kAutoAlpha, 1.0);
+  const auto next = warm_bound(gated_toy_model(2));
+  toy.filter.use(*next);  // forgets the estimate
+  REQUIRE(std::isnan(toy.filter.reading(style::StyleFilter::kStyleEstimate)));
+  toy.filter.set_alpha(0.0F);
+  toy.walk(20);
+  REQUIRE(std::isnan(toy.filter.reading(style::StyleFilter::kStyleEstimate)));
+  CHECK(toy.filter.alpha() < 0.4F);
 }
 
 TEST_CASE("a walker stays known when a model with other mean rotations is swapped in", "[style]") {
@@ -153,10 +173,12 @@ TEST_CASE("a walker stays known when a model with other mean rotations is swappe
   };
   CHECK(after[3] == before[3]);
   CHECK(angle_between_rad(turn * of(after, 6), of(before, 6)) < 1e-5);
+  static_cast<void>(toy.notices());
   const auto old = warm_bound(toy_model(2));
   toy.filter.use(*old);
+  toy.walk(1);
   CHECK_FALSE(toy.filter.walker());
-  CHECK(toy.notices().back() == WalkerWatch::kOtherJoints);
+  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kNoGateData});
 }
 
 TEST_CASE("calibrate is a warm-up by an older name", "[style]") {
