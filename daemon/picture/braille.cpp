@@ -43,7 +43,9 @@ class Dots {
   [[nodiscard]] std::string row(int row) const {
     std::string text;
     for (int column = 0; column < columns_; ++column) {
-      const std::uint8_t dots = patterns_[static_cast<std::size_t>(row * columns_ + column)];
+      const std::uint8_t dots =
+          patterns_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                    static_cast<std::size_t>(column)];
       if (dots == 0) {
         text += ' ';
         continue;
@@ -94,6 +96,7 @@ std::vector<std::string> braille(const Figure& figure, const Camera& camera,
     }
   }
   std::vector<std::string> text;
+  text.reserve(static_cast<std::size_t>(std::max(rows, 0)));
   for (int row = 0; row < rows; ++row) text.push_back(dots.row(row));
   return text;
 }

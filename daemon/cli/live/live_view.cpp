@@ -206,7 +206,7 @@ std::vector<std::string> broken(const std::string& text, const LiveViewOptions& 
   const std::string blanks(static_cast<std::size_t>(indent), ' ');
   std::vector<std::string> lines{text};
   if (options.width > 0) lines = wrapped(text, options.width - indent, "  ");
-  for (std::string& line : lines) line = blanks + paint(options.colour, colour, line);
+  for (std::string& line : lines) line = paint(options.colour, colour, line).insert(0, blanks);
   return lines;
 }
 

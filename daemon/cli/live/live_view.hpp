@@ -54,8 +54,8 @@ class LiveScreen {
   // Sets width, height and colour to those of the terminal now.
   void measure(LiveViewOptions& options) const;
   void draw(const std::vector<std::string>& lines) const;
-  [[nodiscard]] char key_pressed() const;   // the next byte of a key; 0: none. Never waits
-  [[nodiscard]] Key next_key() const;       // kNone: none is waiting. Never waits
+  [[nodiscard]] char key_pressed() const;  // the next byte of a key; 0: none. Never waits
+  [[nodiscard]] Key next_key() const;      // kNone: none is waiting. Never waits
 
  private:
   bool terminal_ = false;

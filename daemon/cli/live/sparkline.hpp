@@ -20,7 +20,7 @@ namespace posed::cli {
   for (const double value : values) {
     const double part = largest > 0.0 ? height(value) / largest : 0.0;
     text += "\xe2\x96";  // U+2581 to U+2588 in UTF-8
-    text += static_cast<char>(0x81 + static_cast<int>(part * 7.0 + 0.5));
+    text += static_cast<char>(0x81 + std::lround(part * 7.0));
   }
   return text;
 }
