@@ -7,6 +7,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "proto/clip/file_names.hpp"
+
 namespace posed::cli {
 namespace {
 

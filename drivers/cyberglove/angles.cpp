@@ -53,6 +53,14 @@ void compute_abductions(float bias, std::span<float> value, Valid& valid) noexce
   value[kLittleAbd] += value[kRingAbd];
 }
 
+// A sensor that was measured is fitted.
+template <Side kHand>
+void compute_measured(const glove::Calibration& calibration, std::span<float> value,
+                      Valid& valid) noexcept {
+  const auto fitted = static_cast<std::uint32_t>(valid.to_ulong());
+  compute_angles(calibration.parameter[kAbductionBias], kHand, fitted, value, valid);
+}
+
 void uncompute_left(std::span<double> value) noexcept { uncompute_angles(Side::kLeft, value); }
 void uncompute_right(std::span<double> value) noexcept { uncompute_angles(Side::kRight, value); }
 
@@ -77,6 +85,8 @@ Result<glove::Model> glove_model(Side hand) {
   if (hand == Side::kLeft) {
     for (const std::size_t i : kMirrored) model.sensors[i].map_sign = -1.0;
   }
+  model.compute =
+      hand == Side::kLeft ? compute_measured<Side::kLeft> : compute_measured<Side::kRight>;
   model.uncompute = hand == Side::kLeft ? uncompute_left : uncompute_right;
   return model;
 }

@@ -69,6 +69,23 @@ Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand
   return values;
 }
 
+HandAngles angles_of(const Model& model, const Calibration& calibration,
+                     std::span<const Held> held) {
+  std::array<float, kMaxSensors> value{};
+  std::bitset<kMaxSensors> valid;
+  const std::size_t sensors = std::min({calibration.sensors, held.size(), value.size()});
+  for (std::size_t i = 0; i < sensors; ++i) {
+    if (held[i].count == 0) continue;
+    value[i] = calibration.curve[i].value_at(static_cast<float>(held[i].mean()));
+    valid[i] = std::isfinite(value[i]);
+  }
+  const std::span<float> values = std::span(value).first(calibration.sensors);
+  if (model.compute != nullptr) model.compute(calibration, values, valid);
+  HandAngles angles{};
+  calibration.map_to_hand(values, valid, angles);
+  return angles;
+}
+
 double Held::deviation() const {
   if (count == 0) return 0.0;
   return std::sqrt(std::max(0.0, squares / static_cast<double>(count) - mean() * mean()));

@@ -76,6 +76,11 @@ struct Fitted {
 // finite for a sensor that the map does not name.
 [[nodiscard]] Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand);
 
+// The angles of a hand whose sensors have the means of `held`, as a decoder with this calibration
+// of the model gives them; not finite for a channel without a measured sensor.
+[[nodiscard]] HandAngles angles_of(const Model& model, const Calibration& calibration,
+                                   std::span<const Held> held);
+
 // The smallest movement of a sensor that is accepted for a calibration [counts].
 [[nodiscard]] double least_span(const Sensor& sensor);
 

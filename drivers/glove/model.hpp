@@ -3,6 +3,7 @@
 // against it.
 #pragma once
 
+#include <bitset>
 #include <span>
 #include <string>
 #include <utility>
@@ -28,8 +29,10 @@ struct Model {
   // The device's own constants that a calibration may set, with their defaults.
   std::vector<std::pair<std::string, double>> parameters{};
   std::string map_toml{};  // config/devices/<name>.toml: calibrated values to hand45
-  // The inverse of the device's own formula, in place: from the values in the map to the values of
-  // the curves. Null: they are the same.
+  // The device's own formula, in place: from the values of the curves to the values in the map; and
+  // its inverse. Null: they are the same.
+  void (*compute)(const Calibration& calibration, std::span<float> value,
+                  std::bitset<kMaxSensors>& valid) = nullptr;
   void (*uncompute)(std::span<double> value) = nullptr;
 };
 

@@ -250,9 +250,10 @@ TEST_CASE("each command explains its own options, and refuses those without an e
   CHECK_FALSE(set.out.contains("posed ctl haptics"));
   CHECK_FALSE(set.out.contains("posed ctl play"));
   const std::string help = posed({"top", "--help"}).out;
-  for (const char* column : {"DROP ", "SHED ", "PUBLISH ", "microseconds"})
+  for (const char* column : {"STATE ", "LATENCY ", "ALPHA ", "microseconds"})
     CHECK(has(help, column));
   CHECK(posed({"monitor", "--topic", "stats", "--stream", "walker"}).code == 2);
+  CHECK(posed({"top", "--json", "--control", "tcp://127.0.0.1:5571"}).code == 2);
   CHECK(posed({"emulate", "lucidgloves", "--stream", "right"}).code == 2);
   CHECK(posed({"emulate", "lucidgloves", "--seed", "3", "--seconds", "1"}).code == 2);
   CHECK(posed({"run", "--config", "none.toml", "--seconds", "-1"}).code == 2);

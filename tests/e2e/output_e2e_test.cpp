@@ -134,7 +134,7 @@ TEST_CASE("posed run sends a stream to a VMC application and reports it") {
   CHECK(std::stoull(output.at("sent").get<std::string>()) > 30);
   CHECK(output.at("failures") == "0");
   const auto shown = posed({"top", "--connect", served.publish, "--count", "1"});
-  CHECK(shown.out.find("vmc output: 1 receiver, ") != std::string::npos);
+  CHECK(shown.out.find("vmc output, 1 receiver, ") != std::string::npos);
   served.daemon->send(SIGTERM);
   CHECK(served.daemon->exit_code() == 0);
 }

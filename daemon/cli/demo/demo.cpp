@@ -1,7 +1,6 @@
 // The demo: makes two families of synthetic walkers and a signer's glove recording, trains a style
 // model from the families and a gesture model from the glove, streams a walker that is not in the
 // training data through the daemon and watches it over ZeroMQ, as any client would.
-#include <cerrno>  // program_invocation_name
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -19,12 +18,14 @@
 #include "daemon/cli/demo/demo_clips.hpp"
 #include "daemon/cli/demo/demo_folder.hpp"
 #include "daemon/cli/demo/demo_hand.hpp"
+#include "daemon/cli/demo/demo_screen.hpp"
 #include "daemon/cli/demo/demo_watcher.hpp"
 #include "daemon/cli/live/client.hpp"
-#include "daemon/cli/live/live_view.hpp"
+#include "daemon/cli/live/live_table.hpp"
 #include "daemon/cli/models/train_gesture.hpp"
 #include "daemon/cli/models/train_style.hpp"
 #include "daemon/cli/output_files.hpp"
+#include "daemon/cli/paint.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/emulate/synthetic_signer.hpp"
 #include "daemon/logging/log_output.hpp"
@@ -33,8 +34,6 @@ namespace posed::cli {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
-constexpr double kRedrawEvery_s = 0.5;
-constexpr double kPlainLinesEvery_s = 5.0;
 constexpr double kFirstFrameWithin_s = 10.0;
 constexpr double kHandRate_hz = 30.0;
 
@@ -45,12 +44,6 @@ struct DemoOptions {
   std::optional<double> seconds;
   bool overwrite = false;
 };
-
-// How this program was called, for the commands that it suggests.
-std::string own_name() {
-  const std::string name = program_invocation_name;
-  return name.contains('/') ? name : "posed";
-}
 
 // Makes the demo's files, unless this program has made them before.
 Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
@@ -89,10 +82,12 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
 }
 
 // Receives every message that waits.
-void drain(Connection& connection, Watcher& watcher) {
+void drain(Connection& connection, Watcher& watcher, DemoScreen& screen) {
   net::Message topic, body;
   while (topic.receive(connection.socket()) && topic.more() &&
          body.receive(connection.socket(), 0)) {
+    screen.take(topic.text(), body.bytes());
+    if (!topic.text().starts_with("pose/")) continue;
     watcher.take(std::string(topic.text()), body.bytes().data(), body.bytes().size());
   }
 }
@@ -109,13 +104,11 @@ Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watch
   auto connection = Connection::open(client, ZMQ_SUB);
   if (!connection) return std::unexpected(connection.error());
   if (auto set = net::set_option(connection->socket(), ZMQ_SUBSCRIBE, "pose/"); !set) return set;
-  const LiveScreen screen;
-  LiveViewOptions view{.title = "posed demo " + daemon.publish_endpoint()};
+  DemoScreen screen(daemon, *connection);
   const auto start = SteadyClock::now();
   std::optional<SteadyClock::time_point> first_frame;
-  SteadyClock::time_point drawn{};
-  while (!Interrupt::came() && !screen.quit_pressed() && !daemon.asked_to_stop()) {
-    if (connection->wait(kLookAround)) drain(*connection, watcher);
+  while (!Interrupt::came() && !screen.quits() && !daemon.asked_to_stop()) {
+    if (connection->wait(kLookAround)) drain(*connection, watcher, screen);
     if (!first_frame && watcher.styled() > 0) first_frame = SteadyClock::now();
     if (first_frame && options.seconds && seconds_since(*first_frame) >= *options.seconds) break;
     if (first_frame) {
@@ -124,23 +117,7 @@ Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watch
     if (!first_frame && seconds_since(start) > kFirstFrameWithin_s) {
       return fail("no styled frame arrived within 10 s; the log above says why");
     }
-    if (seconds_since(drawn) < (screen.is_terminal() ? kRedrawEvery_s : kPlainLinesEvery_s))
-      continue;
-    const bool first_drawing = drawn == SteadyClock::time_point{};
-    drawn = SteadyClock::now();
-    screen.measure(view);
-    view.notes = {
-        fmt::format("received {} styled frames, {} missing; {:.1f} deg rms from the raw pose",
-                    watcher.styled(), watcher.gaps(), watcher.change_lately_deg()),
-        hand.note()};
-    if (screen.is_terminal() || first_drawing) {
-      view.notes.insert(view.notes.end(),
-                        {fmt::format("in another terminal: {} monitor", own_name()),
-                         fmt::format("            or: {} ctl set walker alpha 0.5", own_name()),
-                         fmt::format("            or: {} ctl play hand \"p 4 3 1 g\"", own_name()),
-                         "Ctrl-C ends the demo"});
-    }
-    screen.draw(live_view(daemon.stats(), view));
+    screen.show(watcher, hand);
   }
   return {};
 }
@@ -158,6 +135,23 @@ Result<Signers> put_on_gloves(config::DaemonConfig& config, const std::filesyste
     signers.push_back(std::move(*signer));
   }
   return signers;
+}
+
+// What was seen, for a terminal of 80 columns.
+void print_summary(const Watcher& watcher, const DemoHand& hand, const v1::Stats& stats) {
+  const auto print = [](const std::string& text) {
+    for (const std::string& line : wrapped(text, 80, "  ")) std::puts(line.c_str());
+  };
+  print(fmt::format(
+      "received {} styled frames over ZeroMQ, {} missing; {:.1f} deg rms from the raw poses",
+      watcher.styled(), watcher.gaps(), watcher.change_deg()));
+  if (const std::string summary = hand.summary(); !summary.empty()) print(summary);
+  for (const v1::StreamStats& s : stats.stream()) {
+    print(
+        fmt::format("{}: {:.1f} frames/s, arrival to ZeroMQ {} (99 %: {}), dropped {}, skipped {}",
+                    s.stream(), s.rate_hz(), people_duration(s.publish().p50_us()),
+                    people_duration(s.publish().p99_us()), s.dropped(), s.shed()));
+  }
 }
 
 Result<> stream(const DemoOptions& options, const std::filesystem::path& folder) {
@@ -181,18 +175,8 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   const v1::Stats stats = (*daemon)->stats();
   (*daemon)->stop();
   if (!watched) return watched;
-  std::printf(
-      "\nreceived %llu styled frames over ZeroMQ, %llu missing; %.1f deg rms from the raw poses\n",
-      static_cast<unsigned long long>(watcher.styled()),
-      static_cast<unsigned long long>(watcher.gaps()), watcher.change_deg());
-  if (const std::string summary = hand->summary(); !summary.empty()) std::puts(summary.c_str());
-  for (const v1::StreamStats& s : stats.stream()) {
-    std::printf(
-        "%s: %.1f frames/s, arrival to ZeroMQ p50 %.0f us, p99 %.0f us, dropped %llu, shed %llu\n",
-        s.stream().c_str(), static_cast<double>(s.rate_hz()),
-        static_cast<double>(s.publish().p50_us()), static_cast<double>(s.publish().p99_us()),
-        static_cast<unsigned long long>(s.dropped()), static_cast<unsigned long long>(s.shed()));
-  }
+  std::puts("");
+  print_summary(watcher, *hand, stats);
   return {};
 }
 

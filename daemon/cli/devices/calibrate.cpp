@@ -1,4 +1,6 @@
 // `posed calibrate`: calibrates a user's glove from a few poses, or from another program's file.
+#include <unistd.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -11,6 +13,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/devices/calibrate_poses.hpp"
+#include "daemon/cli/devices/calibrated_hand.hpp"
 #include "daemon/cli/devices/driver_options.hpp"
 #include "daemon/cli/devices/good_poses.hpp"
 #include "daemon/cli/output_files.hpp"
@@ -27,6 +30,7 @@ using drivers::glove::CalibrationFile;
 using drivers::glove::kPoseNames;
 
 constexpr double kMaxSeconds = 60.0;
+constexpr int kHandColumns = 60, kHandRows = 10;  // of the picture of the calibrated hand
 
 struct CalibrateOptions {
   std::string driver, port, id, stream, user;
@@ -138,6 +142,22 @@ CalibrationFile blank_file(const GloveSource& source) {
           .sensors = {}};
 }
 
+// Draws the calibrated hand for a user at a terminal. An error says that the file is none that a
+// driver would take.
+Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
+                   const drivers::glove::Recorded& recorded) {
+  const auto calibration =
+      drivers::glove::make_calibration(source.model(), file, source.hand(), source.identity());
+  if (!calibration) return std::unexpected(calibration.error());
+  if (::isatty(STDERR_FILENO) == 0) return {};
+  std::fputs("the calibrated hand, in the poses as they were held:\n", stderr);
+  for (const std::string& line : calibrated_hand(source.model(), **calibration, source.hand(),
+                                                 recorded, kHandColumns, kHandRows)) {
+    std::fprintf(stderr, "%s\n", line.c_str());
+  }
+  return {};
+}
+
 Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   const auto plan = plan_of(options);
   if (!plan) return std::unexpected(plan.error());
@@ -152,6 +172,9 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   }
   CalibrationFile file = blank_file(**source);
   file.sensors = std::move(fitted->sensors);
+  if (auto shown = show_hand(**source, file, *recorded); !shown) {
+    return std::unexpected(shown.error());
+  }
   return file;
 }
 

@@ -32,25 +32,6 @@ std::string squeezed(const std::string& name, int width) {
 
 std::size_t place(Pose pose) { return static_cast<std::size_t>(pose); }
 
-// Splits the text at blanks into lines of at most `width`.
-std::vector<std::string> wrapped(std::string_view text, int width) {
-  std::vector<std::string> lines(1);
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find(' '), text.size());
-    const std::string word(text.substr(0, end));
-    text.remove_prefix(std::min(end + 1, text.size()));
-    std::string& line = lines.back();
-    if (line.empty()) {
-      line = word;
-    } else if (line.size() + 1 + word.size() <= static_cast<std::size_t>(width)) {
-      line += " " + word;
-    } else {
-      lines.push_back(word);
-    }
-  }
-  return lines;
-}
-
 // "flat: done   [fist]   thumb   spread"
 std::string steps(const CalibrateView& view) {
   std::string text;

@@ -70,12 +70,26 @@ char LiveScreen::key_pressed() const {
   return key;
 }
 
-bool LiveScreen::quit_pressed() const {
-  bool quit = false;
-  for (char key = key_pressed(); key != 0; key = key_pressed()) {
-    quit = quit || key == 'q' || key == 'Q';
+Key LiveScreen::next_key() const {
+  const char first = key_pressed();
+  if (first == 0) return Key::kNone;
+  if (first == 'q' || first == 'Q') return Key::kQuit;
+  if (first != '\x1b') return Key::kOther;
+  // An arrow is ESC [ A to D, or ESC O A to D where the terminal is in application mode.
+  const char second = key_pressed();
+  if (second != '[' && second != 'O') return Key::kOther;
+  switch (key_pressed()) {
+    case 'A':
+      return Key::kUp;
+    case 'B':
+      return Key::kDown;
+    case 'C':
+      return Key::kRight;
+    case 'D':
+      return Key::kLeft;
+    default:
+      return Key::kOther;
   }
-  return quit;
 }
 
 }  // namespace posed::cli

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/cli/live/live_table.hpp"
 #include "daemon/cli/live/monitor_line.hpp"
 #include "daemon/cli/paint.hpp"
 #include "models/stages/registry.hpp"
@@ -17,91 +19,48 @@
 namespace posed::cli {
 namespace {
 
-constexpr int kMinWidth = 80;
-constexpr int kNameWidth = 11;
+constexpr int kMinWidth = 20;
+constexpr int kNoteRows = 3;  // that a panel leaves to the notes
 
-// Cuts or pads to exactly `width` columns (names are ASCII); 0: neither.
-std::string fit(const std::string& text, int width) {
-  if (width == 0) return text.substr(0, text.find_last_not_of(' ') + 1);
-  return fmt::format("{:<{}}", cut(text, width), width);
-}
-
-// Columns for a whole line, for stream names and for model names; 0: no limit.
-struct Widths {
-  int line = kMinWidth;
-  int name = kNameWidth;
-  int model = 1;
-};
-
-// A count in at most 5 characters.
-std::string short_count(std::uint64_t count) {
-  if (count < 100'000) return std::to_string(count);
-  if (count < 10'000'000) return fmt::format("{}k", count / 1000);
-  return fmt::format("{}M", std::min<std::uint64_t>(count / 1'000'000, 9999));
-}
-
-// "-" for a stage that processed no frame in this second.
-std::string stage(const v1::Percentiles& percentiles) {
-  if (percentiles.p99_us() == 0.0F && percentiles.max_us() == 0.0F) return "-";
-  return short_duration(percentiles.p50_us()) + "/" + short_duration(percentiles.p99_us());
-}
-
+// The daemon in one line. What no longer fits is left out: the processor and the memory first.
 std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
-  std::string line = fmt::format("{}   {} stream{}", options.title, stats.stream_size(),
-                                 stats.stream_size() == 1 ? "" : "s");
-  if (options.silence.empty()) {
-    line += fmt::format("   cpu {:.1f} %   rss {:.1f} MB", stats.cpu_percent(),
-                        static_cast<double>(stats.rss_bytes()) / 1e6);
+  std::vector<std::string> parts;
+  if (stats.has_take()) {
+    parts.push_back(fmt::format("take {}", stats.take().number()));
+    if (!stats.take().name().empty()) parts.back() += " " + in_quotes(stats.take().name());
   }
   if (!stats.recorder_file().empty()) {
-    line += fmt::format("   rec {} lost {} errors {}", clean_name(stats.recorder_file()),
-                        stats.recorder_lost_chunks(), stats.recorder_errors());
+    parts.push_back("rec " + clean_name(stats.recorder_file()));
+    const auto add = [&](const char* what, std::uint64_t count) {
+      if (count > 0) parts.back() += fmt::format(" {} {}", what, count);
+    };
+    add("lost", stats.recorder_lost_chunks());
+    add("errors", stats.recorder_errors());
   }
-  if (stats.has_take()) {
-    line += fmt::format("   take {}", stats.take().number());
-    if (!stats.take().name().empty()) line += " " + in_quotes(stats.take().name());
+  const int streams = stats.stream_size();
+  parts.push_back(fmt::format("{} stream{}", streams, streams == 1 ? "" : "s"));
+  if (options.silence.empty()) {
+    parts.push_back(fmt::format("cpu {:.1f} %", stats.cpu_percent()));
+    parts.push_back(fmt::format("{:.1f} MB", static_cast<double>(stats.rss_bytes()) / 1e6));
+  }
+  std::string line = options.title;
+  for (const std::string& part : parts) {
+    const int columns = static_cast<int>(line.size() + part.size()) + 3;
+    if (options.width == 0 || columns <= options.width) line += "   " + part;
   }
   return line;
-}
-
-// An unplugged device is shown as such, not only as a stream without data.
-std::string state_of(const v1::StreamStats& stream) {
-  return stream.away() ? "away" : clean_name(stream.state());
-}
-
-// "-" for a stream whose stages have no alpha.
-std::string alpha_of(const v1::StreamStats& stream) {
-  bool has = stream.stage().empty();
-  for (const v1::StageStats& stage : stream.stage()) {
-    for (const v1::ParameterStats& parameter : stage.parameter()) {
-      has = has || parameter.name() == "alpha";
-    }
-  }
-  return has ? fmt::format("{:.2f}", stream.alpha()) : "-";
-}
-
-std::string row(const v1::StreamStats& stream, const Widths& widths, bool silent) {
-  const std::string rate =
-      silent ? "-" : fmt::format("{:.1f}", std::min(stream.rate_hz(), 9999.9F));
-  const auto now = [&](const v1::Percentiles& times) { return silent ? "-" : stage(times); };
-  return fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} {}",
-                     fit(clean_name(stream.stream()), widths.name),
-                     fit(silent ? "?" : state_of(stream), 7), rate, short_count(stream.dropped()),
-                     short_count(stream.shed()), now(stream.decode()), now(stream.stages()),
-                     now(stream.publish()), alpha_of(stream),
-                     fit(clean_name(stream.model()), widths.model));
 }
 
 // A line below the stream's row about its stages; empty if there is nothing to report.
 std::string stages_row(const v1::StreamStats& stream) {
   std::string text = label_words(stream);
   const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
-  // If there is a single stage, the column already shows its time.
   for (const v1::StageStats& one : stream.stage()) {
-    if (stream.stage_size() > 1) add(clean_name(one.name()) + " " + stage(one.time()));
+    if (one.time().p99_us() == 0.0F) continue;  // it processed no frame in this second
+    add(clean_name(one.name()) + " " + people_duration(one.time().p99_us()));
   }
   if (stream.lag_frames() > 0) {
-    add(fmt::format("lag {} frame{} ({:.0f} ms)", stream.lag_frames(),
+    add(fmt::format("lag {} frame{} ({:.1f} ms)", stream.lag_frames(),
                     stream.lag_frames() == 1 ? "" : "s", stream.lag_ms()));
   }
   // Parameters that differ from their defaults; alpha has its own column.
@@ -158,8 +117,7 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
   if (stream.has_clock_offset_ns()) {
     // avoids -0.0
     const float drift_ppm = std::round(stream.clock_drift_ppm() * 10.0F) / 10.0F + 0.0F;
-    add(fmt::format("clock {:+.3f} s, drift {:+.1f} ppm", seconds(stream.clock_offset_ns()),
-                    drift_ppm));
+    add(fmt::format("clock drift {:+.1f} ppm", drift_ppm));
   }
   if (!stream.device_info().empty()) add(clean(stream.identity()));
   const std::uint64_t dropped = stream.source_name().empty() ? stream.kernel_dropped() : 0;
@@ -202,127 +160,135 @@ std::string source_row(const v1::SourceStats& source) {
   return text + dropped;
 }
 
-// "3 receivers, 1200 frames, 3600 sent"
+// What of the stream did not come out; empty if everything did.
+std::string lost_row(const v1::StreamStats& stream) {
+  if (!has_lost(stream)) return {};
+  std::string text;
+  if (stream.dropped() > 0) {
+    text = fmt::format("{} dropped because a queue was full, ", stream.dropped());
+  }
+  if (stream.shed() > 0) text += fmt::format("{} skipped for newer ones, ", stream.shed());
+  return "frames: " + text + "so far (machine too slow)";
+}
+
+// "vmc output, 3 receivers, 1200 frames, 3600 sent"
 std::string output_row(const v1::OutputStats& output) {
   std::string text = fmt::format(
-      "{} output: {} receiver{}, {} frames, {} sent", clean_name(output.kind()), output.receivers(),
+      "{} output, {} receiver{}, {} frames, {} sent", clean_name(output.kind()), output.receivers(),
       output.receivers() == 1 ? "" : "s", output.frames(), output.sent());
   if (output.dropped() > 0) text += fmt::format(", {} dropped", output.dropped());
   if (output.failures() > 0) text += fmt::format(", {} failed", output.failures());
   return text;
 }
 
-// The lines below the rows of the streams.
-std::vector<std::string> rows_below(const v1::Stats& stats, const Widths& widths) {
+// The details of a stream, or of the chosen one: the colour of each and its text.
+struct Detail {
+  const char* colour;
+  std::string text;
+};
+
+// What is wrong first.
+std::vector<Detail> details_of(const v1::StreamStats& stream, std::int64_t now_ns,
+                               bool only_wrong) {
+  const bool refused = !stream.refusal().empty();
+  std::vector<Detail> details{{kRed, lost_row(stream)}};
+  if (refused || !only_wrong) details.push_back({refused ? kRed : "", body_row(stream)});
+  if (stream.away() || !only_wrong) {
+    details.push_back({stream.away() ? kYellow : "", device_row(stream, now_ns)});
+  }
+  if (!refused && !only_wrong) details.push_back({"", stages_row(stream)});
+  return details;
+}
+
+// As many lines as the text needs.
+std::vector<std::string> broken(const std::string& text, const LiveViewOptions& options,
+                                const char* colour, int indent) {
+  const std::string blanks(static_cast<std::size_t>(indent), ' ');
+  std::vector<std::string> lines{text};
+  if (options.width > 0) lines = wrapped(text, options.width - indent, "  ");
+  for (std::string& line : lines) line = paint(options.colour, colour, line).insert(0, blanks);
+  return lines;
+}
+
+// The lines below the table.
+std::vector<std::string> rows_below(const v1::Stats& stats, const LiveViewOptions& options) {
   std::vector<std::string> rows;
-  if (!stats.replay_file().empty()) rows.push_back("  " + replay_words(stats));
+  const auto add = [&](const char* colour, const std::string& text) {
+    for (std::string& line : broken(text, options, colour, 2)) rows.push_back(std::move(line));
+  };
+  if (!stats.replay_file().empty()) add("", replay_words(stats));
   for (const v1::SourceStats& source : stats.source()) {
     const std::string text = source_row(source);
-    if (text.empty()) continue;
-    rows.push_back("  " + fit(clean_name(source.name()), widths.name - 1) + text);
-  }
-  for (const v1::OutputStats& output : stats.output()) {
-    // Names with their stream's behind the kind are often too long for the column.
-    rows.push_back("  " + fit(clean_name(output.name()), widths.name - 2) + " " +
-                   output_row(output));
+    if (!text.empty()) add(kYellow, clean_name(source.name()) + ": " + text);
   }
   for (const v1::StreamStats& stream : stats.stream()) {
-    for (const std::string& text :
-         {body_row(stream), device_row(stream, stats.time_ns()),
-          stream.refusal().empty() ? stages_row(stream) : std::string()}) {
-      if (text.empty()) continue;
-      rows.push_back("  " + fit(clean_name(stream.stream()), widths.name - 1) + text);
+    const bool only_wrong = !options.chosen.empty() && stream.stream() != options.chosen;
+    for (const auto& [colour, text] : details_of(stream, stats.time_ns(), only_wrong)) {
+      if (!text.empty()) add(colour, clean_name(stream.stream()) + ": " + text);
     }
+  }
+  for (const v1::OutputStats& output : stats.output()) {
+    const bool wrong = output.dropped() > 0 || output.failures() > 0;
+    add(wrong ? kYellow : "", clean_name(output.name()) + ": " + output_row(output));
   }
   return rows;
 }
 
-Widths widths_for(const v1::Stats& stats, int wanted) {
-  if (wanted > 0) return {.line = std::max(wanted, kMinWidth)};
-  Widths widths{.line = 0, .model = 0};
-  for (const v1::StreamStats& stream : stats.stream()) {
-    widths.name = std::max(widths.name, static_cast<int>(stream.stream().size()) + 2);
+// The newest notes that fit into `rows` lines, oldest first.
+std::vector<std::string> newest_notes(const LiveViewOptions& options, std::size_t rows) {
+  std::vector<std::string> lines;
+  for (std::size_t i = options.notes.size(); i > 0; --i) {
+    const auto note = broken(options.notes[i - 1], options, "", 0);
+    if (lines.size() + note.size() > rows) break;
+    lines.insert(lines.begin(), note.begin(), note.end());
   }
-  for (const v1::OutputStats& output : stats.output()) {
-    widths.name = std::max(widths.name, static_cast<int>(output.name().size()) + 2);
-  }
-  return widths;
-}
-
-const char* colour_of(const v1::StreamStats& stream) {
-  if (stream.dropped() > 0 || stream.shed() > 0 || !stream.refusal().empty()) return kRed;
-  if (stream.away() || stream.state() == "stale" || stream.state() == "waiting") return kYellow;
-  return stream.state() == "ended" ? kDim : "";
+  return lines;
 }
 
 }  // namespace
 
-std::string short_duration(double microseconds) {
-  if (microseconds < 999.5) return fmt::format("{:.0f}", microseconds);
-  if (microseconds < 9'950) return fmt::format("{:.1f}m", microseconds * 1e-3);
-  if (microseconds < 999'500) return fmt::format("{:.0f}m", microseconds * 1e-3);
-  return fmt::format("{:.0f}s", std::min(microseconds * 1e-6, 999.0));
-}
-
-const char* const kColumnsHelp = R"(Columns, one row a stream:
-  STATE    waiting (nothing came yet), live, stale (fell silent), away (device unplugged), ended,
-           refused (a stage cannot serve this body; below the row is why)
+const char* const kColumnsHelp = R"(Columns, one row a stream; one that no stream needs is left out:
+  STATE    live, lossy (frames were dropped or skipped: the machine is too slow), waiting (nothing
+           came yet), stale (fell silent), away (device unplugged), ended, refused (a stage cannot
+           serve this body)
   HZ       frames published in the last second
-  DROP     frames lost so far because a queue was full (machine too slow)
-  SHED     frames skipped so far because newer ones were waiting
-  DECODE   from arrival to decoded, STAGES in all stages together, PUBLISH from arrival to handed
-           out: 50 % of the frames of the last second took at most the first figure, 99 % the
-           second; microseconds, with m milliseconds, with s seconds; - where no frame passed
-  ALPHA    how much style, -2 to 2; below the row its target, while it moves
+  LATENCY  from arrival to handed out, lag included: half of the frames of the last second took at
+           most this, and 99 % at most the column behind it
+  ALPHA    how much style, -2 to 2; below the table its target, while it moves
   MODEL    the style model in use, or the gesture model
-Below the rows, of a style: gate, 1 where the model knows the motion to 0 where it is passed
-through; style, what the input shows of it already, 0 like its source to 1 like its target)";
+Below the table are what is wrong, the time of each stage (99 % of the frames took at most this), a
+hand's label and the lag. Of a style: gate, 1 where the model knows the motion to 0 where it is
+passed through; style, what the input shows of it already, 0 like its source to 1 like its target.
+--json has every figure, in microseconds)";
 
-std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& options) {
-  Widths widths = widths_for(stats, options.width);
+std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& wanted) {
+  LiveViewOptions options = wanted;
+  if (options.width > 0) options.width = std::max(options.width, kMinWidth);
   const bool silent = !options.silence.empty();
-  const std::string names =
-      fmt::format("{} {} {:>6} {:>5} {:>5} {:>9} {:>9} {:>9} {:>5} ", fit("STREAM", widths.name),
-                  fit("STATE", 7), "HZ", "DROP", "SHED", "DECODE", "STAGES", "PUBLISH", "ALPHA");
-  if (widths.line > 0) widths.model = std::max(1, widths.line - static_cast<int>(names.size()));
-  std::vector<std::string> lines{
-      paint(options.colour, kBold, fit(head(stats, options), widths.line)),
-      paint(options.colour, kDim, fit(names + fit("MODEL", widths.model), widths.line)),
+  const bool limited = options.height > 0;
+  const auto left = [&](std::size_t lines) {
+    return limited ? std::max(0, options.height - static_cast<int>(lines)) : 1'000'000;
   };
+  std::vector<std::string> lines;
+  const auto add = [&](const std::vector<std::string>& more) {
+    const auto count = std::min(more.size(), static_cast<std::size_t>(left(lines.size())));
+    lines.insert(lines.end(), more.begin(), more.begin() + static_cast<std::ptrdiff_t>(count));
+  };
+  const std::string first = head(stats, options);
   // If the daemon is silent, the first line says so, because everything below it is old.
-  if (silent)
-    lines.insert(lines.begin(), paint(options.colour, kRed, fit(options.silence, widths.line)));
-  // Streams first; those that do not fit are at least counted.
-  const int above = static_cast<int>(lines.size());
-  const int room = options.height == 0 ? stats.stream_size() : options.height - above - 1;
-  const int shown = stats.stream_size() <= room ? stats.stream_size() : std::max(0, room - 1);
-  for (int i = 0; i < shown; ++i) {
-    const char* const colour = silent ? kDim : colour_of(stats.stream(i));
-    const std::string text = fit(row(stats.stream(i), widths, silent), widths.line);
-    lines.push_back(paint(options.colour, colour, text));
+  if (silent) add(broken(options.silence, options, kRed, 0));
+  add({paint(options.colour, kBold, options.width == 0 ? first : cut(first, options.width))});
+  add(live_table(stats, {.width = options.width,
+                         .rows = limited ? std::max(1, left(lines.size())) : 0,
+                         .colour = options.colour,
+                         .silent = silent,
+                         .chosen = options.chosen}));
+  if (!silent) add(rows_below(stats, options));
+  if (options.panel && !silent) {
+    const int notes = std::min(static_cast<int>(options.notes.size()), kNoteRows);
+    add(options.panel(left(lines.size()) - notes));
   }
-  if (shown < stats.stream_size()) {
-    lines.push_back(fmt::format("... and {} more", stats.stream_size() - shown));
-  }
-  const auto fits = [&] {
-    return options.height == 0 || static_cast<int>(lines.size()) + 1 < options.height;
-  };
-  if (!silent) {
-    for (const std::string& below : rows_below(stats, widths)) {
-      if (fits()) lines.push_back(fit(below, widths.line));
-    }
-  }
-  lines.push_back(
-      paint(options.colour, kDim,
-            fit("stage times: p50/p99 in us (m: ms), publish counts from arrival", widths.line)));
-  const std::size_t left =
-      options.height == 0
-          ? options.notes.size()
-          : static_cast<std::size_t>(std::max(0, options.height - static_cast<int>(lines.size())));
-  const std::size_t first = options.notes.size() - std::min(left, options.notes.size());
-  for (std::size_t i = first; i < options.notes.size(); ++i) {
-    lines.push_back(fit(options.notes[i], widths.line));
-  }
+  add(newest_notes(options, static_cast<std::size_t>(left(lines.size()))));
   return lines;
 }
 

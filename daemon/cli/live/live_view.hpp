@@ -2,6 +2,8 @@
 // redrawn. Used by `top` and `demo`.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,26 +15,31 @@ namespace posed::cli {
 
 struct LiveViewOptions {
   std::string title{};  // start of the first line
-  int width = 80;       // columns; at least 80 are used. 0: as wide as the text needs
+  int width = 80;       // columns; at least 20 are used. 0: as wide as the text needs
   int height = 24;      // maximal number of lines; 0: no limit
   bool colour = false;
   // Why there is no current data, as one sentence; empty while the daemon answers. If set, the
   // stats are old, and those of them that describe the present are not shown.
   std::string silence{};
+  // The stream whose row is marked, and whose details are shown; of the others only what is wrong.
+  // Empty: the details of all.
+  std::string chosen{};
+  // Makes lines that belong below the streams, for so many rows that are left; may be null.
+  std::function<std::vector<std::string>(int rows)> panel{};
   std::vector<std::string> notes{};  // recent events, newest last; shown if there is space
 };
 
-// One line for the daemon, one with the names of the columns, one for each stream (rates, drops,
-// sheds, p50/p99 of each stage, alpha, model), then details of single streams: a glove that is
-// unplugged, came back or has its own clock; a hand's label and lag. The notes come last.
+// One line for the daemon, the table of streams (live_table.hpp), then details of single streams: a
+// glove that is unplugged, came back or has its own clock; what was lost; the time of each stage;
+// a hand's label and lag. The notes come last.
 [[nodiscard]] std::vector<std::string> live_view(const v1::Stats& stats,
                                                  const LiveViewOptions& options);
 
 // Explains the columns, for --help.
 extern const char* const kColumnsHelp;
 
-// A duration in at most 4 characters: "31", "850", "1.2m" (milliseconds), "2.5s".
-[[nodiscard]] std::string short_duration(double microseconds);
+// A key that a screen knows; kOther: any other.
+enum class Key : std::uint8_t { kNone, kUp, kDown, kLeft, kRight, kQuit, kOther };
 
 // The terminal behind stdout. Redraws in place while it exists, and restores the terminal at the
 // end. If stdout is not a terminal it prints plain lines.
@@ -47,8 +54,8 @@ class LiveScreen {
   // Sets width, height and colour to those of the terminal now.
   void measure(LiveViewOptions& options) const;
   void draw(const std::vector<std::string>& lines) const;
-  [[nodiscard]] char key_pressed() const;   // the next key; 0: none. Never waits
-  [[nodiscard]] bool quit_pressed() const;  // 'q' was pressed; reads all waiting keys
+  [[nodiscard]] char key_pressed() const;  // the next byte of a key; 0: none. Never waits
+  [[nodiscard]] Key next_key() const;      // kNone: none is waiting. Never waits
 
  private:
   bool terminal_ = false;

@@ -11,6 +11,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/json.hpp"
+#include "daemon/cli/live/chosen_stream.hpp"
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/clock_time.hpp"
 #include "daemon/cli/live/live_view.hpp"
@@ -22,9 +23,14 @@ namespace posed::cli {
 namespace {
 
 constexpr std::size_t kNotesKept = 50;
+constexpr const char* kOwnDaemon = "tcp://127.0.0.1:5570";
+constexpr const char* kOwnControl = "tcp://127.0.0.1:5571";
+
+constexpr std::chrono::milliseconds kFigurePeriod{100};
 
 struct TopOptions {
   ClientOptions client;
+  std::string control;  // endpoint, or empty; the keys are those of `client`
   int count = 0;
   double timeout_s = 0.0;
   bool json = false;
@@ -36,7 +42,10 @@ class Top {
   Top(const TopOptions& options, Connection connection)
       : options_(options),
         connection_(std::move(connection)),
-        watch_(connection_, options.timeout_s) {}
+        watch_(connection_, options.timeout_s),
+        chosen_(connection_, {.endpoint = options.control,
+                              .key = options.client.key,
+                              .server_key = options.client.server_key}) {}
 
   Result<> run() {
     std::optional<LiveScreen> screen;
@@ -44,14 +53,13 @@ class Top {
     const bool drawn = screen && screen->is_terminal();
     watch_.print(!drawn);
     if (drawn) show(*screen);
-    while (!Interrupt::came() && !(screen && screen->quit_pressed())) {
+    while (!Interrupt::came() && !(drawn && quits(*screen))) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
       if (auto given_up = watch_.report()) return std::unexpected(*given_up);
-      if (!connection_.wait(kLookAround)) {
-        if (drawn && (watch_.silence() || was_silent_)) show(*screen);
-        continue;
-      }
-      if (!take()) continue;
+      const bool came = connection_.wait(kLookAround);
+      const bool new_stats = came && take(drawn);
+      if (drawn && !new_stats && is_due()) show(*screen);
+      if (!new_stats) continue;
       const bool shown = screen ? show(*screen) : print_json(stats_);
       if (!shown) return {};  // the reader of stdout has gone
       if (++shown_ == options_.count) return {};
@@ -61,19 +69,45 @@ class Top {
   }
 
  private:
-  // Receives one message; returns true if it brought new stats.
-  bool take() {
+  // Obeys the keys that wait.
+  bool quits(const LiveScreen& screen) {
+    for (Key key = screen.next_key(); key != Key::kNone; key = screen.next_key()) {
+      if (key == Key::kQuit) return true;
+      chosen_.obey(key, stats_);
+    }
+    if (auto note = chosen_.note()) add_note(*note);
+    return false;
+  }
+
+  // Whether the figure, or a silence of the daemon, is to be drawn again.
+  [[nodiscard]] bool is_due() const {
+    return std::chrono::steady_clock::now() - drawn_at_ >= kFigurePeriod;
+  }
+
+  void add_note(const std::string& text) {
+    notes_.push_back(clock_time().substr(0, 8) + " " + text);
+    if (notes_.size() > kNotesKept) notes_.pop_front();
+  }
+
+  // Receives one message; returns true if it brought new stats. `drawn`: the figure is shown.
+  bool take(bool drawn) {
     net::Message topic, body;
     if (!topic.receive(connection_.socket()) || !topic.more()) return false;
     if (!body.receive(connection_.socket(), 0)) return false;
     watch_.heard();
     const auto size = static_cast<int>(body.bytes().size());
-    if (topic.text() == "stats") return stats_.ParseFromArray(body.bytes().data(), size);
+    if (topic.text() == "stats") {
+      if (!stats_.ParseFromArray(body.bytes().data(), size)) return false;
+      if (drawn) chosen_.take(stats_);
+      return true;
+    }
+    if (!topic.text().starts_with("event/")) {
+      chosen_.take(topic.text(), body.bytes());
+      return false;
+    }
     v1::Event event;
     if (!event.ParseFromArray(body.bytes().data(), size)) return false;
-    notes_.push_back(clock_time().substr(0, 8) + " " + clean_name(event.stream()) + ": " +
-                     clean(event.text()));
-    if (notes_.size() > kNotesKept) notes_.pop_front();
+    add_note(clean_name(event.stream()) + ": " + clean(event.text()));
     return false;
   }
 
@@ -82,14 +116,22 @@ class Top {
     LiveViewOptions view{.title = "posed " + options_.client.endpoint};
     screen.measure(view);
     view.notes.assign(notes_.begin(), notes_.end());
+    if (screen.is_terminal()) {
+      drawn_at_ = std::chrono::steady_clock::now();
+      view.chosen = chosen_.name();
+      view.panel = [&](int rows) { return chosen_.lines(stats_, view.width, rows); };
+    }
     view.silence = watch_.silence().value_or("");
-    was_silent_ = !view.silence.empty();
     if (!screen.is_terminal()) notes_.clear();  // plain lines: print each note once
     if (stats_.stream_size() > 0 || stats_.time_ns() != 0) {
       screen.draw(live_view(stats_, view));
     } else if (screen.is_terminal()) {
       std::vector<std::string> lines{"waiting for " + options_.client.endpoint + " (q quits)"};
-      if (was_silent_) lines.push_back(paint(view.colour, kRed, cut(view.silence, view.width)));
+      if (!view.silence.empty()) {
+        for (const std::string& line : wrapped(view.silence, view.width)) {
+          lines.push_back(paint(view.colour, kRed, line));
+        }
+      }
       screen.draw(lines);
     }
     return std::ferror(stdout) == 0;
@@ -100,8 +142,9 @@ class Top {
   SilenceWatch watch_;
   v1::Stats stats_;
   std::deque<std::string> notes_;
+  ChosenStream chosen_;
+  std::chrono::steady_clock::time_point drawn_at_{};
   int shown_ = 0;
-  bool was_silent_ = false;  // when last drawn
 };
 
 Result<> top(const TopOptions& options) {
@@ -121,20 +164,32 @@ Result<> top(const TopOptions& options) {
 void add_top(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("top", "Watch a running daemon: rates, stage times, drops");
   auto options = std::make_shared<TopOptions>();
-  add_client_options(*command, options->client, "tcp://127.0.0.1:5570");
+  add_client_options(*command, options->client, kOwnDaemon);
   command->add_option("--count", options->count, "End after so many updates (one a second)")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
+  auto* const control =
+      command->add_option("--control", options->control,
+                          std::string("The daemon's control endpoint, to change alpha (default: ") +
+                              kOwnControl + " for the daemon of this computer, otherwise none)");
+  control->type_name("ENDPOINT");
   add_timeout_option(*command, options->timeout_s);
-  command->add_flag("--json", options->json, "One proto3 JSON object (posed.v1.Stats) a line");
+  command->add_flag("--json", options->json, "One proto3 JSON object (posed.v1.Stats) a line")
+      ->excludes(control);
   command->footer(std::string(R"(Examples:
   posed top
   posed top --connect tcp://127.0.0.1:5570 --count 1 | cat
   posed top --count 1 --timeout 5 --json      # a health check: exit code 1 when nothing answers
-q or Ctrl-C quits. When stdout is no terminal it prints plain lines. A daemon that falls silent is
+Up and down choose a stream, left and right change its alpha, q or Ctrl-C quits. Below the table is
+the chosen stream's pose, and its latency in the last minute, one bar a second: 99 % of the frames
+took at most this. When stdout is no terminal it prints plain lines. A daemon that falls silent is
 shown in red with the time since then, and values that may be outdated are hidden.
 )") + kColumnsHelp);
   command->callback([options, &exit_code] {
+    // Another daemon's streams may have the same names.
+    if (options->control.empty() && options->client.endpoint == kOwnDaemon) {
+      options->control = kOwnControl;
+    }
     if (auto done = top(*options); !done) exit_code = report(done.error());
   });
 }

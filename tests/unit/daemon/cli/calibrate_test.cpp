@@ -1,10 +1,16 @@
 // `posed calibrate` on an emulated glove behind a pseudo-terminal: from poses to angles.
 #include <catch2/catch.hpp>
 
+#include <array>
+#include <cmath>
 #include <deque>
 
 #include "daemon/cli/devices/calibrate_poses.hpp"
+#include "daemon/cli/devices/calibrated_hand.hpp"
+#include "drivers/cyberglove/angles.hpp"
 #include "drivers/driver.hpp"
+#include "drivers/glove/angle_map.hpp"
+#include "drivers/glove/calibration_file.hpp"
 #include "tests/support/posing_glove.hpp"
 
 namespace posed::cli {
@@ -54,6 +60,16 @@ std::unique_ptr<GloveSource> worn(const PosingGlove& glove) {
   return std::move(*source);
 }
 
+// Some of the angles that every CyberGlove measures.
+void check_hand(const HandAngles& seen, Pose pose) {
+  const HandAngles wanted = drivers::glove::hand_in(pose);
+  for (const char* name : {"index1_x", "middle2_x", "ring1_x", "little2_x", "ring1_y"}) {
+    INFO(drivers::glove::kPoseNames[static_cast<std::size_t>(pose)] << " " << name);
+    const auto channel = static_cast<std::size_t>(drivers::glove::hand_channel(name));
+    CHECK(seen[channel] == Approx(wanted[channel]).margin(0.1));
+  }
+}
+
 const PosePlan kQuick{.seconds = {0.2, 0.2, 0.2, 0.2}, .ready_s = std::nullopt, .settle_s = 0.3};
 
 }  // namespace
@@ -86,6 +102,46 @@ TEST_CASE("a glove calibrated by poses reads the angles of those poses") {
     }
   }
   CHECK(fitted->sensors.size() >= 18);
+
+  // The hand that it makes of what was held is the hand in those poses.
+  const drivers::glove::CalibrationFile file{.driver = "cyberglove",
+                                             .glove = {},
+                                             .user = {},
+                                             .parameters = {},
+                                             .sensors = fitted->sensors};
+  const auto calibration = drivers::glove::make_calibration(model, file, Side::kRight, "");
+  if (!calibration) FAIL(calibration.error().text());
+  for (const Pose pose : {Pose::kFlat, Pose::kFist, Pose::kSpread}) {
+    const auto p = static_cast<std::size_t>(pose);
+    check_hand(drivers::glove::angles_of(model, **calibration, (*recorded)[p]), pose);
+  }
+  const auto drawn = calibrated_hand(model, **calibration, Side::kRight, *recorded, 60, 10);
+  REQUIRE(drawn.size() == 10);
+  CHECK(drawn.back() == "    flat           fist           thumb         spread    ");
+  CHECK(calibrated_hand(model, **calibration, Side::kRight, {}, 60, 10).empty());
+}
+
+TEST_CASE("what the sensors of either hand held gives back the hand's angles") {
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    const auto model = drivers::cyberglove::glove_model(side).value();
+    const auto calibration = drivers::glove::default_calibration(model).value();
+    for (const Pose pose : {Pose::kFlat, Pose::kFist, Pose::kSpread}) {
+      const auto values = drivers::glove::values_of(model, drivers::glove::hand_in(pose)).value();
+      std::array<drivers::glove::Held, drivers::glove::kMaxSensors> held{};
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        const auto& curve = model.sensors[i].curve;  // a line
+        const double slope = (static_cast<double>(curve.value[1]) - curve.value[0]) /
+                             (static_cast<double>(curve.raw[1]) - curve.raw[0]);
+        if (!std::isfinite(values[i])) continue;
+        held[i].add(static_cast<float>(curve.raw[0] + (values[i] - curve.value[0]) / slope));
+      }
+      check_hand(drivers::glove::angles_of(model, *calibration, held), pose);
+      held[drivers::cyberglove::kIndexMcp] = {};  // not measured
+      const HandAngles seen = drivers::glove::angles_of(model, *calibration, held);
+      CHECK_FALSE(
+          std::isfinite(seen[static_cast<std::size_t>(drivers::glove::hand_channel("index1_x"))]));
+    }
+  }
 }
 
 TEST_CASE("a pose can be repeated, and a hand that moved during it is reported") {
