@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "proto/frame/result.hpp"
+
 namespace posed {
 
 // What a task gives back: plain numbers, which can travel between processes.
@@ -38,6 +40,11 @@ class TaskRunner {
   // and may then return anything; any thread may ask.
   [[nodiscard]] virtual bool stopping() const { return false; }
 };
+
+// The error of a training whose progress asked to stop.
+[[nodiscard]] inline std::unexpected<Error> training_stopped() {
+  return fail("the training was stopped; nothing was written");
+}
 
 // One after another on the caller's thread, so a stop waits for the end of a task.
 class SerialTasks final : public TaskRunner {

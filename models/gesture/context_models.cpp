@@ -304,7 +304,7 @@ Result<ContextModels> train_contexts(const std::vector<Recording>& recordings,
                 recordings.front().file);
   }
   if (!trainer.train_isolated() || !trainer.train_embedded()) {
-    return fail("the training was stopped; nothing was written");
+    return training_stopped();
   }
   return trainer.finish();
 }

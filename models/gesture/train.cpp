@@ -165,7 +165,7 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   for (int tree = 0; tree < kTrees; ++tree) {
     const double fraction = kTreesFrom + (1.0 - kTreesFrom) * tree / kTrees;
     if (options.progress && !options.progress("growing trees", fraction)) {
-      return fail("the training was stopped; nothing was written");
+      return training_stopped();
     }
     const int state = tree / kFingers;
     const int finger = tree % kFingers;

@@ -64,6 +64,7 @@ ScgResult scg_minimise(const Value& value, const Gradient& gradient, const Eigen
   s.direction = -s.gradient;
   ScgResult result;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
+    if (options.stop && options.stop()) break;
     if (s.accepted && !probe(s, gradient)) {
       result.converged = s.gradient.allFinite();
       break;

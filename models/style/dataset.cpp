@@ -196,7 +196,7 @@ Result<> follow_clips(Dataset& dataset, const DatasetOptions& options) {
   SerialTasks serial;
   TaskRunner& tasks = options.tasks != nullptr ? *options.tasks : serial;
   const auto found = tasks.run(count, task, progress);
-  if (!found) return fail("training was stopped before it was done");
+  if (!found) return training_stopped();
   for (std::size_t c = 0; c < count; ++c) {
     const TaskResult& numbers = (*found)[c];
     AlignedClip& clip = dataset.clips[c];

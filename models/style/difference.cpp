@@ -101,10 +101,14 @@ Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> sty
                            std::min(static_cast<int>(poses), kMostPoses));
 }
 
-Result<gp::Trained> fit_paper(const MatrixXd& X, const MatrixXd& Y) {
-  const gp::ScgResult best =
-      gp::maximise_evidence(X, Y, paper_start(Y), kMinNoise_rad2, {.max_iterations = 300});
-  return gp::fit(X, Y, VectorXd::Zero(Y.cols()), gp::Hyper::of(best.x));
+gp::Hyper paper_kernel(const MatrixXd& X, const MatrixXd& Y, const std::function<bool()>& stop) {
+  const gp::ScgResult best = gp::maximise_evidence(X, Y, paper_start(Y), kMinNoise_rad2,
+                                                   {.max_iterations = 300, .stop = stop});
+  return gp::Hyper::of(best.x);
+}
+
+Result<gp::Trained> fit_paper(const MatrixXd& X, const MatrixXd& Y, const gp::Hyper& kernel) {
+  return gp::fit(X, Y, VectorXd::Zero(Y.cols()), kernel);
 }
 
 double Way::closes() const { return 1.0 - std::sqrt(after / before); }

@@ -2,6 +2,7 @@
 // cycle, its difference to the target), and the fit (README.md, "Training pairs"). Cold.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -85,7 +86,11 @@ struct StylePairs {
     const Kernel& kernel);
 
 // The method of Sato et al. (--mode paper; README.md, "What differs from the paper, measured"):
-// differences Y [N x D] at the mean cycle X [N x D], all kernel values by evidence (SCG).
-[[nodiscard]] Result<gp::Trained> fit_paper(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y);
+// differences Y [N x D] at the mean cycle X [N x D], all kernel values by evidence (SCG). The
+// search for them takes seconds; once `stop` (may be empty) returns true, it gives the best so far.
+[[nodiscard]] gp::Hyper paper_kernel(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                                     const std::function<bool()>& stop = {});
+[[nodiscard]] Result<gp::Trained> fit_paper(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                                            const gp::Hyper& kernel);
 
 }  // namespace posed::style

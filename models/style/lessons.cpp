@@ -100,7 +100,7 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
     if (leave_outs.back().folds == 0) leave_outs.back().pairs = pairs.back();
   }
   const auto chosen = choose_kernel(leave_outs, tasks, progress);
-  if (!chosen) return fail("training was stopped before it was done");
+  if (!chosen) return training_stopped();
   const std::string how = held_out ? "leave-out" : "default";
   std::vector<Learnt> learnt;
   learnt.reserve(lessons.size());
@@ -114,7 +114,8 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
   return learnt;
 }
 
-Result<std::vector<Learnt>> learn_paper(const Dataset& dataset, const std::string& target) {
+Result<std::vector<Learnt>> learn_paper(const Dataset& dataset, const std::string& target,
+                                        TaskRunner& tasks, const FoldProgress& progress) {
   std::set<std::string> sources;
   for (const Subject& s : dataset.subjects) {
     if (s.group != target) sources.insert(s.group);
@@ -133,7 +134,16 @@ Result<std::vector<Learnt>> learn_paper(const Dataset& dataset, const std::strin
       Y.bottomRows(cycle.rows()) = goal - cycle;
     }
   }
-  auto process = fit_paper(X, Y);
+  // One task: its runner looks for a stop meanwhile.
+  const auto search = [&](std::size_t /*task*/) -> TaskResult {
+    const VectorXd found = paper_kernel(X, Y, [&tasks] { return tasks.stopping(); }).vector();
+    return {found.begin(), found.end()};
+  };
+  const auto found =
+      tasks.run(1, search, [&](std::size_t /*done*/) { return !progress || progress(0.0); });
+  if (!found) return training_stopped();
+  auto process =
+      fit_paper(X, Y, gp::Hyper::of(Eigen::Map<const VectorXd>(found->front().data(), 4)));
   if (!process) return std::unexpected(process.error());
   return std::vector{Learnt{std::move(*process), Y, "evidence"}};
 }

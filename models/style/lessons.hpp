@@ -46,6 +46,7 @@ struct Learnt {
 // The method of Sato et al. (--mode paper): mean source cycle -> difference of the mean cycles,
 // kernel values by evidence.
 [[nodiscard]] Result<std::vector<Learnt>> learn_paper(const Dataset& dataset,
-                                                      const std::string& target);
+                                                      const std::string& target, TaskRunner& tasks,
+                                                      const FoldProgress& progress);
 
 }  // namespace posed::style

@@ -257,7 +257,7 @@ Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data, const VectorXd& th
     return !options.progress || options.progress(fraction);
   };
   const auto found = tasks.run(fits.size(), task, progress);
-  if (!found) return fail("training was stopped before it was done");
+  if (!found) return training_stopped();
   for (std::size_t k = 0; k < fits.size(); ++k) {
     MgpmFit& fit = fits[k];
     take_numbers((*found)[k], fit);

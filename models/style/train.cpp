@@ -19,8 +19,6 @@ using Eigen::VectorXd;
 
 constexpr double kLimitFactor = 1.5;  // of the largest difference in training
 
-std::unexpected<Error> stopped() { return fail("training was stopped before it was done"); }
-
 // Of each of a model's styles.
 std::vector<std::string> targets_of(const TrainOptions& options) {
   std::vector<std::string> targets{options.target};
@@ -140,24 +138,24 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
     }
   }
   if (auto checked = check_recordings(clips); !checked) return std::unexpected(checked.error());
-  if (!report_step("reading poses", 0.0)) return stopped();
+  if (!report_step("reading poses", 0.0)) return training_stopped();
   DatasetOptions how = options.dataset;
   how.mgpm = options.mode == TrainMode::kPaper;
   auto dataset = make_dataset(clips, targets, how);
   if (!dataset) return std::unexpected(dataset.error());
-  if (!report_step("aligning phases", 0.0)) return stopped();
+  if (!report_step("aligning phases", 0.0)) return training_stopped();
   if (auto aligned = align(*dataset, how); !aligned) {
     return std::unexpected(aligned.error());
   }
   const auto progress = [&](double fraction) {
     return report_step("learning the difference", fraction);
   };
-  if (!progress(0.0)) return stopped();
+  if (!progress(0.0)) return training_stopped();
   SerialTasks serial;
   TaskRunner& tasks = how.tasks != nullptr ? *how.tasks : serial;
   const std::vector<Lesson> lessons = lessons_of(*dataset, targets);
   auto learnt = options.mode == TrainMode::kPaper
-                    ? learn_paper(*dataset, options.target)
+                    ? learn_paper(*dataset, options.target, tasks, progress)
                     : learn_default(*dataset, lessons, tasks, progress);
   if (!learnt) return std::unexpected(learnt.error());
 
@@ -169,7 +167,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   model.report_json = report;
   model.gate = std::move(gate);
   model.axis = std::move(axis);
-  if (!progress(1.0)) return stopped();
+  if (!progress(1.0)) return training_stopped();
   return model;
 }
 

@@ -77,3 +77,16 @@ TEST_CASE("SCG refuses steps to where the function is not defined", "[gp]") {
   CHECK(std::any_of(result.trace.begin(), result.trace.end(),
                     [](const gp::ScgStep& step) { return step.comparison < 0.0; }));
 }
+
+TEST_CASE("the search ends with the best so far once somebody asks it to stop", "[gp]") {
+  const auto value = [](const Eigen::VectorXd& x) { return x.squaredNorm(); };
+  const auto gradient = [](const Eigen::VectorXd& x) -> Eigen::VectorXd { return 2.0 * x; };
+  int asked = 0;
+  gp::ScgOptions options;
+  options.stop = [&] { return ++asked > 1; };
+  const auto result =
+      gp::scg_minimise(value, gradient, Eigen::VectorXd::Constant(3, 50.0), options);
+  CHECK(result.trace.size() == 1);
+  CHECK_FALSE(result.converged);
+  CHECK(result.value == result.trace.front().value);
+}

@@ -100,7 +100,9 @@ gp::Trained paper_process(const style::TrainingPairs& pairs) {
   mean /= static_cast<double>(pairs.inputs.size());
   const MatrixXd basis =
       style::harmonic_basis(style::cycle_phases(style::kGridFrames), style::kCycleHarmonics);
-  return style::fit_paper(basis * mean, basis * pairs.outputs.differences.front()).value();
+  const Eigen::MatrixXd X = basis * mean;
+  const Eigen::MatrixXd Y = basis * pairs.outputs.differences.front();
+  return style::fit_paper(X, Y, style::paper_kernel(X, Y)).value();
 }
 
 // Person a's cycle minus person b's, trained on the others without `asked`, and evaluated on
