@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/picture/program.hpp"
+#include "proto/clip/file_names.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/load_file.hpp"
 
@@ -60,7 +61,7 @@ std::string frame_name(int frame) {
 }  // namespace
 
 Result<> write_picture(const std::string& svg, const std::filesystem::path& path) {
-  if (path.extension() == ".svg") return write_text(svg, path);
+  if (clip::extension_of(path) == ".svg") return write_text(svg, path);
   const auto folder = TemporaryFolder::make();
   if (!folder) return std::unexpected(folder.error());
   const std::string drawing = (*folder)->file("picture.svg");

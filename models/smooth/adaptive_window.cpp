@@ -28,6 +28,7 @@ constexpr double kEven = 1e-3;  // frames whose skew is below this count as even
 
 constexpr int kEvenWindow = 26;
 constexpr double kWindow_s = 26.0 / kEvenRate_hz;
+constexpr int kLengthSlack = 8;  // the window's length over the loss that it does not follow
 
 }  // namespace
 
@@ -62,7 +63,7 @@ AdaptiveWindow::AdaptiveWindow(int channels)
 // RT-safe.
 void AdaptiveWindow::reset() noexcept {
   pushed_ = 0;
-  frames_ = 0;
+  frames_ = length_ = 0;
   std::ranges::fill(last_measured_, -1);
   std::ranges::fill(held_rad_, 0.0);
   std::fill_n(active_.get(), stride(), 0.0);
@@ -134,7 +135,11 @@ void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
 // Collects the window's frames and the times between them. RT-safe.
 void AdaptiveWindow::begin(double period_s) noexcept {
   period_s_ = period_s > 0.0 ? period_s : 1.0 / kEvenRate_hz;
-  frames_ = static_cast<int>(std::min<long>(pushed_, window_frames(period_s)));
+  // The period of frames with jitter is never the same twice, and a window that loses more than one
+  // frame at a time loses its past, too. So it grows at once, and shrinks only if that is by much.
+  const int wanted = window_frames(period_s);
+  if (wanted > length_ || wanted < length_ - length_ / kLengthSlack) length_ = wanted;
+  frames_ = static_cast<int>(std::min<long>(pushed_, length_));
   past_.begin(pushed_ - frames_);
   for (int i = 0; i < frames_; ++i) {
     const auto index = static_cast<std::size_t>(i);

@@ -44,7 +44,8 @@ class AdaptiveWindow {
   // The next frame: [channels] rad, NaN where a channel is missing. Times increase.
   void push(double time_s, std::span<const double> measured_rad, double noise_rad) noexcept;
 
-  // Solves the last frames, at most window_frames(period_s) of them.
+  // Solves the last frames: window_frames(period_s) of them, or up to an eighth more, because a
+  // period that grows by less does not shorten the window.
   void solve(double period_s, InformationSource* extra = nullptr) noexcept;
 
   // One solve under the loose prior alone; the benchmark compares the full solve with it.
@@ -98,6 +99,7 @@ class AdaptiveWindow {
   int channels_;
   long pushed_ = 0;
   int frames_ = 0;  // of the window
+  int length_ = 0;  // its frames once so many have come
   double period_s_ = 0.0;
   bool extra_ = false;  // the window's position rows hold more than measurements
   bool even_ = true;    // the window's frames are evenly spaced

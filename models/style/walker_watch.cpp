@@ -106,7 +106,7 @@ void WalkerWatch::exchange(const BoundModel* from, const BoundModel& to) noexcep
   told_no_gate_ = false;
   told_no_axis_ = false;
   if (!walker_ || from == nullptr) return;
-  if (!to.known) return walker_.reset();  // kNoGateData says why
+  if (!serves(&to)) return walker_.reset();
   Walker moved = *walker_;
   if (to.space.take_over(from->space, walker_->neutral, moved.neutral)) {
     walker_ = moved;

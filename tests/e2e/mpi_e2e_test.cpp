@@ -189,6 +189,22 @@ TEST_CASE("ranks train gestures to the file of posed train", "[mpi]") {
   INFO(done.err);
   REQUIRE(done.code == 0);
   CHECK(file_text(studio.path("mpi.gesture")) == file_text(studio.path("alone.gesture")));
+
+  const auto& all = signer->labels;
+  REQUIRE(clip::write_labels({all.begin() + 1, all.begin() + 8}, studio.path("few.lab")));
+  const std::vector<std::string> propose{"train",
+                                         "gesture",
+                                         "--clip",
+                                         studio.path("take.csv"),
+                                         "--labels",
+                                         studio.path("few.lab"),
+                                         "--auto-label",
+                                         "--out",
+                                         studio.path("all.lab")};
+  const auto proposed = run(ranks_of(3, propose));
+  INFO(proposed.err);
+  CHECK(proposed.code == 0);
+  CHECK(clip::read_labels(studio.path("all.lab")).has_value());
 }
 
 TEST_CASE("ranks that read different files say which one and write nothing", "[mpi]") {

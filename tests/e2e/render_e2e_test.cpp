@@ -44,6 +44,8 @@ TEST_CASE("render draws a clip as a strip, as a pose and refuses what it cannot 
 
   REQUIRE(gallery.render("walk.bvh", "pose.svg", {"--frame", "60"}).code == 0);
   CHECK(has(file_text(gallery.path("pose.svg")), "1.00 s"));
+  REQUIRE(gallery.render("walk.bvh", "POSE.SVG", {"--frame", "60"}).code == 0);
+  CHECK(file_text(gallery.path("POSE.SVG")) == file_text(gallery.path("pose.svg")));
 
   const auto refused = [&](const std::string& out, const std::vector<std::string>& more,
                            const std::string& sentence) {

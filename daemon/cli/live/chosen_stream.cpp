@@ -93,6 +93,10 @@ void ChosenStream::change_alpha(const v1::Stats& stats, double by) {
     note_ = clean_name(chosen->stream()) + " has no style stage, so it has no alpha";
     return;
   }
+  if (!stats.replay_file().empty()) {
+    note_ = "this is a replay, which nobody can control";
+    return;
+  }
   if (control_options_.endpoint.empty()) {
     note_ = "add --control, with the daemon's control endpoint, to change alpha from here";
     return;
@@ -175,7 +179,8 @@ std::vector<std::string> ChosenStream::lines(const v1::Stats& stats, int columns
     out.push_back(std::move(line));
   }
   std::string keys = stats.stream_size() > 1 ? "up/down: stream   " : "";
-  if (has_alpha(*chosen) && !control_options_.endpoint.empty()) keys += "left/right: alpha   ";
+  const bool controls = !control_options_.endpoint.empty() && stats.replay_file().empty();
+  if (has_alpha(*chosen) && controls) keys += "left/right: alpha   ";
   const int figure_rows = std::min(rows - static_cast<int>(out.size()) - 1, kMostRows);
   if (figure_rows >= kFewestRows) {
     for (std::string& row : figure_->lines(std::min(columns, kFigureColumns), figure_rows)) {

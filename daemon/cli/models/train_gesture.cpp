@@ -191,12 +191,12 @@ int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
   if (ranks.leads()) {
     if (auto checked = check(options); !checked) return report(checked.error());
   }
-  if (auto same = ranks.check_same(inputs_of(options)); !same) return report(same.error());
   if (options.auto_label) {
-    if (!ranks.leads()) return 0;  // there is nothing to share
+    if (!ranks.leads()) return 0;  // there is nothing to share, so nothing has to be the same
     return auto_label({options.clips[0], options.labels[0], options.out, options.rate_hz,
                        read_options(options.hand), options.json});
   }
+  if (auto same = ranks.check_same(inputs_of(options)); !same) return report(same.error());
   const auto trained = train_gesture(options, ranks);
   if (!trained) return report(trained.error());
   for (const json& warning : (*trained)["warnings"]) {

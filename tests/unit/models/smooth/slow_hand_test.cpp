@@ -1,10 +1,17 @@
 // What a speed-adaptive prior alone does badly: slow hands, steady ramps, a glove's dead band, long
 // dropouts (models/smooth/README.md, "Steady motion").
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <utility>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
+#include "models/smooth/adaptive_window.hpp"
+#include "proto/frame/degree.hpp"
 #include "tests/bench/baselines.hpp"
 #include "tests/support/smoothed.hpp"
 #include "tests/support/synthetic_hand.hpp"
@@ -61,6 +68,43 @@ TEST_CASE("slow steady ramps are followed as well as by the best baseline tuned 
     const Motion truth = ramps(speed_deg_s);
     INFO(speed_deg_s << " deg/s, noise " << noise_deg << " deg");
     CHECK(over_best({truth, noisy(truth, noise_deg, 11)}, noise_deg) < 1.05);
+  }
+}
+
+TEST_CASE("jitter of the frames' times does not cost the window its past", "[live]") {
+  constexpr int kFrames = 1500;
+  for (const double rate_hz : {120.0, 200.0}) {
+    std::array<double, 2>
+        rough_deg{};  // from frame to frame, at rest: even times, and 1 ms of jitter
+    for (const bool jitters : {false, true}) {
+      std::mt19937_64 random(5), jitter(6);
+      std::normal_distribution<double> normal;
+      std::uniform_real_distribution<double> late_s(0.0, 1e-3);
+      smooth::AdaptiveWindow window(4);
+      std::vector<double> steps_s;  // for their median, as a live stream has it
+      double sum = 0.0;
+      double before_s = -1.0 / rate_hz;
+      std::array<double, 4> last{};
+      for (int t = 0; t < kFrames; ++t) {
+        const double time_s = t / rate_hz + (jitters ? late_s(jitter) : 0.0);
+        steps_s.push_back(time_s - std::exchange(before_s, time_s));
+        std::vector<double> recent(
+            steps_s.end() - std::min<std::ptrdiff_t>(15, std::ssize(steps_s)), steps_s.end());
+        std::ranges::nth_element(recent, recent.begin() + std::ssize(recent) / 2);
+        std::array<double, 4> measured_rad{};
+        for (double& value : measured_rad) value = kDegree * normal(random);
+        window.push(time_s, measured_rad, kDegree);
+        window.solve(recent[recent.size() / 2]);
+        for (std::size_t c = 0; c < 4; ++c) {
+          const double step_deg =
+              (window.x(0)[c] - std::exchange(last[c], window.x(0)[c])) / kDegree;
+          if (t > 2 * kFrames / 3) sum += step_deg * step_deg;
+        }
+      }
+      rough_deg[jitters ? 1 : 0] = std::sqrt(sum);
+    }
+    INFO(rate_hz << " Hz");
+    CHECK(rough_deg[1] < 1.5 * rough_deg[0]);
   }
 }
 
