@@ -11,8 +11,8 @@ namespace posed::gp {
 
 struct ScgOptions {
   int max_iterations = 100;
-  double tolerance_x = 1e-8;  // stop when no parameter moved more than this ...
-  double tolerance_f = 1e-8;  // ... and the value changed by less than this
+  double tolerance_x = 1e-8;     // stop when no parameter moved more than this ...
+  double tolerance_f = 1e-8;     // ... and the value changed by less than this
   std::function<bool()> stop{};  // asked in every iteration; true: the best so far will do
 };
 
