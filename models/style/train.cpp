@@ -69,11 +69,10 @@ Result<> check_groups(const std::vector<TrainingClip>& all, const std::vector<st
       return fail("the clip is in no group; say which style it shows", clip->clip.path);
     }
     if (!has(clip->motion, true)) {
-      const std::string remedy = targets.size() == 1 ? "; add one or leave this clip out"
-                                                     : "; add one: every target needs each motion";
-      return fail(
-          "motion " + clip->motion + " has no clip of the target group '" + target + "'" + remedy,
-          clip->clip.path);
+      const char* const remedy = targets.size() == 1 ? "'; add one or leave this clip out"
+                                                     : "'; add one: every target needs each motion";
+      return fail("motion " + clip->motion + " has no clip of the target group '" + target + remedy,
+                  clip->clip.path);
     }
     if (!has(clip->motion, false)) {
       return fail("motion " + clip->motion + " has clips of the target group '" + target +

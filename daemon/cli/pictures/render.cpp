@@ -169,7 +169,8 @@ Result<std::string> still(const RenderArguments& options, const std::vector<Draw
     const int end = drawn.motion.size() - 1;
     for (int i = 0; i < poses; ++i) {
       const double part = poses > 1 ? static_cast<double>(i) / (poses - 1) : 0.0;
-      const int frame = std::min(end, options.frame.value_or(static_cast<int>(part * end + 0.5)));
+      const int frame =
+          std::min(end, options.frame.value_or(static_cast<int>(std::lround(part * end))));
       const auto at = static_cast<std::size_t>(frame);
       row.poses.push_back(pose_at(drawn, at, time_words(drawn.time_s[at])));
     }
@@ -209,6 +210,7 @@ Result<> render_video(const RenderArguments& options, const std::vector<Drawn>& 
     return row;
   };
   std::vector<picture::StripRow> every;
+  every.reserve(static_cast<std::size_t>(frames));
   for (int frame = 0; frame < frames; ++frame) every.push_back(row_at(frame));
   const auto layout = picture::layout_of(every, camera, kPose_px, !last.shape->is_hand());
   ProgressBar bar(kQuietFor_s);
