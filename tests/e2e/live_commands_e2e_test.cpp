@@ -20,15 +20,6 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-// Waits until stderr of the process contains this text; false after half a minute.
-bool comes_to_say(const Process& process, const std::string& part) {
-  for (int i = 0; i < 600; ++i) {
-    if (process.errors().contains(part)) return true;
-    std::this_thread::sleep_for(50ms);
-  }
-  return false;
-}
-
 std::string line_with(Process& process, const std::string& part) {
   while (auto line = process.line()) {
     if (line->contains(part)) return *line;
@@ -78,16 +69,16 @@ TEST_CASE("a daemon that is gone is not shown as live") {
   REQUIRE(top.line());
   REQUIRE(monitor.line());
   served.daemon->send(SIGSTOP);
-  CHECK(comes_to_say(monitor, "s: the connection stands, but the daemon is stopped or stuck"));
+  CHECK(monitor.comes_to_say("s: the connection stands, but the daemon is stopped or stuck"));
   CHECK(waiting.exit_code() == 1);
   CHECK(has(waiting.errors(), "gave up after 4 s (--timeout)"));
   served.daemon->send(SIGCONT);
-  CHECK(comes_to_say(monitor, "answers again, after "));
+  CHECK(monitor.comes_to_say("answers again, after "));
   served.daemon->send(SIGKILL);
   for (const Process* one : {&top, &monitor}) {
     INFO(one->errors());
-    CHECK(comes_to_say(*one, "posed: " + served.publish + ": no answer for "));
-    CHECK(comes_to_say(*one, "the daemon has ended, or cannot be reached"));
+    CHECK(one->comes_to_say("posed: " + served.publish + ": no answer for "));
+    CHECK(one->comes_to_say("the daemon has ended, or cannot be reached"));
   }
   for (Process* one : {&top, &monitor}) {
     one->send(SIGTERM);
@@ -98,7 +89,7 @@ TEST_CASE("a daemon that is gone is not shown as live") {
 TEST_CASE("commands that wait for a daemon report what they wait for") {
   for (const char* command : {"top", "monitor"}) {
     Process waits({command, "--connect", kNobody, "--json"});
-    CHECK(comes_to_say(waits, "posed: waiting: nothing answers at tcp://127.0.0.1:9"));
+    CHECK(waits.comes_to_say("posed: waiting: nothing answers at tcp://127.0.0.1:9"));
     waits.send(SIGINT);
     CHECK(waits.exit_code() == 0);
     const ProgramOutcome gives_up =
@@ -172,7 +163,7 @@ TEST_CASE("a published replay is marked as one, and its times are consistent") {
   CHECK(live);
   const std::string words =
       "a replay of staged.plog, 0.1 x its pace; all times are the recording's";
-  CHECK(comes_to_say(stats, words));
+  CHECK(stats.comes_to_say(words));
   replay.send(SIGINT);
   CHECK(replay.exit_code() == 0);
 

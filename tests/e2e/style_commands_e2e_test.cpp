@@ -55,6 +55,10 @@ struct WalkerStudio {
     what.insert(what.end(), {"--out", path(out), "--json"});
     return posed(std::move(what));
   }
+  // From the first march to the first sway, into m.style.
+  [[nodiscard]] ProgramOutcome march_to_sway() const {
+    return train({"--from", path("march_1.bvh"), "--to", path("sway_1.bvh")}, "m.style");
+  }
   [[nodiscard]] ProgramOutcome experiment(std::vector<std::string> more,
                                           const std::string& out) const {
     more.insert(more.begin(), {"--experiment", path("exp.toml")});
@@ -198,8 +202,7 @@ TEST_CASE("no model is trained from useless data", "[train_style]") {
 TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figure",
           "[train_style][apply][eval_style]") {
   const WalkerStudio studio;
-  const auto trained = studio.train(
-      {"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")}, "m.style");
+  const auto trained = studio.march_to_sway();
   REQUIRE(trained.code == 0);
   CHECK(has(trained.err, "of the way to 'to'"));
   CHECK(has(trained.err, "a constant offset "));
@@ -231,10 +234,7 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
 
 TEST_CASE("apply --gate stands anywhere, alone or with on or off", "[apply]") {
   const WalkerStudio studio;
-  REQUIRE(studio
-              .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
-                     "m.style")
-              .code == 0);
+  REQUIRE(studio.march_to_sway().code == 0);
   const std::string model = studio.path("m.style");
   const std::string in = studio.path("march_2.bvh");
   const std::string out = studio.path("out.bvh");
@@ -254,10 +254,7 @@ TEST_CASE("apply --gate stands anywhere, alone or with on or off", "[apply]") {
 
 TEST_CASE("apply --calibrate goes on where the clip shows no walk, --neutral does not", "[apply]") {
   const WalkerStudio studio;
-  REQUIRE(studio
-              .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
-                     "m.style")
-              .code == 0);
+  REQUIRE(studio.march_to_sway().code == 0);
   auto still = motion::make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
   still.channels.rowwise() = Eigen::RowVectorXd(still.channels.row(0));
   REQUIRE(clip::write_bvh(still, studio.folder.path() / "still.bvh"));
@@ -279,10 +276,7 @@ TEST_CASE("apply --calibrate goes on where the clip shows no walk, --neutral doe
 
 TEST_CASE("apply says that a walker is far from the training", "[apply]") {
   const WalkerStudio studio;
-  REQUIRE(studio
-              .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
-                     "m.style")
-              .code == 0);
+  REQUIRE(studio.march_to_sway().code == 0);
   auto bent = motion::make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
   bent.channels.rightCols(bent.channels.cols() - 6).array() += 0.4;
   REQUIRE(clip::write_bvh(bent, studio.folder.path() / "bent.bvh"));
@@ -296,10 +290,7 @@ TEST_CASE("apply says that a walker is far from the training", "[apply]") {
 TEST_CASE("no command destroys a file: wrong names, inputs and files that exist are refused",
           "[output]") {
   const WalkerStudio studio;
-  REQUIRE(studio
-              .train({"--from", studio.path("march_1.bvh"), "--to", studio.path("sway_1.bvh")},
-                     "m.style")
-              .code == 0);
+  REQUIRE(studio.march_to_sway().code == 0);
   const std::string model = studio.bytes("m.style");
   const std::string walk = studio.bytes("march_1.bvh");
   const auto apply = [&](const std::string& out, std::vector<std::string> more = {}) {

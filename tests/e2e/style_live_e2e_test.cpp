@@ -10,19 +10,7 @@
 #include "tests/e2e/served.hpp"
 
 namespace posed::test {
-namespace {
-
 using namespace std::chrono_literals;
-
-bool daemon_said(const Process& process, const std::string& part) {
-  for (int i = 0; i < 600; ++i) {
-    if (process.errors().contains(part)) return true;
-    std::this_thread::sleep_for(50ms);
-  }
-  return false;
-}
-
-}  // namespace
 
 TEST_CASE("a warm-up, the gate and auto-alpha are told of and replayed") {
   Served served;
@@ -32,18 +20,18 @@ TEST_CASE("a warm-up, the gate and auto-alpha are told of and replayed") {
                                         "[stream.style]\nmodel = \"gated.style\"\n"
                                         "warm_up_s = 2.0\nauto_alpha = true\n");
   served.record();
-  CHECK(daemon_said(*served.daemon, "walker: the warm-up is over"));
+  CHECK(served.daemon->comes_to_say("walker: the warm-up is over"));
   CHECK(served.ctl({"set", "walker", "alpha", "0.6"}).code == 0);
   CHECK(served.ctl({"set", "walker", "gate", "false"}).code == 0);
   CHECK(served.ctl({"warm-up", "walker", "--seconds", "2"}).code == 0);
   CHECK(served.ctl({"set", "walker", "auto_alpha", "false"}).code == 0);
   CHECK(served.ctl({"set", "walker", "gate", "true"}).code == 0);
   CHECK(served.ctl({"model", "walker", served.path("other.style")}).code == 0);
-  CHECK(daemon_said(*served.daemon, "walker: the warm-up was interrupted"));
+  CHECK(served.daemon->comes_to_say("walker: the warm-up was interrupted"));
   CHECK(served.ctl({"warm-up", "walker", "--seconds", "0.5"}).code == 1);
   // A model without gate data: what is asked of it in vain is told.
   CHECK(served.ctl({"model", "walker", served.path("one.style")}).code == 0);
-  CHECK(daemon_said(*served.daemon, "the model has no data for gate, warm-up and auto-alpha"));
+  CHECK(served.daemon->comes_to_say("the model has no data for gate, warm-up and auto-alpha"));
   const auto refused = served.ctl({"warm-up", "walker"});
   CHECK(refused.code == 1);
   CHECK(has(refused.err, "train it again"));

@@ -141,6 +141,16 @@ class Process {
     return exit_code_;
   }
 
+  // Waits until stderr contains this text; false after half a minute.
+  [[nodiscard]] bool comes_to_say(const std::string& part) const {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (!errors().contains(part)) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return true;
+  }
+
   // The text written to stderr so far.
   [[nodiscard]] std::string errors() const {
     std::ifstream file(folder_.path() / "stderr");

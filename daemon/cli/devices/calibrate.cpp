@@ -16,6 +16,7 @@
 #include "daemon/cli/devices/calibrated_hand.hpp"
 #include "daemon/cli/devices/driver_options.hpp"
 #include "daemon/cli/devices/good_poses.hpp"
+#include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/device_info.hpp"
@@ -197,7 +198,7 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   if (!description) return std::unexpected(description.error());
   const auto model = (*driver)->glove->glove_model(*description);
   if (!model) return std::unexpected(model.error());
-  const Side hand = options.hand == "left" ? Side::kLeft : Side::kRight;
+  const Side hand = side_named(options.hand);
   return drivers::glove::import_calibration(options.import, *model, hand);
 }
 

@@ -9,6 +9,7 @@
 #include "daemon/cli/live/live_table.hpp"
 #include "daemon/cli/live/sparkline.hpp"
 #include "daemon/cli/paint.hpp"
+#include "models/style/style_filter.hpp"
 #include "posed/v1/control.pb.h"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
@@ -18,7 +19,7 @@ namespace {
 
 constexpr std::size_t kSecondsKept = 60;
 constexpr int kFigureColumns = 36, kFewestRows = 6, kMostRows = 16;
-constexpr double kMaxAlpha = 2.0, kAlphaStep = 0.1;
+constexpr double kAlphaStep = 0.1;
 constexpr std::chrono::seconds kAnswerWithin{3};  // with an answer
 
 }  // namespace
@@ -110,7 +111,8 @@ void ChosenStream::change_alpha(const v1::Stats& stats, double by) {
     control_.emplace(std::move(*opened));
   }
   const double now = asked_alpha_.value_or(chosen->alpha_target());
-  ask(chosen->stream(), std::clamp(std::round((now + by) * 10.0) / 10.0, -kMaxAlpha, kMaxAlpha));
+  ask(chosen->stream(),
+      std::clamp(std::round((now + by) * 10.0) / 10.0, -style::kMaxAlpha, style::kMaxAlpha));
 }
 
 void ChosenStream::ask(const std::string& stream, double alpha) {

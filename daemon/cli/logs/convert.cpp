@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/logs/convert_mcap.hpp"
 #include "daemon/cli/logs/list_takes.hpp"
 #include "daemon/cli/models/waiting.hpp"
@@ -133,7 +134,7 @@ int run(Convert& convert) {
   if (is_mcap(convert.out)) return convert_to_mcap(convert.in, convert.out, convert.json);
   if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
   if (!convert.hand.empty()) {
-    convert.read.hand = convert.hand == "left" ? Side::kLeft : Side::kRight;
+    convert.read.hand = side_named(convert.hand);
   }
   const auto clip = [&] {
     const Waiting waiting("reading " + convert.in);

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "models/gesture/recording.hpp"
 #include "models/motion/motion.hpp"
@@ -69,7 +70,7 @@ class Measure {
     std::error_code ignored;
     const bool other = path != options_.clip && exists(clip::skeleton_beside(path), ignored);
     if (is_amc(path) && !other) read.asf = options_.skeleton;
-    if (!options_.hand.empty()) read.hand = options_.hand == "left" ? Side::kLeft : Side::kRight;
+    if (!options_.hand.empty()) read.hand = side_named(options_.hand);
     return read;
   }
   [[nodiscard]] Result<motion::Motion> body(const Path& path) const {

@@ -11,6 +11,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/gesture/model_file.hpp"
@@ -103,7 +104,7 @@ Result<> smooth(const SmoothOptions& options) {
                          .check();
   if (!files) return files;
   clip::ReadOptions read;
-  if (!options.hand.empty()) read.hand = options.hand == "left" ? Side::kLeft : Side::kRight;
+  if (!options.hand.empty()) read.hand = side_named(options.hand);
   auto clip = clip::read_hand_clip(options.in, read);
   if (!clip) return std::unexpected(clip.error());
   for (const std::string& warning : clip->warnings) {

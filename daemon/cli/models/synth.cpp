@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/models/waiting.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "models/gesture/model_file.hpp"
@@ -100,7 +101,7 @@ Result<json> synth(const SynthOptions& options) {
   const double gap_m = options.unconstrained ? perform::smallest_gap_m(performance, **shape)
                                              : perform::constrain(performance, **shape).min_gap_m;
   clip::HandClip hand;
-  hand.side = options.hand == "left" ? Side::kLeft : Side::kRight;
+  hand.side = side_named(options.hand);
   hand.rate_hz = rate_hz;
   hand.angles = performance.angles;
   for (std::size_t t = 0; t < hand.angles.size(); ++t) {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/models/auto_label.hpp"
 #include "daemon/cli/models/question_file.hpp"
 #include "daemon/cli/models/tree_options.hpp"
@@ -93,7 +94,7 @@ Result<> check(const TrainGestureOptions& options) {
 
 clip::ReadOptions read_options(const std::string& hand) {
   clip::ReadOptions read;
-  if (!hand.empty()) read.hand = hand == "left" ? Side::kLeft : Side::kRight;
+  if (!hand.empty()) read.hand = side_named(hand);
   return read;
 }
 

@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/models/waiting.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
@@ -311,7 +312,7 @@ void add_render(CLI::App& app, int& exit_code) {
       "  posed render take1.plog --stream walker --raw-beside --video --out walker.mp4");
   command->callback([options, &exit_code] {
     if (!options->hand.empty()) {
-      options->read.hand = options->hand == "left" ? Side::kLeft : Side::kRight;
+      options->read.hand = side_named(options->hand);
     }
     const auto done = run_render(*options);
     exit_code = done ? static_cast<int>(ExitCode::kDone) : report(done.error());
