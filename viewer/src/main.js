@@ -32,6 +32,7 @@ class Page {
   daemon = { alive: true, sentence: '' };
   chosenName = null;
   link = { state: 'connecting', sentence: '' };
+  #tagged_ms = 0;
 
   constructor() {
     const token = new URLSearchParams(location.search).get('token') ?? '';
@@ -130,10 +131,13 @@ class Page {
     if (type === 'hello') {
       this.hello = message;
       this.link = { state: 'open', sentence: '' };
+    } else if (type === 'control') {
+      Object.assign(this.hello ?? {}, message);
     } else if (type === 'daemon') {
       this.daemon = message;
     } else if (type === 'clock') {
-      this.clock.add(message.t0, performance.now(), Number(message.monotonic_ns) / 1e6);
+      // Of another machine's frames nobody here knows when they came.
+      if (this.hello?.same_machine) this.clock.add(message.t0, performance.now(), Number(message.monotonic_ns) / 1e6);
       return;
     } else if (type === 'no_reply') {
       this.requests.refused(message.request, message.error);
@@ -146,7 +150,7 @@ class Page {
   // What is wrong with the way to the daemon, for the header and the empty scene.
   #sayLink() {
     const { state, sentence } = this.link;
-    if (state === 'refused') this.header.say('refused', 'bad');
+    if (state === 'refused') this.header.say(sentence, 'bad');
     else if (!this.hello) this.header.say(sentence || 'connecting', 'busy');
     else if (!this.daemon.alive) this.header.say(this.daemon.sentence || 'the daemon does not answer', 'bad');
     else this.header.say(`live from ${this.hello.connect}`, 'good');
@@ -184,12 +188,17 @@ class Page {
     const done_ms = performance.now();
     for (const stream of this.fresh) this.instruments.add(stream, done_ms);
     if (drawn && this.chosen) this.panel.mark(this.chosen);
+    if (now_ms - this.#tagged_ms > TAGS_EVERY_MS) {
+      this.#tagged_ms = now_ms;
+      writeTags(this.world, this.chosenName);
+    }
     this.instruments.frame(this.chosen, now_ms);
     this.times.add(performance.now() - began_ms);
   }
 }
 
 const READY = { type: 'ready' };
+const TAGS_EVERY_MS = 150;
 
 // For the tests and for who looks into a running page.
 globalThis.posedPage = new Page();

@@ -1,22 +1,12 @@
 // A VRM avatar that moves as a stream does. Rotations are those of VRM's bones relative to the bone
 // above, all identity in the T-pose; the hips move in proportion to the avatar's leg length.
-import { Group, TextureLoader } from 'three';
+import { Group } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { VRMLoaderPlugin, VRMUtils } from '@pixiv/three-vrm';
-
-// The page's security policy lets images come from blobs, but no other request.
-class ImageTextures {
-  name = 'posed_image_textures';
-
-  constructor(parser) {
-    parser.textureLoader = new TextureLoader(parser.options.manager);
-  }
-}
 
 function loader() {
   const gltf = new GLTFLoader();
   gltf.register((parser) => new VRMLoaderPlugin(parser));
-  if (typeof Image !== 'undefined') gltf.register((parser) => new ImageTextures(parser));
   return gltf;
 }
 

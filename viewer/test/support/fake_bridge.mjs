@@ -12,7 +12,7 @@ export const PAGE = join(dirname(fileURLToPath(import.meta.url)), '../../../buil
 
 const TYPES = { html: 'text/html', js: 'text/javascript', css: 'text/css', svg: 'image/svg+xml', vrm: 'model/gltf-binary' };
 const FILES = ['index.html', 'page.js', 'page.css', 'icon.svg', 'mannequin.vrm'];
-const POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'";
+const POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:";
 
 function framed(topic, bytes) {
   const head = Buffer.from(topic, 'ascii');
@@ -26,7 +26,7 @@ class Tab {
   constructor(socket, bridge) {
     this.socket = socket;
     this.bridge = bridge;
-    this.say({ type: 'hello', version: 'fake', connect: 'tcp://127.0.0.1:5570', ...bridge.rights });
+    this.say({ type: 'hello', version: 'fake', connect: 'tcp://127.0.0.1:5570', same_machine: true, ...bridge.rights });
     this.say({ type: 'daemon', alive: true, sentence: '' });
     for (const message of bridge.daemon.skeletons()) this.send(...message);
     this.send('stats', encode('Stats', bridge.daemon.stats()));
@@ -131,6 +131,7 @@ export class FakeBridge {
   }
 
   async stop() {
+    if (!this.http.listening) return;
     this.#timers.forEach(clearInterval);
     for (const { socket } of this.#tabs) socket.terminate();
     this.http.closeAllConnections();
