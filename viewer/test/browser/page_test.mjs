@@ -1,16 +1,15 @@
-// The page in headless Chromium on a bridge of the test's own: `node --test test/browser`.
+// The page in headless Chromium on a bridge of the test's own, without posed.
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import { FakeBridge } from '../support/fake_bridge.mjs';
 import { FakeDaemon } from '../support/fake_daemon.mjs';
-import { hasBrowser, launch, openPage } from '../support/browser.mjs';
+import { launch, openPage } from '../support/browser.mjs';
 
-const skip = hasBrowser() ? false : 'SKIPPED without chromium';
 const PATIENCE = { timeout: 30000 };
 
 let browser;
-before(async () => { if (!skip) browser = await launch(); });
-after(() => browser?.close());
+before(async () => { browser = await launch(); });
+after(() => browser.close());
 
 // A bridge and a page that end with the test, however that ends.
 async function started(context, options = {}, port = 0) {
@@ -27,7 +26,7 @@ async function opened(context, url, options) {
 
 // A test whose page may say nothing on the console.
 function pageTest(name, options, use) {
-  test(name, { skip, timeout: 90000 }, async (context) => {
+  test(name, { timeout: 90000 }, async (context) => {
     const bridge = await started(context, options);
     const page = await opened(context, bridge.url, options);
     await drawn(page);
@@ -129,7 +128,7 @@ pageTest('a page that may only look says why, and its controls are off', { right
   assert.deepEqual(bridge.requests.filter((request) => !request.list_models), []);
 });
 
-test('without the token nothing is shown; a page whose token is old says what to do', { skip, timeout: 90000 }, async (context) => {
+test('without the token nothing is shown; a page whose token is old says what to do', { timeout: 90000 }, async (context) => {
   const bridge = await started(context);
   const page = await opened(context, bridge.url.replace('secret', 'guess'));
   assert.match(await page.locator('body').innerText(), /refused/);
@@ -141,7 +140,7 @@ test('without the token nothing is shown; a page whose token is old says what to
   await page.locator('.link-text', { hasText: 'refused this page: open the URL' }).waitFor(PATIENCE);
 });
 
-test('a bridge that comes back is found again within 3 s, a silent daemon is said', { skip, timeout: 90000 }, async (context) => {
+test('a bridge that comes back is found again within 3 s, a silent daemon is said', { timeout: 90000 }, async (context) => {
   const bridge = await started(context);
   const page = await opened(context, bridge.url);
   await drawn(page);

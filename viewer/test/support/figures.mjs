@@ -55,29 +55,42 @@ const times = ([ax, ay, az, aw], [bx, by, bz, bw]) => [
   aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz,
 ];
 
-// A walk at 1.2 m/s around no corner, from z = -4 m on; style 0 to 1 lets the hips sway and the arms
-// hang wider.
+const CYCLES_PER_S = 0.95;
+const STANCE = 0.6; // share of the cycle in which a foot stands
+const REACH = 27 * D; // of the leg, to the front and to the back
+
+// A leg at a share of its cycle: while its foot stands it turns back evenly, so that the foot stays
+// where it is; then it swings forward with a bent knee.
+function stride(share) {
+  if (share < STANCE) return { hip: REACH * (1 - (2 * share) / STANCE), knee: 4 * D, stands: true };
+  const swing = (share - STANCE) / (1 - STANCE);
+  return { hip: -REACH * Math.cos(Math.PI * swing), knee: (4 + 52 * Math.sin(Math.PI * swing)) * D, stands: false };
+}
+
+// A walk straight ahead, from z = -4 m on; style 0 to 1 lets the hips sway and the arms hang wider.
 export function walk(time_s, style) {
-  const phase = 2 * Math.PI * 0.95 * time_s;
-  const swing = Math.sin(phase);
+  const cycle = CYCLES_PER_S * time_s;
+  const phase = 2 * Math.PI * cycle;
+  const swing = Math.cos(phase);
   const turns = {
-    hips: times(about('z', style * 9 * D * Math.cos(phase)), about('y', 7 * D * swing)),
-    spine: about('z', -style * 7 * D * Math.cos(phase)),
-    chest: times(about('y', -12 * D * swing), about('x', (3 - 6 * style) * D)),
-    head: about('x', (2 + 6 * style) * D),
+    hips: times(about('z', style * 7 * D * Math.sin(phase)), about('y', -7 * D * swing)),
+    spine: about('z', -style * 10 * D * Math.sin(phase)),
+    chest: times(about('y', 13 * D * swing), about('x', (4 - 8 * style) * D)),
+    head: times(about('y', -5 * D * swing), about('x', (2 + 4 * style) * D)),
   };
-  for (const [side, sign] of [['left', 1], ['right', -1]]) {
-    const forward = sign * swing;
-    const lift = Math.max(0, sign * Math.cos(phase));
-    turns[`${side}UpperLeg`] = about('x', (-24 * forward - 12 * lift) * D);
-    turns[`${side}LowerLeg`] = about('x', (6 + 48 * lift) * D);
-    turns[`${side}Foot`] = about('x', (8 * forward - 6 * lift) * D);
-    turns[`${side}UpperArm`] = times(about('x', 24 * forward * (1 - 0.4 * style) * D), about('z', -sign * (76 - 14 * style) * D));
-    turns[`${side}LowerArm`] = about('y', -sign * (24 + 26 * style) * D);
+  let height_m = 0;
+  for (const [side, sign, ahead] of [['left', 1, 0], ['right', -1, 0.5]]) {
+    const { hip, knee, stands } = stride((cycle + ahead) % 1);
+    turns[`${side}UpperLeg`] = about('x', -hip - 0.3 * knee);
+    turns[`${side}LowerLeg`] = about('x', knee);
+    turns[`${side}Foot`] = about('x', hip - 0.7 * knee + (stands ? 0 : 10 * D));
+    turns[`${side}UpperArm`] = times(about('x', sign * 22 * swing * (1 - 0.4 * style) * D), about('z', -sign * (78 - 16 * style) * D));
+    turns[`${side}LowerArm`] = about('y', -sign * (20 + 26 * style) * D);
+    if (stands) height_m = Math.max(height_m, 0.04 + 0.83 * Math.cos(hip) + 0.075);
   }
-  const along = ((1.2 * time_s) % 8) - 4;
+  const speed = (2 * 0.83 * Math.sin(REACH) * CYCLES_PER_S) / STANCE;
   return {
-    root_position_m: [style * 0.03 * Math.cos(phase), 0.905 + 0.016 * Math.cos(2 * phase), along],
+    root_position_m: [style * 0.025 * Math.sin(phase), height_m, ((speed * time_s) % 8) - 4],
     rotation_xyzw: BODY.flatMap(([bone]) => turns[bone] ?? [0, 0, 0, 1]),
   };
 }

@@ -99,8 +99,8 @@ test('a walker\'s feet stand in turns, and it faces +Z', () => {
       stood[side] += foot.stands ? 1 : 0;
     });
   }
-  for (const frames of stood) assert.ok(frames > 10 && frames < 200, String(stood));
-  assert.equal(facing(kinematics), 0);
+  for (const frames of stood) assert.ok(frames > 60 && frames < 200, String(stood));
+  assert.ok(facing(kinematics) === 0);
   const still = new Foot(left.joint, -1);
   for (let i = 0; i < 10; i += 1) still.update(kinematics, 100 * i);
   assert.ok(still.stands && still.speed_m_per_s === 0);

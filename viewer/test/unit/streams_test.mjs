@@ -33,7 +33,7 @@ test('a stream is drawn once its skeleton and a pose of that skeleton are here',
   assert.equal(stream.place(), false); // nothing new
   store.receive(skeletonOf('walker', 8)); // the same again, as every second
   assert.deepEqual(told, ['skeleton walker']);
-  assert.ok(Math.abs(stream.kinematics.position[1] - 0.921) < 1e-3);
+  assert.ok(Math.abs(stream.kinematics.position[1] - walk(0, 0).root_position_m[1]) < 1e-6);
 });
 
 test('streams come and go with the statistics; a raw twin goes with its stream', () => {
