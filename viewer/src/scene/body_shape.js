@@ -6,12 +6,12 @@ import { Mesh, addCapsule } from './capsule.js';
 
 const USUAL_HEIGHT_M = 1.7;
 const USUAL_HAND_M = 0.19; // from the wrist to the tip of the longest finger
-const TRUNK_DEPTH = 0.72;
+const TRUNK_DEPTH = 0.68;
 const SHORT_M = 1e-3;
 
 // Radii [m] of a person of usual height, at the bone's own joint.
 const RADII = [
-  [/^hips$/, 0.1], [/^spine$/, 0.105], [/^chest$/, 0.12], [/^upperChest$/, 0.12],
+  [/^hips$/, 0.118], [/^spine$/, 0.112], [/^chest$/, 0.132], [/^upperChest$/, 0.13],
   [/^neck$/, 0.048], [/^head$/, 0.055], [/Shoulder$/, 0.062], [/UpperArm$/, 0.05],
   [/LowerArm$/, 0.04], [/Hand$/, 0.032], [/UpperLeg$/, 0.078], [/LowerLeg$/, 0.056],
   [/Foot$/, 0.042], [/Toes$/, 0.034],
@@ -85,9 +85,11 @@ class Builder {
       this.limb(joint, to, end_m);
       return;
     }
-    const neck = this.bones[child] === 'neck';
-    const start_m = neck ? 0.85 * this.radius(joint, length_m) : end_m;
-    addCapsule(this.mesh, from, to, start_m, end_m, joint, neck ? TRUNK_DEPTH : 1);
+    addCapsule(this.mesh, from, to, end_m, end_m, joint);
+    if (this.bones[child] !== 'neck') return;
+    const collar = to.map((value, k) => from[k] + 0.7 * (value - from[k]));
+    const start_m = 0.97 * this.radius(joint, length_m); // inside the capsule from below
+    addCapsule(this.mesh, from, collar, start_m, 0.86 * start_m, joint, TRUNK_DEPTH);
   }
 
   // The end of a leaf: fingertips, toes; the head as a ball.

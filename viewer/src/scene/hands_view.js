@@ -5,7 +5,7 @@ import { Lights } from './lights.js';
 
 const FIELD_DEG = 28;
 const APART_M = 0.2; // from hand to hand
-const HEIGHT_M = 0.25; // that is seen
+const HEIGHT_M = 0.3; // that is seen
 
 export class HandsView {
   scene = new Scene();
@@ -69,12 +69,12 @@ export class HandsView {
     const half = Math.tan((FIELD_DEG * Math.PI) / 360);
     const across_m = (this.count ?? 1) * APART_M + 0.03;
     const far = Math.max(HEIGHT_M, across_m / Math.max(this.camera.aspect, 0.2)) / (2 * half);
-    this.controls.target.set(0, 0.083, 0);
+    this.controls.target.set(0, 0.068, 0);
     this.camera.position.set(0.3, 0.11, 1).normalize().multiplyScalar(far).add(this.controls.target);
     this.controls.update();
   }
 
-  // Holds the wrist still, and gives the point above the fingers for its name.
+  // Holds the wrist still, and gives the point below it for its name.
   hold(performer, point) {
     const entry = this.#performers.get(performer.stream.name);
     const { kinematics } = performer.stream;
@@ -83,7 +83,7 @@ export class HandsView {
     wrist.fromArray(kinematics.position, i).applyEuler(group.rotation);
     group.position.copy(wrist).negate();
     point.copy(entry.holder.position);
-    point.y += 0.2 * performer.figure.scale;
+    point.y -= 0.05;
   }
 }
 

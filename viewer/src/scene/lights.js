@@ -10,7 +10,7 @@ export class Lights {
   constructor(theme, shadows) {
     this.sky = new HemisphereLight();
     this.sun = new DirectionalLight();
-    this.sun.position.set(-2.2, 6, 3.2);
+    this.sun.position.set(-1.4, 6.5, 2.2);
     this.sun.castShadow = shadows;
     const { shadow } = this.sun;
     shadow.mapSize.set(SHADOW_PIXELS, SHADOW_PIXELS);

@@ -39,7 +39,7 @@ export class NameTags {
     tag.element.hidden = !shown;
     if (!shown) return;
     const x = area.left + (0.5 + 0.5 * at.x) * area.width;
-    const y = Math.max(area.top + (0.5 - 0.5 * at.y) * area.height, area.top + 44);
+    const y = Math.max(area.top + (0.5 - 0.5 * at.y) * area.height, area.top + 48);
     tag.element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -100%)`;
   }
 

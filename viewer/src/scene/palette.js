@@ -13,8 +13,8 @@ const THEMES = {
   },
   dark: {
     background: colour('#11151a'), ground: colour('#11151a'), line: colour('#2b333c'),
-    strong: colour('#46525e'), styled: colour('#58b0ea'), raw: colour('#aab4c0'),
-    rawOpacity: 0.34, sky: colour('#dfe9f5'), below: colour('#20262d'), sun: 1.9, ambient: 1.05,
+    strong: colour('#46525e'), styled: colour('#58b0ea'), raw: colour('#b4bdc8'),
+    rawOpacity: 0.55, sky: colour('#dfe9f5'), below: colour('#20262d'), sun: 1.9, ambient: 1.05,
     shadow: 0.5, hands: colour('#171c22'),
   },
 };

@@ -18,7 +18,7 @@ export class Views {
   #span_m = LEAST_M;
   #far_m = 0; // distance that is aimed at; 0: as the person left it
   #settled = false;
-  #free = 1; // width of the part that is not covered, in heights
+  #free = { wide: 1, high: 1 }; // the part that is not covered, in heights of the picture
   #yaw = 0; // where the figures face
 
   constructor(element, onChange) {
@@ -65,15 +65,15 @@ export class Views {
   // So far away that all figures are seen.
   #fitting() {
     const half = Math.tan((FIELD_DEG * Math.PI) / 360);
-    const wide = this.#span_m / (half * Math.max(this.#free, 0.2));
-    return Math.max(wide, 1.28 / half) + 0.35;
+    const { wide, high } = this.#free;
+    return Math.max(this.#span_m / Math.max(wide, 0.2), 1.28 / Math.max(high - 0.06, 0.2)) / half + 0.35;
   }
 
-  // covered: of the width, from the right; what is looked at is in the middle of the rest.
-  resize(width, height, covered) {
+  // covered: {right, bottom}; what is looked at is in the middle of the rest.
+  resize(width, height, { right, bottom }) {
     this.camera.aspect = width / Math.max(height, 1);
-    this.#free = (width - covered) / Math.max(height, 1);
-    this.camera.setViewOffset(width, height, covered / 2, 0, width, height);
+    this.#free = { wide: (width - right) / Math.max(height, 1), high: 1 - bottom / Math.max(height, 1) };
+    this.camera.setViewOffset(width, height, right / 2, bottom / 2, width, height);
     if (this.#far_m > 0) this.#far_m = this.#fitting();
   }
 

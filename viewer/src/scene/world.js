@@ -6,6 +6,7 @@ import { Ground } from './ground.js';
 import { HandsView } from './hands_view.js';
 import { Lights } from './lights.js';
 import { NameTags } from './name_tags.js';
+import { Pace } from './pace.js';
 import { Performer } from './performer.js';
 import { Views } from './views.js';
 import { themeColours } from './palette.js';
@@ -19,6 +20,7 @@ export class World {
   options = { raw: 'beside', trails: true };
   #dirty = CALM_FRAMES;
   #yaw = null;
+  #pace = new Pace();
   #areas = { bodies: null, hands: null };
 
   // stage: the element with the canvas, the hands' inset and the names' layer.
@@ -135,7 +137,8 @@ export class World {
   resize() {
     const { width, height } = this.stage.getBoundingClientRect();
     if (width === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_PIXELS));
+    this.renderer.setPixelRatio(this.#pace.now.pixels * Math.min(devicePixelRatio, MOST_PIXELS));
+    this.lights.sun.castShadow = this.#pace.now.shadows;
     this.renderer.setSize(width, height, false);
     this.#areas.bodies = { left: 0, top: 0, width, height };
     const show = this.stage.dataset.show;
@@ -145,10 +148,13 @@ export class World {
     this.touch();
   }
 
-  // The width that the inset takes from the bodies, in CSS pixels: they stand beside it.
+  // What the inset takes from the bodies, in CSS pixels: they stand beside it, or above it where it
+  // is as wide as the scene.
   #covered() {
-    if (!this.#areas.hands || this.stage.dataset.show !== 'both') return 0;
-    return this.#areas.bodies.width - this.#areas.hands.left;
+    if (!this.#areas.hands || this.stage.dataset.show !== 'both') return { right: 0, bottom: 0 };
+    const { bodies, hands } = this.#areas;
+    const wide = hands.width > 0.7 * bodies.width;
+    return { right: wide ? 0 : bodies.width - hands.left, bottom: wide ? bodies.height - hands.top : 0 };
   }
 
   #insetArea() {
@@ -161,10 +167,14 @@ export class World {
   // anything was drawn.
   frame(shown) {
     this.#update(shown);
-    if (this.#dirty === 0) return false;
+    if (this.#dirty === 0 || this.stage.dataset.show === 'none') {
+      this.#pace.rest();
+      return false;
+    }
     this.#dirty -= 1;
     this.#look();
     this.#draw();
+    if (this.#pace.drawn(performance.now())) this.resize();
     return true;
   }
 
