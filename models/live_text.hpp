@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "models/stage_type.hpp"
 
@@ -21,6 +22,12 @@ namespace posed {
   const auto found = std::ranges::find(type.commands, spec.name, &StageCommandType::name);
   if (found == type.commands.end()) return std::nullopt;
   return static_cast<std::size_t>(found - type.commands.begin());
+}
+
+// Whether this command is the one of a live text.
+[[nodiscard]] inline bool is_live_text(const StageType& type, std::string_view command) noexcept {
+  const ParameterSpec* const spec = find_parameter(type.parameters, command);
+  return spec != nullptr && text_command(type, *spec).has_value();
 }
 
 }  // namespace posed

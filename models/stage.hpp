@@ -12,6 +12,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "proto/frame/frame.hpp"
 #include "proto/text/short_text.hpp"
@@ -46,12 +47,14 @@ class StageOut {
 // A model bound to the skeleton and the rate of one stream; each stage with a model derives its own
 // from it. Built cold; the hot side borrows a plain pointer, and the cold side frees it.
 struct StageModel {
-  explicit StageModel(std::string file) : name(std::move(file)) {}
+  StageModel(std::string file, std::vector<std::string> known)
+      : name(std::move(file)), words(std::move(known)) {}
   StageModel(const StageModel&) = delete;
   StageModel& operator=(const StageModel&) = delete;
   virtual ~StageModel() = default;
 
-  std::string name;  // of its file, for messages
+  std::string name;                // of its file, for messages
+  std::vector<std::string> words;  // that it knows, for people: names of styles, gesture labels
 };
 
 // A live parameter, as a number; true and false are 1 and 0.

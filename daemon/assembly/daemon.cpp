@@ -73,8 +73,8 @@ class Daemon::Parts final : public control::DaemonControl {
   void keep_model(std::span<const std::byte> bytes) override {
     if (hooks.record_sink != nullptr) hooks.record_sink->keep_model(bytes);
   }
-  void model_in_use(std::uint32_t stream, const std::string& name) override {
-    publisher->set_model_name(stream, name);
+  void stages_changed(std::uint32_t stream, const pipeline::StreamSettings& settings) override {
+    publisher->set_stages(stream, publish::stage_infos(settings));
   }
   Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
     if (hooks.record_sink != nullptr) return hooks.record_sink->mark_take(mark);
@@ -208,9 +208,8 @@ Result<> Daemon::Parts::open_publisher() {
                      .description = stream->source->device.description,
                      .skeleton = stream->stages.published,
                      .rate_hz = rate_of(*stream),
-                     .stages = pipeline::stage_types_of(stream->stages.settings),
+                     .stages = publish::stage_infos(stream->stages.settings),
                      .raw = stream->config.publish_raw,
-                     .model = pipeline::first_model(stream->stages.settings),
                      .comes_and_goes = stream->source->slot != nullptr,
                      .present = stream->source->present,
                      .counters = &stream->counters,
@@ -268,6 +267,7 @@ Result<> Daemon::Parts::open_engines() {
     devices::OpenStream& stream = *streams[i];
     auto bound = devices::bind_stages(stream.stages);
     if (!bound) return devices::of_stream(stream.config.name, bound.error());
+    publisher->set_stages(i, publish::stage_infos(stream.stages.settings));
     auto engine = devices::make_engine(i, stream.stages, *bound);
     if (!engine) return devices::of_stream(stream.config.name, engine.error());
     engine->clock = system::monotonic_ns;
@@ -298,7 +298,8 @@ Result<> Daemon::Parts::open_engines() {
     }
   }
   if (bodies != nullptr) bodies->add_to(*reader);
-  handler = std::make_unique<control::RequestHandler>(std::move(controlled), *this);
+  handler = std::make_unique<control::RequestHandler>(std::move(controlled), *this,
+                                                      control::ModelFolder(config.models));
   return {};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -27,24 +28,38 @@ constexpr TomlLimits kLimits{
     .what = "config", .bytes = std::size_t{1024} * 1024, .depth = 8, .items = 16384};
 constexpr std::size_t kMaxClients = 1024;
 
-void read_endpoint(TableReader& root, const char* name, std::string& endpoint, bool& insecure,
+void read_endpoint(TableReader& table, const char* name, std::string& endpoint, bool& insecure,
                    bool secured) {
-  auto table = root.table(name);
-  if (!table) return;
-  table->read("endpoint", endpoint);
-  table->read("insecure", insecure);
-  table->finish();
+  table.read("endpoint", endpoint);
+  table.read("insecure", insecure);
   if (!endpoint.starts_with("tcp://") && !endpoint.starts_with("ipc://")) {
-    table->add_error("endpoint",
-                     fmt::format("{} is not an endpoint; it looks like tcp://127.0.0.1:5570,"
-                                 " or ipc:///run/posed.sock",
-                                 in_quotes(endpoint)));
+    table.add_error("endpoint",
+                    fmt::format("{} is not an endpoint; it looks like tcp://127.0.0.1:5570,"
+                                " or ipc:///run/posed.sock",
+                                in_quotes(endpoint)));
   } else if (!net::is_loopback(endpoint) && !secured && !insecure) {
-    table->add_error(
+    table.add_error(
         "endpoint",
         fmt::format("{}; add a server_key in [security], or say insecure = true in [{}]",
                     net::open_to_anyone(endpoint), name));
   }
+}
+
+void read_publish(TableReader table, bool secured, DaemonConfig& config) {
+  read_endpoint(table, "publish", config.publish_endpoint, config.publish_insecure, secured);
+  table.finish();
+}
+
+void read_control(TableReader table, const ConfigFile& file, bool secured, DaemonConfig& config) {
+  read_endpoint(table, "control", config.control_endpoint, config.control_insecure, secured);
+  std::string models;
+  table.read("models", models);
+  config.models = file.resolve(models);
+  std::error_code ignored;
+  if (!models.empty() && !is_directory(config.models, ignored)) {
+    table.add_error("models", in_quotes(config.models.string()) + " is not a folder");
+  }
+  table.finish();
 }
 
 void read_client(TableReader table, const ConfigFile& file,
@@ -106,8 +121,8 @@ void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonCo
   root.read("realtime", config.realtime);
   if (auto table = root.table("security")) read_security(*table, file, config.security);
   const bool secured = !config.security.server_key.empty();
-  read_endpoint(root, "publish", config.publish_endpoint, config.publish_insecure, secured);
-  read_endpoint(root, "control", config.control_endpoint, config.control_insecure, secured);
+  if (auto table = root.table("publish")) read_publish(*table, secured, config);
+  if (auto table = root.table("control")) read_control(*table, file, secured, config);
   if (config.publish_endpoint == config.control_endpoint &&
       !config.publish_endpoint.ends_with(":*")) {
     root.add_error("control", "publish and control cannot share the endpoint " +

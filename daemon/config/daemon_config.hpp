@@ -106,7 +106,8 @@ struct DaemonConfig {
   bool publish_insecure = false;  // allow binding beyond loopback without CURVE
   std::string control_endpoint = "tcp://127.0.0.1:5571";
   bool control_insecure = false;
-  bool realtime = true;  // ask for SCHED_FIFO and mlockall; a refusal is only a warning
+  std::filesystem::path models;  // the folder whose models control may use by name; empty: none
+  bool realtime = true;          // ask for SCHED_FIFO and mlockall; a refusal is only a warning
   SecurityConfig security;
   std::vector<StreamConfig> streams;  // of devices with one body
   std::vector<SourceConfig> sources;

@@ -7,6 +7,7 @@
 
 #include "daemon/control/stage_requests.hpp"
 #include "daemon/devices/about_stream.hpp"
+#include "models/live_text.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/text/clean.hpp"
@@ -32,8 +33,8 @@ Reply refusal(Requester to, const std::string& sentence) {
 }  // namespace
 
 RequestHandler::RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
-                               Clock clock)
-    : daemon_control_(daemon_control), clock_(clock) {
+                               ModelFolder models, Clock clock)
+    : daemon_control_(daemon_control), models_(std::move(models)), clock_(clock) {
   for (std::uint32_t i = 0; i < streams.size(); ++i) {
     streams[i].stream = i;
     streams_.emplace(i, std::move(streams[i]));
@@ -59,6 +60,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
     return make_reply(std::move(requester), reply);
   }
   if (request.has_take()) return mark_take(request, std::move(requester));
+  if (request.has_list_models()) return list_models(std::move(requester));
   const std::scoped_lock lock(mutex_);
   switch (request.request_case()) {
     case v1::ControlRequest::kSetParameter:
@@ -73,6 +75,9 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       if (*taken) return make_reply(std::move(requester), reply);
       break;
     }
+    case v1::ControlRequest::kUseModel:
+      done = use_model(request, requester);
+      break;
     case v1::ControlRequest::kCalibrate:
       done = calibrate(request, requester);
       break;
@@ -103,6 +108,26 @@ Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester req
   reply.set_ok(true);
   *reply.mutable_take() = pipeline::stats_of(*take);
   return make_reply(std::move(requester), reply);
+}
+
+Reply RequestHandler::list_models(Requester requester) const {
+  const auto known = models_.list();
+  if (!known) return refusal(std::move(requester), known.error().text());
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  for (const FolderModel& model : *known) {
+    v1::KnownModel& entry = *reply.add_model();
+    entry.set_name(model.name);
+    entry.set_kind(std::string(model.kind));
+  }
+  return make_reply(std::move(requester), reply);
+}
+
+Result<> RequestHandler::use_model(const v1::ControlRequest& request, const Requester& requester) {
+  const auto& wanted = request.use_model();
+  const auto bytes = models_.read(wanted.name());
+  if (!bytes) return std::unexpected(bytes.error());
+  return set_model(wanted.stream(), std::as_bytes(std::span(*bytes)), wanted.name(), requester);
 }
 
 bool RequestHandler::is_earlier(Streams::iterator stream) const {
@@ -153,8 +178,13 @@ Result<> RequestHandler::stage_command(const v1::ControlRequest& request,
   const std::string_view why = type.refusal.empty() ? "the stage refused this" : type.refusal;
   const auto command = encode_command(type, coming_model(**stream, found->stage), wanted);
   if (!command) return of_stream(wanted.stream(), command.error());
-  return send(**stream, {.change = found->change, .command = *command},
-              {.requester = requester, .stage = found->stage, .refusal = why});
+  std::optional<LiveText> text;
+  if (is_live_text(*found->change.type, type.name)) {
+    text = {.parameter = std::string(type.name), .value = joined_words(wanted)};
+  }
+  return send(
+      **stream, {.change = found->change, .command = *command},
+      {.requester = requester, .stage = found->stage, .refusal = why, .text = std::move(text)});
 }
 
 Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
@@ -251,8 +281,13 @@ void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
   if (done.model) {
     auto& settings = stream.settings.stages[done.stage];
     settings.model_name = done.model->name;
+    settings.model_words = done.model->words;
     stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
-    daemon_control_.model_in_use(stream.stream, pipeline::first_model(stream.settings));
+    daemon_control_.stages_changed(stream.stream, stream.settings);
+  }
+  if (done.text) {
+    stream.settings.stages[done.stage].parameters[done.text->parameter] = done.text->value;
+    daemon_control_.stages_changed(stream.stream, stream.settings);
   }
   if (done.calibration) {
     stream.calibration = std::move(done.calibration);

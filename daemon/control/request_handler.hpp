@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/control/model_folder.hpp"
 #include "daemon/control/uploads.hpp"
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/messages.hpp"
@@ -71,8 +72,8 @@ class DaemonControl {
   [[nodiscard]] virtual bool send(const pipeline::DeviceCommand& command) = 0;
   // Keeps a model's file for the log; call before the command that names its hash.
   virtual void keep_model(std::span<const std::byte> bytes) = 0;
-  // A model has taken effect; `stats` should report its name.
-  virtual void model_in_use(std::uint32_t stream, const std::string& name) = 0;
+  // A stage of the stream has another model, or another text: `stats` should tell it.
+  virtual void stages_changed(std::uint32_t stream, const pipeline::StreamSettings& settings) = 0;
   // Marks a take in the log; fails if the daemon is not recording. Any cold thread.
   [[nodiscard]] virtual Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) = 0;
   virtual void fill(v1::Stats& stats) = 0;
@@ -92,7 +93,7 @@ class RequestHandler {
   // because it owns the models in use. The ids of `streams` are their indices, whatever
   // ControlledStream::stream says.
   RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
-                 Clock clock = system::monotonic_ns);
+                 ModelFolder models = {}, Clock clock = system::monotonic_ns);
   ~RequestHandler();
   RequestHandler(const RequestHandler&) = delete;
   RequestHandler& operator=(const RequestHandler&) = delete;
@@ -124,6 +125,10 @@ class RequestHandler {
   // By id, the generations of a slot in their order. An earlier one stays until it is removed,
   // because the pipeline may still read its models.
   using Streams = std::map<std::uint32_t, ControlledStream, BySlot>;
+  // The new value of a live text.
+  struct LiveText {
+    std::string parameter, value;
+  };
   struct UnderWay {
     Requester requester;
     std::uint32_t stream = 0;
@@ -131,6 +136,7 @@ class RequestHandler {
     std::size_t stage = 0;
     std::unique_ptr<const StageModel> model{};  // the stage's new model
     std::string_view refusal{};                 // of a command: what the stage's refusal means
+    std::optional<LiveText> text{};             // of a command that sets one
     std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
   };
   // Success means that the command is under way; acknowledge() then makes the reply.
@@ -141,9 +147,11 @@ class RequestHandler {
   // Returns true if this was not the last piece, which is acknowledged at once.
   [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request,
                                              const Requester& requester);
+  [[nodiscard]] Result<> use_model(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
                                    const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);
+  [[nodiscard]] Reply list_models(Requester requester) const;
   [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
   [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
   // Whether the slot has a later generation.
@@ -161,6 +169,7 @@ class RequestHandler {
   void apply(ControlledStream& stream, UnderWay& done);
 
   DaemonControl& daemon_control_;
+  const ModelFolder models_;
   Clock clock_;
   std::mutex mutex_;  // guards all below
   Streams streams_;

@@ -182,6 +182,10 @@ Result<FoundCommand> find_command(const StreamSettings& settings, const std::str
                                  .type = settings.stages[place->stage].type}};
 }
 
+std::string joined_words(const v1::ControlRequest::StageCommand& wanted) {
+  return fmt::format("{}", fmt::join(wanted.word(), ","));
+}
+
 Result<StageCommand> encode_command(const StageCommandType& type, const StageModel* model,
                                     const v1::ControlRequest::StageCommand& wanted) {
   if (wanted.word_size() > kMaxWords || wanted.number_size() > kMaxNumbers) {

@@ -31,6 +31,9 @@ struct FoundCommand {
 [[nodiscard]] Result<FoundCommand> find_command(const pipeline::StreamSettings& settings,
                                                 const std::string& name);
 
+// The words of a command as one text, with the commas between which they stood.
+[[nodiscard]] std::string joined_words(const v1::ControlRequest::StageCommand& wanted);
+
 // `model` is the stage's model by the time that the command arrives; it may be null.
 [[nodiscard]] Result<StageCommand> encode_command(const StageCommandType& type,
                                                   const StageModel* model,

@@ -68,10 +68,10 @@ std::vector<const StageModel*> BoundStages::borrowed() const {
   return pointers;
 }
 
-Result<BoundStages> bind_stages(const LoadedStages& stages) {
+Result<BoundStages> bind_stages(LoadedStages& stages) {
   BoundStages bound;
   for (std::size_t i = 0; i < stages.settings.stages.size(); ++i) {
-    const pipeline::StageSettings& stage = stages.settings.stages[i];
+    pipeline::StageSettings& stage = stages.settings.stages[i];
     auto& model = bound.models.emplace_back();
     std::span<const std::byte> file;
     if (stages.skeleton && stages.model_files[i]) {
@@ -81,6 +81,7 @@ Result<BoundStages> bind_stages(const LoadedStages& stages) {
       auto ready = stage.type->bind_model(file, *context, stage.model_name);
       if (!ready) return std::unexpected(ready.error());
       model = std::move(*ready);
+      stage.model_words = model->words;
     }
     if (stage.type->first_command == nullptr) continue;
     const auto first = stage.type->first_command(stage.parameters, model.get(), file);

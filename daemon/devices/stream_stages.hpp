@@ -42,8 +42,8 @@ struct BoundStages {
 
   [[nodiscard]] std::vector<const StageModel*> borrowed() const;
 };
-// Checks and binds the models.
-[[nodiscard]] Result<BoundStages> bind_stages(const LoadedStages& stages);
+// Checks and binds the models, and fills in the words that they know.
+[[nodiscard]] Result<BoundStages> bind_stages(LoadedStages& stages);
 
 // The engine of the stream with this id, untimed. `bound` outlives it.
 [[nodiscard]] Result<pipeline::EngineOptions> make_engine(std::uint32_t stream,

@@ -81,18 +81,6 @@ Result<> find_partners(StreamSettings& settings, const PartnerStreams& known) {
   return {};
 }
 
-std::vector<const StageType*> stage_types_of(const StreamSettings& settings) {
-  std::vector<const StageType*> types;
-  for (const StageSettings& stage : settings.stages) types.push_back(stage.type);
-  return types;
-}
-
-std::string first_model(const StreamSettings& settings) {
-  const auto has_model = [](const StageSettings& stage) { return !stage.model_name.empty(); };
-  const auto found = std::ranges::find_if(settings.stages, has_model);
-  return found == settings.stages.end() ? std::string() : found->model_name;
-}
-
 Result<StageContext> stage_context(const StreamSettings& settings, std::size_t stage,
                                    const std::shared_ptr<const Skeleton>& source) {
   auto skeleton = skeleton_before(settings, stage, source);

@@ -30,8 +30,9 @@ struct StageSettings {
   Parameters parameters{};                // complete
   std::vector<PartnerStream> partners{};  // [StageType::partners], by find_partners()
   // The model with which the stage starts.
-  std::string model_sha256{};  // of its file, which the log keeps; empty: no model
-  std::string model_name{};    // for people
+  std::string model_sha256{};              // of its file, which the log keeps; empty: no model
+  std::string model_name{};                // for people
+  std::vector<std::string> model_words{};  // StageModel::words; empty in replay
 };
 
 struct StreamSettings {
@@ -48,12 +49,6 @@ struct StreamSettings {
 [[nodiscard]] bool has_partners(const StreamSettings& settings);
 // Finds the streams that the stages name. `known`: all that can be partners. Cold.
 [[nodiscard]] Result<> find_partners(StreamSettings& settings, const PartnerStreams& known);
-
-// The kinds of the stages, in order.
-[[nodiscard]] std::vector<const StageType*> stage_types_of(const StreamSettings& settings);
-
-// The name of the first model, as far as there is one. For people.
-[[nodiscard]] std::string first_model(const StreamSettings& settings);
 
 // A stage's view of the stream. `source` is the skeleton of the source's frames: the stages before
 // this one may change it. The error says which of them cannot serve it. Cold.

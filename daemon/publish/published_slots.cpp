@@ -21,11 +21,11 @@ void PublishedSlots::add(std::unique_ptr<PublishedStream> stream) {
   additions_.push_back(std::move(stream));
 }
 
-void PublishedSlots::set_model(std::uint32_t stream, std::string name) {
+void PublishedSlots::set_stages(std::uint32_t stream, std::vector<StageInfo> stages) {
   const std::scoped_lock lock(mutex_);
-  if (PublishedStream* const found = find(stream)) return found->set_model(std::move(name));
+  if (PublishedStream* const found = find(stream)) return found->set_stages(std::move(stages));
   const auto coming = with_id(additions_, stream);
-  if (coming != additions_.end()) (*coming)->set_model(std::move(name));
+  if (coming != additions_.end()) (*coming)->set_stages(std::move(stages));
 }
 
 PublishedStream* PublishedSlots::current(std::uint32_t stream) noexcept {

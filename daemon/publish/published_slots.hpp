@@ -20,7 +20,7 @@ class PublishedSlots {
   // Any thread, cold: the stream comes into its slot at take_additions().
   void add(std::unique_ptr<PublishedStream> stream);
   // Any thread, cold. Does nothing if there is no such stream.
-  void set_model(std::uint32_t stream, std::string name);
+  void set_stages(std::uint32_t stream, std::vector<StageInfo> stages);
   // Any thread, cold: adds the streams that have their slots, and what was published of those that
   // are gone. Both are of one moment, so that no frame counts twice or not at all.
   void fill(v1::Stats& stats) const;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "daemon/publish/frame_output.hpp"
+#include "models/live_text.hpp"
 #include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/parameter.hpp"
@@ -34,17 +35,33 @@ void describe_device(const drivers::Description& device, v1::StreamStats& stats)
   if (driver != nullptr && driver->glove != nullptr) stats.set_device_info(device.text);
 }
 
-// The stages' names and live parameters; the times of the last report stay.
-void fill_stages(const std::vector<const StageType*>& stages,
-                 const pipeline::PipelineCounters& counters, v1::StreamStats& stats) {
+void fill_text(const ParameterSpec& spec, const StageInfo& info, v1::StageStats& stage) {
+  const auto text = info.texts.find(spec.name);
+  if (text == info.texts.end()) return;
+  v1::ParameterStats& parameter = *stage.add_parameter();
+  parameter.set_name(std::string(spec.shown_name()));
+  parameter.set_text(clean(text->second));
+}
+
+// The stages' names, models and live parameters; the times of the last report stay.
+void fill_stages(const std::vector<StageInfo>& stages, const pipeline::PipelineCounters& counters,
+                 v1::StreamStats& stats) {
   std::size_t live = 0;
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const bool known = static_cast<int>(i) < stats.stage_size();
     v1::StageStats& stage = known ? *stats.mutable_stage(static_cast<int>(i)) : *stats.add_stage();
-    stage.set_name(std::string(stages[i]->name));
+    stage.set_name(std::string(stages[i].type->name));
+    stage.set_model(clean(stages[i].model));
+    if (stats.model().empty()) stats.set_model(stage.model());
+    stage.clear_word();
+    for (const std::string& word : stages[i].words) stage.add_word(clean(word));
     stage.clear_parameter();
-    for (const ParameterSpec& spec : stages[i]->parameters) {
-      if (!spec.live || !has_number(spec)) continue;
+    for (const ParameterSpec& spec : stages[i].type->parameters) {
+      if (!spec.live) continue;
+      if (!has_number(spec)) {
+        fill_text(spec, stages[i], stage);
+        continue;
+      }
       const pipeline::ParameterCounter& counter = counters.parameter[live++];
       v1::ParameterStats& parameter = *stage.add_parameter();
       parameter.set_name(std::string(spec.shown_name()));
@@ -58,11 +75,11 @@ void fill_stages(const std::vector<const StageType*>& stages,
 }
 
 // Each reading into the field that has its name, where it is known.
-void fill_readings(const std::vector<const StageType*>& stages,
-                   const pipeline::PipelineCounters& counters, v1::StreamStats& stats) {
+void fill_readings(const std::vector<StageInfo>& stages, const pipeline::PipelineCounters& counters,
+                   v1::StreamStats& stats) {
   std::size_t next = 0;
-  for (const StageType* stage : stages) {
-    for (const StageReadingType& reading : stage->readings) {
+  for (const StageInfo& stage : stages) {
+    for (const StageReadingType& reading : stage.type->readings) {
       const auto* field = v1::StreamStats::descriptor()->FindFieldByName(std::string(reading.name));
       const auto value = static_cast<float>(counters.reading[next++].now.load());
       v1::StreamStats::GetReflection()->ClearField(&stats, field);
@@ -75,6 +92,20 @@ constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "en
 
 }  // namespace
 
+std::vector<StageInfo> stage_infos(const pipeline::StreamSettings& settings) {
+  std::vector<StageInfo> infos;
+  for (const pipeline::StageSettings& stage : settings.stages) {
+    StageInfo& info = infos.emplace_back(
+        StageInfo{.type = stage.type, .model = stage.model_name, .words = stage.model_words});
+    for (const ParameterSpec& spec : stage.type->parameters) {
+      if (!text_command(*stage.type, spec)) continue;
+      info.texts.emplace(spec.name,
+                         parameter<std::string>(stage.parameters, std::string(spec.name)));
+    }
+  }
+  return infos;
+}
+
 Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
     : pose_topic("pose/" + name),
       skeleton_topic("skeleton/" + name),
@@ -85,7 +116,9 @@ Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
   if (const auto& of = unstyled ? info.description.skeleton : info.skeleton) {
     skeleton = message::skeleton_message(name, *of, info.rate_hz);
     if (!unstyled) {
-      for (const StageType* stage : info.stages) skeleton->add_stage(std::string(stage->name));
+      for (const StageInfo& stage : info.stages) {
+        skeleton->add_stage(std::string(stage.type->name));
+      }
     }
   }
 }
@@ -93,7 +126,7 @@ Channel::Channel(const std::string& name, const StreamInfo& info, bool unstyled)
 PublishedStream::PublishedStream(StreamInfo stream_info)
     : info(std::move(stream_info)), styled(info.name, info, false) {
   if (info.raw) raw.emplace(raw_name(info.name), info, true);
-  now_.model = info.model;
+  now_.stages = info.stages;
   if (!info.refusal.empty()) styled.skeleton.reset();  // no pose will ever need it
 }
 
@@ -133,9 +166,9 @@ void PublishedStream::leave_outputs() noexcept {
   outputs.clear();
 }
 
-void PublishedStream::set_model(std::string name) {
+void PublishedStream::set_stages(std::vector<StageInfo> stages) {
   const std::scoped_lock lock(mutex_);
-  now_.model = std::move(name);
+  now_.stages = std::move(stages);
 }
 
 // Before the reader has started, no device counts as absent.
@@ -167,13 +200,13 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
                       : "refused");
   stats.set_dropped(info.counters->reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
-  fill_stages(info.stages, pipeline, stats);
   fill_readings(info.stages, pipeline, stats);
   fill_device(stats);
   const std::scoped_lock lock(mutex_);
   stats.set_frames(now_.published.frames);
   stats.set_samples(now_.published.samples);
-  stats.set_model(now_.model);
+  stats.clear_model();
+  fill_stages(now_.stages, pipeline, stats);
   stats.set_lag_frames(now_.lag_frames);
   stats.set_lag_ms(now_.lag_ms);
   stats.set_label(std::string(now_.label.begin(), std::ranges::find(now_.label, '\0')));

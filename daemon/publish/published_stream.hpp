@@ -34,7 +34,7 @@ struct Channel {
   std::int64_t skeleton_due_ns = 0;
 };
 
-// Publisher thread, except for set_model(), counts() and stats(): any thread.
+// Publisher thread, except for set_stages(), counts() and stats(): any thread.
 class PublishedStream {
  public:
   explicit PublishedStream(StreamInfo stream_info);
@@ -45,7 +45,7 @@ class PublishedStream {
   void count_sample();
   // Tells its outputs that it leaves.
   void leave_outputs() noexcept;
-  void set_model(std::string name);
+  void set_stages(std::vector<StageInfo> stages);
 
   // Published so far.
   struct Counts {
@@ -69,7 +69,7 @@ class PublishedStream {
   // What stats() reads while the publisher continues.
   struct Now {
     Counts published;
-    std::string model;
+    std::vector<StageInfo> stages;
     // Of the last frame.
     std::uint16_t lag_frames = 0;
     float lag_ms = 0.0F;

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -17,6 +18,7 @@
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
+#include "daemon/pipeline/stream_settings.hpp"
 #include "daemon/publish/publish_socket.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
@@ -28,17 +30,27 @@ namespace posed::publish {
 
 class FrameOutput;
 
+// What `stats` tells of a stage beside its numbers.
+struct StageInfo {
+  const StageType* type = nullptr;
+  std::string model{};               // in use, by name; empty: none
+  std::vector<std::string> words{};  // that the model knows
+  std::map<std::string, std::string, std::less<>>
+      texts{};  // the live texts, by ParameterSpec::name
+};
+// Of the stages, in the order in which they run.
+[[nodiscard]] std::vector<StageInfo> stage_infos(const pipeline::StreamSettings& settings);
+
 struct StreamInfo {
   std::uint32_t stream = 0;  // id; its slot is below PublisherOptions::slots
   std::string name;
   drivers::Description description;
   // Of the frames as published; Description::skeleton is the source's own.
   std::shared_ptr<const Skeleton> skeleton;
-  double rate_hz = 0.0;                  // expected frame rate; 0: unknown
-  std::vector<const StageType*> stages;  // in the order in which they run
-  bool raw = false;                      // the unstyled input is published as <name>-raw
-  std::string model;                     // the first stage's model at the start, by name
-  bool comes_and_goes = false;           // the device may be unplugged
+  double rate_hz = 0.0;           // expected frame rate; 0: unknown
+  std::vector<StageInfo> stages;  // at the start, in the order in which they run
+  bool raw = false;               // the unstyled input is published as <name>-raw
+  bool comes_and_goes = false;    // the device may be unplugged
   std::shared_ptr<const devices::PresentDevice> present{};  // null: the stream has no device
   // Never null. They outlive the publisher, or Publisher::remove() of the stream.
   pipeline::StreamCounters* counters = nullptr;
@@ -115,7 +127,8 @@ class Publisher {
   // thread is in run(), the caller does all that itself; so if turn() is used without run(), then
   // only the thread that calls turn() may call remove().
   void remove(std::uint32_t stream);
-  void set_model_name(std::uint32_t stream, std::string name);
+  // The same stages with other models or texts.
+  void set_stages(std::uint32_t stream, std::vector<StageInfo> stages);
   // Publishes a message for people on event/<stream>.
   void post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text);
   // Disconnects subscribers that are no longer allowed (a key was withdrawn); needs an

@@ -47,8 +47,8 @@ void Publisher::remove(std::uint32_t stream) {
   requests_->done.wait(lock, [&] { return requests_->removals_done >= mine; });
 }
 
-void Publisher::set_model_name(std::uint32_t stream, std::string name) {
-  slots_->set_model(stream, std::move(name));
+void Publisher::set_stages(std::uint32_t stream, std::vector<StageInfo> stages) {
+  slots_->set_stages(stream, std::move(stages));
 }
 
 void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {

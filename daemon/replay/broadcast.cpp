@@ -11,6 +11,7 @@
 #include "daemon/replay/pace.hpp"
 #include "daemon/replay/stream_info.hpp"
 #include "daemon/system/clock.hpp"
+#include "models/live_text.hpp"
 
 namespace posed::replay {
 namespace {
@@ -124,7 +125,7 @@ Broadcast::~Broadcast() {
 publish::StreamInfo Broadcast::info_of(std::uint32_t id) {
   const ReplayStream& stream = replay_.stream(id);
   publish::StreamInfo info = stream_info(id, stream);
-  info.model = pipeline::first_model(settings_[id]);
+  info.stages = publish::stage_infos(settings_[id]);
   info.counters = &counters_[id];
   info.source_counters = &source_counters_;
   info.source = stream.source;
@@ -167,6 +168,29 @@ void Broadcast::add(const pipeline::Item& item) {
 }
 
 // Updates what the pipeline's counters and the control thread knew in the live run.
+// A stage's other model or text.
+void Broadcast::note_change(const pipeline::StreamEvent& event) {
+  using Kind = pipeline::StageChange::Kind;
+  pipeline::StreamSettings& settings = settings_[event.stream];
+  const auto stage =
+      std::ranges::find(settings.stages, event.change.type, &pipeline::StageSettings::type);
+  if (stage == settings.stages.end()) return;
+  if (event.change.kind == Kind::kModel) {
+    stage->model_name = event.after.text();
+  } else if (event.change.kind == Kind::kCommand) {
+    const std::string command(stage->type->commands[event.change.index].name);
+    if (!is_live_text(*stage->type, command)) return;
+    stage->parameters[command] = std::string(event.after.text());
+    // People are told of some defaults in words that the config does not take: "whole body".
+    const auto check = stage->type->check;
+    if (check != nullptr && check(stage->parameters, true))
+      stage->parameters[command] = std::string();
+  } else {
+    return;
+  }
+  publisher_->set_stages(event.stream, publish::stage_infos(settings));
+}
+
 void Broadcast::note(const pipeline::StreamEvent& event) {
   using pipeline::StreamState;
   auto& counters = counters_[event.stream].pipeline;
@@ -186,13 +210,7 @@ void Broadcast::note(const pipeline::StreamEvent& event) {
       break;
     case v1::Event::KIND_CONTROL:
       publish_values(event.stream);
-      if (event.change.kind == pipeline::StageChange::Kind::kModel) {
-        pipeline::StreamSettings& settings = settings_[event.stream];
-        for (pipeline::StageSettings& stage : settings.stages) {
-          if (stage.type == event.change.type) stage.model_name = event.after.text();
-        }
-        publisher_->set_model_name(event.stream, pipeline::first_model(settings));
-      }
+      note_change(event);
       break;
     default:
       break;

@@ -77,6 +77,7 @@ class Broadcast {
   void leave(std::uint32_t stream);
   void publish_values(std::uint32_t stream);
   void note(const pipeline::StreamEvent& event);
+  void note_change(const pipeline::StreamEvent& event);
 
   const Replay& replay_;
   TakeClock clock_;

@@ -9,16 +9,15 @@
 
 namespace posed::replay {
 
-// Without counters, model, source and body.
+// Without counters, source and body.
 [[nodiscard]] inline publish::StreamInfo stream_info(std::uint32_t id, const ReplayStream& stream) {
   return {.stream = id,
           .name = stream.name,
           .description = stream.description,
           .skeleton = stream.published,
           .rate_hz = stream.settings.rate_hz,
-          .stages = pipeline::stage_types_of(stream.settings),
-          .raw = stream.settings.publish_raw,
-          .model = {}};
+          .stages = publish::stage_infos(stream.settings),
+          .raw = stream.settings.publish_raw};
 }
 
 }  // namespace posed::replay

@@ -21,8 +21,7 @@ inline constexpr int kMaxWaiting = 1024;  // most labels of one stream that wait
 
 struct BoundModel final : StageModel {
   BoundModel(trajectory::StateInformation states, std::unique_ptr<const smooth::LiveModel> smoother,
-             std::string file)
-      : StageModel(std::move(file)), information(std::move(states)), live(std::move(smoother)) {}
+             std::string file);
 
   trajectory::StateInformation information;  // holds the gesture model
   std::unique_ptr<const smooth::LiveModel> live;

@@ -28,14 +28,13 @@ Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
 
 BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
                        gp::Predictor bound_predictor, std::string file)
-    : StageModel(std::move(file)),
+    : StageModel(std::move(file), model.names()),
       space(std::move(bound_space)),
       predictor(std::move(bound_predictor)),
       limit_rad(model.limit_rad.cast<float>()),
       neutral(model.gate.neutral.cast<float>()),
       axis(model.axis.direction.cast<float>()),
       axis_offset(model.axis.offset),
-      styles(model.names()),
       parts(parts_of(space)) {
   for (const MoreStyle& style : model.more) {
     more_limits_rad.emplace_back(style.limit_rad.cast<float>());

@@ -21,6 +21,9 @@ struct BoundModel final : StageModel {
   BoundModel(const StyleModel& model, motion::PoseSpace bound_space, gp::Predictor bound_predictor,
              std::string file);
 
+  // Their names; the limits and the axis below are the first one's.
+  [[nodiscard]] const std::vector<std::string>& styles() const noexcept { return words; }
+
   motion::PoseSpace space;
   // Mutable, because it keeps the mixture of styles ready that the filter asks for. With several
   // styles a model therefore serves one filter at a time at its full speed.
@@ -30,7 +33,6 @@ struct BoundModel final : StageModel {
   std::optional<KnownMotion> known;  // the same
   Eigen::VectorXf axis;              // [dims]; empty: a model without a style axis
   double axis_offset = 0.0;
-  std::vector<std::string> styles;               // their names; the first one's limits are above
   std::vector<Eigen::VectorXf> more_limits_rad;  // of the others
   std::vector<BodyPart> parts;                   // [dims]
 };

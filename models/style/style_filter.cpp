@@ -48,7 +48,7 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
   mask_.begin(options.mask);
   if (model == nullptr) return;
   weights_.begin(
-      shares_of(options.weights, model->styles).value_or(first_alone(model->styles.size())));
+      shares_of(options.weights, model->styles()).value_or(first_alone(model->styles().size())));
   for (int i = 0; i < gp::Predictor::kSettleCalls; ++i) {
     static_cast<void>(model->predictor.settle(weights_.shares()));
   }
@@ -63,7 +63,7 @@ void StyleFilter::set_alpha(float alpha) noexcept {
 
 // RT-safe
 bool StyleFilter::set_shares(const Shares& shares) noexcept {
-  if (model_ == nullptr || shares.count != model_->styles.size()) return false;
+  if (model_ == nullptr || shares.count != model_->styles().size()) return false;
   weights_.aim(shares);
   return true;
 }
@@ -73,9 +73,9 @@ const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   discontinuity_ = true;
   watch_.exchange(model_, *model);
   if (model_ == nullptr) {
-    weights_.begin(first_alone(model->styles.size()));
+    weights_.begin(first_alone(model->styles().size()));
   } else {
-    weights_.rename(model_->styles, model->styles);
+    weights_.rename(model_->styles(), model->styles());
   }
   const BoundModel* const before = std::exchange(model_, model);
   mix_limits();
@@ -135,7 +135,7 @@ void StyleFilter::describe(std::size_t index, const StageCommand& command,
                            ShortText& text) const noexcept {
   if (index == kMask) describe_mask(command.as<Mask>(), text);
   if (index == kWeights && model_ != nullptr) {
-    describe_shares(command.as<Shares>(), model_->styles, text);
+    describe_shares(command.as<Shares>(), model_->styles(), text);
   }
 }
 

@@ -52,7 +52,7 @@ std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_mod
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* model) {
   FilterOptions options = options_of(context.parameters);
   if (model != nullptr) {
-    const auto shares = shares_of(options.weights, style_of(model)->styles);
+    const auto shares = shares_of(options.weights, style_of(model)->styles());
     if (!shares) return fail(shares.error().message, model->name);
   }
   return std::make_unique<StyleFilter>(style_of(model), options);
@@ -80,7 +80,7 @@ Result<StageCommand> set_weights(const StageModel* model, std::span<const std::s
   if (model == nullptr) {
     return fail("there is no style model; send one with `posed ctl model STREAM M.style`");
   }
-  const auto shares = shares_of(joined(words), style_of(model)->styles);
+  const auto shares = shares_of(joined(words), style_of(model)->styles());
   if (!shares) return std::unexpected(shares.error());
   return StageCommand::of(*shares);
 }

@@ -3,8 +3,11 @@
 #include <catch2/catch.hpp>
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <thread>
+
+#include <nlohmann/json.hpp>
 
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
@@ -66,6 +69,30 @@ TEST_CASE("a performer is known from a clip of another day, also in a replay wit
       posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
   INFO(replay.err);
   CHECK(replay.code == 0);
+}
+
+TEST_CASE("ctl lists the daemon's own models and uses one by name; stats tell weights and mask") {
+  Served served("models = \"models\"\n");  // of [control], which stands before
+  std::filesystem::create_directory(served.path("models"));
+  REQUIRE(style::save_model(toy_styles({1, 2}), served.path("models/both.style")));
+  served.start();
+  CHECK(has(served.ctl({"models"}).out, "style      both.style"));
+  const auto refused = served.ctl({"use-model", "walker", "../one.style"});
+  CHECK(refused.code == 1);
+  CHECK(has(refused.err, "there is no model '../one.style' in the daemon's list"));
+  CHECK(served.ctl({"use-model", "walker", "both.style"}).code == 0);
+  CHECK(served.ctl({"set", "walker", "weights", "s1=0.25,s2=0.75"}).code == 0);
+  CHECK(served.ctl({"set", "walker", "mask", "arms=0.5"}).code == 0);
+  const auto status = nlohmann::json::parse(served.ctl({"--json", "status"}).out);
+  const auto& stage = status["status"]["stream"][0]["stage"][0];
+  CHECK(stage["model"] == "both.style");
+  CHECK(stage["word"] == nlohmann::json({"s1", "s2"}));
+  std::map<std::string, std::string> texts;
+  for (const auto& parameter : stage["parameter"]) {
+    texts[parameter["name"]] = parameter.value("text", "");
+  }
+  CHECK(texts["weights"] == "s1=0.25,s2=0.75");
+  CHECK(texts["mask"] == "arms=0.5");
 }
 
 }  // namespace posed::test

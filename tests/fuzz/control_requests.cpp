@@ -46,7 +46,9 @@ class DaemonControl final : public control::DaemonControl {
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}
-  void model_in_use(std::uint32_t stream, const std::string&) override { demand(stream <= 2); }
+  void stages_changed(std::uint32_t stream, const pipeline::StreamSettings&) override {
+    demand(stream <= 2);
+  }
   Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
     if (!pipeline::check_take_name(mark.name)) std::abort();
     return pipeline::Take{.number = 1, .name = mark.name};

@@ -47,10 +47,16 @@ class FuzzedLog {
 
   bool write() {
     static const std::string style = style::serialize_model(test::toy_model(1));
+    static const std::string gated = style::serialize_model(test::gated_toy_model(1));
+    static const std::string two = style::serialize_model(test::toy_styles({1, 2}));
     static const std::string gesture = gesture::serialize_model(test::toy_gesture_model());
     hashes_ = {writer_.add_blob(bytes_of(style)).value(),
+               writer_.add_blob(bytes_of(gated)).value(),
+               writer_.add_blob(bytes_of(two)).value(),
                writer_.add_blob(bytes_of(gesture)).value(),
-               writer_.add_blob(bytes_of("no model")).value(), "feed", ""};
+               writer_.add_blob(bytes_of("no model")).value(),
+               "feed",
+               ""};
     const auto streams = input_.ConsumeIntegralInRange<std::uint32_t>(1, 3);
     for (std::uint32_t i = 0; i < streams; ++i) add_stream(i);
     for (int rows = 0; rows < 200 && input_.remaining_bytes() > 0; ++rows) add_row();
@@ -214,7 +220,7 @@ class FuzzedLog {
       row.stage = stage;
       row.name = name;
     };
-    switch (input_.ConsumeIntegralInRange(0, 9)) {
+    switch (input_.ConsumeIntegralInRange(0, 12)) {
       case 0:
         say("style", "alpha");
         value.set_number(input_.ConsumeFloatingPointInRange(-2.1, 2.1));
@@ -250,6 +256,27 @@ class FuzzedLog {
       case 8:
         say("", "end");
         break;
+      case 9:
+        say("style", input_.ConsumeBool() ? "weights" : "mask");
+        for (int n = input_.ConsumeIntegralInRange(0, 7); n > 0; --n) {
+          value.mutable_weights()->add_weight(input_.ConsumeIntegralInRange(-1, 4) / 3.0);
+        }
+        break;
+      case 10:
+        say("style", "warm-up");
+        value.set_number(input_.ConsumeFloatingPointInRange(0.0, 100.0));
+        break;
+      case 11:
+        say("style", "know-walker");
+        for (int n = input_.ConsumeIntegralInRange(0, 8); n > 0; --n) {
+          value.mutable_walker()->add_dimension(
+              input_.ConsumeIntegralInRange<std::uint32_t>(0, 30));
+          value.mutable_walker()->add_angle(input_.ConsumeIntegral<std::int16_t>());
+        }
+        if (input_.ConsumeBool()) {
+          value.mutable_walker()->set_cadence_rad_s(input_.ConsumeFloatingPoint<float>());
+        }
+        break;
       default:
         row.stage = input_.ConsumeRandomLengthString(8);
         row.name = input_.ConsumeRandomLengthString(8);
@@ -266,7 +293,7 @@ class FuzzedLog {
 
   FuzzedDataProvider input_;
   log::Writer writer_;
-  std::array<std::string, 5> hashes_;
+  std::array<std::string, 7> hashes_;
   std::vector<std::uint32_t> ids_;
   std::string bytes_;                        // of the current row
   std::vector<log::StreamPosition> places_;  // of the latest description

@@ -185,6 +185,26 @@ int send_model(const CtlOptions& options) {
                      "model " + options.model.filename().string());
 }
 
+int list_models(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_list_models();
+  return ask_and_print(options, request, [](const v1::ControlReply& reply) {
+    if (reply.model().empty()) {
+      std::puts("none; name their folder in the daemon's config: [control] models = \"models\"");
+    }
+    for (const v1::KnownModel& model : reply.model()) {
+      std::printf("%-10s %s\n", model.kind().c_str(), clean(model.name()).c_str());
+    }
+  });
+}
+
+int use_model(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_use_model()->set_stream(options.stream);
+  request.mutable_use_model()->set_name(options.model.string());
+  return change(options, request, "model " + options.model.string());
+}
+
 int play(const CtlOptions& options) {
   v1::ControlRequest request;
   auto& wanted = *request.mutable_stage_command();
@@ -380,6 +400,13 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
   posed ctl model walker march.style   # another style, from the next frame on
   posed ctl model hand ours.gesture    # another gesture model: the file says what it is)");
   model->add_option("model", options.model, "The model file (M.style, H.gesture)")->required();
+  static_cast<void>(actions.add("models", "List the models in the daemon's own folder", list_models,
+                                "Example:\n  posed ctl models\nThe config names the folder: "
+                                "[control] models = \"models\"."));
+  CLI::App* use = actions.add_for_stream("use-model", "Give a stream a model of the daemon's list",
+                                         use_model, R"(Example:
+  posed ctl use-model walker march.style   # nothing is sent: the daemon has the file)");
+  use->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
 }
 
 void add_hand_actions(Actions& actions, CtlOptions& options) {

@@ -35,7 +35,9 @@ class PatientDaemonControl final : public DaemonControl {
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}
-  void model_in_use(std::uint32_t stream, const std::string&) override { in_use = stream; }
+  void stages_changed(std::uint32_t stream, const pipeline::StreamSettings&) override {
+    changed = stream;
+  }
   Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
     return fail("not recording");
   }
@@ -51,7 +53,7 @@ class PatientDaemonControl final : public DaemonControl {
 
   std::mutex mutex;
   std::deque<Command> sent;
-  std::uint32_t in_use = pipeline::kNoStream;
+  std::uint32_t changed = pipeline::kNoStream;
   std::uint32_t to_device = pipeline::kNoStream;
 };
 
@@ -125,7 +127,7 @@ TEST_CASE("a stream can be controlled from when it comes until it leaves") {
   REQUIRE(command);
   CHECK(command->stream == kAnn);
   CHECK(stage.acknowledge(*command, false).empty());
-  CHECK(stage.pipeline.in_use == kAnn);
+  CHECK(stage.pipeline.changed == kAnn);
   stage.handler.remove_stream(kAnn);
   stage.handler.remove_stream(kAnn);
   CHECK(stage.ask(set_alpha("ann")) == "there is no stream 'ann'; there is: walker");

@@ -40,8 +40,8 @@ class FakeDaemonControl final : public DaemonControl {
     return true;
   }
   void keep_model(std::span<const std::byte> bytes) override { kept.push_back(bytes.size()); }
-  void model_in_use(std::uint32_t stream, const std::string& name) override {
-    in_use = std::to_string(stream) + " " + name;
+  void stages_changed(std::uint32_t stream, const pipeline::StreamSettings& settings) override {
+    changed = {stream, settings};
   }
   Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
     if (!recording) return fail("not recording");
@@ -54,7 +54,8 @@ class FakeDaemonControl final : public DaemonControl {
   std::deque<Command> sent;
   std::vector<pipeline::DeviceCommand> to_device;
   std::vector<std::size_t> kept;
-  std::string in_use;
+  // The stream whose stages changed last, and what it has since.
+  std::optional<std::pair<std::uint32_t, pipeline::StreamSettings>> changed;
   std::vector<pipeline::TakeMark> marks;
   bool recording = true;
   bool full = false;
@@ -173,9 +174,11 @@ TEST_CASE("a model is parsed, bound, kept and owned until the next one took effe
   CHECK(command.model->name == "sway.style");
   CHECK(std::string(command.model_hash.data()) == log::sha256_hex(std::as_bytes(std::span(bytes))));
   CHECK(fixture.daemon_control.kept == std::vector<std::size_t>{bytes.size()});
-  CHECK(fixture.daemon_control.in_use.empty());
+  CHECK_FALSE(fixture.daemon_control.changed);
   CHECK(fixture.acknowledge(5).sequence() == 5);
-  CHECK(fixture.daemon_control.in_use == "0 sway.style");
+  REQUIRE(fixture.daemon_control.changed);
+  CHECK(fixture.daemon_control.changed->first == 0);
+  CHECK(fixture.daemon_control.changed->second.stages[0].model_name == "sway.style");
   for (int i = 0; i < 10; ++i) {  // under ASan: no leak, and no model freed too early
     CHECK_FALSE(fixture.ask(model_request("walker", bytes)));
     const auto* bound = fixture.daemon_control.sent.front().model;
@@ -278,7 +281,11 @@ TEST_CASE("a live text is sent as its stage's command, made for the model that w
   CHECK(sent[1].command.as<style::Shares>().of[1] == 0.75);
   CHECK(sent[2].change.index == style::StyleFilter::kMask);
   CHECK(sent[2].command.as<style::Mask>()[2] == 0.5);
-  fixture.daemon_control.sent.clear();
+  for (int i = 0; i < 3; ++i) CHECK(fixture.acknowledge(9).ok());
+  const auto& told = fixture.daemon_control.changed->second.stages[0];
+  CHECK(told.model_words == std::vector<std::string>{"s1", "s2"});
+  CHECK(std::get<std::string>(told.parameters.at("weights")) == "s1=1,s2=3");
+  CHECK(std::get<std::string>(told.parameters.at("mask")) == "arms=0.5");
   CHECK(has(fixture.refused(ask("weights", "sad=1")), "no style 'sad'; it has: s1, s2"));
   CHECK(has(fixture.refused(ask("weights", "s1=0")), "all are 0"));
   CHECK(has(fixture.refused(ask("weights", "s1=1,")), "is not NAME=NUMBER"));
@@ -353,7 +360,7 @@ class Booth final : public DaemonControl {
     wake_->notify();
   }
   void keep_model(std::span<const std::byte>) override {}
-  void model_in_use(std::uint32_t, const std::string&) override {}
+  void stages_changed(std::uint32_t, const pipeline::StreamSettings&) override {}
   Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
     return fail("not recording");
   }

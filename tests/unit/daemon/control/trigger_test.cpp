@@ -29,7 +29,7 @@ class TakeKeeper final : public DaemonControl {
   bool send(const pipeline::Command&) override { return false; }
   bool send(const pipeline::DeviceCommand&) override { return false; }
   void keep_model(std::span<const std::byte>) override {}
-  void model_in_use(std::uint32_t, const std::string&) override {}
+  void stages_changed(std::uint32_t, const pipeline::StreamSettings&) override {}
   Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
     if (!pipeline::check_take_name(mark.name)) return fail("a bad name");
     if (!recording) return fail("not recording");

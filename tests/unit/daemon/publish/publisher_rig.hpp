@@ -55,10 +55,18 @@ class PublisherRig {
     info.skeleton = info.description.skeleton;
     info.description.samples = {.names = {"bend"}, .units = {"rad"}};
     info.rate_hz = 100.0;
-    info.stages = {&style::style_type()};
+    info.stages = styled("");
     info.counters = &counters;
     info.source_counters = &source;
     return info;
+  }
+
+  // The style stage of toy_info() with this model, which knows the style "sway".
+  static std::vector<StageInfo> styled(const std::string& model) {
+    return {{.type = &style::style_type(),
+             .model = model,
+             .words = {"sway"},
+             .texts = {{"weights", "sway=1"}, {"mask", ""}}}};
   }
 
   void put(const pipeline::Item& item) {

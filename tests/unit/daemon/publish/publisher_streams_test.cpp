@@ -82,7 +82,7 @@ TEST_CASE("a body's stream comes with its skeleton, is listed, and leaves") {
   rig.put(toy_frame_item(2, kAnn));  // belongs to nobody
   rig.publisher->remove(kAnn);
   rig.publisher->post_event(kAnn, v1::Event::KIND_WARNING, "too late");
-  rig.publisher->set_model_name(kAnn, "too late");
+  rig.publisher->set_stages(kAnn, PublisherRig::styled("too late"));
   REQUIRE(rig.receive("stats", rig.seen["stats"] + 2));
   CHECK(rig.last<v1::Stats>("stats").stream_size() == 1);
   CHECK(rig.seen["pose/optitrack-ann"] == 1);
@@ -102,7 +102,7 @@ TEST_CASE("the next generation takes its slot at its first item, with its skelet
   Skeleton taller = test::toy_skeleton();
   taller.joints[1].offset_m.y() += 0.1;
   next.skeleton = std::make_shared<const Skeleton>(taller);
-  next.model = "next.style";
+  next.stages = PublisherRig::styled("next.style");
   rig.publisher->add(std::move(next));
   REQUIRE(rig.receive("stats", rig.seen["stats"] + 1));
   REQUIRE(rig.publisher->stats().stream_size() == 2);
@@ -132,7 +132,7 @@ TEST_CASE("the next generation takes its slot when the earlier one is removed") 
   REQUIRE(rig.receive("skeleton/toy", 1));
   rig.publisher->add(ann.info(rig, kAnn));
   rig.publisher->add(ann.info(rig, kAnnAgain));
-  rig.publisher->set_model_name(kAnnAgain, "second.style");
+  rig.publisher->set_stages(kAnnAgain, PublisherRig::styled("second.style"));
   REQUIRE(rig.receive("event/optitrack-ann", 1));
   REQUIRE(rig.receive("skeleton/optitrack-ann", 1));
   CHECK(rig.publisher->stats().stream(1).model().empty());
@@ -230,7 +230,7 @@ TEST_CASE("streams come and go while others ask for the status") {
     while (!done) {
       const v1::Stats stats = rig.publisher->stats();
       if (stats.stream_size() < 1 || stats.stream(0).stream() != "toy") std::abort();
-      rig.publisher->set_model_name(kAnn, "x.style");
+      rig.publisher->set_stages(kAnn, PublisherRig::styled("x.style"));
       rig.publisher->post_event(kAnn, v1::Event::KIND_WARNING, "x");
       std::this_thread::sleep_for(std::chrono::microseconds(100));
     }

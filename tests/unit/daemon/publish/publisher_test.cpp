@@ -42,7 +42,7 @@ TEST_CASE("each kind of item is published under its topic") {
   stale.stream_event = {0, v1::Event::KIND_STALE, 77, 41, 0.5};
   rig.put(stale);
   rig.publisher->post_event(0, v1::Event::KIND_WARNING, "look here");
-  rig.publisher->set_model_name(0, "other.style");
+  rig.publisher->set_stages(0, PublisherRig::styled("other.style"));
   REQUIRE(rig.receive("event/toy", 2));
   REQUIRE(rig.receive("pose/toy-raw", 1));
   REQUIRE(rig.receive("stats", 2));
@@ -152,12 +152,23 @@ TEST_CASE("the status is current, although stats are published once a second") {
   REQUIRE(rig.receive("stats", 1));
   rig.counters.pipeline.parameter[0].target = 0.5;
   rig.counters.pipeline.state = pipeline::StreamState::kLive;
-  rig.publisher->set_model_name(0, "other.style");
+  rig.publisher->set_stages(0, PublisherRig::styled("other.style"));
   v1::Stats stats = rig.publisher->stats();
   REQUIRE(stats.stream_size() == 1);
   CHECK(stats.stream(0).alpha_target() == 0.5F);
   CHECK(stats.stream(0).state() == "live");
   CHECK(stats.stream(0).model() == "other.style");
+  REQUIRE(stats.stream(0).stage_size() == 1);
+  const v1::StageStats& stage = stats.stream(0).stage(0);
+  CHECK(stage.model() == "other.style");
+  REQUIRE(stage.word_size() == 1);
+  CHECK(stage.word(0) == "sway");
+  std::map<std::string, std::string> texts;
+  for (const v1::ParameterStats& parameter : stage.parameter()) {
+    texts[parameter.name()] = parameter.text();
+  }
+  CHECK(texts.at("weights") == "sway=1");
+  CHECK(texts.at("mask").empty());
   CHECK(stats.stream(0).outcome_size() == kOutcomes);
   Item item = toy_frame_item(41);
   item.frame.source = Source::kLabels;

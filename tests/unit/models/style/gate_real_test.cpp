@@ -50,6 +50,19 @@ style::Applied applied(const style::StyleModel& model, const clip::Clip& clip,
   return *std::move(result);
 }
 
+// A clip as long as this one, of its first pose.
+clip::Clip held(clip::Clip clip) {
+  clip.channels.rowwise() = Eigen::RowVectorXd(clip.channels.row(0));
+  return clip;
+}
+
+// The same with all joints at rest; in these files that is a T-pose.
+clip::Clip t_pose(clip::Clip clip) {
+  clip = held(std::move(clip));
+  clip.channels.rightCols(clip.channels.cols() - 3).setZero();
+  return clip;
+}
+
 double gate_mean(const style::StyleModel& model, const clip::Clip& clip,
                  const std::optional<style::Walker>& walker = {}, bool cold = false) {
   style::ApplyOptions options;
@@ -81,6 +94,12 @@ TEST_CASE("the gate knows known and unknown walkers and nothing else", "[style][
     INFO(name);
     CHECK(gate_mean(model, acted(name), {}, true) <= 0.2);
     CHECK(gate_mean(model, acted(name), *actor) <= 0.1);
+  }
+  for (const clip::Clip& still :
+       {held(acted("raise-up-left-hand_normal_001")), held(acted("walk_normal_004")),
+        t_pose(acted("walk_normal_004"))}) {
+    CHECK(gate_mean(model, still, {}, true) <= 0.2);
+    CHECK(gate_mean(model, still, *actor) <= 0.1);
   }
   CHECK(gate_mean(model, recording_of("cmu/02_04.bvh"), {}, true) <= 0.2);
   CHECK(gate_mean(model, recording_of("cmu/09_01.bvh"), {}, true) <= 0.2);

@@ -62,7 +62,7 @@ Frame rested(const style::BoundModel& model, const style::FilterOptions& options
 }
 
 Shares shares(const std::string& text, const style::BoundModel& model) {
-  return style::shares_of(text, model.styles).value();
+  return style::shares_of(text, model.styles()).value();
 }
 
 double largest_rad(const Frame& a, const Frame& b) {
@@ -140,7 +140,7 @@ TEST_CASE("swaps, alpha, weights and masks together never step above the slew", 
   double reach = 0.0;
   for (const auto& seeds : {std::vector{0U, 1U, 2U}, {2U, 3U}, {4U}, {1U, 2U, 5U, 6U}, {6U, 0U}}) {
     models.push_back(bound(toy_styles(seeds, 0.2)));
-    for (const std::string& name : models.back()->styles) {
+    for (const std::string& name : models.back()->styles()) {
       style::FilterOptions alone;
       alone.weights = name + "=1";
       reach = std::max(reach, largest_rad(Still().next(), rested(*models.back(), alone)));
@@ -164,10 +164,10 @@ TEST_CASE("swaps, alpha, weights and masks together never step above the slew", 
     if (random() % 16 == 0) filter.set_alpha(static_cast<float>(random() % 401) / 100.0F - 2.0F);
     if (random() % 8 == 0) {
       std::string weights;
-      for (const std::string& name : model->styles) {
+      for (const std::string& name : model->styles()) {
         weights += (weights.empty() ? "" : ",") + name + "=" + std::to_string(random() % 3);
       }
-      const auto wanted = style::shares_of(weights, model->styles);
+      const auto wanted = style::shares_of(weights, model->styles());
       if (wanted) CHECK(filter.set_shares(*wanted));
     }
     if (random() % 16 == 0) {

@@ -1,0 +1,34 @@
+// ModelFolder: the models that a client may choose by name. Nothing from the network names a path:
+// a name counts only if it is exactly one of the list.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::control {
+
+struct FolderModel {
+  std::string name;       // of the file
+  std::string_view kind;  // the stage that uses it, as the name's ending says: "style", "generate"
+};
+
+// Reads the folder at each call, so that models may come and go. Any thread; cold.
+class ModelFolder {
+ public:
+  ModelFolder() = default;  // no folder: the list is empty
+  explicit ModelFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  // Regular files that end in .style or .gesture, by name; the first 256.
+  [[nodiscard]] Result<std::vector<FolderModel>> list() const;
+  // The bytes of a model of the list.
+  [[nodiscard]] Result<std::string> read(std::string_view name) const;
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace posed::control

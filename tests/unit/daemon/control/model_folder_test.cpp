@@ -1,0 +1,49 @@
+#include "daemon/control/model_folder.hpp"
+
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "models/style/style_model.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+namespace posed::control {
+
+TEST_CASE("a model is read by its name in the folder's list, and by nothing else") {
+  const test::TempFolder home;
+  const auto folder = home.path() / "models";
+  create_directory(folder);
+  for (const auto& path : {folder / "b.style", folder / "a.gesture", home.path() / "c.style",
+                           folder / "notes.txt", folder / "bad\x1bname.style"}) {
+    REQUIRE(style::save_model(test::toy_model(1, 0.3), path));
+  }
+  create_directory(folder / "d.style");
+  const ModelFolder models(folder);
+  const auto list = models.list();
+  REQUIRE(list);
+  REQUIRE(list->size() == 2);
+  CHECK(list->at(0).name == "a.gesture");
+  CHECK(list->at(0).kind == "generate");
+  CHECK(list->at(1).name == "b.style");
+  CHECK(list->at(1).kind == "style");
+  CHECK(models.read("b.style"));
+  const std::string whole = folder / "b.style";
+  for (const std::string& name : std::vector<std::string>{"../c.style", "./b.style", whole,
+                                                          "notes.txt", "d.style", "", "."}) {
+    const auto read = models.read(name);
+    REQUIRE_FALSE(read);
+    CHECK(read.error().message.contains("there is no model"));
+  }
+}
+
+TEST_CASE("without a folder the list is empty; a folder that is gone is told") {
+  CHECK(ModelFolder().list().value().empty());
+  CHECK_FALSE(ModelFolder().read("a.style"));
+  const auto gone = ModelFolder("/nowhere/models").list();
+  REQUIRE_FALSE(gone);
+  CHECK(gone.error().text().contains("/nowhere/models"));
+}
+
+}  // namespace posed::control
