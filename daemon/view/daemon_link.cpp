@@ -22,7 +22,9 @@ constexpr int kReceiveBuffer = 16 * 1024;       // bytes
 constexpr std::int64_t kMaxPart = 1024 * 1024;  // bytes; the stats of 256 streams have 200 KB
 constexpr int kMessagesAtOnce = 256;            // then the pages have their turn
 constexpr std::int64_t kSilent_ns = 3 * kNanosPerSecond;  // three stats are missing
-constexpr std::int64_t kAgain_ns = 5 * kNanosPerSecond;
+// A refused key may be allowed later. Each try costs the daemon a line in its log.
+constexpr std::int64_t kPublishAgain_ns = 5 * kNanosPerSecond;
+constexpr std::int64_t kControlAgain_ns = 60 * kNanosPerSecond;  // such a page may well be wanted
 constexpr std::int64_t kStatusWithin_ns = 5 * kNanosPerSecond;
 constexpr std::uint64_t kStatusTicket = 0;  // the pages' requests have others
 constexpr std::array kAlways{"stats", "skeleton/"};
@@ -228,7 +230,7 @@ void DaemonLink::take_news(std::int64_t now_ns) {
   }
   if (!why.empty()) {
     hub_.daemon_is({.alive = false, .sentence = daemon + " " + why});
-    publish_again_ns_ = now_ns + kAgain_ns;
+    publish_again_ns_ = now_ns + kPublishAgain_ns;
   }
 }
 
@@ -239,7 +241,7 @@ void DaemonLink::check_control(std::int64_t now_ns) {
   const std::string daemon = "the daemon at " + options_.control;
   if (!why.empty()) {
     hub_.control_is({.may = false, .reason = daemon + " " + why});
-    control_again_ns_ = now_ns + kAgain_ns;
+    control_again_ns_ = now_ns + kControlAgain_ns;
     return;
   }
   const bool anew = monitor.ends() != control_ends_ || !control_stood_;

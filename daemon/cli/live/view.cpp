@@ -92,7 +92,8 @@ Result<> serve_page(const ViewCommand& command) {
   if (!bridge) return std::unexpected(bridge.error());
   print_url(**bridge, command);
   const sigset_t set = end_signals();
-  static_cast<void>(sigwaitinfo(&set, nullptr));
+  while (sigwaitinfo(&set, nullptr) < 0) {  // interrupted: stopped and continued
+  }
   return {};
 }
 
