@@ -45,12 +45,12 @@ const leg = (side, sign) => ({
 });
 
 export const figure = {
-  bone: 'hips', offset: [0, 0.945, 0], radius: 0.105, trunk: true,
+  bone: 'hips', offset: [0, 0.945, 0], radius: 0.116, trunk: true,
   children: [
     {
-      bone: 'spine', offset: [0, 0.11, 0], radius: 0.105, trunk: true,
+      bone: 'spine', offset: [0, 0.11, 0], radius: 0.112, trunk: true,
       children: [{
-        bone: 'chest', offset: [0, 0.15, 0], radius: 0.125, trunk: true,
+        bone: 'chest', offset: [0, 0.15, 0], radius: 0.132, trunk: true, tip: [0, 0.135, 0], tipStart: 0.139, tipRadius: 0.12,
         children: [
           {
             bone: 'neck', offset: [0, 0.21, 0], radius: 0.048,

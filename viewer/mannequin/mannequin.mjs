@@ -27,7 +27,8 @@ function shape(list) {
     }
     if (!joint.tip) return;
     const tip = joint.tip.map((value, k) => value + joint.place[k]);
-    addCapsule(mesh, joint.round ? tip : joint.place, tip, joint.tipRadius, joint.tipRadius, i);
+    const [from, start] = joint.round ? [tip, joint.tipRadius] : [joint.place, joint.tipStart ?? joint.radius];
+    addCapsule(mesh, from, tip, start, joint.tipRadius, i, joint.trunk ? TRUNK_DEPTH : 1);
   });
   return mesh;
 }

@@ -4,16 +4,16 @@ const KEPT = 1000;
 
 export class FrameTimes {
   #times_ms = new Float64Array(KEPT);
-  #count = 0;
+  count = 0; // of all pictures
 
   add(time_ms) {
-    this.#times_ms[this.#count % KEPT] = time_ms;
-    this.#count += 1;
+    this.#times_ms[this.count % KEPT] = time_ms;
+    this.count += 1;
   }
 
   // The time that `share` of the pictures do not exceed; NaN before the first.
   quantile(share) {
-    const kept = Math.min(this.#count, KEPT);
+    const kept = Math.min(this.count, KEPT);
     if (kept === 0) return NaN;
     return this.#times_ms.slice(0, kept).sort()[Math.min(kept - 1, Math.floor(share * kept))];
   }

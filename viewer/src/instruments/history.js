@@ -8,7 +8,7 @@ const MOST_STAGES = 6;
 export class History {
   latency = new Series(POINTS, 2); // ms from arrival: handed out by posed, drawn here
   stages = new Series(POINTS, MOST_STAGES); // µs in each
-  label = new Series(POINTS, 1); // probability
+  label = new Series(POINTS, 1); // probability, %
   callback = new Series(POINTS, 1); // ms from arrival until the page's callback
   #since_s = -Infinity;
 
@@ -22,7 +22,7 @@ export class History {
     this.callback.add(now_s, callback_ms - arrival_ms);
     const us = pose.stage_us;
     if (pose.stages > 0) this.stages.add(now_s, us[0], us[1], us[2], us[3], us[4], us[5]);
-    if (pose.label || now_s - this.#since_s < 20) this.label.add(now_s, pose.label ? pose.labelProbability : NaN);
+    if (pose.label || now_s - this.#since_s < 20) this.label.add(now_s, pose.label ? 100 * pose.labelProbability : NaN);
     if (pose.label) this.#since_s = now_s;
   }
 

@@ -17,7 +17,7 @@ function axis(label) {
     label,
     labelSize: 14,
     labelGap: 0,
-    size: 34,
+    size: 40,
     gap: 4,
   };
 }

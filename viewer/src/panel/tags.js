@@ -9,6 +9,9 @@ function styledWords(stream) {
   return `styled, α ${signed(alpha.value, 2)}`;
 }
 
+const labelWords = ({ verb, label, probability }) =>
+  (verb === 'performs' ? `performs ${label}` : `${label}, ${percent(probability)} sure`);
+
 function words(stream, main) {
   const parts = [];
   if (stream.isRaw) parts.push('raw, as captured');
@@ -16,7 +19,7 @@ function words(stream, main) {
   const { word, tone } = stateOf(main?.stats);
   if (tone !== 'good') parts.push(word);
   const label = stream.isRaw ? null : labelOf(stream.pose);
-  if (label) parts.push(`${label.verb} ${label.label}${label.verb === 'performs' ? '' : ` ${percent(label.probability)}`}`);
+  if (label) parts.push(labelWords(label));
   const quality = qualityWord(stream.pose);
   if (quality && quality !== word) parts.push(quality);
   const missing = stream.partsWithoutValue();

@@ -88,8 +88,8 @@ class Builder {
     addCapsule(this.mesh, from, to, end_m, end_m, joint);
     if (this.bones[child] !== 'neck') return;
     const collar = to.map((value, k) => from[k] + 0.7 * (value - from[k]));
-    const start_m = 0.97 * this.radius(joint, length_m); // inside the capsule from below
-    addCapsule(this.mesh, from, collar, start_m, 0.86 * start_m, joint, TRUNK_DEPTH);
+    const start_m = 1.05 * this.radius(joint, length_m); // over the capsule from below
+    addCapsule(this.mesh, from, collar, start_m, 0.88 * start_m, joint, TRUNK_DEPTH);
   }
 
   // The end of a leaf: fingertips, toes; the head as a ball.

@@ -5,7 +5,7 @@ import { Lights } from './lights.js';
 
 const FIELD_DEG = 28;
 const APART_M = 0.2; // from hand to hand
-const HEIGHT_M = 0.3; // that is seen
+const HEIGHT_M = 0.29; // that is seen
 
 export class HandsView {
   scene = new Scene();

@@ -13,6 +13,7 @@ import { themeColours } from './palette.js';
 import { facing } from './facing.js';
 
 const MOST_PIXELS = 2; // per CSS pixel
+const CROWD = 5; // figures; of more only the styled ones have names
 const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
 
 export class World {
@@ -236,6 +237,10 @@ export class World {
   #tag(performer) {
     if (!performer.figure.group.visible) return;
     const { name, isHand } = performer.stream;
+    if (performer.ghost && this.performers.size > CROWD) {
+      this.tags.hide(name); // the colour says it, and names would cover each other
+      return;
+    }
     if (isHand) {
       this.hands.hold(performer, above);
       this.tags.place(name, above, this.hands.camera, this.#areas.hands ?? this.#areas.bodies);
