@@ -169,6 +169,23 @@ pageTest('a body may wear the mannequin', { hands: 0 }, async (page) => {
   assert.ok(gap_m < 0.15, String(gap_m));
 });
 
+// Drops a file of the page's own address on the scene, under another name.
+const drop = (page, path, name) => page.evaluate(async ([source, as]) => {
+  const bytes = await (await fetch(source)).arrayBuffer();
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([bytes], as));
+  document.querySelector('.stage').dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
+}, [path, name]);
+
+pageTest('a dropped avatar is worn, another file refused with a sentence', { hands: 0 }, async (page) => {
+  await drop(page, '/mannequin.vrm', 'Ann.vrm');
+  await page.waitForFunction(() => globalThis.posedPage.world.performers.get('walker').avatar?.name === 'Ann', undefined, PATIENCE);
+  assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
+  await drop(page, '/page.css', 'notes.txt');
+  await acknowledged(page, 'notes.txt cannot be read as VRM');
+  assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
+});
+
 pageTest('on a phone nothing is wider than the screen', { width: 390, height: 844 }, async (page) => {
   assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
 });
