@@ -14,6 +14,7 @@ const configOf = (folder) => `
 endpoint = "ipc://${folder}/publish"
 [control]
 endpoint = "ipc://${folder}/control"
+models = "${DEMO}"
 [[stream]]
 name = "walker"
 driver = "file"
