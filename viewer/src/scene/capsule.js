@@ -1,7 +1,7 @@
 // A capsule with two radii as flat arrays, for the limbs of figures and of the mannequin.
 
-const AROUND = 20; // vertices of a ring
-const ARC = 5; // rings of each rounded end
+const AROUND = 14; // vertices of a ring
+const ARC = 4; // rings of each rounded end
 
 // A mesh that grows: positions, normals, what each vertex belongs to, triangles.
 export class Mesh {

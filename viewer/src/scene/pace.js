@@ -5,7 +5,7 @@ const SLOW_MS = 40; // between two pictures, on average
 const LOOK_MS = 1500;
 const STEPS = [
   { pixels: 1, shadows: true },
-  { pixels: 0.75, shadows: true },
+  { pixels: 1, shadows: false },
   { pixels: 0.75, shadows: false },
   { pixels: 0.5, shadows: false },
 ];

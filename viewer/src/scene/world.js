@@ -1,6 +1,6 @@
 // The scene: who is in it, where they stand, and one picture per animation frame. Two views share
 // one canvas: the bodies, and the hands in an inset.
-import { PCFShadowMap, Scene, Vector3, WebGLRenderer } from 'three';
+import { Scene, Vector3 } from 'three';
 import { LANE_M, lanesOf } from './lanes.js';
 import { Ground } from './ground.js';
 import { HandsView } from './hands_view.js';
@@ -9,6 +9,7 @@ import { NameTags } from './name_tags.js';
 import { Pace } from './pace.js';
 import { Performer } from './performer.js';
 import { Views } from './views.js';
+import { makeRenderer } from './renderer.js';
 import { themeColours } from './palette.js';
 import { facing } from './facing.js';
 
@@ -30,10 +31,7 @@ export class World {
     this.store = store;
     this.canvas = stage.querySelector('canvas');
     this.inset = stage.querySelector('.hands');
-    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true });
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = PCFShadowMap;
-    this.renderer.setScissorTest(true);
+    Object.assign(this, makeRenderer(this.canvas));
     this.theme = themeColours(theme);
     this.scene = new Scene();
     this.ground = new Ground(this.theme);
@@ -175,7 +173,7 @@ export class World {
     this.#dirty -= 1;
     this.#look();
     this.#draw();
-    if (this.#pace.drawn(performance.now())) this.resize();
+    if (!this.fine && this.#pace.drawn(performance.now())) this.resize();
     return true;
   }
 

@@ -49,7 +49,7 @@ async function moves(page, name) {
 }
 
 test('the demo\'s walker and hand move, and a picture of them is small', options, async (context) => {
-  const page = await opened(context, await daemon.view(PAGE));
+  const page = await opened(context, `${await daemon.view(PAGE)}&fine`);
   await drawn(page);
   for (const name of ['walker', 'walker-raw', 'hand']) await moves(page, name);
   await page.waitForTimeout(8000); // the plots fill
@@ -67,6 +67,9 @@ test('alpha, mask, gestures and takes reach the daemon, and it says so', options
   await field.fill('0.3');
   await field.press('Enter');
   await acknowledged(page, 'walker: α 0.30: applied at frame');
+  const [, took_ms] = /\((\d+) ms\)/.exec(await page.locator('.ack').first().innerText());
+  console.log(`alpha in effect after ${took_ms} ms`);
+  assert.ok(took_ms < 1000); // 300 on a machine that does nothing else
   assert.ok(Math.abs((await statsOf('walker')).alphaTarget - 0.3) < 1e-6);
   await page.getByText('Share of the style by body part').click();
   await page.getByLabel('head, number').fill('0');

@@ -7,8 +7,6 @@ import { Kinematics } from '../../src/motion/kinematics.js';
 import { mannequin } from '../../mannequin/mannequin.mjs';
 import { bodySkeleton, walk } from '../support/figures.mjs';
 
-globalThis.self ??= globalThis; // GLTFLoader's
-
 test('the mannequin is a VRM 1.0 avatar with fingers that stands on the ground', async () => {
   const bytes = mannequin();
   const { vrm } = await loadAvatar(bytes.buffer, 'mannequin');
