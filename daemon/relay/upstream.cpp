@@ -4,6 +4,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "daemon/net/refusal_words.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "proto/zmq/keys.hpp"
 
@@ -17,22 +18,6 @@ constexpr int kReceiveBuffer = 16 * 1024;  // bytes
 constexpr std::int64_t kMaxPart = 1024 * 1024;  // bytes
 // All subscriptions that there may be, and as many changes of them.
 constexpr int kSubscriptionsWaiting = static_cast<int>(2 * publish::kMaxWanted);
-
-std::string refusal_words(net::Refusal refusal, const UpstreamSettings& settings) {
-  switch (refusal) {
-    case net::Refusal::kNone:
-      break;
-    case net::Refusal::kKeyNotAllowed:
-      return "refuses the relay's key: it is not on its list, or may not subscribe";
-    case net::Refusal::kTalksNoKeys:
-      return "does not use keys, or is not posed; leave out --key";
-    case net::Refusal::kHangsUp:
-      return "hangs up: " + settings.server_key.string() + " is not its key, or it just ended";
-    case net::Refusal::kWantsKey:
-      return "wants a key; give --key NAME.key --server-key SERVER.pub";
-  }
-  return {};
-}
 
 }  // namespace
 
@@ -75,7 +60,8 @@ void Upstream::take_news() {
   const bool before = monitor_.established();
   const net::Refusal refusal = monitor_.take_news();
   if (refusal != net::Refusal::kNone) {
-    spdlog::error("the daemon at {} {}", endpoint(), refusal_words(refusal, settings_));
+    spdlog::error("the daemon at {} {}", endpoint(),
+                  net::refusal_words(refusal, net::Domain::kPublish, settings_.server_key));
   } else if (established() != before) {
     spdlog::log(before ? spdlog::level::warn : spdlog::level::info, "{}: {}", endpoint(),
                 before ? "connection lost; it is tried again" : "connected");

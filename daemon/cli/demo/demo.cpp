@@ -22,6 +22,7 @@
 #include "daemon/cli/demo/demo_watcher.hpp"
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/live_table.hpp"
+#include "daemon/cli/live/page.hpp"
 #include "daemon/cli/models/train_gesture.hpp"
 #include "daemon/cli/models/train_style.hpp"
 #include "daemon/cli/output_files.hpp"
@@ -29,6 +30,7 @@
 #include "daemon/config/config.hpp"
 #include "daemon/emulate/synthetic_signer.hpp"
 #include "daemon/logging/log_output.hpp"
+#include "daemon/view/bridge.hpp"
 
 namespace posed::cli {
 namespace {
@@ -43,6 +45,7 @@ struct DemoOptions {
   std::filesystem::path prepare;  // only make clips and models in this folder
   std::optional<double> seconds;
   bool overwrite = false;
+  bool no_browser = false;
 };
 
 // Makes the demo's files, unless this program has made them before.
@@ -96,15 +99,36 @@ double seconds_since(SteadyClock::time_point then) {
   return std::chrono::duration<double>(SteadyClock::now() - then).count();
 }
 
-// Shows the running daemon until Ctrl-C or until `seconds` after the first frame.
-Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, Watcher& watcher,
-               DemoHand& hand) {
+// Serves the page for the browser. Null if it cannot be, which a line says: the terminal shows the
+// streams, too.
+std::unique_ptr<view::Bridge> serve_page_of(const assembly::Daemon& daemon,
+                                            const DemoOptions& options) {
+  const auto why_not = [](const Error& error) {
+    logging::say("posed: no page beside this terminal: " + error.text());
+    return nullptr;
+  };
+  const auto page = find_page({});
+  if (!page) return why_not(page.error());
+  auto bridge = view::Bridge::start(
+      {.link = {.connect = daemon.publish_endpoint(), .control = daemon.control_endpoint()},
+       .page = *page,
+       .or_any_port = true});
+  if (!bridge) return why_not(bridge.error());
+  std::fprintf(stderr, "see it: %s\n", (*bridge)->url().c_str());
+  if (!options.no_browser) open_browser((*bridge)->url());
+  return std::move(*bridge);
+}
+
+// Shows the running daemon until Ctrl-C or until `seconds` after the first frame. `url`: the page's
+// address; empty: there is none.
+Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, const std::string& url,
+               Watcher& watcher, DemoHand& hand) {
   ClientOptions client;
   client.endpoint = daemon.publish_endpoint();
   auto connection = Connection::open(client, ZMQ_SUB);
   if (!connection) return std::unexpected(connection.error());
   if (auto set = net::set_option(connection->socket(), ZMQ_SUBSCRIBE, "pose/"); !set) return set;
-  DemoScreen screen(daemon, *connection);
+  DemoScreen screen(daemon, *connection, url);
   const auto start = SteadyClock::now();
   std::optional<SteadyClock::time_point> first_frame;
   while (!Interrupt::came() && !screen.quits() && !daemon.asked_to_stop()) {
@@ -166,12 +190,14 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   auto daemon = assembly::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
   if (auto started = (*daemon)->start(); !started) return started;
+  const auto bridge = serve_page_of(**daemon, options);
   std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
                (*daemon)->publish_endpoint().c_str());
   auto hand = DemoHand::open((*daemon)->control_endpoint());
   if (!hand) return std::unexpected(hand.error());
   Watcher watcher(*hand);
-  const auto watched = watch(**daemon, options, watcher, *hand);
+  const std::string url = bridge ? bridge->url() : "";
+  const auto watched = watch(**daemon, options, url, watcher, *hand);
   const v1::Stats stats = (*daemon)->stats();
   (*daemon)->stop();
   if (!watched) return watched;
@@ -198,9 +224,10 @@ Result<std::filesystem::path> folder_of(const DemoOptions& options) {
 }
 
 Result<> check_options(const DemoOptions& options) {
-  if (!options.prepare.empty() &&
-      (!options.config.empty() || !options.folder.empty() || options.seconds)) {
-    return misuse("--prepare streams nothing; leave out --config, --folder and --seconds");
+  if (!options.prepare.empty() && (!options.config.empty() || !options.folder.empty() ||
+                                   options.seconds || options.no_browser)) {
+    return misuse(
+        "--prepare streams nothing; leave out --config, --folder, --seconds and --no-browser");
   }
   if (!options.config.empty() && !options.folder.empty()) {
     return misuse("--config says where its files are; leave out --folder");
@@ -236,8 +263,10 @@ void add_demo(CLI::App& app, int& exit_code) {
   add_overwrite_option(*command, options->overwrite);
   command->add_option("--seconds", options->seconds, "End so long after the first frame")
       ->check(CLI::PositiveNumber);
+  command->add_flag("--no-browser", options->no_browser,
+                    "Print the page's address, open no browser");
   command->footer(R"(Examples:
-  posed demo                      # from anywhere
+  posed demo                      # from anywhere; its first line is the page for your browser
   posed demo --seconds 10
   posed demo --prepare build/demo # what ./run build does
 Clips and models are kept in $XDG_CACHE_HOME/posed/demo (~/.cache/posed/demo), with a demo.toml that

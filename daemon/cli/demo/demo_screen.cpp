@@ -1,5 +1,6 @@
 #include "daemon/cli/demo/demo_screen.hpp"
 
+#include <algorithm>
 #include <cerrno>  // program_invocation_name
 
 #include <spdlog/fmt/fmt.h>
@@ -32,8 +33,10 @@ bool is_due(std::optional<std::chrono::steady_clock::time_point>& last,
 
 }  // namespace
 
-DemoScreen::DemoScreen(const assembly::Daemon& daemon, const Connection& connection)
+DemoScreen::DemoScreen(const assembly::Daemon& daemon, const Connection& connection,
+                       const std::string& url)
     : daemon_(daemon),
+      first_line_(url.empty() ? "" : "see it: " + url),
       chosen_(connection, {.endpoint = daemon.control_endpoint(), .key = {}, .server_key = {}}),
       view_{.title = "posed demo " + daemon.publish_endpoint()} {
   if (!screen_.is_terminal()) return;
@@ -73,7 +76,14 @@ void DemoScreen::show(Watcher& watcher, const DemoHand& hand) {
   if (!screen_.is_terminal() || is_due(looked_, kLookEvery)) look(watcher, hand);
   screen_.measure(view_);
   view_.chosen = screen_.is_terminal() ? chosen_.name() : "";
-  screen_.draw(live_view(stats_, view_));
+  // Elsewhere than on a terminal the address was printed once, before the first of many views.
+  const bool headed = screen_.is_terminal() && !first_line_.empty();
+  // A terminal that is too narrow for it shows the address on two lines.
+  const int columns = static_cast<int>(first_line_.size());
+  if (headed) view_.height -= (columns + view_.width - 1) / std::max(view_.width, 1);
+  std::vector<std::string> lines = live_view(stats_, view_);
+  if (headed) lines.insert(lines.begin(), first_line_);
+  screen_.draw(lines);
 }
 
 }  // namespace posed::cli

@@ -23,8 +23,9 @@ namespace posed::cli {
 
 class DemoScreen {
  public:
-  // `daemon` and `connection`, which receives its messages, outlive the screen.
-  DemoScreen(const assembly::Daemon& daemon, const Connection& connection);
+  // `daemon` and `connection`, which receives its messages, outlive the screen. `url`: the page's
+  // address, on the first line; empty: there is no page.
+  DemoScreen(const assembly::Daemon& daemon, const Connection& connection, const std::string& url);
 
   // Takes a message of the daemon.
   void take(std::string_view topic, std::span<const std::byte> body) { chosen_.take(topic, body); }
@@ -38,6 +39,7 @@ class DemoScreen {
   void look(Watcher& watcher, const DemoHand& hand);
 
   const assembly::Daemon& daemon_;
+  std::string first_line_;  // empty: none
   ChosenStream chosen_;
   LiveScreen screen_;
   LiveViewOptions view_;

@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
+#include "daemon/net/refusal_words.hpp"
 #include "daemon/system/clock.hpp"
 #include "proto/zmq/keys.hpp"
 
@@ -72,30 +73,9 @@ bool Connection::wait(std::chrono::milliseconds timeout) {
 }
 
 std::optional<Error> Connection::refusal() {
-  const std::string daemon = "the daemon at " + options_.endpoint;
-  switch (monitor_.take_news()) {
-    case net::Refusal::kNone:
-      return std::nullopt;
-    case net::Refusal::kKeyNotAllowed:
-      return fail(daemon + " refuses this key: it is not on its list, or may not " +
-                  (domain_ == Domain::kPublish ? "subscribe" : "control"))
-          .error();
-    case net::Refusal::kTalksNoKeys:
-      return fail(daemon + " does not use keys, or is not posed; leave out --key").error();
-    case net::Refusal::kHangsUp:
-      return fail(daemon + " hangs up: --server-key " + options_.server_key.string() +
-                  " is not its key, or it just ended")
-          .error();
-    case net::Refusal::kWantsKey:
-      return wants_key();
-  }
-  return std::nullopt;
-}
-
-Error Connection::wants_key() const {
-  return fail("the daemon at " + options_.endpoint +
-              " wants a key; give --key NAME.key --server-key SERVER.pub")
-      .error();
+  const std::string why = net::refusal_words(monitor_.take_news(), domain_, options_.server_key);
+  if (why.empty()) return std::nullopt;
+  return fail("the daemon at " + options_.endpoint + " " + why).error();
 }
 
 Error Connection::no_answer() const {

@@ -19,6 +19,10 @@ class App;
 
 namespace posed::cli {
 
+// Where a daemon listens by default.
+inline constexpr const char* kOwnPublish = "tcp://127.0.0.1:5570";
+inline constexpr const char* kOwnControl = "tcp://127.0.0.1:5571";
+
 struct ClientOptions {
   std::string endpoint;
   std::filesystem::path key;         // the client's own NAME.key; empty: no CURVE
@@ -52,7 +56,6 @@ class Connection {
  private:
   Connection(ClientOptions options, net::Domain domain, net::Context context, net::Socket socket,
              net::LinkMonitor monitor);
-  [[nodiscard]] Error wants_key() const;
 
   ClientOptions options_;
   net::Domain domain_;

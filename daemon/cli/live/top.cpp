@@ -23,8 +23,6 @@ namespace posed::cli {
 namespace {
 
 constexpr std::size_t kNotesKept = 50;
-constexpr const char* kOwnDaemon = "tcp://127.0.0.1:5570";
-constexpr const char* kOwnControl = "tcp://127.0.0.1:5571";
 
 constexpr std::chrono::milliseconds kFigurePeriod{100};
 
@@ -164,7 +162,7 @@ Result<> top(const TopOptions& options) {
 void add_top(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("top", "Watch a running daemon: rates, stage times, drops");
   auto options = std::make_shared<TopOptions>();
-  add_client_options(*command, options->client, kOwnDaemon);
+  add_client_options(*command, options->client, kOwnPublish);
   command->add_option("--count", options->count, "End after so many updates (one a second)")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
@@ -187,7 +185,7 @@ shown in red with the time since then, and values that may be outdated are hidde
 )") + kColumnsHelp);
   command->callback([options, &exit_code] {
     // Another daemon's streams may have the same names.
-    if (options->control.empty() && options->client.endpoint == kOwnDaemon) {
+    if (options->control.empty() && options->client.endpoint == kOwnPublish) {
       options->control = kOwnControl;
     }
     if (auto done = top(*options); !done) exit_code = report(done.error());
