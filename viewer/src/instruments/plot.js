@@ -1,0 +1,89 @@
+// One live plot: title, a sentence that says what to see, axes with units.
+import uPlot from 'uplot';
+import { el, write } from '../panel/dom.js';
+
+export const WINDOW_S = 20;
+const HEIGHT_PX = 118;
+
+const variable = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function axis(label) {
+  return {
+    stroke: variable('--faint'),
+    grid: { stroke: variable('--rule'), width: 1 },
+    ticks: { show: false },
+    font: '11px system-ui, sans-serif',
+    labelFont: '11px system-ui, sans-serif',
+    label,
+    labelSize: 14,
+    labelGap: 0,
+    size: 40,
+    gap: 4,
+  };
+}
+
+export class Plot {
+  #plot = null;
+  #names = [];
+
+  // unit: of the y axis; range: of the y axis, or a function of [least, most]
+  constructor(title, sentence, unit, range) {
+    this.unit = unit;
+    this.range = range;
+    this.now = el('span.now');
+    this.area = el('div.plot-area');
+    this.element = el('figure.plot', {}, el('figcaption', {},
+      el('h3', {}, title, this.now), el('p.note', {}, sentence)), this.area);
+    new ResizeObserver(() => this.#resize()).observe(this.area);
+  }
+
+  say(text) {
+    write(this.now, text);
+  }
+
+  // lines: [{name, colour}] with a CSS variable's name as colour. Made again when they differ.
+  setLines(lines) {
+    const names = lines.map(({ name }) => name).join();
+    if (this.#plot && this.#names === names) return;
+    this.#names = names;
+    this.lines = lines;
+    this.#make();
+  }
+
+  retheme() {
+    if (this.#plot) this.#make();
+  }
+
+  #make() {
+    this.#plot?.destroy();
+    const series = this.lines.map(({ name, colour }) => ({
+      label: name, stroke: variable(colour), width: 1.6, points: { show: false },
+    }));
+    const seconds = { ...axis('seconds ago'), size: 20, incrs: [5], values: (_, ticks) => ticks.map((t) => (t === 0 ? 'now' : String(-t))) };
+    const options = {
+      width: this.#width(), height: HEIGHT_PX, series: [{}, ...series],
+      axes: [seconds, axis(this.unit)],
+      scales: { x: { time: false, range: [-WINDOW_S, 0] }, y: { range: this.range } },
+      legend: { show: this.lines.length > 1, live: false },
+      cursor: { show: false },
+      pxAlign: 0,
+    };
+    this.#plot = new uPlot(options, [[], ...series.map(() => [])], this.area);
+  }
+
+  #width() {
+    return Math.max(120, this.area.clientWidth);
+  }
+
+  #resize() {
+    this.#plot?.setSize({ width: this.#width(), height: HEIGHT_PX });
+  }
+
+  // series: a Series whose times are in seconds; the newest is `now_s`
+  draw(series, now_s) {
+    if (!this.#plot) return;
+    const [times, ...values] = series.since(now_s - WINDOW_S);
+    this.#plot.setData([Array.from(times, (time) => time - now_s), ...values], false);
+    this.#plot.setScale('x', { min: -WINDOW_S, max: 0 });
+  }
+}

@@ -1,0 +1,93 @@
+// The WebSocket to `posed view`: opened again whenever it closes. The first attempts follow fast,
+// so that a restarted bridge is there within a second.
+
+const FIRST_WAIT_MS = 150;
+const MOST_WAIT_MS = 1000;
+const REFUSED_WAIT_MS = 3000;
+const CLOCK_EVERY_MS = 1000;
+
+export class Connection {
+  #socket = null;
+  #wait_ms = FIRST_WAIT_MS;
+  #clockTimer = 0;
+
+  // handlers: state(name, sentence), binary(bytes), text(object), open()
+  constructor(token, handlers) {
+    this.token = token;
+    this.handlers = handlers;
+    this.#open();
+  }
+
+  get isOpen() {
+    return this.#socket?.readyState === WebSocket.OPEN;
+  }
+
+  sendText(object) {
+    if (this.isOpen) this.#socket.send(JSON.stringify(object));
+  }
+
+  sendBytes(bytes) {
+    if (!this.isOpen) return false;
+    this.#socket.send(bytes);
+    return true;
+  }
+
+  #open() {
+    const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
+    const url = `${scheme}://${location.host}/ws?token=${encodeURIComponent(this.token)}`;
+    this.handlers.state('connecting', '');
+    const socket = new WebSocket(url);
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => this.#opened();
+    socket.onmessage = ({ data }) => this.#received(data);
+    socket.onclose = () => this.#closed();
+    this.#socket = socket;
+  }
+
+  #opened() {
+    this.#wait_ms = FIRST_WAIT_MS;
+    this.#askClock();
+    this.#clockTimer = setInterval(() => this.#askClock(), CLOCK_EVERY_MS);
+    this.handlers.open();
+  }
+
+  #askClock() {
+    this.sendText({ type: 'clock', t0: performance.now() });
+  }
+
+  #received(data) {
+    if (typeof data !== 'string') {
+      this.handlers.binary(new Uint8Array(data));
+      return;
+    }
+    let message;
+    try {
+      message = JSON.parse(data);
+    } catch {
+      return; // not from our bridge
+    }
+    this.handlers.text(message);
+  }
+
+  async #closed() {
+    clearInterval(this.#clockTimer);
+    const wait_ms = this.#wait_ms;
+    this.#wait_ms = Math.min(1.5 * wait_ms, MOST_WAIT_MS);
+    const sentence = await this.#refusal();
+    if (sentence) this.handlers.state('refused', sentence);
+    else this.handlers.state('closed', 'posed view does not answer; trying again');
+    setTimeout(() => this.#open(), sentence ? REFUSED_WAIT_MS : wait_ms);
+  }
+
+  // A WebSocket does not tell why it was refused, but the page itself is refused in the same way.
+  async #refusal() {
+    try {
+      const page = `/?token=${encodeURIComponent(this.token)}`;
+      const { status } = await fetch(page, { cache: 'no-store' });
+      if (status !== 403) return '';
+      return 'posed view refused this page: open the URL that it printed when it started';
+    } catch {
+      return ''; // it does not run
+    }
+  }
+}

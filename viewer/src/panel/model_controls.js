@@ -1,0 +1,60 @@
+// The model of a stage: one of the daemon's list, or a file of one's own.
+import { sendModel } from '../link/upload.js';
+import { el, labelled } from './dom.js';
+
+export class ModelControls {
+  element = el('div.group');
+
+  // kind: the stage that uses it, style or generate
+  constructor(stream, kind, { control, requests, acks }) {
+    Object.assign(this, { name: stream.name, kind, control, requests, acks });
+    this.choice = el('select', { onchange: () => this.#use() });
+    this.file = el('input', { type: 'file', hidden: true, onchange: () => this.#send() });
+    this.progress = el('progress', { max: 1, value: 0, hidden: true });
+    const pick = el('button', { type: 'button', onclick: () => this.file.click() }, 'Send a file…');
+    this.element.append(labelled('Model', this.choice, pick), this.file, this.progress);
+    this.#list();
+  }
+
+  async #list() {
+    const reply = await this.requests.ask({ list_models: {} });
+    this.names = (reply.ok ? reply.model : []).filter(({ kind }) => kind === this.kind).map(({ name }) => name);
+    this.#fill();
+  }
+
+  #fill() {
+    const names = this.names ?? [];
+    const all = names.includes(this.current) || !this.current ? names : [this.current, ...names];
+    this.choice.replaceChildren(...all.map((name) => el('option', { value: name }, name)));
+    this.choice.value = this.current ?? '';
+    this.choice.disabled = names.length === 0;
+    this.choice.title = names.length === 0 ? 'the daemon offers no list: [control] models names a folder' : '';
+  }
+
+  async #use() {
+    const { value } = this.choice;
+    const reply = await this.control({ use_model: { stream: this.name, name: value } }, `${this.name}: model ${value}`);
+    if (!reply.ok) this.#fill();
+  }
+
+  async #send() {
+    const [file] = this.file.files;
+    this.file.value = '';
+    if (!file) return;
+    this.progress.hidden = false;
+    const bytes = new Uint8Array(await file.arrayBuffer());
+    const ask = (request) => this.requests.ask(request);
+    const reply = await sendModel(ask, this.name, file.name, bytes, (share) => { this.progress.value = share; });
+    this.progress.hidden = true;
+    const what = `${this.name}: model ${file.name}`;
+    if (reply.ok) this.acks.say(`${what}: applied at frame ${reply.sequence}`, 'good');
+    else this.acks.say(`${what}: refused: ${reply.error}`, 'bad');
+  }
+
+  update(stream) {
+    const model = stream.stage(this.kind)?.model ?? '';
+    if (model === this.current) return;
+    this.current = model;
+    this.#fill();
+  }
+}

@@ -1,0 +1,15 @@
+// Numbers with their units, as people read them.
+
+export function ms(value_ms) {
+  if (!Number.isFinite(value_ms)) return '';
+  return `${value_ms.toFixed(value_ms < 99.95 ? 1 : 0)} ms`;
+}
+
+export function signed(value, digits) {
+  const text = Math.abs(value).toFixed(digits);
+  return `${value < 0 && Number(text) !== 0 ? '−' : ''}${text}`;
+}
+
+export const percent = (share) => `${Math.round(100 * share)} %`;
+
+export const megabytes = (bytes) => `${(bytes / 1e6).toFixed(0)} MB`;

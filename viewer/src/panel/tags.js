@@ -1,0 +1,41 @@
+// The words above each figure: its name, what it is (raw or styled, and how much), and how current.
+import { labelOf, qualityWord, stateOf } from '../streams/words.js';
+import { RAW_SUFFIX } from '../streams/stream.js';
+import { percent, signed } from './numbers.js';
+
+function styledWords(stream) {
+  const alpha = stream.parameter('style', 'alpha');
+  if (!alpha) return '';
+  return `styled, α ${signed(alpha.value, 2)}`;
+}
+
+const labelWords = ({ verb, label, probability }) =>
+  (verb === 'performs' ? `performs ${label}` : `${label}, ${percent(probability)} sure`);
+
+function words(stream, main) {
+  const parts = [];
+  if (stream.isRaw) parts.push('raw, as captured');
+  else if (styledWords(stream)) parts.push(styledWords(stream));
+  const { word, tone } = stateOf(main?.stats);
+  if (tone !== 'good') parts.push(word);
+  const label = stream.isRaw ? null : labelOf(stream.pose);
+  if (label) parts.push(labelWords(label));
+  const quality = qualityWord(stream.pose);
+  if (quality && quality !== word) parts.push(quality);
+  const missing = stream.partsWithoutValue();
+  if (missing) parts.push(`no value: ${missing}`);
+  return parts.join(' · ');
+}
+
+export function writeTags(world, chosenName) {
+  for (const { stream, ghost } of world.performers.values()) {
+    const base = ghost ? stream.name.slice(0, -RAW_SUFFIX.length) : stream.name;
+    const main = world.store.streams.get(base);
+    world.tags.write(stream.name, {
+      title: base,
+      detail: words(stream, main),
+      kind: ghost ? 'raw' : 'styled',
+      chosen: base === chosenName,
+    });
+  }
+}

@@ -1,0 +1,65 @@
+// The buttons above the scene: views, the raw figures, trails, avatars.
+import { VIEWS } from '../scene/views.js';
+import { el, write } from './dom.js';
+import { keep, kept } from './settings.js';
+
+const RAW = ['beside', 'under', 'off'];
+const RAW_WORDS = { beside: 'Raw: beside', under: 'Raw: as ghost', off: 'Raw: off' };
+const word = (name) => name[0].toUpperCase() + name.slice(1);
+
+export class Tools {
+  #views = new Map();
+
+  // avatars: {wear(name | null), load(file)}
+  constructor(element, world, avatars) {
+    this.world = world;
+    this.raw = el('button', { type: 'button', onclick: () => this.nextRaw(), title: 'The pose as captured (r)' });
+    this.trails = el('button', { type: 'button', onclick: () => this.toggleTrails(), title: 'Paths and prints of the feet (t)' }, 'Trails');
+    for (const [i, view] of VIEWS.entries()) {
+      const button = el('button', { type: 'button', onclick: () => world.views.set(view), title: `${word(view)} (${i + 1})` }, word(view));
+      this.#views.set(view, button);
+    }
+    this.avatar = el('select', { aria: { label: 'Figure' }, title: 'How bodies look; drop a .vrm file on the scene for your own' });
+    this.avatar.onchange = () => avatars.wear(this.avatar.value || null);
+    element.append(
+      el('div.joined', {}, ...this.#views.values()),
+      el('div.joined', {}, this.raw, this.trails),
+      this.avatar,
+    );
+    world.onView = (name) => this.#mark(name);
+    this.#mark(world.views.name);
+    this.setRaw(RAW.includes(kept('raw')) ? kept('raw') : 'beside');
+    this.#setTrails(kept('trails') !== 'off');
+    this.setAvatars(['mannequin'], '');
+  }
+
+  #mark(name) {
+    for (const [view, button] of this.#views) button.setAttribute('aria-pressed', String(view === name));
+  }
+
+  setAvatars(names, chosen) {
+    this.avatar.replaceChildren(el('option', { value: '' }, 'Capsules'), ...names.map((name) => el('option', { value: name }, word(name))));
+    this.avatar.value = chosen;
+  }
+
+  nextRaw() {
+    this.setRaw(RAW[(RAW.indexOf(this.world.options.raw) + 1) % RAW.length]);
+  }
+
+  setRaw(mode) {
+    this.world.setOption('raw', mode);
+    write(this.raw, RAW_WORDS[mode]);
+    this.raw.setAttribute('aria-pressed', String(mode !== 'off'));
+    keep('raw', mode);
+  }
+
+  toggleTrails() {
+    this.#setTrails(!this.world.options.trails);
+  }
+
+  #setTrails(on) {
+    this.world.setOption('trails', on);
+    this.trails.setAttribute('aria-pressed', String(on));
+    keep('trails', on ? 'on' : 'off');
+  }
+}

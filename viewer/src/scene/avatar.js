@@ -1,0 +1,85 @@
+// A VRM avatar that moves as a stream does. Rotations are those of VRM's bones relative to the bone
+// above, all identity in the T-pose; the hips move in proportion to the avatar's leg length.
+import { Group } from 'three';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { VRMLoaderPlugin, VRMUtils } from '@pixiv/three-vrm';
+
+function loader() {
+  const gltf = new GLTFLoader();
+  gltf.register((parser) => new VRMLoaderPlugin(parser));
+  return gltf;
+}
+
+// bytes: an ArrayBuffer with a .vrm. Rejects with a sentence.
+export async function loadAvatar(bytes, name) {
+  let gltf;
+  try {
+    gltf = await loader().parseAsync(bytes, '');
+  } catch (error) {
+    throw new Error(`${name} cannot be read as VRM: ${error.message}`);
+  }
+  const { vrm } = gltf.userData;
+  if (!vrm) throw new Error(`${name} is no VRM avatar: it has no humanoid`);
+  return new Avatar(vrm, name);
+}
+
+export class Avatar {
+  group = new Group();
+  #bones = []; // {node, joint}: of the figure that it was fitted to
+  #scale = 1;
+  #hips = -1;
+
+  constructor(vrm, name) {
+    this.vrm = vrm;
+    this.name = name;
+    VRMUtils.rotateVRM0(vrm); // older avatars face -Z
+    this.turned = vrm.meta?.metaVersion === '0' ? -1 : 1;
+    vrm.scene.traverse((object) => {
+      object.frustumCulled = false;
+      object.castShadow = object.isMesh === true;
+    });
+    this.group.add(vrm.scene);
+  }
+
+  // Finds the avatar's bones for the figure's joints, and how much longer its legs are.
+  fit(kinematics) {
+    const { humanoid } = this.vrm;
+    this.#bones = [];
+    kinematics.bones.forEach((bone, joint) => {
+      const node = bone && humanoid.getNormalizedBoneNode(bone);
+      if (node) this.#bones.push({ node, joint });
+    });
+    this.#hips = kinematics.jointOf('hips');
+    const own_m = humanoid.getNormalizedBoneNode('hips').position.y;
+    const legs_m = hipsHeight(kinematics);
+    this.#scale = legs_m > 0 ? own_m / legs_m : 1;
+  }
+
+  pose(kinematics) {
+    const local = kinematics.humanoidLocals();
+    const { turned } = this;
+    for (const { node, joint } of this.#bones) {
+      const i = 4 * joint;
+      node.quaternion.set(turned * local[i], local[i + 1], turned * local[i + 2], local[i + 3]);
+    }
+    if (this.#hips >= 0) this.#placeHips(kinematics.position, 3 * this.#hips);
+    this.vrm.update(0);
+  }
+
+  // The avatar's ground is the scene's; it walks as far as the figure does.
+  #placeHips(position, i) {
+    const node = this.vrm.humanoid.getNormalizedBoneNode('hips');
+    node.position.set(0, position[i + 1] * this.#scale, 0);
+    this.group.position.set(position[i], 0, position[i + 2]);
+  }
+}
+
+// Of the figure's T-pose: from its lowest point to the hips [m].
+export function hipsHeight(kinematics) {
+  const hips = kinematics.jointOf('hips');
+  if (hips < 0) return 0;
+  const places = kinematics.restPositions();
+  let low = Infinity;
+  for (let i = 1; i < places.length; i += 3) low = Math.min(low, places[i]);
+  return places[3 * hips + 1] - low;
+}

@@ -1,0 +1,71 @@
+// The avatars that bodies may wear: the mannequin, and files that were dropped on the scene. Each
+// body needs an avatar of its own, loaded from the same bytes. The loader comes when it is needed.
+
+const MANNEQUIN = 'mannequin';
+
+export class Avatars {
+  #files = new Map([[MANNEQUIN, null]]); // name: its bytes, once they are here
+  #chosen = null;
+
+  // say(sentence, tone); changed(names, chosen)
+  constructor(world, say, changed) {
+    Object.assign(this, { world, say, changed });
+    this.#listen(world.stage);
+  }
+
+  #listen(stage) {
+    stage.addEventListener('dragover', (event) => {
+      event.preventDefault();
+      stage.dataset.drop = '';
+    });
+    stage.addEventListener('dragleave', () => { delete stage.dataset.drop; });
+    stage.addEventListener('drop', async (event) => {
+      event.preventDefault();
+      delete stage.dataset.drop;
+      const [file] = event.dataTransfer.files;
+      if (file) await this.#take(file);
+    });
+  }
+
+  async #take(file) {
+    const name = file.name.replace(/\.(vrm|glb)$/i, '');
+    this.#files.set(name, await file.arrayBuffer());
+    await this.wear(name);
+  }
+
+  // name: null for capsules
+  async wear(name) {
+    const before = this.#chosen;
+    this.#chosen = name;
+    try {
+      for (const performer of this.world.performers.values()) await this.dress(performer);
+    } catch (error) {
+      this.say(error.message, 'bad');
+      if (name !== MANNEQUIN) this.#files.delete(name);
+      this.#chosen = before;
+    }
+    this.changed([...this.#files.keys()], this.#chosen ?? '');
+    this.world.touch();
+  }
+
+  // Gives a performer the chosen avatar: styled bodies only, raw ones stay ghosts.
+  async dress(performer) {
+    if (performer.ghost || performer.stream.isHand) return;
+    const name = this.#chosen;
+    if (name === null) {
+      performer.wear(null);
+      return;
+    }
+    const { loadAvatar } = await import('./avatar.js');
+    performer.wear(await loadAvatar((await this.#bytes(name)).slice(0), name));
+  }
+
+  async #bytes(name) {
+    if (!this.#files.get(name)) {
+      const answer = await fetch(`/${MANNEQUIN}.vrm`);
+      if (!answer.ok) throw new Error(`the ${MANNEQUIN} is not in the page's folder`);
+      this.#files.set(name, await answer.arrayBuffer());
+    }
+    return this.#files.get(name);
+  }
+}

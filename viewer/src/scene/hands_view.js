@@ -1,0 +1,90 @@
+// Hands, large, in a view of their own: upright, the palm to the viewer, as signs are read.
+import { Group, PerspectiveCamera, Scene, Vector3 } from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { Lights } from './lights.js';
+
+const FIELD_DEG = 28;
+const APART_M = 0.2; // from hand to hand
+const HEIGHT_M = 0.29; // that is seen
+
+export class HandsView {
+  scene = new Scene();
+  camera = new PerspectiveCamera(FIELD_DEG, 1, 0.02, 10);
+  #performers = new Map(); // name: {performer, holder}
+
+  constructor(element, theme, onChange) {
+    this.lights = new Lights(theme, false);
+    this.scene.add(this.lights.group);
+    this.controls = new OrbitControls(this.camera, element);
+    this.controls.enableDamping = true;
+    this.controls.enablePan = false;
+    this.controls.minDistance = 0.2;
+    this.controls.maxDistance = 3;
+    this.controls.addEventListener('change', onChange);
+    this.setTheme(theme);
+  }
+
+  setTheme(theme) {
+    this.scene.background = theme.hands;
+    this.lights.setTheme(theme);
+  }
+
+  // Turns the hand upright: its fingers, along +Z with the palm down, point up. It is held at the
+  // wrist: a hand's own place in the world counts for nothing here.
+  add(performer) {
+    const holder = new Group();
+    const { group } = performer.figure;
+    group.removeFromParent();
+    group.rotation.x = -Math.PI / 2;
+    holder.add(group);
+    this.scene.add(holder);
+    this.#performers.set(performer.stream.name, { performer, holder });
+  }
+
+  remove(name) {
+    this.#performers.get(name)?.holder.removeFromParent();
+    this.#performers.delete(name);
+  }
+
+  // The shown hands beside each other; raw ones in the place of their twins, or beside them.
+  arrange(names, placeOf) {
+    const places = names.map(placeOf);
+    const middle = (Math.min(...places) + Math.max(...places)) / 2;
+    for (const [name, { holder }] of this.#performers) {
+      const i = names.indexOf(name);
+      holder.visible = i >= 0;
+      if (i >= 0) holder.position.set((places[i] - middle) * APART_M, 0, 0);
+    }
+    this.count = names.length ? 1 + Math.max(...places) - Math.min(...places) : 0;
+    this.#frame();
+  }
+
+  resize(width, height) {
+    this.camera.aspect = width / Math.max(height, 1);
+    this.camera.updateProjectionMatrix();
+    this.#frame();
+  }
+
+  #frame() {
+    const half = Math.tan((FIELD_DEG * Math.PI) / 360);
+    const across_m = (this.count ?? 1) * APART_M + 0.03;
+    const far = Math.max(HEIGHT_M, across_m / Math.max(this.camera.aspect, 0.2)) / (2 * half);
+    this.controls.target.set(0, 0.068, 0);
+    this.camera.position.set(0.3, 0.11, 1).normalize().multiplyScalar(far).add(this.controls.target);
+    this.controls.update();
+  }
+
+  // Holds the wrist still, and gives the point below it for its name.
+  hold(performer, point) {
+    const entry = this.#performers.get(performer.stream.name);
+    const { kinematics } = performer.stream;
+    const i = 3 * kinematics.root;
+    const { group } = performer.figure;
+    wrist.fromArray(kinematics.position, i).applyEuler(group.rotation);
+    group.position.copy(wrist).negate();
+    point.copy(entry.holder.position);
+    point.y -= 0.05;
+  }
+}
+
+const wrist = new Vector3();

@@ -1,0 +1,36 @@
+// Colours of the scene, light and dark. Those that carry a meaning are of Okabe and Ito's palette,
+// which people with any usual colour blindness can tell apart; each comes with a word as well.
+import { Color } from 'three';
+
+const colour = (hex) => new Color(hex);
+
+const THEMES = {
+  light: {
+    background: colour('#eef1f4'), ground: colour('#eef1f4'), line: colour('#c3cad2'),
+    strong: colour('#98a3af'), styled: colour('#2f7fc1'), raw: colour('#7d8793'),
+    rawOpacity: 0.42, sky: colour('#ffffff'), below: colour('#c9ced6'), sun: 2.1, ambient: 1.55,
+    shadow: 0.24, hands: colour('#f8f9fb'),
+  },
+  dark: {
+    background: colour('#11151a'), ground: colour('#11151a'), line: colour('#2b333c'),
+    strong: colour('#46525e'), styled: colour('#58b0ea'), raw: colour('#b4bdc8'),
+    rawOpacity: 0.55, sky: colour('#dfe9f5'), below: colour('#20262d'), sun: 1.9, ambient: 1.05,
+    shadow: 0.5, hands: colour('#171c22'),
+  },
+};
+
+// By Quality; measured has the figure's own colour.
+const QUALITY = [null, colour('#e69f00'), colour('#cc79a7'), colour('#8f969e')];
+const NO_VALUE = colour('#d55e00');
+const CONTACT = colour('#009e73');
+
+export const themeColours = (name) => THEMES[name];
+
+// The colour of a joint: without a value, or as current as the pose is.
+export function jointColour(own, quality, hasValue, performedAtRest) {
+  if (!hasValue) return NO_VALUE;
+  if (performedAtRest) return own;
+  return QUALITY[quality] ?? own;
+}
+
+export { CONTACT };

@@ -1,0 +1,116 @@
+// The camera: free, or with what moves, from the front, the side or above. It never cuts: it glides.
+import { PerspectiveCamera, Vector3 } from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+
+export const VIEWS = ['follow', 'orbit', 'front', 'side', 'top'];
+
+const FIELD_DEG = 34;
+const DIRECTIONS = {
+  follow: [0.62, 0.3, 1], front: [0, 0.12, 1], side: [1, 0.12, 0.001], top: [0, 1, 0.001],
+};
+const GLIDE = 0.12; // share of the way in one frame
+const LEAST_M = 1.2; // half of what is seen across, at least
+
+export class Views {
+  camera = new PerspectiveCamera(FIELD_DEG, 1, 0.05, 120);
+  name = 'follow';
+  #centre = new Vector3(0, 0.9, 0); // where the figures are, smoothed
+  #span_m = LEAST_M;
+  #far_m = 0; // distance that is aimed at; 0: as the person left it
+  #settled = false;
+  #free = { wide: 1, high: 1 }; // the part that is not covered, in heights of the picture
+  #yaw = 0; // where the figures face
+
+  constructor(element, onChange) {
+    this.controls = new OrbitControls(this.camera, element);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.12;
+    this.controls.maxPolarAngle = 0.5 * Math.PI - 0.02;
+    this.controls.minDistance = 0.6;
+    this.controls.maxDistance = 40;
+    this.controls.target.copy(this.#centre);
+    this.onChange = onChange;
+    // Who takes the camera in hand keeps it: from the fixed views it goes on from there, following.
+    this.controls.addEventListener('start', () => {
+      this.#far_m = 0;
+      if (this.name !== 'orbit' && this.name !== 'follow') this.#become('follow');
+    });
+    this.#turnTo('follow');
+  }
+
+  set(name) {
+    if (!VIEWS.includes(name)) return;
+    this.#become(name);
+    if (name !== 'orbit') this.#turnTo(name);
+  }
+
+  // The figures face another way, in radians about Y from +Z.
+  face(yaw) {
+    if (yaw === this.#yaw) return;
+    this.#yaw = yaw;
+    if (this.name !== 'orbit') this.#turnTo(this.name);
+  }
+
+  #become(name) {
+    this.name = name;
+    this.onChange(name);
+  }
+
+  #turnTo(name) {
+    const direction = new Vector3(...DIRECTIONS[name]).normalize().applyAxisAngle(UP, this.#yaw);
+    this.#far_m = this.#fitting();
+    this.camera.position.copy(this.controls.target).addScaledVector(direction, this.#far_m);
+  }
+
+  // So far away that all figures are seen.
+  #fitting() {
+    const half = Math.tan((FIELD_DEG * Math.PI) / 360);
+    const { wide, high } = this.#free;
+    return Math.max(this.#span_m / Math.max(wide, 0.2), 1.28 / Math.max(high - 0.06, 0.2)) / half + 0.35;
+  }
+
+  // covered: {right, bottom}; what is looked at is in the middle of the rest.
+  resize(width, height, { right, bottom }) {
+    this.camera.aspect = width / Math.max(height, 1);
+    this.#free = { wide: (width - right) / Math.max(height, 1), high: 1 - bottom / Math.max(height, 1) };
+    this.camera.setViewOffset(width, height, right / 2, bottom / 2, width, height);
+    if (this.#far_m > 0) this.#far_m = this.#fitting();
+  }
+
+  // centre: of all figures; span_m: half of the width that they take; jumped: the clip began again.
+  update(centre, span_m, jumped) {
+    const far = !this.#settled || jumped;
+    this.#settled = true;
+    const wanted = Math.max(span_m + 0.75, LEAST_M);
+    if (Math.abs(wanted - this.#span_m) > 0.2) {
+      this.#span_m = wanted;
+      if (this.#far_m > 0) this.#far_m = this.#fitting();
+    }
+    if (this.name !== 'orbit') this.#follow(centre, far);
+    this.controls.update();
+  }
+
+  #follow(centre, far) {
+    const { target } = this.controls;
+    shift.copy(centre).sub(this.#centre).multiplyScalar(far ? 1 : GLIDE);
+    this.#centre.add(shift);
+    target.add(shift);
+    this.camera.position.add(shift);
+    // What was shifted by hand glides back to the figures.
+    shift.copy(this.#centre).sub(target).multiplyScalar(0.02);
+    target.add(shift);
+    this.camera.position.add(shift);
+    if (this.#far_m === 0) return;
+    shift.copy(this.camera.position).sub(target);
+    const length = shift.length();
+    shift.setLength(length + GLIDE * (this.#far_m - length));
+    this.camera.position.copy(target).add(shift);
+  }
+
+  get target() {
+    return this.controls.target;
+  }
+}
+
+const shift = new Vector3();
+const UP = new Vector3(0, 1, 0);

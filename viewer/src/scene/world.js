@@ -1,0 +1,256 @@
+// The scene: who is in it, where they stand, and one picture per animation frame. Two views share
+// one canvas: the bodies, and the hands in an inset.
+import { PCFShadowMap, Scene, Vector3, WebGLRenderer } from 'three';
+import { LANE_M, lanesOf } from './lanes.js';
+import { Ground } from './ground.js';
+import { HandsView } from './hands_view.js';
+import { Lights } from './lights.js';
+import { NameTags } from './name_tags.js';
+import { Pace } from './pace.js';
+import { Performer } from './performer.js';
+import { Views } from './views.js';
+import { themeColours } from './palette.js';
+import { facing } from './facing.js';
+
+const MOST_PIXELS = 2; // per CSS pixel
+const CROWD = 5; // figures; of more only the styled ones have names
+const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
+
+export class World {
+  performers = new Map();
+  options = { raw: 'beside', trails: true };
+  #dirty = CALM_FRAMES;
+  #yaw = null;
+  #pace = new Pace();
+  #areas = { bodies: null, hands: null };
+
+  // stage: the element with the canvas, the hands' inset and the names' layer.
+  constructor(stage, store, theme) {
+    this.stage = stage;
+    this.store = store;
+    this.canvas = stage.querySelector('canvas');
+    this.inset = stage.querySelector('.hands');
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFShadowMap;
+    this.renderer.setScissorTest(true);
+    this.theme = themeColours(theme);
+    this.scene = new Scene();
+    this.ground = new Ground(this.theme);
+    this.lights = new Lights(this.theme, true);
+    this.scene.add(this.ground.group, this.lights.group);
+    this.views = new Views(this.canvas, (name) => this.onView?.(name));
+    this.views.controls.addEventListener('change', () => this.touch());
+    this.hands = new HandsView(this.inset.querySelector('.hands-area'), this.theme, () => this.touch());
+    this.tags = new NameTags(stage.querySelector('.name-tags'));
+    this.setTheme(theme);
+    new ResizeObserver(() => this.resize()).observe(stage);
+    store.addEventListener('skeleton', ({ detail }) => this.#enter(detail));
+    store.addEventListener('gone', ({ detail }) => this.#leave(detail.name));
+    store.addEventListener('stats', () => this.arrange());
+  }
+
+  touch() {
+    this.#dirty = CALM_FRAMES;
+  }
+
+  setTheme(name) {
+    this.theme = themeColours(name);
+    this.scene.background = this.theme.background;
+    for (const part of [this.ground, this.lights, this.hands, ...this.performers.values()]) part.setTheme(this.theme);
+    this.touch();
+  }
+
+  setOption(name, value) {
+    this.options[name] = value;
+    this.arrange();
+  }
+
+  #enter(stream) {
+    this.#leave(stream.name);
+    const performer = new Performer(stream, this.scene, this.theme);
+    this.performers.set(stream.name, performer);
+    if (stream.isHand) this.hands.add(performer);
+    this.arrange();
+  }
+
+  #leave(name) {
+    const performer = this.performers.get(name);
+    if (!performer) return;
+    if (performer.stream.isHand) this.hands.remove(name);
+    this.performers.delete(name);
+    performer.dispose();
+    this.tags.remove(name);
+    this.arrange();
+  }
+
+  // Who stands where; after each change of streams or options.
+  arrange() {
+    this.touch();
+    const { raw } = this.options;
+    const mains = this.store.main().filter(({ name }) => this.performers.has(name));
+    const twin = (stream) => this.performers.get(`${stream.name}-raw`);
+    const bodies = mains.filter(({ isHand }) => !isHand);
+    const hands = mains.filter(({ isHand }) => isHand);
+    const lanes = lanesOf(bodies, (stream) => raw === 'beside' && twin(stream) !== undefined);
+    for (const stream of bodies) {
+      const place = lanes.get(stream.name);
+      this.#stand(this.performers.get(stream.name), place.styled, true);
+      this.#stand(twin(stream), raw === 'beside' ? place.raw : place.styled, raw !== 'off');
+    }
+    this.#arrangeHands(hands, twin);
+    this.#show(bodies.length > 0, hands.length > 0);
+  }
+
+  #stand(performer, lane, shown) {
+    if (!performer) return;
+    const yaw = this.#yaw ?? 0;
+    performer.figure.group.position.set(lane * LANE_M * Math.cos(yaw), 0, -lane * LANE_M * Math.sin(yaw));
+    performer.shown = shown;
+    performer.figure.group.visible = shown && performer.stream.drawable;
+    if (!shown) this.tags.hide(performer.stream.name);
+  }
+
+  #arrangeHands(hands, twin) {
+    const places = new Map();
+    let next = 0;
+    for (const stream of hands) {
+      const raw = this.options.raw === 'off' ? undefined : twin(stream);
+      if (raw) places.set(raw.stream.name, next);
+      if (raw && this.options.raw === 'beside') next += 1;
+      places.set(stream.name, next);
+      next += 1;
+    }
+    for (const { stream } of [...this.performers.values()].filter((one) => one.stream.isHand)) {
+      this.performers.get(stream.name).shown = places.has(stream.name);
+      if (!places.has(stream.name)) this.tags.hide(stream.name);
+    }
+    this.hands.arrange([...places.keys()], (name) => places.get(name));
+  }
+
+  #show(bodies, hands) {
+    const show = bodies && hands ? 'both' : (hands && 'hands') || (bodies && 'bodies') || 'none';
+    if (this.stage.dataset.show === show) return;
+    this.stage.dataset.show = show;
+    this.resize();
+  }
+
+  resize() {
+    const { width, height } = this.stage.getBoundingClientRect();
+    if (width === 0) return;
+    this.renderer.setPixelRatio(this.#pace.now.pixels * Math.min(devicePixelRatio, MOST_PIXELS));
+    this.lights.sun.castShadow = this.#pace.now.shadows;
+    this.renderer.setSize(width, height, false);
+    this.#areas.bodies = { left: 0, top: 0, width, height };
+    const show = this.stage.dataset.show;
+    this.#areas.hands = show === 'both' || show === 'hands' ? this.#insetArea() : null;
+    this.views.resize(width, height, this.#covered());
+    if (this.#areas.hands) this.hands.resize(this.#areas.hands.width, this.#areas.hands.height);
+    this.touch();
+  }
+
+  // What the inset takes from the bodies, in CSS pixels: they stand beside it, or above it where it
+  // is as wide as the scene.
+  #covered() {
+    if (!this.#areas.hands || this.stage.dataset.show !== 'both') return { right: 0, bottom: 0 };
+    const { bodies, hands } = this.#areas;
+    const wide = hands.width > 0.7 * bodies.width;
+    return { right: wide ? 0 : bodies.width - hands.left, bottom: wide ? bodies.height - hands.top : 0 };
+  }
+
+  #insetArea() {
+    const outer = this.stage.getBoundingClientRect();
+    const { left, top, width, height } = this.inset.querySelector('.hands-area').getBoundingClientRect();
+    return { left: left - outer.left, top: top - outer.top, width, height };
+  }
+
+  // Shows the newest poses. shown(performer) is called for each that is new. Returns whether
+  // anything was drawn.
+  frame(shown) {
+    this.#update(shown);
+    if (this.#dirty === 0 || this.stage.dataset.show === 'none') {
+      this.#pace.rest();
+      return false;
+    }
+    this.#dirty -= 1;
+    this.#look();
+    this.#draw();
+    if (this.#pace.drawn(performance.now())) this.resize();
+    return true;
+  }
+
+  #update(shown) {
+    for (const performer of this.performers.values()) {
+      if (!performer.update(this.options.trails)) continue;
+      this.touch();
+      performer.figure.group.visible = performer.shown !== false;
+      if (this.#yaw === null && !performer.ghost && performer.stream.isHand === false) this.#face(performer);
+      shown(performer);
+    }
+  }
+
+  // Lanes lie across the first body's way, whichever axis its world has there.
+  #face(performer) {
+    this.#yaw = facing(performer.stream.kinematics);
+    this.views.face(this.#yaw);
+    this.arrange();
+  }
+
+  #look() {
+    let [count, jumped] = [0, false];
+    middle.set(0, 0, 0);
+    for (const performer of this.performers.values()) {
+      if (performer.stream.isHand || !performer.figure.group.visible) continue;
+      middle.add(performer.centre);
+      count += 1;
+      jumped ||= performer.jumped;
+    }
+    if (count > 0) middle.divideScalar(count);
+    let span_m = 0;
+    for (const performer of this.performers.values()) {
+      if (performer.stream.isHand || !performer.figure.group.visible) continue;
+      span_m = Math.max(span_m, Math.hypot(performer.centre.x - middle.x, performer.centre.z - middle.z));
+    }
+    if (count > 0) this.views.update(middle, span_m, jumped);
+    this.ground.follow(this.views.target);
+    this.lights.follow(this.views.target);
+  }
+
+  #draw() {
+    const { bodies, hands } = this.#areas;
+    const show = this.stage.dataset.show;
+    if (bodies && show !== 'hands') this.#render(this.scene, this.views.camera, bodies, bodies.height);
+    if (hands) {
+      this.hands.controls.update();
+      this.#render(this.hands.scene, this.hands.camera, hands, bodies.height);
+    }
+    for (const performer of this.performers.values()) this.#tag(performer);
+  }
+
+  #render(scene, camera, { left, top, width, height }, whole) {
+    const bottom = whole - top - height;
+    this.renderer.setViewport(left, bottom, width, height);
+    this.renderer.setScissor(left, bottom, width, height);
+    this.renderer.render(scene, camera);
+  }
+
+  #tag(performer) {
+    if (!performer.figure.group.visible) return;
+    const { name, isHand } = performer.stream;
+    if (performer.ghost && this.performers.size > CROWD) {
+      this.tags.hide(name); // the colour says it, and names would cover each other
+      return;
+    }
+    if (isHand) {
+      this.hands.hold(performer, above);
+      this.tags.place(name, above, this.hands.camera, this.#areas.hands ?? this.#areas.bodies);
+    } else {
+      above.copy(performer.centre);
+      above.y = performer.top_m + 0.2;
+      this.tags.place(name, above, this.views.camera, this.#areas.bodies);
+    }
+  }
+}
+
+const middle = new Vector3();
+const above = new Vector3();

@@ -1,0 +1,36 @@
+// The state of a stream in a word, a tone for its colour, and a sentence where one helps.
+import { QUALITIES } from '../wire/pose.js';
+
+// tone: good, busy, bad, off
+const state = (word, tone, sentence = '') => ({ word, tone, sentence });
+
+// stats: posed.v1.StreamStats. What is wrong comes first.
+export function stateOf(stats) {
+  if (!stats) return state('unknown', 'off', 'no statistics came yet');
+  if (stats.refusal) return state('refused', 'bad', stats.refusal);
+  if (stats.away && stats.connections === 0) {
+    return state('away', 'busy', 'its device is not there yet; posed looks for it');
+  }
+  if (stats.away) return state('lost', 'bad', 'its device is disconnected; posed looks for it');
+  if (stats.state === 'waiting') return state('waiting', 'busy', 'nothing came yet');
+  if (stats.state === 'stale') return state('stale', 'busy', 'fell silent: the last pose is shown');
+  if (stats.state === 'ended') return state('ended', 'off', 'its source has ended');
+  if (stats.state !== 'live') return state(stats.state, 'busy');
+  const lost = stats.dropped + stats.shed + stats.kernel_dropped;
+  if (lost > 0) return state('live', 'good', `${lost} frames were lost so far: see below`);
+  return state('live', 'good');
+}
+
+// How current a pose is, for people; empty when it is measured.
+export function qualityWord(pose) {
+  if (pose.quality === 0) return '';
+  if (pose.quality === 2 && pose.performed) return 'at rest';
+  return QUALITIES[pose.quality] ?? 'of unknown quality';
+}
+
+// What the label of a pose means: {text, probability}; null without one.
+export function labelOf(pose) {
+  if (!pose.label) return null;
+  const verb = pose.performed ? 'performs' : 'recognised';
+  return { verb, label: pose.label, probability: pose.labelProbability };
+}

@@ -1,0 +1,123 @@
+// The page with the real bridge and the real daemon: POSED=path/to/posed node daemon_test.mjs
+import assert from 'node:assert/strict';
+import { statSync } from 'node:fs';
+import { after, before, test } from 'node:test';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { PAGE } from '../support/fake_bridge.mjs';
+import { RealDaemon, hasDemo } from '../support/real_daemon.mjs';
+import { launch, openPage } from '../support/browser.mjs';
+
+const BUILD = join(dirname(fileURLToPath(import.meta.url)), '../../../build');
+const LARGEST_PICTURE = 400_000;
+const PATIENCE = { timeout: 30000 };
+const skip = hasDemo() ? false : 'SKIPPED without build/demo (`build/posed demo --prepare build/demo` makes it)';
+const options = { skip, timeout: 120000 };
+
+let browser;
+let daemon;
+before(async () => {
+  if (skip) return;
+  browser = await launch();
+  daemon = new RealDaemon(process.env.POSED);
+  await daemon.start();
+});
+after(async () => {
+  await browser?.close();
+  await daemon?.stop();
+});
+
+async function opened(context, url, size) {
+  const page = await openPage(browser, url, size);
+  context.after(() => page.context().close());
+  return page;
+}
+
+const drawn = (page) => page.locator('.name-tag:visible').first().waitFor(PATIENCE);
+const acknowledged = (page, text) => page.locator('.ack', { hasText: text }).first().waitFor(PATIENCE);
+const statsOf = async (name) => (await daemon.ctl('status')).status.stream.find(({ stream }) => stream === name);
+
+// Waits until joints of the stream have moved by a centimetre.
+async function moves(page, name) {
+  const first = await page.waitForFunction((stream) => {
+    const one = globalThis.posedPage.store.streams.get(stream);
+    return one?.drawable ? [...one.kinematics.position] : false;
+  }, name, PATIENCE);
+  await page.waitForFunction(([stream, was]) =>
+    globalThis.posedPage.store.streams.get(stream).kinematics.position.some((value, i) => Math.abs(value - was[i]) > 0.01),
+  [name, await first.jsonValue()], PATIENCE);
+}
+
+test('the demo\'s walker and hand move, and a picture of them is small', options, async (context) => {
+  const page = await opened(context, await daemon.view(PAGE));
+  await drawn(page);
+  for (const name of ['walker', 'walker-raw', 'hand']) await moves(page, name);
+  await page.waitForTimeout(8000); // the plots fill
+  const picture = join(BUILD, 'page.png');
+  await page.screenshot({ path: picture });
+  assert.ok(statSync(picture).size < LARGEST_PICTURE);
+  assert.deepEqual(page.errors, []);
+});
+
+test('alpha, mask, gestures and takes reach the daemon, and it says so', options, async (context) => {
+  const page = await opened(context, await daemon.view(PAGE));
+  await drawn(page);
+  await page.locator('.stream', { hasText: 'walker' }).click();
+  const field = page.getByLabel('Amount of style, α, number');
+  await field.fill('0.3');
+  await field.press('Enter');
+  await acknowledged(page, 'walker: α 0.30: applied at frame');
+  assert.ok(Math.abs((await statsOf('walker')).alphaTarget - 0.3) < 1e-6);
+  await page.getByText('Share of the style by body part').click();
+  await page.getByLabel('head, number').fill('0');
+  await page.getByLabel('head, number').press('Enter');
+  await acknowledged(page, 'head=0: applied');
+  await page.getByLabel('head, number').fill('1');
+  await page.getByLabel('head, number').press('Enter');
+  await acknowledged(page, 'trunk=1: applied');
+  await page.getByLabel('Take name').fill('page');
+  await page.getByRole('button', { name: 'Start take' }).click();
+  await page.locator('.recording', { hasText: 'take 1 “page”' }).waitFor(PATIENCE);
+  await page.getByRole('button', { name: 'End take' }).click();
+  await acknowledged(page, 'take ends');
+  await page.getByLabel('Model', { exact: true }).selectOption('march-to-sway.style');
+  await page.locator('input[type=file]').setInputFiles(join(BUILD, 'demo', 'march-to-sway.style'));
+  await acknowledged(page, 'model march-to-sway.style: applied');
+  await page.locator('.stream', { hasText: 'hand' }).click();
+  await page.getByLabel('Gestures to perform').fill('g 1 c 3 4 p');
+  await page.getByRole('button', { name: 'Play' }).click();
+  await acknowledged(page, 'performs g 1 c 3 4 p: applied');
+  await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
+  assert.deepEqual(page.errors, []);
+});
+
+test('a daemon that restarts is live again within 3 s', options, async (context) => {
+  const page = await opened(context, await daemon.view(PAGE));
+  await drawn(page);
+  await daemon.stopDaemon();
+  await page.locator('.link[data-tone="bad"]').waitFor(PATIENCE);
+  await daemon.start();
+  const began_ms = performance.now();
+  await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);
+  await moves(page, 'walker');
+  const took_ms = performance.now() - began_ms;
+  console.log(`live again after ${took_ms.toFixed(0)} ms`);
+  assert.ok(took_ms < 3000, `${took_ms} ms`);
+  assert.deepEqual(page.errors, []);
+});
+
+test('a page of --read-only can change nothing and says so', options, async (context) => {
+  const page = await opened(context, await daemon.view(PAGE, '--read-only'));
+  await drawn(page);
+  await page.getByText('Controls are off: this page was opened with --read-only').waitFor(PATIENCE);
+  assert.ok(await page.getByLabel('Amount of style, α, number').isDisabled());
+});
+
+test('without the right token there is no page and no stream', options, async (context) => {
+  const url = new URL(await daemon.view(PAGE));
+  assert.equal((await fetch(url.origin)).status, 403);
+  url.searchParams.set('token', 'guess');
+  const page = await openPage(browser, url.href);
+  context.after(() => page.context().close());
+  assert.match(await page.locator('body').innerText(), /URL|address/);
+});

@@ -1,0 +1,95 @@
+// The real daemon and the real bridge on free ports, playing the demo's walker and hand.
+import { spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { createInterface } from 'node:readline';
+
+const DEMO = join(dirname(fileURLToPath(import.meta.url)), '../../../build/demo');
+export const hasDemo = () => existsSync(join(DEMO, 'hand.gesture'));
+
+const configOf = (folder) => `
+[publish]
+endpoint = "ipc://${folder}/publish"
+[control]
+endpoint = "ipc://${folder}/control"
+models = "${DEMO}"
+[[stream]]
+name = "walker"
+driver = "file"
+publish_raw = true
+[stream.file]
+path = "${DEMO}/new_walker.bvh"
+loop = true
+[stream.style]
+model = "${DEMO}/march-to-sway.style"
+[stream.feet]
+[[stream]]
+name = "hand"
+driver = "file"
+[stream.file]
+path = "${DEMO}/new_performer.csv"
+loop = true
+[stream.generate]
+model = "${DEMO}/hand.gesture"
+`;
+
+// A program whose first line of output is JSON: {program, line}. Rejects when it ends before.
+async function start(program, args) {
+  const child = spawn(program, args, { stdio: ['ignore', 'pipe', 'pipe'] });
+  let complaint = '';
+  child.stderr.on('data', (text) => { complaint += text; });
+  const line = await new Promise((done, fail) => {
+    createInterface({ input: child.stdout }).once('line', done);
+    child.once('exit', () => fail(new Error(`${program} ${args[0]}: ${complaint}`)));
+  });
+  return { child, line: JSON.parse(line) };
+}
+
+async function end(child) {
+  if (child.exitCode !== null) return;
+  child.kill('SIGINT');
+  await new Promise((done) => { child.once('exit', done); });
+}
+
+export class RealDaemon {
+  constructor(program) {
+    this.program = program;
+    this.folder = mkdtempSync(join(tmpdir(), 'posed-page-'));
+    writeFileSync(join(this.folder, 'page.toml'), configOf(this.folder));
+  }
+
+  async start() {
+    const args = ['record', '--config', join(this.folder, 'page.toml'), '--out', join(this.folder, 'take.plog'), '--overwrite'];
+    this.daemon = (await start(this.program, args)).child;
+  }
+
+  // page: the folder; returns the page's address
+  async view(page, ...more) {
+    const args = ['view', '--json', '--port', '0', '--page', page, '--connect', `ipc://${this.folder}/publish`,
+      '--control', `ipc://${this.folder}/control`, ...more];
+    const { child, line } = await start(this.program, args);
+    this.bridges = [...(this.bridges ?? []), child];
+    return line.url;
+  }
+
+  // posed ctl ARGS: its output as JSON.
+  async ctl(...args) {
+    const child = spawn(this.program, ['ctl', '--connect', `ipc://${this.folder}/control`, '--json', ...args]);
+    let text = '';
+    child.stdout.on('data', (piece) => { text += piece; });
+    await new Promise((done) => { child.once('exit', done); });
+    return JSON.parse(text);
+  }
+
+  async stopDaemon() {
+    await end(this.daemon);
+  }
+
+  async stop() {
+    for (const bridge of this.bridges ?? []) await end(bridge);
+    await this.stopDaemon();
+    rmSync(this.folder, { recursive: true });
+  }
+}

@@ -1,0 +1,6 @@
+// node main.mjs: the tests of the page's modules, without a browser.
+import './link_test.mjs';
+import './mannequin_test.mjs';
+import './motion_test.mjs';
+import './streams_test.mjs';
+import './wire_test.mjs';

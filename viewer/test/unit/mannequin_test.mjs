@@ -1,0 +1,43 @@
+// The mannequin as its users load it: by three-vrm.
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Quaternion, Vector3 } from 'three';
+import { loadAvatar, hipsHeight } from '../../src/scene/avatar.js';
+import { Kinematics } from '../../src/motion/kinematics.js';
+import { mannequin } from '../../mannequin/mannequin.mjs';
+import { bodySkeleton, walk } from '../support/figures.mjs';
+
+globalThis.self ??= globalThis; // GLTFLoader's
+
+test('the mannequin is a VRM 1.0 avatar with fingers that stands on the ground', async () => {
+  const bytes = mannequin();
+  const { vrm } = await loadAvatar(bytes.buffer, 'mannequin');
+  assert.equal(vrm.meta.metaVersion, '1');
+  const bones = Object.keys(vrm.humanoid.humanBones);
+  assert.equal(bones.length, 51);
+  vrm.scene.updateMatrixWorld(true);
+  const low = vrm.humanoid.getRawBoneNode('leftToes').getWorldPosition(new Vector3()).y;
+  assert.ok(low > 0 && low < 0.05, String(low));
+});
+
+test('an avatar\'s bones turn as the figure\'s, and its hips are as high for its legs', async () => {
+  const avatar = await loadAvatar(mannequin().buffer, 'mannequin');
+  const kinematics = new Kinematics(bodySkeleton({ stream: 'a', id: 1, stage: [] }));
+  const { rotation_xyzw, root_position_m } = walk(0.4, 1);
+  kinematics.pose(rotation_xyzw, root_position_m);
+  avatar.fit(kinematics);
+  avatar.pose(kinematics);
+  avatar.vrm.scene.updateMatrixWorld(true);
+  for (const bone of ['leftLowerArm', 'rightLowerLeg', 'head']) {
+    const node = avatar.vrm.humanoid.getRawBoneNode(bone);
+    const own = node.getWorldQuaternion(new Quaternion());
+    const truth = new Quaternion().fromArray(kinematics.rotation, 4 * kinematics.jointOf(bone));
+    assert.ok(own.angleTo(truth) < 1e-3, bone);
+  }
+  const hips = avatar.vrm.humanoid.getRawBoneNode('hips').getWorldPosition(new Vector3()).y;
+  assert.ok(Math.abs(hips - (0.945 / hipsHeight(kinematics)) * root_position_m[1]) < 1e-3);
+});
+
+test('a file that is no avatar is refused with a sentence', async () => {
+  await assert.rejects(loadAvatar(new ArrayBuffer(10), 'notes.txt'), /notes.txt cannot be read as VRM/);
+});
