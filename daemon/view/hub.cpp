@@ -12,7 +12,7 @@ namespace {
 constexpr std::int64_t kReplyWithin_ns = 5 * kNanosPerSecond;
 constexpr std::int64_t kGone_ns = 10 * kNanosPerSecond;    // a stream without any message
 constexpr std::int64_t kUpload_ns = 10 * kNanosPerSecond;  // between two pieces, as in the daemon
-constexpr std::size_t kLongestTopic = 128;
+constexpr std::size_t kMaxTopic = 128;
 constexpr const char* kSkeleton = "skeleton/";
 constexpr std::array kThinned{"pose/", "sensor/"};
 
@@ -102,7 +102,7 @@ void Hub::replied(std::uint64_t ticket, std::string_view reply) {
 }
 
 void Hub::heard(std::string_view topic, std::string_view body, std::int64_t now_ns) {
-  if (topic.size() > kLongestTopic) {
+  if (topic.size() > kMaxTopic) {
     ++counts_.foreign;
   } else if (topic == "stats") {
     stats_ = with_topic(topic, body);

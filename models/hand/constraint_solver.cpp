@@ -15,13 +15,15 @@ namespace {
 constexpr double kNear_m = 3e-3;            // pairs nearer than this take part in the projection
 constexpr double kFar_m = 10e-3;            // gaps above this are not computed
 constexpr double kHinge_rad = 4 * kDegree;  // bending starts this far inside a limit
-constexpr double kDone_rad = 1e-6;
+constexpr double kDone_rad = 3e-5;
+constexpr double kSame_rad = 0.01;     // two poses on their way to the same result
 constexpr double kMaxStep_rad = 0.35;  // largest step of one linearisation
 constexpr double kDeep_m = 2e-3;
 constexpr double kSliver_m = 1e-5;  // a gap that stays positive after rounding to a Frame's floats
 constexpr double kLoyalty = 0.7;  // another side must cost less than this share of the present one
 constexpr int kMaxRounds = 16;
 constexpr int kHalvings = 10;
+constexpr int kStartHalvings = 4;      // a start need not be exact
 constexpr double kLeastWeight = 1e-9;  // smallest weight, relative to the largest one
 
 // `over` is the distance of an angle inside its limit, less than kHinge_rad; it is bent smoothly
@@ -56,6 +58,36 @@ double largest_difference(const HandAngles& a, const HandAngles& b) noexcept {
     if (!(difference <= largest)) largest = difference;  // keeps a NaN
   }
   return largest;
+}
+
+HandAngles difference(const HandAngles& a, const HandAngles& b) noexcept {
+  HandAngles out;
+  for (std::size_t c = 0; c < out.size(); ++c) out[c] = a[c] - b[c];
+  return out;
+}
+
+// By how much to extend the step from `at` to `next`, at least 1: steps that shrink by the same
+// factor f in the same direction sum up to 1 / (1 - f) times the latest one (Aitken). `last` is the
+// step before; zero: unknown.
+double extension(const HandAngles& at, const HandAngles& next, const HandAngles& last) noexcept {
+  double along = 0.0, before = 0.0, now = 0.0;
+  for (std::size_t c = 0; c < at.size(); ++c) {
+    const double step = next[c] - at[c];
+    along += step * last[c];
+    before += last[c] * last[c];
+    now += step * step;
+  }
+  const bool same_direction = along > 0.0 && along * along > 0.8 * before * now;
+  const double factor = same_direction ? along / before : 0.0;
+  return factor < 0.95 ? 1.0 / (1.0 - factor) : 1.0;
+}
+
+HandAngles clamped(const HandAngles& angles, const Box& box) noexcept {
+  HandAngles out;
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    out[c] = std::clamp(angles[c], box.low_rad[c], box.high_rad[c]);
+  }
+  return out;
 }
 
 HandAngles between(const HandAngles& from, const HandAngles& to, double share) noexcept {
@@ -122,9 +154,12 @@ struct ConstraintSolver::State {
     int rounds = 0;
   };
 
-  // Sequential QP towards `target`.
-  void descend(const HandAngles& target, const HandAngles& variance, Path& path) noexcept {
+  // Sequential QP towards `target`. Ends early where it comes near the result of `known`: then it
+  // would become that one. Null: none is known.
+  void descend(const HandAngles& target, const HandAngles& variance, Path& path,
+               const Path* known = nullptr) noexcept {
     const Box box{geometry.low_rad, geometry.high_rad};
+    HandAngles last{};  // the step before; zero: none, or an extended one
     path.gap_m = gap_of(path.angles);
     for (path.rounds = 0; path.rounds < kMaxRounds;) {
       ++path.rounds;
@@ -132,10 +167,18 @@ struct ConstraintSolver::State {
                                       options.limits ? &box : nullptr, path.forces);
       const double step_rad = largest_difference(next, path.angles);
       if (!std::isfinite(step_rad)) return;
+      const bool may_extend = path.rounds < kMaxRounds;
+      const double share = may_extend ? extension(path.angles, next, last) : 1.0;
+      last = share > 1.0 ? HandAngles{} : difference(next, path.angles);
       // A linearisation is not valid far from where it was made.
-      path.angles = between(path.angles, next, std::min(1.0, kMaxStep_rad / step_rad));
+      path.angles = between(path.angles, next, std::min(share, kMaxStep_rad / step_rad));
+      if (options.limits) path.angles = clamped(path.angles, box);
       path.gap_m = gap_of(path.angles);
       if (step_rad < kDone_rad) break;
+      if (known != nullptr && largest_difference(path.angles, known->angles) < kSame_rad) {
+        path = *known;
+        return;
+      }
     }
     if (path.gap_m < 0.0) return;
     path.cost = 0.0;
@@ -146,41 +189,47 @@ struct ConstraintSolver::State {
   }
 
   // The nearest pose with gaps; infinite cost where none was found. Fingers that are deep in each
-  // other can come apart on more than one side, so three starts are tried: the pose itself, the
-  // pose with its fingers side by side, and the result of the previous frame. The cheapest is
-  // taken, but the last one is kept unless another is far cheaper, so that the side does not
+  // other can come apart on more than one side, so three starts are tried: the result of the
+  // previous frame, the pose itself, and the pose with its fingers side by side. The cheapest is
+  // taken, but the first one is kept unless another is far cheaper, so that the side does not
   // flicker (models/hand/README.md, "Sides and fallback").
   Path separate(const HandAngles& target, const HandAngles& variance) noexcept {
-    Path best{.angles = target, .forces = {}};
+    Path best{.angles = target, .forces = forces};
     best.gap_m = gap_of(target);
     const bool is_deep = best.gap_m < -kDeep_m;
     if (best.gap_m >= options.margin_m) {
       best.cost = 0.0;
+      best.forces = {};
       return best;
     }
-    best.forces = forces;
-    descend(target, variance, best);
-    if (!is_deep) return best;
-    Path aside{.angles = target, .forces = {}};
-    (void)retreat(parallel(target), aside.angles);
-    descend(target, variance, aside);
-    if (aside.cost < best.cost) best = aside;
-    if (!follows) return best;
+    if (!is_deep) {
+      descend(target, variance, best);
+      return best;
+    }
     Path same_side{.angles = before, .forces = forces};
-    descend(target, variance, same_side);
-    return same_side.cost * kLoyalty <= best.cost ? same_side : best;
+    const Path* known = nullptr;
+    if (follows) {
+      descend(target, variance, same_side);
+      if (std::isfinite(same_side.cost)) known = &same_side;
+    }
+    descend(target, variance, best, known);
+    Path aside{.angles = target, .forces = {}};
+    (void)retreat(parallel(target), aside.angles, kStartHalvings);
+    descend(target, variance, aside, std::isfinite(best.cost) ? &best : known);
+    if (aside.cost < best.cost) best = aside;
+    return follows && same_side.cost * kLoyalty <= best.cost ? same_side : best;
   }
 
   // Moves `angles` towards `safe` to the first pose that has a gap, or to `safe` itself; returns
   // the gap.
-  double retreat(const HandAngles& safe, HandAngles& angles) noexcept {
+  double retreat(const HandAngles& safe, HandAngles& angles, int halvings) noexcept {
     const HandAngles from = angles;
     double gap_m = gap_of(safe);
     angles = safe;
     if (gap_m < 0.0) return gap_m;
     double bad = 0.0;
     double good = 1.0;
-    for (int i = 0; i < kHalvings; ++i) {
+    for (int i = 0; i < halvings; ++i) {
       const double middle = 0.5 * (bad + good);
       const HandAngles there = between(from, safe, middle);
       const double there_m = gap_of(there);
@@ -203,12 +252,12 @@ struct ConstraintSolver::State {
     if (report.retreated) {
       if (std::isfinite(path.gap_m)) angles = path.angles;
       HandAngles safe = parallel(angles);
-      report.min_gap_m = retreat(safe, angles);
+      report.min_gap_m = retreat(safe, angles, kHalvings);
       if (report.min_gap_m < 0.0) {
         std::fill_n(safe.begin(), kFingerChannels, 0.0);  // all angles of the thumb, too
-        report.min_gap_m = retreat(safe, angles);
+        report.min_gap_m = retreat(safe, angles, kHalvings);
       }
-      if (report.min_gap_m < 0.0) report.min_gap_m = retreat({}, angles);
+      if (report.min_gap_m < 0.0) report.min_gap_m = retreat({}, angles, kHalvings);
       forces = {};
     } else {
       angles = path.angles;
@@ -221,7 +270,7 @@ struct ConstraintSolver::State {
 
   int count_touching() noexcept {
     for (std::size_t p = 0; p < kPairs.size(); ++p) {
-      touching[p] = forces.contact[p] > 0.0 || (touching[p] && gaps_m[p] < options.leave_m);
+      touching[p] = forces[p] > 0.0 || (touching[p] && gaps_m[p] < options.leave_m);
     }
     return static_cast<int>(touching.count());
   }
@@ -233,6 +282,7 @@ ConstraintSolver::ConstraintSolver(const HandGeometry& geometry, const Constrain
     : state_(std::make_unique<State>()) {
   state_->geometry = geometry;
   state_->options = options;
+  state_->options.margin_m = std::max(options.margin_m, kSliver_m);
 }
 ConstraintSolver::~ConstraintSolver() = default;
 ConstraintSolver::ConstraintSolver(ConstraintSolver&&) noexcept = default;

@@ -22,7 +22,7 @@ struct ConstraintOptions {
   bool limits = true;
   bool soft_limits = true;  // bend angles onto a limit; false: clamp them
   bool collisions = true;
-  double margin_m = 0.2e-3;  // target gap, so that rounding leaves no gap below zero
+  double margin_m = 0.2e-3;  // target gap, so that rounding leaves no gap below zero; at least 1e-5
   double leave_m = 0.5e-3;   // a pair that was held apart counts as touching up to this gap
 };
 

@@ -2,101 +2,164 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+
+#include "models/hand/nonnegative.hpp"
 
 namespace posed::hand {
 namespace {
 
-constexpr int kMaxSweeps = 200;
-constexpr double kStill_rad = 1e-8;  // a sweep that moves no angle farther is the last one
+constexpr int kMaxCycles = 50;       // of sweeps and Newton steps
+constexpr double kStill_rad = 1e-7;  // a sweep that moves no angle farther is the last one
+constexpr double kRidge = 1e-10;     // of the largest diagonal: rows may depend on each other
+constexpr double kLeastCurvature = 1e-300;  // where all angles of the rows are at their limits
+constexpr int kMaxHalvings = 4;
 
-// Updates one constraint at a time. RT-safe.
-class Solver {
+// [row][angle], each angle scaled by the root of its variance; no heap.
+using Slopes = Eigen::Matrix<double, Eigen::Dynamic, kHandChannels, Eigen::RowMajor, kMaxRows>;
+static_assert(kMaxRows <= kMaxUnknowns);
+using RowForces = std::array<double, kMaxRows>;
+
+// f(angle, slope) for the angles of the row's fingers.
+template <typename F>
+void for_each_slope(const Row& row, const F& f) noexcept {
+  for (int i = 0; i < kFingerChannels; ++i) f(kFingerChannels * row.finger_a + i, row.slope.a[i]);
+  for (int i = 0; i < kFingerChannels; ++i) f(kFingerChannels * row.finger_b + i, row.slope.b[i]);
+}
+
+// The dual problem: the forces decide the pose, y = clamp(target + V A' force). All RT-safe.
+class Dual {
  public:
-  Solver(const HandAngles& variance, HandAngles& y) noexcept : variance_(variance), y_(y) {}
-
-  void push(const Row& row, double force) noexcept {
-    for_each_slope(
-        row, [&](int channel, double slope) { move(channel, force * variance_[channel] * slope); });
-  }
-
-  // 1 / (A variance A') of a row.
-  [[nodiscard]] double ease(const Row& row) const noexcept {
-    double sum = 0.0;
-    for_each_slope(row,
-                   [&](int channel, double slope) { sum += slope * slope * variance_[channel]; });
-    return sum > 1e-18 ? 1.0 / sum : 0.0;
-  }
-
-  void relax(const Row& row, double ease, double& force) noexcept {
-    double value = 0.0;
-    for_each_slope(row, [&](int channel, double slope) { value += slope * y_[channel]; });
-    const double change = std::max(-force, (row.least - value) * ease);
-    force += change;
-    if (change != 0.0) push(row, change);
-  }
-
-  void relax_box(const Box& box, Forces& forces) noexcept {
-    for (int c = 0; c < kHandChannels; ++c) {
-      const double up = std::max(-forces.low[c], (box.low_rad[c] - y_[c]) / variance_[c]);
-      forces.low[c] += up;
-      move(c, up * variance_[c]);
-      const double down = std::max(-forces.high[c], (y_[c] - box.high_rad[c]) / variance_[c]);
-      forces.high[c] += down;
-      move(c, -down * variance_[c]);
+  Dual(const HandAngles& target, const HandAngles& variance, std::span<const Row> rows,
+       const Box* box) noexcept
+      : target_(target), variance_(variance), rows_(rows), box_(box) {
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      double sum = 0.0;
+      for_each_slope(rows[r], [&](int c, double slope) { sum += slope * slope * variance[c]; });
+      ease_[r] = sum > 1e-18 ? 1.0 / sum : 0.0;
     }
   }
 
-  // Largest move since the last call.
-  [[nodiscard]] double moved() noexcept { return std::exchange(moved_, 0.0); }
+  void set(const RowForces& force) noexcept {
+    force_ = force;
+    free_ = target_;
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      if (force[r] == 0.0) continue;
+      for_each_slope(rows_[r],
+                     [&](int c, double slope) { free_[c] += force[r] * variance_[c] * slope; });
+    }
+    for (int c = 0; c < kHandChannels; ++c) pose_[c] = within(c);
+  }
+
+  // Changes one force after the other to its best value. Returns the largest move of an angle.
+  [[nodiscard]] double sweep() noexcept {
+    double moved_rad = 0.0;
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      const double change = std::max(-force_[r], lacks(r) * ease_[r]);
+      if (change == 0.0) continue;
+      force_[r] += change;
+      for_each_slope(rows_[r], [&](int c, double slope) {
+        free_[c] += change * variance_[c] * slope;
+        const double before = pose_[c];
+        pose_[c] = within(c);
+        moved_rad = std::max(moved_rad, std::abs(pose_[c] - before));
+      });
+    }
+    return moved_rad;
+  }
+
+  // Changes all forces that count at once, to the best values if neither the rows that count nor
+  // the angles at their limits changed; as far as the dual value grows.
+  void newton() noexcept {
+    std::array<std::size_t, kMaxRows> active{};
+    int count = 0;
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      if (force_[r] > 0.0 || lacks(r) > 0.0) active[count++] = r;
+    }
+    if (count < 2) return;  // a sweep solves that
+    Slopes slopes = Slopes::Zero(count, kHandChannels);
+    SmallVector lack(count), force(count);
+    for (int i = 0; i < count; ++i) {
+      force[i] = force_[active[i]];
+      lack[i] = lacks(active[i]);
+      for_each_slope(rows_[active[i]], [&](int c, double slope) {
+        if (pose_[c] == free_[c]) slopes(i, c) = slope * std::sqrt(variance_[c]);
+      });
+    }
+    SmallMatrix curvature = slopes.lazyProduct(slopes.transpose());
+    curvature.diagonal().array() += kRidge * curvature.diagonal().maxCoeff() + kLeastCurvature;
+    SmallVector best = force;
+    const SmallVector pull = lack + curvature.lazyProduct(force);
+    if (solve_nonnegative(curvature, pull, best)) try_step(active, best - force);
+  }
+
+  [[nodiscard]] const RowForces& forces() const noexcept { return force_; }
+  [[nodiscard]] const HandAngles& pose() const noexcept { return pose_; }
 
  private:
-  template <typename F>
-  static void for_each_slope(const Row& row, const F& f) noexcept {
-    for (int i = 0; i < kFingerChannels; ++i) {
-      f(kFingerChannels * row.finger_a + i, row.slope.a[i]);
+  void try_step(const std::array<std::size_t, kMaxRows>& active, const SmallVector& step) noexcept {
+    const RowForces before = force_;
+    const double value_before = value();
+    double share = 1.0;
+    for (int i = 0; i < kMaxHalvings; ++i, share *= 0.5) {
+      RowForces next = before;
+      for (Eigen::Index k = 0; k < step.size(); ++k) {
+        double& force = next[active[static_cast<std::size_t>(k)]];
+        force = std::max(0.0, force + share * step[k]);
+      }
+      set(next);
+      if (value() >= value_before - 1e-13 * std::abs(value_before)) return;
     }
-    for (int i = 0; i < kFingerChannels; ++i) {
-      f(kFingerChannels * row.finger_b + i, row.slope.b[i]);
-    }
+    set(before);
   }
 
-  void move(int channel, double by_rad) noexcept {
-    y_[channel] += by_rad;
-    moved_ = std::max(moved_, std::abs(by_rad));
+  // How much the row's constraint lacks at the pose; below zero: nothing.
+  [[nodiscard]] double lacks(std::size_t r) const noexcept {
+    double lack = rows_[r].least;
+    for_each_slope(rows_[r], [&](int c, double slope) { lack -= slope * pose_[c]; });
+    return lack;
   }
 
+  [[nodiscard]] double value() const noexcept {
+    double sum = 0.0;
+    for (int c = 0; c < kHandChannels; ++c) {
+      const double by = pose_[c] - target_[c];
+      sum += 0.5 * by * by / variance_[c];
+    }
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      if (force_[r] > 0.0) sum += force_[r] * lacks(r);
+    }
+    return sum;
+  }
+
+  [[nodiscard]] double within(int c) const noexcept {
+    return box_ == nullptr ? free_[c] : std::clamp(free_[c], box_->low_rad[c], box_->high_rad[c]);
+  }
+
+  const HandAngles& target_;
   const HandAngles& variance_;
-  HandAngles& y_;
-  double moved_ = 0.0;
+  std::span<const Row> rows_;
+  const Box* box_;
+  std::array<double, kMaxRows> ease_{};  // 1 / (A V A') of each row
+  RowForces force_{};
+  HandAngles free_{};  // the pose without the box
+  HandAngles pose_{};
 };
 
 }  // namespace
 
 HandAngles project(const HandAngles& target, const HandAngles& variance, std::span<const Row> rows,
                    const Box* box, Forces& forces) noexcept {
-  HandAngles y = target;
-  Solver solver(variance, y);
-  std::array<double, kMaxRows> ease{};
-  std::array<double, kBonePairs> kept{};
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    ease[r] = solver.ease(rows[r]);
-    kept[rows[r].pair] = forces.contact[rows[r].pair];
-    solver.push(rows[r], kept[rows[r].pair]);
+  Dual dual(target, variance, rows, box);
+  RowForces start{};
+  for (std::size_t r = 0; r < rows.size(); ++r) start[r] = forces[rows[r].pair];
+  dual.set(start);
+  for (int cycle = 0; cycle < kMaxCycles; ++cycle) {
+    if (dual.sweep() < kStill_rad) break;
+    dual.newton();
   }
-  forces.contact = kept;
-  if (box != nullptr) {
-    for (int c = 0; c < kHandChannels; ++c) y[c] += variance[c] * (forces.low[c] - forces.high[c]);
-  }
-  (void)solver.moved();
-  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-      solver.relax(rows[r], ease[r], forces.contact[rows[r].pair]);
-    }
-    if (box != nullptr) solver.relax_box(*box, forces);
-    if (solver.moved() < kStill_rad) break;
-  }
-  return y;
+  forces = {};
+  for (std::size_t r = 0; r < rows.size(); ++r) forces[rows[r].pair] = dual.forces()[r];
+  return dual.pose();
 }
 
 }  // namespace posed::hand

@@ -1,7 +1,7 @@
 // The quadratic step of the constraint stage: the point nearest to a target, in a weighted metric,
 // that satisfies linear constraints and lies in a box (models/hand/README.md, "Quadratic step").
-// Dual Gauss-Seidel: each constraint has a non-negative force, and forces are kept between calls as
-// a warm start.
+// Solved in the dual: each constraint has a non-negative force, and forces are kept between calls
+// as a warm start.
 #pragma once
 
 #include <array>
@@ -22,12 +22,7 @@ struct Row {
   double least = 0.0;
 };
 
-// Forces: [pair] of the contacts, [channel] of the box.
-struct Forces {
-  std::array<double, kBonePairs> contact{};
-  HandAngles low{};
-  HandAngles high{};
-};
+using Forces = std::array<double, kBonePairs>;  // [pair]
 
 struct Box {
   const HandAngles& low_rad;

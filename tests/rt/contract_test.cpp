@@ -88,7 +88,7 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
                    .ticket = ticket,
                    .command = payload};
   };
-  const auto weights = style::shares_of("s3=0.5,s4=0.5", second->styles).value();
+  const auto weights = style::shares_of("s3=0.5,s4=0.5", second->styles()).value();
   const auto mask = style::mask_of("legs=0.5").value();
   std::vector<RigStream> streams;
   streams.push_back(

@@ -128,6 +128,7 @@ TEST_CASE("a skeleton is passed on when it changes, a pose with each credit, an 
   REQUIRE(got.size() == 2);
   CHECK(got[0].topic == "event/a");
   CHECK(got[1].body == "T");
+  rig.hub.heard("skeleton/a", "T", 0);  // the daemon repeats it every second
   rig.hub.take(tab, R"({"type":"ready"})", true, 0);
   got = all_of(tab);
   REQUIRE(got.size() == 1);
