@@ -52,8 +52,9 @@ function attributes(buffer, mesh) {
 
 // A joint's inverse bind matrix: all joints stand unturned, so it only moves.
 function inverseBind(joints) {
-  return Float32Array.from(joints.flatMap(({ place: [x, y, z] }) =>
-    [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -z, 1]));
+  return Float32Array.from(
+    joints.flatMap(({ place: [x, y, z] }) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -z, 1]),
+  );
 }
 
 function chunk(kind, data, filler) {
@@ -88,7 +89,12 @@ export function glb({ joints, mesh, colour, extensions }) {
     nodes,
     meshes: [{ name: 'body', primitives: [primitive] }],
     skins: [{ joints: joints.map((_, i) => i), inverseBindMatrices: binds, skeleton: 0 }],
-    materials: [{ name: 'skin', pbrMetallicRoughness: { baseColorFactor: colour, metallicFactor: 0, roughnessFactor: 0.65 } }],
+    materials: [
+      {
+        name: 'skin',
+        pbrMetallicRoughness: { baseColorFactor: colour, metallicFactor: 0, roughnessFactor: 0.65 },
+      },
+    ],
     buffers: [{ byteLength: buffer.bytes.length }],
     bufferViews: buffer.views,
     accessors: buffer.accessors,

@@ -27,7 +27,9 @@ function shape(list) {
     }
     if (!joint.tip) return;
     const tip = joint.tip.map((value, k) => value + joint.place[k]);
-    const [from, start] = joint.round ? [tip, joint.tipRadius] : [joint.place, joint.tipStart ?? joint.radius];
+    const [from, start] = joint.round
+      ? [tip, joint.tipRadius]
+      : [joint.place, joint.tipStart ?? joint.radius];
     addCapsule(mesh, from, tip, start, joint.tipRadius, i, joint.trunk ? TRUNK_DEPTH : 1);
   });
   return mesh;

@@ -57,10 +57,18 @@ class Page {
   #makePanels() {
     const { control, requests, acks, store, world } = this;
     this.list = new StreamList(find('.stream-list'), store, (name) => this.choose(name));
-    this.panel = new Chosen(find('.chosen'), { control, requests, acks }, () => this.hello?.connect ?? '');
+    this.panel = new Chosen(
+      find('.chosen'),
+      { control, requests, acks },
+      () => this.hello?.connect ?? '',
+    );
     this.takes = new Takes(find('.takes'), control);
     this.help = new Help(find('#help'), find('#help-button'));
-    this.avatars = new Avatars(world, (...words) => acks.say(...words), (...list) => this.tools.setAvatars(...list));
+    this.avatars = new Avatars(
+      world,
+      (...words) => acks.say(...words),
+      (...list) => this.tools.setAvatars(...list),
+    );
     this.tools = new Tools(find('.tools'), world, this.avatars);
     this.legend = legend(find('.legend'));
   }
@@ -69,7 +77,9 @@ class Page {
     this.store.addEventListener('stats', () => this.#refresh());
     this.store.addEventListener('skeleton', ({ detail }) => this.#dress(detail));
     this.store.addEventListener('event', ({ detail }) => this.#event(detail));
-    const style = (change) => () => { if (this.panel.style?.alpha && !this.readOnly) change(this.panel.style.alpha); };
+    const style = (change) => () => {
+      if (this.panel.style?.alpha && !this.readOnly) change(this.panel.style.alpha);
+    };
     listenToKeys({
       ArrowDown: () => this.#step(1),
       ArrowUp: () => this.#step(-1),
@@ -82,8 +92,12 @@ class Page {
       s: () => this.takes.toggle(),
       d: () => this.theme.toggle(),
       '?': () => this.help.toggle(),
-      ...Object.fromEntries(['follow', 'orbit', 'front', 'side', 'top']
-        .map((view, i) => [i + 1, () => this.world.views.set(view)])),
+      ...Object.fromEntries(
+        ['follow', 'orbit', 'front', 'side', 'top'].map((view, i) => [
+          i + 1,
+          () => this.world.views.set(view),
+        ]),
+      ),
     });
   }
 
@@ -113,7 +127,13 @@ class Page {
   }
 
   #event({ stream, kind, text }) {
-    const tone = { warning: 'bad', lost: 'bad', stale: 'busy', 'recording error': 'bad', ended: 'busy' }[kind];
+    const tone = {
+      warning: 'bad',
+      lost: 'bad',
+      stale: 'busy',
+      'recording error': 'bad',
+      ended: 'busy',
+    }[kind];
     if (tone) this.acks.say(`${stream}: ${text}`, tone);
   }
 
@@ -137,7 +157,8 @@ class Page {
       this.daemon = message;
     } else if (type === 'clock') {
       // Of another machine's frames nobody here knows when they came.
-      if (this.hello?.same_machine) this.clock.add(message.t0, performance.now(), Number(message.monotonic_ns) / 1e6);
+      if (this.hello?.same_machine)
+        this.clock.add(message.t0, performance.now(), Number(message.monotonic_ns) / 1e6);
       return;
     } else if (type === 'no_reply') {
       this.requests.refused(message.request, message.error);
@@ -152,7 +173,8 @@ class Page {
     const { state, sentence } = this.link;
     if (state === 'refused') this.header.say(sentence, 'bad');
     else if (!this.hello) this.header.say(sentence || 'connecting', 'busy');
-    else if (!this.daemon.alive) this.header.say(this.daemon.sentence || 'the daemon does not answer', 'bad');
+    else if (!this.daemon.alive)
+      this.header.say(this.daemon.sentence || 'the daemon does not answer', 'bad');
     else this.header.say(`live from ${this.hello.connect}`, 'good');
     document.body.dataset.silent = !this.hello || !this.daemon.alive;
     emptyWords(find('.empty p'), this);
@@ -166,7 +188,9 @@ class Page {
     this.panel.update(this.chosen, this.readOnly);
     this.takes.update(store.stats, this.readOnly);
     if (store.stats) this.header.update(store.stats);
-    this.instruments.heading.textContent = this.chosen ? `Instruments: ${this.chosenName}` : 'Instruments';
+    this.instruments.heading.textContent = this.chosen
+      ? `Instruments: ${this.chosenName}`
+      : 'Instruments';
     writeTags(this.world, this.chosenName);
     this.legend(this.world);
     emptyWords(find('.empty p'), this);

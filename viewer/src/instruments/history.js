@@ -22,7 +22,8 @@ export class History {
     this.callback.add(now_s, callback_ms - arrival_ms);
     const us = pose.stage_us;
     if (pose.stages > 0) this.stages.add(now_s, us[0], us[1], us[2], us[3], us[4], us[5]);
-    if (pose.label || now_s - this.#since_s < 20) this.label.add(now_s, pose.label ? 100 * pose.labelProbability : NaN);
+    if (pose.label || now_s - this.#since_s < 20)
+      this.label.add(now_s, pose.label ? 100 * pose.labelProbability : NaN);
     if (pose.label) this.#since_s = now_s;
   }
 

@@ -21,13 +21,34 @@ export class Instruments {
   constructor(element, clock) {
     this.clock = clock;
     this.tiles = new Tiles();
-    this.latency = new Plot('Latency', 'From a frame’s arrival at posed; lower is better. A step: something became slower.',
-      'ms', fromZero(20));
-    this.latency.setLines([{ name: 'handed out by posed', colour: '--plot-1' }, { name: 'drawn here', colour: '--plot-2' }]);
-    this.stages = new Plot('Time in each stage', 'What each stage of the pipeline spends on a frame.', 'µs', fromZero(100));
-    this.label = new Plot('Gesture', 'How sure posed is of the label; 100 %: it is performed.', '%', [0, 105]);
+    this.latency = new Plot(
+      'Latency',
+      'From a frame’s arrival at posed; lower is better. A step: something became slower.',
+      'ms',
+      fromZero(20),
+    );
+    this.latency.setLines([
+      { name: 'handed out by posed', colour: '--plot-1' },
+      { name: 'drawn here', colour: '--plot-2' },
+    ]);
+    this.stages = new Plot(
+      'Time in each stage',
+      'What each stage of the pipeline spends on a frame.',
+      'µs',
+      fromZero(100),
+    );
+    this.label = new Plot(
+      'Gesture',
+      'How sure posed is of the label; 100 %: it is performed.',
+      '%',
+      [0, 105],
+    );
     this.label.setLines([{ name: 'probability', colour: '--plot-3' }]);
-    this.plots = el('div.plots', {}, ...[this.latency, this.stages, this.label].map((plot) => plot.element));
+    this.plots = el(
+      'div.plots',
+      {},
+      ...[this.latency, this.stages, this.label].map((plot) => plot.element),
+    );
     this.heading = el('h2', {}, 'Instruments');
     element.append(this.heading, this.tiles.element, this.plots);
   }
@@ -47,7 +68,8 @@ export class Instruments {
 
   // A pose was drawn.
   add(stream, drawn_ms) {
-    if (this.clock.known) this.history(stream).add(stream.pose, stream.callback_ms, drawn_ms, this.clock);
+    if (this.clock.known)
+      this.history(stream).add(stream.pose, stream.callback_ms, drawn_ms, this.clock);
   }
 
   // After each animation frame.
@@ -56,8 +78,12 @@ export class Instruments {
     while (this.#frames[0] < now_ms - 1000) this.#frames.shift();
     if (!stream || now_ms - this.#drawn_ms < TURN_MS) return;
     this.#drawn_ms = now_ms;
-    const turns = [() => this.#latency(stream), () => this.#stages(stream), () => this.#label(stream),
-      () => this.tiles.update(stream, this.history(stream), this.#frames.length)];
+    const turns = [
+      () => this.#latency(stream),
+      () => this.#stages(stream),
+      () => this.#label(stream),
+      () => this.tiles.update(stream, this.history(stream), this.#frames.length),
+    ];
     turns[this.#turn % turns.length](stream);
     this.#turn += 1;
   }
@@ -74,7 +100,9 @@ export class Instruments {
     const names = stream.message?.stage ?? [];
     this.stages.element.hidden = stages.length === 0 || names.length === 0;
     if (this.stages.element.hidden) return;
-    this.stages.setLines(names.slice(0, COLOURS.length).map((name, i) => ({ name, colour: COLOURS[i] })));
+    this.stages.setLines(
+      names.slice(0, COLOURS.length).map((name, i) => ({ name, colour: COLOURS[i] })),
+    );
     this.stages.draw(stages, performance.now() / 1000);
   }
 
@@ -83,7 +111,9 @@ export class Instruments {
     this.label.element.hidden = !history.labelled;
     if (this.label.element.hidden) return;
     const { label, labelProbability, performed } = stream.pose;
-    this.label.say(label ? `${performed ? 'performs ' : ''}${label} ${percent(labelProbability)}` : 'none');
+    this.label.say(
+      label ? `${performed ? 'performs ' : ''}${label} ${percent(labelProbability)}` : 'none',
+    );
     this.label.draw(history.label, performance.now() / 1000);
   }
 }

@@ -32,8 +32,12 @@ export class Plot {
     this.range = range;
     this.now = el('span.now');
     this.area = el('div.plot-area');
-    this.element = el('figure.plot', {}, el('figcaption', {},
-      el('h3', {}, title, this.now), el('p.note', {}, sentence)), this.area);
+    this.element = el(
+      'figure.plot',
+      {},
+      el('figcaption', {}, el('h3', {}, title, this.now), el('p.note', {}, sentence)),
+      this.area,
+    );
     new ResizeObserver(() => this.#resize()).observe(this.area);
   }
 
@@ -57,11 +61,21 @@ export class Plot {
   #make() {
     this.#plot?.destroy();
     const series = this.lines.map(({ name, colour }) => ({
-      label: name, stroke: variable(colour), width: 1.6, points: { show: false },
+      label: name,
+      stroke: variable(colour),
+      width: 1.6,
+      points: { show: false },
     }));
-    const seconds = { ...axis('seconds ago'), size: 20, incrs: [5], values: (_, ticks) => ticks.map((t) => (t === 0 ? 'now' : String(-t))) };
+    const seconds = {
+      ...axis('seconds ago'),
+      size: 20,
+      incrs: [5],
+      values: (_, ticks) => ticks.map((t) => (t === 0 ? 'now' : String(-t))),
+    };
     const options = {
-      width: this.#width(), height: HEIGHT_PX, series: [{}, ...series],
+      width: this.#width(),
+      height: HEIGHT_PX,
+      series: [{}, ...series],
       axes: [seconds, axis(this.unit)],
       scales: { x: { time: false, range: [-WINDOW_S, 0] }, y: { range: this.range } },
       legend: { show: this.lines.length > 1, live: false },

@@ -6,25 +6,63 @@ const count = (number) => number.toLocaleString('en');
 
 // Each: name, explanation, text of {stream, history, fps}; empty text: not shown.
 const TILES = [
-  ['Rate', 'frames that posed published in the last second', ({ stats }) => `${stats.rate_hz.toFixed(1)} Hz`],
-  ['In posed', 'arrival to handed out, 50 and 99 % of the last second', ({ stats }) =>
-    (stats.publish?.p99_us > 0 ? `${ms(stats.publish.p50_us / 1000)} / ${ms(stats.publish.p99_us / 1000)}` : '')],
-  ['Arrival to callback', '95 % of the poses took at most this from their arrival at posed to this page', ({ history }) =>
-    ms(history.callback.quantile(0, 0.95))],
-  ['Glass to glass', '95 % of the poses took at most this from their arrival at posed until they were drawn', ({ history }) =>
-    ms(history.latency.quantile(1, 0.95))],
-  ['Lag', 'the smoother waits for newer frames', ({ stats }) =>
-    (stats.lag_frames > 0 ? `${stats.lag_frames} frame${stats.lag_frames === 1 ? '' : 's'}, ${ms(stats.lag_ms)}` : '')],
+  [
+    'Rate',
+    'frames that posed published in the last second',
+    ({ stats }) => `${stats.rate_hz.toFixed(1)} Hz`,
+  ],
+  [
+    'In posed',
+    'arrival to handed out, 50 and 99 % of the last second',
+    ({ stats }) =>
+      stats.publish?.p99_us > 0
+        ? `${ms(stats.publish.p50_us / 1000)} / ${ms(stats.publish.p99_us / 1000)}`
+        : '',
+  ],
+  [
+    'Arrival to callback',
+    '95 % of the poses took at most this from their arrival at posed to this page',
+    ({ history }) => ms(history.callback.quantile(0, 0.95)),
+  ],
+  [
+    'Glass to glass',
+    '95 % of the poses took at most this from their arrival at posed until they were drawn',
+    ({ history }) => ms(history.latency.quantile(1, 0.95)),
+  ],
+  [
+    'Lag',
+    'the smoother waits for newer frames',
+    ({ stats }) =>
+      stats.lag_frames > 0
+        ? `${stats.lag_frames} frame${stats.lag_frames === 1 ? '' : 's'}, ${ms(stats.lag_ms)}`
+        : '',
+  ],
   ['Jitter', 'how unevenly frames arrive', ({ stream }) => ms(stream.jitter.ms)],
   ['Dropped', 'frames that found a queue full', ({ stats }) => count(stats.dropped)],
   ['Shed', 'frames skipped for newer ones', ({ stats }) => count(stats.shed)],
-  ['Lost in the kernel', 'datagrams that were not read in time', ({ stats }) =>
-    (stats.kernel_dropped > 0 ? count(stats.kernel_dropped) : '')],
-  ['Device clock', 'the device’s clock beside the host’s: offset and drift', ({ stats }) =>
-    (stats.clock_offset_ns === undefined ? '' :
-      `${signed(stats.clock_offset_ns / 1e6, 1)} ms, ${signed(stats.clock_drift_ppm, 1)} ppm`)],
-  ['Connected', 'how often the device connected', ({ stats }) => (stats.connections > 1 ? `${stats.connections} times` : '')],
-  ['Page', 'pictures per second on this screen', ({ fps }) => (fps > 0 ? `${fps.toFixed(0)} fps` : '')],
+  [
+    'Lost in the kernel',
+    'datagrams that were not read in time',
+    ({ stats }) => (stats.kernel_dropped > 0 ? count(stats.kernel_dropped) : ''),
+  ],
+  [
+    'Device clock',
+    'the device’s clock beside the host’s: offset and drift',
+    ({ stats }) =>
+      stats.clock_offset_ns === undefined
+        ? ''
+        : `${signed(stats.clock_offset_ns / 1e6, 1)} ms, ${signed(stats.clock_drift_ppm, 1)} ppm`,
+  ],
+  [
+    'Connected',
+    'how often the device connected',
+    ({ stats }) => (stats.connections > 1 ? `${stats.connections} times` : ''),
+  ],
+  [
+    'Page',
+    'pictures per second on this screen',
+    ({ fps }) => (fps > 0 ? `${fps.toFixed(0)} fps` : ''),
+  ],
 ];
 
 export class Tiles {

@@ -29,7 +29,9 @@ const FINGER = /(Thumb|Index|Middle|Ring|Little)/;
 // The fingers of a lone hand are its parts: 'thumb' to 'little'; others: as above.
 export function partWords(kinematics) {
   const parts = partsOf(kinematics);
-  return kinematics.bones.map((bone, joint) => FINGER.exec(bone)?.[1].toLowerCase() ?? PARTS[parts[joint]]);
+  return kinematics.bones.map(
+    (bone, joint) => FINGER.exec(bone)?.[1].toLowerCase() ?? PARTS[parts[joint]],
+  );
 }
 
 // A hand alone: it has fingers, but no hips.
@@ -44,7 +46,10 @@ export function parseMask(text) {
     const [name, number] = piece.split('=').map((word) => word.trim());
     const factor = Number(number);
     MASK_WORDS.forEach((word, i) => {
-      if (Number.isFinite(factor) && (word === name || word.endsWith(`-${name?.replace(/s$/, '')}`))) {
+      if (
+        Number.isFinite(factor) &&
+        (word === name || word.endsWith(`-${name?.replace(/s$/, '')}`))
+      ) {
         factors[i] = factor;
       }
     });
@@ -55,10 +60,15 @@ export function parseMask(text) {
 // Only parts that differ from 1; equal sides together. Empty: the whole body.
 export function maskText(factors) {
   const pieces = [];
-  const add = (word, factor) => { if (factor !== 1) pieces.push(`${word}=${Number(factor.toFixed(2))}`); };
+  const add = (word, factor) => {
+    if (factor !== 1) pieces.push(`${word}=${Number(factor.toFixed(2))}`);
+  };
   add('trunk', factors[0]);
   add('head', factors[1]);
-  for (const [word, left] of [['arm', 2], ['leg', 4]]) {
+  for (const [word, left] of [
+    ['arm', 2],
+    ['leg', 4],
+  ]) {
     if (factors[left] === factors[left + 1]) {
       add(`${word}s`, factors[left]);
     } else {

@@ -7,9 +7,15 @@ const IDENTITY = [0, 0, 0, 1];
 // Whether the message's lists fit each other and parents come before their children.
 export function isSound({ parent, offset_m, humanoid_bone, T_world_joint_xyzw, root_joint }) {
   const count = parent.length;
-  return count > 0 && count <= 512 && offset_m.length === 3 * count &&
-    T_world_joint_xyzw.length === 4 * count && humanoid_bone.length === count &&
-    root_joint < count && parent.every((above, joint) => above >= -1 && above < joint);
+  return (
+    count > 0 &&
+    count <= 512 &&
+    offset_m.length === 3 * count &&
+    T_world_joint_xyzw.length === 4 * count &&
+    humanoid_bone.length === count &&
+    root_joint < count &&
+    parent.every((above, joint) => above >= -1 && above < joint)
+  );
 }
 
 export class Kinematics {
@@ -23,7 +29,8 @@ export class Kinematics {
     this.offset = Float32Array.from(message.offset_m);
     this.rest = Float32Array.from(message.T_world_joint_xyzw);
     const tips = message.end_site_m;
-    this.tip = tips.length === 3 * count ? Float32Array.from(tips) : new Float32Array(3 * count).fill(NaN);
+    this.tip =
+      tips.length === 3 * count ? Float32Array.from(tips) : new Float32Array(3 * count).fill(NaN);
     this.root = message.root_joint;
     this.rotation = new Float32Array(4 * count); // in the world
     this.position = new Float32Array(3 * count); // in the world [m]

@@ -2,8 +2,14 @@
 
 // out[o] = a[i] b[j]: first b, then a. `out` may be one of the others.
 export function multiply(out, o, a, i, b, j) {
-  const ax = a[i], ay = a[i + 1], az = a[i + 2], aw = a[i + 3];
-  const bx = b[j], by = b[j + 1], bz = b[j + 2], bw = b[j + 3];
+  const ax = a[i],
+    ay = a[i + 1],
+    az = a[i + 2],
+    aw = a[i + 3];
+  const bx = b[j],
+    by = b[j + 1],
+    bz = b[j + 2],
+    bw = b[j + 3];
   out[o] = aw * bx + ax * bw + ay * bz - az * by;
   out[o + 1] = aw * by - ax * bz + ay * bw + az * bx;
   out[o + 2] = aw * bz + ax * by - ay * bx + az * bw;
@@ -20,8 +26,13 @@ export function invert(out, o, q, i) {
 
 // out[o] = v[j] turned by q[i].
 export function rotate(out, o, q, i, v, j) {
-  const qx = q[i], qy = q[i + 1], qz = q[i + 2], qw = q[i + 3];
-  const vx = v[j], vy = v[j + 1], vz = v[j + 2];
+  const qx = q[i],
+    qy = q[i + 1],
+    qz = q[i + 2],
+    qw = q[i + 3];
+  const vx = v[j],
+    vy = v[j + 1],
+    vz = v[j + 2];
   const tx = 2 * (qy * vz - qz * vy);
   const ty = 2 * (qz * vx - qx * vz);
   const tz = 2 * (qx * vy - qy * vx);

@@ -9,8 +9,11 @@ import { StyleControls } from './style_controls.js';
 
 // What the controls depend on.
 function shapeOf({ name, stats }) {
-  const stages = stats.stage.map(({ name: stage, parameter, word }) =>
-    [stage, parameter.map((one) => one.name), stage === 'style' ? word : word.length > 0]);
+  const stages = stats.stage.map(({ name: stage, parameter, word }) => [
+    stage,
+    parameter.map((one) => one.name),
+    stage === 'style' ? word : word.length > 0,
+  ]);
   return JSON.stringify([name, stages, stats.device_info !== '']);
 }
 
@@ -52,12 +55,19 @@ export class Chosen {
     const find = (name) => stream.stage(name);
     this.style = find('style') ? new StyleControls(stream, control) : null;
     this.gesture = find('generate')?.word.length > 0 ? new GestureControls(stream, control) : null;
-    const models = ['style', 'generate'].filter(find).map((kind) => new ModelControls(stream, kind, this.context));
+    const models = ['style', 'generate']
+      .filter(find)
+      .map((kind) => new ModelControls(stream, kind, this.context));
     const more = new Parameters(stream, control);
     this.#parts = [this.style, this.gesture, ...models, more].filter((part) => part !== null);
     const glove = isGlove(stream) ? [new GloveLine(stream, this.endpoint())] : [];
     this.fields.replaceChildren(...this.#parts.map((part) => part.element));
-    this.element.replaceChildren(el('h2', {}, stream.name), this.reason, this.fields, ...glove.map((part) => part.element));
+    this.element.replaceChildren(
+      el('h2', {}, stream.name),
+      this.reason,
+      this.fields,
+      ...glove.map((part) => part.element),
+    );
   }
 
   // After each animation frame.

@@ -13,24 +13,36 @@ export class GestureControls {
     this.name = stream.name;
     this.control = control;
     this.line = el('input', {
-      type: 'text', value: stream.name in lines ? lines[stream.name] : '', placeholder: 'g 1 c 3 4 p',
-      autocomplete: 'off', spellcheck: false, maxLength: 2000,
+      type: 'text',
+      value: stream.name in lines ? lines[stream.name] : '',
+      placeholder: 'g 1 c 3 4 p',
+      autocomplete: 'off',
+      spellcheck: false,
+      maxLength: 2000,
     });
-    this.line.oninput = () => { lines[this.name] = this.line.value; };
+    this.line.oninput = () => {
+      lines[this.name] = this.line.value;
+    };
     this.tempo = new Slider('Tempo', { ...TEMPO, step: 0.05, send: async () => {} });
     this.tempo.follow(1);
     this.loop = el('input', { type: 'checkbox' });
     const clear = el('button.quiet', { type: 'button', onclick: () => this.#write('') }, 'Clear');
     this.chips = el('div.chips', { aria: { label: 'Gestures of the model' } });
-    const form = el('form', { onsubmit: (event) => this.#play(event) },
+    const form = el(
+      'form',
+      { onsubmit: (event) => this.#play(event) },
       labelled('Gestures to perform', this.line),
       this.chips,
       this.tempo.element,
-      el('div.buttons', {},
+      el(
+        'div.buttons',
+        {},
         el('button.strong', { type: 'submit' }, 'Play'),
         el('button', { type: 'button', onclick: () => this.#stop() }, 'Stop'),
         clear,
-        el('label.check', {}, this.loop, 'Loop')));
+        el('label.check', {}, this.loop, 'Loop'),
+      ),
+    );
     this.element.append(form);
   }
 
@@ -41,7 +53,10 @@ export class GestureControls {
 
   #play(event) {
     event?.preventDefault();
-    const word = this.line.value.trim().split(/\s+/).filter((label) => label !== '');
+    const word = this.line.value
+      .trim()
+      .split(/\s+/)
+      .filter((label) => label !== '');
     if (word.length === 0) {
       this.line.focus();
       return;
@@ -50,13 +65,17 @@ export class GestureControls {
       { key: 'tempo', value: this.tempo.value },
       { key: 'loop', value: this.loop.checked ? 1 : 0 },
     ];
-    this.control({ stage_command: { stream: this.name, name: 'generate.play', word, number } },
-      `${this.name}: performs ${word.join(' ')}`);
+    this.control(
+      { stage_command: { stream: this.name, name: 'generate.play', word, number } },
+      `${this.name}: performs ${word.join(' ')}`,
+    );
   }
 
   #stop() {
-    this.control({ stage_command: { stream: this.name, name: 'generate.stop-playing', word: [], number: [] } },
-      `${this.name}: performs no more`);
+    this.control(
+      { stage_command: { stream: this.name, name: 'generate.stop-playing', word: [], number: [] } },
+      `${this.name}: performs no more`,
+    );
   }
 
   play() {
@@ -73,7 +92,11 @@ export class GestureControls {
 
   #chip(label) {
     const add = () => this.#write(`${this.line.value.trim()} ${label}`.trim());
-    const chip = el('button.chip', { type: 'button', onclick: add, title: `add ${label} to the line` }, label);
+    const chip = el(
+      'button.chip',
+      { type: 'button', onclick: add, title: `add ${label} to the line` },
+      label,
+    );
     this.#chips.set(label, chip);
     return chip;
   }

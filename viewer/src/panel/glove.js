@@ -3,11 +3,17 @@ import { el, write } from './dom.js';
 
 export class GloveLine {
   constructor(stream, endpoint) {
-    const text = `posed calibrate --connect ${endpoint} --stream ${stream.name} --user ann --out ann.toml`;
+    const text =
+      `posed calibrate --connect ${endpoint} --stream ${stream.name}` +
+      ' --user ann --out ann.toml';
     this.line = el('code', { tabIndex: 0 }, text);
     this.button = el('button.quiet', { type: 'button', onclick: () => this.#copy(text) }, 'Copy');
-    this.element = el('div.group', {},
-      el('p.note', {}, 'Calibrate this glove in a terminal:'), el('div.copy', {}, this.line, this.button));
+    this.element = el(
+      'div.group',
+      {},
+      el('p.note', {}, 'Calibrate this glove in a terminal:'),
+      el('div.copy', {}, this.line, this.button),
+    );
   }
 
   async #copy(text) {

@@ -22,20 +22,33 @@ const SEEN = [
   ['Red part', 'a part of the body without a value'],
 ];
 
-const rows = (list, tag) => el('dl', {}, ...list.flatMap(([key, text]) =>
-  [el('dt', {}, el(tag, {}, key)), el('dd', {}, text)]));
+const rows = (list, tag) =>
+  el(
+    'dl',
+    {},
+    ...list.flatMap(([key, text]) => [el('dt', {}, el(tag, {}, key)), el('dd', {}, text)]),
+  );
 
 export class Help {
   constructor(dialog, button) {
     this.dialog = dialog;
     const close = el('button', { type: 'button', onclick: () => dialog.close() }, 'Close');
     dialog.append(
-      el('h2', { id: 'help-title' }, 'What you see'), rows(SEEN, 'span'),
-      el('h2', {}, 'Keys'), rows(KEYS, 'kbd'),
-      el('p.note', {}, 'Drag to turn, scroll to come closer. Drop a .vrm file on the scene to see your avatar move.'),
-      close);
+      el('h2', { id: 'help-title' }, 'What you see'),
+      rows(SEEN, 'span'),
+      el('h2', {}, 'Keys'),
+      rows(KEYS, 'kbd'),
+      el(
+        'p.note',
+        {},
+        'Drag to turn, scroll to come closer. Drop a .vrm file on the scene to see your avatar move.',
+      ),
+      close,
+    );
     button.onclick = () => this.toggle();
-    dialog.onclick = (event) => { if (event.target === dialog) dialog.close(); };
+    dialog.onclick = (event) => {
+      if (event.target === dialog) dialog.close();
+    };
   }
 
   toggle() {

@@ -2,9 +2,14 @@
 import { el } from './dom.js';
 
 const ENTRIES = [
-  ['styled', 'styled by posed'], ['shown', 'published by posed'], ['raw', 'raw, as captured'],
-  ['contact', 'foot stands'], ['predicted', 'predicted'],
-  ['held', 'held'], ['stale', 'stale'], ['no-value', 'no value'],
+  ['styled', 'styled by posed'],
+  ['shown', 'published by posed'],
+  ['raw', 'raw, as captured'],
+  ['contact', 'foot stands'],
+  ['predicted', 'predicted'],
+  ['held', 'held'],
+  ['stale', 'stale'],
+  ['no-value', 'no value'],
 ];
 const QUALITY = [null, 'predicted', 'held', 'stale'];
 
@@ -25,7 +30,9 @@ function seen(world) {
 
 // Returns the function that keeps `list` right.
 export function legend(list) {
-  const items = new Map(ENTRIES.map(([key, text]) => [key, el('li', { data: { key }, hidden: true }, text)]));
+  const items = new Map(
+    ENTRIES.map(([key, text]) => [key, el('li', { data: { key }, hidden: true }, text)]),
+  );
   list.append(...items.values());
   return (world) => {
     const keys = seen(world);

@@ -18,7 +18,9 @@ export class ModelControls {
 
   async #list() {
     const reply = await this.requests.ask({ list_models: {} });
-    this.names = (reply.ok ? reply.model : []).filter(({ kind }) => kind === this.kind).map(({ name }) => name);
+    this.names = (reply.ok ? reply.model : [])
+      .filter(({ kind }) => kind === this.kind)
+      .map(({ name }) => name);
     this.#fill();
   }
 
@@ -28,12 +30,16 @@ export class ModelControls {
     this.choice.replaceChildren(...all.map((name) => el('option', { value: name }, name)));
     this.choice.value = this.current ?? '';
     this.choice.disabled = names.length === 0;
-    this.choice.title = names.length === 0 ? 'the daemon offers no list: [control] models names a folder' : '';
+    this.choice.title =
+      names.length === 0 ? 'the daemon offers no list: [control] models names a folder' : '';
   }
 
   async #use() {
     const { value } = this.choice;
-    const reply = await this.control({ use_model: { stream: this.name, name: value } }, `${this.name}: model ${value}`);
+    const reply = await this.control(
+      { use_model: { stream: this.name, name: value } },
+      `${this.name}: model ${value}`,
+    );
     if (!reply.ok) this.#fill();
   }
 
@@ -44,7 +50,9 @@ export class ModelControls {
     this.progress.hidden = false;
     const bytes = new Uint8Array(await file.arrayBuffer());
     const ask = (request) => this.requests.ask(request);
-    const reply = await sendModel(ask, this.name, file.name, bytes, (share) => { this.progress.value = share; });
+    const reply = await sendModel(ask, this.name, file.name, bytes, (share) => {
+      this.progress.value = share;
+    });
     this.progress.hidden = true;
     const what = `${this.name}: model ${file.name}`;
     if (reply.ok) this.acks.say(`${what}: applied at frame ${reply.sequence}`, 'good');

@@ -17,15 +17,30 @@ export class Parameters {
         if (!SHOWN_ELSEWHERE.has(whole)) rows.push(this.#row(whole, FLAGS.has(name), text !== ''));
       }
     }
-    this.element = el('details', { hidden: rows.length === 0 }, el('summary', {}, 'More parameters'), ...rows);
+    this.element = el(
+      'details',
+      { hidden: rows.length === 0 },
+      el('summary', {}, 'More parameters'),
+      ...rows,
+    );
   }
 
   #row(whole, isFlag, isText) {
-    const field = el('input', { type: isFlag ? 'checkbox' : isText ? 'text' : 'number', step: 'any' });
+    const field = el('input', {
+      type: isFlag ? 'checkbox' : isText ? 'text' : 'number',
+      step: 'any',
+    });
     field.onchange = () => {
-      const value = isFlag ? { flag: field.checked } : isText ? { text: field.value } : { number: Number(field.value) };
+      const value = isFlag
+        ? { flag: field.checked }
+        : isText
+          ? { text: field.value }
+          : { number: Number(field.value) };
       const shown = isFlag ? field.checked : field.value;
-      this.control({ set_parameter: { stream: this.name, name: whole, ...value } }, `${this.name}: ${whole} ${shown}`);
+      this.control(
+        { set_parameter: { stream: this.name, name: whole, ...value } },
+        `${this.name}: ${whole} ${shown}`,
+      );
     };
     this.#fields.set(whole, field);
     return labelled(whole, field);

@@ -13,7 +13,13 @@ export class Slider {
     this.latest = new Latest(send);
     this.range = el('input', { type: 'range', min: shown[0], max: shown[1], step, title: hint });
     this.range.setAttribute('value', '0');
-    this.field = el('input', { type: 'number', min, max, step: 5 * step, aria: { label: `${text}, number` } });
+    this.field = el('input', {
+      type: 'number',
+      min,
+      max,
+      step: 5 * step,
+      aria: { label: `${text}, number` },
+    });
     this.range.oninput = () => this.#moved(Number(this.range.value), this.range);
     this.field.onchange = () => this.#moved(Number(this.field.value), this.field);
     this.note = el('span.note');
@@ -35,7 +41,10 @@ export class Slider {
 
   // By the keyboard.
   nudge(step) {
-    const value = Math.min(Math.max(this.value + step, Number(this.field.min)), Number(this.field.max));
+    const value = Math.min(
+      Math.max(this.value + step, Number(this.field.min)),
+      Number(this.field.max),
+    );
     this.field.value = value.toFixed(2);
     this.#moved(value, this.field);
   }

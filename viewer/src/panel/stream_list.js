@@ -26,7 +26,8 @@ export class StreamList {
   #update(stream, i, isChosen) {
     const { stats } = stream;
     const row = this.#rows.get(stream.name) ?? this.#make(stream.name);
-    if (this.element.children[i] !== row.button) this.element.insertBefore(row.button, this.element.children[i] ?? null);
+    if (this.element.children[i] !== row.button)
+      this.element.insertBefore(row.button, this.element.children[i] ?? null);
     const { word, tone, sentence } = stateOf(stats);
     row.button.setAttribute('aria-checked', String(isChosen));
     row.button.tabIndex = isChosen ? 0 : -1;
@@ -40,11 +41,20 @@ export class StreamList {
   }
 
   #make(name) {
-    const [state, rate, latency] = ['span.state', 'span.number', 'span.number'].map((kind) => el(kind));
+    const [state, rate, latency] = ['span.state', 'span.number', 'span.number'].map((kind) =>
+      el(kind),
+    );
     latency.title = 'half of the frames take at most this from arrival until posed hands them out';
     const sentence = el('span.sentence');
-    const button = el('button.stream', { type: 'button', onclick: () => this.choose(name) },
-      el('strong', {}, name), state, rate, latency, sentence);
+    const button = el(
+      'button.stream',
+      { type: 'button', onclick: () => this.choose(name) },
+      el('strong', {}, name),
+      state,
+      rate,
+      latency,
+      sentence,
+    );
     button.setAttribute('role', 'radio');
     button.onkeydown = (event) => this.#move(event, name);
     const row = { button, state, rate, latency, sentence };

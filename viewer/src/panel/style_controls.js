@@ -12,7 +12,9 @@ const setText = (stream, name, text) => ({ set_parameter: { stream, name, text }
 
 // "feminine=0.6,elderly=0.4" as numbers by name.
 export function parseWeights(text, names) {
-  const given = new Map(text.split(',').map((piece) => piece.split('=').map((word) => word.trim())));
+  const given = new Map(
+    text.split(',').map((piece) => piece.split('=').map((word) => word.trim())),
+  );
   if (text === '') return names.map((_, i) => (i === 0 ? 1 : 0));
   return names.map((name) => Number(given.get(name) ?? 0) || 0);
 }
@@ -36,21 +38,32 @@ export class StyleControls {
       max: LARGEST_ALPHA,
       shown: SHOWN_ALPHA,
       hint: '0: as captured, 1: as learned, −1: the opposite',
-      send: (number) => this.control(
-        { set_parameter: { stream: this.name, name: 'style.alpha', number } },
-        `${this.name}: α ${signed(number, 2)}`),
+      send: (number) =>
+        this.control(
+          { set_parameter: { stream: this.name, name: 'style.alpha', number } },
+          `${this.name}: α ${signed(number, 2)}`,
+        ),
     });
-    const scale = el('p.scale', { aria: { hidden: 'true' } },
-      ...['0 as captured', '1 as learned'].map((word) => el('span', {}, word)));
+    const scale = el(
+      'p.scale',
+      { aria: { hidden: 'true' } },
+      ...['0 as captured', '1 as learned'].map((word) => el('span', {}, word)),
+    );
     this.facts = el('p.note');
     this.element.append(this.alpha.element, scale, this.facts);
   }
 
   #addWeights(styles) {
     this.styles = styles;
-    this.weights = styles.map((style) => new Slider(style, {
-      min: 0, max: 1, step: 0.01, send: () => this.#sendWeights(),
-    }));
+    this.weights = styles.map(
+      (style) =>
+        new Slider(style, {
+          min: 0,
+          max: 1,
+          step: 0.01,
+          send: () => this.#sendWeights(),
+        }),
+    );
     const box = el('details', { open: true }, el('summary', {}, 'Mixture of styles'));
     box.append(...this.weights.map(({ element }) => element));
     this.element.append(box);
@@ -58,14 +71,21 @@ export class StyleControls {
 
   #sendWeights() {
     const text = this.styles
-      .map((style, i) => `${style}=${this.weights[i].value.toFixed(2)}`).join(',');
+      .map((style, i) => `${style}=${this.weights[i].value.toFixed(2)}`)
+      .join(',');
     return this.control(setText(this.name, 'style.weights', text), `${this.name}: ${text}`);
   }
 
   #addMask() {
-    this.mask = PARTS.map((part) => new Slider(part, {
-      min: 0, max: 1, step: 0.01, send: () => this.#sendMask(),
-    }));
+    this.mask = PARTS.map(
+      (part) =>
+        new Slider(part, {
+          min: 0,
+          max: 1,
+          step: 0.01,
+          send: () => this.#sendMask(),
+        }),
+    );
     const box = el('details', {}, el('summary', {}, 'Share of the style by body part'));
     box.append(...this.mask.map(({ element }) => element));
     this.element.append(box);
@@ -97,8 +117,11 @@ export class StyleControls {
   #writeFacts({ style_gate, style_estimate }) {
     const facts = [];
     if (style_gate !== undefined) {
-      facts.push(style_gate > 0.95 ? 'the model knows this motion' :
-        `the model knows this motion to ${Math.round(100 * style_gate)} %: the style is faded`);
+      facts.push(
+        style_gate > 0.95
+          ? 'the model knows this motion'
+          : `the model knows this motion to ${Math.round(100 * style_gate)} %: the style is faded`,
+      );
     }
     if (style_estimate !== undefined) {
       facts.push(`the input shows ${signed(style_estimate, 2)} of the style by itself`);

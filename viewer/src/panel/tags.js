@@ -10,7 +10,7 @@ function styledWords(stream) {
 }
 
 const labelWords = ({ verb, label, probability }) =>
-  (verb === 'performs' ? `performs ${label}` : `${label}, ${percent(probability)} sure`);
+  verb === 'performs' ? `performs ${label}` : `${label}, ${percent(probability)} sure`;
 
 function words(stream, main) {
   const parts = [];

@@ -9,7 +9,12 @@ export class Takes {
   constructor(form, control) {
     this.form = form;
     this.control = control;
-    this.name = el('input', { type: 'text', maxLength: LONGEST_NAME, placeholder: 'take name', aria: { label: 'Take name' } });
+    this.name = el('input', {
+      type: 'text',
+      maxLength: LONGEST_NAME,
+      placeholder: 'take name',
+      aria: { label: 'Take name' },
+    });
     this.button = el('button', { type: 'submit' }, 'Start take');
     this.words = el('span.recording');
     this.fields = el('fieldset', {}, this.name, this.button);
@@ -24,7 +29,10 @@ export class Takes {
     if (this.form.hidden || this.fields.disabled) return;
     const start = !this.#running;
     const name = start ? this.name.value.trim() : '';
-    this.control({ take: { start, name } }, start ? `take ${name || 'without a name'} begins` : 'take ends');
+    this.control(
+      { take: { start, name } },
+      start ? `take ${name || 'without a name'} begins` : 'take ends',
+    );
   }
 
   update(stats, readOnlyReason) {

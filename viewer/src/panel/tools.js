@@ -13,13 +13,32 @@ export class Tools {
   // avatars: {wear(name | null), load(file)}
   constructor(element, world, avatars) {
     this.world = world;
-    this.raw = el('button', { type: 'button', onclick: () => this.nextRaw(), title: 'The pose as captured (r)' });
-    this.trails = el('button', { type: 'button', onclick: () => this.toggleTrails(), title: 'Paths and prints of the feet (t)' }, 'Trails');
+    this.raw = el('button', {
+      type: 'button',
+      onclick: () => this.nextRaw(),
+      title: 'The pose as captured (r)',
+    });
+    this.trails = el(
+      'button',
+      {
+        type: 'button',
+        onclick: () => this.toggleTrails(),
+        title: 'Paths and prints of the feet (t)',
+      },
+      'Trails',
+    );
     for (const [i, view] of VIEWS.entries()) {
-      const button = el('button', { type: 'button', onclick: () => world.views.set(view), title: `${word(view)} (${i + 1})` }, word(view));
+      const button = el(
+        'button',
+        { type: 'button', onclick: () => world.views.set(view), title: `${word(view)} (${i + 1})` },
+        word(view),
+      );
       this.#views.set(view, button);
     }
-    this.avatar = el('select', { aria: { label: 'Figure' }, title: 'How bodies look; drop a .vrm file on the scene for your own' });
+    this.avatar = el('select', {
+      aria: { label: 'Figure' },
+      title: 'How bodies look; drop a .vrm file on the scene for your own',
+    });
     this.avatar.onchange = () => avatars.wear(this.avatar.value || null);
     element.append(
       el('div.joined', {}, ...this.#views.values()),
@@ -34,11 +53,15 @@ export class Tools {
   }
 
   #mark(name) {
-    for (const [view, button] of this.#views) button.setAttribute('aria-pressed', String(view === name));
+    for (const [view, button] of this.#views)
+      button.setAttribute('aria-pressed', String(view === name));
   }
 
   setAvatars(names, chosen) {
-    this.avatar.replaceChildren(el('option', { value: '' }, 'Capsules'), ...names.map((name) => el('option', { value: name }, word(name))));
+    this.avatar.replaceChildren(
+      el('option', { value: '' }, 'Capsules'),
+      ...names.map((name) => el('option', { value: name }, word(name))),
+    );
     this.avatar.value = chosen;
   }
 

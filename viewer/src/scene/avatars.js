@@ -18,7 +18,9 @@ export class Avatars {
       event.preventDefault();
       stage.dataset.drop = '';
     });
-    stage.addEventListener('dragleave', () => { delete stage.dataset.drop; });
+    stage.addEventListener('dragleave', () => {
+      delete stage.dataset.drop;
+    });
     stage.addEventListener('drop', async (event) => {
       event.preventDefault();
       delete stage.dataset.drop;

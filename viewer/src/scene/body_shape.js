@@ -11,11 +11,23 @@ const SHORT_M = 1e-3;
 
 // Radii [m] of a person of usual height, at the bone's own joint.
 const RADII = [
-  [/^hips$/, 0.118], [/^spine$/, 0.112], [/^chest$/, 0.132], [/^upperChest$/, 0.13],
-  [/^neck$/, 0.048], [/^head$/, 0.055], [/Shoulder$/, 0.062], [/UpperArm$/, 0.05],
-  [/LowerArm$/, 0.04], [/Hand$/, 0.032], [/UpperLeg$/, 0.078], [/LowerLeg$/, 0.056],
-  [/Foot$/, 0.042], [/Toes$/, 0.034],
-  [/Thumb/, 0.0115], [/Little/, 0.0085], [/(Index|Middle|Ring)/, 0.0098],
+  [/^hips$/, 0.118],
+  [/^spine$/, 0.112],
+  [/^chest$/, 0.132],
+  [/^upperChest$/, 0.13],
+  [/^neck$/, 0.048],
+  [/^head$/, 0.055],
+  [/Shoulder$/, 0.062],
+  [/UpperArm$/, 0.05],
+  [/LowerArm$/, 0.04],
+  [/Hand$/, 0.032],
+  [/UpperLeg$/, 0.078],
+  [/LowerLeg$/, 0.056],
+  [/Foot$/, 0.042],
+  [/Toes$/, 0.034],
+  [/Thumb/, 0.0115],
+  [/Little/, 0.0085],
+  [/(Index|Middle|Ring)/, 0.0098],
 ];
 const TRUNK = /^(hips|spine|chest|upperChest)$/;
 
@@ -114,7 +126,8 @@ class Builder {
   palm(wrist) {
     const first = [];
     for (let joint = 0; joint < this.bones.length; joint += 1) {
-      if (this.kinematics.parent[joint] === wrist && /Proximal/.test(this.bones[joint])) first.push(joint);
+      if (this.kinematics.parent[joint] === wrist && /Proximal/.test(this.bones[joint]))
+        first.push(joint);
     }
     const thick = 0.0125 * this.scale;
     const from = place(this.places, wrist);
@@ -130,7 +143,10 @@ class Builder {
   }
 
   isPalm(joint, child) {
-    return /(Proximal|Metacarpal)/.test(this.bones[child]) && !/Thumb|Index|Middle|Ring|Little/.test(this.bones[joint]);
+    return (
+      /(Proximal|Metacarpal)/.test(this.bones[child]) &&
+      !/Thumb|Index|Middle|Ring|Little/.test(this.bones[joint])
+    );
   }
 
   build() {
@@ -157,13 +173,18 @@ export function bodyShape(kinematics) {
   const position = Float32Array.from(mesh.position);
   const normal = Float32Array.from(mesh.normal);
   const back = new Float32Array(4 * kinematics.count);
-  for (let joint = 0; joint < kinematics.count; joint += 1) invert(back, 4 * joint, kinematics.rest, 4 * joint);
+  for (let joint = 0; joint < kinematics.count; joint += 1)
+    invert(back, 4 * joint, kinematics.rest, 4 * joint);
   mesh.owner.forEach((joint, i) => {
     for (let k = 0; k < 3; k += 1) position[3 * i + k] -= builder.places[3 * joint + k];
     rotate(position, 3 * i, back, 4 * joint, position, 3 * i);
     rotate(normal, 3 * i, back, 4 * joint, normal, 3 * i);
   });
   return {
-    position, normal, index: mesh.index, owner: Uint16Array.from(mesh.owner), scale: builder.scale,
+    position,
+    normal,
+    index: mesh.index,
+    owner: Uint16Array.from(mesh.owner),
+    scale: builder.scale,
   };
 }

@@ -12,8 +12,11 @@ export class Mesh {
 }
 
 const subtract = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const cross = (a, b) =>
-  [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
 const unit = (v) => {
   const length = Math.hypot(...v) || 1;
   return v.map((value) => value / length);
@@ -23,7 +26,12 @@ const unit = (v) => {
 function directions(from, to) {
   const along = Math.hypot(...subtract(to, from)) > 1e-6 ? unit(subtract(to, from)) : [0, 1, 0];
   const side = Math.abs(along[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
-  const front = unit(subtract(side, along.map((value) => value * dot(side, along))));
+  const front = unit(
+    subtract(
+      side,
+      along.map((value) => value * dot(side, along)),
+    ),
+  );
   return { along, front, across: cross(along, front) };
 }
 
@@ -39,7 +47,11 @@ function rings(length, start_m, end_m) {
   }
   for (let i = 0; i <= ARC; i += 1) {
     const angle = (quarter * i) / ARC;
-    list.push({ at: length + end_m * Math.sin(angle), radius: end_m * Math.cos(angle), slope: angle });
+    list.push({
+      at: length + end_m * Math.sin(angle),
+      radius: end_m * Math.cos(angle),
+      slope: angle,
+    });
   }
   return list;
 }
@@ -54,10 +66,14 @@ export function addCapsule(mesh, from, to, start_m, end_m, owner, flat = 1) {
     for (let i = 0; i < AROUND; i += 1) {
       const turn = (2 * Math.PI * i) / AROUND;
       const [c, s] = [Math.cos(turn), Math.sin(turn)];
-      const normal = [0, 1, 2].map((k) =>
-        Math.cos(slope) * (c * across[k] + (s * front[k]) / flat) + Math.sin(slope) * along[k]);
+      const normal = [0, 1, 2].map(
+        (k) =>
+          Math.cos(slope) * (c * across[k] + (s * front[k]) / flat) + Math.sin(slope) * along[k],
+      );
       for (let k = 0; k < 3; k += 1) {
-        mesh.position.push(from[k] + at * along[k] + radius * (c * across[k] + flat * s * front[k]));
+        mesh.position.push(
+          from[k] + at * along[k] + radius * (c * across[k] + flat * s * front[k]),
+        );
       }
       mesh.normal.push(...unit(normal));
       mesh.owner.push(owner);

@@ -1,8 +1,16 @@
 // A body or hand of capsules in the scene: one mesh whose joints move. A ghost is drawn in two
 // passes, depth first, so that it is evenly translucent where limbs lie behind each other.
 import {
-  Bone, BufferAttribute, BufferGeometry, DetachedBindMode, Group, Matrix4, MeshBasicMaterial, MeshLambertMaterial,
-  Skeleton, SkinnedMesh,
+  Bone,
+  BufferAttribute,
+  BufferGeometry,
+  DetachedBindMode,
+  Group,
+  Matrix4,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  Skeleton,
+  SkinnedMesh,
 } from 'three';
 import { bodyShape } from './body_shape.js';
 import { jointColour } from './palette.js';
@@ -10,7 +18,10 @@ import { jointColour } from './palette.js';
 // A skeleton whose matrices the page writes itself: three.js then walks no tree of bones.
 class DirectSkeleton extends Skeleton {
   constructor(count) {
-    super(Array.from({ length: count }, () => new Bone()), Array.from({ length: count }, () => new Matrix4()));
+    super(
+      Array.from({ length: count }, () => new Bone()),
+      Array.from({ length: count }, () => new Matrix4()),
+    );
   }
 
   update() {} // `Figure.place` has written boneMatrices
@@ -86,7 +97,8 @@ export class Figure {
   place() {
     const { rotation, position, count } = this.kinematics;
     const matrices = this.skeleton.boneMatrices;
-    for (let joint = 0; joint < count; joint += 1) writeMatrix(matrices, 16 * joint, rotation, 4 * joint, position, 3 * joint);
+    for (let joint = 0; joint < count; joint += 1)
+      writeMatrix(matrices, 16 * joint, rotation, 4 * joint, position, 3 * joint);
     this.skeleton.boneTexture.needsUpdate = true;
   }
 
@@ -118,7 +130,10 @@ export class Figure {
 
 // A rotation and a position as a matrix in three.js's order, columns first.
 function writeMatrix(out, o, q, i, p, j) {
-  const x = q[i], y = q[i + 1], z = q[i + 2], w = q[i + 3];
+  const x = q[i],
+    y = q[i + 1],
+    z = q[i + 2],
+    w = q[i + 3];
   out[o] = 1 - 2 * (y * y + z * z);
   out[o + 1] = 2 * (x * y + w * z);
   out[o + 2] = 2 * (x * z - w * y);

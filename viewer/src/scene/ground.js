@@ -42,7 +42,10 @@ export class Ground {
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       uniforms: {
-        line: { value: null }, strong: { value: null }, centre: { value: new Vector3() }, reach: { value: 14 },
+        line: { value: null },
+        strong: { value: null },
+        centre: { value: new Vector3() },
+        reach: { value: 14 },
       },
       transparent: true,
       depthWrite: false,

@@ -70,7 +70,11 @@ export class HandsView {
     const across_m = (this.count ?? 1) * APART_M + 0.03;
     const far = Math.max(HEIGHT_M, across_m / Math.max(this.camera.aspect, 0.2)) / (2 * half);
     this.controls.target.set(0, 0.068, 0);
-    this.camera.position.set(0.3, 0.11, 1).normalize().multiplyScalar(far).add(this.controls.target);
+    this.camera.position
+      .set(0.3, 0.11, 1)
+      .normalize()
+      .multiplyScalar(far)
+      .add(this.controls.target);
     this.controls.update();
   }
 

@@ -16,7 +16,8 @@ export function lanesOf(mains, hasRaw) {
   let next = 0;
   for (const group of groups.values()) {
     const beside = group.some(hasRaw);
-    for (const stream of group) places.set(stream.name, { raw: next, styled: beside ? next + 1 : next });
+    for (const stream of group)
+      places.set(stream.name, { raw: next, styled: beside ? next + 1 : next });
     next += beside ? 2 : 1;
   }
   const middle = (next - 1) / 2;

@@ -17,7 +17,12 @@ export class Lights {
     shadow.radius = 5;
     shadow.normalBias = 0.02;
     Object.assign(shadow.camera, {
-      left: -REACH_M, right: REACH_M, top: REACH_M, bottom: -REACH_M, near: 0.5, far: 16,
+      left: -REACH_M,
+      right: REACH_M,
+      top: REACH_M,
+      bottom: -REACH_M,
+      near: 0.5,
+      far: 16,
     });
     this.group.add(this.sky, this.sun, this.sun.target);
     this.setTheme(theme);

@@ -1,5 +1,5 @@
 // Keeps the page fluent on a machine without a graphics card: when pictures come too slowly, they
-// are drawn coarser, step by step. It never goes back by itself, so that the picture does not waver.
+// are drawn coarser, step by step. It never goes back, so that the picture does not waver.
 
 const SLOW_MS = 40; // between two pictures, on average
 const LOOK_MS = 1500;

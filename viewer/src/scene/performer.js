@@ -18,7 +18,9 @@ export class Performer {
     scene.add(this.figure.group);
     const { own } = this.figure;
     if (stream.isHand) return;
-    this.#trails = feetOf(stream.kinematics).map((foot) => new Trail(foot, { ghost: this.ghost, colour: own }));
+    this.#trails = feetOf(stream.kinematics).map(
+      (foot) => new Trail(foot, { ghost: this.ghost, colour: own }),
+    );
     for (const trail of this.#trails) this.figure.group.add(trail.group);
     this.hips = Math.max(stream.kinematics.jointOf('hips'), 0);
   }
@@ -56,7 +58,9 @@ export class Performer {
   #measure() {
     const { position } = this.stream.kinematics;
     const at = 3 * (this.hips ?? 0);
-    this.centre.set(position[at], position[at + 1], position[at + 2]).add(this.figure.group.position);
+    this.centre
+      .set(position[at], position[at + 1], position[at + 2])
+      .add(this.figure.group.position);
     let top = -Infinity;
     for (let i = 1; i < position.length; i += 3) top = Math.max(top, position[i]);
     this.top_m += (this.top_m === 0 ? 1 : 0.05) * (top - this.top_m);

@@ -1,5 +1,5 @@
-// The renderer, made for what draws: a graphics card, or the processor in its place. There the edges
-// are not smoothed and shadows have hard ones, which takes a third of the time.
+// The renderer, made for what draws: a graphics card, or the processor in its place. There edges are
+// not smoothed and shadows are hard, which takes less than half of the time.
 import { BasicShadowMap, PCFShadowMap, WebGLRenderer } from 'three';
 
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software/i;

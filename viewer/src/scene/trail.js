@@ -1,8 +1,18 @@
 // What the feet leave behind: the path of the toes over the last seconds, a print where a foot
 // stood, and a ring below a foot that stands now.
 import {
-  BufferAttribute, BufferGeometry, CircleGeometry, DynamicDrawUsage, Group, InstancedMesh, Line,
-  LineBasicMaterial, Matrix4, Mesh, MeshBasicMaterial, RingGeometry,
+  BufferAttribute,
+  BufferGeometry,
+  CircleGeometry,
+  DynamicDrawUsage,
+  Group,
+  InstancedMesh,
+  Line,
+  LineBasicMaterial,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  RingGeometry,
 } from 'three';
 import { CONTACT } from './palette.js';
 
@@ -17,9 +27,14 @@ function makeLine(opacity) {
   const place = new BufferAttribute(new Float32Array(3 * POINTS), 3).setUsage(DynamicDrawUsage);
   geometry.setAttribute('position', place);
   const fade = new Float32Array(4 * POINTS);
-  for (let i = 0; i < POINTS; i += 1) fade.set([1, 1, 1, opacity * (i / (POINTS - 1)) ** 1.6], 4 * i);
+  for (let i = 0; i < POINTS; i += 1)
+    fade.set([1, 1, 1, opacity * (i / (POINTS - 1)) ** 1.6], 4 * i);
   geometry.setAttribute('color', new BufferAttribute(fade, 4));
-  const material = new LineBasicMaterial({ vertexColors: true, transparent: true, depthWrite: false });
+  const material = new LineBasicMaterial({
+    vertexColors: true,
+    transparent: true,
+    depthWrite: false,
+  });
   const line = new Line(geometry, material);
   line.frustumCulled = false;
   return line;
@@ -43,7 +58,12 @@ export class Trail {
     this.prints.count = 0;
     this.ring = new Mesh(
       flat(new RingGeometry(0.065, 0.085, 28)),
-      new MeshBasicMaterial({ color: CONTACT, transparent: true, opacity: ghost ? 0.4 : 0.95, depthWrite: false }),
+      new MeshBasicMaterial({
+        color: CONTACT,
+        transparent: true,
+        opacity: ghost ? 0.4 : 0.95,
+        depthWrite: false,
+      }),
     );
     this.ring.visible = false;
     this.group.add(this.line, this.prints, this.ring);

@@ -1,4 +1,4 @@
-// The camera: free, or with what moves, from the front, the side or above. It never cuts: it glides.
+// The camera: free, or with what moves, from the front, the side or above. It glides, never cuts.
 import { PerspectiveCamera, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
@@ -6,7 +6,10 @@ export const VIEWS = ['follow', 'orbit', 'front', 'side', 'top'];
 
 const FIELD_DEG = 34;
 const DIRECTIONS = {
-  follow: [0.62, 0.3, 1], front: [0, 0.12, 1], side: [1, 0.12, 0.001], top: [0, 1, 0.001],
+  follow: [0.62, 0.3, 1],
+  front: [0, 0.12, 1],
+  side: [1, 0.12, 0.001],
+  top: [0, 1, 0.001],
 };
 const GLIDE = 0.12; // share of the way in one frame
 const LEAST_M = 1.2; // half of what is seen across, at least
@@ -66,13 +69,18 @@ export class Views {
   #fitting() {
     const half = Math.tan((FIELD_DEG * Math.PI) / 360);
     const { wide, high } = this.#free;
-    return Math.max(this.#span_m / Math.max(wide, 0.2), 1.28 / Math.max(high - 0.06, 0.2)) / half + 0.35;
+    return (
+      Math.max(this.#span_m / Math.max(wide, 0.2), 1.28 / Math.max(high - 0.06, 0.2)) / half + 0.35
+    );
   }
 
   // covered: {right, bottom}; what is looked at is in the middle of the rest.
   resize(width, height, { right, bottom }) {
     this.camera.aspect = width / Math.max(height, 1);
-    this.#free = { wide: (width - right) / Math.max(height, 1), high: 1 - bottom / Math.max(height, 1) };
+    this.#free = {
+      wide: (width - right) / Math.max(height, 1),
+      high: 1 - bottom / Math.max(height, 1),
+    };
     this.camera.setViewOffset(width, height, right / 2, bottom / 2, width, height);
     if (this.#far_m > 0) this.#far_m = this.#fitting();
   }
@@ -92,7 +100,10 @@ export class Views {
 
   #follow(centre, far) {
     const { target } = this.controls;
-    shift.copy(centre).sub(this.#centre).multiplyScalar(far ? 1 : GLIDE);
+    shift
+      .copy(centre)
+      .sub(this.#centre)
+      .multiplyScalar(far ? 1 : GLIDE);
     this.#centre.add(shift);
     target.add(shift);
     this.camera.position.add(shift);

@@ -39,7 +39,9 @@ export class World {
     this.scene.add(this.ground.group, this.lights.group);
     this.views = new Views(this.canvas, (name) => this.onView?.(name));
     this.views.controls.addEventListener('change', () => this.touch());
-    this.hands = new HandsView(this.inset.querySelector('.hands-area'), this.theme, () => this.touch());
+    this.hands = new HandsView(this.inset.querySelector('.hands-area'), this.theme, () =>
+      this.touch(),
+    );
     this.tags = new NameTags(stage.querySelector('.name-tags'));
     this.setTheme(theme);
     new ResizeObserver(() => this.resize()).observe(stage);
@@ -55,7 +57,8 @@ export class World {
   setTheme(name) {
     this.theme = themeColours(name);
     this.scene.background = this.theme.background;
-    for (const part of [this.ground, this.lights, this.hands, ...this.performers.values()]) part.setTheme(this.theme);
+    for (const part of [this.ground, this.lights, this.hands, ...this.performers.values()])
+      part.setTheme(this.theme);
     this.touch();
   }
 
@@ -103,7 +106,11 @@ export class World {
   #stand(performer, lane, shown) {
     if (!performer) return;
     const yaw = this.#yaw ?? 0;
-    performer.figure.group.position.set(lane * LANE_M * Math.cos(yaw), 0, -lane * LANE_M * Math.sin(yaw));
+    performer.figure.group.position.set(
+      lane * LANE_M * Math.cos(yaw),
+      0,
+      -lane * LANE_M * Math.sin(yaw),
+    );
     performer.shown = shown;
     performer.figure.group.visible = shown && performer.stream.drawable;
     if (!shown) this.tags.hide(performer.stream.name);
@@ -153,12 +160,17 @@ export class World {
     if (!this.#areas.hands || this.stage.dataset.show !== 'both') return { right: 0, bottom: 0 };
     const { bodies, hands } = this.#areas;
     const wide = hands.width > 0.7 * bodies.width;
-    return { right: wide ? 0 : bodies.width - hands.left, bottom: wide ? bodies.height - hands.top : 0 };
+    return {
+      right: wide ? 0 : bodies.width - hands.left,
+      bottom: wide ? bodies.height - hands.top : 0,
+    };
   }
 
   #insetArea() {
     const outer = this.stage.getBoundingClientRect();
-    const { left, top, width, height } = this.inset.querySelector('.hands-area').getBoundingClientRect();
+    const { left, top, width, height } = this.inset
+      .querySelector('.hands-area')
+      .getBoundingClientRect();
     return { left: left - outer.left, top: top - outer.top, width, height };
   }
 
@@ -182,7 +194,8 @@ export class World {
       if (!performer.update(this.options.trails)) continue;
       this.touch();
       performer.figure.group.visible = performer.shown !== false;
-      if (this.#yaw === null && !performer.ghost && performer.stream.isHand === false) this.#face(performer);
+      if (this.#yaw === null && !performer.ghost && performer.stream.isHand === false)
+        this.#face(performer);
       shown(performer);
     }
   }
@@ -207,7 +220,10 @@ export class World {
     let span_m = 0;
     for (const performer of this.performers.values()) {
       if (performer.stream.isHand || !performer.figure.group.visible) continue;
-      span_m = Math.max(span_m, Math.hypot(performer.centre.x - middle.x, performer.centre.z - middle.z));
+      span_m = Math.max(
+        span_m,
+        Math.hypot(performer.centre.x - middle.x, performer.centre.z - middle.z),
+      );
     }
     if (count > 0) this.views.update(middle, span_m, jumped);
     this.ground.follow(this.views.target);
@@ -217,7 +233,8 @@ export class World {
   #draw() {
     const { bodies, hands } = this.#areas;
     const show = this.stage.dataset.show;
-    if (bodies && show !== 'hands') this.#render(this.scene, this.views.camera, bodies, bodies.height);
+    if (bodies && show !== 'hands')
+      this.#render(this.scene, this.views.camera, bodies, bodies.height);
     if (hands) {
       this.hands.controls.update();
       this.#render(this.hands.scene, this.hands.camera, hands, bodies.height);

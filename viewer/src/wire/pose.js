@@ -80,21 +80,49 @@ function clear(pose) {
 
 // By field number << 3 | wire type.
 const FIELDS = {
-  [(2 << 3) | 0]: (pose) => { pose.sequence = reader.uint(); },
-  [(4 << 3) | 0]: (pose) => { pose.arrival_ms = reader.int() / NS_PER_MS; },
-  [(7 << 3) | 5]: (pose) => { pose.skeletonId = reader.fixed32(); },
-  [(8 << 3) | 2]: (pose) => { floats(pose.root_m); },
-  [(9 << 3) | 2]: (pose) => { pose.joints = floats(pose.rotation) >> 2; },
+  [(2 << 3) | 0]: (pose) => {
+    pose.sequence = reader.uint();
+  },
+  [(4 << 3) | 0]: (pose) => {
+    pose.arrival_ms = reader.int() / NS_PER_MS;
+  },
+  [(7 << 3) | 5]: (pose) => {
+    pose.skeletonId = reader.fixed32();
+  },
+  [(8 << 3) | 2]: (pose) => {
+    floats(pose.root_m);
+  },
+  [(9 << 3) | 2]: (pose) => {
+    pose.joints = floats(pose.rotation) >> 2;
+  },
   [(10 << 3) | 2]: validity,
-  [(12 << 3) | 0]: (pose) => { pose.quality = reader.uint(); },
-  [(13 << 3) | 0]: (pose) => { pose.source = reader.uint(); },
-  [(14 << 3) | 2]: (pose) => { pose.label = word(); },
-  [(15 << 3) | 5]: (pose) => { pose.labelProbability = reader.float(); },
-  [(16 << 3) | 0]: (pose) => { pose.lagFrames = reader.uint(); },
-  [(17 << 3) | 5]: (pose) => { pose.lag_ms = reader.float(); },
-  [(20 << 3) | 0]: (pose) => { pose.published_ms = reader.int() / NS_PER_MS; },
-  [(21 << 3) | 2]: (pose) => { pose.stages = floats(pose.stage_us); },
-  [(22 << 3) | 2]: (pose) => { pose.timecode = reader.string(); },
+  [(12 << 3) | 0]: (pose) => {
+    pose.quality = reader.uint();
+  },
+  [(13 << 3) | 0]: (pose) => {
+    pose.source = reader.uint();
+  },
+  [(14 << 3) | 2]: (pose) => {
+    pose.label = word();
+  },
+  [(15 << 3) | 5]: (pose) => {
+    pose.labelProbability = reader.float();
+  },
+  [(16 << 3) | 0]: (pose) => {
+    pose.lagFrames = reader.uint();
+  },
+  [(17 << 3) | 5]: (pose) => {
+    pose.lag_ms = reader.float();
+  },
+  [(20 << 3) | 0]: (pose) => {
+    pose.published_ms = reader.int() / NS_PER_MS;
+  },
+  [(21 << 3) | 2]: (pose) => {
+    pose.stages = floats(pose.stage_us);
+  },
+  [(22 << 3) | 2]: (pose) => {
+    pose.timecode = reader.string();
+  },
 };
 
 export function readPose(bytes, from, pose) {

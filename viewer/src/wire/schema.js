@@ -3,67 +3,120 @@
 // or optional ('?'). A test compares the tables with the .proto files.
 
 export const Skeleton = {
-  1: ['stream', 'string'], 2: ['id', 'fixed32'], 3: ['name', 'string'],
-  4: ['joint_name', 'string', '*'], 5: ['parent', 'sint', '*'], 6: ['offset_m', 'float', '*'],
-  7: ['humanoid_bone', 'string', '*'], 8: ['T_world_joint_xyzw', 'float', '*'],
-  11: ['root_joint', 'uint'], 12: ['rate_hz', 'double'], 13: ['stage', 'string', '*'],
+  1: ['stream', 'string'],
+  2: ['id', 'fixed32'],
+  3: ['name', 'string'],
+  4: ['joint_name', 'string', '*'],
+  5: ['parent', 'sint', '*'],
+  6: ['offset_m', 'float', '*'],
+  7: ['humanoid_bone', 'string', '*'],
+  8: ['T_world_joint_xyzw', 'float', '*'],
+  11: ['root_joint', 'uint'],
+  12: ['rate_hz', 'double'],
+  13: ['stage', 'string', '*'],
   14: ['end_site_m', 'float', '*'],
 };
 
 export const Event = {
-  1: ['stream', 'string'], 2: ['kind', 'uint'], 3: ['time_ns', 'int'], 4: ['sequence', 'uint'],
+  1: ['stream', 'string'],
+  2: ['kind', 'uint'],
+  3: ['time_ns', 'int'],
+  4: ['sequence', 'uint'],
   5: ['text', 'string'],
 };
 
 export const Percentiles = {
-  1: ['p50_us', 'float'], 2: ['p99_us', 'float'], 3: ['max_us', 'float'],
+  1: ['p50_us', 'float'],
+  2: ['p99_us', 'float'],
+  3: ['max_us', 'float'],
 };
 
 export const ParameterStats = {
-  1: ['name', 'string'], 2: ['value', 'double'], 3: ['target', 'double'], 4: ['text', 'string'],
+  1: ['name', 'string'],
+  2: ['value', 'double'],
+  3: ['target', 'double'],
+  4: ['text', 'string'],
 };
 
 export const StageStats = {
-  1: ['name', 'string'], 2: ['time', Percentiles, '?'], 3: ['parameter', ParameterStats, '*'],
-  4: ['model', 'string'], 5: ['word', 'string', '*'],
+  1: ['name', 'string'],
+  2: ['time', Percentiles, '?'],
+  3: ['parameter', ParameterStats, '*'],
+  4: ['model', 'string'],
+  5: ['word', 'string', '*'],
 };
 
 export const StreamStats = {
-  1: ['stream', 'string'], 2: ['driver', 'string'], 3: ['state', 'string'], 4: ['frames', 'uint'],
-  6: ['rate_hz', 'float'], 7: ['dropped', 'uint'], 8: ['shed', 'uint'],
-  12: ['publish', Percentiles, '?'], 13: ['alpha', 'float'], 14: ['model', 'string'],
-  15: ['lag_frames', 'uint'], 16: ['lag_ms', 'float'], 19: ['away', 'bool'],
-  20: ['connections', 'uint'], 21: ['clock_offset_ns', 'int', '?'], 22: ['clock_drift_ppm', 'float'],
-  23: ['link_ns', 'int'], 24: ['identity', 'string'], 25: ['device_info', 'string'],
-  26: ['alpha_target', 'float'], 28: ['stage', StageStats, '*'], 29: ['source_name', 'string'],
-  30: ['body', 'string'], 31: ['refusal', 'string'], 32: ['kernel_dropped', 'uint'],
-  34: ['style_estimate', 'float', '?'], 35: ['style_gate', 'float', '?'],
+  1: ['stream', 'string'],
+  2: ['driver', 'string'],
+  3: ['state', 'string'],
+  4: ['frames', 'uint'],
+  6: ['rate_hz', 'float'],
+  7: ['dropped', 'uint'],
+  8: ['shed', 'uint'],
+  12: ['publish', Percentiles, '?'],
+  13: ['alpha', 'float'],
+  14: ['model', 'string'],
+  15: ['lag_frames', 'uint'],
+  16: ['lag_ms', 'float'],
+  19: ['away', 'bool'],
+  20: ['connections', 'uint'],
+  21: ['clock_offset_ns', 'int', '?'],
+  22: ['clock_drift_ppm', 'float'],
+  23: ['link_ns', 'int'],
+  24: ['identity', 'string'],
+  25: ['device_info', 'string'],
+  26: ['alpha_target', 'float'],
+  28: ['stage', StageStats, '*'],
+  29: ['source_name', 'string'],
+  30: ['body', 'string'],
+  31: ['refusal', 'string'],
+  32: ['kernel_dropped', 'uint'],
+  34: ['style_estimate', 'float', '?'],
+  35: ['style_gate', 'float', '?'],
 };
 
 export const TakeStats = {
-  1: ['number', 'uint'], 2: ['name', 'string'], 3: ['start_ns', 'int'],
+  1: ['number', 'uint'],
+  2: ['name', 'string'],
+  3: ['start_ns', 'int'],
 };
 
 export const Stats = {
-  1: ['time_ns', 'int'], 3: ['stream', StreamStats, '*'], 4: ['cpu_percent', 'float'],
-  5: ['rss_bytes', 'uint'], 6: ['recorder_lost_chunks', 'uint'], 7: ['recorder_errors', 'uint'],
-  8: ['recorder_file', 'string'], 9: ['replay_file', 'string'], 15: ['take', TakeStats, '?'],
+  1: ['time_ns', 'int'],
+  3: ['stream', StreamStats, '*'],
+  4: ['cpu_percent', 'float'],
+  5: ['rss_bytes', 'uint'],
+  6: ['recorder_lost_chunks', 'uint'],
+  7: ['recorder_errors', 'uint'],
+  8: ['recorder_file', 'string'],
+  9: ['replay_file', 'string'],
+  15: ['take', TakeStats, '?'],
 };
 
 const SetParameter = {
-  1: ['stream', 'string'], 2: ['name', 'string'],
-  3: ['number', 'double', '?'], 4: ['flag', 'bool', '?'], 5: ['text', 'string', '?'],
+  1: ['stream', 'string'],
+  2: ['name', 'string'],
+  3: ['number', 'double', '?'],
+  4: ['flag', 'bool', '?'],
+  5: ['text', 'string', '?'],
 };
 
 const NumberEntry = { 1: ['key', 'string'], 2: ['value', 'double'] }; // of a map
 const StageCommand = {
-  1: ['stream', 'string'], 2: ['name', 'string'], 3: ['word', 'string', '*'],
+  1: ['stream', 'string'],
+  2: ['name', 'string'],
+  3: ['word', 'string', '*'],
   4: ['number', NumberEntry, '*'],
 };
 
 const ModelPart = {
-  1: ['stream', 'string'], 2: ['sha256', 'string'], 3: ['total', 'uint'], 4: ['offset', 'uint'],
-  5: ['bytes', 'bytes'], 6: ['name', 'string'],
+  1: ['stream', 'string'],
+  2: ['sha256', 'string'],
+  3: ['total', 'uint'],
+  4: ['offset', 'uint'],
+  5: ['bytes', 'bytes'],
+  6: ['name', 'string'],
 };
 
 const Take = { 1: ['start', 'bool'], 2: ['name', 'string'] };
@@ -71,21 +124,44 @@ const UseModel = { 1: ['stream', 'string'], 2: ['name', 'string'] };
 const Nothing = {};
 
 export const ControlRequest = {
-  3: ['status', Nothing, '?'], 9: ['model_part', ModelPart, '?'],
-  10: ['set_parameter', SetParameter, '?'], 11: ['stage_command', StageCommand, '?'],
-  12: ['take', Take, '?'], 13: ['list_models', Nothing, '?'], 14: ['use_model', UseModel, '?'],
+  3: ['status', Nothing, '?'],
+  9: ['model_part', ModelPart, '?'],
+  10: ['set_parameter', SetParameter, '?'],
+  11: ['stage_command', StageCommand, '?'],
+  12: ['take', Take, '?'],
+  13: ['list_models', Nothing, '?'],
+  14: ['use_model', UseModel, '?'],
 };
 
 const KnownModel = { 1: ['name', 'string'], 2: ['kind', 'string'] };
 
 export const ControlReply = {
-  1: ['ok', 'bool'], 2: ['error', 'string'], 3: ['stream', 'string'], 4: ['sequence', 'uint'],
-  5: ['status', Stats, '?'], 6: ['take', TakeStats, '?'], 7: ['model', KnownModel, '*'],
+  1: ['ok', 'bool'],
+  2: ['error', 'string'],
+  3: ['stream', 'string'],
+  4: ['sequence', 'uint'],
+  5: ['status', Stats, '?'],
+  6: ['take', TakeStats, '?'],
+  7: ['model', KnownModel, '*'],
 };
 
 // posed.v1.Event.Kind, by number.
 export const EVENT_KINDS = [
-  '', 'started', 'stale', 'recovered', 'ended', 'control', 'shed', 'recording gap',
-  'recording error', 'warning', 'playing', 'played', 'lost', 'found', 'calibrated',
-  'clock jumped', 'take',
+  '',
+  'started',
+  'stale',
+  'recovered',
+  'ended',
+  'control',
+  'shed',
+  'recording gap',
+  'recording error',
+  'warning',
+  'playing',
+  'played',
+  'lost',
+  'found',
+  'calibrated',
+  'clock jumped',
+  'take',
 ];

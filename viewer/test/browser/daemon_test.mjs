@@ -11,7 +11,9 @@ import { launch, openPage } from '../support/browser.mjs';
 const BUILD = join(dirname(fileURLToPath(import.meta.url)), '../../../build');
 const LARGEST_PICTURE = 400_000;
 const PATIENCE = { timeout: 30000 };
-const skip = hasDemo() ? false : 'SKIPPED without build/demo (`build/posed demo --prepare build/demo` makes it)';
+const skip = hasDemo()
+  ? false
+  : 'SKIPPED without build/demo (`build/posed demo --prepare build/demo` makes it)';
 const options = { skip, timeout: 120000 };
 
 let browser;
@@ -34,65 +36,86 @@ async function opened(context, url, size) {
 }
 
 const drawn = (page) => page.locator('.name-tag:visible').first().waitFor(PATIENCE);
-const acknowledged = (page, text) => page.locator('.ack', { hasText: text }).first().waitFor(PATIENCE);
-const statsOf = async (name) => (await daemon.ctl('status')).status.stream.find(({ stream }) => stream === name);
+const acknowledged = (page, text) =>
+  page.locator('.ack', { hasText: text }).first().waitFor(PATIENCE);
+const statsOf = async (name) =>
+  (await daemon.ctl('status')).status.stream.find(({ stream }) => stream === name);
 
 // Waits until joints of the stream have moved by a centimetre.
 async function moves(page, name) {
-  const first = await page.waitForFunction((stream) => {
-    const one = globalThis.posedPage.store.streams.get(stream);
-    return one?.drawable ? [...one.kinematics.position] : false;
-  }, name, PATIENCE);
-  await page.waitForFunction(([stream, was]) =>
-    globalThis.posedPage.store.streams.get(stream).kinematics.position.some((value, i) => Math.abs(value - was[i]) > 0.01),
-  [name, await first.jsonValue()], PATIENCE);
+  const first = await page.waitForFunction(
+    (stream) => {
+      const one = globalThis.posedPage.store.streams.get(stream);
+      return one?.drawable ? [...one.kinematics.position] : false;
+    },
+    name,
+    PATIENCE,
+  );
+  await page.waitForFunction(
+    ([stream, was]) =>
+      globalThis.posedPage.store.streams
+        .get(stream)
+        .kinematics.position.some((value, i) => Math.abs(value - was[i]) > 0.01),
+    [name, await first.jsonValue()],
+    PATIENCE,
+  );
 }
 
-test('the demo\'s walker and hand move, and a picture of them is small', options, async (context) => {
-  const page = await opened(context, `${await daemon.view(PAGE)}&fine`);
-  await drawn(page);
-  for (const name of ['walker', 'walker-raw', 'hand']) await moves(page, name);
-  await page.waitForTimeout(8000); // the plots fill
-  const picture = join(BUILD, 'page.png');
-  await page.screenshot({ path: picture });
-  assert.ok(statSync(picture).size < LARGEST_PICTURE);
-  assert.deepEqual(page.errors, []);
-});
+test(
+  "the demo's walker and hand move, and a picture of them is small",
+  options,
+  async (context) => {
+    const page = await opened(context, `${await daemon.view(PAGE)}&fine`);
+    await drawn(page);
+    for (const name of ['walker', 'walker-raw', 'hand']) await moves(page, name);
+    await page.waitForTimeout(8000); // the plots fill
+    const picture = join(BUILD, 'page.png');
+    await page.screenshot({ path: picture });
+    assert.ok(statSync(picture).size < LARGEST_PICTURE);
+    assert.deepEqual(page.errors, []);
+  },
+);
 
-test('alpha, mask, gestures and takes reach the daemon, and it says so', options, async (context) => {
-  const page = await opened(context, await daemon.view(PAGE));
-  await drawn(page);
-  await page.locator('.stream', { hasText: 'walker' }).click();
-  const field = page.getByLabel('Amount of style, α, number');
-  await field.fill('0.3');
-  await field.press('Enter');
-  await acknowledged(page, 'walker: α 0.30: applied at frame');
-  const [, took_ms] = /\((\d+) ms\)/.exec(await page.locator('.ack').first().innerText());
-  console.log(`alpha in effect after ${took_ms} ms`);
-  assert.ok(took_ms < 1000); // 300 on a machine that does nothing else
-  assert.ok(Math.abs((await statsOf('walker')).alphaTarget - 0.3) < 1e-6);
-  await page.getByText('Share of the style by body part').click();
-  await page.getByLabel('head, number').fill('0');
-  await page.getByLabel('head, number').press('Enter');
-  await acknowledged(page, 'head=0: applied');
-  await page.getByLabel('head, number').fill('1');
-  await page.getByLabel('head, number').press('Enter');
-  await acknowledged(page, 'trunk=1: applied');
-  await page.getByLabel('Take name').fill('page');
-  await page.getByRole('button', { name: 'Start take' }).click();
-  await page.locator('.recording', { hasText: 'take 1 “page”' }).waitFor(PATIENCE);
-  await page.getByRole('button', { name: 'End take' }).click();
-  await acknowledged(page, 'take ends');
-  await page.getByLabel('Model', { exact: true }).selectOption('march-to-sway.style');
-  await page.locator('input[type=file]').setInputFiles(join(BUILD, 'demo', 'march-to-sway.style'));
-  await acknowledged(page, 'model march-to-sway.style: applied');
-  await page.locator('.stream', { hasText: 'hand' }).click();
-  await page.getByLabel('Gestures to perform').fill('g 1 c 3 4 p');
-  await page.getByRole('button', { name: 'Play' }).click();
-  await acknowledged(page, 'performs g 1 c 3 4 p: applied');
-  await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
-  assert.deepEqual(page.errors, []);
-});
+test(
+  'alpha, mask, gestures and takes reach the daemon, and it says so',
+  options,
+  async (context) => {
+    const page = await opened(context, await daemon.view(PAGE));
+    await drawn(page);
+    await page.locator('.stream', { hasText: 'walker' }).click();
+    const field = page.getByLabel('Amount of style, α, number');
+    await field.fill('0.3');
+    await field.press('Enter');
+    await acknowledged(page, 'walker: α 0.30: applied at frame');
+    const [, took_ms] = /\((\d+) ms\)/.exec(await page.locator('.ack').first().innerText());
+    console.log(`alpha in effect after ${took_ms} ms`);
+    assert.ok(took_ms < 1000); // 300 on a machine that does nothing else
+    assert.ok(Math.abs((await statsOf('walker')).alphaTarget - 0.3) < 1e-6);
+    await page.getByText('Share of the style by body part').click();
+    await page.getByLabel('head, number').fill('0');
+    await page.getByLabel('head, number').press('Enter');
+    await acknowledged(page, 'head=0: applied');
+    await page.getByLabel('head, number').fill('1');
+    await page.getByLabel('head, number').press('Enter');
+    await acknowledged(page, 'trunk=1: applied');
+    await page.getByLabel('Take name').fill('page');
+    await page.getByRole('button', { name: 'Start take' }).click();
+    await page.locator('.recording', { hasText: 'take 1 “page”' }).waitFor(PATIENCE);
+    await page.getByRole('button', { name: 'End take' }).click();
+    await acknowledged(page, 'take ends');
+    await page.getByLabel('Model', { exact: true }).selectOption('march-to-sway.style');
+    await page
+      .locator('input[type=file]')
+      .setInputFiles(join(BUILD, 'demo', 'march-to-sway.style'));
+    await acknowledged(page, 'model march-to-sway.style: applied');
+    await page.locator('.stream', { hasText: 'hand' }).click();
+    await page.getByLabel('Gestures to perform').fill('g 1 c 3 4 p');
+    await page.getByRole('button', { name: 'Play' }).click();
+    await acknowledged(page, 'performs g 1 c 3 4 p: applied');
+    await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
+    assert.deepEqual(page.errors, []);
+  },
+);
 
 test('a daemon that restarts is live again within 3 s', options, async (context) => {
   const page = await opened(context, await daemon.view(PAGE));

@@ -1,4 +1,4 @@
-// node main.mjs: the tests of the page in a browser; with POSED=path/to/posed, also with the daemon.
+// node main.mjs: the tests of the page in a browser; with POSED=path/to/posed also with the daemon.
 import { hasBrowser } from '../support/browser.mjs';
 
 if (hasBrowser()) {

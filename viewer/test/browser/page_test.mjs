@@ -8,7 +8,9 @@ import { launch, openPage } from '../support/browser.mjs';
 const PATIENCE = { timeout: 30000 };
 
 let browser;
-before(async () => { browser = await launch(); });
+before(async () => {
+  browser = await launch();
+});
 after(() => browser.close());
 
 // A bridge and a page that end with the test, however that ends.
@@ -36,33 +38,49 @@ function pageTest(name, options, use) {
 }
 
 const drawn = (page) => page.locator('.name-tag:visible').first().waitFor(PATIENCE);
-const acknowledged = (page, text) => page.locator('.ack', { hasText: text }).first().waitFor(PATIENCE);
+const acknowledged = (page, text) =>
+  page.locator('.ack', { hasText: text }).first().waitFor(PATIENCE);
 
 // Where joints of a stream are now.
-const places = (page, name) => page.evaluate((stream) =>
-  [...globalThis.posedPage.store.streams.get(stream).kinematics.position], name);
+const places = (page, name) =>
+  page.evaluate(
+    (stream) => [...globalThis.posedPage.store.streams.get(stream).kinematics.position],
+    name,
+  );
 
 pageTest('a body and a hand move, and nothing is said on the console', {}, async (page) => {
   for (const name of ['walker', 'walker-raw', 'hand']) {
     const first = await places(page, name);
-    await page.waitForFunction(([stream, was]) =>
-      globalThis.posedPage.store.streams.get(stream).kinematics.position.some((value, i) => Math.abs(value - was[i]) > 0.01),
-    [name, first], PATIENCE);
+    await page.waitForFunction(
+      ([stream, was]) =>
+        globalThis.posedPage.store.streams
+          .get(stream)
+          .kinematics.position.some((value, i) => Math.abs(value - was[i]) > 0.01),
+      [name, first],
+      PATIENCE,
+    );
   }
-  assert.match(await page.locator('.name-tag[data-kind="raw"]').first().innerText(), /raw, as captured/);
+  assert.match(
+    await page.locator('.name-tag[data-kind="raw"]').first().innerText(),
+    /raw, as captured/,
+  );
   assert.match(await page.locator('.link-text').innerText(), /live from tcp/);
 });
 
-pageTest('the slider sets alpha, and the answer is shown; a refusal, too', {}, async (page, bridge) => {
-  const field = page.getByLabel('Amount of style, α, number');
-  await field.fill('0.35');
-  await field.press('Enter');
-  await acknowledged(page, 'applied at frame');
-  assert.equal(bridge.daemon.bodies[0].target, 0.35);
-  await field.fill('7');
-  await field.press('Enter');
-  await acknowledged(page, 'refused: style.alpha');
-});
+pageTest(
+  'the slider sets alpha, and the answer is shown; a refusal, too',
+  {},
+  async (page, bridge) => {
+    const field = page.getByLabel('Amount of style, α, number');
+    await field.fill('0.35');
+    await field.press('Enter');
+    await acknowledged(page, 'applied at frame');
+    assert.equal(bridge.daemon.bodies[0].target, 0.35);
+    await field.fill('7');
+    await field.press('Enter');
+    await acknowledged(page, 'refused: style.alpha');
+  },
+);
 
 pageTest('keys: arrows choose and change, ? explains, fields type', {}, async (page, bridge) => {
   await page.locator('.stage canvas').focus();
@@ -80,85 +98,116 @@ pageTest('keys: arrows choose and change, ? explains, fields type', {}, async (p
   assert.equal(await page.getByLabel('Gestures to perform').inputValue(), 'g 1 r');
 });
 
-pageTest('a line of gestures is performed, an unknown one refused; chips write the line', { bodies: 0 }, async (page, bridge) => {
-  const line = page.getByLabel('Gestures to perform');
-  await line.fill('g 1 x');
-  await page.getByRole('button', { name: 'Play' }).click();
-  await acknowledged(page, 'does not know');
-  await line.fill('g 1');
-  await page.locator('.chip', { hasText: 'c' }).click();
-  await page.getByRole('button', { name: 'Play' }).click();
-  await acknowledged(page, 'performs g 1 c');
-  assert.deepEqual(bridge.daemon.hands[0].play, ['g', '1', 'c']);
-  await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
-  await page.getByRole('button', { name: 'Stop' }).click();
-  await acknowledged(page, 'performs no more');
-  assert.match(await page.locator('code').innerText(), /posed calibrate .*--stream hand/);
-});
+pageTest(
+  'a line of gestures is performed, an unknown one refused; chips write the line',
+  { bodies: 0 },
+  async (page, bridge) => {
+    const line = page.getByLabel('Gestures to perform');
+    await line.fill('g 1 x');
+    await page.getByRole('button', { name: 'Play' }).click();
+    await acknowledged(page, 'does not know');
+    await line.fill('g 1');
+    await page.locator('.chip', { hasText: 'c' }).click();
+    await page.getByRole('button', { name: 'Play' }).click();
+    await acknowledged(page, 'performs g 1 c');
+    assert.deepEqual(bridge.daemon.hands[0].play, ['g', '1', 'c']);
+    await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
+    await page.getByRole('button', { name: 'Stop' }).click();
+    await acknowledged(page, 'performs no more');
+    assert.match(await page.locator('code').innerText(), /posed calibrate .*--stream hand/);
+  },
+);
 
-pageTest('takes, models, mask and weights become requests of the daemon', {}, async (page, bridge) => {
-  await page.getByLabel('Take name').fill('walk-3');
-  await page.getByRole('button', { name: 'Start take' }).click();
-  await page.locator('.recording', { hasText: 'take 1 “walk-3”' }).waitFor(PATIENCE);
-  await page.getByRole('button', { name: 'End take' }).click();
-  await acknowledged(page, 'take ends');
-  await page.getByLabel('Model', { exact: true }).selectOption('tired.style');
-  await acknowledged(page, 'model tired.style: applied');
-  await page.locator('input[type=file]').setInputFiles({ name: 'own.style', mimeType: '', buffer: Buffer.alloc(70000, 1) });
-  await acknowledged(page, 'model own.style: applied');
-  assert.equal(bridge.requests.filter((request) => request.model_part).length, 3);
-  await page.getByText('Share of the style by body part').click();
-  await page.getByLabel('head, number').fill('0.25');
-  await page.getByLabel('head, number').press('Enter');
-  await acknowledged(page, 'head=0.25');
-  assert.equal(bridge.daemon.bodies[0].mask, 'head=0.25');
-  await page.getByLabel('sway, number').fill('0.4');
-  await page.getByLabel('sway, number').press('Enter');
-  await acknowledged(page, 'sway=0.40');
-  assert.equal(bridge.daemon.bodies[0].weights, 'sway=0.40,march=0.30');
-});
+pageTest(
+  'takes, models, mask and weights become requests of the daemon',
+  {},
+  async (page, bridge) => {
+    await page.getByLabel('Take name').fill('walk-3');
+    await page.getByRole('button', { name: 'Start take' }).click();
+    await page.locator('.recording', { hasText: 'take 1 “walk-3”' }).waitFor(PATIENCE);
+    await page.getByRole('button', { name: 'End take' }).click();
+    await acknowledged(page, 'take ends');
+    await page.getByLabel('Model', { exact: true }).selectOption('tired.style');
+    await acknowledged(page, 'model tired.style: applied');
+    await page
+      .locator('input[type=file]')
+      .setInputFiles({ name: 'own.style', mimeType: '', buffer: Buffer.alloc(70000, 1) });
+    await acknowledged(page, 'model own.style: applied');
+    assert.equal(bridge.requests.filter((request) => request.model_part).length, 3);
+    await page.getByText('Share of the style by body part').click();
+    await page.getByLabel('head, number').fill('0.25');
+    await page.getByLabel('head, number').press('Enter');
+    await acknowledged(page, 'head=0.25');
+    assert.equal(bridge.daemon.bodies[0].mask, 'head=0.25');
+    await page.getByLabel('sway, number').fill('0.4');
+    await page.getByLabel('sway, number').press('Enter');
+    await acknowledged(page, 'sway=0.40');
+    assert.equal(bridge.daemon.bodies[0].weights, 'sway=0.40,march=0.30');
+  },
+);
 
 const rights = { may_control: false, read_only_reason: 'this key may watch only' };
-pageTest('a page that may only look says why, and its controls are off', { rights }, async (page, bridge) => {
-  await page.getByText('Controls are off: this key may watch only').waitFor(PATIENCE);
-  assert.ok(await page.getByLabel('Amount of style, α, number').isDisabled());
-  await page.locator('.stage canvas').focus();
-  await page.keyboard.press('ArrowLeft');
-  await page.keyboard.press('s');
-  assert.deepEqual(bridge.requests.filter((request) => !request.list_models), []);
-});
+pageTest(
+  'a page that may only look says why, and its controls are off',
+  { rights },
+  async (page, bridge) => {
+    await page.getByText('Controls are off: this key may watch only').waitFor(PATIENCE);
+    assert.ok(await page.getByLabel('Amount of style, α, number').isDisabled());
+    await page.locator('.stage canvas').focus();
+    await page.keyboard.press('ArrowLeft');
+    await page.keyboard.press('s');
+    assert.deepEqual(
+      bridge.requests.filter((request) => !request.list_models),
+      [],
+    );
+  },
+);
 
-test('without the token nothing is shown; a page whose token is old says what to do', { timeout: 90000 }, async (context) => {
-  const bridge = await started(context);
-  const page = await opened(context, bridge.url.replace('secret', 'guess'));
-  assert.match(await page.locator('body').innerText(), /refused/);
-  await page.goto(bridge.url);
-  await drawn(page);
-  const { port } = bridge;
-  await bridge.stop();
-  await started(context, { token: 'another' }, port);
-  await page.locator('.link-text', { hasText: 'refused this page: open the URL' }).waitFor(PATIENCE);
-});
+test(
+  'without the token nothing is shown; a page whose token is old says what to do',
+  { timeout: 90000 },
+  async (context) => {
+    const bridge = await started(context);
+    const page = await opened(context, bridge.url.replace('secret', 'guess'));
+    assert.match(await page.locator('body').innerText(), /refused/);
+    await page.goto(bridge.url);
+    await drawn(page);
+    const { port } = bridge;
+    await bridge.stop();
+    await started(context, { token: 'another' }, port);
+    await page
+      .locator('.link-text', { hasText: 'refused this page: open the URL' })
+      .waitFor(PATIENCE);
+  },
+);
 
-test('a bridge that comes back is found again within 3 s, a silent daemon is said', { timeout: 90000 }, async (context) => {
-  const bridge = await started(context);
-  const page = await opened(context, bridge.url);
-  await drawn(page);
-  bridge.say({ type: 'daemon', alive: false, sentence: 'the daemon does not answer' });
-  await page.locator('.link[data-tone="bad"]', { hasText: 'does not answer' }).waitFor(PATIENCE);
-  const { port } = bridge;
-  await bridge.stop();
-  await page.locator('.link[data-tone="busy"]').waitFor(PATIENCE);
-  const began_ms = performance.now();
-  await started(context, {}, port);
-  await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);
-  const took_ms = performance.now() - began_ms;
-  assert.ok(took_ms < 3000, `${took_ms} ms`);
-});
+test(
+  'a bridge that comes back is found again within 3 s, a silent daemon is said',
+  { timeout: 90000 },
+  async (context) => {
+    const bridge = await started(context);
+    const page = await opened(context, bridge.url);
+    await drawn(page);
+    bridge.say({ type: 'daemon', alive: false, sentence: 'the daemon does not answer' });
+    await page.locator('.link[data-tone="bad"]', { hasText: 'does not answer' }).waitFor(PATIENCE);
+    const { port } = bridge;
+    await bridge.stop();
+    await page.locator('.link[data-tone="busy"]').waitFor(PATIENCE);
+    const began_ms = performance.now();
+    await started(context, {}, port);
+    await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);
+    const took_ms = performance.now() - began_ms;
+    assert.ok(took_ms < 3000, `${took_ms} ms`);
+  },
+);
 
 pageTest('a body may wear the mannequin', { hands: 0 }, async (page) => {
   await page.getByLabel('Figure').selectOption('mannequin');
-  await page.waitForFunction(() => globalThis.posedPage.world.performers.get('walker').avatar !== null, undefined, PATIENCE);
+  await page.waitForFunction(
+    () => globalThis.posedPage.world.performers.get('walker').avatar !== null,
+    undefined,
+    PATIENCE,
+  );
   const gap_m = await page.evaluate(() => {
     const { avatar, stream } = globalThis.posedPage.world.performers.get('walker');
     const head = avatar.vrm.humanoid.getRawBoneNode('head');
@@ -170,22 +219,40 @@ pageTest('a body may wear the mannequin', { hands: 0 }, async (page) => {
 });
 
 // Drops a file of the page's own address on the scene, under another name.
-const drop = (page, path, name) => page.evaluate(async ([source, as]) => {
-  const bytes = await (await fetch(source)).arrayBuffer();
-  const dataTransfer = new DataTransfer();
-  dataTransfer.items.add(new File([bytes], as));
-  document.querySelector('.stage').dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
-}, [path, name]);
+const drop = (page, path, name) =>
+  page.evaluate(
+    async ([source, as]) => {
+      const bytes = await (await fetch(source)).arrayBuffer();
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File([bytes], as));
+      document
+        .querySelector('.stage')
+        .dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
+    },
+    [path, name],
+  );
 
-pageTest('a dropped avatar is worn, another file refused with a sentence', { hands: 0 }, async (page) => {
-  await drop(page, '/mannequin.vrm', 'Ann.vrm');
-  await page.waitForFunction(() => globalThis.posedPage.world.performers.get('walker').avatar?.name === 'Ann', undefined, PATIENCE);
-  assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
-  await drop(page, '/page.css', 'notes.txt');
-  await acknowledged(page, 'notes.txt cannot be read as VRM');
-  assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
-});
+pageTest(
+  'a dropped avatar is worn, another file refused with a sentence',
+  { hands: 0 },
+  async (page) => {
+    await drop(page, '/mannequin.vrm', 'Ann.vrm');
+    await page.waitForFunction(
+      () => globalThis.posedPage.world.performers.get('walker').avatar?.name === 'Ann',
+      undefined,
+      PATIENCE,
+    );
+    assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
+    await drop(page, '/page.css', 'notes.txt');
+    await acknowledged(page, 'notes.txt cannot be read as VRM');
+    assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
+  },
+);
 
-pageTest('on a phone nothing is wider than the screen', { width: 390, height: 844 }, async (page) => {
-  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
-});
+pageTest(
+  'on a phone nothing is wider than the screen',
+  { width: 390, height: 844 },
+  async (page) => {
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
+  },
+);

@@ -6,20 +6,31 @@ export const CHROMIUM = process.env.POSED_CHROMIUM ?? '/usr/bin/chromium';
 export const hasBrowser = () => existsSync(CHROMIUM);
 
 const FLAGS = [
-  '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
-  '--disable-component-update', '--disable-sync',
+  '--no-sandbox',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
   // Draws WebGL without a graphics card.
-  '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+  '--use-gl=angle',
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
 ];
 
 export const launch = () => chromium.launch({ executablePath: CHROMIUM, args: FLAGS });
 
-// A page that keeps what it says on the console, except what the WebSocket says while nobody listens.
+// A page that keeps the errors that it says on the console.
 export async function openPage(browser, url, { width = 1440, height = 900, dark = false } = {}) {
-  const context = await browser.newContext({ viewport: { width, height }, colorScheme: dark ? 'dark' : 'light' });
+  const context = await browser.newContext({
+    viewport: { width, height },
+    colorScheme: dark ? 'dark' : 'light',
+  });
   const page = await context.newPage();
   page.errors = [];
-  page.on('console', (message) => { if (message.type() === 'error') page.errors.push(message.text()); });
+  page.on('console', (message) => {
+    if (message.type() === 'error') page.errors.push(message.text());
+  });
   page.on('pageerror', (error) => page.errors.push(String(error.stack ?? error)));
   await page.goto(url);
   return page;

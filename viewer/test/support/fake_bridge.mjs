@@ -10,9 +10,16 @@ import { decode, encode } from './messages.mjs';
 
 export const PAGE = join(dirname(fileURLToPath(import.meta.url)), '../../../build/viewer');
 
-const TYPES = { html: 'text/html', js: 'text/javascript', css: 'text/css', svg: 'image/svg+xml', vrm: 'model/gltf-binary' };
+const TYPES = {
+  html: 'text/html',
+  js: 'text/javascript',
+  css: 'text/css',
+  svg: 'image/svg+xml',
+  vrm: 'model/gltf-binary',
+};
 const FILES = ['index.html', 'page.js', 'page.css', 'icon.svg', 'mannequin.vrm'];
-const POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:";
+const POLICY =
+  "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:";
 
 function framed(topic, bytes) {
   const head = Buffer.from(topic, 'ascii');
@@ -26,11 +33,19 @@ class Tab {
   constructor(socket, bridge) {
     this.socket = socket;
     this.bridge = bridge;
-    this.say({ type: 'hello', version: 'fake', connect: 'tcp://127.0.0.1:5570', same_machine: true, ...bridge.rights });
+    this.say({
+      type: 'hello',
+      version: 'fake',
+      connect: 'tcp://127.0.0.1:5570',
+      same_machine: true,
+      ...bridge.rights,
+    });
     this.say({ type: 'daemon', alive: true, sentence: '' });
     for (const message of bridge.daemon.skeletons()) this.send(...message);
     this.send('stats', encode('Stats', bridge.daemon.stats()));
-    socket.on('message', (data, binary) => (binary ? this.#request(data) : this.#text(JSON.parse(data))));
+    socket.on('message', (data, binary) =>
+      binary ? this.#request(data) : this.#text(JSON.parse(data)),
+    );
   }
 
   say(object) {
@@ -43,7 +58,8 @@ class Tab {
 
   #text(message) {
     if (message.type === 'ready') this.credits = 1;
-    if (message.type === 'clock') this.say({ ...message, monotonic_ns: String(process.hrtime.bigint()) });
+    if (message.type === 'clock')
+      this.say({ ...message, monotonic_ns: String(process.hrtime.bigint()) });
     this.flush();
   }
 
@@ -68,16 +84,25 @@ export class FakeBridge {
   #tabs = new Set();
   #timers = [];
 
-  constructor(daemon, { token = 'secret', rights = { may_control: true, read_only_reason: '' } } = {}) {
+  constructor(
+    daemon,
+    { token = 'secret', rights = { may_control: true, read_only_reason: '' } } = {},
+  ) {
     Object.assign(this, { daemon, token, rights });
   }
 
   async start(port = 0) {
     const files = new Map(FILES.map((name) => [`/${name}`, readFileSync(join(PAGE, name))]));
     this.http = createServer((request, response) => this.#serve(files, request, response));
-    const sockets = new WebSocketServer({ server: this.http, path: '/ws', verifyClient: ({ req }) => this.#knows(req) });
+    const sockets = new WebSocketServer({
+      server: this.http,
+      path: '/ws',
+      verifyClient: ({ req }) => this.#knows(req),
+    });
     sockets.on('connection', (socket) => this.#enter(socket));
-    await new Promise((done) => { this.http.listen(port, '127.0.0.1', done); });
+    await new Promise((done) => {
+      this.http.listen(port, '127.0.0.1', done);
+    });
     this.port = this.http.address().port;
     this.#publish();
     return this;
@@ -114,15 +139,18 @@ export class FakeBridge {
   // A quick timer asks how many frames are due: node's own are too coarse for 120 Hz.
   #publish() {
     const { daemon } = this;
-    this.#timers.push(setInterval(() => {
-      if (daemon.frames >= daemon.time_s() * daemon.rate_hz) return;
-      if (daemon.time_s() * daemon.rate_hz - daemon.frames > 10) daemon.frames = Math.floor(daemon.time_s() * daemon.rate_hz);
-      const poses = daemon.poses();
-      for (const tab of this.#tabs) {
-        for (const [topic, bytes] of poses) tab.unsent.set(topic, bytes);
-        tab.flush();
-      }
-    }, 2));
+    this.#timers.push(
+      setInterval(() => {
+        if (daemon.frames >= daemon.time_s() * daemon.rate_hz) return;
+        if (daemon.time_s() * daemon.rate_hz - daemon.frames > 10)
+          daemon.frames = Math.floor(daemon.time_s() * daemon.rate_hz);
+        const poses = daemon.poses();
+        for (const tab of this.#tabs) {
+          for (const [topic, bytes] of poses) tab.unsent.set(topic, bytes);
+          tab.flush();
+        }
+      }, 2),
+    );
     this.#timers.push(setInterval(() => this.publishStats(), 1000));
   }
 
@@ -135,7 +163,9 @@ export class FakeBridge {
     this.#timers.forEach(clearInterval);
     for (const { socket } of this.#tabs) socket.terminate();
     this.http.closeAllConnections();
-    await new Promise((done) => { this.http.close(done); });
+    await new Promise((done) => {
+      this.http.close(done);
+    });
   }
 }
 

@@ -16,11 +16,24 @@ export class FakeDaemon {
     this.rate_hz = rate_hz;
     this.recording = recording;
     this.began = process.hrtime.bigint();
-    const names = (word, count) => Array.from({ length: count }, (_, i) => (i === 0 ? word : `${word}${i + 1}`));
+    const names = (word, count) =>
+      Array.from({ length: count }, (_, i) => (i === 0 ? word : `${word}${i + 1}`));
     this.bodies = names('walker', bodies).map((name, i) => ({
-      name, id: 100 + i, alpha: 1, target: 1, mask: '', weights: 'sway=0.7,march=0.3', model: 'march-to-sway.style',
+      name,
+      id: 100 + i,
+      alpha: 1,
+      target: 1,
+      mask: '',
+      weights: 'sway=0.7,march=0.3',
+      model: 'march-to-sway.style',
     }));
-    this.hands = names('hand', hands).map((name, i) => ({ name, id: 200 + i, play: [], began_s: 0, loop: false }));
+    this.hands = names('hand', hands).map((name, i) => ({
+      name,
+      id: 200 + i,
+      play: [],
+      began_s: 0,
+      loop: false,
+    }));
   }
 
   now_ns() {
@@ -34,11 +47,17 @@ export class FakeDaemon {
   skeletons() {
     const list = [];
     for (const { name, id } of this.bodies) {
-      list.push(bodySkeleton({ stream: name, id, rate_hz: this.rate_hz, stage: ['style', 'feet'] }));
-      list.push(bodySkeleton({ stream: `${name}-raw`, id: id + 50, rate_hz: this.rate_hz, stage: [] }));
+      list.push(
+        bodySkeleton({ stream: name, id, rate_hz: this.rate_hz, stage: ['style', 'feet'] }),
+      );
+      list.push(
+        bodySkeleton({ stream: `${name}-raw`, id: id + 50, rate_hz: this.rate_hz, stage: [] }),
+      );
     }
     for (const { name, id } of this.hands) {
-      list.push(handSkeleton({ stream: name, id, rate_hz: this.rate_hz, stage: ['generate', 'constrain'] }));
+      list.push(
+        handSkeleton({ stream: name, id, rate_hz: this.rate_hz, stage: ['generate', 'constrain'] }),
+      );
     }
     return list.map((message) => [`skeleton/${message.stream}`, encode('Skeleton', message)]);
   }
@@ -51,10 +70,15 @@ export class FakeDaemon {
     this.bodies.forEach((body, i) => {
       const step = ALPHA_PER_S / this.rate_hz;
       body.alpha += Math.max(-step, Math.min(step, body.target - body.alpha));
-      list.push(this.#frame(body.name, body.id, walk(time_s + 0.3 * i, body.alpha), { stage_us: [90 + 20 * Math.random(), 30] }));
+      list.push(
+        this.#frame(body.name, body.id, walk(time_s + 0.3 * i, body.alpha), {
+          stage_us: [90 + 20 * Math.random(), 30],
+        }),
+      );
       list.push(this.#frame(`${body.name}-raw`, body.id + 50, walk(time_s + 0.3 * i, 0), {}));
     });
-    for (const hand of this.hands) list.push(this.#frame(hand.name, hand.id, ...this.#sign(hand, time_s)));
+    for (const hand of this.hands)
+      list.push(this.#frame(hand.name, hand.id, ...this.#sign(hand, time_s)));
     return list;
   }
 
@@ -64,44 +88,88 @@ export class FakeDaemon {
     const live = Object.keys(SIGNS)[Math.floor(time_s / 1.5) % 6];
     const label = performs ? hand.play[step % hand.play.length] : live;
     const label_probability = performs ? 1 : 0.8 + 0.15 * Math.sin(3 * time_s);
-    return [hold(label, Math.sin(5 * time_s)), {
-      label, label_probability, source: performs ? 3 : 0, lag_frames: 1, lag_ms: 1000 / this.rate_hz,
-      stage_us: [240 + 60 * Math.random(), 60],
-    }];
+    return [
+      hold(label, Math.sin(5 * time_s)),
+      {
+        label,
+        label_probability,
+        source: performs ? 3 : 0,
+        lag_frames: 1,
+        lag_ms: 1000 / this.rate_hz,
+        stage_us: [240 + 60 * Math.random(), 60],
+      },
+    ];
   }
 
   #frame(stream, skeleton_id, pose, more) {
     const now = this.now_ns();
     const joints = pose.rotation_xyzw.length / 4;
-    return [`pose/${stream}`, encode('Frame', {
-      stream, sequence: this.frames, arrival_ns: String(now - 150000n), published_ns: String(now - 20000n),
-      skeleton_id, ...pose, validity: new Uint8Array(joints).fill(1), ...more,
-    })];
+    return [
+      `pose/${stream}`,
+      encode('Frame', {
+        stream,
+        sequence: this.frames,
+        arrival_ns: String(now - 150000n),
+        published_ns: String(now - 20000n),
+        skeleton_id,
+        ...pose,
+        validity: new Uint8Array(joints).fill(1),
+        ...more,
+      }),
+    ];
   }
 
   stats() {
     const common = (name, driver) => ({
-      stream: name, driver, state: 'live', frames: this.frames, rate_hz: this.rate_hz,
+      stream: name,
+      driver,
+      state: 'live',
+      frames: this.frames,
+      rate_hz: this.rate_hz,
       publish: { p50_us: 130, p99_us: 310, max_us: 420 },
     });
     const bodies = this.bodies.map((body) => ({
-      ...common(body.name, 'file'), alpha: body.alpha, alpha_target: body.target, model: body.model, style_gate: 1, style_estimate: -0.05,
-      stage: [{
-        name: 'style', model: body.model, word: ['sway', 'march'],
-        parameter: [
-          { name: 'alpha', value: body.alpha, target: body.target }, { name: 'gate', value: 1, target: 1 },
-          { name: 'mask', text: body.mask }, { name: 'weights', text: body.weights },
-        ],
-      }, { name: 'feet', parameter: [{ name: 'limit_cm', value: 8, target: 8 }] }],
+      ...common(body.name, 'file'),
+      alpha: body.alpha,
+      alpha_target: body.target,
+      model: body.model,
+      style_gate: 1,
+      style_estimate: -0.05,
+      stage: [
+        {
+          name: 'style',
+          model: body.model,
+          word: ['sway', 'march'],
+          parameter: [
+            { name: 'alpha', value: body.alpha, target: body.target },
+            { name: 'gate', value: 1, target: 1 },
+            { name: 'mask', text: body.mask },
+            { name: 'weights', text: body.weights },
+          ],
+        },
+        { name: 'feet', parameter: [{ name: 'limit_cm', value: 8, target: 8 }] },
+      ],
     }));
     const hands = this.hands.map(({ name }) => ({
-      ...common(name, 'cyberglove'), lag_frames: 1, lag_ms: 1000 / this.rate_hz, device_info: 'cyberglove hand=right', connections: 1,
-      clock_offset_ns: -4200000, clock_drift_ppm: 3.1,
-      stage: [{ name: 'generate', model: 'hand.gesture', word: Object.keys(SIGNS) }, { name: 'constrain' }],
+      ...common(name, 'cyberglove'),
+      lag_frames: 1,
+      lag_ms: 1000 / this.rate_hz,
+      device_info: 'cyberglove hand=right',
+      connections: 1,
+      clock_offset_ns: -4200000,
+      clock_drift_ppm: 3.1,
+      stage: [
+        { name: 'generate', model: 'hand.gesture', word: Object.keys(SIGNS) },
+        { name: 'constrain' },
+      ],
     }));
     return {
-      time_ns: String(this.now_ns()), stream: [...bodies, ...hands], cpu_percent: 9.9, rss_bytes: 29900000,
-      recorder_file: this.recording ? 'take1.plog' : '', ...(this.take ? { take: this.take } : {}),
+      time_ns: String(this.now_ns()),
+      stream: [...bodies, ...hands],
+      cpu_percent: 9.9,
+      rss_bytes: 29900000,
+      recorder_file: this.recording ? 'take1.plog' : '',
+      ...(this.take ? { take: this.take } : {}),
     };
   }
 
@@ -115,12 +183,21 @@ export class FakeDaemon {
     if (kind === 'set_parameter' && body) return this.#set(body, details, done);
     if (kind === 'stage_command' && hand) return this.#command(hand, details, done);
     if (kind === 'take') return this.#mark(details);
-    if (kind === 'list_models') return { ok: true, model: [{ name: 'march-to-sway.style', kind: 'style' }, { name: 'tired.style', kind: 'style' }, { name: 'hand.gesture', kind: 'generate' }] };
+    if (kind === 'list_models')
+      return {
+        ok: true,
+        model: [
+          { name: 'march-to-sway.style', kind: 'style' },
+          { name: 'tired.style', kind: 'style' },
+          { name: 'hand.gesture', kind: 'generate' },
+        ],
+      };
     if (kind === 'use_model' && body) {
       body.model = details.name;
       return done;
     }
-    if (kind === 'model_part' && details.offset + details.bytes.length === details.total) return done;
+    if (kind === 'model_part' && details.offset + details.bytes.length === details.total)
+      return done;
     if (kind === 'model_part') return { ok: true };
     return { ok: false, error: `there is no stream "${details.stream}" that can do this` };
   }
@@ -135,7 +212,11 @@ export class FakeDaemon {
 
   #command(hand, { name, word, number }, done) {
     const unknown = word.find((label) => !(label in SIGNS));
-    if (unknown !== undefined) return { ok: false, error: `the model does not know "${unknown}"; it knows ${Object.keys(SIGNS)}` };
+    if (unknown !== undefined)
+      return {
+        ok: false,
+        error: `the model does not know "${unknown}"; it knows ${Object.keys(SIGNS)}`,
+      };
     hand.play = name === 'generate.play' ? word : [];
     hand.loop = number?.loop === 1;
     hand.began_s = this.time_s();
@@ -146,7 +227,9 @@ export class FakeDaemon {
     if (!this.recording) return { ok: false, error: 'the daemon does not record' };
     if (!start && !this.take) return { ok: false, error: 'no take is running' };
     if (start) this.takes += 1;
-    const marked = start ? { number: this.takes, name, start_ns: String(this.now_ns()) } : this.take;
+    const marked = start
+      ? { number: this.takes, name, start_ns: String(this.now_ns()) }
+      : this.take;
     this.take = start ? marked : null;
     return { ok: true, take: marked };
   }

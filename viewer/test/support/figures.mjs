@@ -3,40 +3,63 @@ const D = Math.PI / 180;
 
 // A body: [bone, parent's index, offset m, tip m or null]. Facing +Z; all zero rotations: T-pose.
 const leg = (side, x, hips, at) => [
-  [`${side}UpperLeg`, hips, [x, -0.04, 0]], [`${side}LowerLeg`, at, [0, -0.42, 0]],
-  [`${side}Foot`, at + 1, [0, -0.41, 0]], [`${side}Toes`, at + 2, [0, -0.045, 0.13], [0, 0, 0.06]],
+  [`${side}UpperLeg`, hips, [x, -0.04, 0]],
+  [`${side}LowerLeg`, at, [0, -0.42, 0]],
+  [`${side}Foot`, at + 1, [0, -0.41, 0]],
+  [`${side}Toes`, at + 2, [0, -0.045, 0.13], [0, 0, 0.06]],
 ];
 const arm = (side, sign, chest, at) => [
-  [`${side}Shoulder`, chest, [sign * 0.04, 0.17, 0]], [`${side}UpperArm`, at, [sign * 0.13, 0, 0]],
-  [`${side}LowerArm`, at + 1, [sign * 0.27, 0, 0]], [`${side}Hand`, at + 2, [sign * 0.24, 0, 0], [sign * 0.09, 0, 0]],
+  [`${side}Shoulder`, chest, [sign * 0.04, 0.17, 0]],
+  [`${side}UpperArm`, at, [sign * 0.13, 0, 0]],
+  [`${side}LowerArm`, at + 1, [sign * 0.27, 0, 0]],
+  [`${side}Hand`, at + 2, [sign * 0.24, 0, 0], [sign * 0.09, 0, 0]],
 ];
 const BODY = [
-  ['hips', -1, [0, 0.93, 0]], ['spine', 0, [0, 0.12, 0]], ['chest', 1, [0, 0.15, 0]],
-  ['neck', 2, [0, 0.23, 0]], ['head', 3, [0, 0.09, 0], [0, 0.17, 0]],
-  ...arm('left', 1, 2, 5), ...arm('right', -1, 2, 9), ...leg('left', 0.09, 0, 13), ...leg('right', -0.09, 0, 17),
+  ['hips', -1, [0, 0.93, 0]],
+  ['spine', 0, [0, 0.12, 0]],
+  ['chest', 1, [0, 0.15, 0]],
+  ['neck', 2, [0, 0.23, 0]],
+  ['head', 3, [0, 0.09, 0], [0, 0.17, 0]],
+  ...arm('left', 1, 2, 5),
+  ...arm('right', -1, 2, 9),
+  ...leg('left', 0.09, 0, 13),
+  ...leg('right', -0.09, 0, 17),
 ];
 
 const PHALANGES = ['Proximal', 'Intermediate', 'Distal'];
 const HAND = [['rightHand', -1, [0, 0, 0]]];
 for (const [name, x, z, lengths] of [
-  ['Thumb', 0.028, 0.03, [0.045, 0.034, 0.026]], ['Index', 0.027, 0.09, [0.042, 0.025, 0.02]],
-  ['Middle', 0.006, 0.093, [0.046, 0.029, 0.021]], ['Ring', -0.014, 0.088, [0.042, 0.027, 0.021]],
+  ['Thumb', 0.028, 0.03, [0.045, 0.034, 0.026]],
+  ['Index', 0.027, 0.09, [0.042, 0.025, 0.02]],
+  ['Middle', 0.006, 0.093, [0.046, 0.029, 0.021]],
+  ['Ring', -0.014, 0.088, [0.042, 0.027, 0.021]],
   ['Little', -0.034, 0.08, [0.033, 0.02, 0.018]],
 ]) {
   const along = (length) => (name === 'Thumb' ? [0.6 * length, 0, 0.8 * length] : [0, 0, length]);
   const first = HAND.length;
   const bones = name === 'Thumb' ? ['Metacarpal', 'Proximal', 'Distal'] : PHALANGES;
-  bones.forEach((bone, i) => HAND.push([
-    `right${name}${bone}`, i === 0 ? 0 : first + i - 1, i === 0 ? [x, 0, z] : along(lengths[i - 1]),
-    i === 2 ? along(lengths[2]) : null,
-  ]));
+  bones.forEach((bone, i) =>
+    HAND.push([
+      `right${name}${bone}`,
+      i === 0 ? 0 : first + i - 1,
+      i === 0 ? [x, 0, z] : along(lengths[i - 1]),
+      i === 2 ? along(lengths[2]) : null,
+    ]),
+  );
 }
 
 function skeleton(joints, { stream, id, rate_hz, stage }) {
   return {
-    stream, id, name: 'of the fake bridge', rate_hz, stage, root_joint: 0,
-    joint_name: joints.map(([bone]) => bone), humanoid_bone: joints.map(([bone]) => bone),
-    parent: joints.map(([, parent]) => parent), offset_m: joints.flatMap(([, , offset]) => offset),
+    stream,
+    id,
+    name: 'of the fake bridge',
+    rate_hz,
+    stage,
+    root_joint: 0,
+    joint_name: joints.map(([bone]) => bone),
+    humanoid_bone: joints.map(([bone]) => bone),
+    parent: joints.map(([, parent]) => parent),
+    offset_m: joints.flatMap(([, , offset]) => offset),
     T_world_joint_xyzw: joints.flatMap(() => [0, 0, 0, 1]),
     end_site_m: joints.flatMap(([, , , tip]) => tip ?? [NaN, NaN, NaN]),
   };
@@ -51,8 +74,10 @@ const about = (axis, angle) => {
   return q;
 };
 const times = ([ax, ay, az, aw], [bx, by, bz, bw]) => [
-  aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-  aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz,
+  aw * bx + ax * bw + ay * bz - az * by,
+  aw * by - ax * bz + ay * bw + az * bx,
+  aw * bz + ax * by - ay * bx + az * bw,
+  aw * bw - ax * bx - ay * by - az * bz,
 ];
 
 const CYCLES_PER_S = 0.95;
@@ -64,7 +89,11 @@ const REACH = 27 * D; // of the leg, to the front and to the back
 function stride(share) {
   if (share < STANCE) return { hip: REACH * (1 - (2 * share) / STANCE), knee: 4 * D, stands: true };
   const swing = (share - STANCE) / (1 - STANCE);
-  return { hip: -REACH * Math.cos(Math.PI * swing), knee: (4 + 52 * Math.sin(Math.PI * swing)) * D, stands: false };
+  return {
+    hip: -REACH * Math.cos(Math.PI * swing),
+    knee: (4 + 52 * Math.sin(Math.PI * swing)) * D,
+    stands: false,
+  };
 }
 
 // A walk straight ahead, from z = -4 m on; style 0 to 1 lets the hips sway and the arms hang wider.
@@ -79,12 +108,18 @@ export function walk(time_s, style) {
     head: times(about('y', -5 * D * swing), about('x', (2 + 4 * style) * D)),
   };
   let height_m = 0;
-  for (const [side, sign, ahead] of [['left', 1, 0], ['right', -1, 0.5]]) {
+  for (const [side, sign, ahead] of [
+    ['left', 1, 0],
+    ['right', -1, 0.5],
+  ]) {
     const { hip, knee, stands } = stride((cycle + ahead) % 1);
     turns[`${side}UpperLeg`] = about('x', -hip - 0.3 * knee);
     turns[`${side}LowerLeg`] = about('x', knee);
     turns[`${side}Foot`] = about('x', hip - 0.7 * knee + (stands ? 0 : 10 * D));
-    turns[`${side}UpperArm`] = times(about('x', sign * 22 * swing * (1 - 0.4 * style) * D), about('z', -sign * (78 - 16 * style) * D));
+    turns[`${side}UpperArm`] = times(
+      about('x', sign * 22 * swing * (1 - 0.4 * style) * D),
+      about('z', -sign * (78 - 16 * style) * D),
+    );
     turns[`${side}LowerArm`] = about('y', -sign * (20 + 26 * style) * D);
     if (stands) height_m = Math.max(height_m, 0.04 + 0.83 * Math.cos(hip) + 0.075);
   }
@@ -97,8 +132,12 @@ export function walk(time_s, style) {
 
 // How far each finger is bent, 0 to 1, thumb to little, in a few signs.
 export const SIGNS = {
-  g: [0.3, 0, 1, 1, 1], 1: [0.8, 0, 1, 1, 1], c: [0.4, 0.5, 0.5, 0.5, 0.5], 3: [0, 0, 0, 1, 1],
-  4: [0.9, 0, 0, 0, 0], p: [0.1, 0.1, 0.6, 1, 1],
+  g: [0.3, 0, 1, 1, 1],
+  1: [0.8, 0, 1, 1, 1],
+  c: [0.4, 0.5, 0.5, 0.5, 0.5],
+  3: [0, 0, 0, 1, 1],
+  4: [0.9, 0, 0, 0, 0],
+  p: [0.1, 0.1, 0.6, 1, 1],
 };
 
 export function hold(sign, waver) {

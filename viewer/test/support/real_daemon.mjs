@@ -4,16 +4,17 @@ import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { createServer } from 'node:net';
 import { createInterface } from 'node:readline';
 
 const DEMO = join(dirname(fileURLToPath(import.meta.url)), '../../../build/demo');
 export const hasDemo = () => existsSync(join(DEMO, 'hand.gesture'));
 
-const configOf = (folder) => `
+const configOf = ({ publish, control }) => `
 [publish]
-endpoint = "ipc://${folder}/publish"
+endpoint = "${publish}"
 [control]
-endpoint = "ipc://${folder}/control"
+endpoint = "${control}"
 models = "${DEMO}"
 [[stream]]
 name = "walker"
@@ -35,11 +36,26 @@ loop = true
 model = "${DEMO}/hand.gesture"
 `;
 
+// The endpoint of a port that is free now; a daemon that restarts needs the same again.
+async function freeEndpoint() {
+  const server = createServer();
+  await new Promise((done) => {
+    server.listen(0, '127.0.0.1', done);
+  });
+  const { port } = server.address();
+  await new Promise((done) => {
+    server.close(done);
+  });
+  return `tcp://127.0.0.1:${port}`;
+}
+
 // A program whose first line of output is JSON: {program, line}. Rejects when it ends before.
 async function start(program, args) {
   const child = spawn(program, args, { stdio: ['ignore', 'pipe', 'pipe'] });
   let complaint = '';
-  child.stderr.on('data', (text) => { complaint += text; });
+  child.stderr.on('data', (text) => {
+    complaint += text;
+  });
   const line = await new Promise((done, fail) => {
     createInterface({ input: child.stdout }).once('line', done);
     child.once('exit', () => fail(new Error(`${program} ${args[0]}: ${complaint}`)));
@@ -50,25 +66,49 @@ async function start(program, args) {
 async function end(child) {
   if (child.exitCode !== null) return;
   child.kill('SIGINT');
-  await new Promise((done) => { child.once('exit', done); });
+  await new Promise((done) => {
+    child.once('exit', done);
+  });
 }
 
 export class RealDaemon {
   constructor(program) {
     this.program = program;
     this.folder = mkdtempSync(join(tmpdir(), 'posed-page-'));
-    writeFileSync(join(this.folder, 'page.toml'), configOf(this.folder));
   }
 
   async start() {
-    const args = ['record', '--config', join(this.folder, 'page.toml'), '--out', join(this.folder, 'take.plog'), '--overwrite'];
+    if (!this.publish) {
+      this.publish = await freeEndpoint();
+      this.control = await freeEndpoint();
+      writeFileSync(join(this.folder, 'page.toml'), configOf(this));
+    }
+    const args = [
+      'record',
+      '--config',
+      join(this.folder, 'page.toml'),
+      '--out',
+      join(this.folder, 'take.plog'),
+      '--overwrite',
+    ];
     this.daemon = (await start(this.program, args)).child;
   }
 
   // page: the folder; returns the page's address
   async view(page, ...more) {
-    const args = ['view', '--json', '--port', '0', '--page', page, '--connect', `ipc://${this.folder}/publish`,
-      '--control', `ipc://${this.folder}/control`, ...more];
+    const args = [
+      'view',
+      '--json',
+      '--port',
+      '0',
+      '--page',
+      page,
+      '--connect',
+      this.publish,
+      '--control',
+      this.control,
+      ...more,
+    ];
     const { child, line } = await start(this.program, args);
     this.bridges = [...(this.bridges ?? []), child];
     return line.url;
@@ -76,10 +116,14 @@ export class RealDaemon {
 
   // posed ctl ARGS: its output as JSON.
   async ctl(...args) {
-    const child = spawn(this.program, ['ctl', '--connect', `ipc://${this.folder}/control`, '--json', ...args]);
+    const child = spawn(this.program, ['ctl', '--connect', this.control, '--json', ...args]);
     let text = '';
-    child.stdout.on('data', (piece) => { text += piece; });
-    await new Promise((done) => { child.once('exit', done); });
+    child.stdout.on('data', (piece) => {
+      text += piece;
+    });
+    await new Promise((done) => {
+      child.once('exit', done);
+    });
     return JSON.parse(text);
   }
 

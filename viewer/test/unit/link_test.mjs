@@ -8,7 +8,7 @@ import { ControlReply } from '../../src/wire/schema.js';
 import { decode } from '../../src/wire/message.js';
 import * as reference from '../support/messages.mjs';
 
-test('the clock\'s fastest answer counts', () => {
+test("the clock's fastest answer counts", () => {
   const clock = new ClockMapping();
   assert.equal(clock.known, false);
   clock.add(100, 140, 5120 + 15); // 15 ms off: the way back was slower
@@ -29,12 +29,14 @@ test('an old fast answer is forgotten, because clocks drift apart', () => {
   assert.ok(Math.abs(clock.offset_ms - 1000.8) < 1e-9);
 });
 
-test('a slider\'s newest value replaces those that wait', async () => {
+test("a slider's newest value replaces those that wait", async () => {
   const sent = [];
   let go;
   const latest = new Latest((value) => {
     sent.push(value);
-    return new Promise((done) => { go = done; });
+    return new Promise((done) => {
+      go = done;
+    });
   });
   latest.put(1);
   latest.put(2);
@@ -54,7 +56,11 @@ test('requests are matched with their answers by number', async () => {
   const first = requests.ask({ status: {} });
   const second = requests.ask({ list_models: {} });
   assert.equal(new DataView(sent[1].buffer).getUint32(0, true), 2);
-  requests.reply(2, reference.encode('ControlReply', { ok: true, model: [{ name: 'a.style', kind: 'style' }] }), 0);
+  requests.reply(
+    2,
+    reference.encode('ControlReply', { ok: true, model: [{ name: 'a.style', kind: 'style' }] }),
+    0,
+  );
   assert.deepEqual((await second).model, [{ name: 'a.style', kind: 'style' }]);
   requests.refused(1, 'it does not answer');
   assert.deepEqual([(await first).ok, (await first).error], [false, 'it does not answer']);
@@ -70,7 +76,7 @@ test('without a connection, or when it breaks, a request is answered with a sent
   assert.match((await waiting).error, /broke/);
 });
 
-test('a model goes in pieces of at most 32 KiB with its SHA-256, and stops at a refusal', async () => {
+test('a model goes in pieces of 32 KiB with its SHA-256, and stops at a refusal', async () => {
   const bytes = Uint8Array.from({ length: 2.5 * PIECE_BYTES }, (_, i) => i);
   const parts = [];
   const shares = [];
@@ -79,18 +85,35 @@ test('a model goes in pieces of at most 32 KiB with its SHA-256, and stops at a 
     parts.push(model_part);
     return answer;
   };
-  assert.equal(await sendModel(ask, 'walker', 'm.style', bytes, (share) => shares.push(share)), answer);
-  assert.deepEqual(parts.map(({ offset }) => offset), [0, PIECE_BYTES, 2 * PIECE_BYTES]);
+  assert.equal(
+    await sendModel(ask, 'walker', 'm.style', bytes, (share) => shares.push(share)),
+    answer,
+  );
+  assert.deepEqual(
+    parts.map(({ offset }) => offset),
+    [0, PIECE_BYTES, 2 * PIECE_BYTES],
+  );
   assert.equal(parts[2].bytes.length, PIECE_BYTES / 2);
   assert.match(parts[0].sha256, /^[0-9a-f]{64}$/);
   assert.equal(shares.at(-1), 1);
-  const refused = await sendModel(async () => ({ ok: false, error: 'no' }), 'walker', 'm', bytes, () => {});
+  const refused = await sendModel(
+    async () => ({ ok: false, error: 'no' }),
+    'walker',
+    'm',
+    bytes,
+    () => {},
+  );
   assert.equal(refused.error, 'no');
   assert.equal((await sendModel(ask, 'walker', 'm', new Uint8Array(), () => {})).ok, false);
 });
 
 test('a reply of the daemon reads as it was written', () => {
-  const bytes = reference.encode('ControlReply', { ok: true, stream: 'walker', sequence: 1234, take: { number: 3, name: 'x' } });
+  const bytes = reference.encode('ControlReply', {
+    ok: true,
+    stream: 'walker',
+    sequence: 1234,
+    take: { number: 3, name: 'x' },
+  });
   const reply = decode(ControlReply, bytes);
   assert.deepEqual([reply.ok, reply.sequence, reply.take.number], [true, 1234, 3]);
 });

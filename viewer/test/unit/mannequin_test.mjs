@@ -18,7 +18,7 @@ test('the mannequin is a VRM 1.0 avatar with fingers that stands on the ground',
   assert.ok(low > 0 && low < 0.05, String(low));
 });
 
-test('an avatar\'s bones turn as the figure\'s, and its hips are as high for its legs', async () => {
+test("an avatar's bones turn as the figure's, and its hips are as high for its legs", async () => {
   const avatar = await loadAvatar(mannequin().buffer, 'mannequin');
   const kinematics = new Kinematics(bodySkeleton({ stream: 'a', id: 1, stage: [] }));
   const { rotation_xyzw, root_position_m } = walk(0.4, 1);
@@ -37,5 +37,8 @@ test('an avatar\'s bones turn as the figure\'s, and its hips are as high for its
 });
 
 test('a file that is no avatar is refused with a sentence', async () => {
-  await assert.rejects(loadAvatar(new ArrayBuffer(10), 'notes.txt'), /notes.txt cannot be read as VRM/);
+  await assert.rejects(
+    loadAvatar(new ArrayBuffer(10), 'notes.txt'),
+    /notes.txt cannot be read as VRM/,
+  );
 });

@@ -11,13 +11,19 @@ import { random } from '../support/random.mjs';
 const H = Math.SQRT1_2;
 // Three joints in a row, 1 m apart along Y; the T frame of the second is a quarter turn about z.
 const chain = {
-  joint_name: ['a', 'between', 'b'], humanoid_bone: ['hips', '', 'spine'], parent: [-1, 0, 1], root_joint: 1,
-  offset_m: [5, 5, 5, 0, 1, 0, 0, 1, 0], T_world_joint_xyzw: [0, 0, 0, 1, 0, 0, H, H, 0, 0, H, H],
+  joint_name: ['a', 'between', 'b'],
+  humanoid_bone: ['hips', '', 'spine'],
+  parent: [-1, 0, 1],
+  root_joint: 1,
+  offset_m: [5, 5, 5, 0, 1, 0, 0, 1, 0],
+  T_world_joint_xyzw: [0, 0, 0, 1, 0, 0, H, H, 0, 0, H, H],
   end_site_m: [NaN, NaN, NaN, NaN, NaN, NaN, 0, 0.5, 0],
 };
 const close = (actual, expected, tolerance = 1e-6) => {
   assert.equal(actual.length, expected.length);
-  expected.forEach((value, i) => assert.ok(Math.abs(actual[i] - value) < tolerance, `${[...actual]} not ${expected}`));
+  expected.forEach((value, i) =>
+    assert.ok(Math.abs(actual[i] - value) < tolerance, `${[...actual]} not ${expected}`),
+  );
 };
 
 test('joints are where the rotations put them, and the root joint where the frame says', () => {
@@ -35,12 +41,20 @@ test('VRM rotations are those of three.js by the formula T_parent L T_joint^-1',
   const next = random(4);
   const count = 9;
   const turns = (list) => list.flatMap((q) => q.toArray());
-  const [rests, locals] = [0, 1].map(() => Array.from({ length: count }, () =>
-    new Quaternion(next() - 0.5, next() - 0.5, next() - 0.5, next() - 0.5).normalize()));
+  const [rests, locals] = [0, 1].map(() =>
+    Array.from({ length: count }, () =>
+      new Quaternion(next() - 0.5, next() - 0.5, next() - 0.5, next() - 0.5).normalize(),
+    ),
+  );
   const parent = Array.from({ length: count }, (_, i) => (i === 0 ? -1 : Math.floor(next() * i)));
   const kinematics = new Kinematics({
-    joint_name: parent.map(String), humanoid_bone: parent.map((_, i) => `bone${i}`), parent, root_joint: 0,
-    offset_m: parent.flatMap(() => [0, 1, 0]), T_world_joint_xyzw: turns(rests), end_site_m: [],
+    joint_name: parent.map(String),
+    humanoid_bone: parent.map((_, i) => `bone${i}`),
+    parent,
+    root_joint: 0,
+    offset_m: parent.flatMap(() => [0, 1, 0]),
+    T_world_joint_xyzw: turns(rests),
+    end_site_m: [],
   });
   kinematics.pose(turns(locals), [0, 0, 0]);
   const result = kinematics.humanoidLocals();
@@ -52,7 +66,7 @@ test('VRM rotations are those of three.js by the formula T_parent L T_joint^-1',
   });
 });
 
-test('in the T-pose all VRM rotations are identity; a joint between two bones goes to the lower one', () => {
+test('VRM rotations are identity in the T-pose; a joint between two bones goes to the lower', () => {
   const kinematics = new Kinematics(chain);
   kinematics.pose([0, 0, 0, 1, 0, 0, H, H, 0, 0, 0, 1], [0, 0, 0]); // local rotations of the T-pose
   const locals = kinematics.humanoidLocals();
@@ -87,7 +101,7 @@ test('bodies and hands are told apart, and their parts have words', () => {
   assert.equal(partWords(hand)[hand.jointOf('rightIndexDistal')], 'index');
 });
 
-test('a walker\'s feet stand in turns, and it faces +Z', () => {
+test("a walker's feet stand in turns, and it faces +Z", () => {
   const kinematics = new Kinematics(bodySkeleton({ stream: 'a', id: 1, stage: [] }));
   const [left, right] = feetOf(kinematics);
   const stood = [0, 0];

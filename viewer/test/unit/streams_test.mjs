@@ -13,16 +13,32 @@ function message(topic, bytes) {
   return Uint8Array.from([topic.length, ...new TextEncoder().encode(topic), ...bytes]);
 }
 const skeletonOf = (stream, id) =>
-  message(`skeleton/${stream}`, reference.encode('Skeleton', bodySkeleton({ stream, id, stage: [] })));
+  message(
+    `skeleton/${stream}`,
+    reference.encode('Skeleton', bodySkeleton({ stream, id, stage: [] })),
+  );
 const poseOf = (stream, skeleton_id, sequence) =>
-  message(`pose/${stream}`, reference.encode('Frame', { stream, skeleton_id, sequence, arrival_ns: String(sequence * 1e7), ...walk(0, 0) }));
+  message(
+    `pose/${stream}`,
+    reference.encode('Frame', {
+      stream,
+      skeleton_id,
+      sequence,
+      arrival_ns: String(sequence * 1e7),
+      ...walk(0, 0),
+    }),
+  );
 const statsOf = (...names) =>
-  message('stats', reference.encode('Stats', { stream: names.map((stream) => ({ stream, state: 'live' })) }));
+  message(
+    'stats',
+    reference.encode('Stats', { stream: names.map((stream) => ({ stream, state: 'live' })) }),
+  );
 
 test('a stream is drawn once its skeleton and a pose of that skeleton are here', () => {
   const store = new Store();
   const told = [];
-  for (const type of ['skeleton', 'gone']) store.addEventListener(type, ({ detail }) => told.push(`${type} ${detail.name}`));
+  for (const type of ['skeleton', 'gone'])
+    store.addEventListener(type, ({ detail }) => told.push(`${type} ${detail.name}`));
   store.receive(poseOf('walker', 7, 1));
   const stream = store.streams.get('walker');
   assert.equal(stream.place(), false);
@@ -40,7 +56,10 @@ test('streams come and go with the statistics; a raw twin goes with its stream',
   const store = new Store();
   for (const name of ['a', 'a-raw', 'b']) store.receive(skeletonOf(name, 1));
   store.receive(statsOf('b', 'a'));
-  assert.deepEqual(store.main().map(({ name }) => name), ['b', 'a']);
+  assert.deepEqual(
+    store.main().map(({ name }) => name),
+    ['b', 'a'],
+  );
   assert.equal(store.raw(store.streams.get('a')).name, 'a-raw');
   store.receive(statsOf('b'));
   assert.deepEqual([...store.streams.keys()], ['b']);
@@ -58,7 +77,15 @@ test('damaged messages are counted, and change nothing', () => {
 });
 
 test('states in words, the worst first', () => {
-  const live = { refusal: '', away: false, connections: 1, state: 'live', dropped: 0, shed: 0, kernel_dropped: 0 };
+  const live = {
+    refusal: '',
+    away: false,
+    connections: 1,
+    state: 'live',
+    dropped: 0,
+    shed: 0,
+    kernel_dropped: 0,
+  };
   assert.equal(stateOf(live).word, 'live');
   assert.equal(stateOf({ ...live, away: true }).word, 'lost');
   assert.equal(stateOf({ ...live, away: true, connections: 0 }).word, 'away');
@@ -79,7 +106,13 @@ test('a series keeps the newest, and gives those of a time window', () => {
   const series = new Series(8, 1);
   for (let i = 0; i < 20; i += 1) series.add(i, 10 * i);
   const [times, values] = series.since(17);
-  assert.deepEqual([[...times], [...values]], [[17, 18, 19], [170, 180, 190]]);
+  assert.deepEqual(
+    [[...times], [...values]],
+    [
+      [17, 18, 19],
+      [170, 180, 190],
+    ],
+  );
   assert.ok(series.length <= 8);
   series.add(3, 1); // time ran back: another connection
   assert.equal(series.length, 1);
@@ -88,7 +121,10 @@ test('a series keeps the newest, and gives those of a time window', () => {
 
 test('lanes: raw beside styled, the bodies of one device together', () => {
   const stream = (name, source_name = '') => ({ name, stats: { source_name } });
-  const lanes = lanesOf([stream('a'), stream('b', 'hall'), stream('c', 'hall')], ({ name }) => name === 'a');
+  const lanes = lanesOf(
+    [stream('a'), stream('b', 'hall'), stream('c', 'hall')],
+    ({ name }) => name === 'a',
+  );
   assert.deepEqual([lanes.get('a').raw, lanes.get('a').styled], [-1, 0]);
   assert.deepEqual([lanes.get('b').styled, lanes.get('c').styled], [1, 1]);
 });

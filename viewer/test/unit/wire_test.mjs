@@ -12,13 +12,24 @@ function randomFrame(next) {
   const joints = 1 + Math.floor(60 * next());
   const floats = (count) => Array.from({ length: count }, () => Math.fround(2 * next() - 1));
   return {
-    stream: 'walker', sequence: Math.floor(next() * 2 ** 40), arrival_ns: String(Math.floor(next() * 2 ** 52)),
-    published_ns: String(Math.floor(next() * 2 ** 52)), clock_offset_ns: String(-Math.floor(next() * 2 ** 40)),
-    skeleton_id: Math.floor(next() * 2 ** 32), root_position_m: floats(3), rotation_xyzw: floats(4 * joints),
-    validity: Uint8Array.from({ length: joints }, () => Math.round(next())), angle_rad: floats(3 * joints),
-    quality: Math.floor(4 * next()), source: Math.floor(4 * next()), label: ['', 'g', 'two'][Math.floor(3 * next())],
-    label_probability: Math.fround(next()), lag_frames: Math.floor(5 * next()), lag_ms: Math.fround(50 * next()),
-    stage_us: floats(3), timecode: '01:02:03:04',
+    stream: 'walker',
+    sequence: Math.floor(next() * 2 ** 40),
+    arrival_ns: String(Math.floor(next() * 2 ** 52)),
+    published_ns: String(Math.floor(next() * 2 ** 52)),
+    clock_offset_ns: String(-Math.floor(next() * 2 ** 40)),
+    skeleton_id: Math.floor(next() * 2 ** 32),
+    root_position_m: floats(3),
+    rotation_xyzw: floats(4 * joints),
+    validity: Uint8Array.from({ length: joints }, () => Math.round(next())),
+    angle_rad: floats(3 * joints),
+    quality: Math.floor(4 * next()),
+    source: Math.floor(4 * next()),
+    label: ['', 'g', 'two'][Math.floor(3 * next())],
+    label_probability: Math.fround(next()),
+    lag_frames: Math.floor(5 * next()),
+    lag_ms: Math.fround(50 * next()),
+    stage_us: floats(3),
+    timecode: '01:02:03:04',
   };
 }
 
@@ -37,9 +48,14 @@ test('a frame reads as protobufjs wrote it, for many random frames', () => {
     assert.equal(pose.joints, joints);
     assert.deepEqual([...pose.rotation.subarray(0, 4 * joints)], frame.rotation_xyzw);
     assert.deepEqual([...pose.validity.subarray(0, pose.validJoints)], [...frame.validity]);
-    assert.deepEqual([pose.quality, pose.source, pose.label], [frame.quality, frame.source, frame.label]);
-    assert.deepEqual([pose.labelProbability, pose.lagFrames, pose.lag_ms],
-      [frame.label_probability, frame.lag_frames, frame.lag_ms]);
+    assert.deepEqual(
+      [pose.quality, pose.source, pose.label],
+      [frame.quality, frame.source, frame.label],
+    );
+    assert.deepEqual(
+      [pose.labelProbability, pose.lagFrames, pose.lag_ms],
+      [frame.label_probability, frame.lag_frames, frame.lag_ms],
+    );
     assert.deepEqual([...pose.stage_us.subarray(0, pose.stages)], frame.stage_us);
     assert.equal(pose.timecode, frame.timecode);
   }
@@ -53,7 +69,7 @@ test('what a frame leaves out does not stay from the one before', () => {
   assert.deepEqual([pose.label, pose.quality, pose.timecode], ['', 0, '']);
 });
 
-test('a damaged or cut frame is a RangeError or another frame, never a hang or another error', () => {
+test('a damaged or cut frame is a RangeError or another frame, never a hang', () => {
   const next = random(3);
   const pose = new Pose();
   let refused = 0;
@@ -84,8 +100,15 @@ test('negative 64-bit numbers are exact', () => {
 
 test('the tables of schema.js agree with the .proto files', () => {
   const kinds = {
-    uint: ['uint32', 'uint64', 'Event.Kind', 'Quality', 'Source'], int: ['int64', 'int32'], sint: ['sint32'],
-    bool: ['bool'], float: ['float'], double: ['double'], fixed32: ['fixed32'], string: ['string'], bytes: ['bytes'],
+    uint: ['uint32', 'uint64', 'Event.Kind', 'Quality', 'Source'],
+    int: ['int64', 'int32'],
+    sint: ['sint32'],
+    bool: ['bool'],
+    float: ['float'],
+    double: ['double'],
+    fixed32: ['fixed32'],
+    string: ['string'],
+    bytes: ['bytes'],
   };
   let compared = 0;
   const compare = (table, type) => {
@@ -101,7 +124,11 @@ test('the tables of schema.js agree with the .proto files', () => {
       assert.equal(many === '*', field.repeated, `${type.name}.${name}`);
       field.resolve();
       if (typeof kind === 'object') compare(kind, field.resolvedType);
-      else assert.ok(kinds[kind].includes(field.resolvedType ? 'Event.Kind' : field.type), `${type.name}.${name}`);
+      else
+        assert.ok(
+          kinds[kind].includes(field.resolvedType ? 'Event.Kind' : field.type),
+          `${type.name}.${name}`,
+        );
     }
   };
   for (const name of ['Skeleton', 'Event', 'Stats', 'ControlRequest', 'ControlReply']) {
@@ -116,22 +143,46 @@ test('the tables of schema.js agree with the .proto files', () => {
 
 test('statistics read as protobufjs wrote them', () => {
   const stats = {
-    time_ns: '123456789012', cpu_percent: 2.5, rss_bytes: 31000000, recorder_file: 'a.plog',
+    time_ns: '123456789012',
+    cpu_percent: 2.5,
+    rss_bytes: 31000000,
+    recorder_file: 'a.plog',
     take: { number: 2, name: 'räume', start_ns: '5' },
-    stream: [{
-      stream: 'walker', state: 'live', rate_hz: 30, clock_offset_ns: '-77', style_gate: 0, alpha: 0.5,
-      publish: { p50_us: 100, p99_us: 200, max_us: 300 },
-      stage: [{ name: 'style', word: ['a', 'b'], parameter: [{ name: 'alpha', value: 0.5, target: 1 }] }],
-    }],
+    stream: [
+      {
+        stream: 'walker',
+        state: 'live',
+        rate_hz: 30,
+        clock_offset_ns: '-77',
+        style_gate: 0,
+        alpha: 0.5,
+        publish: { p50_us: 100, p99_us: 200, max_us: 300 },
+        stage: [
+          {
+            name: 'style',
+            word: ['a', 'b'],
+            parameter: [{ name: 'alpha', value: 0.5, target: 1 }],
+          },
+        ],
+      },
+    ],
   };
   const read = decode(schema.Stats, reference.encode('Stats', stats));
   assert.equal(read.time_ns, 123456789012);
   assert.deepEqual([read.take.number, read.take.name], [2, 'räume']);
   const [stream] = read.stream;
-  assert.deepEqual([stream.clock_offset_ns, stream.style_gate, stream.style_estimate], [-77, 0, undefined]);
+  assert.deepEqual(
+    [stream.clock_offset_ns, stream.style_gate, stream.style_estimate],
+    [-77, 0, undefined],
+  );
   assert.equal(stream.publish.max_us, 300);
   assert.deepEqual(stream.stage[0].word, ['a', 'b']);
-  assert.deepEqual(stream.stage[0].parameter[0], { name: 'alpha', value: 0.5, target: 1, text: '' });
+  assert.deepEqual(stream.stage[0].parameter[0], {
+    name: 'alpha',
+    value: 0.5,
+    target: 1,
+    text: '',
+  });
 });
 
 test('requests are what protobufjs reads back', () => {
@@ -140,15 +191,27 @@ test('requests are what protobufjs reads back', () => {
     assert.deepEqual(Object.keys(read), Object.keys(request));
     return read;
   };
-  const set = check({ set_parameter: { stream: 'walker', name: 'style.alpha', number: 0 } }).set_parameter;
+  const set = check({
+    set_parameter: { stream: 'walker', name: 'style.alpha', number: 0 },
+  }).set_parameter;
   assert.deepEqual([set.number, 'text' in set, 'flag' in set], [0, false, false]);
   const play = check({
-    stage_command: { stream: 'hand', name: 'generate.play', word: ['g', '1'], number: [{ key: 'tempo', value: 1.5 }] },
+    stage_command: {
+      stream: 'hand',
+      name: 'generate.play',
+      word: ['g', '1'],
+      number: [{ key: 'tempo', value: 1.5 }],
+    },
   }).stage_command;
   assert.deepEqual(play.word, ['g', '1']);
   assert.equal(play.number.tempo, 1.5);
   const bytes = Uint8Array.from({ length: 40000 }, (_, i) => i);
-  const part = check({ model_part: { stream: 'a', sha256: 'ff', total: 5e6, offset: 3e6, bytes, name: 'm' } }).model_part;
-  assert.deepEqual([part.total, part.offset, part.bytes.length, part.bytes[300]], [5e6, 3e6, 40000, 44]);
+  const part = check({
+    model_part: { stream: 'a', sha256: 'ff', total: 5e6, offset: 3e6, bytes, name: 'm' },
+  }).model_part;
+  assert.deepEqual(
+    [part.total, part.offset, part.bytes.length, part.bytes[300]],
+    [5e6, 3e6, 40000, 44],
+  );
   check({ list_models: {} });
 });
