@@ -36,21 +36,22 @@ class Page {
 
   constructor() {
     const token = new URLSearchParams(location.search).get('token') ?? '';
-    this.requests = new Requests((bytes) => this.connection.sendBytes(bytes));
-    this.acks = new Acks(find('.acks'));
-    this.control = controlWith(this.requests, this.acks);
     this.header = new Header(find('.bar'));
-    this.theme = new Theme(find('#theme'), (name) => this.#retheme(name));
-    this.world = new World(find('.stage'), this.store, this.theme.name);
-    this.instruments = new Instruments(find('.instruments'), this.clock);
-    this.#makePanels();
-    this.#listen();
+    // Early, because its way to the bridge and back takes time that the rest can use.
     this.connection = new Connection(token, {
       state: (state, sentence) => this.#linkChanged(state, sentence),
       open: () => this.clock.clear(),
       binary: (bytes) => this.store.receive(bytes, (...reply) => this.requests.reply(...reply)),
       text: (message) => this.#told(message),
     });
+    this.requests = new Requests((bytes) => this.connection.sendBytes(bytes));
+    this.acks = new Acks(find('.acks'));
+    this.control = controlWith(this.requests, this.acks);
+    this.theme = new Theme(find('#theme'), (name) => this.#retheme(name));
+    this.world = new World(find('.stage'), this.store, this.theme.name);
+    this.instruments = new Instruments(find('.instruments'), this.clock);
+    this.#makePanels();
+    this.#listen();
     requestAnimationFrame((now) => this.#frame(now));
   }
 

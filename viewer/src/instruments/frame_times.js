@@ -11,6 +11,10 @@ export class FrameTimes {
     this.count += 1;
   }
 
+  clear() {
+    this.count = 0;
+  }
+
   // The time that `share` of the pictures do not exceed; NaN before the first.
   quantile(share) {
     const kept = Math.min(this.count, KEPT);
