@@ -20,6 +20,8 @@ export class Instruments {
 
   constructor(element, clock) {
     this.clock = clock;
+    this.element = element;
+    element.hidden = true;
     this.tiles = new Tiles();
     this.latency = new Plot(
       'Latency',
@@ -76,6 +78,7 @@ export class Instruments {
   frame(stream, now_ms) {
     this.#frames.push(now_ms);
     while (this.#frames[0] < now_ms - 1000) this.#frames.shift();
+    this.element.hidden = !stream;
     if (!stream || now_ms - this.#drawn_ms < TURN_MS) return;
     this.#drawn_ms = now_ms;
     const turns = [
