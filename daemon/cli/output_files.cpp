@@ -15,10 +15,10 @@ namespace {
 namespace fs = std::filesystem;
 
 // Extensions of formats that posed or other programs recognise.
-constexpr std::array<std::string_view, 22> kFormats{
+constexpr std::array<std::string_view, 23> kFormats{
     ".bvh",  ".amc", ".asf",  ".csv",  ".style", ".gesture", ".toml", ".lab",
     ".plog", ".svg", ".dot",  ".gv",   ".txt",   ".json",    ".bin",  ".key",
-    ".pub",  ".glb", ".vrma", ".mcap", ".png",   ".mp4"};
+    ".pub",  ".glb", ".vrma", ".mcap", ".png",   ".mp4",     ".html"};
 
 std::string listed(const std::vector<std::string_view>& extensions) {
   std::string text;
@@ -60,6 +60,20 @@ bool is_amc(const fs::path& path) { return clip::extension_of(path) == ".amc"; }
 
 CLI::Option* add_overwrite_option(CLI::App& command, bool& overwrite) {
   return command.add_flag("--overwrite", overwrite, "Replace files that are there already");
+}
+
+CLI::Option* add_report_option(CLI::App& command, std::string& path) {
+  return command.add_option("--report", path, "Figures and tables, too, as one HTML page")
+      ->type_name("OUT.html");
+}
+
+void add_report_file(CLI::App& command, ReportFile& file) {
+  auto* report = add_report_option(command, file.path);
+  add_overwrite_option(command, file.overwrite)->needs(report);
+}
+
+Result<> ReportFile::check() const {
+  return OutputFiles(overwrite).writes(path, {".html"}).check();
 }
 
 OutputFiles& OutputFiles::reads(const fs::path& path) {

@@ -23,6 +23,19 @@ namespace posed::cli {
 // Adds `--overwrite`.
 CLI::Option* add_overwrite_option(CLI::App& command, bool& overwrite);
 
+// Adds `--report FILE.html`.
+CLI::Option* add_report_option(CLI::App& command, std::string& path);
+
+// The report of a command that writes nothing else: `--report` and `--overwrite`.
+struct ReportFile {
+  std::string path;  // empty: none
+  bool overwrite = false;
+
+  [[nodiscard]] bool wanted() const { return !path.empty(); }
+  [[nodiscard]] Result<> check() const;
+};
+void add_report_file(CLI::App& command, ReportFile& file);
+
 class OutputFiles {
  public:
   explicit OutputFiles(bool overwrite) : overwrite_(overwrite) {}

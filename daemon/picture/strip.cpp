@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "proto/text/svg.hpp"
 
@@ -136,8 +137,8 @@ StripLayout layout_of(const std::vector<StripRow>& rows, const Camera& camera, d
   return layout;
 }
 
-std::string strip_svg(const std::vector<StripRow>& rows, const Camera& camera,
-                      const StripLayout& layout, const StripText& text) {
+StripDrawing draw_strip(const std::vector<StripRow>& rows, const Camera& camera,
+                        const StripLayout& layout, const StripText& text) {
   const double height_px = (layout.top_m - layout.bottom_m) * layout.px_per_m;
   const double column_px = (layout.right_m - layout.left_m) * layout.px_per_m + kGap_px;
   std::size_t columns = 0;
@@ -164,7 +165,14 @@ std::string strip_svg(const std::vector<StripRow>& rows, const Camera& camera,
       static_cast<double>(std::max(text.sentence.size(), text.title.size())) * kLetter_px;
   const double width_px =
       2.0 * kMargin_px + std::max(static_cast<double>(columns) * column_px, words_px);
-  return svg_document(width_px, y + kTitle_px, kStyle, body);
+  const double below_px = text.sentence.empty() ? 0.0 : kTitle_px;
+  return {.width_px = width_px, .height_px = y + below_px, .elements = std::move(body)};
+}
+
+std::string strip_svg(const std::vector<StripRow>& rows, const Camera& camera,
+                      const StripLayout& layout, const StripText& text) {
+  const StripDrawing drawing = draw_strip(rows, camera, layout, text);
+  return svg_document(drawing.width_px, drawing.height_px, kStyle, drawing.elements);
 }
 
 }  // namespace posed::picture

@@ -39,7 +39,15 @@ struct StripLayout {
 [[nodiscard]] StripLayout layout_of(const std::vector<StripRow>& rows, const Camera& camera,
                                     double height_px, bool ground);
 
-// The picture as an SVG file.
+// The picture as SVG elements, which have the classes title, row, time, see and ground.
+struct StripDrawing {
+  double width_px = 0.0, height_px = 0.0;
+  std::string elements;
+};
+[[nodiscard]] StripDrawing draw_strip(const std::vector<StripRow>& rows, const Camera& camera,
+                                      const StripLayout& layout, const StripText& text);
+
+// The same as an SVG file.
 [[nodiscard]] std::string strip_svg(const std::vector<StripRow>& rows, const Camera& camera,
                                     const StripLayout& layout, const StripText& text);
 

@@ -56,7 +56,8 @@ Result<PageFiles> PageFiles::load(const fs::path& folder) {
       at.disable_recursion_pending();
       continue;
     }
-    if (at->is_symlink() || !at->is_regular_file()) continue;
+    std::error_code gone;  // since the folder was listed
+    if (at->is_symlink(gone) || !at->is_regular_file(gone)) continue;
     auto read = load_file(at->path(), {.what = "file of the page", .max_bytes = kMaxPageBytes});
     if (!read) return std::unexpected(read.error());
     bytes += read->size();

@@ -38,13 +38,13 @@ struct WebRoom {
 
 class WebServer {
  public:
-  // Listens at the address on `room.site.hosts`' behalf: sets them. `port` 0: any free one; with
-  // `or_any`, also if that port is in use. `io` and `room` outlive the server.
+  // Where to listen. `port` 0: any free one; with `or_any`, also if that port is in use.
   struct Options {
     std::string address = "127.0.0.1";
     std::uint16_t port = 0;
     bool or_any = false;
   };
+  // Listens, and sets the hosts of the room's site. `io` and `room` outlive the server.
   [[nodiscard]] static Result<std::unique_ptr<WebServer>> open(boost::asio::io_context& io,
                                                                WebRoom& room,
                                                                const Options& options);

@@ -1,4 +1,5 @@
-// A tree with the texts that all its drawings share; private to models/gesture. Cold.
+// A tree with the texts that all its drawings share: those of tree_drawing.hpp and those of a
+// report. Cold.
 #pragma once
 
 #include <string>

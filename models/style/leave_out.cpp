@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -128,7 +129,10 @@ class Search {
   }
 
   [[nodiscard]] double best_deg() const { return best_deg_; }
-  [[nodiscard]] const ChosenKernel& best() const { return best_; }
+  [[nodiscard]] ChosenKernel best() && {
+    best_.tried = std::move(tried_);
+    return std::move(best_);
+  }
 
  private:
   [[nodiscard]] double rad(double length_deg) const {
@@ -140,17 +144,19 @@ class Search {
     std::size_t folds = 0;
     for (const LeaveOut& style : styles_) folds += style.folds;
     for (std::size_t n = 0; n < kNoises.size(); ++n) {
-      ChosenKernel tried{{rad(length_deg), kNoises[n]}, 0.0, std::vector<Way>(styles_.size())};
+      ChosenKernel tried{
+          {rad(length_deg), kNoises[n]}, 0.0, std::vector<std::vector<Way>>(styles_.size()), {}};
       for (std::size_t c = 0; c < found.size(); ++c) {
         const TaskResult& numbers = found[c];
         for (std::size_t k = n * kNumbers; k < numbers.size(); k += kNumbers * kNoises.size()) {
           // Each fold has equal weight, whatever its length.
           tried.error += numbers[k] / static_cast<double>(folds);
-          tried.ways[chunks_[c].style].add({numbers[k + 1], numbers[k + 2], numbers[k + 3]});
+          tried.folds[chunks_[c].style].push_back({numbers[k + 1], numbers[k + 2], numbers[k + 3]});
         }
       }
+      tried_.push_back({tried.kernel, tried.error});
       if (!(tried.error < best_.error)) continue;
-      best_ = tried;
+      best_ = std::move(tried);
       best_deg_ = length_deg;
     }
   }
@@ -162,17 +168,26 @@ class Search {
   std::vector<MatrixXd> X_;  // of each style
   double told_ = 0.0;        // progress at the end of the last round
   double best_deg_ = 0.0;
-  ChosenKernel best_{{}, std::numeric_limits<double>::infinity(), {}};
+  ChosenKernel best_{{}, std::numeric_limits<double>::infinity(), {}, {}};
+  std::vector<TriedKernel> tried_;
 };
 
 }  // namespace
+
+Way ChosenKernel::way(std::size_t style) const {
+  Way sum;
+  for (const Way& fold : folds[style]) sum.add(fold);
+  return sum;
+}
 
 std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles, TaskRunner& tasks,
                                           const FoldProgress& progress) {
   if (std::ranges::all_of(styles, [](const LeaveOut& style) { return style.folds == 0; })) {
     const auto dims = styles.front().pairs.inputs.front().cols();
-    return ChosenKernel{
-        {scaled_rad(50.0, dims), kNoises.front()}, 0.0, std::vector<Way>(styles.size())};
+    return ChosenKernel{{scaled_rad(50.0, dims), kNoises.front()},
+                        0.0,
+                        std::vector<std::vector<Way>>(styles.size()),
+                        {}};
   }
   Search search(styles, tasks, progress);
   std::vector<double> lengths_deg(kFirstLengths_deg.begin(), kFirstLengths_deg.end());
@@ -187,7 +202,7 @@ std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles, Task
       lengths_deg.push_back(longest *= kWiden);
     }
   }
-  return search.best();
+  return std::move(search).best();
 }
 
 }  // namespace posed::style

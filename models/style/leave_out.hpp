@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -25,19 +26,36 @@ struct Fold {
   Eigen::MatrixXd goal{};     // the cycle that they should reach; empty: Way is not measured
 };
 
+// Who a fold asks, for people.
+struct HeldOut {
+  std::string file, person;
+  int takes = 0;  // that are not learnt from
+};
+
 struct LeaveOut {
   TrainingPairs pairs;
   std::size_t folds = 0;  // how many
   // Fold `index`. Built where it is used, because all together may take gigabytes; called from any
   // thread.
   std::function<Fold(std::size_t index)> fold{};
+  std::vector<HeldOut> held_out{};  // [fold]
+};
+
+// A kernel, and the mean squared error of a frame's difference, rad^2 summed over dimensions.
+struct TriedKernel {
+  Kernel kernel;
+  double error = 0.0;
 };
 
 // A kernel and how it did on the folds.
 struct ChosenKernel {
   Kernel kernel;
-  double error = 0.0;  // mean squared error of a frame's difference, rad^2 summed over dimensions
-  std::vector<Way> ways{};  // of the walkers held out, for each style
+  double error = 0.0;
+  std::vector<std::vector<Way>> folds{};  // [style][fold]: of each walker held out
+  std::vector<TriedKernel> tried{};       // all, in the order in which they were tried
+
+  // Of all walkers that were held out to learn one style.
+  [[nodiscard]] Way way(std::size_t style) const;
 };
 
 // Receives the fraction done; returning false stops the work.

@@ -105,8 +105,14 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
   std::vector<Learnt> learnt;
   learnt.reserve(lessons.size());
   for (std::size_t i = 0; i < lessons.size(); ++i) {
-    learnt.push_back(
-        {{}, grid_outputs(pairs[i].outputs), how, pairs[i].follows_days, chosen->ways[i]});
+    learnt.push_back({.process = {},
+                      .differences = grid_outputs(pairs[i].outputs),
+                      .length_chosen_by = how,
+                      .follows_days = pairs[i].follows_days,
+                      .way = chosen->way(i),
+                      .held_out = std::move(leave_outs[i].held_out),
+                      .ways = chosen->folds[i],
+                      .tried = chosen->tried});
   }
   auto processes = fit_styles(all, lessons, std::move(pairs), chosen->kernel);
   if (!processes) return std::unexpected(processes.error());

@@ -35,6 +35,10 @@ struct Learnt {
   std::string length_chosen_by;  // "leave-out", "default" or "evidence"
   bool follows_days = false;
   Way way{};  // of walkers held out; not measured where none could be held out
+  // The same, one by one, and all kernels that were tried on them; empty where none was held out.
+  std::vector<HeldOut> held_out{};
+  std::vector<Way> ways{};  // [held_out]
+  std::vector<TriedKernel> tried{};
 };
 
 // One process a lesson; they share kernel and poses.

@@ -158,6 +158,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
                     : learn_default(*dataset, lessons, tasks, progress);
   if (!learnt) return std::unexpected(learnt.error());
 
+  if (options.look) options.look({*dataset, lessons, *learnt});
   const std::string report = json_text(whole_report(*dataset, lessons, *learnt));
   GateData gate = gate_data_of(*dataset, targets);
   StyleAxis axis;  // of a mixture there is none

@@ -2,10 +2,12 @@
 // a callback.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "models/style/dataset.hpp"
+#include "models/style/lessons.hpp"
 #include "models/style/style_model.hpp"
 
 namespace posed::style {
@@ -17,11 +19,19 @@ enum class TrainMode : std::uint8_t {
 
 [[nodiscard]] Result<TrainMode> mode_from_name(std::string_view name);
 
+// What training found out on its way; valid during the call that gets it.
+struct Findings {
+  const Dataset& dataset;
+  const std::vector<Lesson>& lessons;  // one a target
+  const std::vector<Learnt>& learnt;   // [lesson]
+};
+
 struct TrainOptions {
   std::string target;  // the group whose style is learnt; every group that is no target is a source
   std::vector<std::string> more_targets{};  // whose styles the same model has, too
   TrainMode mode = TrainMode::kDefault;
   DatasetOptions dataset;
+  std::function<void(const Findings&)> look{};  // called once, when all is learnt
 };
 
 // Several styles share the sources, the kernel and the poses; each is otherwise learnt as alone.

@@ -17,8 +17,6 @@ using Eigen::VectorXd;
 
 // README.md, "Verdicts", says what was measured.
 constexpr double kLeastSwing_deg = 6.0;
-constexpr double kUnevenStrides = 0.2;
-constexpr double kNoStrides = 0.5;
 
 // The file name alone, for use within a sentence.
 std::string name_of(const std::string& file) {

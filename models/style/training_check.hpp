@@ -10,6 +10,11 @@
 
 namespace posed::style {
 
+// Stride scores (stride_phase.hpp) above which a clip is warned of, and is no walk (README.md,
+// "Verdicts").
+inline constexpr double kUnevenStrides = 0.2;
+inline constexpr double kNoStrides = 0.5;
+
 // On which data the closed share of the distance was measured.
 enum class ClosingBy {
   kLeaveOut,  // on walkers, or halves of clips, that were held out

@@ -140,7 +140,12 @@ std::vector<FoldPlan> take_folds(const Dataset& dataset, const Takes& takes,
 
 LeaveOut planned(std::shared_ptr<const Dataset> dataset, Takes takes, TrainingPairs pairs,
                  std::vector<FoldPlan> plans, const std::string& target) {
-  LeaveOut result{std::move(pairs), plans.size(), {}};
+  LeaveOut result{std::move(pairs), plans.size(), {}, {}};
+  for (const FoldPlan& plan : plans) {
+    const AlignedClip& clip = clip_of(*dataset, takes[plan.asked]);
+    result.held_out.push_back(
+        {clip.file, person_of(*dataset, clip), static_cast<int>(plan.left_out.size())});
+  }
   result.fold = [dataset = std::move(dataset), takes = std::move(takes), pairs = result.pairs,
                  plans = std::move(plans), target](std::size_t index) {
     const FoldPlan& plan = plans[index];
@@ -152,6 +157,7 @@ LeaveOut planned(std::shared_ptr<const Dataset> dataset, Takes takes, TrainingPa
 // The clip's rows [first, first + count), with their phases.
 AlignedClip part_of(const AlignedClip& clip, Eigen::Index first, Eigen::Index count) {
   AlignedClip part;
+  part.file = clip.file;
   part.group = clip.group;
   part.motion = clip.motion;
   part.subject = clip.subject;

@@ -15,10 +15,12 @@
 #include <thread>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/bench/bench_gloves.hpp"
+#include "daemon/cli/bench/bench_report.hpp"
 #include "daemon/cli/bench/percentiles.hpp"
 #include "daemon/cli/cli.hpp"
 #include "daemon/emulate/emulated_port.hpp"
@@ -178,44 +180,98 @@ void print_glove(const json& glove) {
   std::printf("  p99 x%.2f\n", glove["latency"]["p99_ratio"].get<double>());
 }
 
-Result<> bench_decoders(const std::string& only, int samples, bool as_json) {
+struct DecoderBench {
+  std::string glove;
+  int samples = 2000;
+  ReportFile report;
+  bool json = false;
+};
+
+BenchPage page_of_gloves(const json& gloves) {
+  report::PairedBars late{.title = "What decoding adds to a read",
+                          .sentence =
+                              "99 of 100 packets are there within this time: where both "
+                              "bars are equally long, decoding costs nothing beside the "
+                              "read itself.",
+                          .quantity = "from the write of a packet, p99",
+                          .unit = "us",
+                          .series = {"bare read", "decoded"},
+                          .rows = {}};
+  report::PairedBars fast{.title = "How much one core decodes",
+                          .sentence =
+                              "Packets decoded, calibrated and posed by one thread; a "
+                              "glove sends a hundred or so a second.",
+                          .quantity = "packets",
+                          .unit = "millions a second",
+                          .series = {"packets"},
+                          .rows = {},
+                          .digits = 2};
+  double worst = 0.0;
+  for (const json& glove : gloves) {
+    const auto name = glove["glove"].get<std::string>();
+    const json& latency = glove["latency"];
+    late.rows.push_back({name,
+                         {latency["bare_read"]["p99_us"].get<double>(),
+                          latency["decoded"]["p99_us"].get<double>()}});
+    fast.rows.push_back({name, {glove["throughput"]["packets_per_s"].get<double>() * 1e-6}});
+    worst = std::max(worst, latency["p99_ratio"].get<double>());
+  }
+  BenchPage page{
+      .command = "posed bench decoders",
+      .verdict = fmt::format("at most {:.2f} times the time of a bare read (p99) over {} "
+                             "gloves",
+                             worst, gloves.size()),
+      .good = true,
+      .figures = {report::paired_bars(late), report::paired_bars(fast)}};
+  for (const json& glove : gloves) {
+    report::Figure figure = report::percentile_bars(
+        {.title = glove["glove"].get<std::string>(),
+         .sentence = "The same for this glove, with all percentiles; equal distances are "
+                     "equal factors.",
+         .quantity = "from the write of a packet",
+         .peers = {{"bare read", percentiles_of(glove["latency"]["bare_read"])},
+                   {"decoded", percentiles_of(glove["latency"]["decoded"])}}});
+    figure.folded = true;
+    page.figures.push_back(std::move(figure));
+  }
+  return page;
+}
+
+Result<> bench_decoders(const DecoderBench& bench) {
+  if (auto checked = bench.report.check(); !checked) return checked;
   json report = json::array();
-  if (!as_json) std::printf("latency in us: p50, p99, p99.9, max\n");
+  if (!bench.json) std::printf("latency in us: p50, p99, p99.9, max\n");
   auto gloves = bench_gloves();
   if (!gloves) return std::unexpected(gloves.error());
   for (BenchGlove& glove : *gloves) {
-    if (!glove.name.starts_with(only)) continue;
+    if (!glove.name.starts_with(bench.glove)) continue;
     json entry{{"glove", glove.name}, {"throughput", decoder_rate(glove)}};
-    auto ways = decoder_latency(glove, samples);
+    auto ways = decoder_latency(glove, bench.samples);
     if (!ways) return std::unexpected(ways.error());
     entry["latency"] = std::move(*ways);
-    if (!as_json) print_glove(entry);
+    if (!bench.json) print_glove(entry);
     report.push_back(std::move(entry));
   }
   if (report.empty())
-    return misuse("there is no glove '" + only + "'; leave --glove out to see them");
-  if (as_json) std::printf("%s\n", json_text(report, 2).c_str());
-  return {};
+    return misuse("there is no glove '" + bench.glove + "'; leave --glove out to see them");
+  if (bench.json) std::printf("%s\n", json_text(report, 2).c_str());
+  return write_bench_page(page_of_gloves(report), report, bench.report);
 }
 
 }  // namespace
 
 void add_bench_decoders(CLI::App& bench, int& exit_code) {
-  struct Options {
-    std::string glove;
-    int samples = 2000;
-    bool json = false;
-  };
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DecoderBench>();
   CLI::App* command = bench.add_subcommand("decoders", "The decoders of all gloves");
   command->footer(kDecodersFooter);
   command->add_option("--glove", options->glove, "Only gloves whose name begins with this");
   command->add_option("--samples", options->samples, "Timed packets for each glove and way")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
+  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "One JSON array on stdout");
   command->callback([options, &exit_code] {
-    if (auto done = bench_decoders(options->glove, options->samples, options->json); !done) {
+    if (auto done = bench_decoders(*options); !done) {
       exit_code = report(done.error());
     }
   });

@@ -6,12 +6,14 @@
 #include <string>
 #include <thread>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/cli/bench/bench_parts.hpp"
+#include "daemon/cli/bench/bench_report.hpp"
 #include "daemon/cli/bench/hop_report.hpp"
 #include "daemon/cli/bench/hop_subscriber.hpp"
 #include "daemon/cli/cli.hpp"
@@ -33,13 +35,15 @@ a message of the same size straight to ZeroMQ instead: the bare hop. The subscri
 process. The result is valid only if the CPU pressure (PSI some) stays below 5 %.
 
   posed bench pipeline
-  posed bench pipeline --streams 32 --points 200 --json)";
+  posed bench pipeline --streams 32 --points 200 --json
+  posed bench pipeline --report hop.html)";
 
 struct HopOptions {
   int streams = 1;
   int points = 1000;
   int seconds = 60;
   bool gate = false;
+  ReportFile report;
   bool json = false;
 };
 
@@ -243,7 +247,41 @@ void print(const HopOptions& options, const Watched& watched) {
               static_cast<double>(watched.rss_end) * 1e-6);
   std::printf("CPU pressure (PSI some): %.1f %% in the 10 s before, %.1f %% during the run%s\n",
               watched.pressure_before_percent, watched.pressure_percent,
-              watched.pressure_percent > 5.0 ? " - too busy: repeat on a quiet machine" : "");
+              watched.pressure_percent > kMostPressure_percent
+                  ? " - too busy: repeat on a quiet machine"
+                  : "");
+}
+
+BenchPage page_of(const HopOptions& options, const Watched& watched) {
+  const HopReport& report = watched.report;
+  return {.command = "posed bench pipeline",
+          .verdict = fmt::format("at the median the daemon adds {:.0f} us to a bare hop{}",
+                                 report.pipeline.p50_us - report.bare.p50_us,
+                                 pressure_words(watched.pressure_percent)),
+          .good = watched.pressure_percent <= kMostPressure_percent,
+          .figures = {report::percentile_bars(
+              {.title = fmt::format("{} stream{} at {:.0f} Hz, {} poses in the style model",
+                                    options.streams, options.streams == 1 ? "" : "s", kRate_hz,
+                                    options.points),
+               .sentence = "The second bar of a pair is what a frame needs through the whole "
+                           "daemon, the first what ZeroMQ needs alone: their distance is posed's "
+                           "part. Equal distances are equal factors.",
+               .quantity = "from the arrival to another process",
+               .peers = {{"bare ZeroMQ hop", percentiles_of(report.bare)},
+                         {"posed's pipeline", percentiles_of(report.pipeline)}}})}};
+}
+
+Result<> bench_pipeline(const HopOptions& options) {
+  if (auto checked = options.report.check(); !checked) return checked;
+  const auto watched = measure(options);
+  if (!watched) return std::unexpected(watched.error());
+  const auto figures = to_json(options, *watched);
+  if (options.json) {
+    std::printf("%s\n", json_text(figures, 2).c_str());
+  } else {
+    print(options, *watched);
+  }
+  return write_bench_page(page_of(options, *watched), figures, options.report);
 }
 
 }  // namespace
@@ -262,17 +300,11 @@ void add_bench_pipeline(CLI::App& bench, int& exit_code) {
       ->check(CLI::Range(4, 86400))
       ->capture_default_str();
   command->add_flag("--gate", options->gate, "With the style's gate");
+  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchPipelineFooter);
   command->callback([options, &exit_code] {
-    const auto watched = measure(*options);
-    if (!watched) {
-      exit_code = report(watched.error());
-    } else if (options->json) {
-      std::printf("%s\n", json_text(to_json(*options, *watched), 2).c_str());
-    } else {
-      print(*options, *watched);
-    }
+    if (auto done = bench_pipeline(*options); !done) exit_code = report(done.error());
   });
 }
 

@@ -13,9 +13,11 @@
 #include <vector>
 
 #include <hwy/aligned_allocator.h>
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "daemon/cli/bench/bench_report.hpp"
 #include "daemon/cli/bench/percentiles.hpp"
 #include "daemon/cli/bench/stream_sum.hpp"
 #include "daemon/cli/cli.hpp"
@@ -101,6 +103,10 @@ Floats ones(int count) {
 }
 
 int to_yardstick(int floats) { return (floats + 127) / 128 * 128; }
+
+constexpr std::array kVariants{"sum", "mean", "four_at_rest", "four_moving", "four_settling"};
+constexpr std::array kVariantWords{"reading alone", "one style", "four styles at rest",
+                                   "four styles moving", "four styles settling"};
 
 constexpr int kStyles = 4;  // of the mixture
 
@@ -219,7 +225,7 @@ void print_case(const json& report) {
   std::printf("\nN = %d, D = %d\n", report["poses"].get<int>(), report["dims"].get<int>());
   std::printf("  %-13s %-5s %8s %8s %8s %8s %7s\n", "", "", "p50 us", "p99", "p99.9", "max",
               "x sum");
-  for (const auto* name : {"sum", "mean", "four_at_rest", "four_moving", "four_settling"}) {
+  for (const auto* name : kVariants) {
     for (const auto* heat : {"hot", "cold"}) {
       const json& row = report[name][heat];
       std::printf("  %-13s %-5s %8.2f %8.2f %8.2f %8.2f %7.2f", name, heat,
@@ -240,40 +246,80 @@ void print_case(const json& report) {
               same.is_null() ? "not compared, this CPU lacks one" : (same ? "the same" : "DIFFER"));
 }
 
+struct PredictBench {
+  int samples = 2000;
+  ReportFile report;
+  bool json = false;
+};
+
+BenchPage page_of_cases(const json& cases) {
+  BenchPage page{.command = "posed bench predict", .verdict = {}, .good = true, .figures = {}};
+  double most = 0.0;
+  for (const json& one : cases) {
+    most = std::max(most, one["mean"]["hot"]["ratio"].get<double>());
+    for (const auto* heat : {"hot", "cold"}) {
+      std::vector<report::Measured> peers;
+      for (std::size_t v = 0; v < kVariants.size(); ++v) {
+        peers.push_back({kVariantWords[v], percentiles_of(one[kVariants[v]][heat])});
+      }
+      report::Figure figure = report::percentile_bars(
+          {.title = fmt::format("{} poses, {} dimensions, {}", one["poses"].get<int>(),
+                                one["dims"].get<int>(), heat),
+           .sentence =
+               "The first bar of each group is what it takes only to read the model's "
+               "numbers, the second one call of one style; the others are four styles in one "
+               "model. Equal distances are equal factors.",
+           .quantity = "one call",
+           .peers = std::move(peers)});
+      figure.folded = page.figures.size() > 1;
+      page.figures.push_back(std::move(figure));
+    }
+  }
+  page.verdict = fmt::format(
+      "one call takes at most {:.2f} times as long as reading its numbers (hot, median)", most);
+  return page;
+}
+
+// Whether the instruction sets agree.
+Result<bool> bench_predict(const PredictBench& bench) {
+  if (auto checked = bench.report.check(); !checked) return std::unexpected(checked.error());
+  const Evictor evictor;
+  json cases = json::array();
+  if (!bench.json) std::printf("instruction set: %s\n", std::string(gp::isa_name()).c_str());
+  bool same = true;
+  for (const int dims : {43, 63}) {
+    for (const int poses : {200, 1000}) {
+      cases.push_back(run_case(poses, dims, bench.samples, evictor));
+      same = same && cases.back()["accuracy"]["avx2_avx512_same_bits"] != json(false);
+      if (!bench.json) print_case(cases.back());
+    }
+  }
+  const json figures{{"isa", gp::isa_name()},
+                     {"hot_calls_per_sample", kHotCalls},
+                     {"samples", bench.samples},
+                     {"cases", cases}};
+  if (bench.json) std::printf("%s\n", json_text(figures, 2).c_str());
+  if (auto written = write_bench_page(page_of_cases(cases), figures, bench.report); !written) {
+    return std::unexpected(written.error());
+  }
+  return same;
+}
+
 }  // namespace
 
 void add_bench_predict(CLI::App& bench, int& exit_code) {
-  struct Options {
-    int samples = 2000;
-    bool json = false;
-  };
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PredictBench>();
   CLI::App* command = bench.add_subcommand("predict", "One call of the style filter's process");
   command->footer(kBenchPredictFooter);
   command->add_option("--samples", options->samples, "Timed samples for each variant")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
+  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const Evictor evictor;
-    json cases = json::array();
-    if (!options->json) std::printf("instruction set: %s\n", std::string(gp::isa_name()).c_str());
-    bool same = true;
-    for (const int dims : {43, 63}) {
-      for (const int poses : {200, 1000}) {
-        cases.push_back(run_case(poses, dims, options->samples, evictor));
-        same = same && cases.back()["accuracy"]["avx2_avx512_same_bits"] != json(false);
-        if (!options->json) print_case(cases.back());
-      }
-    }
-    if (options->json) {
-      const json report{{"isa", gp::isa_name()},
-                        {"hot_calls_per_sample", kHotCalls},
-                        {"samples", options->samples},
-                        {"cases", cases}};
-      std::printf("%s\n", json_text(report, 2).c_str());
-    }
-    exit_code = static_cast<int>(same ? ExitCode::kDone : ExitCode::kFailed);
+    const auto same = bench_predict(*options);
+    exit_code =
+        same ? static_cast<int>(*same ? ExitCode::kDone : ExitCode::kFailed) : report(same.error());
   });
 }
 

@@ -6,12 +6,14 @@
 #include <thread>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/cli/bench/bench_parts.hpp"
+#include "daemon/cli/bench/bench_report.hpp"
 #include "daemon/cli/bench/child_process.hpp"
 #include "daemon/cli/bench/hop_subscriber.hpp"
 #include "daemon/cli/cli.hpp"
@@ -40,6 +42,7 @@ struct RelayBench {
   int streams = 1;
   int seconds = 10;
   int turns = 3;
+  ReportFile report;
   bool json = false;
 };
 
@@ -177,22 +180,20 @@ Result<RelayFigures> measure(const RelayBench& bench) {
   return figures;
 }
 
-void print_as_json(const RelayBench& bench, const RelayFigures& figures) {
+nlohmann::ordered_json to_json(const RelayBench& bench, const RelayFigures& figures) {
   const auto heard = [](const HeardFrames& one) {
     return nlohmann::ordered_json{{"cpu_percent", one.cpu_percent},
                                   {"send", to_json(figures_of(one.send_us))},
                                   {"sequence_gaps", one.gaps}};
   };
-  const nlohmann::ordered_json line{
-      {"subscribers", bench.subscribers},
-      {"streams", bench.streams},
-      {"seconds", bench.seconds},
-      {"turns", bench.turns},
-      {"direct", heard(figures.direct)},
-      {"relay", heard(figures.relayed)},
-      {"cpu_ratio", figures.relayed.cpu_percent / figures.direct.cpu_percent},
-      {"late_joiner", to_json(figures_of(figures.late_us))}};
-  std::printf("%s\n", json_text(line, 2).c_str());
+  return {{"subscribers", bench.subscribers},
+          {"streams", bench.streams},
+          {"seconds", bench.seconds},
+          {"turns", bench.turns},
+          {"direct", heard(figures.direct)},
+          {"relay", heard(figures.relayed)},
+          {"cpu_ratio", figures.relayed.cpu_percent / figures.direct.cpu_percent},
+          {"late_joiner", to_json(figures_of(figures.late_us))}};
 }
 
 void print(const RelayBench& bench, const RelayFigures& figures) {
@@ -208,6 +209,53 @@ void print(const RelayBench& bench, const RelayFigures& figures) {
   std::printf("sequence gaps: direct %llu, behind the relay %llu\n",
               static_cast<unsigned long long>(figures.direct.gaps),
               static_cast<unsigned long long>(figures.relayed.gaps));
+}
+
+BenchPage page_of(const RelayBench& bench, const RelayFigures& figures) {
+  const double ratio = figures.relayed.cpu_percent / figures.direct.cpu_percent;
+  const std::string direct = "1 direct subscriber";
+  const std::string relayed = fmt::format("{} behind a relay", bench.subscribers);
+  return {
+      .command = "posed bench relay",
+      .verdict = fmt::format("{} subscribers behind a relay cost the daemon {:.2f} times the CPU "
+                             "of one, and {} frames were lost",
+                             bench.subscribers, ratio, figures.relayed.gaps),
+      .good = figures.relayed.gaps == 0,
+      .figures = {
+          report::percentile_bars(
+              {.title = "How long a frame is in the daemon",
+               .sentence = "Pairs of equal length say that the daemon does not notice how many "
+                           "listen behind the relay. Equal distances are equal factors.",
+               .quantity = "from the arrival to the hand-over",
+               .peers = {{direct, percentiles_of(figures_of(figures.direct.send_us))},
+                         {relayed, percentiles_of(figures_of(figures.relayed.send_us))}}}),
+          report::paired_bars({.title = "What it costs the daemon",
+                               .sentence = "The same number of streams, heard by one and by "
+                                           "many.",
+                               .quantity = "CPU time of the daemon",
+                               .unit = "% of a core",
+                               .series = {"CPU"},
+                               .rows = {{direct, {figures.direct.cpu_percent}},
+                                        {relayed, {figures.relayed.cpu_percent}}},
+                               .digits = 2}),
+          report::percentile_bars(
+              {.title = "Who comes late",
+               .sentence = "How long a new subscriber waits for its skeleton from the relay.",
+               .quantity = "from the subscription to the skeleton",
+               .peers = {{"late joiner", percentiles_of(figures_of(figures.late_us))}}})}};
+}
+
+Result<> bench_relay(const RelayBench& bench) {
+  if (auto checked = bench.report.check(); !checked) return checked;
+  const auto measured = measure(bench);
+  if (!measured) return std::unexpected(measured.error());
+  const auto figures = to_json(bench, *measured);
+  if (bench.json) {
+    std::printf("%s\n", json_text(figures, 2).c_str());
+  } else {
+    print(bench, *measured);
+  }
+  return write_bench_page(page_of(bench, *measured), figures, bench.report);
 }
 
 }  // namespace
@@ -228,17 +276,11 @@ void add_bench_relay(CLI::App& bench, int& exit_code) {
   command->add_option("--turns", options->turns, "How often both are measured")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchRelayFooter);
   command->callback([options, &exit_code] {
-    const auto figures = measure(*options);
-    if (!figures) {
-      exit_code = report(figures.error());
-    } else if (options->json) {
-      print_as_json(*options, *figures);
-    } else {
-      print(*options, *figures);
-    }
+    if (auto done = bench_relay(*options); !done) exit_code = report(done.error());
   });
 }
 

@@ -11,12 +11,14 @@
 #include <vector>
 
 #include <arpa/inet.h>
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/cli/bench/bench_parts.hpp"
+#include "daemon/cli/bench/bench_report.hpp"
 #include "daemon/cli/bench/child_process.hpp"
 #include "daemon/cli/bench/hop_subscriber.hpp"
 #include "daemon/cli/cli.hpp"
@@ -49,6 +51,7 @@ struct StageBench {
   int seconds = 60;
   bool no_vmc = false;
   bool realtime = false;
+  ReportFile report;
   bool json = false;
 };
 
@@ -278,6 +281,36 @@ void print(const StageBench& bench, const StageFigures& figures) {
               figures.pressure_percent);
 }
 
+BenchPage page_of(const StageBench& bench, const StageFigures& figures) {
+  return {
+      .command = "posed bench stage",
+      .verdict = fmt::format("{} performers cost {:.0f} % of a core, {} of {} frames were lost{}",
+                             bench.performers, figures.cpu_percent,
+                             figures.dropped + figures.shed + figures.kernel_dropped,
+                             figures.frames, pressure_words(figures.pressure_percent)),
+      .good = figures.dropped + figures.shed + figures.kernel_dropped == 0,
+      .figures = {report::percentile_bars(
+          {.title = fmt::format("{} performers at {:g} Hz", bench.performers, bench.rate_hz),
+           .sentence = "How long a frame is in the daemon, from the kernel's receive stamp "
+                       "until ZeroMQ has it: all bars should end far left of the time between "
+                       "two frames. Equal distances are equal factors.",
+           .quantity = "from receipt to the hand-over",
+           .peers = {{"posed", percentiles_of(figures.send)}}})}};
+}
+
+Result<> bench_stage(const StageBench& bench) {
+  if (auto checked = bench.report.check(); !checked) return checked;
+  const auto measured = measure(bench);
+  if (!measured) return std::unexpected(measured.error());
+  const auto figures = to_json(bench, *measured);
+  if (bench.json) {
+    std::printf("%s\n", json_text(figures, 2).c_str());
+  } else {
+    print(bench, *measured);
+  }
+  return write_bench_page(page_of(bench, *measured), figures, bench.report);
+}
+
 }  // namespace
 
 void add_bench_stage(CLI::App& bench, int& exit_code) {
@@ -298,17 +331,11 @@ void add_bench_stage(CLI::App& bench, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--no-vmc", options->no_vmc, "Without avatars");
   command->add_flag("--realtime", options->realtime, "Ask for real-time rights, as `run` does");
+  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchStageFooter);
   command->callback([options, &exit_code] {
-    const auto figures = measure(*options);
-    if (!figures) {
-      exit_code = report(figures.error());
-    } else if (options->json) {
-      std::printf("%s\n", json_text(to_json(*options, *figures), 2).c_str());
-    } else {
-      print(*options, *figures);
-    }
+    if (auto done = bench_stage(*options); !done) exit_code = report(done.error());
   });
 }
 

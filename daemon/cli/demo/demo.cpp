@@ -71,7 +71,7 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
     experiment.clips.push_back({clips->to[i], "sway", person, "walk", 0});
   }
   OneRank alone;
-  const auto report = train_and_save(experiment, 0, folder / kDemoModel, false, alone);
+  const auto report = train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone);
   if (!report) return std::unexpected(report.error());
   const std::string verdict = (*report)["verdict"].get<std::string>();
   if (!(*report)["written"].get<bool>()) return fail("the demo's own model is " + verdict);

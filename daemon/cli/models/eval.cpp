@@ -8,6 +8,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
 #include "daemon/cli/models/eval_natural.hpp"
+#include "daemon/cli/models/eval_style_report.hpp"
 #include "daemon/cli/models/root_option.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
@@ -27,6 +28,7 @@ using nlohmann::json;
 constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
+  posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --report proud.html
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --root stride
   posed eval style --model two.style --weights sad=1 --source plain_3.bvh --target sad_3.bvh
 
@@ -51,6 +53,7 @@ struct EvalOptions {
   std::string model, source, target, skeleton, weights;
   double alpha = 1.0;
   std::optional<feet::RootOptions> feet;
+  ReportFile report;
   bool json = false;
 };
 
@@ -65,6 +68,7 @@ struct Evaluation {
   double moved_rms_deg = 0.0;
   std::optional<double> gate_mean{};
   style::WalkerFit fit;
+  std::optional<EvaluatedClips> clips{};  // for the report
 
   [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0; }
 };
@@ -128,7 +132,15 @@ json report_of(const Evaluation& e, const EvalOptions& options) {
               {"verdict", verdict(e)}};
 }
 
+Result<> check_files(const EvalOptions& options) {
+  return OutputFiles(options.report.overwrite)
+      .reads_all(std::vector{options.model, options.source, options.target, options.skeleton})
+      .writes(options.report.path, {".html"})
+      .check();
+}
+
 Result<Evaluation> evaluate(const EvalOptions& options) {
+  if (auto checked = check_files(options); !checked) return std::unexpected(checked.error());
   if (!options.skeleton.empty() && !is_amc(options.source) && !is_amc(options.target)) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
@@ -162,6 +174,13 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
     (full ? evaluation.score : evaluation.constant) = *score;
     evaluation.gate_mean = styled->gate_mean;
     evaluation.moved_rms_deg = styled->rms_change_rad * kDegrees;
+    if (full && options.report.wanted()) {
+      evaluation.clips = {.source = *source,
+                          .styled = styled->clip,
+                          .target = *target,
+                          .space = model->space.space,
+                          .rate_hz = model->rate_hz};
+    }
   }
   return evaluation;
 }
@@ -177,6 +196,10 @@ void print_numbers(const std::string& prefix, const json& figures) {
 
 int finish(const Evaluation& evaluation, const EvalOptions& options) {
   const json figures = report_of(evaluation, options);
+  if (evaluation.clips) {
+    const auto written = write_eval_style_report(figures, *evaluation.clips, options.report.path);
+    if (!written) return report(written.error());
+  }
   if (options.json) {
     std::printf("%s\n", json_text(figures, 2).c_str());
   } else {
@@ -207,6 +230,7 @@ void add_eval(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(-2.0, 2.0))
       ->capture_default_str();
   add_root_option(*style, options->feet);
+  add_report_file(*style, options->report);
   style->add_flag("--json", options->json, "One JSON object on stdout");
   style->callback([options, &exit_code] {
     const auto evaluation = evaluate(*options);

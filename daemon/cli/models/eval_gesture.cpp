@@ -11,7 +11,9 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/models/gesture_report.hpp"
 #include "daemon/cli/models/lag_curve.hpp"
+#include "daemon/cli/models/train_gesture.hpp"
 #include "daemon/cli/models/tree_options.hpp"
 #include "daemon/cli/models/waiting.hpp"
 #include "daemon/cli/output_files.hpp"
@@ -31,6 +33,8 @@ constexpr const char* kEvalGestureFooter = R"(Examples:
   posed eval gesture --model hand.gesture
   posed eval gesture --model hand.gesture --labels "g 1 c 3 4 p" --reference hand.csv --json
   posed eval gesture --model hand.gesture --svg lag.svg --tree-svg tree.svg --trees middle:4
+  posed eval gesture --model hand.gesture --reference take2.csv --reference-labels take2.lab \
+      --report hand.html
 
 jerk: rms third difference, deg/frame^3; ldlj and sparc: smoothness of the speed, closer to 0 is
 smoother; nearest_reference_deg: distance to the nearest recorded frame, rms over the performed
@@ -39,7 +43,7 @@ frames and the angles that move; frechet: distance of the Gaussians of windows o
 how much worse a performance is that knows its labels only so many frames ahead.)";
 
 struct EvalGestureOptions {
-  std::string model, reference, labels, svg;
+  std::string model, reference, reference_labels, labels, svg, report;
   bool overwrite = false, json = false;
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
@@ -135,12 +139,52 @@ std::string verdict(const json& report) {
   return text;
 }
 
+// The recording to compare with, cut at its labels if it has some.
+Result<std::vector<gesture::Recording>> compared_with(const EvalGestureOptions& options,
+                                                      double rate_hz) {
+  std::vector<gesture::Recording> recordings;
+  if (options.reference.empty()) return recordings;
+  if (!options.reference_labels.empty()) {
+    auto labelled = load_recording(options.reference, options.reference_labels, rate_hz);
+    if (!labelled) return std::unexpected(labelled.error());
+    recordings.push_back(std::move(*labelled));
+    return recordings;
+  }
+  auto clip = clip::read_hand_clip(options.reference);
+  if (!clip) return std::unexpected(clip.error());
+  clip::fill_gaps(*clip);
+  auto recording = gesture::recording_of(*clip, rate_hz);
+  if (!recording) return std::unexpected(recording.error());
+  recordings.push_back(std::move(*recording));
+  return recordings;
+}
+
+Result<> write_report(const EvalGestureOptions& options, const gesture::GestureModel& model,
+                      const std::vector<int>& labels, const std::vector<LagPoint>& curve,
+                      const json& report) {
+  if (options.report.empty()) return {};
+  const auto recordings = compared_with(options, model.rate_hz);
+  if (!recordings) return std::unexpected(recordings.error());
+  return write_gesture_report({.title = "Evaluation of gestures",
+                               .command = "posed eval gesture",
+                               .recorded_by = "the reference",
+                               .labels = labels,
+                               .good = report["min_gap_cm"].get<double>() >= 0.0,
+                               .curve = curve},
+                              std::make_shared<const gesture::GestureModel>(model), *recordings,
+                              report, options.report);
+}
+
 Result<json> evaluate_gesture(const EvalGestureOptions& options) {
   OutputFiles files(options.overwrite);
   if (auto checked = check_tree_options(*options.trees, files); !checked) {
     return std::unexpected(checked.error());
   }
-  files.reads(options.model).reads(options.reference).writes_any_but_other(options.svg, {".svg"});
+  files.reads(options.model)
+      .reads(options.reference)
+      .reads(options.reference_labels)
+      .writes_any_but_other(options.svg, {".svg"})
+      .writes(options.report, {".html"});
   if (auto checked = files.check(); !checked) return std::unexpected(checked.error());
   auto model = gesture::load_model(options.model);
   if (!model) return std::unexpected(model.error());
@@ -178,6 +222,9 @@ Result<json> evaluate_gesture(const EvalGestureOptions& options) {
     report["svg"] = options.svg;
   }
   report["verdict"] = verdict(report);
+  if (auto written = write_report(options, information.model(), *labels, curve, report); !written) {
+    return std::unexpected(written.error());
+  }
   return report;
 }
 
@@ -224,9 +271,16 @@ void add_eval_gesture(CLI::App& eval, int& exit_code) {
   const auto options = std::make_shared<EvalGestureOptions>();
   command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
   command->add_option("--labels", options->labels, "What to perform (default: every label once)");
-  command->add_option("--reference", options->reference, "A recording to compare with");
+  auto* reference =
+      command->add_option("--reference", options->reference, "A recording to compare with");
   command->add_option("--svg", options->svg, "Where to draw look-ahead against error");
   add_tree_options(*command, options->trees);
+  auto* page = add_report_option(*command, options->report);
+  command
+      ->add_option("--reference-labels", options->reference_labels,
+                   "Its labels, to show which are recognised")
+      ->needs(reference)
+      ->needs(page);
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {

@@ -10,6 +10,8 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/models/auto_label.hpp"
+#include "daemon/cli/models/gesture_figures.hpp"
+#include "daemon/cli/models/gesture_report.hpp"
 #include "daemon/cli/models/question_file.hpp"
 #include "daemon/cli/models/tree_options.hpp"
 #include "daemon/cli/output_files.hpp"
@@ -30,6 +32,7 @@ constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --show ok=ok_pose.csv --out h.gesture
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture \
       --tree-svg tree.svg --trees middle:4
+  posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture --report hand.html
 
 A label file has a line per gesture, `start end name`, in seconds from the first frame (or HTK's
 100 ns). Label two gestures of each name by hand and let posed propose the rest:
@@ -37,7 +40,7 @@ A label file has a line per gesture, `start end name`, in seconds from the first
 
 struct TrainGestureOptions {
   std::vector<std::string> clips, labels, shows;
-  std::string questions, propose, out;
+  std::string questions, propose, out, report;
   std::string hand;  // which hand of a body
   double rate_hz = 30.0;
   int embedded_rounds = 0;
@@ -53,11 +56,11 @@ Result<> check_auto_label(const TrainGestureOptions& options) {
   }
   const bool draws =
       !options.trees->text.empty() || !options.trees->dot.empty() || !options.trees->svg.empty();
-  if (draws || !options.questions.empty() || !options.propose.empty() || !options.shows.empty() ||
-      options.embedded_rounds > 0) {
+  if (draws || !options.report.empty() || !options.questions.empty() || !options.propose.empty() ||
+      !options.shows.empty() || options.embedded_rounds > 0) {
     return misuse(
         "--auto-label only proposes labels; leave out --questions, --propose-questions, --show, "
-        "--embedded-rounds and --tree-...");
+        "--embedded-rounds, --tree-... and --report");
   }
   return {};
 }
@@ -89,6 +92,7 @@ Result<> check(const TrainGestureOptions& options) {
   }
   return files.writes_any_but_other(options.propose, {".toml"})
       .writes_any_but_other(options.out, {".gesture"})
+      .writes(options.report, {".html"})
       .check();
 }
 
@@ -173,8 +177,7 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   gesture::TrainOptions train_options;
   train_options.labels = std::move(*labels);
   train_options.embedded_rounds = options.embedded_rounds;
-  const auto training =
-      train_gesture_and_save(recordings, std::move(train_options), options.out, ranks);
+  auto training = train_gesture_and_save(recordings, std::move(train_options), options.out, ranks);
   if (!training) return std::unexpected(training.error());
   const auto drawn = ranks.leads() ? draw_trees(training->model, *options.trees) : Result<>{};
   if (!drawn) return std::unexpected(drawn.error());
@@ -185,6 +188,16 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   report["verdict"] = warnings == 0 ? "good: these recordings show no problem with the model"
                                     : "usable with care: " + std::to_string(warnings) +
                                           " warnings above say what to record more of";
+  if (!options.report.empty() && ranks.leads()) {
+    const auto model = std::make_shared<const gesture::GestureModel>(std::move(training->model));
+    const auto written = write_gesture_report({.title = "Training of gestures",
+                                               .command = "posed train gesture",
+                                               .recorded_by = "the training recordings",
+                                               .labels = labels_to_show(*model),
+                                               .good = warnings == 0},
+                                              model, recordings, report, options.report);
+    if (!written) return std::unexpected(written.error());
+  }
   return report;
 }
 
@@ -278,6 +291,7 @@ void add_train_gesture(CLI::App& train_command, int& exit_code,
                     "Train nothing: propose labels from few examples and write them to --out");
   add_tree_options(*command, options->trees);
   command->add_option("--out", options->out, "Where to write the model")->required();
+  add_report_option(*command, options->report);
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback(

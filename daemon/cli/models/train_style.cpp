@@ -9,6 +9,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/models/experiment.hpp"
+#include "daemon/cli/models/style_report.hpp"
 #include "daemon/cli/models/train_style.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
@@ -27,7 +28,7 @@ constexpr const char* kTrainStyleFooter = R"(Examples:
   posed train style --from ann:a.bvh ann:b.bvh bob:c.bvh --to ann:d.bvh --out two.style
   posed train style --motion walk --from 02_02.amc 35_01.amc --to 08_01.amc --pose-space cmu43 \
       --out eight.style
-  posed train style --experiment styles.toml --out styles.style --json
+  posed train style --experiment styles.toml --out styles.style --report styles.html
 
 Several styles in one model, mixed live by weights: NAME= begins the clips of each.
   posed train style --from plain_1.bvh plain_2.bvh --to feminine=f_1.bvh f_2.bvh \
@@ -57,7 +58,7 @@ walk, a held-out walker becomes worse) is not written, and the exit code is 1.)"
 // Options that are not given keep the value of the experiment file, or the default.
 struct TrainStyleOptions {
   std::vector<std::string> from, to;
-  std::string experiment, skeleton, out;
+  std::string experiment, skeleton, out, report;
   std::optional<std::string> motion, pose_space, mode;
   std::optional<double> rate_hz;
   std::uint64_t seed = 0;
@@ -168,11 +169,14 @@ Result<json> train_style(const TrainStyleOptions& options, Ranks& ranks) {
     const auto ok = OutputFiles(options.overwrite)
                         .reads_all(inputs)
                         .writes_any_but_other(options.out, {".style"})
+                        .writes(options.report, {".html"})
                         .check();
     if (!ok) return std::unexpected(ok.error());
   }
   if (auto same = ranks.check_same(inputs); !same) return std::unexpected(same.error());
-  return train_and_save(*experiment, options.seed, options.out, options.force, ranks);
+  return train_and_save(*experiment, options.seed,
+                        {.model = options.out, .force = options.force, .report = options.report},
+                        ranks);
 }
 
 // Prints warnings and, last, the verdict on stderr.
@@ -201,7 +205,7 @@ int finish(const json& report, const TrainStyleOptions& options) {
 }  // namespace
 
 Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
-                            const std::filesystem::path& out, bool force, Ranks& ranks) {
+                            const StyleFiles& files, Ranks& ranks) {
   const FixedProducts fixed;
   ProgressBar bar;
   if (!bar.show("reading clips", 0.0)) return fail("stopped");
@@ -218,17 +222,26 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   options.dataset.progress = [&bar](std::string_view step, double fraction) {
     return bar.show(step, overall(step, fraction));
   };
+  StyleReport page(*clips);
+  const bool reports = !files.report.empty() && ranks.leads();
+  if (reports) options.look = [&page](const style::Findings& findings) { page.look(findings); };
   auto model = style::train_style(*clips, options);
   if (!model) return std::unexpected(model.error());
   json report = json::parse(model->report_json);
-  const bool written = report["usable"].get<bool>() || force;
-  const auto saved =
-      written ? ranks.write_model([&] { return style::save_model(*model, out); }) : Result<>{};
+  const bool written = report["usable"].get<bool>() || files.force;
+  const auto saved = written
+                         ? ranks.write_model([&] { return style::save_model(*model, files.model); })
+                         : Result<>{};
   if (!saved) return std::unexpected(saved.error());
   report["mode"] = experiment.mode == style::TrainMode::kPaper ? "paper" : "default";
   report["written"] = written;
   report["seconds"] = bar.elapsed_s();
-  report["out"] = out.string();
+  report["out"] = files.model.string();
+  if (reports) {
+    if (auto drawn = page.write(report, files.report); !drawn) {
+      return std::unexpected(drawn.error());
+    }
+  }
   return report;
 }
 
@@ -254,6 +267,7 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
   style->add_option("--out", options->out, "Where to write the model")
       ->required()
       ->type_name("OUT.style");
+  add_report_option(*style, options->report);
   add_overwrite_option(*style, options->overwrite);
   style->add_flag("--force", options->force, "Write the model even if it is unusable");
   style->add_flag("--json", options->json, "One JSON object on stdout");

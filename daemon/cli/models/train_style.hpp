@@ -12,13 +12,17 @@
 
 namespace posed::cli {
 
-// Reads the experiment's clips, trains, writes the model to `out` and returns the report that
-// `train --json` prints. A model that is unusable is written only with `force`; see `written` and
-// `verdict` in the report. Draws progress on stderr; Ctrl-C ends it with an error and without a
-// file. `ranks` share the work; one of them writes.
+struct StyleFiles {
+  std::filesystem::path model;
+  bool force = false;              // also a model that is unusable
+  std::filesystem::path report{};  // an HTML page, of an unusable model, too; empty: none
+};
+
+// Reads the experiment's clips, trains, writes the model and returns the report that `train --json`
+// prints; see `written` and `verdict` in it. Draws progress on stderr; Ctrl-C ends it with an error
+// and without a file. `ranks` share the work; one of them writes.
 [[nodiscard]] Result<nlohmann::json> train_and_save(const Experiment& experiment,
-                                                    std::uint64_t seed,
-                                                    const std::filesystem::path& out, bool force,
+                                                    std::uint64_t seed, const StyleFiles& files,
                                                     Ranks& ranks);
 
 }  // namespace posed::cli

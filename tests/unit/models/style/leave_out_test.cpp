@@ -75,8 +75,8 @@ TEST_CASE("folds count alike in one task and in several", "[style][people]") {
   CHECK(many.kernel.length_rad == few.kernel.length_rad);
   CHECK(many.kernel.noise == few.kernel.noise);
   CHECK(many.error == Approx(few.error));
-  CHECK(many.ways[0].before == Approx(3.0 * few.ways[0].before));
-  CHECK(many.ways[0].after == Approx(3.0 * few.ways[0].after));
+  CHECK(many.way(0).before == Approx(3.0 * few.way(0).before));
+  CHECK(many.way(0).after == Approx(3.0 * few.way(0).after));
 }
 
 TEST_CASE("progress never goes back when lengths are added", "[style][people]") {

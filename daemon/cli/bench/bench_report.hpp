@@ -1,0 +1,37 @@
+// The page of a benchmark's `--report`. Cold.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "daemon/cli/bench/hop_report.hpp"
+#include "daemon/cli/output_files.hpp"
+#include "daemon/report/bench_sections.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::cli {
+
+struct BenchPage {
+  std::string command;  // "posed bench pipeline"
+  std::string verdict;  // one sentence
+  bool good = true;
+  std::vector<report::Figure> figures;
+};
+
+// Does nothing where no report is wanted. `figures`: what `--json` prints.
+[[nodiscard]] Result<> write_bench_page(const BenchPage& page,
+                                        const nlohmann::ordered_json& figures,
+                                        const ReportFile& file);
+
+[[nodiscard]] report::Percentiles percentiles_of(const HopFigures& figures);
+// Of {"p50_us", "p99_us", "p99_9_us", "max_us"}.
+[[nodiscard]] report::Percentiles percentiles_of(const nlohmann::json& figures);
+
+// Whether others kept the CPU so busy (PSI some, percent) that a measurement does not count; and
+// the sentence about it.
+inline constexpr double kMostPressure_percent = 5.0;
+[[nodiscard]] std::string pressure_words(double pressure_percent);
+
+}  // namespace posed::cli
