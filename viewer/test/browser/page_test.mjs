@@ -201,6 +201,18 @@ test(
   },
 );
 
+pageTest(
+  'a part without a value and a predicted pose are said',
+  { missing: [5, 6, 7, 8] },
+  async (page) => {
+    const words = await page
+      .locator('.name-tag[data-kind="styled"]', { hasText: 'walker' })
+      .innerText();
+    assert.match(words, /predicted · no value: left arm/);
+    assert.ok(await page.locator('.legend li[data-key="no-value"]').isVisible());
+  },
+);
+
 pageTest('a body may wear the mannequin', { hands: 0 }, async (page) => {
   await page.getByLabel('Figure').selectOption('mannequin');
   await page.waitForFunction(

@@ -3,6 +3,7 @@
 import { SIGNS, bodySkeleton, handSkeleton, hold, walk } from './figures.mjs';
 import { encode } from './messages.mjs';
 
+const BODY_JOINTS = bodySkeleton({ stage: [] }).parent;
 const ALPHA_PER_S = 2;
 const GESTURE_S = 0.7;
 
@@ -11,10 +12,12 @@ export class FakeDaemon {
   take = null;
   takes = 0;
 
-  // bodies, hands: how many; rate_hz: of all of them
-  constructor({ bodies = 1, hands = 1, rate_hz = 60, recording = true } = {}) {
+  // bodies, hands: how many; rate_hz: of all of them; missing: joints of styled bodies without a
+  // value
+  constructor({ bodies = 1, hands = 1, rate_hz = 60, recording = true, missing = [] } = {}) {
     this.rate_hz = rate_hz;
     this.recording = recording;
+    this.missing = missing;
     this.began = process.hrtime.bigint();
     const names = (word, count) =>
       Array.from({ length: count }, (_, i) => (i === 0 ? word : `${word}${i + 1}`));
@@ -72,6 +75,8 @@ export class FakeDaemon {
       body.alpha += Math.max(-step, Math.min(step, body.target - body.alpha));
       list.push(
         this.#frame(body.name, body.id, walk(time_s + 0.3 * i, body.alpha), {
+          validity: this.#validity(),
+          quality: this.missing.length > 0 ? 1 : 0,
           stage_us: [90 + 20 * Math.random(), 30],
         }),
       );
@@ -80,6 +85,10 @@ export class FakeDaemon {
     for (const hand of this.hands)
       list.push(this.#frame(hand.name, hand.id, ...this.#sign(hand, time_s)));
     return list;
+  }
+
+  #validity() {
+    return BODY_JOINTS.map((_, joint) => (this.missing.includes(joint) ? 0 : 1));
   }
 
   #sign(hand, time_s) {
