@@ -36,11 +36,15 @@ export class NameTags {
     if (!tag) return;
     at.copy(point).project(camera);
     const shown = at.z < 1 && Math.abs(at.x) < 1.1 && Math.abs(at.y) < 1.1;
-    tag.element.hidden = !shown;
+    if (tag.element.hidden === shown) tag.element.hidden = !shown;
     if (!shown) return;
-    const x = area.left + (0.5 + 0.5 * at.x) * area.width;
-    const y = Math.max(area.top + (0.5 - 0.5 * at.y) * area.height, area.top + 48);
-    tag.element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -100%)`;
+    // Whole pixels, and only when they change: each move costs the browser a layer.
+    const x = Math.round(area.left + (0.5 + 0.5 * at.x) * area.width);
+    const y = Math.round(Math.max(area.top + (0.5 - 0.5 * at.y) * area.height, area.top + 48));
+    if (x === tag.x && y === tag.y) return;
+    tag.x = x;
+    tag.y = y;
+    tag.element.style.transform = `translate(${x}px, ${y}px) translate(-50%, -100%)`;
   }
 
   hide(key) {
