@@ -19,6 +19,11 @@ double round_step(double extent, int most) {
   return 10.0 * power;
 }
 
+std::string tick_text(double value) {
+  const bool long_number = std::abs(value) >= 1e5 && std::abs(value) < 1e9;  // {:g}: 1e+05
+  return long_number ? fmt::format("{:.0f}", value) : fmt::format("{:g}", value);
+}
+
 }  // namespace
 
 void Range::add(double value) {
@@ -76,18 +81,17 @@ std::vector<Tick> Axis::ticks(int most) const {
     const bool halves = 2.0 * decades + 1.0 <= most;  // room for 3 between 1 and 10
     for (double decade = 0.0; decade <= decades; ++decade) {
       const double value = low_ * std::pow(10.0, decade);
-      ticks.push_back({value, fmt::format("{:g}", value)});
-      if (halves && decade < decades)
-        ticks.push_back({3.0 * value, fmt::format("{:g}", 3 * value)});
+      ticks.push_back({value, tick_text(value)});
+      if (halves && decade < decades) ticks.push_back({3.0 * value, tick_text(3.0 * value)});
     }
     return ticks;
   }
   const double step = round_step(high_ - low_, most);
   for (double k = std::ceil(low_ / step - 1e-9); k * step <= high_ + 1e-9 * step; ++k) {
     const double value = k == 0.0 ? 0.0 : k * step;  // never -0
-    ticks.push_back({value, fmt::format("{:g}", value)});
+    ticks.push_back({value, tick_text(value)});
   }
-  if (ticks.empty()) ticks.push_back({low_, fmt::format("{:g}", low_)});
+  if (ticks.empty()) ticks.push_back({low_, tick_text(low_)});
   return ticks;
 }
 

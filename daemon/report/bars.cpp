@@ -32,7 +32,11 @@ Axis axis_of(const Bars& bars) {
   Range range;
   for (const BarGroup& group : bars.groups) range.add(group.values);
   for (const BarRule& rule : bars.rules) range.add(rule.value);
-  if (bars.logarithmic) return Axis::logarithmic(bars.quantity, bars.unit, range);
+  if (bars.logarithmic) {
+    // No bar is short only because the axis begins there.
+    range.add(range.low / 3.0);
+    return Axis::logarithmic(bars.quantity, bars.unit, range);
+  }
   range.add(0.0);
   return {bars.quantity, bars.unit, range};
 }

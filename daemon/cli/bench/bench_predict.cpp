@@ -259,6 +259,7 @@ BenchPage page_of_cases(const json& cases) {
     most = std::max(most, one["mean"]["hot"]["ratio"].get<double>());
     for (const auto* heat : {"hot", "cold"}) {
       std::vector<report::Measured> peers;
+      peers.reserve(kVariants.size());
       for (std::size_t v = 0; v < kVariants.size(); ++v) {
         peers.push_back({kVariantWords[v], percentiles_of(one[kVariants[v]][heat])});
       }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -17,28 +18,26 @@ namespace {
 
 constexpr std::size_t kMostSegments = 8;  // of a recording that are drawn
 constexpr double kBandDeviations = 2.0;
-constexpr int kHoldStart = 2, kHoldEnd = 4;  // states, from 0
+constexpr std::size_t kHoldStart = 2, kHoldEnd = 4;  // states, from 0
 
 // Of the gesture's `index`-th label: frames [from, to) of these states.
 struct FrameRange {
   int from = 0, to = 0;
   [[nodiscard]] int middle() const { return (from + to) / 2; }
 };
-FrameRange range_of(const perform::Performance& performance, std::size_t index, int first_state,
-                    int end_state) {
-  const auto base = static_cast<int>(index) * gesture::kStates;
-  const auto& first = performance.states[static_cast<std::size_t>(base + first_state)];
-  const auto& last = performance.states[static_cast<std::size_t>(base + end_state - 1)];
+FrameRange range_of(const perform::Performance& performance, std::size_t index,
+                    std::size_t first_state, std::size_t end_state) {
+  const perform::PerformedState* const states = &performance.states[index * gesture::kStates];
+  const perform::PerformedState& first = states[first_state];
+  const perform::PerformedState& last = states[end_state - 1];
   return {first.start, last.start + last.frames};
 }
 
 // The middle joint's flexion of a finger, among the hand's angles.
-std::size_t flexion_of(int finger) {
-  return static_cast<std::size_t>(finger * kFingerChannels + 3);
-}
+std::size_t flexion_of(std::size_t finger) { return finger * kFingerChannels + 3; }
 
-report::FingerTrajectory finger_named(int finger) {
-  return {.finger = std::string(kFingerNames[static_cast<std::size_t>(finger)]) + ", middle joint",
+report::FingerTrajectory finger_named(std::string_view name) {
+  return {.finger = std::string(name) + ", middle joint",
           .recorded = {},
           .mean = {},
           .low = {},
@@ -50,7 +49,7 @@ void add_frame(const perform::Performance& performance, int frame, double time_s
                std::vector<report::FingerTrajectory>& fingers) {
   const auto t = static_cast<std::size_t>(frame);
   for (std::size_t f = 0; f < fingers.size(); ++f) {
-    const std::size_t channel = flexion_of(static_cast<int>(f));
+    const std::size_t channel = flexion_of(f);
     const double mean_deg = kDegrees * performance.angles[t][channel];
     const double band_deg =
         kDegrees * kBandDeviations * std::sqrt(performance.variances[t][channel]);
@@ -61,8 +60,8 @@ void add_frame(const perform::Performance& performance, int frame, double time_s
 }
 
 std::vector<report::FingerTrajectory> all_fingers() {
-  std::vector<report::FingerTrajectory> fingers;
-  for (int f = 0; f < kFingers; ++f) fingers.push_back(finger_named(f));
+  std::vector<report::FingerTrajectory> fingers(kFingerNames.size());
+  std::ranges::transform(kFingerNames, fingers.begin(), finger_named);
   return fingers;
 }
 
@@ -78,8 +77,8 @@ report::QuestionTree question_tree(const gesture::DrawnTree& tree) {
 
 std::vector<int> labels_to_show(const gesture::GestureModel& model) {
   if (auto paper = perform::labels_of(model, "g 1 c 3 4 p")) return std::move(*paper);
-  std::vector<int> all;
-  for (int label = 0; label < std::ssize(model.labels); ++label) all.push_back(label);
+  std::vector<int> all(model.labels.size());
+  std::iota(all.begin(), all.end(), 0);
   return all;
 }
 
@@ -174,10 +173,9 @@ std::optional<report::Figure> GestureFigures::over(const gesture::Recording& rec
   auto fingers = all_fingers();
   const double period_s = 1.0 / recording.rate_hz;
   for (int t = segments.front().begin; t < segments.back().end; ++t) {
-    for (int f = 0; f < kFingers; ++f) {
+    for (std::size_t f = 0; f < fingers.size(); ++f) {
       const auto channel = static_cast<Eigen::Index>(flexion_of(f));
-      fingers[static_cast<std::size_t>(f)].recorded.push_back(
-          {t * period_s, kDegrees * recording.angles_rad(t, channel)});
+      fingers[f].recorded.push_back({t * period_s, kDegrees * recording.angles_rad(t, channel)});
     }
   }
   std::vector<report::LabelSpan> spans;

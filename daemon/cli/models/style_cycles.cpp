@@ -136,6 +136,7 @@ report::Figure CycleFigures::paths(const StyleCycles& cycles) const {
 
 report::Figure CycleFigures::residuals(const StyleCycles& cycles) const {
   std::vector<report::JointResidual> joints;
+  joints.reserve(spec_.joints.size());
   for (const std::string& name : spec_.joints) joints.push_back({name, 0.0, 0.0});
   for (int d = 0; d < space_.dims(); ++d) {
     report::JointResidual& joint = joints[static_cast<std::size_t>(space_.joint_of_dim(d))];

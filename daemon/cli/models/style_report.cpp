@@ -185,6 +185,7 @@ void StyleReport::add_kernel(const style::Findings& findings) {
   const auto joints = static_cast<double>(findings.dataset.spec.joints.size());
   const auto length_deg = [](double rad) { return kDegrees * rad; };
   std::vector<report::TriedLength> tried;
+  tried.reserve(first.tried.size());
   for (const style::TriedKernel& one : first.tried) {
     tried.push_back({length_deg(one.kernel.length_rad), one.kernel.noise,
                      kDegrees * std::sqrt(one.error / joints)});
@@ -212,6 +213,7 @@ void StyleReport::add_kernel(const style::Findings& findings) {
 void StyleReport::add_strides(const style::Findings& findings) {
   const style::Dataset& dataset = findings.dataset;
   std::vector<report::ClipStride> clips;
+  clips.reserve(dataset.clips.size());
   for (const style::AlignedClip& clip : dataset.clips) {
     clips.push_back({.clip = stem_of(clip.file),
                      .group = clip.group,
