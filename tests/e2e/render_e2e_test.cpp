@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "models/motion/synthetic_walker.hpp"
+#include "proto/clip/hand_clip.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
@@ -60,6 +61,19 @@ TEST_CASE("render draws a clip as a strip, as a pose and refuses what it cannot 
   refused("no.svg", {"--raw-beside"}, "is a clip");
   refused("no.svg", {"--from", "7"}, "has no frame from 7");
   refused("strip.svg", {}, "--overwrite");
+}
+
+TEST_CASE("render draws a hand from a BVH as from a CSV") {
+  const Gallery gallery;
+  clip::HandClip hand;
+  hand.angles.assign(2, HandAngles{});
+  hand.time_s = {0.0, 1.0 / 30.0};
+  REQUIRE(clip::write_hand_csv(hand, gallery.path("hand.csv")));
+  REQUIRE(clip::write_bvh(clip::clip_of_hand(hand, "adult").value(), gallery.path("hand.bvh")));
+  for (const char* name : {"hand.csv", "hand.bvh"}) {
+    REQUIRE(gallery.render(name, std::string(name) + ".svg", {"--frame", "0"}).code == 0);
+    CHECK(has(file_text(gallery.path(std::string(name) + ".svg")), "thumb dark orange"));
+  }
 }
 
 TEST_CASE("render draws a log's motion beside the unstyled one, where the log has it") {

@@ -25,6 +25,8 @@
 #include "proto/clip/clip.hpp"
 #include "proto/clip/file_names.hpp"
 #include "proto/clip/frames_clip.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/json_text.hpp"
 #include "proto/text/stream_name.hpp"
 
@@ -80,10 +82,21 @@ Result<> check_render(const RenderArguments& options) {
       .check();
 }
 
+// A clip of fingers without a body (a BVH of `posed synth`) as a hand of ours, which is drawn as
+// one.
+Result<clip::Clip> as_hand(const clip::Clip& clip, const clip::ReadOptions& read) {
+  auto hand = clip::hand_of(clip, read);
+  if (!hand) return std::unexpected(hand.error());
+  return clip::clip_of_hand(*hand, read.hand_shape);
+}
+
 Result<clip::Clip> read_motion(const RenderArguments& options, const std::string& stream) {
   const Waiting waiting("reading " + options.in);
   auto clip = reads_log(options) ? replay::clip_of_log(options.in, stream, options.take)
                                  : clip::read_clip(options.in, options.read);
+  if (clip && clip->skeleton->joint_of(Bone::kHips) < 0 && !hand_side(*clip->skeleton)) {
+    if (auto hand = as_hand(*clip, options.read)) clip = std::move(hand);
+  }
   if (clip) clip::hold_missing(*clip);
   return clip;
 }
