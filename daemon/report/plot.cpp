@@ -47,10 +47,9 @@ struct Box {
   }
 };
 
-}  // namespace
-
-std::string mark_at(double x_px, double y_px, std::size_t series, bool hollow) {
-  const std::string kind = series_class(series) + (hollow ? " hollow" : " fill");
+// One mark, by series another shape: circle, square, triangle, diamond, cross ...
+std::string mark_at(double x_px, double y_px, std::size_t series) {
+  const std::string kind = series_class(series) + " fill";
   const double r = kMark_px;
   const auto corners = [&](std::vector<Point> around) {
     for (Point& corner : around) corner = {x_px + r * corner.x, y_px + r * corner.y};
@@ -85,6 +84,8 @@ std::string mark_at(double x_px, double y_px, std::size_t series, bool hollow) {
                          attribute("cy", y_px), attribute("r", r));
   }
 }
+
+}  // namespace
 
 Plot::Plot(Axis x, Axis y, PlotSize size) : x_(std::move(x)), y_(std::move(y)), size_(size) {
   x_.place(kLeft_px, size_.width_px - kRight_px);
@@ -141,11 +142,10 @@ void Plot::band(std::string_view name, std::size_t series, std::span<const Point
   if (around.size() > 2) back_ += polygon(around, series_class(series) + " band");
 }
 
-void Plot::marks(std::string_view name, std::size_t series, std::span<const Point> points,
-                 bool hollow) {
-  name_series(name, series, hollow ? Sample::kHollow : Sample::kMark);
+void Plot::marks(std::string_view name, std::size_t series, std::span<const Point> points) {
+  name_series(name, series, Sample::kMark);
   for (const Point& point : points) {
-    if (shows(point)) body_ += mark_at(x_.px(point.x), y_.px(point.y), series, hollow);
+    if (shows(point)) body_ += mark_at(x_.px(point.x), y_.px(point.y), series);
   }
 }
 
@@ -204,13 +204,6 @@ void Plot::rule_at_x(double x, std::string_view words) {
   body_ += words_at("quiet", at + 5.0, kTop_px + 12.0, words);
 }
 
-void Plot::rule_at_y(double y, std::string_view words) {
-  if (!y_.shows(y)) return;
-  const double at = y_.px(y);
-  body_ += line_at("rule", {kLeft_px, at}, {size_.width_px - kRight_px, at});
-  body_ += words_at("quiet end", size_.width_px - kRight_px - 4.0, at - 5.0, words);
-}
-
 std::string Plot::grid() const {
   const double bottom = size_.height_px - kBottom_px;
   const double right = size_.width_px - kRight_px;
@@ -254,7 +247,7 @@ std::string Plot::legend(double& height_px) const {
           "<polyline class=\"{} stroke\"{} points=\"{:.1f},{:.1f} {:.1f},{:.1f}\"/>\n",
           series_class(entry.series), dash_of(entry.series), x, middle, x + kSample_px, middle);
     } else {
-      out += mark_at(x + kSample_px / 2.0, middle, entry.series, entry.sample == Sample::kHollow);
+      out += mark_at(x + kSample_px / 2.0, middle, entry.series);
     }
     out += words_at("", x + kSample_px + 8.0, y, entry.name);
     x += width_px;

@@ -34,8 +34,7 @@ class Plot {
   // Between two lines over the same x.
   void band(std::string_view name, std::size_t series, std::span<const Point> low,
             std::span<const Point> high);
-  void marks(std::string_view name, std::size_t series, std::span<const Point> points,
-             bool hollow = false);
+  void marks(std::string_view name, std::size_t series, std::span<const Point> points);
   void word(const Point& beside, std::string_view text);
   // A name beside each point, where it covers no other point and no other name; returns how many
   // found no place. `points` and `names` are equally many.
@@ -46,12 +45,11 @@ class Plot {
   void tie(const Point& from, const Point& to);
   // Straight through the whole plot, with words.
   void rule_at_x(double x, std::string_view words);
-  void rule_at_y(double y, std::string_view words);
 
   [[nodiscard]] Drawing drawing() const;
 
  private:
-  enum class Sample { kLine, kBand, kMark, kHollow };
+  enum class Sample { kLine, kBand, kMark };
   struct Entry {
     std::string name;
     std::size_t series;
@@ -68,8 +66,5 @@ class Plot {
   std::string back_, body_;  // bands, and what is above them
   std::vector<Entry> names_;
 };
-
-// One mark, by series another shape: circle, square, triangle, diamond, cross ...
-[[nodiscard]] std::string mark_at(double x_px, double y_px, std::size_t series, bool hollow);
 
 }  // namespace posed::report

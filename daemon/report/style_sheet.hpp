@@ -20,7 +20,7 @@ color:var(--ink);font:16px/1.5 system-ui,sans-serif}
 h1{font-size:1.7rem;line-height:1.25;margin:0 0 .25rem}
 h2{font-size:1.3rem;margin:2.5rem 0 .75rem;padding-top:.75rem;border-top:1px solid var(--line)}
 h3{font-size:1.05rem;margin:0}
-.by,.see,footer{color:var(--soft)}.see{margin:.25rem 0 .75rem;max-width:50rem}
+.by,.see{color:var(--soft)}.see{margin:.25rem 0 .75rem;max-width:50rem}
 .verdict{margin:1rem 0;padding:.75rem 1rem;border-left:5px solid var(--good);background:var(--card);
 font-size:1.1rem}
 .verdict.bad{border-color:var(--bad)}.verdict b{color:var(--good)}.verdict.bad b{color:var(--bad)}
@@ -46,7 +46,6 @@ pre{white-space:pre-wrap;overflow-wrap:anywhere;font-size:.8rem;background:var(-
 .s0{--c:var(--s0)}.s1{--c:var(--s1)}.s2{--c:var(--s2)}.s3{--c:var(--s3)}.s4{--c:var(--s4)}
 .s5{--c:var(--s5)}.s6{--c:var(--s6)}
 .stroke{stroke:var(--c)}.fill{fill:var(--c)}.band{fill:var(--c);opacity:.22}
-.hollow{fill:var(--paper);stroke:var(--c);stroke-width:1.8}
 .tree .ask{fill:var(--paper);stroke:var(--soft)}.tree .leaf{fill:var(--card);stroke:var(--s2)}
 .tree .way{stroke:var(--soft);fill:none}.tree .quiet{fill:var(--soft)}
 .strip text{font:13px system-ui,sans-serif;text-anchor:middle;fill:var(--ink)}

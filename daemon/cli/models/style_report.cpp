@@ -16,7 +16,6 @@
 #include "models/gp/regression.hpp"
 #include "models/style/training_check.hpp"
 #include "models/style/training_pairs.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
