@@ -7,6 +7,7 @@ import { RAW_SUFFIX, Stream } from './stream.js';
 
 const MOST_STREAMS = 256;
 const MOST_EVENTS = 64;
+const ABSENT_FOR = 3; // statistics, until a stream is gone
 
 export class Store extends EventTarget {
   streams = new Map();
@@ -89,11 +90,14 @@ export class Store extends EventTarget {
     this.#tell('stats', stats);
   }
 
-  // Bodies leave: their streams, and the raw ones beside them, go from the page.
+  // Bodies leave: their streams, and the raw ones beside them, go from the page. Not at once, for
+  // the statistics may be older than a skeleton, which comes only once.
   #forget(names) {
     for (const [name, stream] of this.streams) {
       const base = stream.isRaw ? name.slice(0, -RAW_SUFFIX.length) : name;
-      if (names.has(name) || names.has(base)) continue;
+      if (names.has(name) || names.has(base)) stream.absent = 0;
+      else stream.absent += 1;
+      if (stream.absent < ABSENT_FOR) continue;
       this.streams.delete(name);
       this.#byTopic.delete(`pose/${name}`);
       this.#tell('gone', stream);

@@ -14,6 +14,7 @@ export class Stream {
   placed = 0; // the version that `kinematics` shows
   stats = null; // posed.v1.StreamStats
   jitter = new Jitter();
+  absent = 0; // statistics in a row that do not have it, without a pose between them
   callback_ms = NaN; // performance.now() when the newest pose came
 
   constructor(name) {
@@ -38,6 +39,7 @@ export class Stream {
   // The newest pose was read into `pose`.
   posed(now_ms) {
     this.version += 1;
+    this.absent = 0;
     this.callback_ms = now_ms;
     this.jitter.add(this.pose.sequence, this.pose.arrival_ms);
   }

@@ -62,6 +62,12 @@ test('streams come and go with the statistics; a raw twin goes with its stream',
   );
   assert.equal(store.raw(store.streams.get('a')).name, 'a-raw');
   store.receive(statsOf('b'));
+  assert.deepEqual([...store.streams.keys()], ['a', 'a-raw', 'b']); // they may be older than it
+  store.receive(statsOf('b'));
+  store.receive(poseOf('a', 1, 1)); // it is there, whatever they say
+  store.receive(statsOf('b'));
+  assert.deepEqual([...store.streams.keys()], ['a', 'b']);
+  for (let i = 0; i < 3; i += 1) store.receive(statsOf('b'));
   assert.deepEqual([...store.streams.keys()], ['b']);
 });
 
