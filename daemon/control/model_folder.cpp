@@ -5,8 +5,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/model/model_file.hpp"
+#include "daemon/control/uploads.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::control {
 namespace {
@@ -49,7 +50,7 @@ Result<std::string> ModelFolder::read(std::string_view name) const {
     return fail(fmt::format(
         "there is no model {} in the daemon's list; `posed ctl models` shows it", in_quotes(name)));
   }
-  return model_file::load(folder_ / name);
+  return load_file(folder_ / name, {.what = "model", .max_bytes = kMaxModel});
 }
 
 }  // namespace posed::control

@@ -1,7 +1,10 @@
 #include "daemon/control/request_handler.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -28,6 +31,17 @@ Reply refusal(Requester to, const std::string& sentence) {
   v1::ControlReply reply;
   reply.set_error(sentence);
   return make_reply(std::move(to), reply);
+}
+
+// Texts that the new model does not take, such as weights of the styles that the one before had,
+// stand for their defaults.
+void forget_texts(const StageModel& model, pipeline::StageSettings& settings) {
+  for (const StageCommandType& command : settings.type->commands) {
+    if (!is_live_text(*settings.type, command.name)) continue;
+    auto& text = settings.parameters.at(std::string(command.name));
+    const std::vector<std::string> words{std::get<std::string>(text)};
+    if (!command.encode(&model, words, {})) text = std::string();
+  }
 }
 
 }  // namespace
@@ -61,6 +75,12 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   }
   if (request.has_take()) return mark_take(request, std::move(requester));
   if (request.has_list_models()) return list_models(std::move(requester));
+  std::string model;  // read without the lock: a disk may be slow
+  if (request.has_use_model()) {
+    auto read = models_.read(request.use_model().name());
+    if (!read) return refusal(std::move(requester), read.error().text());
+    model = std::move(*read);
+  }
   const std::scoped_lock lock(mutex_);
   switch (request.request_case()) {
     case v1::ControlRequest::kSetParameter:
@@ -76,7 +96,8 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
       break;
     }
     case v1::ControlRequest::kUseModel:
-      done = use_model(request, requester);
+      done = set_model(request.use_model().stream(), std::as_bytes(std::span(std::as_const(model))),
+                       request.use_model().name(), requester);
       break;
     case v1::ControlRequest::kCalibrate:
       done = calibrate(request, requester);
@@ -121,13 +142,6 @@ Reply RequestHandler::list_models(Requester requester) const {
     entry.set_kind(std::string(model.kind));
   }
   return make_reply(std::move(requester), reply);
-}
-
-Result<> RequestHandler::use_model(const v1::ControlRequest& request, const Requester& requester) {
-  const auto& wanted = request.use_model();
-  const auto bytes = models_.read(wanted.name());
-  if (!bytes) return std::unexpected(bytes.error());
-  return set_model(wanted.stream(), std::as_bytes(std::span(*bytes)), wanted.name(), requester);
 }
 
 bool RequestHandler::is_earlier(Streams::iterator stream) const {
@@ -282,6 +296,7 @@ void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
     auto& settings = stream.settings.stages[done.stage];
     settings.model_name = done.model->name;
     settings.model_words = done.model->words;
+    forget_texts(*done.model, settings);
     stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
     daemon_control_.stages_changed(stream.stream, stream.settings);
   }

@@ -147,7 +147,6 @@ class RequestHandler {
   // Returns true if this was not the last piece, which is acknowledged at once.
   [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request,
                                              const Requester& requester);
-  [[nodiscard]] Result<> use_model(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
                                    const std::string& name, const Requester& requester);
   [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);

@@ -167,7 +167,6 @@ void Broadcast::add(const pipeline::Item& item) {
   if (ends && !replay_.stream(stream).body.empty()) leave(stream);
 }
 
-// Updates what the pipeline's counters and the control thread knew in the live run.
 // A stage's other model or text.
 void Broadcast::note_change(const pipeline::StreamEvent& event) {
   using Kind = pipeline::StageChange::Kind;
@@ -191,6 +190,7 @@ void Broadcast::note_change(const pipeline::StreamEvent& event) {
   publisher_->set_stages(event.stream, publish::stage_infos(settings));
 }
 
+// Updates what the pipeline's counters and the control thread knew in the live run.
 void Broadcast::note(const pipeline::StreamEvent& event) {
   using pipeline::StreamState;
   auto& counters = counters_[event.stream].pipeline;

@@ -25,6 +25,7 @@ constexpr std::int64_t kSilent_ns = 3 * kNanosPerSecond;  // three stats are mis
 // A refused key may be allowed later. Each try costs the daemon a line in its log.
 constexpr std::int64_t kPublishAgain_ns = 5 * kNanosPerSecond;
 constexpr std::int64_t kControlAgain_ns = 60 * kNanosPerSecond;  // such a page may well be wanted
+constexpr std::int64_t kTryAgain_ns = 5 * kNanosPerSecond;
 constexpr std::int64_t kStatusWithin_ns = 5 * kNanosPerSecond;
 constexpr std::uint64_t kStatusTicket = 0;  // the pages' requests have others
 constexpr std::array kAlways{"stats", "skeleton/"};
@@ -127,9 +128,9 @@ Result<std::unique_ptr<DaemonLink>> DaemonLink::open(boost::asio::io_context& io
 }
 
 Result<> DaemonLink::open_publish() {
-  publish_again_ns_.reset();
   auto socket = WatchedSocket::open(io_, context_, ZMQ_SUB, options_, [this] { return hear(); });
   if (!socket) return std::unexpected(socket.error());
+  publish_again_ns_.reset();
   publish_ = std::move(*socket);
   publish_ends_ = 0;
   for (const char* prefix : kAlways) {
@@ -141,11 +142,11 @@ Result<> DaemonLink::open_publish() {
 }
 
 Result<> DaemonLink::open_control() {
-  control_again_ns_.reset();
-  asked_ns_.reset();
   auto socket =
       WatchedSocket::open(io_, context_, ZMQ_DEALER, options_, [this] { return hear_replies(); });
   if (!socket) return std::unexpected(socket.error());
+  control_again_ns_.reset();
+  asked_ns_.reset();
   control_ = std::move(*socket);
   control_ends_ = 0;
   control_stood_ = false;
@@ -281,8 +282,16 @@ void DaemonLink::connect_anew(std::int64_t now_ns) {
     return again_ns && now_ns >= *again_ns;
   };
   Result<> opened;
-  if (due(publish_again_ns_)) opened = open_publish();
-  if (opened && due(control_again_ns_)) opened = open_control();
+  // What fails now (a key file is being replaced, no descriptor is free) is tried again.
+  const std::int64_t later_ns = now_ns + kTryAgain_ns;
+  if (due(publish_again_ns_)) {
+    publish_again_ns_ = later_ns;
+    opened = open_publish();
+  }
+  if (opened && due(control_again_ns_)) {
+    control_again_ns_ = later_ns;
+    opened = open_control();
+  }
   if (!opened) spdlog::error("the bridge cannot connect anew: {}", opened.error().text());
 }
 

@@ -10,7 +10,9 @@ namespace posed::view {
 namespace {
 
 constexpr std::int64_t kReplyWithin_ns = 5 * kNanosPerSecond;
-constexpr std::int64_t kGone_ns = 10 * kNanosPerSecond;    // a stream without any message
+constexpr std::int64_t kGone_ns = 10 * kNanosPerSecond;  // a stream without any message
+// Since the skeleton came last: the daemon repeats those of all streams each second.
+constexpr std::int64_t kStayed_ns = 3 * kNanosPerSecond / 2;
 constexpr std::int64_t kUpload_ns = 10 * kNanosPerSecond;  // between two pieces, as in the daemon
 constexpr std::size_t kMaxTopic = 128;
 constexpr const char* kSkeleton = "skeleton/";
@@ -135,10 +137,12 @@ void Hub::hear_stream(std::string_view topic, std::string_view body, std::int64_
   if (tabs_.empty() && !skeleton) return;
   Bytes bytes = with_topic(topic, body);
   if (skeleton) {
-    // The daemon repeats it every second, for clients that come later.
-    Bytes& kept = known->second.skeleton;
-    if (kept && *kept == *bytes) return;
-    kept = bytes;
+    // The daemon repeats it every second, for clients that come later. After a pause the stream had
+    // left, and pages have forgotten its skeleton.
+    Stream& stream = known->second;
+    const bool stayed = now_ns - std::exchange(stream.skeleton_ns, now_ns) < kStayed_ns;
+    if (stream.skeleton && *stream.skeleton == *bytes && stayed) return;
+    stream.skeleton = bytes;
   }
   for (Tab* tab : tabs_) {
     if (skeleton) tab->outbox.put_newest(topic, bytes);

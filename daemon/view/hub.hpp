@@ -69,7 +69,8 @@ class Hub {
  private:
   struct Stream {
     std::int64_t heard_ns = 0;
-    Bytes skeleton{};  // with its topic; null: none yet
+    Bytes skeleton{};              // with its topic; null: none yet
+    std::int64_t skeleton_ns = 0;  // when it came last
   };
   struct UnderWay {
     Tab* tab = nullptr;

@@ -1,9 +1,12 @@
 #include "daemon/view/web_server.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <utility>
 #include <vector>
+
+#include <fcntl.h>
 
 #include <spdlog/fmt/fmt.h>
 #include <boost/asio/ip/address.hpp>
@@ -42,6 +45,7 @@ std::vector<std::string> hosts_of(const asio::ip::address& address, std::uint16_
   if (address.is_loopback()) {
     for (const char* name : {"localhost", "127.0.0.1"}) {
       hosts.push_back(fmt::format("{}:{}", name, port));
+      if (port == 80) hosts.emplace_back(name);  // browsers leave HTTP's own port out
     }
   }
   return hosts;
@@ -51,6 +55,10 @@ Result<> listen(Tcp::acceptor& acceptor, const asio::ip::address& address, std::
   ErrorCode error;
   const Tcp::endpoint endpoint(address, port);
   acceptor.open(endpoint.protocol(), error);
+  // A browser that posed starts must not keep the port.
+  if (!error && fcntl(acceptor.native_handle(), F_SETFD, FD_CLOEXEC) != 0) {
+    error.assign(errno, boost::system::system_category());
+  }
   if (!error) acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
   // Connections inherit these.
   if (!error) acceptor.set_option(asio::socket_base::send_buffer_size(kTcpSendBuffer), error);

@@ -72,7 +72,7 @@ bool solve_nonnegative(const SmallMatrix& H, const SmallVector& c, SmallVector& 
   SmallVector wanted(size);
   Support support;
   for (int i = 0; i < size; ++i) support.add(i);
-  const int most = 3 * size + 3;
+  const int most = 2 * size + 10;
   for (int turn = 0; turn < most; ++turn) {
     if (!solve_on(support, H, c, L, wanted)) return false;
     if (!move_to(wanted, support, x)) {

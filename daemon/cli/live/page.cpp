@@ -1,6 +1,7 @@
 #include "daemon/cli/live/page.hpp"
 
 #include <array>
+#include <csignal>
 #include <cstdlib>
 #include <system_error>
 #include <thread>
@@ -53,10 +54,21 @@ void open_browser(const std::string& url) {
   for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     posix_spawn_file_actions_addopen(&quiet, descriptor, "/dev/null", O_RDWR, 0);
   }
+  // A browser lives longer than posed: in a session of its own, with signals as they usually are.
+  posix_spawnattr_t usual;
+  posix_spawnattr_init(&usual);
+  sigset_t none, all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&usual, &none);
+  posix_spawnattr_setsigdefault(&usual, &all);
+  posix_spawnattr_setflags(&usual, static_cast<short>(POSIX_SPAWN_SETSIGMASK |
+                                                      POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSID));
   pid_t process = -1;
   // Without xdg-open the user opens the address that is printed.
   const bool started =
-      posix_spawnp(&process, program.c_str(), &quiet, nullptr, arguments.data(), environ) == 0;
+      posix_spawnp(&process, program.c_str(), &quiet, &usual, arguments.data(), environ) == 0;
+  posix_spawnattr_destroy(&usual);
   posix_spawn_file_actions_destroy(&quiet);
   // It ends when the browser has been told, or with the browser.
   if (started) std::thread([process] { waitpid(process, nullptr, 0); }).detach();

@@ -261,6 +261,18 @@ TEST_CASE("a tab that leaves gets nothing more, and its replies are dropped") {
   CHECK(rig.hub.tabs() == 0);
 }
 
+TEST_CASE("a body that comes back after seconds has its skeleton sent again") {
+  HubRig rig;
+  Tab tab;
+  rig.join(tab);
+  rig.hub.heard("skeleton/a", "S", 0);
+  static_cast<void>(all_of(tab));
+  rig.hub.heard("skeleton/a", "S", kNanosPerSecond);  // the daemon repeats it
+  CHECK(all_of(tab).empty());
+  rig.hub.heard("skeleton/a", "S", 5 * kNanosPerSecond);
+  CHECK(all_of(tab).size() == 1);
+}
+
 TEST_CASE("a daemon that goes takes its poses and skeletons with it") {
   HubRig rig;
   Tab tab;
