@@ -26,6 +26,7 @@ export async function loadAvatar(bytes, name) {
 export class Avatar {
   group = new Group();
   #bones = []; // {node, joint}: of the figure that it was fitted to
+  #boneAbove = []; // the next joint above, by joint, whose bone the avatar has
   #scale = 1;
   #hips = -1;
 
@@ -44,11 +45,14 @@ export class Avatar {
   // Finds the avatar's bones for the figure's joints, and how much longer its legs are.
   fit(kinematics) {
     const { humanoid } = this.vrm;
+    const nodeOf = (bone) => (bone ? humanoid.getNormalizedBoneNode(bone) : null);
     this.#bones = [];
     kinematics.bones.forEach((bone, joint) => {
-      const node = bone && humanoid.getNormalizedBoneNode(bone);
+      const node = nodeOf(bone);
       if (node) this.#bones.push({ node, joint });
     });
+    // The turn of a bone that the avatar lacks, like upperChest, goes to the bones below it.
+    this.#boneAbove = kinematics.bonesAbove((bone) => Boolean(nodeOf(bone)));
     this.#hips = kinematics.jointOf('hips');
     const own_m = humanoid.getNormalizedBoneNode('hips').position.y;
     const legs_m = hipsHeight(kinematics);
@@ -56,7 +60,7 @@ export class Avatar {
   }
 
   pose(kinematics) {
-    const local = kinematics.humanoidLocals();
+    const local = kinematics.humanoidLocals(this.#boneAbove);
     const { turned } = this;
     for (const { node, joint } of this.#bones) {
       const i = 4 * joint;
