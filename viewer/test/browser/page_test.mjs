@@ -67,6 +67,33 @@ pageTest('a body and a hand move, and nothing is said on the console', {}, async
   assert.match(await page.locator('.link-text').innerText(), /live from tcp/);
 });
 
+pageTest("the hands' view stays as it was turned, and a still scene rests", {}, async (page, bridge) => {
+  await page.waitForTimeout(2000); // until every part of the page has its size
+  const turned = await page.evaluate(() => {
+    const { camera } = globalThis.posedPage.world.hands;
+    camera.position.set(0.6, 0.1, 0.6);
+    return camera.position.toArray();
+  });
+  await page.waitForTimeout(2500); // some statistics later
+  const now = await page.evaluate(() =>
+    globalThis.posedPage.world.hands.camera.position.toArray(),
+  );
+  now.forEach((value, i) => assert.ok(Math.abs(value - turned[i]) < 0.01, String(now)));
+  bridge.daemon.rate_hz = 0; // no poses any more, but statistics
+  await page.waitForFunction(
+    async () => {
+      const { render } = globalThis.posedPage.world.renderer.info;
+      const before = render.frame;
+      await new Promise((done) => {
+        setTimeout(done, 1500);
+      });
+      return render.frame === before;
+    },
+    undefined,
+    PATIENCE,
+  );
+});
+
 pageTest(
   'the slider sets alpha, and the answer is shown; a refusal, too',
   {},
@@ -81,6 +108,36 @@ pageTest(
     await acknowledged(page, 'refused: style.alpha');
   },
 );
+
+pageTest('an emptied number field changes nothing', {}, async (page, bridge) => {
+  await page.getByText('More parameters').click();
+  for (const [label, shown] of [
+    ['Amount of style, α, number', '1.00'],
+    ['feet.limit_cm', '8'],
+  ]) {
+    const field = page.getByLabel(label);
+    await field.fill('');
+    await field.press('Enter');
+    assert.equal(await field.inputValue(), shown);
+  }
+  assert.ok(bridge.requests.every((request) => !request.set_parameter));
+});
+
+pageTest('each field of More parameters sends what the daemon takes', {}, async (page, bridge) => {
+  await page.getByText('More parameters').click();
+  assert.equal(await page.getByLabel('feet.root').inputValue(), 'stride');
+  await page.getByLabel('feet.root').selectOption('actor');
+  await acknowledged(page, 'feet.root actor: applied');
+  assert.equal(bridge.daemon.bodies[0].root, 2);
+  await page.getByLabel('feet.limit_cm').fill('5.5');
+  await page.getByLabel('feet.limit_cm').press('Enter');
+  await acknowledged(page, 'feet.limit_cm 5.5: applied');
+  for (const name of ['style.gate', 'style.calibrate']) {
+    await page.getByLabel(name).click();
+    await acknowledged(page, `${name} `);
+  }
+  assert.equal(await page.locator('.ack[data-tone="bad"]').count(), 0);
+});
 
 pageTest('keys: arrows choose and change, ? explains, fields type', {}, async (page, bridge) => {
   await page.locator('.stage canvas').focus();

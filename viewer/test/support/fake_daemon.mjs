@@ -6,6 +6,7 @@ import { encode } from './messages.mjs';
 const BODY_JOINTS = bodySkeleton({ stage: [] }).parent;
 const ALPHA_PER_S = 2;
 const GESTURE_S = 0.7;
+const ROOTS = ['off', 'stride', 'actor'];
 
 export class FakeDaemon {
   frames = 0;
@@ -28,6 +29,8 @@ export class FakeDaemon {
       target: 1,
       mask: '',
       weights: 'sway=0.7,march=0.3',
+      root: 1,
+      limit_cm: 8,
       model: 'march-to-sway.style',
     }));
     this.hands = names('hand', hands).map((name, i) => ({
@@ -152,11 +155,18 @@ export class FakeDaemon {
           parameter: [
             { name: 'alpha', value: body.alpha, target: body.target },
             { name: 'gate', value: 1, target: 1 },
+            { name: 'calibrate', value: 0, target: 0 },
             { name: 'mask', text: body.mask },
             { name: 'weights', text: body.weights },
           ],
         },
-        { name: 'feet', parameter: [{ name: 'limit_cm', value: 8, target: 8 }] },
+        {
+          name: 'feet',
+          parameter: [
+            { name: 'root', value: body.root, target: body.root },
+            { name: 'limit_cm', value: body.limit_cm, target: body.limit_cm },
+          ],
+        },
       ],
     }));
     const hands = this.hands.map(({ name }) => ({
@@ -211,10 +221,14 @@ export class FakeDaemon {
     return { ok: false, error: `there is no stream "${details.stream}" that can do this` };
   }
 
-  #set(body, { name, number, text }, done) {
+  #set(body, { name, number, text, flag }, done) {
+    const root = ROOTS.indexOf(text);
     if (name === 'style.alpha' && Math.abs(number) <= 2) body.target = number;
     else if (name === 'style.mask') body.mask = text;
     else if (name === 'style.weights') body.weights = text;
+    else if (name === 'feet.limit_cm' && number > 0) body.limit_cm = number;
+    else if (name === 'feet.root' && root >= 0) body.root = root;
+    else if ((name === 'style.gate' || name === 'style.calibrate') && flag !== undefined) return done;
     else return { ok: false, error: `${name}: give a number from -2 to 2` };
     return done;
   }
