@@ -49,7 +49,7 @@ class Page {
     this.control = controlWith(this.requests, this.acks);
     this.theme = new Theme(find('#theme'), (name) => this.#retheme(name));
     this.world = new World(find('.stage'), this.store, this.theme.name);
-    this.instruments = new Instruments(find('.instruments'), this.clock);
+    this.instruments = new Instruments(find('.instruments'));
     this.#makePanels();
     this.#listen();
     requestAnimationFrame((now) => this.#frame(now));
@@ -109,6 +109,11 @@ class Page {
   get readOnly() {
     if (!this.hello) return 'there is no connection to posed view yet';
     return this.hello.may_control ? '' : this.hello.read_only_reason || 'this page may only look';
+  }
+
+  // A replay's times are those of its recording: this page's clock says nothing about them.
+  get #poseClock() {
+    return this.store.stats?.replay_file === '' ? this.clock : UNKNOWN_CLOCK;
   }
 
   choose(name) {
@@ -211,7 +216,7 @@ class Page {
     this.fresh = [];
     const drawn = this.world.frame((performer) => this.fresh.push(performer.stream));
     const done_ms = performance.now();
-    for (const stream of this.fresh) this.instruments.add(stream, done_ms);
+    for (const stream of this.fresh) this.instruments.add(stream, done_ms, this.#poseClock);
     if (drawn && this.chosen) this.panel.mark(this.chosen);
     if (now_ms - this.#tagged_ms > TAGS_EVERY_MS) {
       this.#tagged_ms = now_ms;
@@ -224,6 +229,7 @@ class Page {
 
 const READY = { type: 'ready' };
 const TAGS_EVERY_MS = 150;
+const UNKNOWN_CLOCK = new ClockMapping();
 
 // For the tests and for who looks into a running page.
 globalThis.posedPage = new Page();

@@ -109,6 +109,30 @@ pageTest(
   },
 );
 
+const tile = (page, name) =>
+  page.locator('.tile', { has: page.locator('dt', { hasText: new RegExp(`^${name}$`) }) });
+
+for (const [where, options] of [
+  ['of a daemon on another machine', { same_machine: false }],
+  ['of a replay', { replay_file: 'take1.plog' }],
+]) {
+  pageTest(
+    `instruments ${where}: all but those that need the page's clock`,
+    options,
+    async (page) => {
+      await page.getByText('Time in each stage').waitFor(PATIENCE);
+      await tile(page, 'Rate').waitFor(PATIENCE);
+      for (const name of ['Glass to glass', 'Arrival to callback'])
+        assert.equal(await tile(page, name).isVisible(), false, name);
+    },
+  );
+}
+
+pageTest('instruments of a live daemon have its times', {}, async (page) => {
+  for (const name of ['Glass to glass', 'Arrival to callback'])
+    await tile(page, name).waitFor(PATIENCE);
+});
+
 pageTest('an emptied number field changes nothing', {}, async (page, bridge) => {
   await page.getByText('More parameters').click();
   for (const [label, shown] of [

@@ -15,7 +15,15 @@ export class FakeDaemon {
 
   // bodies, hands: how many; rate_hz: of all of them; missing: joints of styled bodies without a
   // value
-  constructor({ bodies = 1, hands = 1, rate_hz = 60, recording = true, missing = [] } = {}) {
+  constructor({
+    bodies = 1,
+    hands = 1,
+    rate_hz = 60,
+    recording = true,
+    missing = [],
+    replay_file = '',
+  } = {}) {
+    this.replay_file = replay_file;
     this.rate_hz = rate_hz;
     this.recording = recording;
     this.missing = missing;
@@ -187,6 +195,7 @@ export class FakeDaemon {
       stream: [...bodies, ...hands],
       cpu_percent: 9.9,
       rss_bytes: 29900000,
+      replay_file: this.replay_file,
       recorder_file: this.recording ? 'take1.plog' : '',
       ...(this.take ? { take: this.take } : {}),
     };
