@@ -48,11 +48,24 @@ class Page {
     this.acks = new Acks(find('.acks'));
     this.control = controlWith(this.requests, this.acks);
     this.theme = new Theme(find('#theme'), (name) => this.#retheme(name));
-    this.world = new World(find('.stage'), this.store, this.theme.name);
+    if (!this.#makeWorld()) return;
     this.instruments = new Instruments(find('.instruments'));
     this.#makePanels();
     this.#listen();
     requestAnimationFrame((now) => this.#frame(now));
+  }
+
+  // False where WebGL is off, as in some virtual machines: the page says so and ends.
+  #makeWorld() {
+    try {
+      this.world = new World(find('.stage'), this.store, this.theme.name);
+      return true;
+    } catch (error) {
+      console.error(error);
+      this.connection.close();
+      this.#linkChanged('refused', NO_WEBGL);
+      return false;
+    }
   }
 
   #makePanels() {
@@ -229,6 +242,8 @@ class Page {
 
 const READY = { type: 'ready' };
 const TAGS_EVERY_MS = 150;
+const NO_WEBGL =
+  'this browser draws no WebGL: switch on hardware acceleration, or use posed top in a terminal';
 const UNKNOWN_CLOCK = new ClockMapping();
 
 // For the tests and for who looks into a running page.

@@ -32,6 +32,14 @@ export class Connection {
     return true;
   }
 
+  // For good: nothing is heard any more.
+  close() {
+    this.#socket.onopen = null;
+    this.#socket.onmessage = null;
+    this.#socket.onclose = null;
+    this.#socket.close();
+  }
+
   #open() {
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     const url = `${scheme}://${location.host}/ws?token=${encodeURIComponent(this.token)}`;

@@ -245,6 +245,36 @@ pageTest(
 );
 
 test(
+  'a list of models that was refused is asked for again once the page may control',
+  { timeout: 90000 },
+  async (context) => {
+    const bridge = await started(context, { rights });
+    const { daemon } = bridge;
+    const { answer } = daemon;
+    daemon.answer = () => ({ ok: false, error: 'this key may watch only' });
+    const page = await opened(context, bridge.url);
+    await drawn(page);
+    const models = page.getByLabel('Model', { exact: true });
+    await page.locator('select[title="no list of models: this key may watch only"]').waitFor(PATIENCE);
+    daemon.answer = answer;
+    bridge.say({ type: 'control', may_control: true, read_only_reason: '' });
+    await models.locator('option[value="tired.style"]').waitFor({ state: 'attached', ...PATIENCE });
+    assert.ok(await models.isEnabled());
+  },
+);
+
+test('without WebGL the page says what to do', { timeout: 90000 }, async (context) => {
+  const blind = await launch(['--disable-gpu', '--disable-3d-apis']);
+  context.after(() => blind.close());
+  const bridge = await started(context);
+  const page = await openPage(blind, bridge.url);
+  await page.locator('.link-text', { hasText: 'this browser draws no WebGL' }).waitFor(PATIENCE);
+  await page.waitForTimeout(1500); // what the bridge sends is no error
+  assert.match(await page.locator('.link-text').innerText(), /hardware acceleration/);
+  assert.ok(page.errors.every((text) => text.includes('WebGL')), page.errors.join());
+});
+
+test(
   'without the token nothing is shown; a page whose token is old says what to do',
   { timeout: 90000 },
   async (context) => {
