@@ -162,7 +162,9 @@ class Page {
       this.hello = null;
       this.requests.abandon();
     }
+    if (!this.hello) this.store.silence();
     this.#sayLink();
+    if (this.legend) this.#refresh(); // the panels are there
   }
 
   #told(message) {
@@ -174,6 +176,7 @@ class Page {
       Object.assign(this.hello ?? {}, message);
     } else if (type === 'daemon') {
       this.daemon = message;
+      if (!message.alive) this.store.silence();
     } else if (type === 'clock') {
       // Of another machine's frames nobody here knows when they came.
       if (this.hello?.same_machine)
@@ -206,7 +209,7 @@ class Page {
     this.list.update(this.chosen);
     this.panel.update(this.chosen, this.readOnly);
     this.takes.update(store.stats, this.readOnly);
-    if (store.stats) this.header.update(store.stats);
+    this.header.update(this.hello && this.daemon.alive ? store.stats : null);
     this.instruments.heading.textContent = this.chosen
       ? `Instruments: ${this.chosenName}`
       : 'Instruments';

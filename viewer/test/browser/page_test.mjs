@@ -227,6 +227,24 @@ pageTest(
   },
 );
 
+pageTest('a held key or two quick presses make one take', {}, async (page, bridge) => {
+  bridge.publishStats = () => {}; // the answers alone say whether a take runs
+  const takes = () => bridge.requests.flatMap(({ take }) => (take ? [Boolean(take.start)] : []));
+  await page.evaluate(() => {
+    globalThis.posedPage.takes.toggle();
+    globalThis.posedPage.takes.toggle();
+  });
+  await acknowledged(page, 'begins');
+  assert.deepEqual(takes(), [true]);
+  await page.locator('.stage canvas').focus();
+  for (let i = 0; i < 3; i += 1) {
+    await page.keyboard.down('s'); // again without up: the key repeats
+    await page.waitForTimeout(200);
+  }
+  await acknowledged(page, 'take ends');
+  assert.deepEqual(takes(), [true, false]);
+});
+
 const rights = { may_control: false, read_only_reason: 'this key may watch only' };
 pageTest(
   'a page that may only look says why, and its controls are off',
@@ -301,9 +319,12 @@ test(
     await drawn(page);
     bridge.say({ type: 'daemon', alive: false, sentence: 'the daemon does not answer' });
     await page.locator('.link[data-tone="bad"]', { hasText: 'does not answer' }).waitFor(PATIENCE);
+    await page.locator('.stream .state', { hasText: 'unknown' }).first().waitFor(PATIENCE);
     const { port } = bridge;
     await bridge.stop();
     await page.locator('.link[data-tone="busy"]').waitFor(PATIENCE);
+    await page.getByText('Controls are off: there is no connection').waitFor(PATIENCE);
+    assert.equal(await page.locator('.machine').innerText(), '');
     const began_ms = performance.now();
     await started(context, {}, port);
     await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);

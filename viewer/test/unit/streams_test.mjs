@@ -71,6 +71,16 @@ test('streams come and go with the statistics; a raw twin goes with its stream',
   assert.deepEqual([...store.streams.keys()], ['b']);
 });
 
+test('without word of the daemon no stream is called live, until the next statistics', () => {
+  const store = new Store();
+  store.receive(statsOf('a'));
+  assert.equal(stateOf(store.streams.get('a').stats).word, 'live');
+  store.silence();
+  assert.equal(stateOf(store.main()[0].stats).word, 'unknown');
+  store.receive(statsOf('a'));
+  assert.equal(stateOf(store.main()[0].stats).word, 'live');
+});
+
 test('damaged messages are counted, and change nothing', () => {
   const store = new Store();
   store.receive(skeletonOf('a', 1));
