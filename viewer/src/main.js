@@ -142,7 +142,12 @@ class Page {
 
   async #dress(stream) {
     const performer = this.world.performers.get(stream.name);
-    if (performer) await this.avatars.dress(performer);
+    if (!performer) return;
+    try {
+      await this.avatars.dress(performer);
+    } catch (error) {
+      this.acks.say(error.message, 'bad');
+    }
   }
 
   #event({ stream, kind, text }) {
