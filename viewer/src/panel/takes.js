@@ -6,6 +6,7 @@ const LONGEST_NAME = 128;
 export class Takes {
   #running = false;
   #asking = false;
+  #stats = null; // the last that were read: an answer is newer than those
 
   constructor(form, control) {
     this.form = form;
@@ -43,7 +44,8 @@ export class Takes {
   update(stats, readOnlyReason) {
     this.form.hidden = !stats || stats.recorder_file === '';
     if (this.form.hidden) return;
-    this.#run(stats.take !== undefined);
+    if (stats !== this.#stats) this.#run(stats.take !== undefined);
+    this.#stats = stats;
     this.fields.disabled = readOnlyReason !== '';
     this.fields.title = readOnlyReason;
     write(this.words, this.#words(stats));

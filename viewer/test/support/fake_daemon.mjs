@@ -237,8 +237,8 @@ export class FakeDaemon {
     else if (name === 'style.weights') body.weights = text;
     else if (name === 'feet.limit_cm' && number > 0) body.limit_cm = number;
     else if (name === 'feet.root' && root >= 0) body.root = root;
-    else if ((name === 'style.gate' || name === 'style.calibrate') && flag !== undefined) return done;
-    else return { ok: false, error: `${name}: give a number from -2 to 2` };
+    else if (!['style.gate', 'style.calibrate'].includes(name) || flag === undefined)
+      return { ok: false, error: `${name}: give a number from -2 to 2` };
     return done;
   }
 

@@ -113,7 +113,7 @@ test('an avatar that is no longer chosen, or whose body has left, is not worn', 
   assert.deepEqual(worn, [null]);
 });
 
-test('a dropped file that is no avatar is not listed, also when nobody is there', async (context) => {
+test('a dropped file that is no avatar is not listed, whoever is there', async (context) => {
   const { avatars, world, said, names } = dressing(context);
   world.performers.clear();
   const drop = new Event('drop');
