@@ -48,11 +48,24 @@ class Page {
     this.acks = new Acks(find('.acks'));
     this.control = controlWith(this.requests, this.acks);
     this.theme = new Theme(find('#theme'), (name) => this.#retheme(name));
-    this.world = new World(find('.stage'), this.store, this.theme.name);
-    this.instruments = new Instruments(find('.instruments'), this.clock);
+    if (!this.#makeWorld()) return;
+    this.instruments = new Instruments(find('.instruments'));
     this.#makePanels();
     this.#listen();
     requestAnimationFrame((now) => this.#frame(now));
+  }
+
+  // False where WebGL is off, as in some virtual machines: the page says so and ends.
+  #makeWorld() {
+    try {
+      this.world = new World(find('.stage'), this.store, this.theme.name);
+      return true;
+    } catch (error) {
+      console.error(error);
+      this.connection.close();
+      this.#linkChanged('refused', NO_WEBGL);
+      return false;
+    }
   }
 
   #makePanels() {
@@ -111,6 +124,11 @@ class Page {
     return this.hello.may_control ? '' : this.hello.read_only_reason || 'this page may only look';
   }
 
+  // A replay's times are those of its recording: this page's clock says nothing about them.
+  get #poseClock() {
+    return this.store.stats?.replay_file === '' ? this.clock : UNKNOWN_CLOCK;
+  }
+
   choose(name) {
     this.chosenName = name;
     this.#refresh();
@@ -124,7 +142,12 @@ class Page {
 
   async #dress(stream) {
     const performer = this.world.performers.get(stream.name);
-    if (performer) await this.avatars.dress(performer);
+    if (!performer) return;
+    try {
+      await this.avatars.dress(performer);
+    } catch (error) {
+      this.acks.say(error.message, 'bad');
+    }
   }
 
   #event({ stream, kind, text }) {
@@ -144,7 +167,9 @@ class Page {
       this.hello = null;
       this.requests.abandon();
     }
+    if (!this.hello) this.store.silence();
     this.#sayLink();
+    if (this.legend) this.#refresh(); // the panels are there
   }
 
   #told(message) {
@@ -156,6 +181,7 @@ class Page {
       Object.assign(this.hello ?? {}, message);
     } else if (type === 'daemon') {
       this.daemon = message;
+      if (!message.alive) this.store.silence();
     } else if (type === 'clock') {
       // Of another machine's frames nobody here knows when they came.
       if (this.hello?.same_machine)
@@ -188,7 +214,7 @@ class Page {
     this.list.update(this.chosen);
     this.panel.update(this.chosen, this.readOnly);
     this.takes.update(store.stats, this.readOnly);
-    if (store.stats) this.header.update(store.stats);
+    this.header.update(this.hello && this.daemon.alive ? store.stats : null);
     this.instruments.heading.textContent = this.chosen
       ? `Instruments: ${this.chosenName}`
       : 'Instruments';
@@ -211,7 +237,7 @@ class Page {
     this.fresh = [];
     const drawn = this.world.frame((performer) => this.fresh.push(performer.stream));
     const done_ms = performance.now();
-    for (const stream of this.fresh) this.instruments.add(stream, done_ms);
+    for (const stream of this.fresh) this.instruments.add(stream, done_ms, this.#poseClock);
     if (drawn && this.chosen) this.panel.mark(this.chosen);
     if (now_ms - this.#tagged_ms > TAGS_EVERY_MS) {
       this.#tagged_ms = now_ms;
@@ -224,6 +250,9 @@ class Page {
 
 const READY = { type: 'ready' };
 const TAGS_EVERY_MS = 150;
+const NO_WEBGL =
+  'this browser draws no WebGL: switch on hardware acceleration, or use posed top in a terminal';
+const UNKNOWN_CLOCK = new ClockMapping();
 
 // For the tests and for who looks into a running page.
 globalThis.posedPage = new Page();

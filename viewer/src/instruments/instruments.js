@@ -18,8 +18,7 @@ export class Instruments {
   #drawn_ms = 0;
   #frames = [];
 
-  constructor(element, clock) {
-    this.clock = clock;
+  constructor(element) {
     this.element = element;
     element.hidden = true;
     this.tiles = new Tiles();
@@ -68,10 +67,10 @@ export class Instruments {
     return history;
   }
 
-  // A pose was drawn.
-  add(stream, drawn_ms) {
-    if (this.clock.known)
-      this.history(stream).add(stream.pose, stream.callback_ms, drawn_ms, this.clock);
+  // A pose was drawn. clock: a ClockMapping, or an unknown one for poses whose times are of another
+  // clock; what needs it is then not shown.
+  add(stream, drawn_ms, clock) {
+    this.history(stream).add(stream.pose, stream.callback_ms, drawn_ms, clock);
   }
 
   // After each animation frame.

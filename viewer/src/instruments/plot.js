@@ -34,7 +34,7 @@ export class Plot {
     this.area = el('div.plot-area');
     this.element = el(
       'figure.plot',
-      {},
+      { hidden: true }, // until there is something to draw
       el('figcaption', {}, el('h3', {}, title, this.now), el('p.note', {}, sentence)),
       this.area,
     );

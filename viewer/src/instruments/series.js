@@ -42,10 +42,12 @@ export class Series {
     return this.columns.map((column) => column.subarray(first, this.#count));
   }
 
-  // The value that `share` of the points of a quantity do not exceed; NaN without points.
+  // The value that `share` of the points with this quantity do not exceed; NaN without such points.
   quantile(line, share) {
-    if (this.#count === 0) return NaN;
-    const sorted = this.columns[line + 1].slice(0, this.#count).sort();
-    return sorted[Math.min(this.#count - 1, Math.floor(share * this.#count))];
+    const sorted = this.columns[line + 1].slice(0, this.#count).sort(); // NaN comes last
+    let count = this.#count;
+    while (count > 0 && Number.isNaN(sorted[count - 1])) count -= 1;
+    if (count === 0) return NaN;
+    return sorted[Math.min(count - 1, Math.floor(share * count))];
   }
 }

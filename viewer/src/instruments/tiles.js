@@ -69,7 +69,8 @@ export class Tiles {
   constructor() {
     this.tiles = TILES.map(([name, title, text]) => {
       const value = el('dd');
-      return { element: el('div.tile', { title }, el('dt', {}, name), value), value, text };
+      const element = el('div.tile', { title, hidden: true }, el('dt', {}, name), value);
+      return { element, value, text };
     });
     this.element = el('dl.tiles', {}, ...this.tiles.map(({ element }) => element));
   }

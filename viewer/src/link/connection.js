@@ -4,17 +4,21 @@
 const FIRST_WAIT_MS = 150;
 const MOST_WAIT_MS = 1000;
 const REFUSED_WAIT_MS = 3000;
+const MOST_QUESTION_MS = 2000; // a bridge that hangs, a network that is lost
+const SILENT = 'posed view does not answer; trying again';
 const CLOCK_EVERY_MS = 1000;
 
 export class Connection {
   #socket = null;
   #wait_ms = FIRST_WAIT_MS;
   #clockTimer = 0;
+  #refused = false;
 
   // handlers: state(name, sentence), binary(bytes), text(object), open()
   constructor(token, handlers) {
     this.token = token;
     this.handlers = handlers;
+    handlers.state('connecting', '');
     this.#open();
   }
 
@@ -32,10 +36,17 @@ export class Connection {
     return true;
   }
 
+  // For good: nothing is heard any more.
+  close() {
+    this.#socket.onopen = null;
+    this.#socket.onmessage = null;
+    this.#socket.onclose = null;
+    this.#socket.close();
+  }
+
   #open() {
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     const url = `${scheme}://${location.host}/ws?token=${encodeURIComponent(this.token)}`;
-    this.handlers.state('connecting', '');
     const socket = new WebSocket(url);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => this.#opened();
@@ -46,6 +57,7 @@ export class Connection {
 
   #opened() {
     this.#wait_ms = FIRST_WAIT_MS;
+    this.#refused = false;
     this.#askClock();
     this.#clockTimer = setInterval(() => this.#askClock(), CLOCK_EVERY_MS);
     this.handlers.open();
@@ -73,9 +85,12 @@ export class Connection {
     clearInterval(this.#clockTimer);
     const wait_ms = this.#wait_ms;
     this.#wait_ms = Math.min(1.5 * wait_ms, MOST_WAIT_MS);
+    // At once: the question below may wait. Between two refusals it would only flicker.
+    if (!this.#refused) this.handlers.state('closed', SILENT);
     const sentence = await this.#refusal();
+    if (this.#refused && !sentence) this.handlers.state('closed', SILENT);
+    this.#refused = sentence !== '';
     if (sentence) this.handlers.state('refused', sentence);
-    else this.handlers.state('closed', 'posed view does not answer; trying again');
     setTimeout(() => this.#open(), sentence ? REFUSED_WAIT_MS : wait_ms);
   }
 
@@ -83,7 +98,8 @@ export class Connection {
   async #refusal() {
     try {
       const page = `/?token=${encodeURIComponent(this.token)}`;
-      const { status } = await fetch(page, { cache: 'no-store' });
+      const signal = AbortSignal.timeout(MOST_QUESTION_MS);
+      const { status } = await fetch(page, { cache: 'no-store', signal });
       if (status !== 403) return '';
       return 'posed view refused this page: open the URL that it printed when it started';
     } catch {

@@ -26,9 +26,9 @@ export class Foot {
       for (let i = 0; i < 3; i += 1) point[i] = kinematics.position[3 * this.joint + i];
     }
     const passed_s = (time_ms - this.#time_ms) / 1000;
-    if (passed_s <= 0) return;
+    if (passed_s === 0) return;
     const moved = distance(point, this.#last);
-    this.jumped = moved > JUMP_M;
+    this.jumped = passed_s < 0 || moved > JUMP_M; // times go back when a recording begins again
     if (passed_s < 0.5 && !this.jumped) {
       this.speed_m_per_s += 0.5 * (moved / passed_s - this.speed_m_per_s);
       this.#level = Math.min(point[1], this.#level + LEVEL_RISE_M_PER_S * passed_s);

@@ -34,7 +34,7 @@ export class Kinematics {
     this.root = message.root_joint;
     this.rotation = new Float32Array(4 * count); // in the world
     this.position = new Float32Array(3 * count); // in the world [m]
-    this.boneAbove = this.bones.map((_, joint) => this.#boneAbove(joint));
+    this.boneAbove = this.bonesAbove(Boolean);
     this.fromRest = new Float32Array(4 * count);
     this.local = new Float32Array(4 * count);
   }
@@ -93,8 +93,9 @@ export class Kinematics {
   }
 
   // `local`: rotations of the VRM bones relative to the bone above, of the pose that was set last;
-  // all are identity in the T-pose. A joint between two bones is part of the lower one.
-  humanoidLocals() {
+  // all are identity in the T-pose. A joint between two bones is part of the lower one. An avatar
+  // that lacks some of the bones passes its own list of the bones above.
+  humanoidLocals(boneAbove = this.boneAbove) {
     const { fromRest, local } = this;
     for (let joint = 0; joint < this.count; joint += 1) {
       invert(local, 4 * joint, this.rest, 4 * joint);
@@ -102,7 +103,7 @@ export class Kinematics {
     }
     for (let joint = 0; joint < this.count; joint += 1) {
       if (!this.bones[joint]) continue;
-      const above = this.boneAbove[joint];
+      const above = boneAbove[joint];
       if (above < 0) invert(local, 4 * joint, IDENTITY, 0);
       else invert(local, 4 * joint, fromRest, 4 * above);
       multiply(local, 4 * joint, local, 4 * joint, fromRest, 4 * joint);
@@ -110,9 +111,12 @@ export class Kinematics {
     return local;
   }
 
-  #boneAbove(joint) {
-    let above = this.parent[joint];
-    while (above >= 0 && !this.bones[above]) above = this.parent[above];
-    return above;
+  // For each joint the next one above whose bone counts, -1 without one. counts(bone): a boolean
+  bonesAbove(counts) {
+    return this.bones.map((_, joint) => {
+      let above = this.parent[joint];
+      while (above >= 0 && !counts(this.bones[above])) above = this.parent[above];
+      return above;
+    });
   }
 }

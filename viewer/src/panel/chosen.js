@@ -44,7 +44,9 @@ export class Chosen {
     const shape = shapeOf(stream);
     if (shape !== this.#shape) this.#make(stream);
     this.#shape = shape;
+    const wasOff = this.fields.disabled;
     this.fields.disabled = readOnlyReason !== '';
+    if (wasOff && !this.fields.disabled) for (const part of this.#parts) part.list?.();
     this.reason.hidden = readOnlyReason === '';
     write(this.reason, readOnlyReason && `Controls are off: ${readOnlyReason}`);
     for (const part of this.#parts) part.update?.(stream);

@@ -15,7 +15,12 @@ export class Header {
     write(this.text, text);
   }
 
+  // stats: null where nobody says what the daemon costs
   update(stats) {
+    if (!stats) {
+      write(this.machine, '');
+      return;
+    }
     const parts = [`cpu ${stats.cpu_percent.toFixed(1)} %`, megabytes(stats.rss_bytes)];
     if (stats.replay_file) parts.unshift(`replay of ${stats.replay_file}`);
     write(this.machine, parts.join('   '));

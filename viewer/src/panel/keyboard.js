@@ -10,6 +10,7 @@ export function listenToKeys(actions) {
   addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
     if (isTyping(event.target)) return;
+    if (event.repeat && !event.key.startsWith('Arrow')) return; // held: once is meant
     if (takesArrows(event.target) && event.key.startsWith('Arrow')) return;
     const action = actions[event.key];
     if (!action) return;

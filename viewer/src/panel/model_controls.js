@@ -2,6 +2,8 @@
 import { sendModel } from '../link/upload.js';
 import { el, labelled } from './dom.js';
 
+const NO_LIST = 'the daemon offers no list: [control] models names a folder';
+
 export class ModelControls {
   element = el('div.group');
 
@@ -13,11 +15,13 @@ export class ModelControls {
     this.progress = el('progress', { max: 1, value: 0, hidden: true });
     const pick = el('button', { type: 'button', onclick: () => this.file.click() }, 'Send a file…');
     this.element.append(labelled('Model', this.choice, pick), this.file, this.progress);
-    this.#list();
+    this.list();
   }
 
-  async #list() {
+  // Asks for the daemon's list; again when the page may control what it could not before.
+  async list() {
     const reply = await this.requests.ask({ list_models: {} });
+    this.refusal = reply.ok ? '' : `no list of models: ${reply.error}`;
     this.names = (reply.ok ? reply.model : [])
       .filter(({ kind }) => kind === this.kind)
       .map(({ name }) => name);
@@ -30,8 +34,7 @@ export class ModelControls {
     this.choice.replaceChildren(...all.map((name) => el('option', { value: name }, name)));
     this.choice.value = this.current ?? '';
     this.choice.disabled = names.length === 0;
-    this.choice.title =
-      names.length === 0 ? 'the daemon offers no list: [control] models names a folder' : '';
+    this.choice.title = names.length === 0 ? this.refusal || NO_LIST : '';
   }
 
   async #use() {

@@ -7,6 +7,7 @@ const QUIET_MS = 1200; // after the last move: the daemon's statistics may be ol
 
 export class Slider {
   #moved_ms = -Infinity;
+  #value = 0; // the last that was a number: an emptied field is none
 
   // limits: the field's {min, max}; shown: the slider's, within them; send(number): a promise
   constructor(text, { min, max, shown = [min, max], step = 0.01, send, hint = '' }) {
@@ -21,18 +22,22 @@ export class Slider {
       aria: { label: `${text}, number` },
     });
     this.range.oninput = () => this.#moved(Number(this.range.value), this.range);
-    this.field.onchange = () => this.#moved(Number(this.field.value), this.field);
+    this.field.onchange = () => this.#moved(this.field.valueAsNumber, this.field);
     this.note = el('span.note');
     this.element = labelled(text, this.range, this.field, this.note);
     this.element.classList.add('slider');
   }
 
   get value() {
-    return Number(this.field.value);
+    return this.#value;
   }
 
   #moved(value, from) {
-    if (!Number.isFinite(value)) return;
+    if (!Number.isFinite(value)) {
+      this.field.value = this.#value.toFixed(2);
+      return;
+    }
+    this.#value = value;
     this.#moved_ms = performance.now();
     if (from !== this.field) this.field.value = value.toFixed(2);
     if (from !== this.range) this.range.value = String(value);
@@ -56,6 +61,7 @@ export class Slider {
     if (this.latest.busy || performance.now() - this.#moved_ms < QUIET_MS) return;
     if (document.activeElement === this.field) return;
     const text = target.toFixed(2);
+    this.#value = Number(text);
     if (this.field.value !== text) this.field.value = text;
     if (this.range.value !== String(target)) this.range.value = String(target);
   }

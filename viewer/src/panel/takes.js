@@ -5,6 +5,8 @@ const LONGEST_NAME = 128;
 
 export class Takes {
   #running = false;
+  #asking = false;
+  #stats = null; // the last that were read: an answer is newer than those
 
   constructor(form, control) {
     this.form = form;
@@ -25,27 +27,36 @@ export class Takes {
     };
   }
 
-  toggle() {
-    if (this.form.hidden || this.fields.disabled) return;
+  // The answer says whether a take runs: the next statistics come up to a second later.
+  async toggle() {
+    if (this.form.hidden || this.fields.disabled || this.#asking) return;
+    this.#asking = true;
     const start = !this.#running;
     const name = start ? this.name.value.trim() : '';
-    this.control(
+    const reply = await this.control(
       { take: { start, name } },
       start ? `take ${name || 'without a name'} begins` : 'take ends',
     );
+    this.#asking = false;
+    if (reply.ok) this.#run(start);
   }
 
   update(stats, readOnlyReason) {
     this.form.hidden = !stats || stats.recorder_file === '';
     if (this.form.hidden) return;
-    this.#running = stats.take !== undefined;
+    if (stats !== this.#stats) this.#run(stats.take !== undefined);
+    this.#stats = stats;
     this.fields.disabled = readOnlyReason !== '';
     this.fields.title = readOnlyReason;
-    this.name.hidden = this.#running;
-    write(this.button, this.#running ? 'End take' : 'Start take');
-    this.form.dataset.running = this.#running;
     write(this.words, this.#words(stats));
     this.words.title = stats.recorder_file;
+  }
+
+  #run(running) {
+    this.#running = running;
+    this.name.hidden = running;
+    write(this.button, running ? 'End take' : 'Start take');
+    this.form.dataset.running = running;
   }
 
   #words({ take, recorder_lost_chunks: lost, recorder_errors: errors }) {

@@ -3,6 +3,7 @@
 import { Group } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { VRMLoaderPlugin, VRMUtils } from '@pixiv/three-vrm';
+import { rotate } from '../motion/quaternion.js';
 
 function loader() {
   const gltf = new GLTFLoader();
@@ -26,6 +27,7 @@ export async function loadAvatar(bytes, name) {
 export class Avatar {
   group = new Group();
   #bones = []; // {node, joint}: of the figure that it was fitted to
+  #boneAbove = []; // the next joint above, by joint, whose bone the avatar has
   #scale = 1;
   #hips = -1;
 
@@ -44,11 +46,14 @@ export class Avatar {
   // Finds the avatar's bones for the figure's joints, and how much longer its legs are.
   fit(kinematics) {
     const { humanoid } = this.vrm;
+    const nodeOf = (bone) => (bone ? humanoid.getNormalizedBoneNode(bone) : null);
     this.#bones = [];
     kinematics.bones.forEach((bone, joint) => {
-      const node = bone && humanoid.getNormalizedBoneNode(bone);
+      const node = nodeOf(bone);
       if (node) this.#bones.push({ node, joint });
     });
+    // The turn of a bone that the avatar lacks, like upperChest, goes to the bones below it.
+    this.#boneAbove = kinematics.bonesAbove((bone) => Boolean(nodeOf(bone)));
     this.#hips = kinematics.jointOf('hips');
     const own_m = humanoid.getNormalizedBoneNode('hips').position.y;
     const legs_m = hipsHeight(kinematics);
@@ -56,7 +61,7 @@ export class Avatar {
   }
 
   pose(kinematics) {
-    const local = kinematics.humanoidLocals();
+    const local = kinematics.humanoidLocals(this.#boneAbove);
     const { turned } = this;
     for (const { node, joint } of this.#bones) {
       const i = 4 * joint;
@@ -64,6 +69,12 @@ export class Avatar {
     }
     if (this.#hips >= 0) this.#placeHips(kinematics.position, 3 * this.#hips);
     this.vrm.update(0);
+  }
+
+  // Frees what it holds on the graphics card: tens of megabytes for a usual avatar.
+  dispose() {
+    this.group.removeFromParent();
+    VRMUtils.deepDispose(this.vrm.scene);
   }
 
   // The avatar's ground is the scene's; it walks as far as the figure does.
@@ -74,12 +85,17 @@ export class Avatar {
   }
 }
 
-// Of the figure's T-pose: from its lowest point to the hips [m].
+// Of the figure's T-pose: from its lowest point, of joints and tips, to the hips [m].
 export function hipsHeight(kinematics) {
   const hips = kinematics.jointOf('hips');
   if (hips < 0) return 0;
   const places = kinematics.restPositions();
   let low = Infinity;
-  for (let i = 1; i < places.length; i += 3) low = Math.min(low, places[i]);
+  const tip = [0, 0, 0];
+  for (let joint = 0; joint < kinematics.count; joint += 1) {
+    const height_m = places[3 * joint + 1];
+    rotate(tip, 0, kinematics.rest, 4 * joint, kinematics.tip, 3 * joint);
+    low = Math.min(low, height_m, Number.isNaN(tip[1]) ? height_m : height_m + tip[1]);
+  }
   return places[3 * hips + 1] - low;
 }

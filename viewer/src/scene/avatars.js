@@ -3,6 +3,12 @@
 
 const MANNEQUIN = 'mannequin';
 
+// The loader keeps the bytes it is given, so it gets its own.
+async function load(bytes, name) {
+  const { loadAvatar } = await import('./avatar.js');
+  return loadAvatar(bytes.slice(0), name);
+}
+
 export class Avatars {
   #files = new Map([[MANNEQUIN, null]]); // name: its bytes, once they are here
   #chosen = null;
@@ -31,7 +37,14 @@ export class Avatars {
 
   async #take(file) {
     const name = file.name.replace(/\.(vrm|glb)$/i, '');
-    this.#files.set(name, await file.arrayBuffer());
+    const bytes = await file.arrayBuffer();
+    try {
+      (await load(bytes, name)).dispose(); // also while no body is there to wear it
+    } catch (error) {
+      this.say(error.message, 'bad');
+      return;
+    }
+    this.#files.set(name, bytes);
     await this.wear(name);
   }
 
@@ -43,14 +56,14 @@ export class Avatars {
       for (const performer of this.world.performers.values()) await this.dress(performer);
     } catch (error) {
       this.say(error.message, 'bad');
-      if (name !== MANNEQUIN) this.#files.delete(name);
-      this.#chosen = before;
+      if (this.#chosen === name) this.#chosen = before;
     }
     this.changed([...this.#files.keys()], this.#chosen ?? '');
     this.world.touch();
   }
 
-  // Gives a performer the chosen avatar: styled bodies only, raw ones stay ghosts.
+  // Gives a performer the chosen avatar: styled bodies only, raw ones stay ghosts. While it loads
+  // another one may be chosen, or the body may leave: then it is not worn.
   async dress(performer) {
     if (performer.ghost || performer.stream.isHand) return;
     const name = this.#chosen;
@@ -58,8 +71,10 @@ export class Avatars {
       performer.wear(null);
       return;
     }
-    const { loadAvatar } = await import('./avatar.js');
-    performer.wear(await loadAvatar((await this.#bytes(name)).slice(0), name));
+    const avatar = await load(await this.#bytes(name), name);
+    const isThere = this.world.performers.get(performer.stream.name) === performer;
+    if (isThere && this.#chosen === name) performer.wear(avatar);
+    else avatar.dispose();
   }
 
   async #bytes(name) {

@@ -55,12 +55,16 @@ export class HandsView {
       holder.visible = i >= 0;
       if (i >= 0) holder.position.set((places[i] - middle) * APART_M, 0, 0);
     }
-    this.count = names.length ? 1 + Math.max(...places) - Math.min(...places) : 0;
+    const count = names.length ? 1 + Math.max(...places) - Math.min(...places) : 0;
+    if (count === this.count) return; // whoever turned the view keeps it
+    this.count = count;
     this.#frame();
   }
 
   resize(width, height) {
-    this.camera.aspect = width / Math.max(height, 1);
+    const aspect = width / Math.max(height, 1);
+    if (aspect === this.camera.aspect) return;
+    this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
     this.#frame();
   }

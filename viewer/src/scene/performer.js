@@ -68,7 +68,7 @@ export class Performer {
 
   // Capsules again, or an avatar in their place.
   wear(avatar) {
-    if (this.avatar) this.figure.group.remove(this.avatar.group);
+    this.avatar?.dispose();
     this.avatar = avatar;
     for (const child of this.figure.group.children) {
       if (child.isSkinnedMesh) child.visible = avatar === null;
@@ -81,6 +81,7 @@ export class Performer {
 
   dispose() {
     for (const trail of this.#trails) trail.dispose();
+    this.avatar?.dispose();
     this.figure.dispose();
   }
 }

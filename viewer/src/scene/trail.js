@@ -115,6 +115,7 @@ export class Trail {
       geometry.dispose();
       material.dispose();
     }
+    this.prints.dispose();
   }
 }
 

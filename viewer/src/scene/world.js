@@ -24,6 +24,7 @@ export class World {
   #yaw = null;
   #pace = new Pace();
   #areas = { bodies: null, hands: null };
+  #arranged = ''; // the streams of the last statistics that moved somebody
 
   // stage: the element with the canvas, the hands' inset and the names' layer.
   constructor(stage, store, theme) {
@@ -47,7 +48,7 @@ export class World {
     new ResizeObserver(() => this.resize()).observe(stage);
     store.addEventListener('skeleton', ({ detail }) => this.#enter(detail));
     store.addEventListener('gone', ({ detail }) => this.#leave(detail.name));
-    store.addEventListener('stats', () => this.arrange());
+    store.addEventListener('stats', () => this.#arrangeChanged());
   }
 
   touch() {
@@ -82,6 +83,16 @@ export class World {
     this.performers.delete(name);
     performer.dispose();
     this.tags.remove(name);
+    this.arrange();
+  }
+
+  // Statistics come each second; only other streams or devices in them move anybody. Without this
+  // the scene would never rest.
+  #arrangeChanged() {
+    const streams = this.store.main().map(({ name, stats }) => [name, stats.source_name]);
+    const now = JSON.stringify(streams);
+    if (now === this.#arranged) return;
+    this.#arranged = now;
     this.arrange();
   }
 

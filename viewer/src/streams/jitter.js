@@ -17,7 +17,11 @@ export class Jitter {
     this.#arrival_ms = arrival_ms;
     if (!(steps > 0) || !(passed_ms > 0)) return; // the first, a repeated one, a new run
     const period_ms = passed_ms / steps;
-    if (!(this.period_ms > 0) || period_ms > 10 * this.period_ms) {
+    if (this.period_ms > 0 && period_ms > 10 * this.period_ms) {
+      this.period_ms = NaN; // a pause: the next step says what is usual
+      return;
+    }
+    if (!(this.period_ms > 0)) {
       this.period_ms = period_ms;
       this.ms = 0;
       return;

@@ -104,6 +104,12 @@ export class Store extends EventTarget {
     }
   }
 
+  // Nobody says any more how the streams are.
+  silence() {
+    for (const stream of this.streams.values())
+      if (stream.stats) stream.stats = { ...stream.stats, state: 'unknown', away: false };
+  }
+
   // The streams that are chosen and controlled, in the daemon's order: not the raw ones.
   main() {
     return (this.stats?.stream ?? [])

@@ -67,6 +67,33 @@ pageTest('a body and a hand move, and nothing is said on the console', {}, async
   assert.match(await page.locator('.link-text').innerText(), /live from tcp/);
 });
 
+pageTest("the hands' view stays as turned, and a still scene rests", {}, async (page, bridge) => {
+  await page.waitForTimeout(2000); // until every part of the page has its size
+  const turned = await page.evaluate(() => {
+    const { camera } = globalThis.posedPage.world.hands;
+    camera.position.set(0.6, 0.1, 0.6);
+    return camera.position.toArray();
+  });
+  await page.waitForTimeout(2500); // some statistics later
+  const now = await page.evaluate(() =>
+    globalThis.posedPage.world.hands.camera.position.toArray(),
+  );
+  now.forEach((value, i) => assert.ok(Math.abs(value - turned[i]) < 0.01, String(now)));
+  bridge.daemon.rate_hz = 0; // no poses any more, but statistics
+  await page.waitForFunction(
+    async () => {
+      const { render } = globalThis.posedPage.world.renderer.info;
+      const before = render.frame;
+      await new Promise((done) => {
+        setTimeout(done, 1500);
+      });
+      return render.frame === before;
+    },
+    undefined,
+    PATIENCE,
+  );
+});
+
 pageTest(
   'the slider sets alpha, and the answer is shown; a refusal, too',
   {},
@@ -81,6 +108,60 @@ pageTest(
     await acknowledged(page, 'refused: style.alpha');
   },
 );
+
+const tile = (page, name) =>
+  page.locator('.tile', { has: page.locator('dt', { hasText: new RegExp(`^${name}$`) }) });
+
+for (const [where, options] of [
+  ['of a daemon on another machine', { same_machine: false }],
+  ['of a replay', { replay_file: 'take1.plog' }],
+]) {
+  pageTest(
+    `instruments ${where}: all but those that need the page's clock`,
+    options,
+    async (page) => {
+      await page.getByText('Time in each stage').waitFor(PATIENCE);
+      await tile(page, 'Rate').waitFor(PATIENCE);
+      for (const name of ['Glass to glass', 'Arrival to callback'])
+        assert.equal(await tile(page, name).isVisible(), false, name);
+    },
+  );
+}
+
+pageTest('instruments of a live daemon have its times', {}, async (page) => {
+  for (const name of ['Glass to glass', 'Arrival to callback'])
+    await tile(page, name).waitFor(PATIENCE);
+});
+
+pageTest('an emptied number field changes nothing', {}, async (page, bridge) => {
+  await page.getByText('More parameters').click();
+  for (const [label, shown] of [
+    ['Amount of style, α, number', '1.00'],
+    ['feet.limit_cm', '8'],
+  ]) {
+    const field = page.getByLabel(label);
+    await field.fill('');
+    await field.press('Enter');
+    assert.equal(await field.inputValue(), shown);
+  }
+  assert.ok(bridge.requests.every((request) => !request.set_parameter));
+});
+
+pageTest('each field of More parameters sends what the daemon takes', {}, async (page, bridge) => {
+  await page.getByText('More parameters').click();
+  assert.equal(await page.getByLabel('feet.root').inputValue(), 'stride');
+  await page.getByLabel('feet.root').selectOption('actor');
+  await acknowledged(page, 'feet.root actor: applied');
+  assert.equal(bridge.daemon.bodies[0].root, 2);
+  await page.getByLabel('feet.limit_cm').fill('5.5');
+  await page.getByLabel('feet.limit_cm').press('Enter');
+  await acknowledged(page, 'feet.limit_cm 5.5: applied');
+  for (const name of ['style.gate', 'style.calibrate']) {
+    await page.getByLabel(name).click();
+    await acknowledged(page, `${name} `);
+  }
+  assert.equal(await page.locator('.ack[data-tone="bad"]').count(), 0);
+});
 
 pageTest('keys: arrows choose and change, ? explains, fields type', {}, async (page, bridge) => {
   await page.locator('.stage canvas').focus();
@@ -146,6 +227,25 @@ pageTest(
   },
 );
 
+pageTest('a held key or two quick presses make one take', {}, async (page, bridge) => {
+  bridge.publishStats = () => {}; // the answers alone say whether a take runs
+  const takes = () => bridge.requests.flatMap(({ take }) => (take ? [Boolean(take.start)] : []));
+  await page.evaluate(() => {
+    globalThis.posedPage.takes.toggle();
+    globalThis.posedPage.takes.toggle();
+  });
+  await acknowledged(page, 'begins');
+  assert.deepEqual(takes(), [true]);
+  await page.keyboard.press('ArrowDown'); // the panels are written again, with the old statistics
+  await page.locator('.stage canvas').focus();
+  for (let i = 0; i < 3; i += 1) {
+    await page.keyboard.down('s'); // again without up: the key repeats
+    await page.waitForTimeout(200);
+  }
+  await acknowledged(page, 'take ends');
+  assert.deepEqual(takes(), [true, false]);
+});
+
 const rights = { may_control: false, read_only_reason: 'this key may watch only' };
 pageTest(
   'a page that may only look says why, and its controls are off',
@@ -162,6 +262,36 @@ pageTest(
     );
   },
 );
+
+test(
+  'a list of models that was refused is asked for again once the page may control',
+  { timeout: 90000 },
+  async (context) => {
+    const bridge = await started(context, { rights });
+    const { daemon } = bridge;
+    const { answer } = daemon;
+    daemon.answer = () => ({ ok: false, error: 'this key may watch only' });
+    const page = await opened(context, bridge.url);
+    await drawn(page);
+    const models = page.getByLabel('Model', { exact: true });
+    await page.locator('select[title*="this key may watch only"]').waitFor(PATIENCE);
+    daemon.answer = answer;
+    bridge.say({ type: 'control', may_control: true, read_only_reason: '' });
+    await models.locator('option[value="tired.style"]').waitFor({ state: 'attached', ...PATIENCE });
+    assert.ok(await models.isEnabled());
+  },
+);
+
+test('without WebGL the page says what to do', { timeout: 90000 }, async (context) => {
+  const blind = await launch(['--disable-gpu', '--disable-3d-apis']);
+  context.after(() => blind.close());
+  const bridge = await started(context);
+  const page = await openPage(blind, bridge.url);
+  await page.locator('.link-text', { hasText: 'this browser draws no WebGL' }).waitFor(PATIENCE);
+  await page.waitForTimeout(1500); // what the bridge sends is no error
+  assert.match(await page.locator('.link-text').innerText(), /hardware acceleration/);
+  assert.ok(page.errors.every((text) => text.includes('WebGL')), page.errors.join());
+});
 
 test(
   'without the token nothing is shown; a page whose token is old says what to do',
@@ -190,9 +320,12 @@ test(
     await drawn(page);
     bridge.say({ type: 'daemon', alive: false, sentence: 'the daemon does not answer' });
     await page.locator('.link[data-tone="bad"]', { hasText: 'does not answer' }).waitFor(PATIENCE);
+    await page.locator('.stream .state', { hasText: 'unknown' }).first().waitFor(PATIENCE);
     const { port } = bridge;
     await bridge.stop();
     await page.locator('.link[data-tone="busy"]').waitFor(PATIENCE);
+    await page.getByText('Controls are off: there is no connection').waitFor(PATIENCE);
+    assert.equal(await page.locator('.machine').innerText(), '');
     const began_ms = performance.now();
     await started(context, {}, port);
     await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);

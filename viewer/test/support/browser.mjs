@@ -6,7 +6,6 @@ export const CHROMIUM = process.env.POSED_CHROMIUM ?? '/usr/bin/chromium';
 export const hasBrowser = () => existsSync(CHROMIUM);
 
 const FLAGS = [
-  '--no-sandbox',
   '--disable-quic',
   '--no-first-run',
   '--disable-background-networking',
@@ -18,7 +17,8 @@ const FLAGS = [
   '--enable-unsafe-swiftshader',
 ];
 
-export const launch = () => chromium.launch({ executablePath: CHROMIUM, args: FLAGS });
+export const launch = (flags = FLAGS) =>
+  chromium.launch({ executablePath: CHROMIUM, args: ['--no-sandbox', ...flags] });
 
 // A page that keeps the errors that it says on the console.
 export async function openPage(browser, url, { width = 1440, height = 900, dark = false } = {}) {

@@ -37,7 +37,7 @@ class Tab {
       type: 'hello',
       version: 'fake',
       connect: 'tcp://127.0.0.1:5570',
-      same_machine: true,
+      same_machine: bridge.same_machine,
       ...bridge.rights,
     });
     this.say({ type: 'daemon', alive: true, sentence: '' });
@@ -86,9 +86,13 @@ export class FakeBridge {
 
   constructor(
     daemon,
-    { token = 'secret', rights = { may_control: true, read_only_reason: '' } } = {},
+    {
+      token = 'secret',
+      rights = { may_control: true, read_only_reason: '' },
+      same_machine = true,
+    } = {},
   ) {
-    Object.assign(this, { daemon, token, rights });
+    Object.assign(this, { daemon, token, rights, same_machine });
   }
 
   async start(port = 0) {

@@ -6,6 +6,7 @@ import { encode } from './messages.mjs';
 const BODY_JOINTS = bodySkeleton({ stage: [] }).parent;
 const ALPHA_PER_S = 2;
 const GESTURE_S = 0.7;
+const ROOTS = ['off', 'stride', 'actor'];
 
 export class FakeDaemon {
   frames = 0;
@@ -14,7 +15,15 @@ export class FakeDaemon {
 
   // bodies, hands: how many; rate_hz: of all of them; missing: joints of styled bodies without a
   // value
-  constructor({ bodies = 1, hands = 1, rate_hz = 60, recording = true, missing = [] } = {}) {
+  constructor({
+    bodies = 1,
+    hands = 1,
+    rate_hz = 60,
+    recording = true,
+    missing = [],
+    replay_file = '',
+  } = {}) {
+    this.replay_file = replay_file;
     this.rate_hz = rate_hz;
     this.recording = recording;
     this.missing = missing;
@@ -28,6 +37,8 @@ export class FakeDaemon {
       target: 1,
       mask: '',
       weights: 'sway=0.7,march=0.3',
+      root: 1,
+      limit_cm: 8,
       model: 'march-to-sway.style',
     }));
     this.hands = names('hand', hands).map((name, i) => ({
@@ -152,11 +163,18 @@ export class FakeDaemon {
           parameter: [
             { name: 'alpha', value: body.alpha, target: body.target },
             { name: 'gate', value: 1, target: 1 },
+            { name: 'calibrate', value: 0, target: 0 },
             { name: 'mask', text: body.mask },
             { name: 'weights', text: body.weights },
           ],
         },
-        { name: 'feet', parameter: [{ name: 'limit_cm', value: 8, target: 8 }] },
+        {
+          name: 'feet',
+          parameter: [
+            { name: 'root', value: body.root, target: body.root },
+            { name: 'limit_cm', value: body.limit_cm, target: body.limit_cm },
+          ],
+        },
       ],
     }));
     const hands = this.hands.map(({ name }) => ({
@@ -177,6 +195,7 @@ export class FakeDaemon {
       stream: [...bodies, ...hands],
       cpu_percent: 9.9,
       rss_bytes: 29900000,
+      replay_file: this.replay_file,
       recorder_file: this.recording ? 'take1.plog' : '',
       ...(this.take ? { take: this.take } : {}),
     };
@@ -211,11 +230,15 @@ export class FakeDaemon {
     return { ok: false, error: `there is no stream "${details.stream}" that can do this` };
   }
 
-  #set(body, { name, number, text }, done) {
+  #set(body, { name, number, text, flag }, done) {
+    const root = ROOTS.indexOf(text);
     if (name === 'style.alpha' && Math.abs(number) <= 2) body.target = number;
     else if (name === 'style.mask') body.mask = text;
     else if (name === 'style.weights') body.weights = text;
-    else return { ok: false, error: `${name}: give a number from -2 to 2` };
+    else if (name === 'feet.limit_cm' && number > 0) body.limit_cm = number;
+    else if (name === 'feet.root' && root >= 0) body.root = root;
+    else if (!['style.gate', 'style.calibrate'].includes(name) || flag === undefined)
+      return { ok: false, error: `${name}: give a number from -2 to 2` };
     return done;
   }
 

@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { ClockMapping } from '../../src/link/clock.js';
+import { Connection } from '../../src/link/connection.js';
 import { Latest } from '../../src/link/latest.js';
 import { Requests } from '../../src/link/requests.js';
 import { PIECE_BYTES, sendModel } from '../../src/link/upload.js';
@@ -105,6 +106,36 @@ test('a model goes in pieces of 32 KiB with its SHA-256, and stops at a refusal'
   );
   assert.equal(refused.error, 'no');
   assert.equal((await sendModel(ask, 'walker', 'm', new Uint8Array(), () => {})).ok, false);
+});
+
+test('a connection that closes is said at once, also when the bridge hangs', async (context) => {
+  const sockets = [];
+  class Socket {
+    constructor() {
+      sockets.push(this);
+    }
+
+    close() {}
+  }
+  const asked = [];
+  const hang = (_, { signal }) => {
+    asked.push(signal);
+    return new Promise(() => {});
+  };
+  const browser = { WebSocket: Socket, location: { protocol: 'http:', host: 'a' }, fetch: hang };
+  for (const [name, value] of Object.entries(browser)) {
+    const before = globalThis[name];
+    globalThis[name] = value;
+    context.after(() => {
+      globalThis[name] = before;
+    });
+  }
+  const states = [];
+  const connection = new Connection('x', { state: (name) => states.push(name) });
+  sockets[0].onclose();
+  assert.deepEqual(states, ['connecting', 'closed']);
+  assert.ok(asked[0] instanceof AbortSignal); // it ends by itself
+  connection.close();
 });
 
 test('a reply of the daemon reads as it was written', () => {

@@ -120,6 +120,26 @@ test("a walker's feet stand in turns, and it faces +Z", () => {
   assert.ok(still.stands && still.speed_m_per_s === 0);
 });
 
+test('feet go on after times went back: a recording began again', () => {
+  const kinematics = new Kinematics(bodySkeleton({ stream: 'a', id: 1, stage: [] }));
+  const [left] = feetOf(kinematics);
+  const step = (i, began_ms) => {
+    const { root_position_m, rotation_xyzw } = walk(i / 60, 0);
+    kinematics.pose(rotation_xyzw, root_position_m);
+    left.update(kinematics, began_ms + (1000 * i) / 60);
+  };
+  for (let i = 0; i < 60; i += 1) step(i, 9e6);
+  step(60, 1000);
+  assert.ok(left.jumped);
+  let stood = 0;
+  for (let i = 61; i < 240; i += 1) {
+    step(i, 1000);
+    assert.equal(left.jumped, false);
+    stood += left.stands ? 1 : 0;
+  }
+  assert.ok(stood > 60 && stood < 140, String(stood));
+});
+
 test('three.js and the page turn vectors in the same way', () => {
   const kinematics = new Kinematics({ ...chain, root_joint: 0 });
   const q = new Quaternion(0.1, -0.4, 0.2, 0.6).normalize();

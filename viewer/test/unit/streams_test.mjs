@@ -71,6 +71,16 @@ test('streams come and go with the statistics; a raw twin goes with its stream',
   assert.deepEqual([...store.streams.keys()], ['b']);
 });
 
+test('without word of the daemon no stream is called live, until the next statistics', () => {
+  const store = new Store();
+  store.receive(statsOf('a'));
+  assert.equal(stateOf(store.streams.get('a').stats).word, 'live');
+  store.silence();
+  assert.equal(stateOf(store.main()[0].stats).word, 'unknown');
+  store.receive(statsOf('a'));
+  assert.equal(stateOf(store.main()[0].stats).word, 'live');
+});
+
 test('damaged messages are counted, and change nothing', () => {
   const store = new Store();
   store.receive(skeletonOf('a', 1));
@@ -108,6 +118,14 @@ test('jitter of even frames is 0, also when the page sees only some', () => {
   assert.ok(Math.abs(jitter.ms - 4) < 0.5, String(jitter.ms));
 });
 
+test('a pause between even frames is no jitter', () => {
+  const jitter = new Jitter();
+  for (let i = 0; i < 200; i += 1) {
+    jitter.add(i, (1000 * i) / 60 + (i < 100 ? 0 : 2000));
+    if (i > 1) assert.ok(jitter.ms < 1, `${jitter.ms} ms at frame ${i}`);
+  }
+});
+
 test('a series keeps the newest, and gives those of a time window', () => {
   const series = new Series(8, 1);
   for (let i = 0; i < 20; i += 1) series.add(i, 10 * i);
@@ -123,6 +141,8 @@ test('a series keeps the newest, and gives those of a time window', () => {
   series.add(3, 1); // time ran back: another connection
   assert.equal(series.length, 1);
   assert.equal(new Series(8, 1).quantile(0, 0.5), NaN);
+  for (let i = 0; i < 7; i += 1) series.add(4 + i, NaN); // only one has the quantity
+  assert.equal(series.quantile(0, 0.95), 1);
 });
 
 test('lanes: raw beside styled, the bodies of one device together', () => {
