@@ -276,7 +276,7 @@ TEST_CASE("view says in one sentence what it cannot do, and ctrl-c ends it", "[v
   const auto url = open.line();
   REQUIRE(url);
   CHECK(url->starts_with("http://127.0.0.1:"));
-  CHECK(has(open.errors(), "warning: other machines reach this page on 0.0.0.0"));
+  CHECK(open.comes_to_say("warning: other machines reach this page on 0.0.0.0"));
   open.send(SIGINT);
   CHECK(open.exit_code() == 0);
 }
