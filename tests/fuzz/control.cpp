@@ -41,7 +41,7 @@ class DaemonControl final : public control::DaemonControl {
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}
-  void stages_changed(std::uint32_t stream, const pipeline::StreamSettings&) override {
+  void stages_changed(std::uint32_t stream, const posed::pipeline::StreamSettings&) override {
     if (stream > 1) std::abort();
   }
   Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {

@@ -46,7 +46,7 @@ class DaemonControl final : public control::DaemonControl {
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}
-  void stages_changed(std::uint32_t stream, const pipeline::StreamSettings&) override {
+  void stages_changed(std::uint32_t stream, const posed::pipeline::StreamSettings&) override {
     demand(stream <= 2);
   }
   Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {

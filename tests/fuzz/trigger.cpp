@@ -15,7 +15,7 @@ class AnyTake final : public posed::control::DaemonControl {
   bool send(const posed::pipeline::Command&) override { return false; }
   bool send(const posed::pipeline::DeviceCommand&) override { return false; }
   void keep_model(std::span<const std::byte>) override {}
-  void stages_changed(std::uint32_t, const pipeline::StreamSettings&) override {}
+  void stages_changed(std::uint32_t, const posed::pipeline::StreamSettings&) override {}
   posed::Result<posed::pipeline::Take> mark_take(const posed::pipeline::TakeMark& mark) override {
     if (!posed::pipeline::check_take_name(mark.name)) std::abort();
     if (mark.timecode.size() > 12) std::abort();

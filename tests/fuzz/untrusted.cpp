@@ -124,7 +124,7 @@ class Sockets final : public control::DaemonControl {
   bool send(const pipeline::Command&) override { return true; }
   bool send(const pipeline::DeviceCommand&) override { return true; }
   void keep_model(std::span<const std::byte>) override {}
-  void stages_changed(std::uint32_t, const pipeline::StreamSettings&) override {}
+  void stages_changed(std::uint32_t, const posed::pipeline::StreamSettings&) override {}
   Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
     return fail("not recording");
   }
