@@ -298,8 +298,10 @@ Result<> Daemon::Parts::open_engines() {
     }
   }
   if (bodies != nullptr) bodies->add_to(*reader);
-  handler = std::make_unique<control::RequestHandler>(std::move(controlled), *this,
-                                                      control::ModelFolder(config.models));
+  auto models = control::ModelFolder::open(config.models);
+  if (!models) return std::unexpected(models.error());
+  handler =
+      std::make_unique<control::RequestHandler>(std::move(controlled), *this, std::move(*models));
   return {};
 }
 

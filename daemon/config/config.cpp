@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <set>
-#include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -54,11 +53,7 @@ void read_control(TableReader table, const ConfigFile& file, bool secured, Daemo
   read_endpoint(table, "control", config.control_endpoint, config.control_insecure, secured);
   std::string models;
   table.read("models", models);
-  config.models = file.resolve(models);
-  std::error_code ignored;
-  if (!models.empty() && !is_directory(config.models, ignored)) {
-    table.add_error("models", in_quotes(config.models.string()) + " is not a folder");
-  }
+  if (!models.empty()) config.models = file.resolve(models);
   table.finish();
 }
 

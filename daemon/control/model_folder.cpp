@@ -22,6 +22,16 @@ std::string_view kind_of(const std::filesystem::path& file) {
 
 }  // namespace
 
+Result<ModelFolder> ModelFolder::open(std::filesystem::path folder) {
+  std::error_code ignored;
+  if (!folder.empty() && !is_directory(folder, ignored)) {
+    return fail(
+        "models in [control] names no folder; make it and put models into it, or leave the key out",
+        folder.string());
+  }
+  return ModelFolder(std::move(folder));
+}
+
 Result<std::vector<FolderModel>> ModelFolder::list() const {
   std::vector<FolderModel> models;
   if (folder_.empty()) return models;

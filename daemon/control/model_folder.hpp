@@ -20,7 +20,8 @@ struct FolderModel {
 class ModelFolder {
  public:
   ModelFolder() = default;  // no folder: the list is empty
-  explicit ModelFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  // Says so when `folder`, unless it is empty, is not a folder.
+  [[nodiscard]] static Result<ModelFolder> open(std::filesystem::path folder);
 
   // Regular files that end in .style or .gesture, by name; the first 256.
   [[nodiscard]] Result<std::vector<FolderModel>> list() const;
@@ -28,6 +29,8 @@ class ModelFolder {
   [[nodiscard]] Result<std::string> read(std::string_view name) const;
 
  private:
+  explicit ModelFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
   std::filesystem::path folder_;
 };
 

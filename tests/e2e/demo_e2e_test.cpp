@@ -24,21 +24,25 @@ std::string on_free_ports(std::string toml) {
 }  // namespace
 
 TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
+  // As in a fresh clone: the config is there, the folder of its files is not.
   const TempFolder folder;
-  const auto kept = folder.path() / "kept";
-  const auto prepare = [&] { return posed({"demo", "--prepare", kept.string()}); };
-  const ProgramOutcome first = prepare();
+  const auto kept = folder.path() / "build" / "demo";
+  create_directory(folder.path() / "config");
+  const auto shipped =
+      folder.write("config/demo.toml", on_free_ports(file_text("config/demo.toml")));
+  const ProgramOutcome first = posed({"demo", "--config", shipped.string(), "--seconds", "1"});
   INFO(first.err);
   REQUIRE(first.code == 0);
   CHECK(first.err.contains("learning the style"));
   const std::string model = file_text(kept / "march-to-sway.style");
 
+  const auto prepare = [&] { return posed({"demo", "--prepare", kept.string()}); };
   const ProgramOutcome again = prepare();
   CHECK(again.code == 0);
   CHECK(again.err.contains("using what was made and learnt before"));
   CHECK_FALSE(again.err.contains("learning the style"));
 
-  const auto config = folder.path() / "kept" / "free.toml";
+  const auto config = kept / "free.toml";
   std::ofstream(config) << on_free_ports(file_text(kept / "demo.toml"));
   const ProgramOutcome streamed = posed({"demo", "--config", config.string(), "--seconds", "1"});
   INFO(streamed.err);

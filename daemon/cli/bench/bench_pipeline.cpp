@@ -21,7 +21,6 @@
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
 #include "proto/message/frame_message.hpp"
-#include "proto/text/json_text.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::cli {
@@ -275,13 +274,9 @@ Result<> bench_pipeline(const HopOptions& options) {
   if (auto checked = options.report.check(); !checked) return checked;
   const auto watched = measure(options);
   if (!watched) return std::unexpected(watched.error());
-  const auto figures = to_json(options, *watched);
-  if (options.json) {
-    std::printf("%s\n", json_text(figures, 2).c_str());
-  } else {
-    print(options, *watched);
-  }
-  return write_bench_page(page_of(options, *watched), figures, options.report);
+  return show_bench(
+      options.json, to_json(options, *watched), [&] { print(options, *watched); },
+      page_of(options, *watched), options.report);
 }
 
 }  // namespace

@@ -19,7 +19,6 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/relay/relay.hpp"
 #include "daemon/system/clock.hpp"
-#include "proto/text/json_text.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::cli {
@@ -252,13 +251,9 @@ Result<> bench_relay(const RelayBench& bench) {
   if (auto checked = bench.report.check(); !checked) return checked;
   const auto measured = measure(bench);
   if (!measured) return std::unexpected(measured.error());
-  const auto figures = to_json(bench, *measured);
-  if (bench.json) {
-    std::printf("%s\n", json_text(figures, 2).c_str());
-  } else {
-    print(bench, *measured);
-  }
-  return write_bench_page(page_of(bench, *measured), figures, bench.report);
+  return show_bench(
+      bench.json, to_json(bench, *measured), [&] { print(bench, *measured); },
+      page_of(bench, *measured), bench.report);
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
 #include "daemon/cli/bench/bench_report.hpp"
 
+#include <cstdio>
+
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/json_numbers.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 
@@ -22,6 +25,17 @@ Result<> write_bench_page(const BenchPage& page, const nlohmann::ordered_json& f
   }
   add_json(figures, out);
   return report::write_page(out, file.path);
+}
+
+Result<> show_bench(bool as_json, const nlohmann::ordered_json& figures,
+                    const std::function<void()>& print, const BenchPage& page,
+                    const ReportFile& file) {
+  if (as_json) {
+    std::printf("%s\n", json_text(figures, 2).c_str());
+  } else {
+    print();
+  }
+  return write_bench_page(page, figures, file);
 }
 
 report::Percentiles percentiles_of(const HopFigures& figures) {

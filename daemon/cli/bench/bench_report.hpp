@@ -1,6 +1,7 @@
 // The page of a benchmark's `--report`. Cold.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,12 @@ struct BenchPage {
 [[nodiscard]] Result<> write_bench_page(const BenchPage& page,
                                         const nlohmann::ordered_json& figures,
                                         const ReportFile& file);
+
+// What was measured, at the end of a benchmark: `figures` as JSON or what `print` prints, and the
+// page where one is wanted.
+[[nodiscard]] Result<> show_bench(bool as_json, const nlohmann::ordered_json& figures,
+                                  const std::function<void()>& print, const BenchPage& page,
+                                  const ReportFile& file);
 
 [[nodiscard]] report::Percentiles percentiles_of(const HopFigures& figures);
 // Of {"p50_us", "p99_us", "p99_9_us", "max_us"}.

@@ -28,7 +28,6 @@
 #include "daemon/system/process.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_type.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -302,13 +301,9 @@ Result<> bench_stage(const StageBench& bench) {
   if (auto checked = bench.report.check(); !checked) return checked;
   const auto measured = measure(bench);
   if (!measured) return std::unexpected(measured.error());
-  const auto figures = to_json(bench, *measured);
-  if (bench.json) {
-    std::printf("%s\n", json_text(figures, 2).c_str());
-  } else {
-    print(bench, *measured);
-  }
-  return write_bench_page(page_of(bench, *measured), figures, bench.report);
+  return show_bench(
+      bench.json, to_json(bench, *measured), [&] { print(bench, *measured); },
+      page_of(bench, *measured), bench.report);
 }
 
 }  // namespace

@@ -20,19 +20,20 @@ TEST_CASE("a model is read by its name in the folder's list, and by nothing else
     REQUIRE(style::save_model(test::toy_model(1, 0.3), path));
   }
   create_directory(folder / "d.style");
-  const ModelFolder models(folder);
-  const auto list = models.list();
+  const auto models = ModelFolder::open(folder);
+  REQUIRE(models);
+  const auto list = models->list();
   REQUIRE(list);
   REQUIRE(list->size() == 2);
   CHECK(list->at(0).name == "a.gesture");
   CHECK(list->at(0).kind == "generate");
   CHECK(list->at(1).name == "b.style");
   CHECK(list->at(1).kind == "style");
-  CHECK(models.read("b.style"));
+  CHECK(models->read("b.style"));
   const std::string whole = folder / "b.style";
   for (const std::string& name : std::vector<std::string>{"../c.style", "./b.style", whole,
                                                           "notes.txt", "d.style", "", "."}) {
-    const auto read = models.read(name);
+    const auto read = models->read(name);
     REQUIRE_FALSE(read);
     CHECK(read.error().message.contains("there is no model"));
   }
@@ -41,9 +42,18 @@ TEST_CASE("a model is read by its name in the folder's list, and by nothing else
 TEST_CASE("without a folder the list is empty; a folder that is gone is told") {
   CHECK(ModelFolder().list().value().empty());
   CHECK_FALSE(ModelFolder().read("a.style"));
-  const auto gone = ModelFolder("/nowhere/models").list();
+  const test::TempFolder home;
+  const auto folder = home.path() / "models";
+  const auto never = ModelFolder::open(folder);
+  REQUIRE_FALSE(never);
+  CHECK(never.error().text().contains(folder.string()));
+  create_directory(folder);
+  const auto models = ModelFolder::open(folder);
+  REQUIRE(models);
+  remove(folder);
+  const auto gone = models->list();
   REQUIRE_FALSE(gone);
-  CHECK(gone.error().text().contains("/nowhere/models"));
+  CHECK(gone.error().text().contains(folder.string()));
 }
 
 }  // namespace posed::control
