@@ -6,6 +6,7 @@
 
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/file_text.hpp"
+#include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
@@ -28,8 +29,8 @@ TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   const TempFolder folder;
   const auto kept = folder.path() / "build" / "demo";
   create_directory(folder.path() / "config");
-  const auto shipped =
-      folder.write("config/demo.toml", on_free_ports(file_text("config/demo.toml")));
+  const auto shipped = folder.write(
+      "config/demo.toml", on_free_ports(file_text(source_dir() / "config" / "demo.toml")));
   const ProgramOutcome first = posed({"demo", "--config", shipped.string(), "--seconds", "1"});
   INFO(first.err);
   REQUIRE(first.code == 0);
