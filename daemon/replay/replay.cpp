@@ -127,19 +127,27 @@ std::optional<std::uint64_t> Replay::broken_at(std::uint32_t stream) const {
 }
 
 void Replay::before(const pipeline::Item& item, std::uint32_t index) noexcept {
-  while (const Schedule::Entry* entry = schedule_.due(item, index)) apply(*entry);
+  while (const Schedule::Entry* entry = schedule_.due(item, index)) {
+    apply(*entry, item.number);
+  }
   position_ = item.number;
 }
 
 void Replay::reach(std::uint64_t item) noexcept {
-  while (const Schedule::Entry* entry = schedule_.due(item)) apply(*entry);
+  while (const Schedule::Entry* entry = schedule_.due(item)) apply(*entry, item);
 }
 
-void Replay::apply(const Schedule::Entry& entry) noexcept {
+void Replay::apply(const Schedule::Entry& entry, std::uint64_t item) noexcept {
+  decided_(entry.row, item);
   // The row was already checked; decoding it again here saves several times the memory of keeping
   // all decoded decisions.
   if (const auto decision = record::decision_of(entry.row, {}))
     contexts_[entry.stream]->apply(*decision);
+}
+
+std::uint64_t Replay::next_sample(std::uint32_t stream) const noexcept {
+  const ReplaySource* const source = source_of(reader_.streams()[stream].source);
+  return source == nullptr ? 0 : source->next_sample(stream);
 }
 
 const pipeline::StreamEngine* Replay::engine(std::uint32_t stream) const {
@@ -160,7 +168,7 @@ Result<> Replay::run(const Out& out, const Pace& pace) {
     if (error_) return std::unexpected(*error_);
   }
   apply_gaps(std::numeric_limits<std::int64_t>::max());
-  while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry);
+  while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry, next_item());
   for (std::size_t i = 0; i < contexts_.size(); ++i) {
     std::optional<std::int64_t> end_ns;
     if (!reader_.counts_items()) end_ns = source_of(reader_.streams()[i].source)->arrival_ns();

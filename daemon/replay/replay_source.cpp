@@ -161,11 +161,17 @@ void ReplaySource::set_gap(std::int64_t after_chunk) {
 StreamPosition ReplaySource::position(const ReplayStreamContext& stream,
                                       const log::StreamPosition& place) const {
   StreamPosition position{.stream = stream.index(), .frame = place.next_frame};
-  for (const StreamPosition& now : intake_.next().streams) {
-    if (now.stream == position.stream) position.sample = now.sample;
-  }
+  const std::uint64_t next = next_sample(position.stream);
+  if (next != 0) position.sample = next;
   if (place.next_sample != 0) position.sample = place.next_sample;
   return position;
+}
+
+std::uint64_t ReplaySource::next_sample(std::uint32_t stream) const noexcept {
+  for (const StreamPosition& now : intake_.next().streams) {
+    if (now.stream == stream) return now.sample;
+  }
+  return 0;
 }
 
 void ReplaySource::arrived(const log::ChunkRow& chunk, std::span<const StreamPosition> positions) {

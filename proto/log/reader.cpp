@@ -224,6 +224,18 @@ Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }
 
+Result<std::vector<std::string>> Reader::blobs() const {
+  auto select = state_->database.prepare("SELECT sha256 FROM blob ORDER BY sha256");
+  if (!select) return std::unexpected(select.error());
+  std::vector<std::string> hashes;
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return std::unexpected(row.error());
+    if (!*row) return hashes;
+    hashes.emplace_back(select->text(0));
+  }
+}
+
 Result<std::optional<ChunkRow>> Reader::next_chunk() {
   Statement& select = *state_->chunks;
   const auto stepped = state_->step(select, "chunk");

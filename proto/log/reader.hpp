@@ -48,6 +48,8 @@ class Reader {
 
   // The bytes stored under a hash; an error when they are missing or do not match it.
   [[nodiscard]] Result<std::vector<std::byte>> blob(std::string_view sha256) const;
+  // The hashes of all that are stored.
+  [[nodiscard]] Result<std::vector<std::string>> blobs() const;
 
   // The next chunk of all sources in log order; empty after the last. Its bytes and places are
   // valid until the next call.

@@ -68,8 +68,8 @@ TEST_CASE("convert says what a file for another program cannot hold") {
   hand.angles.resize(2);
   REQUIRE(clip::write_hand_csv(hand, path("hand.csv")));
   check({path("walk.bvh"), "--out", path("a.mcap")}, 2, "only a log becomes a .mcap");
-  check({staged_log(), "--stream", "a", "--out", path("a.mcap")}, 2, "holds the whole log");
-  check({staged_log(), "--take", "1", "--out", path("a.mcap")}, 2, "holds the whole log");
+  check({staged_log(), "--stream", "a", "--out", path("a.mcap")}, 2, "as a whole log");
+  check({staged_log(), "--take", "1", "--out", path("a.mcap")}, 2, "as a whole log");
   check({staged_log(), "--stream", "c", "--out", path("a.glb")}, 2, "has no stream 'c'");
   check({path("hand.csv"), "--out", path("a.vrma")}, 1, "lacks bones");
   check({folder.write("no.plog", "no log").string(), "--out", path("a.mcap")}, 1, "no.plog");

@@ -1,5 +1,5 @@
-// `posed convert`: converts a clip to another format, a stream of a device log to a clip, or a
-// whole log to MCAP.
+// `posed convert`: converts a clip to another format, a stream of a device log to a clip, a whole
+// log to MCAP, or a log of an older format to today's.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -11,11 +11,13 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/hand_option.hpp"
+#include "daemon/cli/live/client.hpp"
 #include "daemon/cli/logs/convert_mcap.hpp"
 #include "daemon/cli/logs/list_takes.hpp"
 #include "daemon/cli/models/waiting.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/replay/log_clip.hpp"
+#include "daemon/replay/log_upgrade.hpp"
 #include "models/motion/vrm_animation.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/file_names.hpp"
@@ -64,10 +66,12 @@ Result<> check_options(const Convert& convert) {
                 "is not a device log (.plog), so --stream has no effect"),
         useless(!convert.take.empty(), is_log(convert.in),
                 "is not a device log (.plog), so --take has no effect"),
-        useless(!convert.stream.empty() || !convert.take.empty(), !is_mcap(convert.out),
-                "a .mcap holds the whole log, so --stream and --take have no effect"),
-        useless(is_mcap(convert.out), is_log(convert.in),
-                "is not a device log (.plog), and only a log becomes a .mcap; name a .glb"),
+        useless(!convert.stream.empty() || !convert.take.empty(),
+                !is_mcap(convert.out) && !is_log(convert.out),
+                "is written as a whole log, so --stream and --take have no effect"),
+        useless(is_mcap(convert.out) || is_log(convert.out), is_log(convert.in),
+                "is not a device log (.plog), and only a log becomes a .mcap or a newer .plog; "
+                "name a .glb"),
         useless(!convert.read.asf.empty(), is_amc(convert.in),
                 "is not an AMC, so --skeleton has no effect"),
         useless(convert.rate_given, is_amc(convert.in), "is not an AMC, so --rate has no effect"),
@@ -84,7 +88,7 @@ Result<> check_options(const Convert& convert) {
   return OutputFiles(convert.overwrite)
       .reads(convert.in)
       .reads(convert.read.asf)
-      .writes(convert.out, {".bvh", ".csv", ".glb", ".vrma", ".mcap"})
+      .writes(convert.out, {".bvh", ".csv", ".glb", ".vrma", ".mcap", ".plog"})
       .check();
 }
 
@@ -122,6 +126,28 @@ Result<> write(const Convert& convert, const clip::Clip& clip) {
   return clip::write_hand_csv(*hand, convert.out);
 }
 
+int upgrade(const Convert& convert) {
+  const auto summary = [&] {
+    const Waiting waiting("writing " + convert.out);
+    const Interrupt interrupt;
+    return replay::upgrade_log(convert.in, convert.out, Interrupt::came);
+  }();
+  if (!summary) return report(summary.error());
+  if (convert.json) {
+    const nlohmann::json figures{{"in", convert.in},
+                                 {"out", convert.out},
+                                 {"chunks", summary->chunks},
+                                 {"decisions", summary->decisions},
+                                 {"frames", summary->frames}};
+    std::printf("%s\n", json_text(figures).c_str());
+  } else {
+    std::fprintf(stderr, "posed: wrote %s in today's format: %llu chunks, %llu decisions\n",
+                 convert.out.c_str(), static_cast<unsigned long long>(summary->chunks),
+                 static_cast<unsigned long long>(summary->decisions));
+  }
+  return static_cast<int>(ExitCode::kDone);
+}
+
 int run(Convert& convert) {
   if (convert.takes) {
     if (is_log(convert.in)) return list_takes(convert.in, convert.json);
@@ -132,6 +158,7 @@ int run(Convert& convert) {
   }
   if (auto ok = check_options(convert); !ok) return report(ok.error());
   if (is_mcap(convert.out)) return convert_to_mcap(convert.in, convert.out, convert.json);
+  if (is_log(convert.out)) return upgrade(convert);
   if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
   if (!convert.hand.empty()) {
     convert.read.hand = side_named(convert.hand);
@@ -171,7 +198,8 @@ void add_convert(CLI::App& app, int& exit_code) {
   command->add_option("IN", convert->in, "To read: .bvh, .amc, a hand as .csv, or a log (.plog)")
       ->required();
   auto* out = command->add_option(
-      "--out", convert->out, "To write: .bvh, .csv of a hand, .glb, .vrma; .mcap of a whole log");
+      "--out", convert->out,
+      "To write: .bvh, .csv of a hand, .glb, .vrma; of a whole log .mcap or .plog");
   command->add_option("--skeleton", convert->read.asf,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   auto* rate =
@@ -210,7 +238,9 @@ void add_convert(CLI::App& app, int& exit_code) {
       "centimetres.\n"
       "A .glb is glTF: the figure as an armature, for Blender and game engines. A .vrma moves any\n"
       "VRM avatar and needs a person's bones. Both keep the clip's times. A .mcap has pose/,\n"
-      "skeleton/ and sensor/ of all streams of a log, with the protobuf schema, in UTC.\n\n"
+      "skeleton/ and sensor/ of all streams of a log, with the protobuf schema, in UTC. A .plog "
+      "of\n"
+      "an older posed becomes one of this posed's format, and replays with the same bits.\n\n"
       "Examples:\n"
       "  posed convert 07_01.amc --out walk.bvh\n"
       "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
@@ -219,7 +249,8 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert take1.plog --takes\n"
       "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
       "  posed convert walk.bvh --out walk.vrma\n"
-      "  posed convert take1.plog --out take1.mcap");
+      "  posed convert take1.plog --out take1.mcap\n"
+      "  posed convert old.plog --out new.plog");
   command->callback([convert, rate, shape, &exit_code] {
     convert->rate_given = rate->count() > 0;
     convert->shape_given = shape->count() > 0;
