@@ -45,11 +45,12 @@ Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& 
     return fail("this is not a posed model; make one with `posed train`", name);
   }
   const auto version = get<std::uint32_t>(bytes.subspan(8));
-  if (version != kVersion) {
-    return fail("the model has version " + std::to_string(version) + ", this posed reads version " +
-                    std::to_string(kVersion) + "; train it again",
+  if (version > kVersion) {
+    return fail("the model is of a newer posed (version " + std::to_string(version) +
+                    ", this one reads up to " + std::to_string(kVersion) + "); update posed",
                 name);
   }
+  if (version == 0) return fail("the model has no version; copy it again", name);
   const auto length = get<std::uint64_t>(bytes.subspan(12));
   const auto payload = bytes.subspan(kHeaderBytes);
   if (length != payload.size()) {
@@ -69,7 +70,7 @@ Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& 
 }
 
 std::string wrap(v1::ModelFile file) {
-  file.set_posed_version("0.1.0");
+  file.set_posed_version(POSED_VERSION);
   const std::string payload = file.SerializeAsString();
   std::string out(kMagic);
   put<std::uint32_t>(out, kVersion);
