@@ -1,5 +1,6 @@
 #include "daemon/assembly/output_threads.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "daemon/system/clock.hpp"
@@ -25,8 +26,9 @@ Result<std::unique_ptr<OutputThreads>> OutputThreads::open(
 }
 
 std::vector<publish::FrameOutput*> OutputThreads::outputs() const {
-  std::vector<publish::FrameOutput*> outputs;
-  for (const Running& running : running_) outputs.push_back(running.output.get());
+  std::vector<publish::FrameOutput*> outputs(running_.size());
+  std::ranges::transform(running_, outputs.begin(),
+                         [](const Running& running) { return running.output.get(); });
   return outputs;
 }
 

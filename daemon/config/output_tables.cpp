@@ -108,10 +108,9 @@ void OutputReader::read_streams(TableReader& table, OutputConfig& output) const 
 // Whether the port of an endpoint is one that a program can have.
 bool has_port(std::string_view endpoint) {
   const std::string_view port = endpoint.substr(endpoint.rfind(':') + 1);
-  const char* const end = port.data() + port.size();
   std::uint16_t number = 0;
-  const auto [read_to, error] = std::from_chars(port.data(), end, number);
-  return error == std::errc() && read_to == end && number > 0;
+  const auto [read_to, error] = std::from_chars(port.data(), port.data() + port.size(), number);
+  return error == std::errc() && read_to == port.data() + port.size() && number > 0;
 }
 
 void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {

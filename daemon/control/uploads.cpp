@@ -73,7 +73,7 @@ Result<std::optional<std::string>> Uploads::take(const std::string& client, cons
   bytes_ += piece.bytes.size();
   if (upload.bytes.size() < upload.total) return std::nullopt;
   bytes_ -= upload.bytes.size();
-  const Upload whole = std::move(upload);
+  Upload whole = std::move(upload);
   uploads_.erase(*found);
   if (log::sha256_hex(std::as_bytes(std::span(whole.bytes))) != whole.sha256) {
     return fail("the model arrived damaged: its sha256 is different; send it again");

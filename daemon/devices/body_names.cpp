@@ -1,5 +1,6 @@
 #include "daemon/devices/body_names.hpp"
 
+#include <algorithm>
 #include <string_view>
 
 #include "proto/text/stream_name.hpp"
@@ -20,11 +21,11 @@ bool continues_character(char c) { return (static_cast<unsigned char>(c) & 0xc0)
 }  // namespace
 
 std::string plain_stream_name(const std::string& source, const std::string& body) {
-  std::string name;
-  for (const char c : source + "-" + body) {
-    if (continues_character(c)) continue;  // of UTF-8: one '-' for each character
-    name += plain(c);
-  }
+  std::string name = source;
+  name += "-";
+  name += body;
+  std::erase_if(name, continues_character);  // of UTF-8: one '-' for each character
+  std::ranges::transform(name, name.begin(), plain);
   return name.substr(0, kMaxName);
 }
 

@@ -63,8 +63,8 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
 }
 
 std::vector<const StageModel*> BoundStages::borrowed() const {
-  std::vector<const StageModel*> pointers;
-  for (const auto& model : models) pointers.push_back(model.get());
+  std::vector<const StageModel*> pointers(models.size());
+  std::ranges::transform(models, pointers.begin(), [](const auto& model) { return model.get(); });
   return pointers;
 }
 

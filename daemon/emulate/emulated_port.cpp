@@ -176,6 +176,7 @@ void EmulatedPort::accept() noexcept {
 
 std::optional<EmulatedPort::Heard> EmulatedPort::receive(std::chrono::nanoseconds patience) {
   std::vector<pollfd> wait;
+  wait.reserve(fds_.size() + 1);
   for (const int fd : fds_) wait.push_back({.fd = fd, .events = POLLIN, .revents = 0});
   if (listener_ >= 0) wait.push_back({.fd = listener_, .events = POLLIN, .revents = 0});
   const auto whole_s = std::chrono::duration_cast<std::chrono::seconds>(patience);

@@ -49,7 +49,8 @@ std::string AxisFigure::hierarchy() const {
   // With displacement every joint has a position.
   Skeleton figure = *to_figure_.target();
   figure.channels.clear();
-  for (std::uint16_t joint = 0; joint < figure.joints.size(); ++joint) {
+  const auto joints = static_cast<std::uint16_t>(figure.joints.size());
+  for (std::uint16_t joint = 0; joint < joints; ++joint) {
     for (const Axis along : {Axis::kX, Axis::kY, Axis::kZ}) {
       figure.channels.push_back({.joint = joint, .axis = along, .translation = true});
     }

@@ -32,6 +32,7 @@ std::string last_words(int descriptor) {
 
 Result<> run_program(const std::vector<std::string>& arguments, const std::string& package) {
   std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   int said[2];

@@ -106,7 +106,7 @@ Result<Chosen> choose(const Replay& replay, const std::string& wanted, const std
 // Collects the frames of a stream's parts as they were published, each once.
 class Collector {
  public:
-  explicit Collector(std::shared_ptr<const Skeleton> skeleton) : clip_(std::move(skeleton)) {}
+  explicit Collector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
 
   void take(const Frame& frame) {
     const Header& header = frame.header;

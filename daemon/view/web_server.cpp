@@ -28,25 +28,28 @@ constexpr std::chrono::milliseconds kPause{100};  // after a connection could no
 
 Result<asio::ip::address> address_of(const std::string& text) {
   ErrorCode error;
-  const auto address = asio::ip::make_address(text == "localhost" ? "127.0.0.1" : text, error);
+  auto address = asio::ip::make_address(text == "localhost" ? "127.0.0.1" : text, error);
   if (!error) return address;
   return misuse(in_quotes(text) + " is not an address: --bind takes one such as 127.0.0.1");
 }
 
+std::string host_of(const asio::ip::address& address) {
+  return fmt::format(fmt::runtime(address.is_v6() ? "[{}]" : "{}"), address.to_string());
+}
+
 std::string host_of(const asio::ip::address& address, std::uint16_t port) {
-  return fmt::format(fmt::runtime(address.is_v6() ? "[{}]:{}" : "{}:{}"), address.to_string(),
-                     port);
+  return fmt::format("{}:{}", host_of(address), port);
 }
 
 // The names under which the page may be opened; empty: any.
 std::vector<std::string> hosts_of(const asio::ip::address& address, std::uint16_t port) {
   if (address.is_unspecified()) return {};
-  std::vector<std::string> hosts{host_of(address, port)};
-  if (address.is_loopback()) {
-    for (const char* name : {"localhost", "127.0.0.1"}) {
-      hosts.push_back(fmt::format("{}:{}", name, port));
-      if (port == 80) hosts.emplace_back(name);  // browsers leave HTTP's own port out
-    }
+  std::vector<std::string> names{host_of(address)};
+  if (address.is_loopback()) names.insert(names.end(), {"localhost", "127.0.0.1"});
+  std::vector<std::string> hosts;
+  for (const std::string& name : names) {
+    hosts.push_back(fmt::format("{}:{}", name, port));
+    if (port == 80) hosts.push_back(name);  // browsers leave HTTP's own port out
   }
   return hosts;
 }

@@ -27,6 +27,7 @@ constexpr std::array<Vec3f, kBones> kPlaces_m{
 
 std::vector<BoneEntry> standing() {
   std::vector<BoneEntry> bones;
+  bones.reserve(kBones);
   for (std::uint16_t id = 0; id < kBones; ++id) {
     bones.push_back({.id = id,
                      .parent = usual_parent(id),

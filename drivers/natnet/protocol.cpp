@@ -32,8 +32,9 @@ void write_program(ByteWriter& writer, std::string_view name, Version natnet) {
 
 Result<Version> parse_version(std::string_view text) {
   Version version;
+  const auto [point, bad_major] =
+      std::from_chars(text.data(), text.data() + text.size(), version.major);
   const char* const end = text.data() + text.size();
-  const auto [point, bad_major] = std::from_chars(text.data(), end, version.major);
   if (bad_major == std::errc() && point != end && *point == '.') {
     const auto [stop, bad_minor] = std::from_chars(point + 1, end, version.minor);
     const bool in_range = version >= Version{2, 5} && version.major <= 4;

@@ -105,7 +105,7 @@ Result<std::vector<DescribedBody>> parse_description(std::span<const std::byte> 
     if (std::ranges::find(bodies, body->key, &DescribedBody::key) != bodies.end()) {
       return wrong_description("names a body twice");
     }
-    bodies.push_back(std::move(*body));
+    bodies.push_back(*body);
   }
   if (reader.left() != 0) return wrong_description("goes on after its last body");
   return bodies;

@@ -126,7 +126,8 @@ Motion resample(const Motion& motion, double rate_hz) {
   Motion out{motion.skeleton, rate_hz, {}};
   const auto count = static_cast<int>(std::floor((motion.size() - 1) / exact + 1e-9)) + 1;
   for (int k = 0; k < count; ++k) {
-    Frame frame = motion.frames[std::min(motion.size() - 1, static_cast<int>(k * exact + 0.5))];
+    Frame frame =
+        motion.frames[std::min(motion.size() - 1, static_cast<int>(std::lround(k * exact)))];
     fill_frame(columns, k * exact, frame);
     frame.angle_count = 0;  // channel angles are not resampled, because training does not read them
     out.frames.push_back(frame);

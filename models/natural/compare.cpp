@@ -74,8 +74,8 @@ void place(std::string name, double value, std::vector<double> of_corpus, Bad ba
 
 template <typename Member>
 std::vector<double> all_of(const std::vector<Figures>& corpus, Member member) {
-  std::vector<double> values;
-  for (const Figures& figures : corpus) values.push_back(member(figures));
+  std::vector<double> values(corpus.size());
+  std::ranges::transform(corpus, values.begin(), member);
   return values;
 }
 

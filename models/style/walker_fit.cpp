@@ -39,6 +39,7 @@ Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& mode
     return fail("the model's parts do not fit each other", model_name);
   }
   std::vector<double> squares;
+  squares.reserve(static_cast<std::size_t>(q.rows()));
   for (Eigen::Index t = 0; t < q.rows(); ++t) {
     squares.push_back(
         (model.process.inputs.rowwise() - q.row(t)).rowwise().squaredNorm().minCoeff());

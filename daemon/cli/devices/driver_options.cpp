@@ -40,7 +40,8 @@ Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
     if (spec == driver.options.end() || equals == std::string::npos) {
       std::string known;
       for (const auto& option : driver.options) {
-        known += (known.empty() ? "" : ", ") + std::string(option.name);
+        if (!known.empty()) known += ", ";
+        known += option.name;
       }
       return misuse("'" + word + "' is not an option of " + std::string(driver.name) +
                     "; KEY=VALUE with one of: " + known);

@@ -103,11 +103,12 @@ class CounterLine {
     messages_before_ = counts.messages;
     if (json_) return print_json(counts, rate_hz);
     drawn_ = true;
+    const unsigned long long dropped = counts.foreign + counts.clashes;
     std::fprintf(stderr,
                  "\r\033[K%zu of %zu upstreams, %zu streams, %zu subscribers, %.0f messages/s"
                  ", dropped %llu",
                  counts.upstreams, upstreams_, counts.streams, counts.subscribers, rate_hz,
-                 static_cast<unsigned long long>(counts.foreign + counts.clashes));
+                 dropped);
   }
   void upstreams(std::size_t count) { upstreams_ = count; }
 

@@ -76,6 +76,7 @@ std::optional<std::vector<TaskResult>> ThreadTasks::run(std::size_t count, const
   {
     std::vector<std::jthread> workers;
     const auto threads = std::min<std::size_t>(threads_, count);
+    workers.reserve(threads);
     for (std::size_t t = 0; t < threads; ++t) {
       workers.emplace_back([&work, &task] { run_tasks(work, task); });
     }
