@@ -196,10 +196,6 @@ void print_numbers(const std::string& prefix, const json& figures) {
 
 int finish(const Evaluation& evaluation, const EvalOptions& options) {
   const json figures = report_of(evaluation, options);
-  if (evaluation.clips) {
-    const auto written = write_eval_style_report(figures, *evaluation.clips, options.report.path);
-    if (!written) return report(written.error());
-  }
   if (options.json) {
     std::printf("%s\n", json_text(figures, 2).c_str());
   } else {
@@ -207,6 +203,10 @@ int finish(const Evaluation& evaluation, const EvalOptions& options) {
   }
   std::fflush(stdout);
   std::fprintf(stderr, "posed: %s\n", verdict(evaluation).c_str());
+  if (evaluation.clips) {
+    const auto written = write_eval_style_report(figures, *evaluation.clips, options.report.path);
+    if (!written) return report(written.error());
+  }
   return static_cast<int>(evaluation.helps() ? ExitCode::kDone : ExitCode::kFailed);
 }
 

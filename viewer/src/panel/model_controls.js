@@ -2,6 +2,7 @@
 import { sendModel } from '../link/upload.js';
 import { el, labelled } from './dom.js';
 
+const ASK_AGAIN_MS = 5000; // for a list that was refused or did not come
 const NO_LIST = 'the daemon offers no list: [control] models names a folder';
 
 export class ModelControls {
@@ -20,6 +21,7 @@ export class ModelControls {
 
   // Asks for the daemon's list; again when the page may control what it could not before.
   async list() {
+    this.askedAt_ms = performance.now();
     const reply = await this.requests.ask({ list_models: {} });
     this.refusal = reply.ok ? '' : `no list of models: ${reply.error}`;
     this.names = (reply.ok ? reply.model : [])
@@ -63,6 +65,7 @@ export class ModelControls {
   }
 
   update(stream) {
+    if (this.refusal && performance.now() - this.askedAt_ms > ASK_AGAIN_MS) this.list();
     const model = stream.stage(this.kind)?.model ?? '';
     if (model === this.current) return;
     this.current = model;

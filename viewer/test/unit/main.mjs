@@ -4,4 +4,5 @@ import './link_test.mjs';
 import './mannequin_test.mjs';
 import './motion_test.mjs';
 import './streams_test.mjs';
+import './weight_test.mjs';
 import './wire_test.mjs';
