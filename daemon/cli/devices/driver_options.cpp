@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "drivers/options.hpp"
 
 namespace posed::cli {
@@ -43,8 +45,8 @@ Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
         if (!known.empty()) known += ", ";
         known += option.name;
       }
-      return misuse("'" + word + "' is not an option of " + std::string(driver.name) +
-                    "; KEY=VALUE with one of: " + known);
+      return misuse(fmt::format("'{}' is not an option of {}; KEY=VALUE with one of: {}", word,
+                                driver.name, known));
     }
     drivers::OptionValue value = spec->default_value;
     if (!read_value(word.substr(equals + 1), value)) {
