@@ -5,6 +5,7 @@ set(POSED_MAINTAINER "The posed authors <posed@example.org>" CACHE STRING
 set(debian ${CMAKE_CURRENT_LIST_DIR}/debian)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT ${POSED_MAINTAINER})
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package has its own, the first line of its description
 set(CPACK_COMPONENTS_ALL posed dev python)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
