@@ -23,7 +23,8 @@ set(CPACK_DEBIAN_POSED_PACKAGE_SECTION utils)
 set(CPACK_DEBIAN_POSED_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_POSED_PACKAGE_DEPENDS adduser)
 set(CPACK_DEBIAN_POSED_PACKAGE_SUGGESTS "ffmpeg, librsvg2-bin, python3-posed, xdg-utils")
-set(CPACK_DEBIAN_POSED_PACKAGE_CONTROL_EXTRA ${debian}/posed/postinst ${debian}/posed/postrm)
+set(CPACK_DEBIAN_POSED_PACKAGE_CONTROL_EXTRA ${debian}/posed/postinst ${debian}/posed/prerm
+  ${debian}/posed/postrm)
 set(CPACK_DEBIAN_POSED_DESCRIPTION "pose daemon: live poses in, another style out
 posed receives live poses from data gloves and motion capture systems,
 changes their style, smooths them and publishes them over ZeroMQ. The style
