@@ -44,6 +44,7 @@ void add_view(CLI::App& app, int& exit_code);
 void add_keygen(CLI::App& app, int& exit_code);
 void add_emulate(CLI::App& app, int& exit_code);
 void add_completion(CLI::App& app, int& exit_code);
+void add_man(CLI::App& app, int& exit_code);
 void add_train(CLI::App& app, int& exit_code);
 void add_train_for(CLI::App& app, int& exit_code, const std::shared_ptr<Ranks>& ranks);
 void add_train_gesture(CLI::App& train, int& exit_code, const std::shared_ptr<Ranks>& ranks);
