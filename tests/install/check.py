@@ -76,7 +76,7 @@ def check_page(posed, prefix):
 def check_clients(prefix, folder):
     source = folder / "client.cpp"
     source.write_text("#include <posed/posed_client.hpp>\n#include <cstdio>\n"
-                      'int main() { posed::v1::Frame frame; frame.set_stream_name("walker");\n'
+                      'int main() { posed::v1::Frame frame; frame.set_stream("walker");\n'
                       "std::puts(frame.GetTypeName().c_str()); }\n")
     found = next(prefix.glob("lib/**/posed.pc")).parent
     flags = output("pkg-config", "--cflags", "--libs", "posed",
