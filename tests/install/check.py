@@ -76,7 +76,7 @@ def check_page(posed, prefix):
 def check_clients(prefix, folder):
     source = folder / "client.cpp"
     source.write_text("#include <posed/posed_client.hpp>\n#include <cstdio>\n"
-                      'int main() { posed::v1::Frame frame; frame.set_stream("walker");\n'
+                      'int main() { posed_client::Keys keys; posed::v1::Frame frame; frame.set_sequence(1);\n'
                       "std::puts(frame.GetTypeName().c_str()); }\n")
     found = next(prefix.glob("lib/**/posed.pc")).parent
     flags = output("pkg-config", "--cflags", "--libs", "posed",
@@ -84,7 +84,8 @@ def check_clients(prefix, folder):
     output("c++", "-std=c++17", "-O0", str(source), *flags, "-o", str(folder / "client"))
     assert output(folder / "client").strip() == "posed.v1.Frame"
     python = next(prefix.glob("lib/python3*/**/posed/__init__.py")).parent.parent
-    output(sys.executable, "-c", "import posed; from posed.v1 import posed_pb2; posed.Client; posed_pb2.Frame()",
+    # Debian's own, for which `run` installs the packages of zmq and protobuf.
+    output("/usr/bin/python3", "-c", "import posed; from posed.v1 import posed_pb2; posed.Client; posed_pb2.Frame()",
            env={**os.environ, "PYTHONPATH": str(python), "PYTHONDONTWRITEBYTECODE": "1"})
 
 
