@@ -110,10 +110,11 @@ Result<> BodyStreams::start(StreamUsers users, std::set<std::string> reserved) {
 }
 
 void BodyStreams::run() {
-  system::name_thread("posed-bodies");
+  system::name_thread(kThreadName);
   while (true) {
     wake_->going_to_sleep();  // before the turn, so that what comes during it ends the wait
     if (builder_->stopped()) break;
+    pulse_.beat();
     const std::int64_t due_ns = builder_->turn(system::monotonic_ns());
     static_cast<void>(poller_->wait(system::time_left_ns(due_ns, system::monotonic_ns)));
     wake_->awake();

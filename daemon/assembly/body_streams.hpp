@@ -36,6 +36,8 @@ struct StreamUsers {
 
 class BodyStreams final : public devices::StreamHost {
  public:
+  static constexpr const char* kThreadName = "posed-bodies";
+
   // Opens the sources. Null if the config has none. `first` is the number of the first source and
   // the slot of the first stream, behind those of the one-body devices.
   [[nodiscard]] static Result<std::unique_ptr<BodyStreams>> open(const config::DaemonConfig& config,
@@ -60,6 +62,8 @@ class BodyStreams final : public devices::StreamHost {
   void stop_supervisors() noexcept;
   // After the reader has ended: ends the threads.
   void stop() noexcept;
+  // Of the builder's thread.
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
 
  private:
   BodyStreams() = default;
@@ -95,6 +99,7 @@ class BodyStreams final : public devices::StreamHost {
   std::mutex mutex_;                                                            // guards source_of_
   std::map<std::uint32_t, const devices::BodySource*> source_of_;               // by stream
   std::vector<std::unique_ptr<devices::DeviceSupervisor>> supervisors_;
+  system::Pulse pulse_;
   std::thread thread_;
 };
 

@@ -27,6 +27,9 @@
 namespace posed::assembly {
 namespace {
 
+constexpr const char* kReaderName = "posed-reader";
+constexpr const char* kPipelineName = "posed-pipeline";
+constexpr const char* kPublisherName = "posed-publish";
 constexpr double kUnknownRate_hz = 1000.0;  // assumed for the rings if a device states no rate
 
 double rate_of(const devices::OpenStream& stream) {
@@ -326,11 +329,11 @@ Result<> Daemon::Parts::start_threads() {
   });
   const bool fifo = config.realtime && system::ask_for_realtime();
   publisher_thread = std::thread([this, fifo] {
-    system::enter_hot_thread("posed-publish", fifo ? system::kPublisherPriority : 0);
+    system::enter_hot_thread(kPublisherName, fifo ? system::kPublisherPriority : 0);
     publisher->run();
   });
   worker_thread = std::thread([this, fifo] {
-    system::enter_hot_thread("posed-pipeline", fifo ? system::kPipelinePriority : 0);
+    system::enter_hot_thread(kPipelineName, fifo ? system::kPipelinePriority : 0);
     if (hooks.hot_thread) hooks.hot_thread("pipeline");
     worker->run();
   });
@@ -345,7 +348,7 @@ Result<> Daemon::Parts::start_threads() {
     if (auto started = bodies->start(users(), stream_names()); !started) return started;
   }
   reader_thread = std::thread([this, fifo] {
-    system::enter_hot_thread("posed-reader", fifo ? system::kReaderPriority : 0);
+    system::enter_hot_thread(kReaderName, fifo ? system::kReaderPriority : 0);
     if (hooks.hot_thread) hooks.hot_thread("reader");
     reader->run();
   });
@@ -437,6 +440,23 @@ bool Daemon::wants_keys() const noexcept { return !parts_->secret_z85.empty(); }
 void Daemon::allow(const std::vector<net::AllowedClient>& clients) {
   const auto change = parts_->authenticator->replace(net::AccessList(clients));
   if (change.publisher_must_check) parts_->publisher->check_subscribers();
+}
+
+std::vector<system::ThreadPulse> Daemon::pulses() const {
+  std::vector<system::ThreadPulse> all = parts_->outputs->pulses();
+  all.push_back({.thread = kReaderName, .pulse = &parts_->reader->pulse()});
+  all.push_back({.thread = kPipelineName, .pulse = &parts_->worker->pulse()});
+  all.push_back({.thread = kPublisherName, .pulse = &parts_->publisher->pulse()});
+  all.push_back(
+      {.thread = control::ControlServer::kThreadName, .pulse = &parts_->control->pulse()});
+  if (parts_->trigger) {
+    all.push_back(
+        {.thread = control::TriggerServer::kThreadName, .pulse = &parts_->trigger->pulse()});
+  }
+  if (parts_->bodies) {
+    all.push_back({.thread = BodyStreams::kThreadName, .pulse = &parts_->bodies->pulse()});
+  }
+  return all;
 }
 
 void Daemon::post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text) {

@@ -13,6 +13,7 @@
 #include "daemon/devices/open_stream.hpp"
 #include "daemon/devices/source_builder.hpp"
 #include "daemon/pipeline/record_sink.hpp"
+#include "daemon/system/pulse.hpp"
 #include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
@@ -64,6 +65,8 @@ class Daemon {
   // no effect without CURVE.
   void allow(const std::vector<net::AllowedClient>& clients);
   void post_event(std::uint32_t stream, v1::Event::Kind kind, const std::string& text);
+  // Of the threads that must not get stuck; valid until the destructor.
+  [[nodiscard]] std::vector<system::ThreadPulse> pulses() const;
 
  private:
   class Parts;

@@ -7,6 +7,11 @@
 #include "daemon/system/realtime.hpp"
 
 namespace posed::assembly {
+namespace {
+
+std::string thread_name(const output::Output& output) { return "out-" + output.name(); }
+
+}  // namespace
 
 Result<std::unique_ptr<OutputThreads>> OutputThreads::open(
     const std::vector<config::OutputConfig>& configs) {
@@ -19,8 +24,10 @@ Result<std::unique_ptr<OutputThreads>> OutputThreads::open(
     if (auto added = (*poller)->add((*output)->wake()); !added) {
       return std::unexpected(added.error());
     }
-    threads->running_.push_back(
-        {.output = std::move(*output), .poller = std::move(*poller), .thread = {}});
+    threads->running_.push_back({.output = std::move(*output),
+                                 .poller = std::move(*poller),
+                                 .pulse = std::make_unique<system::Pulse>(),
+                                 .thread = {}});
   }
   return threads;
 }
@@ -41,8 +48,9 @@ void OutputThreads::start(const output::Tell& tell) {
 
 void OutputThreads::run(Running& running) {
   output::Output& output = *running.output;
-  system::name_thread("out-" + output.name());
+  system::name_thread(thread_name(output));
   while (true) {
+    running.pulse->beat();
     output.wake().going_to_sleep();  // before the turn, so that what comes during it ends the wait
     const bool last = stop_.load(std::memory_order_acquire);
     const std::int64_t due_ns = output.turn(system::monotonic_ns());
@@ -50,6 +58,14 @@ void OutputThreads::run(Running& running) {
     static_cast<void>(running.poller->wait(system::time_left_ns(due_ns, system::monotonic_ns)));
     output.wake().awake();
   }
+}
+
+std::vector<system::ThreadPulse> OutputThreads::pulses() const {
+  std::vector<system::ThreadPulse> all;
+  for (const Running& running : running_) {
+    all.push_back({.thread = thread_name(*running.output), .pulse = running.pulse.get()});
+  }
+  return all;
 }
 
 void OutputThreads::stop() noexcept {

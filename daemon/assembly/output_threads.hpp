@@ -30,11 +30,14 @@ class OutputThreads {
   void start(const output::Tell& tell);
   // What was handed over before is still sent. May be called again.
   void stop() noexcept;
+  // Of all threads; valid until the destructor.
+  [[nodiscard]] std::vector<system::ThreadPulse> pulses() const;
 
  private:
   struct Running {
     std::unique_ptr<output::Output> output;
     std::unique_ptr<system::Poller> poller;
+    std::unique_ptr<system::Pulse> pulse;
     std::thread thread;
   };
   OutputThreads() = default;

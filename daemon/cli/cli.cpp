@@ -20,10 +20,10 @@ using AddCommand = void (*)(CLI::App& app, int& exit_code);
 
 // The order in which `posed --help` lists them.
 constexpr auto kCommands = std::to_array<AddCommand>({
-    add_demo,   add_run,     add_check,  add_devices,    add_calibrate, add_record,
-    add_replay, add_train,   add_apply,  add_smooth,     add_synth,     add_convert,
-    add_render, add_eval,    add_ctl,    add_monitor,    add_top,       add_view,
-    add_relay,  add_emulate, add_keygen, add_completion, add_man,       add_bench,
+    add_demo,   add_run,        add_check,   add_doctor, add_devices, add_calibrate, add_record,
+    add_replay, add_train,      add_apply,   add_smooth, add_synth,   add_convert,   add_render,
+    add_eval,   add_ctl,        add_monitor, add_top,    add_view,    add_relay,     add_emulate,
+    add_keygen, add_completion, add_man,     add_bench,
 });
 
 constexpr const char* kMpiFooter = R"(Examples:

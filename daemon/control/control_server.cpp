@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "daemon/system/clock.hpp"
+#include "daemon/system/realtime.hpp"
 #include "posed/v1/control.pb.h"
 
 namespace posed::control {
@@ -30,8 +31,8 @@ Result<> set_limits(void* router) {
   return net::set_receive_limits(router, kMaxPart, kRequestsWaiting, kReceiveBuffer_bytes);
 }
 
-long milliseconds_until(std::int64_t due_ns, std::int64_t now_ns) {
-  return static_cast<long>(std::max<std::int64_t>(due_ns - now_ns, 0) / 1'000'000 + 1);
+long milliseconds_until(std::int64_t due_ns) {
+  return static_cast<long>(system::time_left_ns(due_ns, system::monotonic_ns) / 1'000'000 + 1);
 }
 
 }  // namespace
@@ -79,13 +80,14 @@ ControlServer::~ControlServer() {
 }
 
 void ControlServer::serve() {
+  system::name_thread(kThreadName);
   while (!stop_.load(std::memory_order_acquire)) {
+    pulse_.beat();
     bool busy = false;
     for (int i = 0; i < kRequestsARound && take_request(); ++i) busy = true;
     while (take_ack()) busy = true;
-    const std::int64_t now_ns = system::monotonic_ns();
-    const std::int64_t due_ns = handler_.forget_old(now_ns);
-    if (!busy) sleep(due_ns == system::kForever_ns ? -1 : milliseconds_until(due_ns, now_ns));
+    const std::int64_t due_ns = handler_.forget_old(system::monotonic_ns());
+    if (!busy) sleep(milliseconds_until(due_ns));
   }
 }
 

@@ -37,6 +37,9 @@ class ControlServer {
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;
 
+  static constexpr const char* kThreadName = "posed-control";
+  // Any thread.
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
   // the endpoint that is really bound
   [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
 
@@ -44,7 +47,7 @@ class ControlServer {
   ControlServer(net::Socket router, std::unique_ptr<net::PeerGuard> guard, std::string endpoint,
                 const ControlPorts& ports, RequestHandler& handler);
   void serve();
-  void sleep(long longest_ms);  // negative: until something comes
+  void sleep(long longest_ms);
   [[nodiscard]] bool take_request();
   [[nodiscard]] bool take_ack();
   void send(const Reply& reply);
@@ -54,6 +57,7 @@ class ControlServer {
   std::string endpoint_;
   ControlPorts ports_;
   RequestHandler& handler_;
+  system::Pulse pulse_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -10,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/system/clock.hpp"
+#include "daemon/system/realtime.hpp"
 
 namespace posed::control {
 namespace {
@@ -61,7 +62,10 @@ TriggerServer::~TriggerServer() {
 // Between two rounds it pauses, so that a flood costs little of a core; the kernel drops the rest.
 void TriggerServer::serve() {
   constexpr int kPause_ms = 10;
+  constexpr int kLongest_ms = system::kLongestSleep_ns / 1'000'000;
+  system::name_thread(kThreadName);
   while (!stop_.load(std::memory_order_acquire)) {
+    pulse_.beat();
     int taken = 0;
     while (taken < kDatagramsARound && take_datagram()) ++taken;
     wake_->going_to_sleep();
@@ -69,7 +73,7 @@ void TriggerServer::serve() {
       std::array<pollfd, 2> wait{{{.fd = wake_->fd(), .events = POLLIN, .revents = 0},
                                   {.fd = fd_, .events = POLLIN, .revents = 0}}};
       const bool flooded = taken == kDatagramsARound;
-      ::poll(wait.data(), flooded ? 1 : 2, flooded ? kPause_ms : -1);
+      ::poll(wait.data(), flooded ? 1 : 2, flooded ? kPause_ms : kLongest_ms);
     }
     wake_->awake();
   }

@@ -26,6 +26,10 @@ class TriggerServer {
   TriggerServer(const TriggerServer&) = delete;
   TriggerServer& operator=(const TriggerServer&) = delete;
 
+  static constexpr const char* kThreadName = "posed-trigger";
+  // Any thread.
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
+
  private:
   TriggerServer(int fd, std::unique_ptr<system::EventFd> wake, std::vector<drivers::Host> peers,
                 DaemonControl& daemon_control);
@@ -39,6 +43,7 @@ class TriggerServer {
   std::vector<drivers::Host> peers_;
   Trigger trigger_;
   std::uint64_t strangers_ = 0;  // datagrams of others
+  system::Pulse pulse_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -145,7 +145,9 @@ void DeviceSupervisor::look_for_device() {
   source_.slot->give_back.store(false);  // that request was for the previous device
   static_cast<void>(source_.slot->in.push(device_.get()));
   ports_.reader->call();
-  ports_.report(v1::Event::KIND_FOUND, "connected: " + device_->description.identity);
+  const std::string note = source_.ports->take_note();
+  ports_.report(v1::Event::KIND_FOUND,
+                "connected: " + device_->description.identity + (note.empty() ? "" : "; " + note));
 }
 
 // Refuses a device that differs from what the stream was set up for: its data would silently be

@@ -87,13 +87,15 @@ std::optional<LineLimiter::Line> LineLimiter::take_due(std::int64_t now_ns, bool
   };
   for (auto& [key, cause] : causes_) {
     if (!due(cause)) continue;
-    Line line{cause.last.level, with_count(cause.last, std::exchange(cause.held, 0))};
+    const std::uint64_t held = std::exchange(cause.held, 0);
+    Line line{cause.last.level, with_count(cause.last, held), cause_of(cause.last.text), held};
     cause.written_ns = now_ns;
     return line;
   }
   if (!due(others_)) return std::nullopt;
   Line line{others_.last.level,
-            std::to_string(others_.held) + " more lines of many kinds are left out"};
+            std::to_string(others_.held) + " more lines of many kinds are left out",
+            "lines of many kinds", others_.held};
   others_ = {.written_ns = now_ns, .held = 0, .last = {}};
   return line;
 }

@@ -23,6 +23,8 @@ class LineLimiter {
   struct Line {
     int level = 0;
     std::string text;
+    std::string cause{};      // of take_due(): of the lines that it stands for
+    std::uint64_t count = 1;  // of take_due(): how many
   };
 
   // Whether to write the line now. A line that is held back is counted, and take_due() returns it.

@@ -13,11 +13,13 @@
 #include <deque>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/sink.h>
 #include <spdlog/spdlog.h>
 
+#include "daemon/logging/journal.hpp"
 #include "daemon/logging/line_limiter.hpp"
 #include "proto/text/clean.hpp"
 
@@ -57,7 +59,10 @@ std::string_view colour_of(spdlog::level::level_enum level) {
 // left running.
 class LogOutput::Queue final : public spdlog::sinks::sink {
  public:
-  explicit Queue(int descriptor) : descriptor_(descriptor), coloured_(::isatty(descriptor) == 1) {}
+  explicit Queue(int descriptor)
+      : descriptor_(descriptor),
+        coloured_(::isatty(descriptor) == 1),
+        journal_(is_journal(descriptor)) {}
 
   void log(const spdlog::details::log_msg& message) override {
     // The text may contain names chosen by files, devices and clients; clean() removes control
@@ -66,7 +71,9 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
     spdlog::details::log_msg shown = message;
     shown.payload = text;
     const std::scoped_lock lock(mutex_);
-    if (!limits_ || limiter_.admit(now_ns(), message.level, text)) push(format(shown));
+    if (!limits_ || limiter_.admit(now_ns(), message.level, text)) {
+      push({.line = format(shown), .fields = fields_of({message.level, text})});
+    }
     changed_.notify_all();  // a line waits, or one that was held back will be due
   }
   void flush() override {}
@@ -78,7 +85,8 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
 
   void say(std::string_view line) {
     const std::scoped_lock lock(mutex_);
-    push(std::string(line) + '\n');
+    push({.line = std::string(line) + '\n',
+          .fields = fields_of({spdlog::level::info, std::string(line)})});
     changed_.notify_all();
   }
 
@@ -120,8 +128,13 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
   }
 
  private:
+  struct Waiting {
+    std::string line;
+    std::vector<std::string> fields;  // where the journal gets it instead of the line
+  };
+
   // All functions below: call with the lock held.
-  void push(std::string line) {
+  void push(Waiting line) {
     if (lines_.size() >= kMaxWaiting) {
       lines_.pop_front();
       ++lost_;
@@ -131,7 +144,8 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
 
   void sum_up() {
     while (const auto line = limiter_.take_due(now_ns(), ending_)) {
-      push(format_text(static_cast<spdlog::level::level_enum>(line->level), line->text));
+      push({.line = format_text(static_cast<spdlog::level::level_enum>(line->level), line->text),
+            .fields = fields_of(*line)});
     }
   }
 
@@ -143,12 +157,21 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
           spdlog::level::warn,
           std::to_string(lost) + " lines of the log were discarded here: nobody read it");
     }
-    text += lines_.front();
+    const Waiting next = std::move(lines_.front());
+    text += next.line;
     lines_.pop_front();
     lock.unlock();
-    const bool written = write_within(descriptor_, text, kForEver);
+    // What the journal does not take as fields it gets as a line.
+    const bool written = (journal_ && lost == 0 && send_to_journal(next.fields)) ||
+                         write_within(descriptor_, text, kForEver);
     lock.lock();
     if (!written) lost_ += lost + 1;
+  }
+
+  [[nodiscard]] std::vector<std::string> fields_of(const LineLimiter::Line& line) const {
+    if (!journal_) return {};
+    const std::string cause = line.cause.empty() ? cause_of(line.text) : line.cause;
+    return journal_fields(line.level, line.text, cause, line.count);
   }
 
   std::string format_text(spdlog::level::level_enum level, const std::string& text) {
@@ -168,12 +191,13 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
 
   const int descriptor_;
   const bool coloured_;
+  const bool journal_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::unique_ptr<spdlog::formatter> formatter_ = std::make_unique<spdlog::pattern_formatter>();
   LineLimiter limiter_;
   bool limits_ = false;
-  std::deque<std::string> lines_;
+  std::deque<Waiting> lines_;
   std::uint64_t lost_ = 0;  // lines that were discarded and not reported yet
   bool ending_ = false, ended_ = false;
 };

@@ -49,6 +49,7 @@ void Reader::run() noexcept {
   const system::HotSection hot;
   begin();
   while (!stop_.load(std::memory_order_acquire)) {
+    pulse_.beat();
     const std::int64_t due_ns = turn(ports_.clock());
     wake_->going_to_sleep();
     if (stop_.load(std::memory_order_acquire)) break;

@@ -97,6 +97,8 @@ class Reader {
   // thread.
   void run() noexcept;
   void stop() noexcept;  // any thread
+  // Of the thread in run(). Any thread.
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
   // Wakes the reader because a slot or the command ring has something. Any thread.
   void call() noexcept;
 
@@ -118,6 +120,7 @@ class Reader {
   std::uint64_t next_item_ = 1;  // the next Item::number
   bool requests_wait_ = false;   // for space in `out`
   std::atomic<bool> called_{false};
+  system::Pulse pulse_;
   std::atomic<bool> stop_{false};
 };
 

@@ -92,6 +92,7 @@ void Worker::finish() noexcept {
 void Worker::run() noexcept {
   const system::HotSection hot;
   while (!stop_.load(std::memory_order_acquire)) {
+    pulse_.beat();
     const std::int64_t due_ns = turn(ports_.clock());
     ports_.wake->going_to_sleep();
     if (idle()) static_cast<void>(poller_->wait(system::time_left_ns(due_ns, ports_.clock)));

@@ -74,6 +74,8 @@ class Worker {
   // thread.
   void run() noexcept;
   void stop() noexcept;  // any thread
+  // Of the thread in run(). Any thread.
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
 
   // Call after run() has returned.
   [[nodiscard]] const StreamEngine& engine(std::uint32_t stream) const;
@@ -104,6 +106,7 @@ class Worker {
   // Acks for which the ring was full; never more than there are commands under way.
   std::array<Ack, kMaxUnderWay> unsent_{};
   std::size_t unsent_count_ = 0;
+  system::Pulse pulse_;
   std::atomic<bool> stop_{false};
 };
 

@@ -110,10 +110,11 @@ void Publisher::finish(std::int64_t now_ns) {
 void Publisher::run() {
   begin_serving();
   while (!stop_.load(std::memory_order_acquire)) {
+    pulse_.beat();
     const std::int64_t due_ns = turn(options_.clock());
     wake_.going_to_sleep();
     if (in_.empty() && !asked() && !stop_.load(std::memory_order_acquire)) {
-      static_cast<void>(poller_->wait(std::max<std::int64_t>(due_ns - options_.clock(), 0)));
+      static_cast<void>(poller_->wait(system::time_left_ns(due_ns, options_.clock)));
     }
     wake_.awake();
   }

@@ -119,6 +119,8 @@ class Publisher {
 
   // All below: for any other thread; cold.
   void stop() noexcept;
+  // Of the thread in run().
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
   // A stream comes. It is there at the publisher's next turn; but if its slot still has an earlier
   // generation, at its own first item, or when the earlier one is removed.
   void add(StreamInfo stream);
@@ -186,6 +188,7 @@ class Publisher {
   std::int64_t reported_ns_ = kNoTime_ns;
   std::int64_t reported_cpu_ns_ = 0;
   std::string scratch_;
+  system::Pulse pulse_;
   std::atomic<bool> stop_{false};
 };
 

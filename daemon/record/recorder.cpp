@@ -11,6 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/record/ring_sizes.hpp"
+#include "daemon/system/realtime.hpp"
 #include "models/gp/isa.hpp"
 
 namespace posed::record {
@@ -82,8 +83,10 @@ Recorder::Recorder(RecorderOptions options, const RecordedSetup& setup, const Ri
 Recorder::~Recorder() = default;
 
 void Recorder::run(const std::stop_token& stop) {
+  system::name_thread(kThreadName);
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
+    pulse_.beat();
     log_writer_.turn(options_.clock());
     wake_.wait_for(lock, stop, kWakeEvery, [] { return false; });
   }

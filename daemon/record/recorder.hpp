@@ -17,6 +17,7 @@
 #include "daemon/record/log_writer_loop.hpp"
 #include "daemon/record/record_rings.hpp"
 #include "daemon/record/recorded_stream.hpp"
+#include "daemon/system/pulse.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/log/writer.hpp"
@@ -40,6 +41,8 @@ struct RecorderOptions {
 
 class Recorder {
  public:
+  static constexpr const char* kThreadName = "posed-record";
+
   // Creates the log and starts the thread.
   [[nodiscard]] static Result<std::unique_ptr<Recorder>> open(RecorderOptions options,
                                                               const RecordedSetup& setup);
@@ -58,6 +61,7 @@ class Recorder {
   [[nodiscard]] Result<> finish();
 
   // Any thread.
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
   [[nodiscard]] std::optional<pipeline::Take> running_take() const { return rings_.running_take(); }
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return log_writer_.lost_chunks(); }
   [[nodiscard]] std::uint64_t lost_frames() const noexcept { return log_writer_.lost_frames(); }
@@ -74,6 +78,7 @@ class Recorder {
   LogWriterLoop log_writer_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
+  system::Pulse pulse_;
   std::jthread thread_;  // last, because it uses all the others
 };
 

@@ -10,6 +10,7 @@
 #include <memory>
 #include <span>
 
+#include "daemon/system/pulse.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
 
@@ -50,9 +51,10 @@ class EventFd {
 
 inline constexpr std::int64_t kForever_ns = std::numeric_limits<std::int64_t>::max();
 
-// How long a thread may sleep when its next turn is due at `due_ns`; never negative. RT-safe.
+// How long a thread may sleep when its next turn is due at `due_ns`: never negative, and never so
+// long that it seems to be stuck. RT-safe.
 [[nodiscard]] inline std::int64_t time_left_ns(std::int64_t due_ns, Clock clock) noexcept {
-  return due_ns == kForever_ns ? kForever_ns : std::max<std::int64_t>(due_ns - clock(), 0);
+  return std::clamp<std::int64_t>(due_ns - clock(), 0, kLongestSleep_ns);
 }
 
 class Poller {

@@ -12,6 +12,7 @@
 #include <cstdlib>
 
 #include "drivers/transport/enumerate.hpp"
+#include "drivers/transport/latency_timer.hpp"
 #include "drivers/transport/node.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
@@ -54,15 +55,6 @@ Result<> set_raw(int fd, const std::string& port, int baud) {
   return {};
 }
 
-// USB adapters batch bytes to save interrupts, an FTDI chip for 16 ms; this requests immediate
-// delivery. Ports that do not offer it return an error, which is ignored.
-void ask_for_low_latency(int fd) {
-  serial_struct port{};
-  if (::ioctl(fd, TIOCGSERIAL, &port) != 0) return;
-  port.flags |= ASYNC_LOW_LATENCY;
-  ::ioctl(fd, TIOCSSERIAL, &port);
-}
-
 Result<DeviceInfo> find_port(const SerialSettings& settings) {
   const auto ports = list_serial_ports();
   if (!settings.port.empty()) return find_node(ports, settings.port);
@@ -93,7 +85,7 @@ Result<Connection> TransportFactory::serial(const SerialSettings& settings) {
   }
   const int lines = TIOCM_DTR | TIOCM_RTS;
   ::ioctl(*fd, TIOCMBIS, &lines);  // a port without modem lines returns an error, which is ignored
-  ask_for_low_latency(*fd);
+  if (auto note = ask_for_low_latency(*fd, port->node); !note.empty()) note_ = std::move(note);
   // Discards old bytes, which were meant for another program or came at another rate.
   ::ioctl(*fd, TCFLSH, TCIOFLUSH);
   return link;

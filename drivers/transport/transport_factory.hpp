@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "drivers/transport/connection.hpp"
@@ -89,6 +90,10 @@ class TransportFactory {
   // keeps a glove that connects at once. Cold.
   void only_prepare(bool on) noexcept { only_prepare_ = on; }
 
+  // What people should know about the serial port that was opened last: a sentence for the log, or
+  // nothing. Given once. Cold.
+  [[nodiscard]] std::string take_note() { return std::exchange(note_, {}); }
+
   // Number of connections dropped so far because their address is not in the list of peers.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
@@ -97,6 +102,7 @@ class TransportFactory {
   [[nodiscard]] static std::unexpected<Error> not_opened() { return fail("not opened yet"); }
 
   bool only_prepare_ = false;
+  std::string note_{};
   std::uint64_t refused_ = 0;
   std::map<std::string, int> listeners_;  // by endpoint
 };

@@ -19,8 +19,6 @@ constexpr std::size_t kMaxDatagram = 65'507;  // bytes; the most that IPv4 carri
 // Room for the kernel's time stamp and its count of drops.
 constexpr std::size_t kControlBytes =
     CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t));
-// Bytes, about a tenth of a second of a large system; the kernel grants at most net.core.rmem_max.
-constexpr int kReceiveBuffer = 1024 * 1024;
 // A datagram counts as at most this old: an older stamp means that the wall clock was set.
 constexpr int kMaxOldBatches = 1000;  // more than a socket's buffer holds
 constexpr std::int64_t kMaxAge_ns = 50'000'000;
@@ -156,7 +154,7 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
   if (socket.fd >= 0) {
     ::setsockopt(socket.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
     ::setsockopt(socket.fd, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
-    ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof kReceiveBuffer);
+    ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kUdpBuffer_bytes, sizeof kUdpBuffer_bytes);
     // Several programs may receive a group; a single address belongs to one.
     if (wanted->group) ::setsockopt(socket.fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   }

@@ -21,6 +21,10 @@
 
 namespace posed::drivers {
 
+// What each socket asks the kernel to hold, about a tenth of a second of a large system; the kernel
+// gives at most net.core.rmem_max.
+inline constexpr int kUdpBuffer_bytes = 1024 * 1024;
+
 struct UdpSocketSettings {
   std::string listen{};  // "0.0.0.0:1511"; numbers only, IPv4 or IPv6
   std::string group{};   // multicast group to join, "239.255.42.99"; empty: none

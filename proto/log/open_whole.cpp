@@ -67,4 +67,10 @@ Result<OpenedLog> open_whole(const std::filesystem::path& path) {
   return OpenedLog{std::move(*database), *format};
 }
 
+Result<int> format_of(const std::filesystem::path& path) {
+  auto database = Database::open(path, Database::Mode::kRead);
+  if (!database) return std::unexpected(database.error());
+  return check_marks(*database, path.string());
+}
+
 }  // namespace posed::log

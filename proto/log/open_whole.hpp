@@ -15,4 +15,8 @@ struct OpenedLog {
 };
 [[nodiscard]] Result<OpenedLog> open_whole(const std::filesystem::path& path);
 
+// The format of a log, without reading the rest of it or changing anything. An error for what
+// open_whole() refuses by its first bytes.
+[[nodiscard]] Result<int> format_of(const std::filesystem::path& path);
+
 }  // namespace posed::log

@@ -4,8 +4,11 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
 #include <string>
+#include <utility>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -13,6 +16,8 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/logging/log_output.hpp"
+#include "daemon/service/service.hpp"
+#include "daemon/system/clock.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
@@ -39,6 +44,25 @@ bool read_clients_again(assembly::Daemon& daemon, const std::string& path) {
   daemon.allow(config->security.clients);
   spdlog::info("{} clients may connect now", config->security.clients.size());
   return true;
+}
+
+// Returns whether SIGHUP has been obeyed, so that the daemon goes on.
+bool reload(assembly::Daemon& daemon, const std::string& path, service::Service& service) {
+  service.reloading();
+  const bool read = read_clients_again(daemon, path);
+  if (!read && !service.present()) return false;
+  if (!read) spdlog::info("nothing is read again: without keys the config has no list of clients");
+  service.ready();
+  return true;
+}
+
+// For `systemctl status`. It asks no thread, because that one may be stuck.
+std::string status_of(const assembly::Daemon& daemon) {
+  const auto live = std::ranges::count_if(daemon.streams(), [](const auto& stream) {
+    return stream->counters.pipeline.state.load() == pipeline::StreamState::kLive;
+  });
+  return fmt::format("{} of {} streams live, {} sources of several bodies; poses at {}", live,
+                     daemon.streams().size(), daemon.sources().size(), daemon.publish_endpoint());
 }
 
 }  // namespace
@@ -96,14 +120,20 @@ void print_ready(const assembly::Daemon& daemon) {
   }
 }
 
-void serve(assembly::Daemon& daemon, const ServeOptions& options) {
+void serve(assembly::Daemon& daemon, const ServeOptions& options,
+           std::vector<system::ThreadPulse> more) {
   using Steady = std::chrono::steady_clock;
   const auto start = Steady::now();
   const sigset_t set = end_signals();
   const timespec look_every{.tv_sec = 0, .tv_nsec = 50'000'000};
+  std::ranges::move(daemon.pulses(), std::back_inserter(more));
+  service::Service service(std::move(more));
+  service.ready();
   while (true) {
+    if (service.present()) service.status(status_of(daemon));
+    service.turn(system::monotonic_ns());
     if (const int signal = sigtimedwait(&set, nullptr, &look_every); signal > 0) {
-      if (signal == SIGHUP && read_clients_again(daemon, options.config)) continue;
+      if (signal == SIGHUP && reload(daemon, options.config, service)) continue;
       spdlog::info("{}: ending", signal == SIGINT ? "interrupted" : "terminated");
       break;
     }
@@ -115,6 +145,7 @@ void serve(assembly::Daemon& daemon, const ServeOptions& options) {
     const std::chrono::duration<double> served = Steady::now() - start;
     if (options.seconds && served.count() >= *options.seconds) break;
   }
+  service.stopping();
   daemon.stop();
 }
 

@@ -4,8 +4,10 @@
 #include <csignal>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/assembly/daemon.hpp"
+#include "daemon/system/pulse.hpp"
 
 namespace CLI {
 class App;
@@ -40,7 +42,9 @@ void add_serve_options(CLI::App& command, ServeOptions& options);
 
 // Waits for SIGINT, SIGTERM, a control message or the end that the options set, then stops the
 // daemon. SIGHUP reads the client list again if keys are used; otherwise it means a closed terminal
-// and stops the daemon.
-void serve(assembly::Daemon& daemon, const ServeOptions& options);
+// and stops the daemon, unless systemd started it. Tells systemd that the daemon is ready, and that
+// its threads and `more` make progress.
+void serve(assembly::Daemon& daemon, const ServeOptions& options,
+           std::vector<system::ThreadPulse> more = {});
 
 }  // namespace posed::cli

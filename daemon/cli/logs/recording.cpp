@@ -195,7 +195,8 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   *started = true;
   print_ready(daemon);
   const std::int64_t start_ns = system::monotonic_ns();
-  serve(daemon, plan.serve);
+  serve(daemon, plan.serve,
+        {{.thread = record::Recorder::kThreadName, .pulse = &(*recorder)->pulse()}});
   const double took_s = seconds(system::monotonic_ns() - start_ns);
   auto finished = (*recorder)->finish();
   for (const auto& source : daemon.sources()) {

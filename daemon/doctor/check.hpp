@@ -1,0 +1,23 @@
+// One finding of `posed doctor`.
+#pragma once
+
+#include <string>
+#include <utility>
+
+namespace posed::doctor {
+
+struct Check {
+  std::string name;   // "usb latency"; the same in every run, for scripts
+  bool ok = true;     // also when it does not apply to this machine or config
+  std::string found;  // what is there, or why it does not apply
+  std::string fix{};  // the line that mends it; empty if ok
+};
+
+[[nodiscard]] inline Check right(std::string name, std::string found) {
+  return {.name = std::move(name), .ok = true, .found = std::move(found)};
+}
+[[nodiscard]] inline Check wrong(std::string name, std::string found, std::string fix) {
+  return {.name = std::move(name), .ok = false, .found = std::move(found), .fix = std::move(fix)};
+}
+
+}  // namespace posed::doctor

@@ -1,0 +1,65 @@
+#include "daemon/service/service.hpp"
+
+#include <cstdlib>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+
+#include "daemon/system/clock.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::service {
+namespace {
+
+// A thread may sleep that long, and needs as long again on a busy machine.
+constexpr std::int64_t kLeastWithin_ns = 4 * system::kLongestSleep_ns;
+
+}  // namespace
+
+Service::Service(std::vector<system::ThreadPulse> threads)
+    : present_(std::getenv("NOTIFY_SOCKET") != nullptr) {
+  std::uint64_t within_us = 0;
+  if (!present_ || ::sd_watchdog_enabled(0, &within_us) <= 0) return;
+  const auto within_ns = static_cast<std::int64_t>(within_us) * 1000;
+  if (within_ns < kLeastWithin_ns) {
+    spdlog::warn("WatchdogSec is too short for signs of life in time; set it to {} s or more",
+                 kLeastWithin_ns / kNanosPerSecond);
+  }
+  watchdog_.emplace(std::move(threads), within_ns);
+}
+
+void Service::tell(const std::string& words) {
+  if (!present_) return;
+  if (const int sent = ::sd_notify(0, words.c_str()); sent < 0 && !std::exchange(warned_, true)) {
+    spdlog::warn("systemd cannot be told of this daemon's state ({})", errno_text(-sent));
+  }
+}
+
+void Service::ready() { tell("READY=1"); }
+
+void Service::reloading() {
+  tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(system::monotonic_ns() / 1000));
+}
+
+void Service::stopping() { tell("STOPPING=1\nSTATUS=ending"); }
+
+void Service::status(const std::string& sentence) {
+  if (sentence == status_) return;
+  status_ = sentence;
+  tell("STATUS=" + sentence);
+}
+
+void Service::turn(std::int64_t now_ns) {
+  if (!watchdog_) return;
+  const Watchdog::Finding found = watchdog_->look(now_ns);
+  for (const std::string& thread : found.stuck) {
+    spdlog::error(
+        "the thread {} is stuck; systemd gets no more signs of life and will start posed again",
+        thread);
+  }
+  for (const std::string& thread : found.again) spdlog::warn("the thread {} goes on", thread);
+  if (found.alive) tell("WATCHDOG=1");
+}
+
+}  // namespace posed::service

@@ -1,0 +1,69 @@
+#include "daemon/service/watchdog.hpp"
+
+#include <catch2/catch.hpp>
+
+namespace posed::service {
+namespace {
+
+constexpr std::int64_t kWithin_ns = 2 * kNanosPerSecond;
+constexpr std::int64_t kHalf_ns = kWithin_ns / 2;
+
+struct TwoThreads {
+  system::Pulse reader, writer;
+  Watchdog watchdog{
+      {{.thread = "reader", .pulse = &reader}, {.thread = "writer", .pulse = &writer}}, kWithin_ns};
+  std::int64_t now_ns = 17 * kNanosPerSecond;
+
+  // The next look, after `ns`.
+  Watchdog::Finding after(std::int64_t ns) {
+    now_ns += ns;
+    return watchdog.look(now_ns);
+  }
+};
+
+TEST_CASE("watchdog: a sign of life twice within the time, while all threads go on") {
+  TwoThreads two;
+  int signs = 0;
+  static_cast<void>(two.after(0));
+  for (int i = 0; i < 100; ++i) {  // 50 ms a turn: 5 s
+    two.reader.beat();
+    two.writer.beat();
+    const auto found = two.after(kNanosPerSecond / 20);
+    CHECK(found.stuck.empty());
+    signs += found.alive ? 1 : 0;
+  }
+  CHECK(signs == 5);
+}
+
+TEST_CASE("watchdog: one thread without progress ends the signs and is named once") {
+  TwoThreads two;
+  static_cast<void>(two.after(0));
+  two.reader.beat();
+  const auto stuck = two.after(kHalf_ns);
+  CHECK_FALSE(stuck.alive);
+  CHECK(stuck.stuck == std::vector<std::string>{"writer"});
+  two.reader.beat();
+  const auto still = two.after(kHalf_ns);
+  CHECK_FALSE(still.alive);
+  CHECK(still.stuck.empty());
+  two.reader.beat();
+  two.writer.beat();
+  const auto again = two.after(kHalf_ns);
+  CHECK(again.alive);
+  CHECK(again.again == std::vector<std::string>{"writer"});
+  two.writer.beat();
+  CHECK(two.after(kHalf_ns).stuck == std::vector<std::string>{"reader"});
+}
+
+TEST_CASE("watchdog: nothing is found between two looks, however often it is called") {
+  TwoThreads two;
+  static_cast<void>(two.after(0));
+  for (int i = 0; i < 9; ++i) {
+    const auto found = two.after(kHalf_ns / 10);
+    CHECK_FALSE(found.alive);
+    CHECK(found.stuck.empty());
+  }
+}
+
+}  // namespace
+}  // namespace posed::service
