@@ -72,10 +72,10 @@ class Proposer {
   // inside an example only its own label is possible.
   [[nodiscard]] MatrixXd costs() const {
     const auto labels = static_cast<Index>(poses_.size());
-    MatrixXd pose(labels, kHandChannels);
+    MatrixXd pose(labels, angles_.cols());
     for (Index k = 0; k < labels; ++k) {
       pose.row(k) =
-          Eigen::Map<const Eigen::RowVectorXd>(poses_[k].angles_rad.data(), kHandChannels);
+          Eigen::Map<const Eigen::RowVectorXd>(poses_[k].angles_rad.data(), angles_.cols());
     }
     double apart = 0.0;
     for (Index k = 0; k < labels; ++k) {

@@ -22,10 +22,11 @@ constexpr double kNoise_rad = 0.2 * kDegree;   // lower bound of a sensor's nois
 constexpr double kStill_rad = 1e-4 * kDegree;  // a channel with a smaller deviation is constant
 constexpr double kOwnModelFrom = 3;  // examples; with fewer, a context uses its label's model
 
-// One segment: its context, and its frames within a recording.
+// One segment: its frames within a recording, and its context. At the ends of a closed recording it
+// is in a second one, too, where the recording's other end is its neighbour; else `also` is -1.
 struct Example {
   std::size_t recording, segment;
-  int context;
+  int context, also;
 };
 
 struct ByIndices {
@@ -131,22 +132,32 @@ class Trainer {
       return static_cast<int>(found - labels.begin());
     };
     std::map<Context, int, ByIndices> known;
-    std::vector<std::pair<Example, Context>> found;
+    struct Found {
+      Example example;
+      Context context, also;
+    };
+    std::vector<Found> found;
     for (std::size_t r = 0; r < recordings_.size(); ++r) {
       const auto& segments = recordings_[r].segments;
-      for (std::size_t s = 0; s < segments.size(); ++s) {
+      const std::size_t last = segments.size() - 1;
+      for (std::size_t s = 0; s <= last; ++s) {
         const Context context{index_of(segments[s > 0 ? s - 1 : s]), index_of(segments[s]),
-                              index_of(segments[s + 1 < segments.size() ? s + 1 : s])};
+                              index_of(segments[s < last ? s + 1 : s])};
         known[context] = 0;
-        found.push_back({{r, s, 0}, context});
+        Context also = context;
+        if (recordings_[r].closed && s == 0) also.previous = index_of(segments[last]);
+        if (recordings_[r].closed && s == last) also.next = index_of(segments[0]);
+        known[also] = 0;
+        found.push_back({{r, s, 0, 0}, context, also});
       }
     }
     for (auto& [context, index] : known) {
       index = static_cast<int>(out_.contexts.size());
       out_.contexts.push_back(context);
     }
-    for (auto& [example, context] : found) {
+    for (auto& [example, context, also] : found) {
       example.context = known[context];
+      example.also = known[also] != example.context ? known[also] : -1;
       examples_.push_back(example);
     }
     out_.sums.resize(out_.contexts.size());
@@ -189,7 +200,8 @@ class Trainer {
   [[nodiscard]] std::vector<Frames> frames_where(const Wanted& wanted) const {
     std::vector<Frames> frames;
     for (const Example& example : examples_) {
-      if (wanted(example.context)) frames.emplace_back(frames_of(example));
+      const bool is_wanted = wanted(example.context) || (example.also >= 0 && wanted(example.also));
+      if (is_wanted) frames.emplace_back(frames_of(example));
     }
     return frames;
   }
@@ -266,6 +278,8 @@ class Trainer {
         const Frames frames = features_[r].middleRows(from, gamma.rows());
         const int context = first[segment].context;
         contexts[context].add(frames, gamma, stays);
+        const int also = first[segment].also;
+        if (also >= 0) contexts[also].add(frames, gamma, stays);
         labels[out_.contexts[context].current].add(frames, gamma, stays);
       }
       out_.log_likelihood += numbers.number();

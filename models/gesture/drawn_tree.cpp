@@ -8,49 +8,60 @@ namespace {
 
 constexpr std::array<const char*, 3> kPositions{"previous", "current", "next"};
 
-// The classes that a label at each position can have at a node.
-using Allowed = std::array<std::array<bool, kClasses>, 3>;
+// The labels that can be at each position at a node.
+using Allowed = std::array<std::vector<bool>, 3>;
 
 class Words {
  public:
-  Words(const GestureModel& model, int finger) : model_(model), finger_(finger) {}
+  Words(const GestureModel& model, int group) : model_(model), group_(group) {}
 
   [[nodiscard]] std::string reach(const Allowed& allowed) const {
     return set(allowed[0]) + "-" + set(allowed[1]) + "-" + set(allowed[2]);
   }
 
   [[nodiscard]] std::string question(int number) const {
-    std::array<bool, kClasses> only{};
-    only[number % kClasses] = true;
-    return std::string(kPositions[number / kClasses]) + " is " + set(only) + "?";
+    return std::string(kPositions[position_of(number)]) + " is " + set(yes(number)) + "?";
+  }
+
+  [[nodiscard]] std::size_t position_of(int question) const {
+    return static_cast<std::size_t>(question / model_.statements(group_));
+  }
+
+  // [label] for which the question's answer is yes.
+  [[nodiscard]] std::vector<bool> yes(int question) const {
+    std::vector<bool> labels;
+    for (int label = 0; label < std::ssize(model_.labels); ++label) {
+      labels.push_back(model_.holds(group_, question % model_.statements(group_), label));
+    }
+    return labels;
   }
 
  private:
-  // The labels of these classes: c, {g,1}, or * for all of them.
-  [[nodiscard]] std::string set(const std::array<bool, kClasses>& classes) const {
+  // These labels: c, {g,1}, or * for all of them.
+  [[nodiscard]] std::string set(const std::vector<bool>& labels) const {
     std::string names;
     std::size_t count = 0;
-    for (const Label& label : model_.labels) {
-      if (!classes[label.finger_class[finger_]]) continue;
-      names += (count++ == 0 ? "" : ",") + label.name;
+    for (std::size_t label = 0; label < labels.size(); ++label) {
+      if (!labels[label]) continue;
+      names += (count++ == 0 ? "" : ",") + model_.labels[label].name;
     }
     if (count == model_.labels.size()) return "*";
     return count == 1 ? names : "{" + names + "}";
   }
 
   const GestureModel& model_;
-  int finger_;
+  int group_;
 };
 
-DrawnTree draw_tree(const GestureModel& model, int state, int finger) {
-  const Tree<FingerGaussian>& tree = model.trees[state][finger];
-  const Words words(model, finger);
-  DrawnTree drawn{"state " + std::to_string(state + 1) + ", " + std::string(kFingerNames[finger]) +
-                      ": " + std::to_string(tree.leaves.size()) +
+DrawnTree draw_tree(const GestureModel& model, int state, int group) {
+  const Tree<GroupGaussian>& tree = model.trees[state][group];
+  const Words words(model, group);
+  DrawnTree drawn{"state " + std::to_string(state + 1) + ", " + model.groups[group].name + ": " +
+                      std::to_string(tree.leaves.size()) +
                       (tree.leaves.size() == 1 ? " leaf" : " leaves"),
                   std::vector<DrawnNode>(tree.nodes.size())};
   std::vector<Allowed> allowed(tree.nodes.size());
-  allowed[0].fill({true, true, true});
+  allowed[0].fill(std::vector<bool>(model.labels.size(), true));
   for (std::size_t i = 0; i < tree.nodes.size(); ++i) {  // parents stand before their children
     const TreeNode& node = tree.nodes[i];
     DrawnNode& out = drawn.nodes[i];
@@ -63,13 +74,13 @@ DrawnTree draw_tree(const GestureModel& model, int state, int finger) {
     out.words = words.question(node.question);
     out.yes = node.yes;
     out.no = node.no;
-    const int position = node.question / kClasses;
-    const int asked = node.question % kClasses;
+    const std::vector<bool> yes = words.yes(node.question);
     for (const int child : {node.yes, node.no}) {
       drawn.nodes[child].depth = out.depth + 1;
       allowed[child] = allowed[i];
-      for (int k = 0; k < kClasses; ++k) {
-        if ((k == asked) != (child == node.yes)) allowed[child][position][k] = false;
+      std::vector<bool>& labels = allowed[child][words.position_of(node.question)];
+      for (std::size_t label = 0; label < labels.size(); ++label) {
+        if (yes[label] != (child == node.yes)) labels[label] = false;
       }
     }
   }
@@ -80,11 +91,11 @@ DrawnTree draw_tree(const GestureModel& model, int state, int finger) {
 
 std::vector<DrawnTree> draw_trees(const GestureModel& model, const TreeChoice& choice) {
   std::vector<DrawnTree> trees;
-  for (int finger = 0; finger < kFingers; ++finger) {
+  for (int group = 0; group < std::ssize(model.groups); ++group) {
     for (int state = 0; state < kStates; ++state) {
       if (choice.state >= 0 && choice.state != state) continue;
-      if (choice.finger >= 0 && choice.finger != finger) continue;
-      trees.push_back(draw_tree(model, state, finger));
+      if (choice.group >= 0 && choice.group != group) continue;
+      trees.push_back(draw_tree(model, state, group));
     }
   }
   return trees;

@@ -22,7 +22,7 @@ struct DrawnTree {
   std::vector<DrawnNode> nodes;  // as in the model: node 0 is the root
 };
 
-// Ordered by finger, then by state.
+// Ordered by group, then by state.
 [[nodiscard]] std::vector<DrawnTree> draw_trees(const GestureModel& model,
                                                 const TreeChoice& choice);
 

@@ -1,9 +1,10 @@
 #include "models/gesture/model_file.hpp"
 
-#include <set>
-#include <utility>
+#include <algorithm>
+#include <array>
+#include <vector>
 
-#include "proto/frame/label.hpp"
+#include "models/gesture/vocabulary_file.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/model/validator.hpp"
 
@@ -13,26 +14,48 @@ namespace {
 using model_file::kMaxNumber;
 using model_file::Validator;
 
-constexpr int kMaxModelLabels = 1'000;
-constexpr int kMaxLeaves = 1 << kQuestions;  // because no path asks a question twice
-constexpr double kMinVariance = 1e-20;       // its inverse can still be summed without overflow
+constexpr int kMostDeep = 12;           // more questions make no larger tree than these do
+constexpr double kMinVariance = 1e-20;  // its inverse can still be summed without overflow
 
-constexpr int kRow = kDeltaWindows * kFingerChannels;
+// Copies the file's row, from `row` on, into a leaf's values.
+void take_row(const double* row, int dims, std::array<std::vector<double>, kDeltaWindows>& to) {
+  const int channels = dims / kDeltaWindows;
+  for (int w = 0; w < kDeltaWindows; ++w) {
+    to[w].assign(row + w * channels, row + (w + 1) * channels);
+  }
+}
+void take_row(const double* row, int dims, std::array<double, kStates>& to) {
+  std::copy_n(row, dims, to.begin());
+}
 
-// A leaf's values in the order of the file's rows.
-std::span<double> mean_row(FingerGaussian& leaf) { return {leaf.mean[0].data(), kRow}; }
-std::span<double> variance_row(FingerGaussian& leaf) { return {leaf.variance[0].data(), kRow}; }
-std::span<double> mean_row(DurationGaussian& leaf) { return leaf.mean; }
-std::span<double> variance_row(DurationGaussian& leaf) { return leaf.variance; }
-static_assert(sizeof(FingerGaussian::mean) == kRow * sizeof(double));
+void add_row(const std::array<std::vector<double>, kDeltaWindows>& from,
+             google::protobuf::RepeatedField<double>& to) {
+  for (const auto& window : from) to.Add(window.begin(), window.end());
+}
+void add_row(const std::array<double, kStates>& from, google::protobuf::RepeatedField<double>& to) {
+  to.Add(from.begin(), from.end());
+}
+
+// What a tree must have: its questions are below this number, and a leaf has `dims` values.
+struct TreeShape {
+  int questions, dims;
+};
+TreeShape shape_of(const Vocabulary& vocabulary, int group) {
+  const int dims =
+      group == Vocabulary::kDurations ? kStates : kDeltaWindows * vocabulary.groups[group].channels;
+  return {3 * vocabulary.statements(group), dims};
+}
 
 // Checks that the nodes form one tree: children come after their parent, so every descent ends;
 // every node but the root is the child of exactly one node; every leaf Gaussian belongs to exactly
 // one node.
 template <typename Gaussian>
-void read_nodes(const v1::GestureTree& from, Tree<Gaussian>& tree, Validator& check) {
+void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree,
+                Validator& check) {
   const int count = from.question_size();
-  check.want(count >= 1 && count < 2 * kMaxLeaves, "the number of nodes of a tree");
+  // No path asks a question twice.
+  const int most = 1 << std::min(questions, kMostDeep);
+  check.want(count >= 1 && count < 2 * most, "the number of nodes of a tree");
   check.want(from.yes_size() == count && from.no_size() == count && from.leaf_size() == count,
              "the node arrays of a tree, which differ in length");
   if (!check.sound()) return;
@@ -46,7 +69,7 @@ void read_nodes(const v1::GestureTree& from, Tree<Gaussian>& tree, Validator& ch
                  "a leaf of a tree");
       ++leaves;
     } else {
-      check.want(node.question < kQuestions && node.leaf == -1, "a question of a tree");
+      check.want(node.question < questions && node.leaf == -1, "a question of a tree");
       for (const int child : {node.yes, node.no}) {
         check.want(child > i && child < count, "a child of a tree's node");
         if (check.sound()) ++parents[child];
@@ -61,13 +84,12 @@ void read_nodes(const v1::GestureTree& from, Tree<Gaussian>& tree, Validator& ch
 }
 
 template <typename Gaussian>
-Tree<Gaussian> read_tree(const v1::GestureTree& from, Validator& check) {
+Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Validator& check) {
   Tree<Gaussian> tree;
-  read_nodes(from, tree, check);
+  read_nodes(from, shape.questions, tree, check);
   if (!check.sound()) return {};
   const int leaves = static_cast<int>(tree.leaves.size());
-  Gaussian shape;
-  const int dims = static_cast<int>(mean_row(shape).size());
+  const int dims = shape.dims;
   check.want(from.mean_size() == leaves * dims && from.variance_size() == leaves * dims &&
                  from.occupancy_size() == leaves,
              "the number of a tree's means, variances or occupancies");
@@ -76,53 +98,39 @@ Tree<Gaussian> read_tree(const v1::GestureTree& from, Validator& check) {
   check.numbers(from.occupancy(), 0.0, kMaxNumber, "an occupancy");
   if (!check.sound()) return {};
   for (int i = 0; i < leaves; ++i) {
-    std::copy_n(from.mean().begin() + i * dims, dims, mean_row(tree.leaves[i]).begin());
-    std::copy_n(from.variance().begin() + i * dims, dims, variance_row(tree.leaves[i]).begin());
+    take_row(from.mean().data() + i * dims, dims, tree.leaves[i].mean);
+    take_row(from.variance().data() + i * dims, dims, tree.leaves[i].variance);
   }
   tree.occupancy.assign(from.occupancy().begin(), from.occupancy().end());
   return tree;
 }
 
-std::vector<Label> read_labels(const v1::GestureModel& from, Validator& check) {
-  std::vector<Label> labels;
-  std::set<std::string> names;
-  check.want(from.label_size() >= 1 && from.label_size() <= kMaxModelLabels,
-             "the number of labels");
-  if (!check.sound()) return labels;
-  for (const v1::GestureLabel& label : from.label()) {
-    Label read{.name = label.name(), .trained = label.trained()};
-    check.want(is_label_name(read.name), "a label's name");
-    check.want(names.insert(read.name).second, "a label's name, which stands twice");
-    check.want(label.finger_class_size() == kFingers, "a label's classes, not one a finger");
-    for (int f = 0; f < kFingers && check.sound(); ++f) {
-      check.want(label.finger_class(f) < kClasses, "a label's class");
-      read.finger_class[f] = static_cast<int>(label.finger_class(f));
-    }
-    labels.push_back(std::move(read));
-  }
-  return labels;
-}
-
 void read_range(const v1::GestureModel& from, GestureModel& model, Validator& check) {
-  check.want(from.low_rad_size() == kHandChannels && from.high_rad_size() == kHandChannels,
+  const int channels = model.channels();
+  check.want(from.low_rad_size() == channels && from.high_rad_size() == channels,
              "the range of the angles");
   if (!check.sound()) return;
-  for (int c = 0; c < kHandChannels; ++c) {
-    model.low[c] = check.number(from.low_rad(c), -1e3, 1e3, "the range of an angle");
-    model.high[c] = check.number(from.high_rad(c), model.low[c], 1e3, "the range of an angle");
+  for (int c = 0; c < channels; ++c) {
+    model.low.push_back(check.number(from.low_rad(c), -1e3, 1e3, "the range of an angle"));
+    model.high.push_back(
+        check.number(from.high_rad(c), model.low.back(), 1e3, "the range of an angle"));
   }
 }
 
 GestureModel read_model(const v1::GestureModel& from, Validator& check) {
   GestureModel model;
   model.rate_hz = check.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
-  model.labels = read_labels(from, check);
-  check.want(from.tree_size() == kStates * kFingers, "the number of trees");
+  read_vocabulary(from, model, check);
   if (!check.sound()) return model;
-  for (int i = 0; i < kStates * kFingers; ++i) {
-    model.trees[i / kFingers][i % kFingers] = read_tree<FingerGaussian>(from.tree(i), check);
+  const auto groups = static_cast<int>(model.groups.size());
+  check.want(from.tree_size() == kStates * groups, "the number of trees");
+  if (!check.sound()) return model;
+  for (int i = 0; i < kStates * groups; ++i) {
+    const TreeShape shape = shape_of(model, i % groups);
+    model.trees[i / groups].push_back(read_tree<GroupGaussian>(from.tree(i), shape, check));
   }
-  model.durations = read_tree<DurationGaussian>(from.duration(), check);
+  const TreeShape shape = shape_of(model, Vocabulary::kDurations);
+  model.durations = read_tree<DurationGaussian>(from.duration(), shape, check);
   read_range(from, model, check);
   model.report_json = from.report_json();
   return model;
@@ -136,9 +144,9 @@ void write_tree(const Tree<Gaussian>& tree, v1::GestureTree& out) {
     out.add_no(node.no);
     out.add_leaf(node.leaf);
   }
-  for (Gaussian leaf : tree.leaves) {
-    for (const double value : mean_row(leaf)) out.add_mean(value);
-    for (const double value : variance_row(leaf)) out.add_variance(value);
+  for (const Gaussian& leaf : tree.leaves) {
+    add_row(leaf.mean, *out.mutable_mean());
+    add_row(leaf.variance, *out.mutable_variance());
   }
   out.mutable_occupancy()->Add(tree.occupancy.begin(), tree.occupancy.end());
 }
@@ -167,14 +175,7 @@ std::string serialize_model(const GestureModel& model) {
   v1::ModelFile file;
   v1::GestureModel& gesture = *file.mutable_gesture();
   gesture.set_rate_hz(model.rate_hz);
-  for (const Label& label : model.labels) {
-    v1::GestureLabel& out = *gesture.add_label();
-    out.set_name(label.name);
-    for (const int finger_class : label.finger_class) {
-      out.add_finger_class(static_cast<std::uint32_t>(finger_class));
-    }
-    out.set_trained(label.trained);
-  }
+  write_vocabulary(model, gesture);
   for (const auto& state : model.trees) {
     for (const auto& tree : state) write_tree(tree, *gesture.add_tree());
   }

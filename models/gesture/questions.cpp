@@ -6,18 +6,19 @@
 #include <numeric>
 #include <utility>
 
+#include "proto/frame/degree.hpp"
 #include "proto/frame/label.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::gesture {
 namespace {
 
-constexpr int kRounds = 50;  // of k-means; a few labels converge in three
-constexpr const char* kClassNames = "ABC";
+constexpr int kRounds = 50;                        // of k-means; a few labels converge in three
+constexpr double kSameClass_rad = 15.0 * kDegree;  // rms over a group's joints within a class
 
 using Finger = std::array<double, kFingerChannels>;
 
-Finger finger_of(const HandAngles& angles, int finger) {
+Finger finger_of(const std::vector<double>& angles, int finger) {
   Finger out{};
   std::copy_n(angles.begin() + finger * kFingerChannels, kFingerChannels, out.begin());
   return out;
@@ -77,33 +78,66 @@ std::vector<int> cluster(const std::vector<Finger>& poses) {
   return member;
 }
 
-std::string finger_word(int finger) { return std::string(kFingerNames[finger]); }
+std::string class_name(int index) { return {static_cast<char>('A' + index)}; }
 
-// The class of the finger that contains the label; an error when there is none or more than one.
-Result<int> class_of(const ClassLists& lists, int finger, const std::string& name) {
+// "A, B or C"
+std::string class_names(int classes) {
+  std::string names = class_name(0);
+  for (int k = 1; k < classes; ++k) names += (k + 1 < classes ? ", " : " or ") + class_name(k);
+  return names;
+}
+
+// The class of the group that contains the label; an error when there is none or more than one.
+Result<int> class_of(const std::vector<std::vector<std::string>>& classes,
+                     const ChannelGroup& group, const std::string& name) {
   int found = -1;
-  for (int k = 0; k < kClasses; ++k) {
-    if (std::ranges::count(lists[finger][k], name) == 0) continue;
+  for (int k = 0; k < static_cast<int>(classes.size()); ++k) {
+    if (std::ranges::count(classes[k], name) == 0) continue;
     if (found >= 0) {
-      return fail("label " + in_quotes(name) + " is in the classes " + kClassNames[found] +
-                  " and " + kClassNames[k] + " of the " + finger_word(finger) +
-                  "; a finger of a gesture is of one class");
+      return fail("label " + in_quotes(name) + " is in the classes " + class_name(found) + " and " +
+                  class_name(k) + " of the " + group.name +
+                  "; a finger, or group, of a gesture is of one class");
     }
     found = k;
   }
   if (found < 0) {
-    return fail("label " + in_quotes(name) + " is in no class of the " + finger_word(finger) +
-                "; add it to A, B or C of [" + finger_word(finger) + "]");
+    return fail("label " + in_quotes(name) + " is in no class of the " + group.name +
+                "; add it to " + class_names(static_cast<int>(classes.size())) + " of [" +
+                group.name + "]");
   }
   return found;
 }
 
+double distance(const LabelPose& a, const LabelPose& b, const ChannelGroup& group) {
+  double sum = 0.0;
+  for (int c = group.first; c < group.first + group.channels; ++c) {
+    const double off = a.angles_rad[c] - b.angles_rad[c];
+    sum += off * off;
+  }
+  return std::sqrt(sum);
+}
+
+// The pose with the least sum of distances to all others.
+std::size_t most_central(const std::vector<LabelPose>& poses, const ChannelGroup& group) {
+  const auto sum_to = [&](std::size_t i) {
+    double sum = 0.0;
+    for (const LabelPose& other : poses) sum += distance(poses[i], other, group);
+    return sum;
+  };
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    if (sum_to(i) < sum_to(best)) best = i;
+  }
+  return best;
+}
+
 }  // namespace
 
-Result<std::vector<Label>> labels_of(const ClassLists& lists) {
+Result<std::vector<Label>> labels_of(const ClassLists& lists,
+                                     const std::vector<ChannelGroup>& groups) {
   std::vector<Label> labels;
-  for (const auto& finger : lists) {
-    for (const auto& names : finger) {
+  for (const auto& group : lists) {
+    for (const auto& names : group) {
       for (const std::string& name : names) {
         if (!is_label_name(name)) {
           return fail(in_quotes(name) + " is no label; use 1 to 15 signs of ASCII without a blank");
@@ -114,57 +148,96 @@ Result<std::vector<Label>> labels_of(const ClassLists& lists) {
     }
   }
   for (Label& label : labels) {
-    for (int f = 0; f < kFingers; ++f) {
-      const auto found = class_of(lists, f, label.name);
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const auto found = class_of(lists[g], groups[g], label.name);
       if (!found) return std::unexpected(found.error());
-      label.finger_class[f] = *found;
+      label.group_class.push_back(*found);
     }
   }
   return labels;
 }
 
-ClassLists lists_of(const std::vector<Label>& labels) {
+ClassLists lists_of(const std::vector<Label>& labels, const std::vector<ChannelGroup>& groups) {
   ClassLists lists;
+  for (const ChannelGroup& group : groups) {
+    lists.emplace_back(static_cast<std::size_t>(group.classes));
+  }
   for (const Label& label : labels) {
-    for (int f = 0; f < kFingers; ++f) lists[f][label.finger_class[f]].push_back(label.name);
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      lists[g][static_cast<std::size_t>(label.group_class[g])].push_back(label.name);
+    }
   }
   return lists;
 }
 
 const std::vector<Label>& built_in_labels() {
-  static const std::vector<Label> labels{{.name = "g", .finger_class = {0, 0, 0, 0, 0}},
-                                         {.name = "c", .finger_class = {1, 1, 1, 1, 1}},
-                                         {.name = "p", .finger_class = {2, 2, 2, 2, 2}},
-                                         {.name = "1", .finger_class = {0, 2, 0, 0, 0}},
-                                         {.name = "3", .finger_class = {0, 2, 2, 2, 0}},
-                                         {.name = "4", .finger_class = {0, 2, 2, 2, 2}}};
+  static const std::vector<Label> labels{
+      {.name = "g", .group_class = {0, 0, 0, 0, 0}}, {.name = "c", .group_class = {1, 1, 1, 1, 1}},
+      {.name = "p", .group_class = {2, 2, 2, 2, 2}}, {.name = "1", .group_class = {0, 2, 0, 0, 0}},
+      {.name = "3", .group_class = {0, 2, 2, 2, 0}}, {.name = "4", .group_class = {0, 2, 2, 2, 2}}};
   return labels;
 }
 
+Vocabulary built_in_vocabulary() {
+  Vocabulary vocabulary;
+  vocabulary.labels = built_in_labels();
+  return vocabulary;
+}
+
 std::vector<Label> propose_labels(const std::vector<LabelPose>& poses) {
-  std::vector<Label> labels(poses.size());
-  for (std::size_t i = 0; i < poses.size(); ++i) labels[i].name = poses[i].name;
+  std::vector<Label> labels;
+  for (const LabelPose& pose : poses) labels.push_back({.name = pose.name});
   for (int f = 0; f < kFingers && !poses.empty(); ++f) {
     std::vector<Finger> fingers;
     fingers.reserve(poses.size());
     for (const LabelPose& pose : poses) fingers.push_back(finger_of(pose.angles_rad, f));
     const std::vector<int> classes = cluster(fingers);
-    for (std::size_t i = 0; i < poses.size(); ++i) labels[i].finger_class[f] = classes[i];
+    for (std::size_t i = 0; i < poses.size(); ++i) labels[i].group_class.push_back(classes[i]);
   }
   return labels;
 }
 
+void propose_body_labels(const std::vector<LabelPose>& poses, Vocabulary& vocabulary) {
+  vocabulary.labels.clear();
+  for (const LabelPose& pose : poses) vocabulary.labels.push_back({.name = pose.name});
+  for (ChannelGroup& group : vocabulary.groups) {
+    // Each further class begins with the pose that is farthest from all classes so far.
+    std::vector<std::size_t> centres{most_central(poses, group)};
+    const auto nearest_centre = [&](std::size_t i) {
+      return std::ranges::min_element(centres, {}, [&](std::size_t centre) {
+        return distance(poses[i], poses[centre], group);
+      });
+    };
+    const double alike_rad = kSameClass_rad * std::sqrt(group.channels / 3.0);
+    while (centres.size() < kMaxClasses) {
+      std::size_t farthest = 0;
+      double most_rad = 0.0;
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        const double off_rad = distance(poses[i], poses[*nearest_centre(i)], group);
+        if (off_rad > most_rad) most_rad = off_rad, farthest = i;
+      }
+      if (most_rad <= alike_rad) break;
+      centres.push_back(farthest);
+    }
+    group.classes = static_cast<int>(centres.size());
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const auto place = nearest_centre(i) - centres.begin();
+      vocabulary.labels[i].group_class.push_back(static_cast<int>(place));
+    }
+  }
+}
+
 Label label_like(const LabelPose& shown, const std::vector<LabelPose>& trained,
-                 const std::vector<Label>& labels) {
-  Label label{.name = shown.name};
-  for (int f = 0; f < kFingers; ++f) {
+                 const std::vector<Label>& labels, const std::vector<ChannelGroup>& groups) {
+  Label label{.name = shown.name, .group_class = std::vector<int>(groups.size())};
+  for (std::size_t g = 0; g < groups.size(); ++g) {
     double best = std::numeric_limits<double>::infinity();
     for (const LabelPose& pose : trained) {
-      const double off = distance(finger_of(pose.angles_rad, f), finger_of(shown.angles_rad, f));
+      const double off = distance(pose, shown, groups[g]);
       const auto like = std::ranges::find(labels, pose.name, &Label::name);
       if (off >= best || like == labels.end()) continue;
       best = off;
-      label.finger_class[f] = like->finger_class[f];
+      label.group_class[g] = like->group_class[g];
     }
   }
   return label;

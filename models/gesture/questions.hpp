@@ -1,45 +1,53 @@
-// The questions of the decision trees: to which class does a label belong for a finger? With these
-// classes a gesture that was never recorded can descend every tree, finger by finger
+// The questions of the decision trees: to which class does a label belong for a finger, or for a
+// group of a body's joints? With these classes a gesture that was never recorded can descend every
+// tree, group by group
 // (models/gesture/README.md, "Questions and unseen labels"). Cold.
 #pragma once
 
-#include <array>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "models/gesture/gesture_model.hpp"
+#include "models/gesture/vocabulary.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::gesture {
 
-// The labels of each class, as people write them: [finger][class] names.
-using ClassLists = std::array<std::array<std::vector<std::string>, kClasses>, kFingers>;
+// The labels of each class, as people write them: [group][class] names.
+using ClassLists = std::vector<std::vector<std::vector<std::string>>>;
 
-// Every label of the lists in exactly one class per finger, in order of first mention. Returns an
-// error for a label that is in no class or in two classes of a finger, and for a name that is not a
+// Every label of the lists in exactly one class per group, in order of first mention. Returns an
+// error for a label that is in no class or in two classes of a group, and for a name that is not a
 // valid label.
-[[nodiscard]] Result<std::vector<Label>> labels_of(const ClassLists& lists);
-[[nodiscard]] ClassLists lists_of(const std::vector<Label>& labels);
+[[nodiscard]] Result<std::vector<Label>> labels_of(
+    const ClassLists& lists, const std::vector<ChannelGroup>& groups = finger_groups());
+[[nodiscard]] ClassLists lists_of(const std::vector<Label>& labels,
+                                  const std::vector<ChannelGroup>& groups = finger_groups());
 
 // The labels of Takamido et al. (models/gesture/README.md, "References"): fist g, scissors c, open
 // p, and unseen 1 (index), 3 (index to ring), 4 (all but the thumb). A closed like g, B as in c, C
 // open like p.
 [[nodiscard]] const std::vector<Label>& built_in_labels();
+[[nodiscard]] Vocabulary built_in_vocabulary();
 
-// A label's pose: the mean angles while the pose is held.
+// A label's pose: the mean of each channel while the pose is held [rad].
 struct LabelPose {
   std::string name;
-  HandAngles angles_rad{};
+  std::vector<double> angles_rad{};
 };
 
-// Proposes classes for labels without any: for each finger k-means of the poses' angles with three
-// centres, named A to C from the most closed to the most open. Deterministic.
+// Proposes classes for a hand's labels without any: for each finger k-means of the poses' angles
+// with three centres, named A to C from the most closed to the most open. Deterministic.
 [[nodiscard]] std::vector<Label> propose_labels(const std::vector<LabelPose>& poses);
 
-// Classes of a new label whose pose was shown once: each finger takes the class of the trained
-// label whose pose is nearest in that finger. `labels` contains every name of `trained`.
+// The same for a body, as `vocabulary` has its groups: in each, poses of one class are alike,
+// within 15 degrees rms over the group's joints; A is the class of the pose that is nearest to all
+// others. Sets the groups' numbers of classes, too.
+void propose_body_labels(const std::vector<LabelPose>& poses, Vocabulary& vocabulary);
+
+// Classes of a new label whose pose was shown once: each group takes the class of the trained label
+// whose pose is nearest in that group. `labels` contains every name of `trained`.
 [[nodiscard]] Label label_like(const LabelPose& shown, const std::vector<LabelPose>& trained,
-                               const std::vector<Label>& labels);
+                               const std::vector<Label>& labels,
+                               const std::vector<ChannelGroup>& groups = finger_groups());
 
 }  // namespace posed::gesture

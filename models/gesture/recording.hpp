@@ -1,4 +1,5 @@
-// A labelled hand recording for training: angles at one even rate, segments in frames. Cold.
+// A labelled recording of a hand or a body for training: angles at one even rate, segments in
+// frames. Cold.
 #pragma once
 
 #include <string>
@@ -21,8 +22,10 @@ struct Segment {
 struct Recording {
   std::string file;  // for errors
   double rate_hz = 0.0;
-  FeatureMatrix angles_rad;  // [frame][finger][joint][x, y, z]
+  FeatureMatrix angles_rad;  // [frame][group][joint][x, y, z]
   std::vector<Segment> segments;
+  // It ends where it began, so its first gesture may follow its last one.
+  bool closed = false;
 };
 
 // Time from the first frame to the end of the last frame [s].

@@ -21,7 +21,6 @@ using Eigen::VectorXd;
 constexpr double kMinDurationExamples = 5.0;
 constexpr double kTreesFrom =
     0.95;  // of the progress, because the alignments take nearly all of the time
-constexpr int kTrees = kStates * kFingers;
 
 // Checks that the label of every segment has classes, and marks the recorded labels.
 Result<> mark_trained(const std::vector<Recording>& recordings, std::vector<Label>& labels) {
@@ -31,8 +30,8 @@ Result<> mark_trained(const std::vector<Recording>& recordings, std::vector<Labe
       const auto found = std::ranges::find(labels, segment.label, &Label::name);
       if (found == labels.end()) {
         return fail("label " + in_quotes(segment.label) +
-                        " is in no class; say in a questions file what each finger does "
-                        "(--questions), or let --propose-questions write one",
+                        " is in no class; say in a questions file what each finger, or group of "
+                        "joints, does (--questions), or let --propose-questions write one",
                     recording.file);
       }
       found->trained = true;
@@ -41,33 +40,35 @@ Result<> mark_trained(const std::vector<Recording>& recordings, std::vector<Labe
   return {};
 }
 
-// [question][context]: does the label at the question's position belong to its class?
-template <typename ClassOf>
-Answers answers_of(const std::vector<Context>& contexts, const ClassOf& class_of) {
-  Answers answers(kQuestions);
-  for (int q = 0; q < kQuestions; ++q) {
+// [question][context]: does the question's statement hold for the label at its position?
+Answers answers_of(const std::vector<Context>& contexts, const Vocabulary& vocabulary, int group) {
+  const int statements = vocabulary.statements(group);
+  Answers answers(3 * static_cast<std::size_t>(statements));
+  for (int q = 0; q < 3 * statements; ++q) {
     for (const Context& context : contexts) {
       const std::array<int, 3> at{context.previous, context.current, context.next};
-      answers[q].push_back(class_of(at[q / kClasses]) == q % kClasses);
+      answers[q].push_back(vocabulary.holds(group, q % statements, at[q / statements]));
     }
   }
   return answers;
 }
 
-// Indices of one finger's features among those of all fingers: [window][channel of the finger].
-std::vector<int> features_of_finger(int finger) {
+// Indices of one group's features among those of all groups: [window][channel of the group].
+std::vector<int> features_of_group(const Vocabulary& vocabulary, int group) {
+  const ChannelGroup& channels = vocabulary.groups[group];
   std::vector<int> features;
   for (int w = 0; w < kDeltaWindows; ++w) {
-    for (int c = 0; c < kFingerChannels; ++c) {
-      features.push_back(w * kHandChannels + finger * kFingerChannels + c);
+    for (int c = 0; c < channels.channels; ++c) {
+      features.push_back(w * vocabulary.channels() + channels.first + c);
     }
   }
   return features;
 }
 
-GrownTree grow_finger(const ContextModels& models, const std::vector<Label>& labels, int state,
-                      int finger, double mdl_factor) {
-  const std::vector<int> features = features_of_finger(finger);
+GrownTree grow_group(const ContextModels& models, const Vocabulary& vocabulary, int state,
+                     int group, double mdl_factor) {
+  const std::vector<int> features = features_of_group(vocabulary, group);
+  const ChannelGroup& channels = vocabulary.groups[group];
   const auto rows = static_cast<Index>(models.contexts.size());
   const auto dims = static_cast<Index>(features.size());
   ContextSums sums{VectorXd(rows), VectorXd(rows), MatrixXd(rows, dims), MatrixXd(rows, dims)};
@@ -81,14 +82,13 @@ GrownTree grow_finger(const ContextModels& models, const std::vector<Label>& lab
   GrowOptions options;
   options.mdl_factor = mdl_factor;
   for (int d = 0; d < static_cast<int>(dims); ++d) {
-    if (models.moves[finger * kFingerChannels + d % kFingerChannels]) options.counted.push_back(d);
+    if (models.moves[channels.first + d % channels.channels]) options.counted.push_back(d);
   }
-  const Answers answers =
-      answers_of(models.contexts, [&](int label) { return labels[label].finger_class[finger]; });
+  const Answers answers = answers_of(models.contexts, vocabulary, group);
   return grow_tree(sums, answers, models.floor(features), options);
 }
 
-GrownTree grow_durations(const ContextModels& models, const std::vector<Label>& labels,
+GrownTree grow_durations(const ContextModels& models, const Vocabulary& vocabulary,
                          double mdl_factor) {
   const auto rows = static_cast<Index>(models.contexts.size());
   ContextSums sums{VectorXd(rows), VectorXd(rows), MatrixXd(rows, kStates),
@@ -102,15 +102,16 @@ GrownTree grow_durations(const ContextModels& models, const std::vector<Label>& 
                             .min_occupancy = kMinDurationExamples,
                             .min_examples = kMinDurationExamples,
                             .counted = {0, 1, 2, 3, 4}};
-  const Answers answers =
-      answers_of(models.contexts, [&](int label) { return majority_class(labels[label]); });
+  const Answers answers = answers_of(models.contexts, vocabulary, Vocabulary::kDurations);
   return grow_tree(sums, answers, VectorXd::Constant(kStates, kMinDurationVariance), options);
 }
 
 // Copies a row of values into one of the Gaussian's arrays.
-void fill(std::array<std::array<double, kFingerChannels>, kDeltaWindows>& to, const VectorXd& row) {
+void fill(std::array<std::vector<double>, kDeltaWindows>& to, const VectorXd& row) {
+  const Index channels = row.size() / kDeltaWindows;
   for (int w = 0; w < kDeltaWindows; ++w) {
-    for (int c = 0; c < kFingerChannels; ++c) to[w][c] = row[w * kFingerChannels + c];
+    const auto window = row.segment(w * channels, channels);
+    to[w].assign(window.begin(), window.end());
   }
 }
 void fill(std::array<double, kStates>& to, const VectorXd& row) {
@@ -131,12 +132,15 @@ Tree<Gaussian> tree_of(const GrownTree& grown) {
 }
 
 void set_range(const std::vector<Recording>& recordings, GestureModel& model) {
-  for (int c = 0; c < kHandChannels; ++c) {
-    model.low[c] = model.high[c] = recordings.front().angles_rad(0, c);
+  for (int c = 0; c < model.channels(); ++c) {
+    double low = recordings.front().angles_rad(0, c);
+    double high = low;
     for (const Recording& recording : recordings) {
-      model.low[c] = std::min(model.low[c], recording.angles_rad.col(c).minCoeff());
-      model.high[c] = std::max(model.high[c], recording.angles_rad.col(c).maxCoeff());
+      low = std::min(low, recording.angles_rad.col(c).minCoeff());
+      high = std::max(high, recording.angles_rad.col(c).maxCoeff());
     }
+    model.low.push_back(low);
+    model.high.push_back(high);
   }
 }
 
@@ -145,8 +149,8 @@ void set_range(const std::vector<Recording>& recordings, GestureModel& model) {
 Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
                                    const TrainOptions& options) {
   GestureModel model;
+  static_cast<Vocabulary&>(model) = options.vocabulary;
   model.rate_hz = recordings.front().rate_hz;
-  model.labels = options.labels;
   if (auto marked = mark_trained(recordings, model.labels); !marked) {
     return std::unexpected(marked.error());
   }
@@ -161,20 +165,19 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   }
   const auto contexts = train_contexts(recordings, model.labels, context_options);
   if (!contexts) return std::unexpected(contexts.error());
-  TrainReport report(recordings, *contexts, model.labels);
-  for (int tree = 0; tree < kTrees; ++tree) {
-    const double fraction = kTreesFrom + (1.0 - kTreesFrom) * tree / kTrees;
+  TrainReport report(recordings, *contexts, model);
+  const auto groups = static_cast<int>(model.groups.size());
+  for (int tree = 0; tree < kStates * groups; ++tree) {
+    const double fraction = kTreesFrom + (1.0 - kTreesFrom) * tree / (kStates * groups);
     if (options.progress && !options.progress("growing trees", fraction)) {
       return training_stopped();
     }
-    const int state = tree / kFingers;
-    const int finger = tree % kFingers;
-    const GrownTree grown = grow_finger(*contexts, model.labels, state, finger, options.mdl_factor);
-    report.add_tree(state, finger, grown);
-    model.trees[state][finger] = tree_of<FingerGaussian>(grown);
+    const int state = tree / groups;
+    const GrownTree grown = grow_group(*contexts, model, state, tree % groups, options.mdl_factor);
+    report.add_tree(state, tree % groups, grown);
+    model.trees[state].push_back(tree_of<GroupGaussian>(grown));
   }
-  model.durations =
-      tree_of<DurationGaussian>(grow_durations(*contexts, model.labels, options.mdl_factor));
+  model.durations = tree_of<DurationGaussian>(grow_durations(*contexts, model, options.mdl_factor));
   set_range(recordings, model);
   model.report_json = report.json_of(model);
   return model;
@@ -185,7 +188,8 @@ std::vector<LabelPose> label_poses(const std::vector<Recording>& recordings) {
   for (const Recording& recording : recordings) {
     for (const Segment& segment : recording.segments) {
       auto& [sum, frames] =
-          sums.try_emplace(segment.label, VectorXd::Zero(kHandChannels), 0.0).first->second;
+          sums.try_emplace(segment.label, VectorXd::Zero(recording.angles_rad.cols()), 0.0)
+              .first->second;
       const int from = segment.begin + segment.frames() / 2;
       const int to = segment.end - segment.frames() / 10;
       sum += recording.angles_rad.middleRows(from, to - from).colwise().sum();
@@ -194,9 +198,8 @@ std::vector<LabelPose> label_poses(const std::vector<Recording>& recordings) {
   }
   std::vector<LabelPose> poses;
   for (const auto& [name, sum] : sums) {
-    LabelPose& pose = poses.emplace_back(LabelPose{name, {}});
     const VectorXd mean = sum.first / sum.second;
-    std::copy(mean.begin(), mean.end(), pose.angles_rad.begin());
+    poses.push_back({name, {mean.begin(), mean.end()}});
   }
   return poses;
 }

@@ -16,9 +16,10 @@
 namespace posed::gesture {
 
 struct TrainOptions {
-  std::vector<Label> labels = built_in_labels();  // with the classes of every label
-  int segmental_rounds = 2;                       // k-means along best paths
-  int rounds = 8;                                 // of Baum-Welch, for labels and then for contexts
+  // The labels with their classes; without any the built-in ones of a hand.
+  Vocabulary vocabulary = built_in_vocabulary();
+  int segmental_rounds = 2;       // k-means along best paths
+  int rounds = 8;                 // of Baum-Welch, for labels and then for contexts
   int embedded_rounds = 0;        // over whole recordings, for labels with imprecise borders
   double embedded_slack_s = 0.5;  // how far a border may then move from its label
   double mdl_factor = 1.0;        // factor on the trees' stopping threshold

@@ -20,7 +20,7 @@ constexpr int kFewExamples = 2;
 constexpr std::array<int, 2> kHold{2, 3};      // the states in which a gesture's pose is held
 constexpr double kAlike_rad = 10.0 * kDegree;  // poses closer than this count as the same
 
-using Counts = std::array<std::array<int, kFingers>, kStates>;
+using Counts = std::array<std::vector<int>, kStates>;  // [state][group]
 
 int total(const Counts& counts) {
   int sum = 0;
@@ -30,11 +30,11 @@ int total(const Counts& counts) {
   return sum;
 }
 
-json by_state(const Counts& counts) {
+json by_state(const Counts& counts, const std::vector<ChannelGroup>& groups) {
   json states = json::array();
   for (int state = 0; state < kStates; ++state) {
     json row{{"state", state + 1}};
-    for (int f = 0; f < kFingers; ++f) row[std::string(kFingerNames[f])] = counts[state][f];
+    for (std::size_t g = 0; g < groups.size(); ++g) row[groups[g].name] = counts[state][g];
     states.push_back(std::move(row));
   }
   return states;
@@ -42,27 +42,36 @@ json by_state(const Counts& counts) {
 
 std::string classes_text(const Label& label) {
   std::string text;
-  for (const int finger_class : label.finger_class) text += static_cast<char>('A' + finger_class);
+  for (const int group_class : label.group_class) text += static_cast<char>('A' + group_class);
   return text;
 }
 
 }  // namespace
 
 TrainReport::TrainReport(const std::vector<Recording>& recordings, const ContextModels& contexts,
-                         const std::vector<Label>& labels)
-    : recordings_(recordings), contexts_(contexts), labels_(labels) {}
+                         const Vocabulary& vocabulary)
+    : recordings_(recordings),
+      contexts_(contexts),
+      vocabulary_(vocabulary),
+      astray_(vocabulary.groups.size()) {
+  leaves_.fill(std::vector<int>(vocabulary.groups.size()));
+  mixed_ = leaves_;
+}
 
 // The distance between the classes of a leaf's members in the channel where they differ most [rad].
-double TrainReport::apart_rad(int state, int finger, const std::vector<int>& members) const {
+double TrainReport::apart_rad(int state, int group, const std::vector<int>& members) const {
+  const ChannelGroup& channels = vocabulary_.groups[group];
   struct Sum {
-    Eigen::VectorXd angles = Eigen::VectorXd::Zero(kFingerChannels);
+    Eigen::VectorXd angles;
     double frames = 0.0;
   };
-  std::array<Sum, kClasses> classes;
+  std::vector<Sum> classes(static_cast<std::size_t>(channels.classes),
+                           Sum{Eigen::VectorXd::Zero(channels.channels)});
   for (const int row : members) {
     const Statistics& sums = contexts_.sums[row];
-    Sum& of = classes[labels_[contexts_.contexts[row].current].finger_class[finger]];
-    of.angles += sums.first.row(state).segment(finger * kFingerChannels, kFingerChannels);
+    const Label& label = vocabulary_.labels[contexts_.contexts[row].current];
+    Sum& of = classes[label.group_class[group]];
+    of.angles += sums.first.row(state).segment(channels.first, channels.channels);
     of.frames += sums.occupancy[state];
   }
   double apart = 0.0;
@@ -76,17 +85,18 @@ double TrainReport::apart_rad(int state, int finger, const std::vector<int>& mem
   return apart;
 }
 
-void TrainReport::add_tree(int state, int finger, const GrownTree& tree) {
-  leaves_[state][finger] = static_cast<int>(tree.members.size());
+void TrainReport::add_tree(int state, int group, const GrownTree& tree) {
+  leaves_[state][group] = static_cast<int>(tree.members.size());
   const bool held = std::ranges::count(kHold, state) > 0;
   for (const auto& members : tree.members) {
     std::set<int> classes;
     for (const int row : members) {
-      classes.insert(labels_[contexts_.contexts[row].current].finger_class[finger]);
+      const Label& label = vocabulary_.labels[contexts_.contexts[row].current];
+      classes.insert(label.group_class[group]);
     }
     if (classes.size() < 2) continue;
-    ++mixed_[state][finger];
-    if (held && apart_rad(state, finger, members) > kAlike_rad) ++astray_[finger];
+    ++mixed_[state][group];
+    if (held && apart_rad(state, group, members) > kAlike_rad) ++astray_[group];
   }
 }
 
@@ -106,7 +116,7 @@ std::vector<std::string> TrainReport::warnings() const {
     warnings.push_back("only " + std::to_string(gestures) +
                        " gestures; below 20 labels that were not recorded go astray, record more");
   }
-  for (const Label& label : labels_) {
+  for (const Label& label : vocabulary_.labels) {
     if (label.trained && gestures_of(label.name) < kFewExamples) {
       warnings.push_back("label " + in_quotes(label.name) +
                          " was recorded once only; how it varies is a guess");
@@ -118,16 +128,17 @@ std::vector<std::string> TrainReport::warnings() const {
 
 // A leaf of the hold that mixes classes gives a label that was not recorded the mean of two poses.
 std::string TrainReport::mixed_warning() const {
-  std::string fingers;
+  std::string parts;
   int leaves = 0;
-  for (int f = 0; f < kFingers; ++f) {
-    leaves += astray_[f];
-    if (astray_[f] > 0) fingers += (fingers.empty() ? "" : ", ") + std::string(kFingerNames[f]);
+  for (std::size_t g = 0; g < astray_.size(); ++g) {
+    leaves += astray_[g];
+    if (astray_[g] > 0) parts += (parts.empty() ? "" : ", ") + vocabulary_.groups[g].name;
   }
   if (leaves == 0) return {};
   return std::to_string(leaves) +
          (leaves == 1 ? " leaf of the hold mixes" : " leaves of the hold mix") +
-         " gestures whose finger is of different classes and poses (" + fingers +
+         " gestures whose " + (vocabulary_.is_hand() ? "finger" : "group of joints") +
+         " is of different classes and poses (" + parts +
          "): a label that was not recorded may go astray there, record more";
 }
 
@@ -148,13 +159,13 @@ std::string TrainReport::json_of(const GestureModel& model) const {
   report["contexts"] = contexts_.contexts.size();
   report["moving_channels"] = std::ranges::count(contexts_.moves, true);
   report["labels"] = json::array();
-  for (const Label& label : labels_) {
+  for (const Label& label : vocabulary_.labels) {
     report["labels"].push_back({{"name", label.name},
                                 {"classes", classes_text(label)},
                                 {"gestures", gestures_of(label.name)}});
   }
   report["leaves"] = total(leaves_);
-  report["leaves_by_state"] = by_state(leaves_);
+  report["leaves_by_state"] = by_state(leaves_, vocabulary_.groups);
   report["mixed_leaves"] = total(mixed_);
   report["duration_leaves"] = model.durations.leaves.size();
   report["log_likelihood_per_frame"] = contexts_.log_likelihood / frames;

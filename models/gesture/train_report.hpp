@@ -15,9 +15,9 @@ class TrainReport {
  public:
   // The arguments outlive the report.
   TrainReport(const std::vector<Recording>& recordings, const ContextModels& contexts,
-              const std::vector<Label>& labels);
+              const Vocabulary& vocabulary);
 
-  void add_tree(int state, int finger, const GrownTree& tree);
+  void add_tree(int state, int group, const GrownTree& tree);
 
   // One JSON object; the same training gives the same text.
   [[nodiscard]] std::string json_of(const GestureModel& model) const;
@@ -25,17 +25,18 @@ class TrainReport {
  private:
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::string mixed_warning() const;  // empty: no leaf mixes classes
-  [[nodiscard]] double apart_rad(int state, int finger, const std::vector<int>& members) const;
+  [[nodiscard]] double apart_rad(int state, int group, const std::vector<int>& members) const;
   [[nodiscard]] int gestures_of(const std::string& label) const;
 
   const std::vector<Recording>& recordings_;
   const ContextModels& contexts_;
-  const std::vector<Label>& labels_;
-  std::array<std::array<int, kFingers>, kStates> leaves_{};
+  const Vocabulary& vocabulary_;
+  using Counts = std::array<std::vector<int>, kStates>;  // [state][group]
+  Counts leaves_;
   // Numbers of leaves whose members' current labels belong to different classes. They matter in the
   // hold (states 3 and 4) where these classes also have different poses.
-  std::array<std::array<int, kFingers>, kStates> mixed_{};
-  std::array<int, kFingers> astray_{};
+  Counts mixed_;
+  std::vector<int> astray_;  // [group]
 };
 
 }  // namespace posed::gesture

@@ -48,25 +48,26 @@ std::string dot_of(const DrawnTree& tree, std::size_t number) {
 
 }  // namespace
 
-Result<TreeChoice> tree_choice(std::string_view text) {
+Result<TreeChoice> tree_choice(std::string_view text, const std::vector<ChannelGroup>& groups) {
   TreeChoice choice;
   if (text == "all") return choice;
   const auto colon = text.find(':');
   const std::string_view first = text.substr(0, colon);
   std::string_view state = colon == std::string_view::npos ? "" : text.substr(colon + 1);
-  const auto finger = std::ranges::find(kFingerNames, first);
-  if (finger != kFingerNames.end()) {
-    choice.finger = static_cast<int>(finger - kFingerNames.begin());
+  const auto group = std::ranges::find(groups, first, &ChannelGroup::name);
+  if (group != groups.end()) {
+    choice.group = static_cast<int>(group - groups.begin());
   } else if (colon == std::string_view::npos) {
     state = first;
   }
   const bool has_state = state.size() == 1 && state[0] >= '1' && state[0] < '1' + kStates;
   if (has_state) choice.state = state[0] - '1';
-  const bool whole = choice.finger >= 0 ? has_state || colon == std::string_view::npos
-                                        : has_state && colon == std::string_view::npos;
+  const bool whole = choice.group >= 0 ? has_state || colon == std::string_view::npos
+                                       : has_state && colon == std::string_view::npos;
   if (whole) return choice;
   return misuse("'" + std::string(text) +
-                "' names no tree; write all, a finger (middle), a state (4) or both (middle:4)");
+                "' names no tree; write all, a finger (middle) or group of joints, a state (4) or "
+                "both (middle:4)");
 }
 
 std::string trees_text(const GestureModel& model, const TreeChoice& choice) {

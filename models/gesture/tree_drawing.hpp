@@ -5,6 +5,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "models/gesture/gesture_model.hpp"
 #include "proto/frame/result.hpp"
@@ -12,11 +13,12 @@
 namespace posed::gesture {
 
 struct TreeChoice {
-  int state = -1, finger = -1;  // from 0; -1: all of them
+  int state = -1, group = -1;  // from 0; -1: all of them
 };
-// Parses "all", "middle" (all its states), "4" (state 4 of all fingers) or "middle:4"; anything
-// else is a usage error.
-[[nodiscard]] Result<TreeChoice> tree_choice(std::string_view text);
+// Parses "all", "middle" (all its states), "4" (state 4 of all groups) or "middle:4"; anything else
+// is a usage error. A body's groups have other names than fingers.
+[[nodiscard]] Result<TreeChoice> tree_choice(
+    std::string_view text, const std::vector<ChannelGroup>& groups = finger_groups());
 
 [[nodiscard]] std::string trees_text(const GestureModel& model, const TreeChoice& choice);
 [[nodiscard]] std::string trees_dot(const GestureModel& model, const TreeChoice& choice);

@@ -11,8 +11,8 @@ namespace posed::perform {
 double smallest_gap_m(const Performance& performance, const HandShape& shape) {
   const hand::HandGeometry geometry = hand::hand_geometry(shape);
   double gap_m = std::numeric_limits<double>::infinity();
-  for (const HandAngles& pose : performance.angles) {
-    gap_m = std::min(gap_m, hand::min_gap_m(geometry, pose));
+  for (const Pose& pose : performance.angles) {
+    gap_m = std::min(gap_m, hand::min_gap_m(geometry, hand_of(pose)));
   }
   return gap_m;
 }
@@ -22,7 +22,9 @@ ConstrainReport constrain(Performance& performance, const HandShape& shape) {
   report.before_m = smallest_gap_m(performance, shape);
   hand::ConstraintSolver solver(hand::hand_geometry(shape));
   for (std::size_t t = 0; t < performance.angles.size(); ++t) {
-    const auto step = solver.step(performance.angles[t], performance.variances[t]);
+    HandAngles pose = hand_of(performance.angles[t]);
+    const auto step = solver.step(pose, hand_of(performance.variances[t]));
+    performance.angles[t].assign(pose.begin(), pose.end());
     report.changed_rad = std::max(report.changed_rad, step.changed_rad);
   }
   report.min_gap_m = smallest_gap_m(performance, shape);

@@ -23,9 +23,9 @@ std::vector<PerformedState> plan(const trajectory::StateInformation& information
     if (cursor.frames_left == cursor.frames) {
       PerformedState& entered = states.emplace_back(
           PerformedState{script.context(cursor.position), cursor.state, start, cursor.frames, {}});
-      for (int f = 0; f < kFingers; ++f) {
-        entered.leaf[f] =
-            gesture::leaf_index(information.model(), cursor.state, f, entered.context);
+      for (int g = 0; g < std::ssize(information.model().groups); ++g) {
+        entered.leaf.push_back(
+            gesture::leaf_index(information.model(), cursor.state, g, entered.context));
       }
     }
     ++start;
@@ -33,35 +33,30 @@ std::vector<PerformedState> plan(const trajectory::StateInformation& information
   return states;
 }
 
-HandAngles angles_of(const double* row) {
-  HandAngles angles;
-  std::copy_n(row, kHandChannels, angles.begin());
-  return angles;
-}
-
-void solve_all(const std::vector<const double*>& frames, Performance& performance) {
+void solve_all(const std::vector<const double*>& frames, int channels, Performance& performance) {
   const auto count = static_cast<int>(frames.size());
-  trajectory::SlidingWindow window(kHandChannels, count);
+  trajectory::SlidingWindow window(channels, count);
   window.solve(frames);
-  constexpr int kStride = trajectory::padded(kHandChannels);
-  const auto variances = hwy::AllocateAligned<double>(frames.size() * kStride);
+  const auto variances = trajectory::make_rows(count, window.stride());
   window.variances(variances.get());
   for (int t = 0; t < count; ++t) {
-    performance.angles.push_back(angles_of(window.x(t)));
-    performance.variances.push_back(
-        angles_of(variances.get() + static_cast<std::ptrdiff_t>(t) * kStride));
+    const double* const variance =
+        variances.get() + static_cast<std::ptrdiff_t>(t) * window.stride();
+    performance.angles.emplace_back(window.x(t), window.x(t) + channels);
+    performance.variances.emplace_back(variance, variance + channels);
   }
 }
 
-void solve_with_lag(const std::vector<const double*>& frames, int lag, Performance& performance) {
-  trajectory::FixedLag stream(kHandChannels, lag);
-  trajectory::InformationForm out(kHandChannels, 1);
+void solve_with_lag(const std::vector<const double*>& frames, int channels, int lag,
+                    Performance& performance) {
+  trajectory::FixedLag stream(channels, lag);
+  trajectory::InformationForm out(channels, 1);
   double* x = out.row(0, trajectory::kPosition);
   double* variance = out.row(0, trajectory::kPositionMean);
   const auto give = [&](int back) {
     stream.estimate(back, x, variance);
-    performance.angles.push_back(angles_of(x));
-    performance.variances.push_back(angles_of(variance));
+    performance.angles.emplace_back(x, x + channels);
+    performance.variances.emplace_back(variance, variance + channels);
   };
   for (const double* frame : frames) {
     stream.push(frame);
@@ -73,6 +68,12 @@ void solve_with_lag(const std::vector<const double*>& frames, int lag, Performan
 }
 
 }  // namespace
+
+HandAngles hand_of(const Pose& pose) {
+  HandAngles angles;
+  std::copy_n(pose.begin(), angles.size(), angles.begin());
+  return angles;
+}
 
 Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::string_view text) {
   std::vector<int> labels;
@@ -99,7 +100,8 @@ Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::stri
 Performance perform(const trajectory::StateInformation& information, std::span<const int> labels,
                     const PerformOptions& options) {
   Performance performance{information.rate_hz(), plan(information, labels, options.tempo), {}, {}};
-  trajectory::InformationForm rows(kHandChannels, static_cast<int>(performance.states.size()));
+  const int channels = information.model().channels();
+  trajectory::InformationForm rows(channels, static_cast<int>(performance.states.size()));
   std::vector<const double*> frames;
   for (std::size_t i = 0; i < performance.states.size(); ++i) {
     const PerformedState& state = performance.states[i];
@@ -109,9 +111,9 @@ Performance perform(const trajectory::StateInformation& information, std::span<c
                   rows.frame(static_cast<int>(i)));
   }
   if (options.look_ahead) {
-    solve_with_lag(frames, *options.look_ahead, performance);
+    solve_with_lag(frames, channels, *options.look_ahead, performance);
   } else {
-    solve_all(frames, performance);
+    solve_all(frames, channels, performance);
   }
   if (options.global_variance) restore_variance(information.model(), performance);
   return performance;

@@ -3,7 +3,6 @@
 // solver as the player. Cold.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -26,15 +25,20 @@ struct PerformedState {
   int state = 0;  // 0 to 4
   int start = 0;  // first frame
   int frames = 0;
-  std::array<int, kFingers> leaf{};  // leaf index of each finger's tree
+  std::vector<int> leaf{};  // [group] leaf index of the group's tree
 };
+
+using Pose = std::vector<double>;  // [channel of the model]
 
 struct Performance {
   double rate_hz = 0.0;
   std::vector<PerformedState> states;
-  std::vector<HandAngles> angles;     // [frame], rad
-  std::vector<HandAngles> variances;  // of each angle, rad^2
+  std::vector<Pose> angles;     // [frame], rad
+  std::vector<Pose> variances;  // of each angle, rad^2
 };
+
+// A pose, or its variances, of a model of hands.
+[[nodiscard]] HandAngles hand_of(const Pose& pose);
 
 // Converts words separated by blanks into label indices. Returns an error for an empty text and for
 // words that are not labels of the model; the error lists the labels.

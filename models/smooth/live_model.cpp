@@ -95,6 +95,12 @@ Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& mod
                     " is none: give the stream a hand, or leave the model out",
                 name);
   }
+  if (!model.is_hand()) {
+    return fail(
+        "the model is of a body, and live streams follow models of hands only; perform it "
+        "into a file with `posed synth`",
+        name);
+  }
   auto live = std::make_unique<LiveModel>();
   live->rate_hz = model.rate_hz;
   live->skeleton = skeleton.id;

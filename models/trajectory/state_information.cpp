@@ -27,14 +27,15 @@ StateInformation::StateInformation(std::shared_ptr<const gesture::GestureModel> 
     : model_(std::move(model)), rate_hz_(rate_hz) {
   const WindowScale scale = scale_of(rate_hz_ / model_->rate_hz);
   for (int s = 0; s < kStates; ++s) {
-    for (int f = 0; f < kFingers; ++f) {
-      for (const gesture::FingerGaussian& leaf : model_->trees[s][f].leaves) {
-        FingerRows& rows = leaves_[s][f].emplace_back();
+    for (const auto& tree : model_->trees[s]) {
+      std::vector<GroupRows>& group = leaves_[s].emplace_back();
+      for (const gesture::GroupGaussian& leaf : tree.leaves) {
+        GroupRows& rows = group.emplace_back();
         for (int w = 0; w < kDeltaWindows; ++w) {
-          for (int c = 0; c < kFingerChannels; ++c) {
+          for (std::size_t c = 0; c < leaf.mean[w].size(); ++c) {
             const double precision = 1.0 / (scale.variance[w] * leaf.variance[w][c]);
-            rows[2 * w][c] = precision;
-            rows[2 * w + 1][c] = precision * scale.mean[w] * leaf.mean[w][c];
+            rows[2 * w].push_back(precision);
+            rows[2 * w + 1].push_back(precision * scale.mean[w] * leaf.mean[w][c]);
           }
         }
       }
@@ -44,16 +45,16 @@ StateInformation::StateInformation(std::shared_ptr<const gesture::GestureModel> 
 
 // RT-safe.
 void StateInformation::fill(const Context& context, int state, double* rows) const noexcept {
-  constexpr int kStride = padded(kHandChannels);
-  for (int f = 0; f < kFingers; ++f) {
-    const FingerRows& leaf = leaves_[state][f][gesture::leaf_index(*model_, state, f, context)];
-    for (int r = 0; r < kRows; ++r) {
-      std::ranges::copy(leaf[r], rows + r * kStride + f * kFingerChannels);
-    }
+  const int channels = model_->channels();
+  const int stride = padded(channels);
+  for (int g = 0; g < std::ssize(model_->groups); ++g) {
+    const GroupRows& leaf = leaves_[state][g][gesture::leaf_index(*model_, state, g, context)];
+    const int first = model_->groups[g].first;
+    for (int r = 0; r < kRows; ++r) std::ranges::copy(leaf[r], rows + r * stride + first);
   }
   for (int r = 0; r < kRows; ++r) {
     const double padding = r == kPosition ? 1.0 : 0.0;
-    std::fill(rows + r * kStride + kHandChannels, rows + (r + 1) * kStride, padding);
+    std::fill(rows + r * stride + channels, rows + (r + 1) * stride, padding);
   }
 }
 

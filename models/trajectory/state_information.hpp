@@ -20,8 +20,8 @@ class StateInformation {
  public:
   StateInformation(std::shared_ptr<const gesture::GestureModel> model, double rate_hz);
 
-  // Writes the kRows rows (stride padded(kHandChannels)) of one frame in `state` (from 0) of a
-  // gesture. RT-safe.
+  // Writes the kRows rows (stride padded(channels of the model)) of one frame in `state` (from 0)
+  // of a gesture. RT-safe.
   void fill(const gesture::Context& context, int state, double* rows) const noexcept;
 
   // Durations in frames of rate_hz(). RT-safe.
@@ -31,11 +31,12 @@ class StateInformation {
   [[nodiscard]] double rate_hz() const noexcept { return rate_hz_; }
 
  private:
-  using FingerRows = std::array<std::array<double, kFingerChannels>, kRows>;
+  using GroupRows = std::array<std::vector<double>, kRows>;  // [row][channel of the group]
 
   std::shared_ptr<const gesture::GestureModel> model_;
   double rate_hz_;
-  std::array<std::array<std::vector<FingerRows>, kFingers>, gesture::kStates> leaves_;
+  // [state][group][leaf]
+  std::array<std::vector<std::vector<GroupRows>>, gesture::kStates> leaves_;
 };
 
 }  // namespace posed::trajectory

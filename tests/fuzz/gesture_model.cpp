@@ -22,8 +22,8 @@ void walk_all(const GestureModel& model) {
     const Context context{number % labels, number / labels % labels, number / labels / labels};
     double sum = duration(model, context).mean[0];
     for (int state = 0; state < kStates; ++state) {
-      for (int finger = 0; finger < posed::kFingers; ++finger) {
-        sum += leaf(model, state, finger, context).mean[0][0];
+      for (int group = 0; group < std::ssize(model.groups); ++group) {
+        sum += leaf(model, state, group, context).mean[0][0];
       }
     }
     if (!(sum < 1e300)) std::abort();

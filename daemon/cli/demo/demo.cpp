@@ -23,6 +23,7 @@
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/live_table.hpp"
 #include "daemon/cli/live/page.hpp"
+#include "daemon/cli/models/gesture_data.hpp"
 #include "daemon/cli/models/train_gesture.hpp"
 #include "daemon/cli/models/train_style.hpp"
 #include "daemon/cli/output_files.hpp"

@@ -5,21 +5,25 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
-#include "daemon/cli/models/train_gesture.hpp"
+#include "daemon/cli/models/gesture_data.hpp"
 #include "daemon/cli/models/waiting.hpp"
 #include "models/gesture/auto_label.hpp"
+#include "models/gesture/movement_label.hpp"
 #include "proto/clip/label_file.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 
 int auto_label(const AutoLabelOptions& options) {
+  const bool one_movement = !options.movement.empty();
   const auto recording =
-      load_recording(options.clip, options.examples, options.rate_hz, options.read);
+      one_movement ? load_unlabelled(options.clip, options.body, options.rate_hz, options.read)
+                   : load_recording(options.clip, options.examples, options.rate_hz, options.read);
   if (!recording) return report(recording.error());
   const auto proposed = [&] {
     const Waiting waiting("proposing labels");
-    return gesture::propose_segments(*recording);
+    return one_movement ? gesture::propose_movement(*recording, options.movement, options.rest)
+                        : gesture::propose_segments(*recording);
   }();
   if (!proposed) return report(proposed.error());
   std::vector<clip::LabelSegment> labels;
@@ -35,6 +39,9 @@ int auto_label(const AutoLabelOptions& options) {
     const nlohmann::json counts{
         {"examples", examples}, {"segments", labels.size()}, {"out", options.out.string()}};
     std::printf("%s\n", json_text(counts, 2).c_str());
+  } else if (one_movement) {
+    std::printf("%zu segments proposed, written to %s; look through them\n", labels.size(),
+                options.out.c_str());
   } else {
     std::printf(
         "%zu segments proposed from %zu examples, written to %s; look through them, two "

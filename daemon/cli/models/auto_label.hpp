@@ -1,15 +1,20 @@
 // `posed train gesture --auto-label`: proposes labels for a recording of which few parts are
-// labelled.
+// labelled, or which is a single movement.
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "proto/clip/clip.hpp"
 
 namespace posed::cli {
 
+inline constexpr const char* kDefaultRest = "rest";
+
 struct AutoLabelOptions {
   std::filesystem::path clip, examples, out;
+  std::string movement, rest;  // of a take without examples
+  bool body;                   // such a take is of a body
   double rate_hz;
   clip::ReadOptions read;
   bool json;

@@ -11,9 +11,9 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
+#include "daemon/cli/models/gesture_data.hpp"
 #include "daemon/cli/models/gesture_report.hpp"
 #include "daemon/cli/models/lag_curve.hpp"
-#include "daemon/cli/models/train_gesture.hpp"
 #include "daemon/cli/models/tree_options.hpp"
 #include "daemon/cli/models/waiting.hpp"
 #include "daemon/cli/output_files.hpp"
@@ -48,7 +48,9 @@ struct EvalGestureOptions {
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
-motion::Rows degrees_of(const std::vector<HandAngles>& angles) {
+// Of poses of a hand, recorded or performed.
+template <typename Poses>
+motion::Rows degrees_of(const Poses& angles) {
   motion::Rows rows(static_cast<Eigen::Index>(angles.size()), kHandChannels);
   for (Eigen::Index t = 0; t < rows.rows(); ++t) {
     rows.row(t) = kDegrees * Eigen::Map<const Eigen::RowVectorXd>(
@@ -188,6 +190,12 @@ Result<json> evaluate_gesture(const EvalGestureOptions& options) {
   if (auto checked = files.check(); !checked) return std::unexpected(checked.error());
   auto model = gesture::load_model(options.model);
   if (!model) return std::unexpected(model.error());
+  if (!model->is_hand()) {
+    return misuse(
+        "the model is of a body, and the figures are of hands; perform it with `posed "
+        "synth` and measure that with `posed eval natural`",
+        options.model);
+  }
   if (auto drawn = draw_trees(*model, *options.trees); !drawn) {
     return std::unexpected(drawn.error());
   }

@@ -123,7 +123,8 @@ report::Figure GestureFigures::strip() const {
     const int held = range_of(performance, k, kHoldStart, kHoldEnd).middle();
     for (const auto& [frame, words] : {std::pair(moving, "to " + label), std::pair(held, label)}) {
       row.poses.push_back(
-          {.figure = pose(performance.angles[static_cast<std::size_t>(frame)]), .caption = words});
+          {.figure = pose(perform::hand_of(performance.angles[static_cast<std::size_t>(frame)])),
+           .caption = words});
     }
   }
   std::string never;
@@ -204,7 +205,7 @@ std::optional<report::Figure> GestureFigures::unseen(const gesture::FeatureMatri
   for (std::size_t k = 0; k < labels_.size(); ++k) {
     if (model_->labels[static_cast<std::size_t>(labels_[k])].trained) continue;
     const int held = range_of(performance, k, kHoldStart, kHoldEnd).middle();
-    const HandAngles& angles = performance.angles[static_cast<std::size_t>(held)];
+    const HandAngles angles = perform::hand_of(performance.angles[static_cast<std::size_t>(held)]);
     const Eigen::Map<const Eigen::RowVectorXd> wanted(angles.data(), kHandChannels);
     Eigen::Index at = 0;
     const double squares = (poses.rowwise() - wanted).rowwise().squaredNorm().minCoeff(&at);
@@ -252,11 +253,11 @@ std::vector<report::Figure> GestureFigures::trees() const {
   };
   std::vector<report::Figure> figures{
       report::decision_trees("The decision tree of the middle finger in state 4",
-                             drawn({.state = kFourth, .finger = kMiddle}), false)};
+                             drawn({.state = kFourth, .group = kMiddle}), false)};
   for (int f = 0; f < kFingers; ++f) {
     figures.push_back(report::decision_trees(
         fmt::format("All trees of the {} finger", kFingerNames[static_cast<std::size_t>(f)]),
-        drawn({.state = -1, .finger = f}), true));
+        drawn({.state = -1, .group = f}), true));
   }
   return figures;
 }

@@ -10,16 +10,14 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/models/auto_label.hpp"
+#include "daemon/cli/models/gesture_data.hpp"
 #include "daemon/cli/models/gesture_figures.hpp"
 #include "daemon/cli/models/gesture_report.hpp"
-#include "daemon/cli/models/question_file.hpp"
 #include "daemon/cli/models/tree_options.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/fixed_products.hpp"
 #include "models/gesture/model_file.hpp"
-#include "proto/clip/hand_clip.hpp"
-#include "proto/frame/label.hpp"
 
 namespace posed::cli {
 namespace {
@@ -33,26 +31,41 @@ constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture \
       --tree-svg tree.svg --trees middle:4
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture --report hand.html
+  posed train gesture --clip left.bvh right.bvh --labels left.lab right.lab \
+      --questions config/gestures/raise-arms.toml --out body.gesture
 
 A label file has a line per gesture, `start end name`, in seconds from the first frame (or HTK's
 100 ns). Label two gestures of each name by hand and let posed propose the rest:
-  posed train gesture --auto-label --clip take1.csv --labels few.lab --out take1.lab)";
+  posed train gesture --auto-label --clip take1.csv --labels few.lab --out take1.lab
 
-struct TrainGestureOptions {
-  std::vector<std::string> clips, labels, shows;
-  std::string questions, propose, out, report;
-  std::string hand;  // which hand of a body
-  double rate_hz = 30.0;
+A body's questions file says which joints stand together as a finger's do; --body takes groups and
+classes from the clips. A take of one movement, from rest and back to it, labels itself:
+  posed train gesture --auto-label --movement raise-left --body --clip left.bvh --out left.lab)";
+
+struct TrainGestureOptions : GestureSources {
+  std::string out, report;
+  std::string hand;                             // which of two hands in a clip
+  std::string movement, resting{kDefaultRest};  // of a take that labels itself
   int embedded_rounds = 0;
   bool auto_label = false;
   bool overwrite = false, json = false;
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
+constexpr int kWide = 10;  // letters of a column
+
 // --auto-label trains nothing, so options about the training are refused.
 Result<> check_auto_label(const TrainGestureOptions& options) {
   if (options.clips.size() != 1) {
     return misuse("--auto-label proposes labels for one clip at a time");
+  }
+  if (options.movement.empty() == options.labels.empty()) {
+    return misuse(
+        "--auto-label takes examples of all labels from --labels, or names a take's one movement "
+        "with --movement");
+  }
+  if (options.movement.empty() && options.body) {
+    return misuse("--auto-label from examples is for hands; name the take's movement: --movement");
   }
   const bool draws =
       !options.trees->text.empty() || !options.trees->dot.empty() || !options.trees->svg.empty();
@@ -77,17 +90,23 @@ std::vector<std::filesystem::path> inputs_of(const TrainGestureOptions& options)
 }
 
 Result<> check(const TrainGestureOptions& options) {
-  if (options.clips.size() != options.labels.size()) {
+  if (options.movement.empty() && options.clips.size() != options.labels.size()) {
     return misuse("name one label file for each clip: --clip A.csv B.csv --labels A.lab B.lab");
   }
   if (!options.questions.empty() && !options.propose.empty()) {
     return misuse("--propose-questions makes the classes that --questions reads; name one of them");
   }
-  OutputFiles files(options.overwrite);
-  if (auto trees = check_tree_options(*options.trees, files); !trees) return trees;
-  files.reads_all(inputs_of(options));
   if (options.auto_label) {
     if (auto useful = check_auto_label(options); !useful) return useful;
+  } else if (!options.movement.empty()) {
+    return misuse("--movement labels a take; add --auto-label");
+  }
+  OutputFiles files(options.overwrite);
+  const auto groups = groups_of(options);
+  if (!groups) return std::unexpected(groups.error());
+  if (auto trees = check_tree_options(*options.trees, files, *groups); !trees) return trees;
+  files.reads_all(inputs_of(options));
+  if (options.auto_label) {
     return files.writes_any_but_other(options.out, {".lab"}).check();
   }
   return files.writes_any_but_other(options.propose, {".toml"})
@@ -96,86 +115,38 @@ Result<> check(const TrainGestureOptions& options) {
       .check();
 }
 
-clip::ReadOptions read_options(const std::string& hand) {
-  clip::ReadOptions read;
-  if (!hand.empty()) read.hand = side_named(hand);
-  return read;
-}
-
-// "ok=ok_pose.csv": the pose is the mean of the clip.
-Result<gesture::LabelPose> shown_pose(const std::string& show, const TrainGestureOptions& options) {
-  const auto equals = show.find('=');
-  if (equals == std::string::npos || !is_label_name(std::string_view(show).substr(0, equals))) {
-    return misuse("'" + show +
-                  "' shows no pose; write --show NAME=POSE.csv, NAME of 1 to 15 signs");
-  }
-  const auto clip = clip::read_hand_clip(show.substr(equals + 1), read_options(options.hand));
-  if (!clip) return std::unexpected(clip.error());
-  const auto recording = gesture::recording_of(*clip, options.rate_hz);
-  if (!recording) return std::unexpected(recording.error());
-  gesture::LabelPose pose{show.substr(0, equals), {}};
-  const Eigen::RowVectorXd mean = recording->angles_rad.colwise().mean();
-  std::copy(mean.begin(), mean.end(), pose.angles_rad.begin());
-  return pose;
-}
-
-// The classes of all labels: from the file, proposed, or built in; then the poses given by clips.
-Result<std::vector<gesture::Label>> classes(const TrainGestureOptions& options,
-                                            const std::vector<gesture::Recording>& recordings,
-                                            const Ranks& ranks) {
-  std::vector<gesture::Label> labels = gesture::built_in_labels();
-  const auto poses = gesture::label_poses(recordings);
-  if (!options.questions.empty()) {
-    auto read = read_questions(options.questions);
-    if (!read) return read;
-    labels = std::move(*read);
-  } else if (!options.propose.empty()) {
-    labels = gesture::propose_labels(poses);
-    const auto written = ranks.leads() ? write_questions(labels, options.propose) : Result<>{};
-    if (!written) return std::unexpected(written.error());
-  }
-  for (const std::string& show : options.shows) {
-    const auto shown = shown_pose(show, options);
-    if (!shown) return std::unexpected(shown.error());
-    const gesture::Label label = gesture::label_like(*shown, poses, labels);
-    std::erase_if(labels, [&](const gesture::Label& known) { return known.name == label.name; });
-    labels.push_back(label);
-  }
-  return labels;
-}
-
-void print_gesture_summary(const json& report, const std::string& out) {
+void print_gesture_summary(const json& report, const TrainGestureOptions& options) {
   std::printf("%d gestures, %d frames, %d contexts, %d moving channels; leaves a state:\n",
               report["gestures"].get<int>(), report["frames"].get<int>(),
               report["contexts"].get<int>(), report["moving_channels"].get<int>());
+  const auto& groups = report["groups"];
   std::printf("%-8s", "state");
-  for (const auto finger : kFingerNames) std::printf("%8s", std::string(finger).c_str());
+  for (const json& group : groups) std::printf("%*s", kWide, group.get<std::string>().c_str());
   for (const json& state : report["leaves_by_state"]) {
     std::printf("\n%-8d", state["state"].get<int>());
-    for (const auto finger : kFingerNames) {
-      std::printf("%8d", state[std::string(finger)].get<int>());
+    for (const json& group : groups) {
+      std::printf("%*d", kWide, state[group.get<std::string>()].get<int>());
     }
   }
-  std::printf("\n%d leaves in 25 trees, %d of durations\n", report["leaves"].get<int>(),
-              report["duration_leaves"].get<int>());
-  std::printf(
-      "%s written after %.2f s; try: posed synth --model %s --labels \"g 1 c 3 4 p\" "
-      "--out hand.csv\n",
-      out.c_str(), report["seconds"].get<double>(), out.c_str());
+  std::printf("\n%d leaves in %zu trees, %d of durations\n", report["leaves"].get<int>(),
+              gesture::kStates * groups.size(), report["duration_leaves"].get<int>());
+  std::string labels;
+  for (const json& label : report["labels"]) labels += " " + label["name"].get<std::string>();
+  std::printf("%s written after %.2f s; try: posed synth --model %s --labels \"%s\" --out %s\n",
+              options.out.c_str(), report["seconds"].get<double>(), options.out.c_str(),
+              labels.substr(1).c_str(),
+              report["body"].get<bool>() ? "body.bvh --body A_CLIP.bvh" : "hand.csv");
 }
 
 Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
-  std::vector<gesture::Recording> recordings;
-  for (std::size_t i = 0; i < options.clips.size(); ++i) {
-    auto recording = load_recording(options.clips[i], options.labels[i], options.rate_hz,
-                                    read_options(options.hand));
-    if (!recording) return std::unexpected(recording.error());
-    recordings.push_back(std::move(*recording));
+  auto data = read_gesture_data(options, ranks.leads());
+  if (!data) return std::unexpected(data.error());
+  const std::vector<gesture::Recording>& recordings = data->recordings;
+  if (!options.report.empty() && !data->vocabulary.is_hand()) {
+    return misuse("--report draws the gestures of hands; leave it out for a body");
   }
-  auto labels = classes(options, recordings, ranks);
-  if (!labels) return std::unexpected(labels.error());
   gesture::TrainOptions train_options;
-  train_options.labels = std::move(*labels);
+  train_options.vocabulary = std::move(data->vocabulary);
   train_options.embedded_rounds = options.embedded_rounds;
   auto training = train_gesture_and_save(recordings, std::move(train_options), options.out, ranks);
   if (!training) return std::unexpected(training.error());
@@ -184,6 +155,8 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   json report = json::parse(training->model.report_json);
   report["seconds"] = training->seconds;
   report["out"] = options.out;
+  report["body"] = !training->model.is_hand();
+  for (const auto& group : training->model.groups) report["groups"].push_back(group.name);
   const std::size_t warnings = report["warnings"].size();
   report["verdict"] = warnings == 0 ? "good: these recordings show no problem with the model"
                                     : "usable with care: " + std::to_string(warnings) +
@@ -207,8 +180,15 @@ int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
   }
   if (options.auto_label) {
     if (!ranks.leads()) return 0;  // there is nothing to share, so nothing has to be the same
-    return auto_label({options.clips[0], options.labels[0], options.out, options.rate_hz,
-                       read_options(options.hand), options.json});
+    return auto_label({.clip = options.clips[0],
+                       .examples = options.labels.empty() ? "" : options.labels[0],
+                       .out = options.out,
+                       .movement = options.movement,
+                       .rest = options.resting,
+                       .body = options.body,
+                       .rate_hz = options.rate_hz,
+                       .read = options.read,
+                       .json = options.json});
   }
   if (auto same = ranks.check_same(inputs_of(options)); !same) return report(same.error());
   const auto trained = train_gesture(options, ranks);
@@ -219,7 +199,7 @@ int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
   if (options.json) {
     std::printf("%s\n", trained->dump(2).c_str());
   } else {
-    print_gesture_summary(*trained, options.out);
+    print_gesture_summary(*trained, options);
   }
   std::fflush(stdout);
   std::fprintf(stderr, "posed: %s\n", (*trained)["verdict"].get<std::string>().c_str());
@@ -227,24 +207,6 @@ int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
 }
 
 }  // namespace
-
-Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
-                                          const std::filesystem::path& labels, double rate_hz,
-                                          const clip::ReadOptions& read) {
-  const auto hand = clip::read_hand_clip(clip, read);
-  if (!hand) return std::unexpected(hand.error());
-  for (const std::string& warning : hand->warnings) {
-    std::fprintf(stderr, "posed: warning: %s: %s\n", clip.c_str(), warning.c_str());
-  }
-  auto recording = gesture::recording_of(*hand, rate_hz);
-  if (!recording) return std::unexpected(recording.error());
-  const auto segments = clip::read_labels(labels);
-  if (!segments) return std::unexpected(segments.error());
-  if (auto done = gesture::cut(*recording, *segments, labels.string()); !done) {
-    return std::unexpected(done.error());
-  }
-  return recording;
-}
 
 Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Recording>& recordings,
                                                gesture::TrainOptions options,
@@ -266,15 +228,21 @@ Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Record
 void add_train_gesture(CLI::App& train_command, int& exit_code,
                        const std::shared_ptr<Ranks>& ranks) {
   CLI::App* command =
-      train_command.add_subcommand("gesture", "Learn a hand's gestures from labelled recordings");
+      train_command.add_subcommand("gesture", "Learn gestures from labelled recordings");
   command->footer(kTrainGestureFooter);
   const auto options = std::make_shared<TrainGestureOptions>();
-  command->add_option("--clip", options->clips, "Hand recordings (CSV, or BVH with fingers)")
+  command
+      ->add_option("--clip", options->clips,
+                   "Recordings of a hand (CSV, or BVH with fingers) or a body (BVH, AMC)")
       ->required();
-  command->add_option("--labels", options->labels, "Their label files, in the same order")
-      ->required();
+  command->add_option("--labels", options->labels, "Their label files, in the same order");
   command->add_option("--questions", options->questions,
-                      "TOML file of the fingers' classes; without it the set g c p 1 3 4");
+                      "TOML file of the classes of fingers, or of groups of a body's joints; "
+                      "without it the set g c p 1 3 4");
+  command->add_option("--hand", options->hand, "left or right, where a clip has both")
+      ->check(CLI::IsMember({"left", "right"}));
+  command->add_flag("--body", options->body,
+                    "The clips are of a body; groups and classes are proposed from them");
   command->add_option("--propose-questions", options->propose,
                       "Sort the recorded gestures into classes, write them here and use them");
   command->add_option("--show", options->shows,
@@ -289,13 +257,19 @@ void add_train_gesture(CLI::App& train_command, int& exit_code,
       ->capture_default_str();
   command->add_flag("--auto-label", options->auto_label,
                     "Train nothing: propose labels from few examples and write them to --out");
+  command->add_option(
+      "--movement", options->movement,
+      "With --auto-label: the take is one movement of this name, from rest to rest");
+  command->add_option("--rest", options->resting, "The label of its rest")->capture_default_str();
   add_tree_options(*command, options->trees);
   command->add_option("--out", options->out, "Where to write the model")->required();
   add_report_option(*command, options->report);
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
-  command->callback(
-      [options, ranks, &exit_code] { exit_code = train_or_report(*options, *ranks); });
+  command->callback([options, ranks, &exit_code] {
+    if (!options->hand.empty()) options->read.hand = side_named(options->hand);
+    exit_code = train_or_report(*options, *ranks);
+  });
 }
 
 }  // namespace posed::cli

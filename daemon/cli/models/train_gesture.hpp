@@ -10,16 +10,9 @@
 #include "daemon/cli/models/ranks.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/train.hpp"
-#include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::cli {
-
-// A clip with its labels, resampled to the training rate.
-[[nodiscard]] Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
-                                                        const std::filesystem::path& labels,
-                                                        double rate_hz,
-                                                        const clip::ReadOptions& read = {});
 
 struct GestureTraining {
   gesture::GestureModel model;

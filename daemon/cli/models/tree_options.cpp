@@ -31,8 +31,9 @@ void add_tree_options(CLI::App& command, const std::shared_ptr<TreeOptions>& opt
       [options](const std::string&) { options->which_given = true; });
 }
 
-Result<> check_tree_options(const TreeOptions& options, OutputFiles& files) {
-  auto choice = gesture::tree_choice(options.which);
+Result<> check_tree_options(const TreeOptions& options, OutputFiles& files,
+                            const std::vector<gesture::ChannelGroup>& groups) {
+  auto choice = gesture::tree_choice(options.which, groups);
   if (!choice) return std::unexpected(choice.error());
   if (options.which_given && options.text.empty() && options.dot.empty() && options.svg.empty()) {
     return misuse("--trees says which trees to draw; add --tree-text, --tree-dot or --tree-svg");
@@ -45,7 +46,7 @@ Result<> check_tree_options(const TreeOptions& options, OutputFiles& files) {
 }
 
 Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options) {
-  const auto choice = gesture::tree_choice(options.which);
+  const auto choice = gesture::tree_choice(options.which, model.groups);
   if (!choice) return std::unexpected(choice.error());
   using Draw = std::string (*)(const gesture::GestureModel&, const gesture::TreeChoice&);
   const std::pair<const std::string&, Draw> drawings[]{{options.text, gesture::trees_text},

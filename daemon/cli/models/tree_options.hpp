@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "daemon/cli/output_files.hpp"
 #include "models/gesture/gesture_model.hpp"
@@ -22,9 +23,11 @@ struct TreeOptions {
 
 void add_tree_options(CLI::App& command, const std::shared_ptr<TreeOptions>& options);
 
-// Checks that `which` names trees, and that they are drawn somewhere if it is given; adds the
-// drawings to `files`. Call before long work.
-[[nodiscard]] Result<> check_tree_options(const TreeOptions& options, OutputFiles& files);
+// Checks that `which` names trees of these groups, and that they are drawn somewhere if it is
+// given; adds the drawings to `files`. Call before long work.
+[[nodiscard]] Result<> check_tree_options(
+    const TreeOptions& options, OutputFiles& files,
+    const std::vector<gesture::ChannelGroup>& groups = gesture::finger_groups());
 [[nodiscard]] Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options);
 
 }  // namespace posed::cli

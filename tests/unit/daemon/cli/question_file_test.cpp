@@ -35,25 +35,28 @@ Error refusal(const char* from, const char* to) {
 }  // namespace
 
 TEST_CASE("The sample questions are the built-in set", "[questions]") {
-  const auto labels = read_questions(kSample);
-  REQUIRE(labels.has_value());
+  const auto read = read_questions(kSample);
+  REQUIRE(read.has_value());
+  CHECK(read->is_hand());
+  const std::vector<gesture::Label>* const labels = &read->labels;
   CHECK(labels->size() == gesture::built_in_labels().size());
   for (const gesture::Label& built_in : gesture::built_in_labels()) {
     const auto same = std::ranges::find(*labels, built_in.name, &gesture::Label::name);
     REQUIRE(same != labels->end());
-    CHECK(same->finger_class == built_in.finger_class);
+    CHECK(same->group_class == built_in.group_class);
   }
 }
 
 TEST_CASE("Written questions read back", "[questions]") {
   const test::TempFolder folder;
-  std::vector<gesture::Label> labels = gesture::built_in_labels();
+  gesture::Vocabulary vocabulary = gesture::built_in_vocabulary();
+  std::vector<gesture::Label>& labels = vocabulary.labels;
   labels[2].name = "\"\\,";
-  REQUIRE(write_questions(labels, folder.path() / "q.toml").has_value());
+  REQUIRE(write_questions(vocabulary, folder.path() / "q.toml").has_value());
   const auto read = read_questions(folder.path() / "q.toml");
   REQUIRE(read.has_value());
   const auto sorted = gesture::labels_of(gesture::lists_of(labels));
-  CHECK(gesture::lists_of(*read) == gesture::lists_of(sorted.value()));
+  CHECK(gesture::lists_of(read->labels) == gesture::lists_of(sorted.value()));
 }
 
 TEST_CASE("Invalid questions are refused", "[questions]") {
@@ -67,4 +70,57 @@ TEST_CASE("Invalid questions are refused", "[questions]") {
   CHECK(refusal("A = \\[\"g\"", "A = \\[7").line > 0);
   CHECK(refusal("A = ", "A = = ").message.find("not TOML") != std::string::npos);
   CHECK_FALSE(read_questions("none.toml").has_value());
+}
+
+namespace {
+
+// The groups of raised arms, with a text in place of another.
+Result<gesture::Vocabulary> arms_with(const char* from, const char* to) {
+  const test::TempFolder folder;
+  std::ifstream stream(test::source_dir() / "config/gestures/raise-arms.toml");
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  return read_questions(folder.write("arms.toml", std::regex_replace(text, std::regex(from), to)));
+}
+
+std::string arms_refusal(const char* from, const char* to) {
+  const auto read = arms_with(from, to);
+  return read ? "" : read.error().text();
+}
+
+}  // namespace
+
+TEST_CASE("The groups of a body are read, and read back as written", "[questions]") {
+  const auto read = arms_with("\\[head\\]", "named = [\"rest\"]\n[head]");
+  REQUIRE(read.has_value());
+  REQUIRE_FALSE(read->is_hand());
+  REQUIRE(read->groups.size() == 5);
+  CHECK(read->groups[1].name == "left-arm");
+  CHECK(read->groups[1].classes == 2);
+  CHECK(read->groups[4].classes == 1);
+  CHECK(read->named == std::vector<int>{read->label_index("rest")});
+  const int both = read->label_index("raise-both");
+  REQUIRE(both >= 0);
+  CHECK(read->labels[static_cast<std::size_t>(both)].group_class ==
+        std::vector<int>{0, 1, 0, 1, 0});
+  const test::TempFolder folder;
+  REQUIRE(write_questions(*read, folder.path() / "q.toml").has_value());
+  const auto again = read_questions(folder.path() / "q.toml");
+  REQUIRE(again.has_value());
+  CHECK(again->body->joints == read->body->joints);
+  CHECK(gesture::lists_of(again->labels, again->groups) ==
+        gesture::lists_of(read->labels, read->groups));
+}
+
+TEST_CASE("Groups of a body that are wrong are refused", "[questions]") {
+  const auto tells = [](const std::string& text, const char* what) {
+    UNSCOPED_INFO(text);
+    return text.find(what) != std::string::npos && text.find("arms.toml") != std::string::npos;
+  };
+  CHECK(tells(arms_refusal("joints = \\[\"spine\", \"chest\"\\]", ""),
+              "group 'trunk' has no joints"));
+  CHECK(tells(arms_refusal("\"chest\"", "\"head\""), "groups overlap: joint 'head'"));
+  CHECK(tells(arms_refusal("\"spine\"", "\"back\""), "'back', which is no bone"));
+  CHECK(tells(arms_refusal("B = \\[\"raise-left\"", "D = [\"raise-left\""), "unknown key"));
+  CHECK(tells(arms_refusal("B = \\[\"raise-left\", ", "B = ["), "in no class of the left-arm"));
+  CHECK(tells(arms_refusal("\\[head\\]", "named = [\"wave\"]\n[head]"), "named has 'wave'"));
 }

@@ -90,6 +90,6 @@ TEST_CASE("Numbers and labels that a lookup cannot use are refused", "[gesture_f
   CHECK(says(verdict([](auto& m) { m.labels.clear(); }), "the number of labels"));
   CHECK(says(verdict([](auto& m) { m.labels[1].name = "g"; }), "a label's name, which stands"));
   CHECK(says(verdict([](auto& m) { m.labels[1].name = "two words"; }), "a label's name"));
-  CHECK(says(verdict([](auto& m) { m.labels[1].finger_class[3] = 3; }), "a label's class"));
+  CHECK(says(verdict([](auto& m) { m.labels[1].group_class[3] = 3; }), "a label's class"));
   CHECK(says(verdict([](auto& m) { m.low[7] = 1; }), "the range of an angle"));
 }

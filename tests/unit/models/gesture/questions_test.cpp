@@ -10,8 +10,8 @@ using namespace posed::gesture;
 namespace {
 
 // The pose of the toy hand for a label's classes.
-LabelPose toy_pose(const std::string& name, const std::array<int, kFingers>& classes) {
-  LabelPose pose{name, {}};
+LabelPose toy_pose(const std::string& name, const std::vector<int>& classes) {
+  LabelPose pose{name, std::vector<double>(kHandChannels)};
   for (int f = 0; f < kFingers; ++f) {
     for (int joint = 0; joint < kFingerJoints; ++joint) {
       pose.angles_rad[f * kFingerChannels + 3 * joint] = test::toy_flexion(f, joint, classes[f]);
@@ -44,7 +44,7 @@ TEST_CASE("The built-in set is that of Takamido et al.", "[questions]") {
   for (const Label& label : built_in_labels()) {
     const auto same = std::ranges::find(*labels, label.name, &Label::name);
     REQUIRE(same != labels->end());
-    CHECK(same->finger_class == label.finger_class);
+    CHECK(same->group_class == label.group_class);
   }
 }
 
@@ -52,7 +52,7 @@ TEST_CASE("A label in no class or in two is refused", "[questions]") {
   ClassLists lists = lists_of(built_in_labels());
   std::erase(lists[3][0], "1");
   CHECK(refusal(lists) == "label '1' is in no class of the ring; add it to A, B or C of [ring]");
-  lists[3] = {{{"g", "1"}, {"c", "1"}, {"p", "3", "4"}}};
+  lists[3] = {{"g", "1"}, {"c", "1"}, {"p", "3", "4"}};
   CHECK(refusal(lists).find("'1' is in the classes A and B of the ring") != std::string::npos);
   lists[3][1] = {"c", "two words"};
   CHECK(refusal(lists).find("is no label") != std::string::npos);
@@ -63,12 +63,12 @@ TEST_CASE("Proposals sort fingers from closed to open", "[questions]") {
   poses.push_back(toy_pose("3", {0, 2, 2, 2, 0}));
   const auto labels = propose_labels(poses);
   REQUIRE(labels.size() == 4);
-  for (int f = 1; f < kFingers; ++f) CHECK(labels[0].finger_class[f] == 0);  // the fist is closed
-  CHECK(labels[2].finger_class == std::array<int, kFingers>{2, 2, 2, 2, 2});
-  CHECK(labels[3].finger_class == std::array<int, kFingers>{0, 2, 2, 2, 0});
+  for (int f = 1; f < kFingers; ++f) CHECK(labels[0].group_class[f] == 0);  // the fist is closed
+  CHECK(labels[2].group_class == std::vector<int>{2, 2, 2, 2, 2});
+  CHECK(labels[3].group_class == std::vector<int>{0, 2, 2, 2, 0});
   CHECK(labels_of(lists_of(labels)).has_value());
   // One label, and labels that look alike, are sorted too.
-  CHECK(propose_labels({poses[0]}).front().finger_class == std::array<int, kFingers>{});
+  CHECK(propose_labels({poses[0]}).front().group_class == std::vector<int>(kFingers));
   CHECK(propose_labels({poses[0], poses[0], poses[0]}).size() == 3);
 }
 
@@ -77,5 +77,5 @@ TEST_CASE("A pose shown once takes each finger's class from the nearest pose", "
   for (double& angle : shown.angles_rad) angle += 0.02;
   const Label label = label_like(shown, toy_poses(), built_in_labels());
   CHECK(label.name == "new");
-  CHECK(label.finger_class == std::array<int, kFingers>{0, 2, 1, 0, 2});
+  CHECK(label.group_class == std::vector<int>{0, 2, 1, 0, 2});
 }

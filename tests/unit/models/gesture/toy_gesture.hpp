@@ -19,9 +19,9 @@ inline double toy_flexion(int finger, int joint, int finger_class) {
 }
 
 // A tree of three leaves that asks for the current label's class only: A, B, else C.
-inline gesture::Tree<gesture::FingerGaussian> toy_tree(int state, int finger) {
+inline gesture::Tree<gesture::GroupGaussian> toy_tree(int state, int finger) {
   using namespace gesture;
-  Tree<FingerGaussian> tree;
+  Tree<GroupGaussian> tree;
   tree.nodes = {{kClasses + 0, 1, 2, -1},
                 {-1, -1, -1, 0},
                 {kClasses + 1, 3, 4, -1},
@@ -32,7 +32,9 @@ inline gesture::Tree<gesture::FingerGaussian> toy_tree(int state, int finger) {
   const double loose =
       state == 0 || state == 4 ? 9.0 : 1.0;  // the hand moves in the first and last state
   for (int leaf = 0; leaf < 3; ++leaf) {
-    FingerGaussian& gaussian = tree.leaves[leaf];
+    GroupGaussian& gaussian = tree.leaves[leaf];
+    gaussian.mean.fill(std::vector<double>(kFingerChannels));
+    gaussian.variance.fill(std::vector<double>(kFingerChannels));
     for (int c = 0; c < kFingerChannels; ++c) {
       const bool moves = c % 3 == 0;
       gaussian.mean[0][c] = moves ? toy_flexion(finger, c / 3, leaf) : 0.0;
@@ -54,7 +56,7 @@ inline gesture::GestureModel toy_gesture_model() {
                   {"3", {0, 2, 2, 2, 0}, false}, {"4", {0, 2, 2, 2, 2}, false}};
   for (int state = 0; state < kStates; ++state) {
     for (int finger = 0; finger < kFingers; ++finger) {
-      model.trees[state][finger] = toy_tree(state, finger);
+      model.trees[state].push_back(toy_tree(state, finger));
     }
   }
   // One question: scissors (c) last a little longer.
@@ -64,8 +66,8 @@ inline gesture::GestureModel toy_gesture_model() {
   model.durations.occupancy = {33.0, 67.0};
   for (int c = 0; c < kHandChannels; ++c) {
     const bool moves = c % 3 == 0;
-    model.low[c] = moves ? -0.1 : 0.0;
-    model.high[c] = moves ? 1.6 : 0.0;
+    model.low.push_back(moves ? -0.1 : 0.0);
+    model.high.push_back(moves ? 1.6 : 0.0);
   }
   model.report_json = "{}";
   return model;

@@ -18,7 +18,7 @@ std::size_t count(const std::string& text, const std::string& what) {
 }  // namespace
 
 TEST_CASE("A tree as text lists the contexts that reach each node", "[drawing]") {
-  const auto text = trees_text(test::toy_gesture_model(), {.state = 3, .finger = 2});
+  const auto text = trees_text(test::toy_gesture_model(), {.state = 3, .group = 2});
   CHECK(text ==
         "state 4, middle: 3 leaves\n"
         "  current is {g,1}?\n"
@@ -53,7 +53,7 @@ TEST_CASE("Drawings have every node once, whatever the labels are called", "[dra
   CHECK(count(svg, "<rect class=\"ask\"") == 50);
   CHECK(count(svg, "<line") == 100);
   CHECK(svg.find("current is &lt;&amp;\"\\&gt;?") != std::string::npos);
-  const auto dot = trees_dot(model, {.state = 0, .finger = 0});
+  const auto dot = trees_dot(model, {.state = 0, .group = 0});
   CHECK(count(dot, "->") == 4);
   CHECK(dot.find("<&\\\"\\\\>") != std::string::npos);
 }
