@@ -56,7 +56,7 @@ constexpr int kWide = 10;  // letters of a column
 
 // --auto-label trains nothing, so options about the training are refused.
 Result<> check_auto_label(const TrainGestureOptions& options) {
-  if (options.clips.size() != 1) {
+  if (options.clips.size() != 1 || options.labels.size() > 1) {
     return misuse("--auto-label proposes labels for one clip at a time");
   }
   if (options.movement.empty() == options.labels.empty()) {
@@ -90,16 +90,15 @@ std::vector<std::filesystem::path> inputs_of(const TrainGestureOptions& options)
 }
 
 Result<> check(const TrainGestureOptions& options) {
-  if (options.movement.empty() && options.clips.size() != options.labels.size()) {
-    return misuse("name one label file for each clip: --clip A.csv B.csv --labels A.lab B.lab");
-  }
-  if (!options.questions.empty() && !options.propose.empty()) {
-    return misuse("--propose-questions makes the classes that --questions reads; name one of them");
-  }
   if (options.auto_label) {
     if (auto useful = check_auto_label(options); !useful) return useful;
   } else if (!options.movement.empty()) {
     return misuse("--movement labels a take; add --auto-label");
+  } else if (options.clips.size() != options.labels.size()) {
+    return misuse("name one label file for each clip: --clip A.csv B.csv --labels A.lab B.lab");
+  }
+  if (!options.questions.empty() && !options.propose.empty()) {
+    return misuse("--propose-questions makes the classes that --questions reads; name one of them");
   }
   OutputFiles files(options.overwrite);
   const auto groups = groups_of(options);
