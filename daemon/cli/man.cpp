@@ -155,9 +155,8 @@ void add_man(CLI::App& app, int& exit_code) {
       ->required();
   add_overwrite_option(*command, options->overwrite);
   command->footer(R"help(Examples:
-  posed man --out pages && man pages/posed-train.1
-Packages and `cmake --install` bring these pages; each says what `posed COMMAND --help`
-says.)help");
+  mkdir pages && posed man --out pages && man pages/posed-train.1
+Packages and `cmake --install` bring these pages, which say what `--help` says.)help");
   command->callback([&app, options, &exit_code] {
     const auto written = write_pages(app, options->out, options->overwrite);
     exit_code = written ? 0 : report(written.error());

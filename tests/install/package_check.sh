@@ -23,6 +23,7 @@ trap unmount EXIT
 # Debian as debootstrap makes it, with this machine's way to the packages.
 make_bare() {
   unmount
+  ! grep -q " $root/" /proc/self/mounts || fail "$root still has mounts; unmount them first"
   rm -rf "$root"
   debootstrap --variant=minbase --include=ca-certificates bookworm "$root" >"$packages/debootstrap.log" 2>&1 ||
     { tail "$packages/debootstrap.log" >&2; fail "debootstrap failed"; }
