@@ -21,6 +21,7 @@
 #include "proto/clip/file_names.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_shape.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
@@ -216,7 +217,7 @@ void add_synth(CLI::App& app, int& exit_code) {
     if (!made) {
       exit_code = report(made.error());
     } else if (options->json) {
-      std::printf("%s\n", made->dump(2).c_str());
+      std::printf("%s\n", json_text(*made, 2).c_str());
     } else {
       print_summary(*made);
     }

@@ -196,7 +196,7 @@ int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
     std::fprintf(stderr, "posed: warning: %s\n", warning.get<std::string>().c_str());
   }
   if (options.json) {
-    std::printf("%s\n", trained->dump(2).c_str());
+    std::printf("%s\n", json_text(*trained, 2).c_str());
   } else {
     print_gesture_summary(*trained, options);
   }
