@@ -18,6 +18,7 @@
 #include "daemon/cli/progress.hpp"
 #include "models/fixed_products.hpp"
 #include "models/gesture/model_file.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed::cli {
 namespace {
