@@ -20,4 +20,9 @@ struct Check {
   return {.name = std::move(name), .ok = false, .found = std::move(found), .fix = std::move(fix)};
 }
 
+// "a, b": appends a word to a list in a sentence.
+inline void add_word(std::string& list, const std::string& word) {
+  list += (list.empty() ? "" : ", ") + word;
+}
+
 }  // namespace posed::doctor

@@ -34,11 +34,6 @@ std::string rules_file(const Machine& machine) {
   return {};
 }
 
-// "a, b"
-void add_word(std::string& list, const std::string& word) {
-  list += (list.empty() ? "" : ", ") + word;
-}
-
 int number_of(const std::string& text) {
   int number = 0;
   std::from_chars(text.data(), text.data() + text.size(), number);

@@ -88,7 +88,7 @@ Check check_governor(const Machine& machine) {
   std::string all;
   bool quick = true;
   for (const auto& [governor, good] : governors) {
-    all += (all.empty() ? "" : ", ") + clean_name(governor);
+    add_word(all, clean_name(governor));
     quick = quick && good;
   }
   if (quick) return right(name, all);

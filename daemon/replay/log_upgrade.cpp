@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/replay/replay.hpp"
+#include "proto/log/files.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/writer.hpp"
 
@@ -158,13 +159,13 @@ Result<UpgradeSummary> upgrade_log(const std::filesystem::path& log,
   }();
   std::error_code failed;
   if (upgraded) std::filesystem::rename(part, path, failed);
-  if (failed) return fail("cannot be written: " + failed.message(), path.string());
-  if (!upgraded) {
-    for (const char* suffix : {"", "-wal", "-shm"}) {
-      std::filesystem::remove(part.string() + suffix, failed);
-    }
+  if (upgraded && !failed) return upgraded;
+  std::error_code ignored;
+  for (const char* suffix : log::kFileSuffixes) {
+    std::filesystem::remove(part.string() + suffix, ignored);
   }
-  return upgraded;
+  if (!upgraded) return upgraded;
+  return fail("cannot be written: " + failed.message(), path.string());
 }
 
 }  // namespace posed::replay

@@ -24,4 +24,10 @@ inline ProgramOutcome posed(std::vector<std::string> arguments) {
   return {*code, out, process.errors()};
 }
 
+// Whether it ended with this code and said `what` on stderr and nothing on stdout.
+inline bool one_sentence(const ProgramOutcome& outcome, int code, const std::string& what) {
+  UNSCOPED_INFO(outcome.code << ": " << outcome.err);
+  return outcome.code == code && outcome.out.empty() && outcome.err.find(what) != std::string::npos;
+}
+
 }  // namespace posed::test

@@ -53,11 +53,6 @@ struct ArmTakes {
   }
 };
 
-bool refused(const ProgramOutcome& outcome, int code, const std::string& what) {
-  UNSCOPED_INFO(outcome.code << ": " << outcome.err);
-  return outcome.code == code && outcome.out.empty() && outcome.err.find(what) != std::string::npos;
-}
-
 }  // namespace
 
 TEST_CASE("Raised arms are learnt, and both are raised", "[train_body]") {
@@ -105,9 +100,9 @@ TEST_CASE("Raised arms are learnt, and both are raised", "[train_body]") {
   const auto clip = clip::read_clip(takes.file("both.bvh"));
   REQUIRE(clip.has_value());
   CHECK(clip->frames() == told["frames"]);
-  CHECK(refused(synth({"--out", takes.file("x.bvh")}), 2, "name a clip of the body"));
-  CHECK(refused(posed({"eval", "gesture", "--model", takes.file("b.gesture")}), 2,
-                "the model is of a body"));
+  CHECK(one_sentence(synth({"--out", takes.file("x.bvh")}), 2, "name a clip of the body"));
+  CHECK(one_sentence(posed({"eval", "gesture", "--model", takes.file("b.gesture")}), 2,
+                     "the model is of a body"));
 }
 
 TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
@@ -117,16 +112,16 @@ TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
                                "--clip", takes.clips[0]});
     return posed(std::move(more));
   };
-  CHECK(refused(label({"--body"}), 2, "names a take's one movement"));
-  CHECK(refused(label({"--movement", "raise", "--labels", takes.labels[0]}), 2, "--movement"));
+  CHECK(one_sentence(label({"--body"}), 2, "names a take's one movement"));
+  CHECK(one_sentence(label({"--movement", "raise", "--labels", takes.labels[0]}), 2, "--movement"));
   const auto sample = (source_dir() / "config/gestures/raise-arms.toml").string();
-  CHECK(refused(takes.train("x.gesture", {"--questions", sample}), 1,
-                "the skeleton has no leftToes"));
-  CHECK(refused(takes.train("x.gesture", {"--body", "--report", takes.file("x.html")}), 2,
-                "--report draws the gestures of hands"));
-  CHECK(refused(takes.train("x.gesture", {"--body", "--tree-text", "-", "--trees", "thumb"}), 2,
-                "names no tree"));
-  CHECK(refused(takes.train("x.gesture", {"--movement", "raise"}), 2, "add --auto-label"));
+  CHECK(one_sentence(takes.train("x.gesture", {"--questions", sample}), 1,
+                     "the skeleton has no leftToes"));
+  CHECK(one_sentence(takes.train("x.gesture", {"--body", "--report", takes.file("x.html")}), 2,
+                     "--report draws the gestures of hands"));
+  CHECK(one_sentence(takes.train("x.gesture", {"--body", "--tree-text", "-", "--trees", "thumb"}),
+                     2, "names no tree"));
+  CHECK(one_sentence(takes.train("x.gesture", {"--movement", "raise"}), 2, "add --auto-label"));
   CHECK_FALSE(std::filesystem::exists(takes.file("x.gesture")));
 }
 

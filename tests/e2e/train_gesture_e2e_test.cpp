@@ -50,11 +50,6 @@ struct Glove {
   }
 };
 
-bool one_sentence(const ProgramOutcome& outcome, int code, const std::string& what) {
-  UNSCOPED_INFO(outcome.code << ": " << outcome.err);
-  return outcome.code == code && outcome.out.empty() && outcome.err.find(what) != std::string::npos;
-}
-
 }  // namespace
 
 TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") {

@@ -85,6 +85,12 @@ TEST_CASE("an upgrade that fails or is interrupted leaves the files as they were
   const auto damaged = upgrade_log(old, out, kNeverStop);
   REQUIRE_FALSE(damaged);
   CHECK(test::file_text(out) == "mine");
+  create_directory(folder.path() / "taken.plog");
+  const auto whole = folder.path() / "whole.plog";
+  std::filesystem::copy_file(test::golden("replay/staged.plog"), whole);
+  CHECK_FALSE(upgrade_log(whole, folder.path() / "taken.plog", kNeverStop));
+  remove(whole);
+  remove(folder.path() / "taken.plog");
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
     CHECK((entry.path() == old || entry.path() == out));
   }
