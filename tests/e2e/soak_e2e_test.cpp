@@ -99,8 +99,8 @@ void trouble(Soaked& stage, int second, std::mt19937& random) {
     case 0:
       return stage.plug(!stage.plugged());
     case 1:
-      static_cast<void>(
-          stage.ctl({"set", "walker", "alpha", std::to_string(random() % 200 / 100.0)}));
+      static_cast<void>(stage.ctl(
+          {"set", "walker", "alpha", std::to_string(static_cast<double>(random() % 200) / 100.0)}));
       return;
     case 2:
       static_cast<void>(stage.ctl({"model", "walker", stage.path("two.style")}));
