@@ -14,7 +14,7 @@
 #include "daemon/record/recorder.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/digest.hpp"
-#include "proto/log/files.hpp"
+#include "tests/support/copy_log.hpp"
 #include "tests/support/file_limit.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/virtual_bodies.hpp"
@@ -456,17 +456,9 @@ void VirtualDaemon::Parts::stop() {
 void VirtualDaemon::Parts::kill() {
   const TempFolder folder;
   const auto copy = folder.path() / "log";
-  const auto copy_log = [](const std::string& from, const std::string& to) {
-    for (const char* suffix : log::kFileSuffixes) {
-      std::filesystem::remove(to + suffix);
-      if (std::filesystem::exists(from + suffix)) {
-        std::filesystem::copy_file(from + suffix, to + suffix);
-      }
-    }
-  };
-  if (log_writer) copy_log(options.log.string(), copy.string());
+  if (log_writer) copy_log(options.log, copy);
   log_writer.reset();
-  if (!options.log.empty()) copy_log(copy.string(), options.log.string());
+  if (!options.log.empty()) copy_log(copy, options.log);
   if (bodies) bodies->finish();
 }
 

@@ -196,12 +196,12 @@ void check_places(const std::vector<VirtualBody>& bodies) {
   }
 }
 
-struct Met {
+struct Lived {
   std::uint64_t frames = 0, compared = 0, in_gaps = 0, shed = 0;
   int kills = 0, full_disks = 0, sleeps = 0;
 };
 
-void check_world(std::uint64_t seed, const std::filesystem::path& log, Met& met) {
+void check_world(std::uint64_t seed, const std::filesystem::path& log, Lived& met) {
   INFO("seed " << seed << "; POSED_SEED=" << seed << " runs it alone");
   Dice dice(seed);
   World world(dice, log);
@@ -242,7 +242,7 @@ void check_world(std::uint64_t seed, const std::filesystem::path& log, Met& met)
 TEST_CASE("whatever happens in the world, the daemon keeps its promises", "[property]") {
   const TempFolder folder;
   const auto [first, last] = seeds(1);
-  Met met;
+  Lived met;
   for (std::uint64_t seed = first; seed <= last; ++seed) {
     const auto path = folder.path() / (std::to_string(seed) + ".plog");
     check_world(seed, path, met);
