@@ -14,6 +14,7 @@
 #include "daemon/control/trigger_server.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/device_supervisor.hpp"
+#include "daemon/metrics/metrics_server.hpp"
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/pipeline/reader.hpp"
@@ -110,6 +111,7 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<pipeline::Reader> reader;
   std::unique_ptr<control::ControlServer> control;
   std::unique_ptr<control::TriggerServer> trigger;  // null: the config has no [trigger]
+  std::unique_ptr<metrics::MetricsServer> metrics;  // null: the config has no [metrics]
   std::thread publisher_thread, worker_thread, reader_thread;
   std::vector<std::unique_ptr<devices::DeviceSupervisor>> supervisors;
 
@@ -118,6 +120,8 @@ class Daemon::Parts final : public control::DaemonControl {
   Result<> open_publisher();
   Result<> open_engines();
   Result<> start_threads();
+  Result<> start_metrics();
+  [[nodiscard]] metrics::Figures figures() const;
   [[nodiscard]] StreamUsers users() const {
     return {.publisher = publisher.get(),
             .handler = handler.get(),
@@ -323,6 +327,7 @@ Result<> Daemon::Parts::start_threads() {
     if (!listening) return std::unexpected(listening.error());
     trigger = std::move(*listening);
   }
+  if (auto started = start_metrics(); !started) return started;
   outputs->start([this](std::optional<std::uint32_t> stream, const std::string& text) {
     if (stream) return publisher->post_event(*stream, v1::Event::KIND_WARNING, text);
     spdlog::warn("{}", text);
@@ -365,6 +370,27 @@ Result<> Daemon::Parts::start_threads() {
   return {};
 }
 
+Result<> Daemon::Parts::start_metrics() {
+  if (!config.metrics) return {};
+  auto server = metrics::MetricsServer::start(config.metrics->listen, [this] { return figures(); });
+  if (!server) return std::unexpected(server.error());
+  metrics = std::move(*server);
+  return {};
+}
+
+metrics::Figures Daemon::Parts::figures() const {
+  const auto of = [](const net::PeerGuard& guard) {
+    return metrics::SocketFigures{.peers = guard.peers(), .cuts = guard.cuts()};
+  };
+  metrics::Figures all{.stats = publisher->stats(),
+                       .streams = publisher->figures(),
+                       .publish = of(publisher->guard()),
+                       .control = of(control->guard()),
+                       .requests = control->counts()};
+  if (hooks.recorder_figures) all.recorder = hooks.recorder_figures();
+  return all;
+}
+
 std::set<std::string> Daemon::Parts::stream_names() const {
   std::set<std::string> names;
   const auto add = [&](const config::StreamConfig& stream) {
@@ -390,6 +416,7 @@ void Daemon::Parts::halt() noexcept {
   if (bodies) bodies->stop();
   if (worker) worker->stop();
   if (worker_thread.joinable()) worker_thread.join();
+  metrics.reset();
   trigger.reset();
   control.reset();
   if (publisher) publisher->stop();
@@ -422,6 +449,7 @@ const std::string& Daemon::publish_endpoint() const noexcept {
   return parts_->publisher->endpoint();
 }
 const std::string& Daemon::control_endpoint() const noexcept { return parts_->control->endpoint(); }
+std::string Daemon::metrics_url() const { return parts_->metrics ? parts_->metrics->url() : ""; }
 bool Daemon::asked_to_stop() const noexcept { return parts_->stop_asked.load(); }
 v1::Stats Daemon::stats() const { return parts_->publisher->stats(); }
 
@@ -452,6 +480,10 @@ std::vector<system::ThreadPulse> Daemon::pulses() const {
   if (parts_->trigger) {
     all.push_back(
         {.thread = control::TriggerServer::kThreadName, .pulse = &parts_->trigger->pulse()});
+  }
+  if (parts_->metrics) {
+    all.push_back(
+        {.thread = metrics::MetricsServer::kThreadName, .pulse = &parts_->metrics->pulse()});
   }
   if (parts_->bodies) {
     all.push_back({.thread = BodyStreams::kThreadName, .pulse = &parts_->bodies->pulse()});

@@ -12,6 +12,7 @@
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/devices/open_stream.hpp"
 #include "daemon/devices/source_builder.hpp"
+#include "daemon/metrics/figures.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/system/pulse.hpp"
 #include "drivers/driver.hpp"
@@ -26,6 +27,8 @@ struct DaemonHooks {
   // Called for each stream that comes while the daemon runs, before its first item; may be empty.
   std::function<void(const devices::NewStream&)> record_stream{};
   std::function<void(v1::Stats&)> more_stats;  // adds the recorder's counters; may be empty
+  // The same for metrics; may be empty.
+  std::function<metrics::RecorderFigures()> recorder_figures{};
   // called first on each hot thread; may be empty
   std::function<void(const char* name)> hot_thread;
 };
@@ -56,6 +59,8 @@ class Daemon {
   [[nodiscard]] const std::string& publish_endpoint() const noexcept;
   // the one that is really bound
   [[nodiscard]] const std::string& control_endpoint() const noexcept;
+  // "http://127.0.0.1:5572/metrics"; empty: the config has no [metrics].
+  [[nodiscard]] std::string metrics_url() const;
   [[nodiscard]] bool asked_to_stop() const noexcept;  // by a control message
   // Whether every source that can end has ended and been published; false if there is none.
   [[nodiscard]] bool all_ended() const noexcept;

@@ -18,7 +18,6 @@ namespace {
 
 using AddCommand = void (*)(CLI::App& app, int& exit_code);
 
-// The order in which `posed --help` lists them.
 constexpr auto kCommands = std::to_array<AddCommand>({
     add_demo,   add_run,        add_check,   add_doctor, add_devices, add_calibrate, add_record,
     add_replay, add_train,      add_apply,   add_smooth, add_synth,   add_convert,   add_render,
@@ -75,12 +74,16 @@ int report(const Error& error) {
   return static_cast<int>(error.exit_code);
 }
 
+void add_commands(CLI::App& app, int& exit_code) {
+  for (const AddCommand add : kCommands) add(app, exit_code);
+}
+
 int main_of(int argc, char** argv) {
   logging::protect_standard_descriptors();
   const logging::LogOutput log;
   CLI::App app{"posed: live poses in, another style out", "posed"};
   int exit_code = 0;
-  for (const AddCommand add : kCommands) add(app, exit_code);
+  add_commands(app, exit_code);
   return with_stdout_written(parse_and_run(argc, argv, app, exit_code));
 }
 

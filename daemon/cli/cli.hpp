@@ -26,6 +26,8 @@ class Ranks;
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.
 [[nodiscard]] int report(const Error& error);
 
+// All of them, in the order in which `posed --help` lists them.
+void add_commands(CLI::App& app, int& exit_code);
 void add_demo(CLI::App& app, int& exit_code);
 void add_run(CLI::App& app, int& exit_code);
 void add_relay(CLI::App& app, int& exit_code);

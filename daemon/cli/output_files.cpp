@@ -15,10 +15,10 @@ namespace {
 namespace fs = std::filesystem;
 
 // Extensions of formats that posed or other programs recognise.
-constexpr std::array<std::string_view, 23> kFormats{
+constexpr std::array<std::string_view, 24> kFormats{
     ".bvh",  ".amc", ".asf",  ".csv",  ".style", ".gesture", ".toml", ".lab",
     ".plog", ".svg", ".dot",  ".gv",   ".txt",   ".json",    ".bin",  ".key",
-    ".pub",  ".glb", ".vrma", ".mcap", ".png",   ".mp4",     ".html"};
+    ".pub",  ".glb", ".vrma", ".mcap", ".png",   ".mp4",     ".html", ".jsonl"};
 
 std::string listed(const std::vector<std::string_view>& extensions) {
   std::string text;

@@ -9,6 +9,7 @@
 #include "daemon/config/output_tables.hpp"
 #include "daemon/config/stream_tables.hpp"
 #include "daemon/config/take_tables.hpp"
+#include "drivers/transport/address.hpp"
 #include "models/stages/registry.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
@@ -55,6 +56,25 @@ void read_control(TableReader table, const ConfigFile& file, bool secured, Daemo
   table.read("models", models);
   if (!models.empty()) config.models = file.resolve(models);
   table.finish();
+}
+
+// Prometheus knows no keys, so other machines never reach this port itself.
+void read_metrics(TableReader& root, DaemonConfig& config) {
+  auto table = root.table("metrics");
+  if (!table) return;
+  MetricsConfig& metrics = config.metrics.emplace();
+  table->read("listen", metrics.listen);
+  table->finish();
+  const auto address = drivers::parse_endpoint(metrics.listen);
+  if (!address) {
+    table->add_error("listen", address.error().message);
+  } else if (!drivers::is_loopback(drivers::host_of(*address))) {
+    table->add_error("listen",
+                     fmt::format("{} can be reached by other machines, and metrics have no keys;"
+                                 " listen on 127.0.0.1, and let a reverse proxy with TLS and a"
+                                 " password pass them on",
+                                 in_quotes(metrics.listen)));
+  }
 }
 
 void read_client(TableReader table, const ConfigFile& file,
@@ -127,12 +147,13 @@ void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonCo
   read_outputs(root, file, config);
   read_record(root, file, config);
   read_trigger(root, config);
+  read_metrics(root, config);
   root.finish();
 }
 
-// Every key that a config may have, found by reading a config that has every table. [[output]]
-// and [trigger] are left out: who misplaces a key of their names (body, listen) means that of a
-// stream or source.
+// Every key that a config may have, found by reading a config that has every table. [[output]],
+// [trigger] and [metrics] are left out: who misplaces a key of their names (body, listen) means
+// that of a stream or source.
 std::set<std::string> all_keys(Drivers drivers) {
   std::string text = "[publish]\n[control]\n[security]\n[[security.client]]\n[record]\n";
   for (const drivers::Driver& driver : drivers) {

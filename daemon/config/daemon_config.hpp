@@ -95,6 +95,11 @@ struct TriggerConfig {
   std::vector<std::string> peers;         // addresses that may send; empty: this machine
 };
 
+// Figures for Prometheus, over HTTP.
+struct MetricsConfig {
+  std::string listen = "127.0.0.1:5572";  // address and port, on loopback
+};
+
 // Who may connect; without a server key CURVE is off.
 struct SecurityConfig {
   std::filesystem::path server_key;  // NAME.key; empty: no CURVE
@@ -114,6 +119,7 @@ struct DaemonConfig {
   std::vector<OutputConfig> outputs;
   std::optional<RecordConfig> record;
   std::optional<TriggerConfig> trigger;
+  std::optional<MetricsConfig> metrics;
   // How many streams there may be at once, with those that come while the daemon runs. Memory is
   // set aside for all of them only if there is a source.
   int max_streams = 64;

@@ -112,13 +112,14 @@ bool ControlServer::take_request() {
     if (!part.receive(router_.get(), 0)) return true;  // libzmq hands over whole messages
   }
   if (envelope.size() > kMaxEnvelope) return true;  // not a client of this protocol: no reply
-  (void)guard_->take_gone();                        // this socket keeps no state for a connection
+  ++requests_;
+  (void)guard_->take_gone();  // this socket keeps no state for a connection
   if (const int client = net::source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.authenticator != nullptr &&
       !ports_.authenticator->allows(part.property("User-Id"), net::Domain::kControl)) {
     v1::ControlReply reply;
     reply.set_error("your key may no longer control this daemon");
-    send({std::move(envelope), reply.SerializeAsString()});
+    send({.to = std::move(envelope), .bytes = reply.SerializeAsString(), .refused = true});
     return true;
   }
   if (auto reply = handler_.handle(std::move(envelope), part.bytes())) send(*reply);
@@ -135,6 +136,7 @@ bool ControlServer::take_ack() {
 
 // A ROUTER socket drops a reply that a slow or disconnected client does not accept.
 void ControlServer::send(const Reply& reply) {
+  if (reply.refused) ++refusals_;
   for (const std::string& part : reply.to) {
     if (!net::send_part(router_.get(), part, true)) return;
   }

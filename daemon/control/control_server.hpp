@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <thread>
@@ -26,6 +27,12 @@ struct ControlPorts {
   std::string secret_z85;  // the server's key; empty: no CURVE
 };
 
+// Since the start.
+struct ControlCounts {
+  std::uint64_t requests = 0;
+  std::uint64_t refusals = 0;  // of them
+};
+
 class ControlServer {
  public:
   // Binds and starts the thread. `handler` outlives the server.
@@ -40,6 +47,11 @@ class ControlServer {
   static constexpr const char* kThreadName = "posed-control";
   // Any thread.
   [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
+  [[nodiscard]] ControlCounts counts() const noexcept {
+    return {.requests = requests_.load(), .refusals = refusals_.load()};
+  }
+  // Of the clients.
+  [[nodiscard]] const net::PeerGuard& guard() const noexcept { return *guard_; }
   // the endpoint that is really bound
   [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
 
@@ -58,6 +70,7 @@ class ControlServer {
   ControlPorts ports_;
   RequestHandler& handler_;
   system::Pulse pulse_;
+  std::atomic<std::uint64_t> requests_{0}, refusals_{0};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -24,7 +24,7 @@ using pipeline::Command;
 using pipeline::StageChange;
 
 Reply make_reply(Requester to, const v1::ControlReply& reply) {
-  return {std::move(to), reply.SerializeAsString()};
+  return {.to = std::move(to), .bytes = reply.SerializeAsString(), .refused = !reply.ok()};
 }
 
 Reply refusal(Requester to, const std::string& sentence) {

@@ -85,6 +85,7 @@ using Requester = std::vector<std::string>;
 struct Reply {
   Requester to;
   std::string bytes;  // a serialized posed.v1.ControlReply
+  bool refused = false;
 };
 
 class RequestHandler {

@@ -73,6 +73,7 @@ std::vector<Listener> listeners_of(const config::DaemonConfig& config) {
   if (config.trigger) {
     all.push_back({.who = "trigger", .udp = true, .endpoint = config.trigger->listen});
   }
+  if (config.metrics) all.push_back({.who = "metrics", .endpoint = config.metrics->listen});
   for (const config::OutputConfig& output : config.outputs) {
     if (output.kind != config::OutputKind::kBvh) continue;
     all.push_back({.who = "output " + output.name, .endpoint = output.listen});

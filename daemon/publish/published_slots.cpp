@@ -76,6 +76,15 @@ void PublishedSlots::fill(v1::Stats& stats) const {
   fill_left(stats);
 }
 
+std::vector<StreamFigures> PublishedSlots::figures() const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<StreamFigures> all;
+  for (const Slot& slot : slots_) {
+    if (!slot.empty()) all.push_back(slot.front()->figures());
+  }
+  return all;
+}
+
 void PublishedSlots::fill_left(v1::Stats& stats) const {
   stats.set_left_frames(left_.frames);
   stats.set_left_samples(left_.samples);

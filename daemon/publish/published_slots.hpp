@@ -24,6 +24,7 @@ class PublishedSlots {
   // Any thread, cold: adds the streams that have their slots, and what was published of those that
   // are gone. Both are of one moment, so that no frame counts twice or not at all.
   void fill(v1::Stats& stats) const;
+  [[nodiscard]] std::vector<StreamFigures> figures() const;  // of these streams
 
   // All below: the publisher's thread, or another one while that does not run.
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 
 #include "daemon/publish/frame_output.hpp"
 #include "models/live_text.hpp"
@@ -24,8 +25,11 @@ v1::Percentiles percentiles(LatencyHistogram& histogram) {
 }
 
 // A stage that did not process the frame has set no stamp.
-void add_between(LatencyHistogram& histogram, std::int64_t from_ns, std::int64_t to_ns) noexcept {
-  if (from_ns != kNoTime_ns && to_ns != kNoTime_ns) histogram.add(to_ns - from_ns);
+void add_between(LatencyHistogram& second, DurationBuckets& all, std::int64_t from_ns,
+                 std::int64_t to_ns) noexcept {
+  if (from_ns == kNoTime_ns || to_ns == kNoTime_ns) return;
+  second.add(to_ns - from_ns);
+  all.add(to_ns - from_ns);
 }
 
 // Only of a glove, because the device info of a file is its whole header.
@@ -133,21 +137,24 @@ PublishedStream::PublishedStream(StreamInfo stream_info)
 void PublishedStream::measure(const Frame& frame, const StageStamps& stamps) noexcept {
   if (frame.quality == Quality::kStale) return;
   const std::int64_t arrival_ns = frame.header.arrival_ns;
-  add_between(decode_, arrival_ns, stamps.decoded_ns);
+  add_between(decode_, all_decode_, arrival_ns, stamps.decoded_ns);
   if (stamps.decoded_ns == kNoTime_ns) return;  // computed by a replay, which is not timed
   float all_us = 0.0F;
   for (std::size_t i = 0; i < info.stages.size(); ++i) {
-    stage_[i].add(nanoseconds(frame.stage_us[i] * 1e-6));
+    const std::int64_t took_ns = nanoseconds(frame.stage_us[i] * 1e-6);
+    stage_[i].add(took_ns);
+    all_stage_[i].add(took_ns);
     all_us += frame.stage_us[i];
   }
   if (!info.stages.empty()) stages_.add(nanoseconds(all_us * 1e-6));
-  add_between(publish_, arrival_ns, stamps.published_ns);
+  add_between(publish_, all_publish_, arrival_ns, stamps.published_ns);
 }
 
 void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
   measure(frame, stamps);
   const std::scoped_lock lock(mutex_);
   ++now_.published.frames;
+  ++now_.by_quality[static_cast<std::size_t>(frame.quality)];
   now_.lag_frames = frame.lag_frames;
   now_.lag_ms = frame.lag_ms;
   now_.label = frame.label;
@@ -159,6 +166,11 @@ void PublishedStream::count(const Frame& frame, const StageStamps& stamps) {
 void PublishedStream::count_sample() {
   const std::scoped_lock lock(mutex_);
   ++now_.published.samples;
+}
+
+void PublishedStream::count_silence() {
+  const std::scoped_lock lock(mutex_);
+  ++now_.silences;
 }
 
 void PublishedStream::leave_outputs() noexcept {
@@ -219,6 +231,22 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
 PublishedStream::Counts PublishedStream::counts() const {
   const std::scoped_lock lock(mutex_);
   return now_.published;
+}
+
+StreamFigures PublishedStream::figures() const {
+  StreamFigures figures{
+      .stream = info.name, .rate_hz = info.rate_hz, .decoded = info.counters->reader.frames.load()};
+  {
+    const std::scoped_lock lock(mutex_);
+    figures.published = now_.by_quality;
+    figures.silences = now_.silences;
+  }
+  figures.decode = all_decode_.counts();
+  figures.publish = all_publish_.counts();
+  for (std::size_t i = 0; i < info.stages.size(); ++i) {
+    figures.stages.emplace_back(info.stages[i].type->name, all_stage_[i].counts());
+  }
+  return figures;
 }
 
 v1::StreamStats PublishedStream::stats() const {

@@ -3,15 +3,17 @@
 #pragma once
 
 #include <array>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/publish/duration_buckets.hpp"
 #include "daemon/publish/encode.hpp"
 #include "daemon/publish/histogram.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/shed_tally.hpp"
+#include "daemon/publish/stream_figures.hpp"
+#include "daemon/system/priority_mutex.hpp"
 #include "proto/message/frame_message.hpp"
 
 namespace posed::publish {
@@ -34,7 +36,7 @@ struct Channel {
   std::int64_t skeleton_due_ns = 0;
 };
 
-// Publisher thread, except for set_stages(), counts() and stats(): any thread.
+// Publisher thread, except for set_stages(), counts(), stats() and figures(): any thread.
 class PublishedStream {
  public:
   explicit PublishedStream(StreamInfo stream_info);
@@ -43,6 +45,8 @@ class PublishedStream {
   // current second, except those of a stale frame, which are old.
   void count(const Frame& frame, const StageStamps& stamps);
   void count_sample();
+  // It has become stale.
+  void count_silence();
   // Tells its outputs that it leaves.
   void leave_outputs() noexcept;
   void set_stages(std::vector<StageInfo> stages);
@@ -57,6 +61,7 @@ class PublishedStream {
   [[nodiscard]] v1::StreamStats stats() const;
   // The same with those of the second that ends here; starts the next one.
   [[nodiscard]] v1::StreamStats report(double seconds_since);
+  [[nodiscard]] StreamFigures figures() const;
 
   StreamInfo info;
   Channel styled;
@@ -69,6 +74,8 @@ class PublishedStream {
   // What stats() reads while the publisher continues.
   struct Now {
     Counts published;
+    std::array<std::uint64_t, kQualityNames.size()> by_quality{};  // frames
+    std::uint64_t silences = 0;
     std::vector<StageInfo> stages;
     // Of the last frame.
     std::uint16_t lag_frames = 0;
@@ -84,12 +91,16 @@ class PublishedStream {
   void fill(v1::StreamStats& stats) const;
   void fill_device(v1::StreamStats& stats) const;
 
-  mutable std::mutex mutex_;
+  // The publisher is a real-time thread.
+  mutable system::PriorityMutex mutex_;
   Now now_;                   // under mutex_
   v1::StreamStats reported_;  // by the last report(); under mutex_
   std::uint64_t frames_reported_ = 0;
   LatencyHistogram decode_, stages_, publish_;
   std::array<LatencyHistogram, kMaxStages> stage_;
+  // The same since the start.
+  DurationBuckets all_decode_, all_publish_;
+  std::array<DurationBuckets, kMaxStages> all_stage_;
 };
 
 }  // namespace posed::publish

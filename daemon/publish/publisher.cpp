@@ -176,6 +176,7 @@ void Publisher::take_notice(PublishedStream& published, const pipeline::StreamEv
     published.shed.add(event.sequence, static_cast<std::uint64_t>(event.value));
     return report_shed(published, false);
   }
+  if (kind == v1::Event::KIND_STALE) published.count_silence();
   std::string text = sentence(event);
   if (kind == v1::Event::KIND_ENDED) {
     report_shed(published, true);

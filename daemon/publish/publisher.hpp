@@ -20,6 +20,7 @@
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/pipeline/stream_settings.hpp"
 #include "daemon/publish/publish_socket.hpp"
+#include "daemon/publish/stream_figures.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "drivers/driver.hpp"
@@ -138,6 +139,10 @@ class Publisher {
   void check_subscribers();
   // Rates and percentiles are those of the last full second; everything else is current.
   [[nodiscard]] v1::Stats stats() const;
+  // What was counted since the start, of the streams that are there now.
+  [[nodiscard]] std::vector<StreamFigures> figures() const;
+  // Of the subscribers.
+  [[nodiscard]] const net::PeerGuard& guard() const noexcept { return socket_.guard(); }
 
  private:
   struct Requests;

@@ -73,6 +73,8 @@ v1::Stats Publisher::stats() const {
   return stats;
 }
 
+std::vector<StreamFigures> Publisher::figures() const { return slots_->figures(); }
+
 void Publisher::add_sources(v1::Stats& stats) const {
   for (const SourceInfo& info : options_.sources) {
     v1::SourceStats& source = *stats.add_source();

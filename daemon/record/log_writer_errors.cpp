@@ -31,6 +31,7 @@ void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
   writer_->rollback();
   writer_.reset();
   ++errors_;
+  error_ns_ = now_ns;
   // An almost full disk accepts a little now and then, so try again less and less often.
   const bool held_long = now_ns - resumed_ns_ > kLastRetry_ns;
   retry_after_ns_ = held_long ? kFirstRetry_ns : std::min(2 * retry_after_ns_, kLastRetry_ns);
@@ -56,6 +57,7 @@ void LogWriterLoop::resume(std::int64_t now_ns) {
   auto writer = log::Writer::reopen(path_);
   if (!writer) {
     ++errors_;
+    error_ns_ = now_ns;
     return;
   }
   writer_ = std::move(*writer);
@@ -64,6 +66,7 @@ void LogWriterLoop::resume(std::int64_t now_ns) {
   if (!done) {
     writer_.reset();
     ++errors_;
+    error_ns_ = now_ns;
     return;
   }
   resumed_ns_ = now_ns;

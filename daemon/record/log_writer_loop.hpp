@@ -50,6 +50,8 @@ class LogWriterLoop {
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept;
   [[nodiscard]] std::uint64_t lost_frames() const noexcept { return lost_frames_.load(); }
   [[nodiscard]] std::uint64_t errors() const noexcept { return errors_.load(); }
+  // When the last of these attempts was; kNoTime_ns: there was none.
+  [[nodiscard]] std::int64_t error_ns() const noexcept { return error_ns_.load(); }
 
  private:
   using GapKind = log::GapRow::Kind;
@@ -133,6 +135,7 @@ class LogWriterLoop {
   std::int64_t retry_after_ns_ = 0;  // grows while attempts fail
   std::int64_t resumed_ns_ = kNoTime_ns / 2;
   std::atomic<std::uint64_t> errors_{0};
+  std::atomic<std::int64_t> error_ns_{kNoTime_ns};
   std::atomic<std::uint64_t> lost_to_errors_{0}, lost_frames_{0};
 };
 

@@ -66,6 +66,7 @@ class Recorder {
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return log_writer_.lost_chunks(); }
   [[nodiscard]] std::uint64_t lost_frames() const noexcept { return log_writer_.lost_frames(); }
   [[nodiscard]] std::uint64_t errors() const noexcept { return log_writer_.errors(); }
+  [[nodiscard]] std::int64_t error_ns() const noexcept { return log_writer_.error_ns(); }
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }
 
  private:

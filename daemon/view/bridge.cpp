@@ -8,13 +8,16 @@
 
 #include <pthread.h>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include "daemon/http/server.hpp"
 #include "daemon/net/security.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/view/hub.hpp"
-#include "daemon/view/web_server.hpp"
+#include "daemon/view/web_room.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::view {
@@ -22,7 +25,20 @@ namespace {
 
 constexpr std::chrono::milliseconds kTurnEvery{50};
 
+Result<boost::asio::ip::address> address_of(const std::string& text) {
+  boost::system::error_code error;
+  auto address = boost::asio::ip::make_address(text == "localhost" ? "127.0.0.1" : text, error);
+  if (!error) return address;
+  return misuse(in_quotes(text) + " is not an address: --bind takes one such as 127.0.0.1");
+}
+
 }  // namespace
+
+Result<bool> is_loopback_address(const std::string& address) {
+  const auto parsed = address_of(address);
+  if (!parsed) return std::unexpected(parsed.error());
+  return parsed->is_loopback();
+}
 
 // In the order in which they need each other: connections of pages live in the io_context's
 // handlers and use hub and room.
@@ -41,11 +57,16 @@ class Bridge::Parts {
     auto link = DaemonLink::open(parts->io_, parts->context_.get(), options.link, parts->hub_);
     if (!link) return std::unexpected(link.error());
     parts->link_ = std::move(*link);
-    auto server = WebServer::open(
-        parts->io_, parts->room_,
-        {.address = options.address, .port = options.port, .or_any = options.or_any_port});
+    const auto address = address_of(options.address);
+    if (!address) return std::unexpected(address.error());
+    auto server = http::Server::open(parts->io_, parts->connections_,
+                                     {.at = {*address, options.port},
+                                      .or_any = options.or_any_port,
+                                      .advice = "choose another port (--port 0: any free one)"});
     if (!server) return std::unexpected(server.error());
     parts->server_ = std::move(*server);
+    parts->room_.site.hosts = parts->server_->hosts();
+    parts->url_ = parts->server_->url() + "?token=" + parts->room_.site.token;
     return parts;
   }
   ~Parts() {
@@ -67,7 +88,8 @@ class Bridge::Parts {
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
     pthread_setname_np(thread_.native_handle(), "posed-view");
   }
-  [[nodiscard]] const WebServer& server() const noexcept { return *server_; }
+  [[nodiscard]] const std::string& url() const noexcept { return url_; }
+  [[nodiscard]] std::uint16_t port() const noexcept { return server_->port(); }
 
  private:
   Parts(net::Context context, Site site, Greeting greeting)
@@ -76,7 +98,7 @@ class Bridge::Parts {
              [this](std::uint64_t ticket, std::string_view request) {
                return link_->ask(ticket, request);
              }),
-        room_{.site = std::move(site), .hub = hub_},
+        room_(std::move(site), hub_),
         timer_(io_) {}
 
   void turn() {
@@ -84,7 +106,7 @@ class Bridge::Parts {
     link_->want_streams(hub_.tabs() > 0);
     link_->turn(now_ns);
     hub_.expire(now_ns);
-    server_->turn(now_ns);
+    room_.turn(now_ns);
     timer_.expires_after(kTurnEvery);
     timer_.async_wait([this](const boost::system::error_code& error) {
       if (!error) turn();
@@ -94,10 +116,12 @@ class Bridge::Parts {
   net::Context context_;
   Hub hub_;
   WebRoom room_;
+  http::Room connections_{.service = room_};
   boost::asio::io_context io_{1};
   boost::asio::steady_timer timer_;
   std::unique_ptr<DaemonLink> link_;
-  std::unique_ptr<WebServer> server_;
+  std::unique_ptr<http::Server> server_;
+  std::string url_;
   std::thread thread_;
 };
 
@@ -111,7 +135,7 @@ Result<std::unique_ptr<Bridge>> Bridge::start(const BridgeOptions& options) {
 Bridge::Bridge(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Bridge::~Bridge() = default;
 
-const std::string& Bridge::url() const noexcept { return parts_->server().url(); }
-std::uint16_t Bridge::port() const noexcept { return parts_->server().port(); }
+const std::string& Bridge::url() const noexcept { return parts_->url(); }
+std::uint16_t Bridge::port() const noexcept { return parts_->port(); }
 
 }  // namespace posed::view

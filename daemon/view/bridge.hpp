@@ -23,6 +23,9 @@ struct BridgeOptions {
   bool or_any_port = false;           // if the port is in use, any free one
 };
 
+// Whether an address is this machine's own, which no other machine reaches.
+[[nodiscard]] Result<bool> is_loopback_address(const std::string& address);
+
 class Bridge {
  public:
   // Reads the page, listens and connects in the background.

@@ -1,6 +1,5 @@
 #include "daemon/view/request_rules.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstdlib>
 
@@ -10,7 +9,6 @@ namespace posed::view {
 namespace {
 
 constexpr std::size_t kTokenBytes = 16;
-constexpr std::size_t kLongestHost = 262;  // a DNS name and a port
 
 constexpr std::string_view kWithoutToken = R"(<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>posed: no access</title>
@@ -18,10 +16,6 @@ constexpr std::string_view kWithoutToken = R"(<!doctype html>
 <p>posed prints it in the terminal: <code>http://.../?token=...</code>. Open that one; each start
 of posed has a new token.</p></html>
 )";
-
-WebAnswer refuse(unsigned status, std::string_view sentence) {
-  return {.status = status, .body = sentence};
-}
 
 // In a time that does not depend on where the two differ.
 bool same_secret(std::string_view a, std::string_view b) {
@@ -41,48 +35,37 @@ std::string_view token_of(std::string_view target) {
   return {};
 }
 
-bool is_host(std::string_view text) {
-  const auto fits = [](char sign) {
-    return (sign >= 'a' && sign <= 'z') || (sign >= 'A' && sign <= 'Z') ||
-           (sign >= '0' && sign <= '9') || std::string_view("-.:[]").contains(sign);
-  };
-  return !text.empty() && text.size() <= kLongestHost && std::ranges::all_of(text, fits);
-}
-
-bool is_own_host(std::string_view host, const Site& site) {
-  if (!is_host(host)) return false;
-  return site.hosts.empty() || std::ranges::find(site.hosts, host) != site.hosts.end();
-}
-
 // A browser says in `Origin` which page opens a WebSocket, and no page can change that.
-bool is_own_origin(const WebRequest& request) {
+bool is_own_origin(const http::Request& request) {
   constexpr std::string_view kScheme = "http://";
   return request.origin.starts_with(kScheme) &&
          request.origin.substr(kScheme.size()) == request.host;
 }
 
-WebAnswer answer_to_upgrade(const WebRequest& request, const Site& site, std::string_view path) {
-  if (path != "/ws") return refuse(404, "the WebSocket is /ws\n");
-  if (!is_own_origin(request)) return refuse(403, "another page may not open this WebSocket\n");
+http::Answer answer_to_upgrade(const http::Request& request, const Site& site,
+                               std::string_view path) {
+  if (path != "/ws") return http::refuse(404, "the WebSocket is /ws\n");
+  if (!is_own_origin(request))
+    return http::refuse(403, "another page may not open this WebSocket\n");
   if (!same_secret(token_of(request.target), site.token)) {
-    return refuse(403, "the token is wrong: open the URL that posed printed\n");
+    return http::refuse(403, "the token is wrong: open the URL that posed printed\n");
   }
   return {.status = 101};
 }
 
 }  // namespace
 
-WebAnswer answer_to(const WebRequest& request, const Site& site) {
-  if (!is_own_host(request.host, site)) {
-    return refuse(403, "this name is not the bridge's: open the URL that posed printed\n");
+http::Answer answer_to(const http::Request& request, const Site& site) {
+  if (!http::is_own_host(request.host, site.hosts)) {
+    return http::refuse(403, "this name is not the bridge's: open the URL that posed printed\n");
   }
   const std::string_view path = request.target.substr(0, request.target.find('?'));
   if (request.upgrade) return answer_to_upgrade(request, site, path);
   if (request.method != "GET" && request.method != "HEAD") {
-    return refuse(405, "only GET and HEAD\n");
+    return http::refuse(405, "only GET and HEAD\n");
   }
   const PageFile* const file = site.files.find(path);
-  if (file == nullptr) return refuse(404, "there is no such file\n");
+  if (file == nullptr) return http::refuse(404, "there is no such file\n");
   const bool is_page = file == site.files.find("/");
   if (is_page && !same_secret(token_of(request.target), site.token)) {
     return {.status = 403, .body = kWithoutToken, .type = type_of_name(".html")};
@@ -93,10 +76,10 @@ WebAnswer answer_to(const WebRequest& request, const Site& site) {
   return {.body = file->bytes, .type = file->type, .etag = file->etag};
 }
 
-std::vector<WebHeader> safety_headers(std::string_view host) {
+std::vector<http::Header> safety_headers(std::string_view host) {
   // three.js reads the textures of a model from blob: addresses, which the page makes itself. Older
   // browsers do not count the WebSocket as 'self'.
-  const std::string socket = is_host(host) ? " ws://" + std::string(host) : "";
+  const std::string socket = http::is_host(host) ? " ws://" + std::string(host) : "";
   return {{"Content-Security-Policy",
            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
            "connect-src 'self' blob: data:" +

@@ -33,7 +33,7 @@ TabSession::~TabSession() {
   room_.tabs.erase(place_);
 }
 
-void TabSession::start(const Upgrade& request) {
+void TabSession::start(const http::Message& request) {
   // A browser answers pings by itself, also while the page's script stands still.
   socket_.set_option(websocket::stream_base::timeout{
       .handshake_timeout = 10s, .idle_timeout = 30s, .keep_alive_pings = true});

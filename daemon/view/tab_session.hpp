@@ -9,26 +9,23 @@
 
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
-#include <boost/beast/http/empty_body.hpp>
-#include <boost/beast/http/message.hpp>
 #include <boost/beast/websocket/stream.hpp>
 
+#include "daemon/http/service.hpp"
 #include "daemon/view/hub.hpp"
-#include "daemon/view/web_server.hpp"
+#include "daemon/view/web_room.hpp"
 
 namespace posed::view {
 
 class TabSession : public std::enable_shared_from_this<TabSession> {
  public:
-  using Upgrade = boost::beast::http::request<boost::beast::http::empty_body>;
-
   // The connection of a request that the rules let become a WebSocket. `room` outlives it.
   TabSession(boost::beast::tcp_stream stream, WebRoom& room);
   ~TabSession();
   TabSession(const TabSession&) = delete;
   TabSession& operator=(const TabSession&) = delete;
 
-  void start(const Upgrade& request);
+  void start(const http::Message& request);
   // Ends the connection if the page has taken nothing for too long.
   void check(std::int64_t now_ns);
 

@@ -103,7 +103,9 @@ struct ServiceStage {
   explicit ServiceStage(const std::string& command = "record") {
     REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
     folder.write("posed.toml", std::string(Stage::kEndpoints) +
-                                   "[trigger]\nlisten = \"127.0.0.1:0\"\n" + Stage::kWalker +
+                                   "[trigger]\nlisten = \"127.0.0.1:0\"\n"
+                                   "[metrics]\nlisten = \"127.0.0.1:0\"\n" +
+                                   Stage::kWalker +
                                    "[[output]]\nkind = \"vmc\"\nbody = \"walker\"\n"
                                    "to = [\"127.0.0.1:9\"]\n"
                                    "[[source]]\nname = \"stage\"\ndriver = \"template_mocap\"\n"
@@ -161,8 +163,9 @@ TEST_CASE("a service is not ready while its config is wrong") {
 TEST_CASE("a service whose thread stands still gives no sign of life, names it, and recovers") {
   ServiceStage stage;
   REQUIRE(stage.socket.comes("WATCHDOG=1"));
-  for (const char* name : {"posed-reader", "posed-pipeline", "posed-publish", "posed-record",
-                           "posed-control", "posed-trigger", "posed-bodies", "out-vmc-walker"}) {
+  for (const char* name :
+       {"posed-reader", "posed-pipeline", "posed-publish", "posed-record", "posed-control",
+        "posed-trigger", "posed-bodies", "posed-metrics", "out-vmc-walker"}) {
     INFO(name);
     const pid_t thread = thread_named(stage.daemon->pid(), name);
     REQUIRE(thread > 0);

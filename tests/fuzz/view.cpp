@@ -11,9 +11,9 @@
 
 #include <unistd.h>
 
+#include "daemon/http/session.hpp"
 #include "daemon/view/hub.hpp"
 #include "daemon/view/request_rules.hpp"
-#include "daemon/view/web_session.hpp"
 
 namespace {
 
@@ -36,19 +36,19 @@ const Site& site() {
 }
 
 void check_request(std::string_view bytes) {
-  namespace http = boost::beast::http;
-  http::request_parser<http::empty_body> parser;
+  namespace beast_http = boost::beast::http;
+  beast_http::request_parser<beast_http::empty_body> parser;
   boost::beast::error_code error;
   parser.header_limit(8 * 1024);
   parser.put(boost::asio::buffer(bytes.data(), bytes.size()), error);
   if (error || !parser.is_header_done()) return;
-  const WebRequest request = parts_of(parser.get());
-  const WebAnswer answer = answer_to(request, site());
+  const posed::http::Request request = posed::http::parts_of(parser.get());
+  const posed::http::Answer answer = answer_to(request, site());
   const bool knows = request.target.find(kToken) != std::string_view::npos;
   const bool is_page = answer.status == 200 && answer.body == "/index.html";
   if ((is_page || answer.upgrades()) && (!knows || request.host != "127.0.0.1:5580")) std::abort();
   if (answer.upgrades() && request.origin != "http://127.0.0.1:5580") std::abort();
-  for (const WebHeader& header : safety_headers(request.host)) {
+  for (const posed::http::Header& header : safety_headers(request.host)) {
     if (header.value.find_first_of("\r\n") != std::string::npos) std::abort();
   }
 }

@@ -107,7 +107,8 @@ def main(build):
         assert [error["file"] for error in errors] == [str(config / "walk.bvh")], errors
         for path in ("lib/udev/rules.d/70-posed.rules", "share/bash-completion/completions/posed",
                      "share/zsh/vendor-completions/_posed", "share/fish/vendor_completions.d/posed.fish",
-                     "share/posed/config/stage/capture.toml", "share/posed/proto/posed/v1/posed.proto"):
+                     "share/posed/config/stage/capture.toml", "share/posed/config/metrics/alerts.yml",
+                     "share/posed/config/metrics/dashboard.json", "share/posed/proto/posed/v1/posed.proto"):
             assert (prefix / path).stat().st_size > 0, path
         check_page(posed, prefix)
         check_clients(prefix, folder)

@@ -105,6 +105,10 @@ ordered_json summary_of(const config::TriggerConfig& trigger) {
   return {{"listen", trigger.listen}, {"peers", trigger.peers}};
 }
 
+ordered_json summary_of(const config::MetricsConfig& metrics) {
+  return {{"listen", metrics.listen}};
+}
+
 std::string security_of(const config::DaemonConfig& config) {
   if (config.security.server_key.empty()) return "no keys";
   return "keys, " + std::to_string(config.security.clients.size()) + " clients allowed";
@@ -189,6 +193,7 @@ void print(const config::DaemonConfig& config, const ordered_json& streams,
   for (const ordered_json& output : outputs) print_output(output);
   if (config.record) print_record(*config.record);
   if (config.trigger) print_trigger(*config.trigger);
+  if (config.metrics) std::printf("metrics on http://%s/metrics\n", config.metrics->listen.c_str());
 }
 
 // Returns 0 if everything would run; 2 if the config is wrong; 1 if it is right, but a file or a
@@ -235,6 +240,7 @@ int check(const CheckOptions& options) {
                      {"outputs", outputs}};
     if (reading.config.record) all["record"] = summary_of(*reading.config.record);
     if (reading.config.trigger) all["trigger"] = summary_of(*reading.config.trigger);
+    if (reading.config.metrics) all["metrics"] = summary_of(*reading.config.metrics);
     all["errors"] = errors;
     std::printf("%s\n", json_text(all).c_str());
   } else if (errors.empty()) {

@@ -112,6 +112,7 @@ void print_ready(const assembly::Daemon& daemon) {
                               {"streams", nlohmann::json::array()}};
   for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
   for (const auto& source : daemon.sources()) line["sources"].push_back(source->config.name);
+  if (!daemon.metrics_url().empty()) line["metrics"] = daemon.metrics_url();
   // Not through stdio, because a pipe that is full or that nobody reads must not delay the signals
   // that stop the daemon.
   if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kReadyLineWithin)) {

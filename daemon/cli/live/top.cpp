@@ -14,7 +14,9 @@
 #include "daemon/cli/live/chosen_stream.hpp"
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/clock_time.hpp"
+#include "daemon/cli/live/line_file.hpp"
 #include "daemon/cli/live/live_view.hpp"
+#include "daemon/cli/output_files.hpp"
 #include "daemon/cli/paint.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
@@ -32,6 +34,8 @@ struct TopOptions {
   int count = 0;
   double timeout_s = 0.0;
   bool json = false;
+  std::string record;  // a file; empty: none
+  bool overwrite = false;
 };
 
 // Runs until the user ends it; an error says why the daemon cannot be shown.
@@ -43,7 +47,9 @@ class Top {
         watch_(connection_, options.timeout_s),
         chosen_(connection_, {.endpoint = options.control,
                               .key = options.client.key,
-                              .server_key = options.client.server_key}) {}
+                              .server_key = options.client.server_key}) {
+    if (!options.record.empty()) record_.emplace(options.record);
+  }
 
   Result<> run() {
     std::optional<LiveScreen> screen;
@@ -58,6 +64,9 @@ class Top {
       const bool new_stats = came && take(drawn);
       if (drawn && !new_stats && is_due()) show(*screen);
       if (!new_stats) continue;
+      if (record_) {
+        if (auto kept = record_->add(to_json(stats_)); !kept) return kept;
+      }
       const bool shown = screen ? show(*screen) : print_json(stats_);
       if (!shown) return {};  // the reader of stdout has gone
       if (++shown_ == options_.count) return {};
@@ -141,11 +150,16 @@ class Top {
   v1::Stats stats_;
   std::deque<std::string> notes_;
   ChosenStream chosen_;
+  std::optional<LineFile> record_;
   std::chrono::steady_clock::time_point drawn_at_{};
   int shown_ = 0;
 };
 
 Result<> top(const TopOptions& options) {
+  OutputFiles files(options.overwrite);
+  files.reads(options.client.key).reads(options.client.server_key);
+  if (auto fine = files.writes_any_but_other(options.record, {".jsonl"}).check(); !fine)
+    return fine;
   const Interrupt interrupt;
   auto connection = Connection::open(options.client, ZMQ_SUB);
   if (!connection) return std::unexpected(connection.error());
@@ -174,10 +188,19 @@ void add_top(CLI::App& app, int& exit_code) {
   add_timeout_option(*command, options->timeout_s);
   command->add_flag("--json", options->json, "One proto3 JSON object (posed.v1.Stats) a line")
       ->excludes(control);
+  auto* const record =
+      command->add_option("--record", options->record,
+                          "Keep what is shown, too: the lines of --json, one a second, in a file");
+  record->type_name("OUT.jsonl");
+  add_overwrite_option(*command, options->overwrite)->needs(record);
   command->footer(std::string(R"(Examples:
   posed top
   posed top --connect tcp://127.0.0.1:5570 --count 1 | cat
   posed top --count 1 --timeout 5 --json      # a health check: exit code 1 when nothing answers
+  posed top --record show.jsonl               # Ctrl-C, or a full disk, leaves whole lines
+  jq -r '(.timeNs | tonumber / 1e9) as $t | .stream[] | select(.stream == "walker")
+    | [$t, .rateHz, .publish.p99Us / 1000, .dropped] | @tsv' show.jsonl > walker.tsv
+  gnuplot -p -e "plot 'walker.tsv' using 1:3 with lines title 'ms'"    # its latency over the time
 Up and down choose a stream, left and right change its alpha, q or Ctrl-C quits. Below the table is
 the chosen stream's pose, and its latency in the last minute, one bar a second: 99 % of the frames
 took at most this. When stdout is no terminal it prints plain lines. A daemon that falls silent is

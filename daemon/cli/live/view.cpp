@@ -1,5 +1,4 @@
 // `posed view`: serves the page that shows a running daemon in a browser.
-#include "daemon/view/bridge.hpp"
 
 #include <filesystem>
 #include <memory>
@@ -16,7 +15,7 @@
 #include "daemon/cli/live/page.hpp"
 #include "daemon/cli/live/serve.hpp"
 #include "daemon/logging/log_output.hpp"
-#include "daemon/view/web_server.hpp"
+#include "daemon/view/bridge.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 

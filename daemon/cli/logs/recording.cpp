@@ -44,6 +44,14 @@ std::uint64_t kernel_dropped(const v1::Stats& stats) {
   return dropped;
 }
 
+metrics::RecorderFigures figures_of(const record::Recorder& recorder) {
+  return {.file = recorder.file(),
+          .lost_chunks = recorder.lost_chunks(),
+          .lost_frames = recorder.lost_frames(),
+          .errors = recorder.errors(),
+          .error_ns = recorder.error_ns()};
+}
+
 std::string missing_words(const record::Recorder& recorder, std::uint64_t dropped) {
   const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
   std::string words;
@@ -183,6 +191,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
       *stats.mutable_take() = pipeline::stats_of(*take);
     }
   };
+  hooks.recorder_figures = [&recorder] { return figures_of(**recorder); };
   if (auto done = daemon.start(std::move(hooks)); !done) {
     daemon.stop();
     // What failed at the start is told, not what follows from it.

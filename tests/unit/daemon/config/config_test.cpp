@@ -271,6 +271,24 @@ TEST_CASE("the tables of recordings and triggers are checked") {
   CHECK(reading.config.trigger->peers.size() == 1);
 }
 
+TEST_CASE("metrics are for this machine only, whatever else the config permits") {
+  const std::string insecure = "[publish]\nendpoint = \"tcp://*:5570\"\ninsecure = true\n";
+  for (const char* listen : {"0.0.0.0:5572", "192.168.1.5:5572", "[::]:5572"}) {
+    INFO(listen);
+    CHECK(complaint(insecure + "[metrics]\nlisten = \"" + listen + "\"\n").find("reverse proxy") !=
+          std::string::npos);
+  }
+  CHECK(complaint("[metrics]\nlisten = \"localhost\"\n").find("an address and a port") !=
+        std::string::npos);
+  CHECK(complaint("[metrics]\ninsecure = true\n").find("insecure") != std::string::npos);
+  const Reading off = read(kWalker);
+  REQUIRE(off.errors.empty());
+  CHECK_FALSE(off.config.metrics);
+  const Reading on = read(std::string(kWalker) + "[metrics]\nlisten = \"[::1]:9000\"\n");
+  REQUIRE(on.errors.empty());
+  CHECK(on.config.metrics->listen == "[::1]:9000");
+}
+
 TEST_CASE("the error for a wrong unit names the right one") {
   const std::string stream = "[[stream]]\nname = \"w\"\ndriver = \"glove\"\n";
   CHECK(complaint("stale_after_s = \"500 ms\"\n", stream) ==
@@ -441,6 +459,9 @@ TEST_CASE("the shipped config contains every key with its default") {
   REQUIRE(b.trigger);
   CHECK(b.trigger->listen == config::TriggerConfig{}.listen);
   CHECK(b.trigger->peers.empty());
+  CHECK_FALSE(a.metrics);
+  REQUIRE(b.metrics);
+  CHECK(b.metrics->listen == config::MetricsConfig{}.listen);
   CHECK(a.streams[0].publish_raw == b.streams[0].publish_raw);
   CHECK(a.streams[0].stale_after_s == b.streams[0].stale_after_s);
   CHECK(a.streams[0].options == b.streams[0].options);

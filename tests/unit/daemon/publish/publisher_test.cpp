@@ -1,3 +1,7 @@
+#include <array>
+#include <cstdint>
+#include <numeric>
+
 #include <catch2/catch.hpp>
 
 #include "daemon/publish/published_stream.hpp"
@@ -19,6 +23,44 @@ TEST_CASE("status reports the stages by name with the times of the last second")
   REQUIRE(status.stream(0).stage_size() == 1);
   CHECK(status.stream(0).stage(0).name() == "style");
   CHECK(status.stream(0).stage(0).time().p50_us() == Approx(50.0).epsilon(0.2));
+}
+
+TEST_CASE("figures count from the start: by quality, and the times of what is not stale") {
+  PublisherRig rig;
+  REQUIRE(rig.receive("skeleton/toy", 1));
+  Item item = toy_frame_item(1);
+  item.frame.header.arrival_ns = system::monotonic_ns();
+  item.frame.stamps.decoded_ns = item.frame.header.arrival_ns + 3000;
+  item.frame.stage_us[0] = 50.0F;
+  for (const Quality quality :
+       {Quality::kMeasured, Quality::kHeld, Quality::kHeld, Quality::kStale}) {
+    item.frame.quality = quality;
+    rig.put(item);
+  }
+  item.kind = Item::Kind::kRawFrame;
+  rig.put(item);
+  Item stale;
+  stale.kind = Item::Kind::kEvent;
+  stale.stream_event = {0, v1::Event::KIND_STALE, 77, 41, 0.5};
+  rig.put(stale);
+  REQUIRE(rig.receive("event/toy", 1));
+  const auto figures = rig.publisher->figures();
+  REQUIRE(figures.size() == 1);
+  CHECK(figures[0].stream == "toy");
+  CHECK(figures[0].rate_hz == 100.0);
+  CHECK(figures[0].published == std::array<std::uint64_t, 4>{1, 0, 2, 1});
+  CHECK(figures[0].silences == 1);
+  const auto count_of = [](const DurationBuckets::Counts& counts) {
+    return std::accumulate(counts.count.begin(), counts.count.end(), std::uint64_t{0});
+  };
+  CHECK(count_of(figures[0].decode) == 3);
+  CHECK(figures[0].decode.count[0] == 3);  // at most 5 us
+  CHECK(figures[0].decode.sum_ns == 9000);
+  CHECK(count_of(figures[0].publish) == 3);
+  REQUIRE(figures[0].stages.size() == 1);
+  CHECK(figures[0].stages[0].first == "style");
+  CHECK(count_of(figures[0].stages[0].second) == 3);
+  CHECK(figures[0].stages[0].second.sum_ns == Approx(150'000).margin(10));
 }
 
 TEST_CASE("each kind of item is published under its topic") {

@@ -24,11 +24,11 @@ struct SiteRig {
     std::filesystem::create_symlink("/etc/passwd", folder.path() / "link.txt");
     site.files = PageFiles::load(folder.path()).value();
   }
-  [[nodiscard]] WebAnswer get(std::string_view target) const {
+  [[nodiscard]] http::Answer get(std::string_view target) const {
     return answer_to({.method = "GET", .target = target, .host = kOwnHost}, site);
   }
-  [[nodiscard]] WebAnswer open(std::string_view target, std::string_view origin,
-                               std::string_view host = kOwnHost) const {
+  [[nodiscard]] http::Answer open(std::string_view target, std::string_view origin,
+                                  std::string_view host = kOwnHost) const {
     return answer_to(
         {.method = "GET", .target = target, .host = host, .origin = origin, .upgrade = true}, site);
   }
@@ -45,7 +45,7 @@ TEST_CASE("only who knows the token gets the page") {
        {"/", "/?token=", "/?token=secre", "/?token=secrets", "/?token=Secret", "/?xtoken=secret",
         "/?token=wrong&token=secret", "/index.html", "/?token=secret#", "/?TOKEN=secret"}) {
     INFO(target);
-    const WebAnswer answer = rig.get(target);
+    const http::Answer answer = rig.get(target);
     CHECK(answer.status == 403);
     CHECK(answer.body.find("posed prints") != std::string_view::npos);
   }
@@ -67,9 +67,9 @@ TEST_CASE("what the network names is looked up in the list of files, and nowhere
 
 TEST_CASE("a file that the browser has is not sent again, and only GET and HEAD are answered") {
   const SiteRig rig;
-  const WebAnswer first = rig.get("/page.js");
+  const http::Answer first = rig.get("/page.js");
   REQUIRE(first.status == 200);
-  WebRequest again{.method = "GET", .target = "/page.js", .host = kOwnHost};
+  http::Request again{.method = "GET", .target = "/page.js", .host = kOwnHost};
   again.if_none_match = first.etag;
   CHECK(answer_to(again, rig.site).status == 304);
   again.if_none_match = "\"other\"";
@@ -105,7 +105,7 @@ TEST_CASE("a name that somebody else points at this machine is refused") {
   SiteRig rig;
   for (const char* host : {"", "evil.example:5580", "127.0.0.1", "127.0.0.1:5581", "localhost"}) {
     INFO(host);
-    WebRequest request{.method = "GET", .target = "/page.js", .host = host};
+    http::Request request{.method = "GET", .target = "/page.js", .host = host};
     CHECK(answer_to(request, rig.site).status == 403);
     const std::string origin = std::string("http://") + host;
     CHECK(rig.open("/ws?token=secret", origin, host).status == 403);
@@ -118,7 +118,7 @@ TEST_CASE("a name that somebody else points at this machine is refused") {
 
 TEST_CASE("every answer forbids the browser what is not the page's own") {
   std::set<std::string_view> names;
-  for (const WebHeader& header : safety_headers(kOwnHost)) {
+  for (const http::Header& header : safety_headers(kOwnHost)) {
     names.insert(header.name);
     if (header.name != "Content-Security-Policy") continue;
     for (const char* part : {"default-src 'none'", "script-src 'self';", "style-src 'self';",

@@ -1,4 +1,4 @@
-#include "daemon/view/web_session.hpp"
+#include "daemon/http/session.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -12,88 +12,84 @@
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 
-#include "daemon/view/tab_session.hpp"
-
-namespace posed::view {
+namespace posed::http {
 namespace {
 
 namespace beast = boost::beast;
-namespace http = beast::http;
+namespace protocol = beast::http;
 using namespace std::chrono_literals;
 
 constexpr std::uint32_t kMaxHeader = 8 * 1024;  // bytes
 constexpr auto kRequestWithin = 10s;            // also until the next one
-constexpr auto kAnswerWithin = 30s;             // a slow reader of the avatar's file
+constexpr auto kAnswerWithin = 30s;             // a slow reader of a large file
 
 std::string_view text(beast::string_view part) { return {part.data(), part.size()}; }
 
 }  // namespace
 
-WebRequest parts_of(const http::request<http::empty_body>& message) {
+Request parts_of(const Message& message) {
   return {.method = text(message.method_string()),
           .target = text(message.target()),
-          .host = text(message[http::field::host]),
-          .origin = text(message[http::field::origin]),
-          .if_none_match = text(message[http::field::if_none_match]),
+          .host = text(message[protocol::field::host]),
+          .origin = text(message[protocol::field::origin]),
+          .if_none_match = text(message[protocol::field::if_none_match]),
           .upgrade = beast::websocket::is_upgrade(message)};
 }
 
-WebSession::WebSession(boost::asio::ip::tcp::socket socket, WebRoom& room)
+Session::Session(boost::asio::ip::tcp::socket socket, Room& room)
     : room_(room),
       place_(room.sessions.insert(room.sessions.end(), this)),
       stream_(std::move(socket)),
       buffer_(2 * kMaxHeader) {}
 
-WebSession::~WebSession() { close(); }
+Session::~Session() { close(); }
 
-void WebSession::close() {
+void Session::close() {
   if (place_) room_.sessions.erase(*place_);
   place_.reset();
   stream_.close();
 }
 
-void WebSession::read() {
+void Session::read() {
   parser_.emplace();
   parser_->header_limit(kMaxHeader);
   stream_.expires_after(kRequestWithin);
-  http::async_read_header(stream_, buffer_, *parser_,
-                          [self = shared_from_this()](const beast::error_code& error, std::size_t) {
-                            if (error) return self->close();
-                            self->obey();
-                          });
+  protocol::async_read_header(
+      stream_, buffer_, *parser_,
+      [self = shared_from_this()](const beast::error_code& error, std::size_t) {
+        if (error) return self->close();
+        self->obey();
+      });
 }
 
-void WebSession::obey() {
-  const WebAnswer answer = answer_to(parts_of(parser_->get()), room_.site);
+void Session::obey() {
+  const Answer answer = room_.service.answer(parts_of(parser_->get()));
   if (!answer.upgrades()) return send(answer);
-  if (room_.tabs.size() >= kMaxTabs) {
-    return send({.status = 503, .body = "too many pages are open: close one\n"});
-  }
   upgrade();
 }
 
-void WebSession::upgrade() {
+void Session::upgrade() {
   // A browser sends nothing before the answer to its handshake.
   if (buffer_.size() > 0) return close();
-  stream_.expires_never();  // the WebSocket has limits of its own
-  std::make_shared<TabSession>(std::move(stream_), room_)->start(parser_->get());
+  stream_.expires_never();  // what the connection becomes has limits of its own
+  room_.service.upgrade(std::move(stream_), parser_->get());
 }
 
-void WebSession::send(const WebAnswer& answer) {
-  const bool bare = parser_->get().method() == http::verb::head || answer.status == 304;
-  if (bare) return send_message<http::empty_body>(answer, {});
-  send_message<http::span_body<const char>>(answer, {answer.body.data(), answer.body.size()});
+void Session::send(const Answer& answer) {
+  const bool bare = parser_->get().method() == protocol::verb::head || answer.status == 304;
+  if (bare) return send_message<protocol::empty_body>(answer, {});
+  send_message<protocol::span_body<const char>>(answer, {answer.body.data(), answer.body.size()});
 }
 
 template <typename Body>
-void WebSession::send_message(const WebAnswer& answer, typename Body::value_type body) {
+void Session::send_message(const Answer& answer, typename Body::value_type body) {
   const auto& request = parser_->get();
-  auto message = std::make_shared<http::response<Body>>();
+  auto message = std::make_shared<protocol::response<Body>>();
   message->version(request.version());
   message->result(answer.status);
   message->body() = body;
   message->content_length(answer.body.size());
-  message->set(http::field::content_type,
+  message->set(protocol::field::content_type,
                beast::string_view(answer.type.data(), answer.type.size()));
   const auto set = [&](beast::string_view name, std::string_view value) {
     message->set(name, beast::string_view(value.data(), value.size()));
@@ -101,19 +97,19 @@ void WebSession::send_message(const WebAnswer& answer, typename Body::value_type
   set("Cache-Control", answer.etag.empty() ? "no-store" : "no-cache");
   if (!answer.etag.empty()) set("ETag", answer.etag);
   if (answer.status == 405) set("Allow", "GET, HEAD");
-  for (const WebHeader& header : safety_headers(text(request[http::field::host]))) {
+  for (const Header& header : room_.service.headers(text(request[protocol::field::host]))) {
     set(beast::string_view(header.name.data(), header.name.size()), header.value);
   }
   // A body is never read, so nothing can follow one.
   const bool has_body = request.has_content_length() || request.chunked();
   message->keep_alive(request.keep_alive() && !has_body && answer.status < 400);
   stream_.expires_after(kAnswerWithin);
-  http::async_write(
-      stream_, *message,
-      [self = shared_from_this(), message](const beast::error_code& error, std::size_t) {
-        if (error || !message->keep_alive()) return self->close();
-        self->read();
-      });
+  protocol::async_write(stream_, *message,
+                        [self = shared_from_this(), message, keeps = answer.keeps](
+                            const beast::error_code& error, std::size_t) {
+                          if (error || !message->keep_alive()) return self->close();
+                          self->read();
+                        });
 }
 
-}  // namespace posed::view
+}  // namespace posed::http

@@ -1,0 +1,55 @@
+// Server: a small HTTP server, by Boost.Beast. It accepts connections and asks a service what to
+// answer. Every connection has limits of its own in bytes and time, and there is a limit for all
+// together, so strangers can neither fill the memory nor keep the server's users out for good. One
+// thread: the one that runs the io_context. Cold.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include "daemon/http/service.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::http {
+
+inline constexpr std::size_t kMaxConnections = 64;  // at once; one more ends the oldest
+
+class Server {
+ public:
+  // Where to listen.
+  struct Options {
+    boost::asio::ip::tcp::endpoint at{};  // port 0: any free one
+    bool or_any = false;                  // if the port is in use, any free one
+    std::string advice{};                 // what to do if none can be had; ends the error
+  };
+  // `io` and `room` outlive the server.
+  [[nodiscard]] static Result<std::unique_ptr<Server>> open(boost::asio::io_context& io, Room& room,
+                                                            const Options& options);
+
+  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
+  // "http://127.0.0.1:5580/". Where it listens on all addresses, that of this machine for itself.
+  [[nodiscard]] const std::string& url() const noexcept { return url_; }
+  // The Host headers of its own addresses, for is_own_host().
+  [[nodiscard]] const std::vector<std::string>& hosts() const noexcept { return hosts_; }
+
+ private:
+  Server(boost::asio::io_context& io, Room& room, boost::asio::ip::tcp::acceptor acceptor);
+  void accept();
+  void admit(boost::asio::ip::tcp::socket socket);
+
+  Room& room_;
+  boost::asio::ip::tcp::acceptor acceptor_;
+  boost::asio::steady_timer pause_;
+  std::uint16_t port_ = 0;
+  std::string url_;
+  std::vector<std::string> hosts_;
+};
+
+}  // namespace posed::http

@@ -1,0 +1,50 @@
+// Service: what an HTTP server serves. All calls come from the thread that runs the io_context.
+// Cold.
+#pragma once
+
+#include <cstddef>
+#include <list>
+#include <string_view>
+#include <vector>
+
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+
+#include "daemon/http/exchange.hpp"
+
+namespace posed::http {
+
+using Message = boost::beast::http::request<boost::beast::http::empty_body>;
+
+class Service {
+ public:
+  Service() = default;
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+  virtual ~Service() = default;
+
+  [[nodiscard]] virtual Answer answer(const Request& request) = 0;
+  // What each answer says beside its own headers.
+  [[nodiscard]] virtual std::vector<Header> headers(std::string_view host) const {
+    static_cast<void>(host);
+    return {{"X-Content-Type-Options", "nosniff"}};
+  }
+  // Takes the connection of a request that was answered by 101.
+  virtual void upgrade(boost::beast::tcp_stream stream, const Message& request) {
+    static_cast<void>(request);
+    stream.close();
+  }
+  // Connections that were taken so and still stand; they count with the others.
+  [[nodiscard]] virtual std::size_t upgraded() const { return 0; }
+};
+
+class Session;
+
+// The service and its connections, the oldest first. Outlives them and the io_context.
+struct Room {
+  Service& service;
+  std::list<Session*> sessions{};
+};
+
+}  // namespace posed::http
