@@ -62,6 +62,7 @@ void OutputThreads::run(Running& running) {
 
 std::vector<system::ThreadPulse> OutputThreads::pulses() const {
   std::vector<system::ThreadPulse> all;
+  all.reserve(running_.size());
   for (const Running& running : running_) {
     all.push_back({.thread = thread_name(*running.output), .pulse = running.pulse.get()});
   }

@@ -106,7 +106,9 @@ Check check_usb_latency(const Machine& machine) {
     if (latency.empty()) continue;  // only FTDI's adapters collect bytes
     const std::string node = port.filename().string();
     add_word(ports, node);
-    if (number_of(latency) > kLongestLatency_ms) add_word(slow, node + " " + latency + " ms");
+    if (number_of(latency) <= kLongestLatency_ms) continue;
+    add_word(slow, node);
+    slow += " " + latency + " ms";
   }
   if (ports.empty()) return right(name, "no USB adapter with a latency timer is here");
   if (slow.empty()) return right(name, ports + " deliver at once (1 ms)");

@@ -12,6 +12,7 @@
 #include "proto/log/open_whole.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/zmq/keys.hpp"
 
 namespace posed::doctor {
 namespace {
@@ -116,13 +117,13 @@ Check check_keys(Config config) {
   if (files.empty()) return right(name, "not needed: the config names no secret key");
   for (const fs::path& file : files) {
     struct stat info{};
-    if (::stat(file.c_str(), &info) != 0) {
-      return wrong(name, shown(file) + " cannot be read (" + errno_text() + ")",
+    if (::stat(file.c_str(), &info) == 0 && (info.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+      return wrong(name, shown(file) + " can be read by other users", "chmod 600 " + shown(file));
+    }
+    if (const auto pair = net::read_secret_key(file); !pair) {
+      return wrong(name, pair.error().text(),
                    "posed keygen " + shown(file.stem()) + " --out " +
                        shown(file.has_parent_path() ? file.parent_path() : "."));
-    }
-    if ((info.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-      return wrong(name, shown(file) + " can be read by other users", "chmod 600 " + shown(file));
     }
   }
   return right(name, std::to_string(files.size()) + " that only their owner reads");

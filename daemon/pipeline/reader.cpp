@@ -40,7 +40,9 @@ void Reader::begin() noexcept {
 
 std::int64_t Reader::turn(std::int64_t now_ns) noexcept {
   const bool all_taken = take_requests();
-  for (const std::uint32_t source : std::exchange(ready_, {})) sources_[source]->serve();
+  for (const std::uint32_t source : std::exchange(ready_, {})) {
+    handled_ += sources_[source]->serve();
+  }
   const std::int64_t due_ns = serve_timed(now_ns);
   return all_taken ? due_ns : std::min(due_ns, now_ns + kLookAgain_ns);
 }
@@ -50,7 +52,9 @@ void Reader::run() noexcept {
   begin();
   while (!stop_.load(std::memory_order_acquire)) {
     pulse_.beat();
-    const std::int64_t due_ns = turn(ports_.clock());
+    const std::int64_t now_ns = ports_.clock();
+    const std::int64_t due_ns = turn(now_ns);
+    system::rest(moderation_.rest_ns(handled_, now_ns));
     wake_->going_to_sleep();
     if (stop_.load(std::memory_order_acquire)) break;
     ready_ = poller_->wait(called() ? 0 : system::time_left_ns(due_ns, ports_.clock));
@@ -96,7 +100,7 @@ std::int64_t Reader::serve_timed(std::int64_t now_ns) noexcept {
     std::int64_t due_ns = source->due_ns();
     if (due_ns == kNoTime_ns) continue;
     if (due_ns <= now_ns) {
-      source->serve();
+      handled_ += source->serve();
       due_ns = source->due_ns();
       if (due_ns == kNoTime_ns) continue;
       if (source->must_wait()) due_ns = std::max(due_ns, now_ns + kLookAgain_ns);

@@ -16,6 +16,7 @@
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/system/event_fd.hpp"
+#include "daemon/system/moderation.hpp"
 #include "drivers/driver.hpp"
 
 namespace posed::pipeline {
@@ -120,6 +121,8 @@ class Reader {
   std::uint64_t next_item_ = 1;  // the next Item::number
   bool requests_wait_ = false;   // for space in `out`
   std::atomic<bool> called_{false};
+  std::uint64_t handled_ = 0;  // chunks that came at their device's own pace
+  system::Moderation moderation_;
   system::Pulse pulse_;
   std::atomic<bool> stop_{false};
 };

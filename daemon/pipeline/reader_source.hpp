@@ -24,7 +24,7 @@ class Reader::Source final : private IntakeOut {
   // that always has data then costs each of the others only a fraction of a millisecond. No glove
   // comes near the limit: USB full speed is 64 bytes a millisecond, a serial line 11.5 KB a second.
   // A mocap system's datagram is often larger: then one is a turn.
-  static constexpr int kChunksATurn = 64;
+  static constexpr std::uint64_t kChunksATurn = 64;
   static constexpr std::size_t kBytesATurn = 4096;
   // Frames of a lossless source on their way through the pipeline; below what the pipeline sheds.
   static constexpr std::uint64_t kFramesUnderWay = 2;
@@ -111,11 +111,14 @@ class Reader::Source final : private IntakeOut {
     return all_taken;
   }
 
-  void serve() noexcept {
-    if (device_ == nullptr) return;
+  // Returns how many chunks came at the device's own pace.
+  std::uint64_t serve() noexcept {
+    if (device_ == nullptr) return 0;
+    const bool paced = !device_->transport->lossless();
     poll();
     std::size_t bytes = 0;
-    for (int i = 0; i < kChunksATurn && bytes < kBytesATurn && may_read(); ++i) {
+    std::uint64_t chunks = 0;
+    for (; chunks < kChunksATurn && bytes < kBytesATurn && may_read(); ++chunks) {
       const std::size_t got = read_one();
       if (got == 0) break;
       bytes += got;
@@ -123,6 +126,7 @@ class Reader::Source final : private IntakeOut {
     if (ended_ && device_ != nullptr && device_->transport->poll_fd() >= 0) {
       poller_.remove(device_->transport->poll_fd());
     }
+    return paced ? chunks : 0;
   }
 
   // IntakeOut: counts the item and puts it into the ring.

@@ -4,6 +4,7 @@
 
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "daemon/system/hot_mark.hpp"
@@ -36,6 +37,13 @@ void EventFd::notify() noexcept {
   const std::uint64_t one = 1;
   const AllowedCall allowed;
   [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+}
+
+void rest(std::int64_t time_ns) noexcept {
+  if (time_ns <= 0) return;
+  const timespec time{.tv_sec = time_ns / kNanosPerSecond, .tv_nsec = time_ns % kNanosPerSecond};
+  const AllowedCall allowed;
+  nanosleep(&time, nullptr);
 }
 
 Result<std::unique_ptr<Poller>> Poller::open() {

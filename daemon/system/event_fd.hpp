@@ -57,6 +57,10 @@ inline constexpr std::int64_t kForever_ns = std::numeric_limits<std::int64_t>::m
   return std::clamp<std::int64_t>(due_ns - clock(), 0, kLongestSleep_ns);
 }
 
+// Sleeps for so long, whatever happens; returns at once if that is 0. One system call; RT-safe
+// except for it.
+void rest(std::int64_t time_ns) noexcept;
+
 class Poller {
  public:
   [[nodiscard]] static Result<std::unique_ptr<Poller>> open();

@@ -153,6 +153,7 @@ Result<std::vector<Recording>> body_recordings(const std::vector<clip::Clip>& cl
     if (!motion) return std::unexpected(motion.error());
     motions.push_back(std::move(*motion));
   }
+  all.reserve(motions.size());
   for (const motion::Motion& motion : motions) all.push_back(&motion);
   if (auto set = motion::set_mean_rotations(all, *vocabulary.body); !set) {
     return std::unexpected(set.error());

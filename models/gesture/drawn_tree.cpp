@@ -30,6 +30,7 @@ class Words {
   // [label] for which the question's answer is yes.
   [[nodiscard]] std::vector<bool> yes(int question) const {
     std::vector<bool> labels;
+    labels.reserve(model_.labels.size());
     for (int label = 0; label < std::ssize(model_.labels); ++label) {
       labels.push_back(model_.holds(group_, question % model_.statements(group_), label));
     }

@@ -186,6 +186,7 @@ Vocabulary built_in_vocabulary() {
 
 std::vector<Label> propose_labels(const std::vector<LabelPose>& poses) {
   std::vector<Label> labels;
+  labels.reserve(poses.size());
   for (const LabelPose& pose : poses) labels.push_back({.name = pose.name});
   for (int f = 0; f < kFingers && !poses.empty(); ++f) {
     std::vector<Finger> fingers;

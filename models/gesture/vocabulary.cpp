@@ -8,6 +8,7 @@ namespace posed::gesture {
 const std::vector<ChannelGroup>& finger_groups() {
   static const std::vector<ChannelGroup> groups = [] {
     std::vector<ChannelGroup> fingers;
+    fingers.reserve(kFingers);
     for (int f = 0; f < kFingers; ++f) {
       fingers.push_back({std::string(kFingerNames[f]), f * kFingerChannels, kFingerChannels});
     }

@@ -56,6 +56,8 @@ int flood_size() {
   return wanted == nullptr ? 3000 : std::atoi(wanted);
 }
 
+constexpr int kMostMissing = 20;
+
 // Watches `count` frames of the walker in a separate process and determines whether any is missing.
 struct Watched {
   explicit Watched(const std::string& publish, int count)
@@ -81,14 +83,17 @@ struct Watched {
   std::uint64_t first = 0;
 };
 
-// Checks that the walker lost no frames except those that a busy machine made the pipeline skip,
-// which are counted.
+// Checks that the walker lost no frames except the few that a busy machine cost, which are counted.
+// A thread that waits for stderr would cost all of them.
 void check_nothing_lost(const Stage& stage, Watched& watched) {
   const int missing = watched.missing();
   const auto status = json::parse(stage.ctl({"--json", "status"}).out).at("status");
   const auto& walker = status.at("stream").at(0);
-  CHECK(walker.at("dropped") == "0");
-  CHECK(missing <= std::stoi(walker.at("shed").get<std::string>()));
+  const auto count = [&walker](const char* what) {
+    return std::stoi(walker.at(what).get<std::string>());
+  };
+  CHECK(missing <= count("shed") + count("dropped"));
+  CHECK(missing <= kMostMissing);
 }
 
 void stop(Stage& stage) {

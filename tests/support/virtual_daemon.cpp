@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <random>
 #include <set>
 
@@ -13,9 +14,12 @@
 #include "daemon/record/recorder.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/log/digest.hpp"
+#include "tests/support/copy_log.hpp"
+#include "tests/support/file_limit.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/virtual_bodies.hpp"
 #include "tests/support/virtual_stream_context.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::test {
 namespace {
@@ -33,6 +37,12 @@ std::vector<devices::ModelBytes> shared(const std::vector<std::string>& files) {
   return bytes;
 }
 
+bool within(const std::vector<Spell>& spells) {
+  return std::ranges::any_of(spells, [](const Spell& spell) {
+    return at_ns(spell.from_s) <= virtual_now_ns && virtual_now_ns < at_ns(spell.until_s);
+  });
+}
+
 }  // namespace
 
 class VirtualDaemon::Parts {
@@ -48,6 +58,7 @@ class VirtualDaemon::Parts {
   std::vector<pipeline::Ack> acks_taken;
   std::unique_ptr<VirtualBodies> bodies;  // null without sources
   pipeline::PartnerStreams partners;      // that stages may name
+  std::uint64_t write_errors = 0;         // of the log, until it was closed
 
  private:
   enum Part : std::uint8_t {
@@ -73,7 +84,10 @@ class VirtualDaemon::Parts {
   void speak(const VirtualCommand& command, std::uint64_t ticket);
   void keep_devices();
   void run_beside_builder();
+  void write_log();
+  void sleep();
   void stop();
+  void kill();
   std::int64_t draw_ns(std::int64_t most_ns) {
     return std::uniform_int_distribution<std::int64_t>(0, most_ns)(random);
   }
@@ -214,8 +228,9 @@ void VirtualDaemon::Parts::open() {
 // advances.
 void VirtualDaemon::Parts::run(double until_s) {
   open();
-  const std::int64_t until_ns = at_ns(until_s);
+  const std::int64_t until_ns = std::min(at_ns(until_s), at_ns(options.killed_at_s));
   while (virtual_now_ns < until_ns) {
+    if (within(options.asleep)) sleep();
     std::array<Part, kParts> ready{};
     std::size_t count = 0;
     std::int64_t next_ns = until_ns;
@@ -237,7 +252,15 @@ void VirtualDaemon::Parts::run(double until_s) {
       held_until_ns[part] = virtual_now_ns + draw_ns(kMaxHoldup_ns);
     }
   }
-  stop();
+  if (virtual_now_ns < at_ns(options.killed_at_s)) return stop();
+  kill();
+}
+
+void VirtualDaemon::Parts::sleep() {
+  for (const Spell& spell : options.asleep) {
+    if (at_ns(spell.from_s) > virtual_now_ns) continue;
+    virtual_now_ns = std::max(virtual_now_ns, at_ns(spell.until_s));
+  }
 }
 
 // When a part would wake: at the time it asked for, or because one of its rings has something.
@@ -285,7 +308,7 @@ void VirtualDaemon::Parts::take_turn(Part part) {
       publish(kItemsPublishedATurn);
       break;
     case kLogWriter:
-      if (log_writer) log_writer->turn(virtual_now_ns);
+      if (log_writer) write_log();
       due[part] = virtual_now_ns + kLogWriterEvery_ns;
       break;
     case kPerson:
@@ -301,6 +324,13 @@ void VirtualDaemon::Parts::take_turn(Part part) {
     default:
       keep_devices();
   }
+}
+
+void VirtualDaemon::Parts::write_log() {
+  std::optional<FileLimit> full;
+  if (within(options.disk_full)) full.emplace(0);
+  log_writer->turn(virtual_now_ns);
+  write_errors = log_writer->errors();
 }
 
 void VirtualDaemon::Parts::keep_devices() {
@@ -402,7 +432,12 @@ void VirtualDaemon::Parts::publish_frame(PublishedStream& stream, const pipeline
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
   VirtualDaemon::Published& published = stream.published;
   ++(raw ? published.raw : published.frames);
-  if (!raw) published.sequences.push_back(item.frame.header.sequence);
+  REQUIRE(is_sound(item.frame));
+  published.root_z_m.insert(std::lround(item.frame.root_position_m[2]));
+  if (!raw) {
+    published.sequences.push_back(item.frame.header.sequence);
+    published.at_s.push_back(static_cast<double>(virtual_now_ns - kVirtualBegin_ns) * 1e-9);
+  }
   if (!record_sink) return;
   const std::string bytes =
       (raw ? stream.raw : stream.styled).encode(item.frame).SerializeAsString();
@@ -414,6 +449,16 @@ void VirtualDaemon::Parts::stop() {
   worker->finish();
   while (!finished->empty() || !acks->empty()) publish(kItemsPublishedATurn);
   if (log_writer) REQUIRE(log_writer->finish(virtual_now_ns));
+  if (bodies) bodies->finish();
+}
+
+// To close the log would complete it, so its files are put back as they were.
+void VirtualDaemon::Parts::kill() {
+  const TempFolder folder;
+  const auto copy = folder.path() / "log";
+  if (log_writer) copy_log(options.log, copy);
+  log_writer.reset();
+  if (!options.log.empty()) copy_log(copy, options.log);
   if (bodies) bodies->finish();
 }
 
@@ -444,6 +489,7 @@ const std::vector<VirtualBody>& VirtualDaemon::bodies() const {
 std::size_t VirtualDaemon::warnings() const {
   return parts_->bodies ? parts_->bodies->warnings() : 0;
 }
+std::uint64_t VirtualDaemon::write_errors() const { return parts_->write_errors; }
 const std::vector<pipeline::Ack>& VirtualDaemon::acks() const { return parts_->acks_taken; }
 
 }  // namespace posed::test

@@ -18,6 +18,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -85,6 +86,11 @@ struct VirtualCommand {
   bool loop = false;  // kPlay
 };
 
+// From one time to another.
+struct Spell {
+  double from_s = 0.0, until_s = 0.0;
+};
+
 struct VirtualOptions {
   std::uint64_t seed = 1;
   std::filesystem::path log;  // empty: no recording
@@ -92,8 +98,14 @@ struct VirtualOptions {
   int turns_between_holdups = 400;
   double calm_from_s = kNever_s;  // no holdup begins after this
   double turn_us = 40.0;          // the longest duration of a turn
-  std::size_t ack_slots = 64;     // of the ring to control
-  std::size_t bodies = 8;         // of all sources that may have a stream at once
+  // Nothing can be written to the disk. Ends before the run does.
+  std::vector<Spell> disk_full{};
+  // The computer sleeps: nothing has a turn, and time goes on.
+  std::vector<Spell> asleep{};
+  // The process ends there as if by SIGKILL, so the log is as its last commit left it.
+  double killed_at_s = kNever_s;
+  std::size_t ack_slots = 64;  // of the ring to control
+  std::size_t bodies = 8;      // of all sources that may have a stream at once
   // Each device's and each stream's share of the recorder's rings.
   std::size_t chunk_bytes = 4 << 20;
   record::SlotSizes record_slot{.frame_bytes = 16 << 20, .decisions = 2048};
@@ -111,14 +123,17 @@ class VirtualDaemon {
   void add(VirtualSource source);
   void command(VirtualCommand command);
 
-  // Runs from time 0 to `until_s`, stops as the daemon does and closes the log. Call once. Fails
-  // the test if something cannot be set up.
+  // Runs from time 0 to `until_s`, stops as the daemon does and closes the log, unless it is killed
+  // before. Call once. Fails the test if something cannot be set up, or if a published frame has a
+  // rotation that is not of length 1 or a number that is not finite.
   void run(double until_s);
 
   struct Published {
     std::uint64_t frames = 0, raw = 0, samples = 0;
     std::uint64_t missed = 0;              // numbers of frames that never came, as events said
     std::vector<std::uint64_t> sequences;  // of the styled frames, as they came
+    std::vector<double> at_s;              // of each of them, when it was published
+    std::set<long> root_z_m;               // rounded, of all frames
   };
   [[nodiscard]] const Published& published(std::uint32_t stream) const;
   [[nodiscard]] const pipeline::StreamCounters& counters(std::uint32_t stream) const;
@@ -126,6 +141,8 @@ class VirtualDaemon {
   [[nodiscard]] const std::vector<VirtualBody>& bodies() const;
   // How often people were told of a problem with a source.
   [[nodiscard]] std::size_t warnings() const;
+  // How often the recorder could not write.
+  [[nodiscard]] std::uint64_t write_errors() const;
   // The Acks that control received; tickets count the commands from 1, by time.
   [[nodiscard]] const std::vector<pipeline::Ack>& acks() const;
 
@@ -158,7 +175,8 @@ struct VirtualBody {
 
 // A room with two to six people at 60 to 120 Hz who come and go and change their skeleton, and
 // whose system repeats, cuts, distorts or floods its descriptions. What happens, and the stages of
-// the bodies, are drawn from the seed.
+// the bodies, are drawn from the seed. The root of each is z metres away, where z is the system's
+// number for the person; a person may get a new one, but nobody that of another.
 [[nodiscard]] VirtualSource mocap_source(const std::string& name, double length_s,
                                          std::uint64_t seed);
 

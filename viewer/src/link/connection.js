@@ -7,11 +7,13 @@ const REFUSED_WAIT_MS = 3000;
 const MOST_QUESTION_MS = 2000; // a bridge that hangs, a network that is lost
 const SILENT = 'posed view does not answer; trying again';
 const CLOCK_EVERY_MS = 1000;
+const MOST_UNANSWERED = 3; // the bridge answers each question about the clock at once
 
 export class Connection {
   #socket = null;
   #wait_ms = FIRST_WAIT_MS;
   #clockTimer = 0;
+  #unanswered = 0;
   #refused = false;
 
   // handlers: state(name, sentence), binary(bytes), text(object), open()
@@ -58,16 +60,25 @@ export class Connection {
   #opened() {
     this.#wait_ms = FIRST_WAIT_MS;
     this.#refused = false;
+    this.#unanswered = 0;
     this.#askClock();
     this.#clockTimer = setInterval(() => this.#askClock(), CLOCK_EVERY_MS);
     this.handlers.open();
   }
 
+  // A network that is lost, or a bridge that hangs, closes no socket.
   #askClock() {
+    if (this.#unanswered === MOST_UNANSWERED) {
+      this.close();
+      this.#closed();
+      return;
+    }
+    this.#unanswered += 1;
     this.sendText({ type: 'clock', t0: performance.now() });
   }
 
   #received(data) {
+    this.#unanswered = 0;
     if (typeof data !== 'string') {
       this.handlers.binary(new Uint8Array(data));
       return;

@@ -108,6 +108,13 @@ test('a model goes in pieces of 32 KiB with its SHA-256, and stops at a refusal'
   assert.equal((await sendModel(ask, 'walker', 'm', new Uint8Array(), () => {})).ok, false);
 });
 
+// Puts these in the place of the browser's own until the test ends.
+function pretend(browser, context) {
+  const kept = Object.keys(browser).map((name) => [name, globalThis[name]]);
+  Object.assign(globalThis, browser);
+  context.after(() => Object.assign(globalThis, Object.fromEntries(kept)));
+}
+
 test('a connection that closes is said at once, also when the bridge hangs', async (context) => {
   const sockets = [];
   class Socket {
@@ -123,19 +130,49 @@ test('a connection that closes is said at once, also when the bridge hangs', asy
     return new Promise(() => {});
   };
   const browser = { WebSocket: Socket, location: { protocol: 'http:', host: 'a' }, fetch: hang };
-  for (const [name, value] of Object.entries(browser)) {
-    const before = globalThis[name];
-    globalThis[name] = value;
-    context.after(() => {
-      globalThis[name] = before;
-    });
-  }
+  pretend(browser, context);
   const states = [];
   const connection = new Connection('x', { state: (name) => states.push(name) });
   sockets[0].onclose();
   assert.deepEqual(states, ['connecting', 'closed']);
   assert.ok(asked[0] instanceof AbortSignal); // it ends by itself
   connection.close();
+});
+
+test('an open socket that carries nothing any more counts as closed', async (context) => {
+  context.mock.timers.enable({ apis: ['setInterval', 'setTimeout'] });
+  const sockets = [];
+  class Socket {
+    static OPEN = 1;
+    readyState = Socket.OPEN;
+    closed = false;
+    constructor() {
+      sockets.push(this);
+    }
+    send() {}
+    close() {
+      this.closed = true;
+    }
+  }
+  const fetch = async () => ({ status: 200 });
+  const browser = { WebSocket: Socket, location: { protocol: 'http:', host: 'a' }, fetch };
+  pretend(browser, context);
+  const said = [];
+  new Connection('', { state: (name) => said.push(name), open() {}, binary() {}, text() {} });
+  sockets[0].onopen();
+  for (let second = 0; second < 10; ++second) {
+    context.mock.timers.tick(1000);
+    sockets[0].onmessage({ data: '{"type":"clock"}' });
+  }
+  assert.deepEqual(said, ['connecting']);
+  context.mock.timers.tick(3000);
+  assert.equal(sockets[0].closed, false); // one answer may be late
+  context.mock.timers.tick(1000);
+  assert.equal(sockets[0].closed, true);
+  assert.deepEqual(said, ['connecting', 'closed']);
+  await new Promise(setImmediate);
+  context.mock.timers.tick(1000);
+  assert.equal(sockets.length, 2);
 });
 
 test('a reply of the daemon reads as it was written', () => {

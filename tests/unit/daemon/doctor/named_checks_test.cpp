@@ -132,6 +132,9 @@ TEST_CASE("doctor: secret keys are for their owner alone") {
   const Check bad = check_keys(&config);
   CHECK_FALSE(bad.ok);
   CHECK(bad.fix == "chmod 600 " + key.string());
+  sound.folder.write("server.key", "my password\n");
+  ::chmod(key.c_str(), 0600);
+  CHECK(has(check_keys(&config).found, "this is not a key"));
   std::filesystem::remove(key);
   CHECK(has(check_keys(&config).fix, "posed keygen server"));
 }

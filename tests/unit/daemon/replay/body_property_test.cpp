@@ -12,6 +12,7 @@
 
 #include "tests/support/dice.hpp"
 #include "tests/support/gapped_logs.hpp"
+#include "tests/support/numbers_of_names.hpp"
 #include "tests/support/replayed.hpp"
 #include "tests/support/seeds.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -37,41 +38,6 @@ struct Met {
     return *this;
   }
 };
-
-// All streams of one name, whichever slots and generations they had.
-struct Name {
-  std::set<std::uint64_t> published;
-  std::uint64_t missed = 0, decoded = 0, unpublished = 0;
-  bool left = false;
-  bool last_decoded = false;  // the last of the streams had frames
-};
-
-// The numbers of a name never go back, and those that were not published were reported as missing.
-// Within a stream a pose may be repeated under its number.
-std::map<std::string, Name> check_numbers(const std::vector<VirtualBody>& bodies) {
-  std::map<std::string, Name> names;
-  for (const VirtualBody& body : bodies) {
-    if (!body.refusal.empty()) continue;
-    INFO(body.name << ", stream " << body.stream);
-    Name& name = names[body.name];
-    const auto& sequences = body.published.sequences;
-    CHECK(std::ranges::is_sorted(sequences));
-    if (!sequences.empty() && !name.published.empty()) {
-      CHECK(sequences.front() > *name.published.rbegin());
-    }
-    name.published.insert(sequences.begin(), sequences.end());
-    name.missed += body.published.missed;
-    name.last_decoded = body.decoded > name.decoded;
-    name.decoded = body.decoded;
-    name.unpublished += body.unpublished;
-    name.left = body.left;
-  }
-  for (const auto& [text, name] : names) {
-    INFO(text);
-    if (name.unpublished == 0) CHECK(name.published.size() + name.missed == name.decoded);
-  }
-  return names;
-}
 
 Met met_by(const VirtualDaemon& daemon) {
   Met met{.warnings = daemon.warnings()};

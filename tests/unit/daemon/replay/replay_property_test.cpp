@@ -6,72 +6,18 @@
 #include <cstdint>
 #include <string>
 
-#include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
 #include "tests/support/dice.hpp"
 #include "tests/support/gapped_logs.hpp"
+#include "tests/support/random_streams.hpp"
 #include "tests/support/replayed.hpp"
 #include "tests/support/seeds.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/virtual_daemon.hpp"
-#include "tests/unit/models/gesture/toy_gesture.hpp"
-#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
 namespace {
 
 constexpr double kLength_s = 2.5;
-
-enum class What : std::uint8_t { kBody, kHand };
-
-void set_lag(pipeline::StageSettings& generate, int frames) {
-  generate.parameters["lag_frames"] = std::int64_t{frames};
-}
-
-VirtualStream random_body(const std::string& name, Dice& dice) {
-  VirtualStream body = walking_stream(name, kLength_s, 1);
-  body.settings.publish_raw = dice.below(2) == 0;
-  if (dice.below(2) == 0) {
-    body.settings.stages.pop_back();
-    body.model_files.pop_back();
-  } else {
-    set_lag(body.settings.stages[1], dice.below(4));
-  }
-  return body;
-}
-
-VirtualStream random_hand(const std::string& name, Dice& dice) {
-  VirtualStream hand = glove_stream(name, kLength_s);
-  hand.settings.publish_raw = dice.below(2) == 0;
-  set_lag(hand.settings.stages[0], dice.below(4));
-  if (dice.below(4) == 0) {
-    hand.settings.stages.pop_back();
-    hand.model_files.pop_back();
-  }
-  if (dice.below(2) == 0) hand.calibration = glove_calibration(dice.below(3));
-  return hand;
-}
-
-VirtualCommand random_command(std::uint32_t stream, What what, Dice& dice) {
-  static const std::string one = style::serialize_model(toy_model(1));
-  static const std::string two = style::serialize_model(toy_model(2));
-  static const std::string gestures = gesture::serialize_model(toy_gesture_model());
-  using Kind = VirtualCommand::Kind;
-  VirtualCommand command{.at_s = dice.within(0.0, kLength_s), .stream = stream};
-  if (what == What::kBody) {
-    command.kind = dice.below(2) == 0 ? Kind::kAlpha : Kind::kModel;
-    command.alpha = static_cast<float>(dice.within(-2.0, 2.0));
-    command.bytes = dice.below(2) == 0 ? one : two;
-    return command;
-  }
-  constexpr std::array kKinds{Kind::kPlay, Kind::kPlay, Kind::kStopPlaying, Kind::kModel,
-                              Kind::kCalibrate};
-  command.kind = kKinds[static_cast<std::size_t>(dice.below(kKinds.size()))];
-  command.bytes = command.kind == Kind::kModel ? gestures : glove_calibration(dice.below(4));
-  command.labels = dice.below(2) == 0 ? "g 1 c" : "4";
-  command.loop = dice.below(4) == 0;
-  return command;
-}
 
 // Runs the daemon as the seed determines; the log is at `path`.
 void record_run(std::uint64_t seed, const std::filesystem::path& path,
@@ -85,13 +31,13 @@ void record_run(std::uint64_t seed, const std::filesystem::path& path,
   if (dice.below(3) == 0) streams.push_back(dice.below(2) == 0 ? What::kBody : What::kHand);
   for (std::uint32_t id = 0; id < streams.size(); ++id) {
     const std::string name = "s" + std::to_string(id);
-    VirtualStream stream =
-        streams[id] == What::kBody ? random_body(name, dice) : random_hand(name, dice);
+    VirtualStream stream = streams[id] == What::kBody ? random_body(name, kLength_s, dice)
+                                                      : random_hand(name, kLength_s, dice);
     stream.slots = small_rings ? 16 : 256;
     disturb(stream, dice.seed());
     daemon.add(std::move(stream));
     for (int i = dice.below(10); i > 0; --i) {
-      daemon.command(random_command(id, streams[id], dice));
+      daemon.command(random_command(id, streams[id], kLength_s, dice));
     }
   }
   daemon.run(kLength_s + dice.within(0.0, 2.5));
