@@ -2,13 +2,15 @@
 
 #include <utility>
 
-#include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::drivers {
 
-LabelsDecoder::LabelsDecoder(std::shared_ptr<const Skeleton> skeleton, double rate_hz)
-    : skeleton_(std::move(skeleton)), rate_hz_(rate_hz) {}
+LabelsDecoder::LabelsDecoder(const Frame& rest, double rate_hz) : rest_(rest), rate_hz_(rate_hz) {
+  rest_.header = {};
+  rest_.source = Source::kLabels;
+  rest_.quality = Quality::kHeld;
+}
 
 // RT-safe.
 void LabelsDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
@@ -19,13 +21,9 @@ void LabelsDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arriva
       continue;
     }
     foreign_ = false;
-    Frame frame;
-    frame.header.device_ns = nanoseconds(static_cast<double>(beats_++) / rate_hz_);
-    frame.source = Source::kLabels;
-    frame.quality = Quality::kHeld;
-    set_hand_angles(*skeleton_, HandAngles{}, frame);
+    rest_.header.device_ns = nanoseconds(static_cast<double>(beats_++) / rate_hz_);
     sink.outcome(Outcome::kOk);
-    sink.frame(frame);
+    sink.frame(rest_);
   }
 }
 

@@ -4,26 +4,26 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <string_view>
 
 #include "drivers/driver.hpp"
 
 namespace posed::drivers {
 
-// Device time follows the ticks: frame n is at n / rate. The pose is the hand at rest, held.
+// Device time follows the ticks: frame n is at n / rate. The pose is that of rest, held.
 class LabelsDecoder final : public Decoder {
  public:
   static constexpr std::string_view kBeat = "\n";
 
-  LabelsDecoder(std::shared_ptr<const Skeleton> skeleton, double rate_hz);
+  // `rest` is posed for the stream's skeleton; its header does not matter.
+  LabelsDecoder(const Frame& rest, double rate_hz);
 
   // RT-safe.
   void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
             Sink& sink) noexcept override;
 
  private:
-  std::shared_ptr<const Skeleton> skeleton_;
+  Frame rest_;
   double rate_hz_;
   std::int64_t beats_ = 0;
   bool foreign_ = false;  // inside foreign bytes, which are already counted

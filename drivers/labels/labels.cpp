@@ -1,11 +1,18 @@
 #include "drivers/labels/labels.hpp"
 
+#include <algorithm>
+#include <optional>
+#include <span>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
+#include "drivers/file/decoder.hpp"
 #include "drivers/labels/decoder.hpp"
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
+#include "proto/clip/text_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
@@ -14,55 +21,123 @@ namespace {
 
 constexpr double kMaxRate_hz = 1000.0;
 
-struct Header {
-  Side side = Side::kRight;
+// Who performs, and how they stand at rest.
+struct Performer {
+  std::shared_ptr<const Skeleton> skeleton;
+  Frame rest;
   double rate_hz = 0.0;
 };
 
-std::string text_of(const std::string& side, double rate_hz) {
+// Keeps the last frame.
+class RestSink final : public Sink {
+ public:
+  void frame(std::size_t /*body*/, Frame& frame) noexcept override { rest = frame; }
+  void sample(std::size_t /*body*/, Sample& /*sample*/) noexcept override {}
+  void outcome(Outcome /*outcome*/) noexcept override {}
+
+  std::optional<Frame> rest;
+};
+
+// "right 30.000000" describes a hand; "body 30.000000 N", a line end, N bytes with a frame of a
+// clip and then the clip's own description a body.
+std::string hand_text(const std::string& side, double rate_hz) {
   return side + " " + std::to_string(rate_hz);
 }
 
-// Parses "right 30.000000".
-Result<Header> parse_text(const std::string& text, const std::string& identity) {
-  std::istringstream words(text);
-  std::string side, rest;
-  Header header;
-  words >> side >> header.rate_hz;
-  header.side = side == "left" ? Side::kLeft : Side::kRight;
-  const bool sided = side == "left" || side == "right";
-  if (!words || words >> rest || !sided || !(header.rate_hz >= 1.0) ||
-      header.rate_hz > kMaxRate_hz) {
-    return fail("the description of a labels stream is damaged", identity);
+std::string body_text(const clip::TextClip& clip, double rate_hz) {
+  const std::string rest = std::string(clip.frames.front()) + "\n";
+  return "body " + std::to_string(rate_hz) + " " + std::to_string(rest.size()) + "\n" + rest +
+         clip.description;
+}
+
+Error damaged(const std::string& identity) {
+  return {.message = "the description of a labels stream is damaged",
+          .file = identity,
+          .line = 0,
+          .exit_code = ExitCode::kFailed};
+}
+
+// The body of a clip, as it stands in that frame.
+Result<Performer> body_of(std::string_view frame, std::string_view description, double rate_hz,
+                          const std::string& identity) {
+  auto format = clip::parse_description(description, identity);
+  if (!format) return std::unexpected(format.error());
+  Performer body{.skeleton = format->skeleton, .rest = {}, .rate_hz = rate_hz};
+  if (body.skeleton->joint_of(Bone::kHips) < 0) {
+    return fail("is no clip of a body, because no joint of it is the hips", identity);
   }
-  return header;
+  ClipDecoder decoder(std::move(*format));
+  RestSink sink;
+  decoder.feed(std::as_bytes(std::span(frame)), 0, sink);
+  if (!sink.rest) return std::unexpected(damaged(identity));
+  body.rest = *sink.rest;
+  return body;
+}
+
+Result<Performer> parse_text(const std::string& text, const std::string& identity) {
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  std::istringstream words(text.substr(0, end));
+  std::string who, more;
+  double rate_hz = 0.0;
+  std::size_t bytes = 0;
+  words >> who >> rate_hz;
+  const bool sound = words && rate_hz >= 1.0 && rate_hz <= kMaxRate_hz;
+  if (!sound) return std::unexpected(damaged(identity));
+  if (who == "body") {
+    const bool cut = !(words >> bytes) || words >> more || bytes > text.size() - end;
+    if (cut || end == text.size()) return std::unexpected(damaged(identity));
+    const std::string_view rest = std::string_view(text).substr(end + 1);
+    if (bytes > rest.size()) return std::unexpected(damaged(identity));
+    return body_of(rest.substr(0, bytes), rest.substr(bytes), rate_hz, identity);
+  }
+  const bool sided = who == "left" || who == "right";
+  if (!sided || words >> more || end != text.size()) return std::unexpected(damaged(identity));
+  Performer hand{.skeleton = std::make_shared<const Skeleton>(
+                     hand_skeleton(who == "left" ? Side::kLeft : Side::kRight)),
+                 .rest = {},
+                 .rate_hz = rate_hz};
+  set_hand_angles(*hand.skeleton, HandAngles{}, hand.rest);
+  return hand;
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto header = parse_text(text, identity);
-  if (!header) return std::unexpected(header.error());
+  auto performer = parse_text(text, identity);
+  if (!performer) return std::unexpected(performer.error());
   return Description{.driver = "labels",
                      .text = text,
                      .identity = identity,
-                     .skeleton = std::make_shared<const Skeleton>(hand_skeleton(header->side)),
+                     .skeleton = std::move(performer->skeleton),
                      .samples = {},
-                     .rate_hz = header->rate_hz};
+                     .rate_hz = performer->rate_hz};
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  return std::make_unique<LabelsDecoder>(description.skeleton, description.rate_hz);
+  const auto performer = parse_text(description.text, description.identity);
+  if (!performer) return std::unexpected(performer.error());
+  return std::make_unique<LabelsDecoder>(performer->rest, performer->rate_hz);
+}
+
+Result<Device> make_body(const std::string& path, double rate_hz) {
+  const auto clip = clip::open_text_clip(path);
+  if (!clip) return std::unexpected(clip.error());
+  auto device = make_device(labels_driver(), body_text(**clip, rate_hz), path);
+  if (device) device->warnings = (*clip)->warnings;
+  return device;
 }
 
 Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const auto options = complete_options(labels_driver(), given);
   if (!options) return std::unexpected(options.error());
   const auto& side = option<std::string>(*options, "side");
+  const auto& body = option<std::string>(*options, "body");
   const double rate_hz = option<double>(*options, "rate_hz");
   if (side != "left" && side != "right") return misuse("side should be \"left\" or \"right\"");
   if (!(rate_hz >= 1.0 && rate_hz <= kMaxRate_hz)) {
     return misuse("rate_hz should be 1 to 1000 frames a second");
   }
-  auto device = make_device(labels_driver(), text_of(side, rate_hz), side + " hand");
+  auto device = body.empty()
+                    ? make_device(labels_driver(), hand_text(side, rate_hz), side + " hand")
+                    : make_body(body, rate_hz);
   if (!device) return device;
   Chunks beat;
   beat.add(LabelsDecoder::kBeat);
@@ -79,8 +154,16 @@ const Driver& labels_driver() {
   static const Driver driver{
       .name = "labels",
       .summary =
-          "a hand without a device that performs gesture labels (needs a [stream.generate] table)",
-      .options = {{.name = "side", .default_value = std::string("right"), .help = "left or right"},
+          "a hand or a body without a device that performs labels (needs a [stream.generate] "
+          "table)",
+      .options = {{.name = "side",
+                   .default_value = std::string("right"),
+                   .help = "of a hand: left or right"},
+                  {.name = "body",
+                   .default_value = std::string(),
+                   .is_path = true,
+                   .help = "a clip of the body that performs in place of a hand; it stands as in "
+                           "the first frame"},
                   {.name = "rate_hz", .default_value = 30.0, .help = "frames a second"}},
       .open = labels::open,
       .make_decoder = labels::make_decoder,

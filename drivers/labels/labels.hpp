@@ -1,4 +1,4 @@
-// A stream without a device: a hand that performs gesture labels only.
+// A stream without a device: a hand or a body that performs gesture labels only.
 #pragma once
 
 #include "drivers/driver.hpp"

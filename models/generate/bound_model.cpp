@@ -4,9 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "proto/frame/hand_skeleton.hpp"
-#include "proto/text/clean.hpp"
-
 namespace posed::generate {
 namespace {
 
@@ -28,10 +25,6 @@ BoundModel::BoundModel(trajectory::StateInformation states,
 Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
                                                      const Skeleton& skeleton, double rate_hz,
                                                      std::string name) {
-  if (!hand_side(skeleton)) {
-    return fail("a gesture model needs a stream of hands (hand45), not " + in_quotes(skeleton.name),
-                std::move(name));
-  }
   auto live = smooth::bind_live_model(model, skeleton, name);
   if (!live) return std::unexpected(live.error());
   auto shared = std::make_shared<const gesture::GestureModel>(std::move(model));

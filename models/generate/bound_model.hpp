@@ -36,8 +36,8 @@ struct BoundModel final : StageModel {
   return nominal_hz > 0.0 ? std::clamp(nominal_hz, 10.0, 1000.0) : 60.0;
 }
 
-// Returns an error for a skeleton that is not a hand. `rate_hz` is the stream's, 0 if unknown.
-// Cold.
+// Returns an error for a skeleton that lacks channels of the model. `rate_hz` is the stream's, 0 if
+// unknown. Cold.
 [[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
                                                                    const Skeleton& skeleton,
                                                                    double rate_hz,

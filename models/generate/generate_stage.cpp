@@ -12,6 +12,7 @@ namespace {
 // Silence after which frames that wait go out: longer than a frame that is only late.
 constexpr std::int64_t kSilence_ns = 100'000'000;
 constexpr std::int64_t kSilentFrames = 4;
+constexpr double kMaxStep_s = 0.1;  // of the heading: a frame of the slowest stream
 
 }  // namespace
 
@@ -19,12 +20,28 @@ GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton,
                              const smooth::LiveOptions& options, double rate_hz,
                              const BoundModel* model)
     : skeleton_(std::move(skeleton)),
-      hand_(hand_side(*skeleton_).has_value()),
       smoother_(*skeleton_, options, model != nullptr ? model->live.get() : nullptr),
-      player_(rate_hz),
+      player_(rate_hz, gesture::most_channels(*skeleton_)),
       model_(model),
-      period_ns_(nanoseconds(1.0 / rate_hz)) {
+      period_ns_(nanoseconds(1.0 / rate_hz)),
+      live_(static_cast<std::size_t>(gesture::most_channels(*skeleton_))),
+      read_(live_.size()) {
+  if (hand_side(*skeleton_)) {
+    hand_ = gesture::PoseChannels::of_hand(*skeleton_);
+  } else {
+    standing_.emplace(*skeleton_);
+  }
   player_.set_model(model);
+  take_channels();
+}
+
+// RT-safe.
+void GenerateStage::take_channels() noexcept {
+  if (hand_) {
+    pose_channels_ = &*hand_;
+  } else {
+    pose_channels_ = model_ != nullptr ? &*model_->live->body : nullptr;
+  }
 }
 
 // RT-safe.
@@ -32,6 +49,12 @@ void GenerateStage::use(const StageModel& model) noexcept {
   model_ = static_cast<const BoundModel*>(&model);
   static_cast<void>(smoother_.set_model(model_->live.get()));
   player_.set_model(model_);
+  take_channels();
+  if (hand_ || !has_last_) return;
+  // The channels of a body are those of its model.
+  std::ranges::fill(live_, 0.0);
+  follow(last_);
+  player_.go_on_from(used(live_));
 }
 
 // RT-safe.
@@ -71,9 +94,7 @@ void GenerateStage::process(const StageFrame& in, StageOut& out) noexcept {
     smoother_.flush(smoothed);
     out.frame({.frame = in.frame});  // not this stage's body
   } else if (in.frame.source == Source::kLabels) {
-    last_ = in.frame;
-    has_last_ = true;
-    show(last_, nullptr, out);
+    rest(in, out);
   } else {
     ++entered_;
     smoother_.process(in, smoothed);
@@ -104,7 +125,7 @@ void GenerateStage::tick(std::int64_t now_ns, StageOut& out) noexcept {
   if (header.device_ns != kNoTime_ns) header.device_ns += now_ns - header.arrival_ns;
   header.arrival_ns = now_ns;
   const bool only_performs = last_.source == Source::kLabels && !live_seen_;
-  show(last_, only_performs ? nullptr : &live_, out);
+  show(last_, only_performs ? std::span<const double>() : used(live_), out);
 }
 
 // RT-safe.
@@ -118,39 +139,73 @@ void GenerateStage::smoothed(const StageFrame& in, StageOut& out) noexcept {
   entered_ = std::max(entered_ - 1, 0);
   channels_ = std::min(in.variance_rad2.size(), variance_rad2_.size());
   std::copy_n(in.variance_rad2.begin(), channels_, variance_rad2_.begin());
-  if (!hand_) return out.frame({.frame = in.frame, .variance_rad2 = variance_rad2()});
-  const HandAngles angles = hand_angles(in.frame);
-  for (std::size_t c = 0; c < live_.size(); ++c) {
-    if (std::isfinite(angles[c])) live_[c] = angles[c];
+  if (pose_channels_ == nullptr) {
+    return out.frame({.frame = in.frame, .variance_rad2 = variance_rad2()});
   }
   live_seen_ = true;
   last_ = in.frame;
   has_last_ = true;
-  show(last_, &live_, out);
+  follow(last_);
+  show(last_, used(live_), out);
+}
+
+// A frame of a stream that only performs: a hand at rest, or a body as it stands. RT-safe.
+void GenerateStage::rest(const StageFrame& in, StageOut& out) noexcept {
+  if (pose_channels_ == nullptr) return out.frame(in);
+  const bool first = !std::exchange(has_last_, true);
+  last_ = in.frame;
+  if (!hand_ && first) {
+    follow(last_);
+    player_.go_on_from(used(live_));
+  }
+  show(last_, {}, out);
+}
+
+// Takes the live pose from a frame; what it did not measure stays. RT-safe.
+void GenerateStage::follow(const Frame& frame) noexcept {
+  const double dt_s = std::min(elapsed_.next_s(frame.header), kMaxStep_s);
+  if (pose_channels_->has_heading(frame)) {
+    static_cast<void>(heading_.update(pose_channels_->heading_rad(frame), dt_s));
+  }
+  const std::span<double> read = used(read_);
+  pose_channels_->read(frame, heading_.value_rad(), read);
+  pose_channels_->unwrap(used(live_), read);
+  for (std::size_t c = 0; c < read.size(); ++c) {
+    if (std::isfinite(read[c])) live_[c] = read[c];
+  }
 }
 
 // What the player makes of the frame goes out. RT-safe.
-void GenerateStage::show(Frame& frame, const HandAngles* live, StageOut& out) noexcept {
-  const GesturePlayer::Pose& pose = player_.step(live);
-  if (pose.what != GesturePlayer::What::kLive) {
-    const Vec3f root_position_m = frame.root_position_m;
-    set_hand_angles(*skeleton_, pose.angles, frame);
-    frame.root_position_m = root_position_m;
-    frame.source = Source::kLabels;
-    frame.quality = pose.what == GesturePlayer::What::kHeld ? Quality::kHeld : Quality::kMeasured;
-    frame.label.fill('\0');
-    frame.label_probability = 0.0F;
-  }
-  if (pose.what == GesturePlayer::What::kPerformed) {
-    const std::string& name = model_->gesture().labels[static_cast<std::size_t>(pose.label)].name;
+void GenerateStage::show(Frame& frame, std::span<const double> live, StageOut& out) noexcept {
+  const GesturePlayer::Pose shown = player_.step(live);
+  if (shown.what != GesturePlayer::What::kLive) pose(shown, frame);
+  if (shown.what == GesturePlayer::What::kPerformed) {
+    const std::string& name = model_->gesture().labels[static_cast<std::size_t>(shown.label)].name;
     std::copy_n(name.begin(), std::min(name.size(), frame.label.size() - 1), frame.label.begin());
     frame.label_probability = 1.0F;
-    channels_ = kHandChannels;
-    for (std::size_t c = 0; c < channels_; ++c) {
-      variance_rad2_[c] = pose.variance_rad2[kAngleOfChannel[c]];
+    const auto all = static_cast<std::size_t>(frame.angle_count);
+    if (channels_ < all) {  // the smoother did not see this frame: it is exact but for these
+      std::fill(variance_rad2_.begin(), variance_rad2_.begin() + frame.angle_count, 0.0);
+      channels_ = all;
     }
+    pose_channels_->spread(shown.variance_rad2, std::span(variance_rad2_).first(channels_));
   }
   out.frame({.frame = frame, .variance_rad2 = variance_rad2()});
+}
+
+// A body stays where its feet are: the model knows no place of the root. RT-safe.
+void GenerateStage::pose(const GesturePlayer::Pose& shown, Frame& frame) noexcept {
+  if (standing_) {
+    const perform::Standing::Feet places_m = standing_->feet_m(frame);
+    pose_channels_->write(shown.angles, heading_.value_rad(), frame);
+    static_cast<void>(standing_->stand(places_m, frame));
+  } else {
+    pose_channels_->write(shown.angles, 0.0, frame);
+  }
+  frame.source = Source::kLabels;
+  frame.quality = shown.what == GesturePlayer::What::kHeld ? Quality::kHeld : Quality::kMeasured;
+  frame.label.fill('\0');
+  frame.label_probability = 0.0F;
 }
 
 }  // namespace posed::generate

@@ -32,9 +32,10 @@ const gesture::GestureModel* gesture_of(const StageModel* model) {
 }
 
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* model) {
-  if (context.skeleton->channels.empty()) {
+  if (context.skeleton->channels.empty() && model == nullptr) {
     return misuse("skeleton " + in_quotes(context.skeleton->name) +
-                  " has no joint angles, so there is nothing to generate");
+                  " has no joint angles, so there is nothing to generate without a gesture model "
+                  "of a body");
   }
   return std::make_unique<GenerateStage>(context.skeleton, options_of(context.parameters),
                                          stream_rate_hz(context.rate_hz),
@@ -123,7 +124,7 @@ std::vector<ParameterSpec> parameters() {
   std::vector<ParameterSpec> table{
       {.name = "lag_frames",
        .default_value = std::int64_t{defaults.lag.frames},
-       .help = "frames by which the output lags behind the hand; more are smoother",
+       .help = "frames by which the output lags behind; more are smoother",
        .min = 0.0,
        .max = kMaxLagFrames},
       {.name = "lag_s",
@@ -159,7 +160,7 @@ std::vector<StageCommandType> commands() {
            .to_log = play_to_log,
            .from_log = play_from_log},
           {.name = "stop-playing",
-           .help = "back to the live hand, or to rest",
+           .help = "back to the live pose, or to rest",
            .encode = stop_playing}};
 }
 
@@ -178,7 +179,8 @@ Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& p
 const StageType& generate_type() {
   static const StageType type{
       .name = "generate",
-      .summary = "smooths a hand's joint angles, and performs labels from a gesture model",
+      .summary =
+          "smooths joint angles, and performs labels from a gesture model on a hand or a body",
       .parameters = parameters(),
       .check = check,
       .make = make,

@@ -16,15 +16,34 @@ constexpr int kLoopAhead = 3;
 
 }  // namespace
 
-GesturePlayer::GesturePlayer(double rate_hz)
+GesturePlayer::GesturePlayer(double rate_hz, int channels)
     : rate_hz_(rate_hz),
-      player_(rate_hz, {.look_ahead_s = kLookAhead_s, .capacity = kMaxWaiting + 4}) {}
+      channels_(static_cast<std::size_t>(channels)),
+      player_(rate_hz, channels, {.look_ahead_s = kLookAhead_s, .capacity = kMaxWaiting + 4}),
+      way_back_(channels) {
+  for (auto* pose :
+       {&hold_, &past_[0], &past_[1], &live_[0], &live_[1], &shown_, &offset_, &velocity_}) {
+    pose->assign(channels_, 0.0);
+  }
+}
 
 // RT-safe.
 void GesturePlayer::set_model(const BoundModel* model) noexcept {
   stop();
   model_ = model;
-  if (model_ != nullptr) player_.use(model_->information);
+  if (model_ == nullptr) return;
+  player_.use(model_->information);
+  channels_ = static_cast<std::size_t>(model_->gesture().channels());
+}
+
+// RT-safe.
+void GesturePlayer::go_on_from(std::span<const double> pose) noexcept {
+  started_ = true;
+  live_known_ = false;
+  for (auto* known : {&hold_, &past_[0], &past_[1]}) std::ranges::copy(pose, known->begin());
+  // What is left of a performance is not in these channels: the way back begins anew.
+  stopping_ = phase_ != Phase::kIdle;
+  if (stopping_) phase_ = Phase::kPerforming;
 }
 
 // RT-safe.
@@ -61,34 +80,40 @@ void GesturePlayer::stop() noexcept {
 }
 
 // RT-safe.
-const GesturePlayer::Pose& GesturePlayer::step(const HandAngles* live) noexcept {
-  if (!std::exchange(started_, true) && live != nullptr) {
-    past_.fill(*live);
-    live_.fill(*live);
+GesturePlayer::Pose GesturePlayer::step(std::span<const double> live) noexcept {
+  const bool is_live = !live.empty();
+  if (is_live && !std::exchange(live_known_, true)) {
+    for (auto& pose : live_) std::ranges::copy(live, pose.begin());
   }
-  if (phase_ == Phase::kPerforming && (stopping_ || !next_performed())) {
-    begin_way_back(live != nullptr);
+  if (!std::exchange(started_, true) && is_live) {
+    for (auto& pose : past_) std::ranges::copy(live, pose.begin());
   }
+  if (phase_ == Phase::kPerforming && (stopping_ || !next_performed())) begin_way_back(is_live);
   if (phase_ != Phase::kPerforming && ahead_ > 0) {
-    player_.start(past_[0], past_[1]);
+    player_.start(used(past_[0]), used(past_[1]));
     phase_ = next_performed() ? Phase::kPerforming : Phase::kIdle;
   }
-  if (live != nullptr) live_ = {live_[1], *live};
-  pose_.label = -1;
-  pose_.variance_rad2.fill(0.0);
-  pose_.angles = live != nullptr ? *live : hold_;
+  if (is_live) {
+    std::swap(live_[0], live_[1]);
+    std::ranges::copy(live, live_[1].begin());
+  }
+  Pose pose{.angles = used(shown_)};
+  std::ranges::copy(is_live ? live : std::span<const double>(used(hold_)), shown_.begin());
   if (phase_ == Phase::kIdle) {
-    pose_.what = live != nullptr ? What::kLive : What::kHeld;
+    pose.what = is_live ? What::kLive : What::kHeld;
   } else if (phase_ == Phase::kPerforming) {
-    pose_ = {What::kPerformed, played_.label, played_.angle, played_.variance};
+    pose.what = What::kPerformed;
+    pose.label = played_.label;
+    pose.variance_rad2 = played_.variance;
+    std::ranges::copy(played_.angle, shown_.begin());
   } else {
-    pose_.what = What::kLeadingBack;
-    const HandAngles offset = way_back_.next();
-    for (std::size_t c = 0; c < offset.size(); ++c) pose_.angles[c] += offset[c];
+    pose.what = What::kLeadingBack;
+    way_back_.add_next(used(shown_));
     if (way_back_.done()) phase_ = Phase::kIdle;
   }
-  past_ = {past_[1], pose_.angles};
-  return pose_;
+  std::swap(past_[0], past_[1]);
+  std::ranges::copy(pose.angles, past_[1].begin());
+  return pose;
 }
 
 // RT-safe.
@@ -114,14 +139,16 @@ void GesturePlayer::begin_way_back(bool live) noexcept {
   player_.clear();
   ahead_ = 0;
   played_.state = -1;
-  hold_ = past_[1];
-  if (!live) live_ = {hold_, hold_};
-  HandAngles offset, velocity;
-  for (std::size_t c = 0; c < offset.size(); ++c) {
-    offset[c] = past_[1][c] - live_[1][c];
-    velocity[c] = (past_[1][c] - past_[0][c]) - (live_[1][c] - live_[0][c]);
+  std::ranges::copy(past_[1], hold_.begin());
+  if (!live) {
+    for (auto& pose : live_) std::ranges::copy(hold_, pose.begin());
   }
-  way_back_.start(offset, velocity, static_cast<int>(std::ceil(kWayBack_s * rate_hz_)));
+  for (std::size_t c = 0; c < channels_; ++c) {
+    offset_[c] = past_[1][c] - live_[1][c];
+    velocity_[c] = (past_[1][c] - past_[0][c]) - (live_[1][c] - live_[0][c]);
+  }
+  way_back_.start(used(offset_), used(velocity_),
+                  static_cast<int>(std::ceil(kWayBack_s * rate_hz_)));
   phase_ = Phase::kLeadingBack;
 }
 

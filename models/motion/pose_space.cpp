@@ -176,10 +176,15 @@ int PoseSpace::skeleton_joint_of_dim(int d) const noexcept {
 }
 
 // RT-safe
-bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {
-  bool all = item.joint < frame.joint_count && frame.valid[item.joint];
+bool PoseSpace::chain_measured(const Item& item, const Frame& frame) const noexcept {
+  bool all = item.joint < frame.joint_count;
   for (int i = item.chain_begin; i < item.chain_end; ++i) all = all && frame.valid[chain_[i]];
   return all;
+}
+
+// RT-safe
+bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {
+  return chain_measured(item, frame) && frame.valid[item.joint];
 }
 
 // The product of all factors before L in V, without the mean. RT-safe
@@ -284,6 +289,19 @@ void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
     const Quaterniond local = to_base.conjugate() *
                               changed(item, now, &q[item.first_dim], change.data()) *
                               item.after.conjugate();
+    set_rotation(*skeleton_, item.joint, local, frame);
+  }
+}
+
+// RT-safe
+void PoseSpace::put(Frame& frame, double heading_rad, std::span<const double> q) const noexcept {
+  for (const Item& item : items_) {
+    const auto d = static_cast<std::size_t>(item.first_dim);
+    const Vector3d v(q[d], q[d + 1], q[d + 2]);
+    if (!v.allFinite() || !chain_measured(item, frame)) continue;
+    const Quaterniond to_base = item.mean.conjugate() * base(item, frame, heading_rad);
+    const Quaterniond local = to_base.conjugate() * rotation_exp(v) * item.after.conjugate();
+    frame.valid[static_cast<std::size_t>(item.joint)] = true;
     set_rotation(*skeleton_, item.joint, local, frame);
   }
 }

@@ -84,6 +84,11 @@ class PoseSpace {
   void add(Frame& frame, double heading_rad, std::span<const float> q,
            std::span<const float> delta) const noexcept;
 
+  // Gives the joints of a space of rotation vectors the pose q [dims], whether they were measured
+  // or not; then they are. A joint with q that is not finite, or with unmeasured joints between it
+  // and the joint of the space above it, is unchanged. RT-safe.
+  void put(Frame& frame, double heading_rad, std::span<const double> q) const noexcept;
+
  private:
   // One joint of the space. The rotation that q describes is
   //   V = mean^-1 [Ry(-heading) for the root] before (product of `chain`) L after
@@ -101,6 +106,7 @@ class PoseSpace {
 
   PoseSpace() = default;
   [[nodiscard]] bool measured(const Item& item, const Frame& frame) const noexcept;
+  [[nodiscard]] bool chain_measured(const Item& item, const Frame& frame) const noexcept;
   [[nodiscard]] Eigen::Quaterniond base(const Item& item, const Frame& frame,
                                         double heading_rad) const noexcept;
   [[nodiscard]] Eigen::Quaterniond changed(const Item& item, const Eigen::Quaterniond& rotation,

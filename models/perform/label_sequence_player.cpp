@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "models/perform/state_duration.hpp"
 #include "models/trajectory/pentadiagonal.hpp"
@@ -10,17 +11,18 @@
 namespace posed::perform {
 namespace {
 
-constexpr int kStride = trajectory::padded(kHandChannels);
+using trajectory::kRows;
+
 constexpr int kSettling = 3;  // frames that a permanent elimination needs (pentadiagonal.hpp)
 
 // The lead-in lasts 1.5 times as long as the farthest channel would need at this speed.
 constexpr double kLeadSpeed_rad_s = 300.0 * kDegree;
 constexpr double kMinLead_s = 0.2, kMaxLead_s = 0.8;
 
-hwy::AlignedFreeUniquePtr<double[]> rows(int count) {
-  auto data = hwy::AllocateAligned<double>(static_cast<std::size_t>(count) * kStride);
-  std::fill_n(data.get(), count * kStride, 0.0);
-  return data;
+trajectory::Rows zero_rows(int count, int stride) {
+  auto rows = trajectory::make_rows(count, stride);
+  std::fill_n(rows.get(), count * stride, 0.0);
+  return rows;
 }
 
 int frames_in(double seconds, double rate_hz) {
@@ -30,46 +32,66 @@ int frames_in(double seconds, double rate_hz) {
 // Writes the solver's carry rows for two poses that are known exactly: the information about the
 // next two frames through delta-delta windows of precision p2 and mean 0, centred on the second
 // pose and on the first frame after it (models/perform/README.md, "Lead-in").
-void clamp_to(const HandAngles& before, const HandAngles& last, const double* p2,
+void clamp_to(const double* before, const double* last, int channels, const double* p2,
               double* carry) noexcept {
-  for (int c = 0; c < kHandChannels; ++c) {
-    carry[0 * kStride + c] = 5.0 * p2[c];
-    carry[1 * kStride + c] = -2.0 * p2[c];
-    carry[2 * kStride + c] = p2[c] * (4.0 * last[c] - before[c]);
-    carry[3 * kStride + c] = p2[c];
-    carry[4 * kStride + c] = -p2[c] * last[c];
+  const int stride = trajectory::padded(channels);
+  for (int c = 0; c < channels; ++c) {
+    carry[0 * stride + c] = 5.0 * p2[c];
+    carry[1 * stride + c] = -2.0 * p2[c];
+    carry[2 * stride + c] = p2[c] * (4.0 * last[c] - before[c]);
+    carry[3 * stride + c] = p2[c];
+    carry[4 * stride + c] = -p2[c] * last[c];
+  }
+  for (int row = 0; row < trajectory::kernel::kCarryRows; ++row) {
+    std::fill(carry + row * stride + channels, carry + (row + 1) * stride, 0.0);
   }
 }
 
 }  // namespace
 
-LabelSequencePlayer::LabelSequencePlayer(double rate_hz, const PlayerOptions& options)
+LabelSequencePlayer::LabelSequencePlayer(double rate_hz, int channels, const PlayerOptions& options)
     : options_(options),
       look_ahead_(std::max(kSettling, frames_in(options.look_ahead_s, rate_hz))),
-      script_(options.capacity),
-      states_(kHandChannels, 2 + look_ahead_),
-      carry_(rows(trajectory::kernel::kCarryRows)),
-      variance_(rows(1)) {
+      script_(options.capacity) {
+  const int stride = trajectory::padded(channels);
   const int most = frames_in(kMaxLead_s, rate_hz) + look_ahead_ + 1;
+  before_ = zero_rows(1, stride);
+  last_ = zero_rows(1, stride);
+  states_ = zero_rows((2 + look_ahead_) * kRows, stride);
+  carry_ = zero_rows(trajectory::kernel::kCarryRows, stride);
+  factor_rows_ = zero_rows(most * trajectory::kernel::kFactorRows, stride);
+  x_ = zero_rows(most, stride);
+  variance_ = zero_rows(1, stride);
   frames_.resize(static_cast<std::size_t>(most));
-  x_ = rows(most);
-  factor_rows_ = rows(most * trajectory::kernel::kFactorRows);
-  for (int i = 0; i < most; ++i) {
-    factors_.push_back(factor_rows_.get() +
-                       static_cast<std::ptrdiff_t>(i) * trajectory::kernel::kFactorRows * kStride);
-  }
+  factors_.resize(static_cast<std::size_t>(most));
 }
 
 LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& information,
                                          const PlayerOptions& options)
-    : LabelSequencePlayer(information.rate_hz(), options) {
+    : LabelSequencePlayer(information.rate_hz(), information.model().channels(), options) {
+  begin(information);
+}
+
+// RT-safe.
+void LabelSequencePlayer::begin(const trajectory::StateInformation& information) noexcept {
   information_ = &information;
+  channels_ = information.model().channels();
+  stride_ = trajectory::padded(channels_);
+  for (std::size_t i = 0; i < factors_.size(); ++i) {
+    factors_[i] = factor_rows_.get() +
+                  static_cast<std::ptrdiff_t>(i) * trajectory::kernel::kFactorRows * stride_;
+  }
 }
 
 // RT-safe.
 void LabelSequencePlayer::use(const trajectory::StateInformation& information) noexcept {
   clear();
-  information_ = &information;
+  begin(information);
+}
+
+// The six rows of a slot. RT-safe.
+double* LabelSequencePlayer::slot(int index) noexcept {
+  return states_.get() + static_cast<std::ptrdiff_t>(index) * kRows * stride_;
 }
 
 // RT-safe.
@@ -92,31 +114,33 @@ void LabelSequencePlayer::start() noexcept {
 }
 
 // RT-safe.
-void LabelSequencePlayer::start(const HandAngles& before, const HandAngles& last) noexcept {
+void LabelSequencePlayer::start(std::span<const double> before,
+                                std::span<const double> last) noexcept {
   start();
   if (!started_) return;
-  before_ = before;
-  last_ = last;
+  std::copy_n(before.begin(), channels_, before_.get());
+  std::copy_n(last.begin(), channels_, last_.get());
   glide();
 }
 
 // Starts the lead-in from the last two poses into the cursor's state. RT-safe.
 void LabelSequencePlayer::glide() noexcept {
-  double* lead = states_.row(0, trajectory::kPosition);
+  double* const lead = slot(0);
   information_->fill(script_.context(cursor_.position), 0, lead);
   double farthest_rad = 0.0;
-  for (int c = 0; c < kHandChannels; ++c) {
+  for (int c = 0; c < channels_; ++c) {
     const double goal =
-        lead[trajectory::kPositionMean * kStride + c] / lead[trajectory::kPosition * kStride + c];
+        lead[trajectory::kPositionMean * stride_ + c] / lead[trajectory::kPosition * stride_ + c];
     farthest_rad = std::max(farthest_rad, std::abs(goal - last_[c]));
   }
   const double lead_s = std::clamp(1.5 * farthest_rad / kLeadSpeed_rad_s, kMinLead_s, kMaxLead_s);
   lead_left_ = frames_in(lead_s, information_->rate_hz());
-  std::fill_n(lead, kHandChannels, 0.0);  // only the first state's delta-delta precision is kept
-  std::fill(lead + trajectory::kPositionMean * kStride, lead + trajectory::kDeltaDelta * kStride,
+  std::fill_n(lead, channels_, 0.0);  // only the first state's delta-delta precision is kept
+  std::fill(lead + trajectory::kPositionMean * stride_, lead + trajectory::kDeltaDelta * stride_,
             0.0);
-  std::fill(lead + trajectory::kDeltaDeltaMean * kStride, lead + trajectory::kRows * kStride, 0.0);
-  clamp_to(before_, last_, lead + trajectory::kDeltaDelta * kStride, carry_.get());
+  std::fill(lead + trajectory::kDeltaDeltaMean * stride_, lead + kRows * stride_, 0.0);
+  clamp_to(before_.get(), last_.get(), channels_, lead + trajectory::kDeltaDelta * stride_,
+           carry_.get());
   carries_ = true;
 }
 
@@ -125,17 +149,16 @@ void LabelSequencePlayer::glide() noexcept {
 int LabelSequencePlayer::plan(Cursor& shown) noexcept {
   const int most = lead_left_ + look_ahead_ + 1;
   int frames = 0;
-  for (; frames < lead_left_; ++frames) frames_[frames] = states_.frame(0);
+  for (; frames < lead_left_; ++frames) frames_[frames] = slot(0);
   Cursor ahead = cursor_;
-  int slot = 0;
+  int used = 0;
   for (bool entered = true; frames < most; ++frames) {
     if (ahead.frames_left == 0 && !options_.rest && !script_.has_next(ahead.position)) break;
     if (entered) {
-      information_->fill(script_.context(ahead.position), ahead.state,
-                         states_.row(++slot, trajectory::kPosition));
+      information_->fill(script_.context(ahead.position), ahead.state, slot(++used));
     }
     if (frames == shown_) shown = ahead;
-    frames_[frames] = states_.frame(slot);
+    frames_[frames] = slot(used);
     const Cursor before = ahead;
     step(ahead, script_, *information_, tempo_);
     entered = ahead.state != before.state || ahead.position != before.position;
@@ -171,16 +194,17 @@ bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
   if (frames <= shown_) return false;
   trajectory::kernel::eliminate({.information = frames_.data(),
                                  .frames = frames,
-                                 .stride = kStride,
+                                 .stride = stride_,
                                  .carry_in = carries_ ? carry_.get() : nullptr,
                                  .carry_out = frames >= kSettling ? carry_.get() : nullptr},
                                 factors_.data());
-  trajectory::kernel::substitute(factors_.data(), frames, shown_, kStride, x_.get());
-  trajectory::kernel::variance(factors_.data(), frames, shown_, kStride, variance_.get(), 0);
-  std::copy_n(x_.get(), kHandChannels, out.angle.begin());
-  std::copy_n(variance_.get(), kHandChannels, out.variance.begin());
-  before_ = last_;
-  last_ = out.angle;
+  trajectory::kernel::substitute(factors_.data(), frames, shown_, stride_, x_.get());
+  trajectory::kernel::variance(factors_.data(), frames, shown_, stride_, variance_.get(), 0);
+  std::swap(before_, last_);
+  std::copy_n(x_.get(), channels_, last_.get());
+  const auto channels = static_cast<std::size_t>(channels_);
+  out.angle = {last_.get(), channels};
+  out.variance = {variance_.get(), channels};
   out.label = script_.context(shown.position).current;
   out.state = lead_left_ > shown_ || shown.frames_left == 0 ? -1 : shown.state;
   advance(frames);

@@ -21,6 +21,10 @@ constexpr double kVanished = 1e-200;
 // Variance that sensor noise adds to a feature, relative to the noise variance of a value.
 constexpr std::array<double, kDeltaWindows> kNoiseGain{1.0, 0.5, 6.0};
 
+std::size_t padded_features(int channels) noexcept {
+  return static_cast<std::size_t>(trajectory::padded(kDeltaWindows * channels));
+}
+
 // ln(e^a + e^b)
 double log_sum(double a, double b) noexcept {
   const double top = std::max(a, b);
@@ -30,17 +34,23 @@ double log_sum(double a, double b) noexcept {
 
 }  // namespace
 
-HmmForwardFilter::HmmForwardFilter(int max_window)
+HmmForwardFilter::HmmForwardFilter(int max_window, int max_channels)
     : max_window_(max_window),
+      feature_(padded_features(max_channels)),
+      weight_(feature_.size()),
       tables_(kMaxLiveChains * kStates),
+      rows_(tables_.size() * kTableRows * feature_.size()),
       forward_(static_cast<std::size_t>(max_window)),
       likelihood_(static_cast<std::size_t>(max_window)),
-      swept_(static_cast<std::size_t>(max_window)) {}
+      swept_(static_cast<std::size_t>(max_window)) {
+  for (auto& row : past_) row.resize(static_cast<std::size_t>(max_channels));
+}
 
 // RT-safe.
 void HmmForwardFilter::set_model(const LiveModel* model) noexcept {
   model_ = model;
   states_ = model == nullptr ? 0 : static_cast<int>(model->states.size());
+  features_ = model == nullptr ? 0 : padded_features(model->channels);
   period_s_ = 0.0;
   reset();
 }
@@ -50,7 +60,7 @@ void HmmForwardFilter::reset() noexcept {
   pushed_ = 0;
   swept_frames_ = 0;
   even_frames_ = 0;
-  for (auto& row : past_) row.fill(kMissing);
+  for (auto& row : past_) std::ranges::fill(row, kMissing);
   if (states_ == 0) return;
   std::fill_n(log_now_.begin(), states_, -std::log(states_));
   const auto labels = static_cast<double>(model_->labels.size());
@@ -64,16 +74,21 @@ void HmmForwardFilter::renew_table(int state) noexcept {
   const LiveState& from = model_->states[s];
   Table& table = tables_[s];
   const RateFactors rule = rate_factors(pace_);
+  const auto channels = static_cast<std::size_t>(model_->channels);
+  double* const mean = features_of(s, kMean);
+  double* const half_precision = features_of(s, kHalfPrecision);
+  double* const half_log = features_of(s, kHalfLog);
   std::size_t k = 0;
   for (std::size_t w = 0; w < kDeltaWindows; ++w) {
     const double noise = kNoiseGain[w] * noise_rad_ * noise_rad_;
-    for (std::size_t c = 0; c < kHandChannels; ++c, ++k) {
-      const double variance = from.variance[w][c] * rule.variance[w] + noise;
-      table.mean[k] = from.mean[w][c] * rule.mean[w];
-      table.half_precision[k] = 0.5 / variance;
-      table.half_log[k] = 0.5 * std::log(variance);
+    for (std::size_t c = 0; c < channels; ++c, ++k) {
+      const double variance = from.variance[k] * rule.variance[w] + noise;
+      mean[k] = from.mean[k] * rule.mean[w];
+      half_precision[k] = 0.5 / variance;
+      half_log[k] = 0.5 * std::log(variance);
     }
   }
+  for (; k < features_; ++k) mean[k] = half_precision[k] = half_log[k] = 0.0;
   table.stay = 1.0 - 1.0 / std::max(kShortestStay, from.frames * pace_);
   table.log_stay = std::log(table.stay);
   table.log_leave = std::log(1.0 - table.stay);
@@ -95,7 +110,7 @@ void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, dou
   even_frames_ = even ? std::min(even_frames_ + 1, 2) : 0;
   Row log_emission;
   weigh(measured_rad, log_emission);
-  for (std::size_t c = 0; c < kHandChannels; ++c) {
+  for (std::size_t c = 0; c < measured_rad.size(); ++c) {
     past_[1][c] = past_[0][c];
     past_[0][c] = measured_rad[c];
   }
@@ -103,30 +118,33 @@ void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, dou
 }
 
 // The tempered log likelihood of every state; missing values are left out. RT-safe.
-void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) const noexcept {
-  std::array<double, kPaddedFeatures> feature{};
-  std::array<double, kPaddedFeatures> weight{};
+void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) noexcept {
+  const auto channels = static_cast<std::size_t>(model_->channels);
+  std::fill_n(feature_.begin(), features_, 0.0);
+  std::fill_n(weight_.begin(), features_, 0.0);
   const bool near = even_frames_ == 2;
-  for (std::size_t c = 0; c < kHandChannels; ++c) {
-    if (!model_->moves[c]) continue;
+  for (std::size_t c = 0; c < channels; ++c) {
+    if (model_->moves[c] == 0) continue;
     const double before = past_[0][c];
     const double now = near ? measured_rad[c] : kMissing;
     const std::array<double, kDeltaWindows> values{before, 0.5 * (now - past_[1][c]),
                                                    now - 2.0 * before + past_[1][c]};
     for (std::size_t w = 0; w < kDeltaWindows; ++w) {
       if (!std::isfinite(values[w])) continue;
-      feature[w * kHandChannels + c] = values[w];
-      weight[w * kHandChannels + c] = kTemper / pace_;
+      feature_[w * channels + c] = values[w];
+      weight_[w * channels + c] = kTemper / pace_;
     }
   }
   for (std::size_t s = 0; s < static_cast<std::size_t>(states_); ++s) {
-    const Table& table = tables_[s];
+    const double* const mean = features_of(s, kMean);
+    const double* const half_precision = features_of(s, kHalfPrecision);
+    const double* const half_log = features_of(s, kHalfLog);
     std::array<double, trajectory::kLanes>
         sum{};  // several sums, because each addition waits for the previous one
-    for (std::size_t k = 0; k < kPaddedFeatures; k += trajectory::kLanes) {
+    for (std::size_t k = 0; k < features_; k += trajectory::kLanes) {
       for (std::size_t i = 0; i < trajectory::kLanes; ++i) {
-        const double off = feature[k + i] - table.mean[k + i];
-        sum[i] += weight[k + i] * (off * off * table.half_precision[k + i] + table.half_log[k + i]);
+        const double off = feature_[k + i] - mean[k + i];
+        sum[i] += weight_[k + i] * (off * off * half_precision[k + i] + half_log[k + i]);
       }
     }
     out[s] = -std::accumulate(sum.begin(), sum.end(), 0.0);

@@ -22,14 +22,15 @@ namespace posed::smooth {
 
 class HmmForwardFilter {
  public:
-  explicit HmmForwardFilter(int max_window);
+  // For models of at most `max_channels` channels.
+  HmmForwardFilter(int max_window, int max_channels);
 
   // Restarts with this model, which is not owned; with null, no gesture is recognised. RT-safe.
   void set_model(const LiveModel* model) noexcept;
   [[nodiscard]] const LiveModel* model() const noexcept { return model_; }
 
-  // The next frame: [45 channels] rad, NaN where missing; `even`: it follows the previous frame by
-  // one period. RT-safe.
+  // The next frame: [channels of the model] rad, NaN where missing; `even`: it follows the previous
+  // frame by one period. RT-safe.
   void push(std::span<const double> measured_rad, bool even, double period_s,
             double noise_rad) noexcept;
 
@@ -59,20 +60,21 @@ class HmmForwardFilter {
   void reset() noexcept;  // RT-safe
 
  private:
-  static constexpr std::size_t kPaddedFeatures =
-      (gesture::kDeltaWindows * kHandChannels + trajectory::kLanes - 1) / trajectory::kLanes *
-      trajectory::kLanes;
-
-  // One state's Gaussian, [window][channel], and its duration, at the stream's rate and noise.
+  // One state's Gaussian, three rows of features ([window][channel], padded) in rows_: mean, half
+  // of the precision, half of the variance's logarithm; and its duration. All at the stream's rate
+  // and noise.
   struct Table {
-    std::array<double, kPaddedFeatures> mean{}, half_precision{}, half_log{};
     double stay = 0.0, log_stay = 0.0, log_leave = 0.0;
   };
+  enum TableRow : std::size_t { kMean, kHalfPrecision, kHalfLog, kTableRows };
   using Row = std::array<double, kMaxLiveChains * gesture::kStates>;  // [states]
   using LabelRow = std::array<double, kMaxLiveChains>;                // [labels]
 
+  [[nodiscard]] double* features_of(std::size_t state, TableRow row) noexcept {
+    return rows_.data() + (state * kTableRows + row) * features_;
+  }
   void renew_table(int state) noexcept;
-  void weigh(std::span<const double> measured_rad, Row& out) const noexcept;
+  void weigh(std::span<const double> measured_rad, Row& out) noexcept;
   void advance(const Row& log_emission) noexcept;
   void step_back(const Row& ahead, Row& backward) const noexcept;
 
@@ -84,13 +86,16 @@ class HmmForwardFilter {
   double period_s_ = 0.0, noise_rad_ = 0.0;
   int next_table_ = 0;
   long pushed_ = 0;
-  int even_frames_ = 0;                                      // in a row, up to 2
-  std::array<std::array<double, kHandChannels>, 2> past_{};  // the last measured frames
-  std::vector<Table> tables_;                                // [states]
-  Row log_now_{};                                            // forward filter, sums to 1
-  std::vector<Row> forward_, likelihood_;                    // rings [max_window], linear
-  std::vector<Row> swept_;                                   // [max_window], by frames back
-  int swept_frames_ = 0;                                     // number of frames in the last sweep
+  int even_frames_ = 0;                      // in a row, up to 2
+  std::array<std::vector<double>, 2> past_;  // [channel] the last measured frames
+  std::size_t features_ = 0;                 // of the model, padded to whole lanes
+  std::vector<double> feature_, weight_;     // [features] of the frame that comes
+  std::vector<Table> tables_;                // [states]
+  std::vector<double> rows_;                 // [states][kTableRows][features]
+  Row log_now_{};                            // forward filter, sums to 1
+  std::vector<Row> forward_, likelihood_;    // rings [max_window], linear
+  std::vector<Row> swept_;                   // [max_window], by frames back
+  int swept_frames_ = 0;                     // number of frames in the last sweep
 };
 
 }  // namespace posed::smooth

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "proto/frame/hand_skeleton.hpp"
-#include "proto/text/clean.hpp"
 
 namespace posed::smooth {
 namespace {
@@ -55,31 +55,47 @@ std::vector<LiveChain> chains_of(int labels) {
   return chains;
 }
 
+// The model's channel that a channel of the stream is: hands have theirs in the skeleton's order.
+std::size_t model_channel(const GestureModel& model, std::size_t channel) {
+  return model.is_hand() ? kAngleOfChannel[channel] : channel;
+}
+
+int group_of(const GestureModel& model, std::size_t channel) {
+  int group = 0;
+  while (static_cast<int>(channel) >= model.groups[static_cast<std::size_t>(group)].first +
+                                          model.groups[static_cast<std::size_t>(group)].channels) {
+    ++group;
+  }
+  return group;
+}
+
 // Moment matching over the contexts: the mean of their means, and the mean of their variances plus
 // the spread of their means (models/smooth/README.md, "Live model").
 LiveState state_of(const GestureModel& model, const std::vector<Context>& contexts, int state) {
-  LiveState pooled;
+  const auto channels = static_cast<std::size_t>(model.channels());
+  LiveState pooled{.mean = LiveRows(kDeltaWindows * channels),
+                   .variance = LiveRows(kDeltaWindows * channels)};
   const double share = 1.0 / static_cast<double>(contexts.size());
-  HandRows square{};
+  LiveRows square(kDeltaWindows * channels);
   double frames = 0.0;
   for (const Context& context : contexts) {
     frames += share * gesture::duration(model, context).mean[static_cast<std::size_t>(state)];
-    for (std::size_t c = 0; c < kHandChannels; ++c) {
-      const std::size_t angle = kAngleOfChannel[c];
-      const auto& leaf =
-          gesture::leaf(model, state, static_cast<int>(angle / kFingerChannels), context);
+    for (std::size_t c = 0; c < channels; ++c) {
+      const std::size_t angle = model_channel(model, c);
+      const int group = group_of(model, angle);
+      const auto& leaf = gesture::leaf(model, state, group, context);
+      const std::size_t at =
+          angle - static_cast<std::size_t>(model.groups[static_cast<std::size_t>(group)].first);
       for (std::size_t w = 0; w < kDeltaWindows; ++w) {
-        const double mean = leaf.mean[w][angle % kFingerChannels];
-        pooled.mean[w][c] += share * mean;
-        square[w][c] += share * (leaf.variance[w][angle % kFingerChannels] + mean * mean);
+        const double mean = leaf.mean[w][at];
+        pooled.mean[w * channels + c] += share * mean;
+        square[w * channels + c] += share * (leaf.variance[w][at] + mean * mean);
       }
     }
   }
-  for (std::size_t w = 0; w < kDeltaWindows; ++w) {
-    for (std::size_t c = 0; c < kHandChannels; ++c) {
-      const double mean = pooled.mean[w][c];
-      pooled.variance[w][c] = std::max(square[w][c] - mean * mean, 1e-12);
-    }
+  for (std::size_t k = 0; k < square.size(); ++k) {
+    const double mean = pooled.mean[k];
+    pooled.variance[k] = std::max(square[k] - mean * mean, 1e-12);
   }
   pooled.frames = std::max(frames, 1.0);
   return pooled;
@@ -90,24 +106,22 @@ LiveState state_of(const GestureModel& model, const std::vector<Context>& contex
 Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& model,
                                                          const Skeleton& skeleton,
                                                          const std::string& name) {
-  if (!hand_side(skeleton)) {
-    return fail("a gesture model steadies a hand, but " + in_quotes(skeleton.name) +
-                    " is none: give the stream a hand, or leave the model out",
-                name);
-  }
-  if (!model.is_hand()) {
-    return fail(
-        "the model is of a body, and live streams follow models of hands only; perform it "
-        "into a file with `posed synth`",
-        name);
+  auto channels = gesture::PoseChannels::bind(model, skeleton);
+  if (!channels) {
+    Error error = channels.error();
+    error.file = name;
+    return std::unexpected(std::move(error));
   }
   auto live = std::make_unique<LiveModel>();
   live->rate_hz = model.rate_hz;
-  live->skeleton = skeleton.id;
-  for (std::size_t c = 0; c < kHandChannels; ++c) {
-    const std::size_t angle = kAngleOfChannel[c];
-    live->moves[c] = model.high[angle] - model.low[angle] > kStill_rad;
+  live->channels = model.channels();
+  live->groups = static_cast<int>(model.groups.size());
+  for (std::size_t c = 0; c < static_cast<std::size_t>(live->channels); ++c) {
+    const std::size_t angle = model_channel(model, c);
+    live->group.push_back(group_of(model, angle));
+    live->moves.push_back(model.high[angle] - model.low[angle] > kStill_rad ? 1 : 0);
   }
+  if (!model.is_hand()) live->body = std::move(*channels);
   const std::vector<int> trained = trained_labels(model);
   if (trained.empty()) return fail("the model holds no recorded label", name);
   if (std::ssize(trained) > kMaxLiveChains) {

@@ -1,16 +1,19 @@
 // LiveModel: a gesture model in the form that the live smoother uses, bound to the skeleton of one
-// hand (models/smooth/README.md, "Live model"). There is a chain of five states for each ordered
-// pair (recorded label, label before it), with one Gaussian over all channels per state that pools
-// all labels which may follow. Models with many labels have one chain per label, whatever label
-// comes before. Immutable; shared between threads.
+// hand or body (models/smooth/README.md, "Live model"). There is a chain of five states for each
+// ordered pair (recorded label, label before it), with one Gaussian over all channels per state
+// that pools all labels which may follow. Models with many labels have one chain per label,
+// whatever label comes before. Immutable; shared between threads.
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "models/gesture/gesture_model.hpp"
+#include "models/gesture/pose_channels.hpp"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
@@ -20,12 +23,12 @@ namespace posed::smooth {
 inline constexpr int kMaxLiveChains =
     64;  // also the most labels; pairs are used with up to 8 labels
 
-// One row per window (value, delta, delta-delta) with the hand skeleton's channels in their order;
-// radians per frame of the model's rate to the power of the window's order.
-using HandRows = std::array<std::array<double, kHandChannels>, gesture::kDeltaWindows>;
+// [window][channel], windows are value, delta and delta-delta; radians per frame of the model's
+// rate to the power of the window's order.
+using LiveRows = std::vector<double>;
 
 struct LiveState {
-  HandRows mean{}, variance{};
+  LiveRows mean, variance;
   double frames = 1.0;  // duration at the model's rate
 };
 
@@ -39,9 +42,13 @@ struct LiveModel {
   double rate_hz = 30.0;
   std::vector<std::array<char, kMaxLabel>> labels;
   std::vector<LiveChain> chains;
-  std::vector<LiveState> states;            // [chain][kStates]
-  std::array<bool, kHandChannels> moves{};  // true: the channel moves in the recordings
-  std::uint32_t skeleton = 0;               // id of the skeleton it is bound to
+  std::vector<LiveState> states;  // [chain][kStates]
+  // Those of a body in a frame; empty: of a hand, whose channels are the skeleton's in their order.
+  std::optional<gesture::PoseChannels> body;
+  int channels = 0;
+  int groups = 0;
+  std::vector<int> group;           // [channel]
+  std::vector<std::uint8_t> moves;  // [channel] 1: it moves in the recordings
 };
 
 // Factors on a model's means and variances at a rate ratio (stream rate over model rate)
@@ -56,8 +63,8 @@ struct RateFactors {
           .variance = {pace, 1.0 / pace, 1.0 / (pace * pace * pace)}};
 }
 
-// Returns an error for a skeleton that is not a hand and for a model with more than kMaxLiveChains
-// labels. `name` is for errors.
+// Returns an error for a skeleton that lacks channels of the model and for a model with more than
+// kMaxLiveChains labels. `name` is for errors.
 [[nodiscard]] Result<std::unique_ptr<const LiveModel>> bind_live_model(
     const gesture::GestureModel& model, const Skeleton& skeleton, const std::string& name);
 

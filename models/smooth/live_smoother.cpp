@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
+#include "models/gesture/pose_channels.hpp"
+#include "models/motion/heading.hpp"
 #include "models/smooth/adaptive_window.hpp"
 #include "models/smooth/frame_clock.hpp"
 #include "models/smooth/model_prior.hpp"
 #include "models/smooth/noise_estimate.hpp"
 #include "models/smooth/unwrap.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::smooth {
@@ -21,58 +25,98 @@ constexpr int kMaxPending = static_cast<int>(kMaxLag_s * 1000.0) + 2;  // frames
 constexpr long kMaxWaiting = 8;  // most frames that wait until the period is known
 constexpr double kEvenStep =
     1.5;  // periods: frames with a longer step between them are not neighbours
+constexpr double kHeadingStep_s = 0.1;  // the heading takes a longer step between frames for this
 
 int rotation_channels(const Skeleton& skeleton) {
   return static_cast<int>(std::ranges::count_if(
       skeleton.channels, [](const Channel& channel) { return !channel.translation; }));
 }
 
+// The most columns of the window: a gesture model of a body has three for each joint that is a
+// bone, in place of the joint's own channels.
+int most_columns(const Skeleton& skeleton, int angles) {
+  if (hand_side(skeleton)) return angles;
+  const auto is_free = [&skeleton](const Channel& channel) {
+    return !channel.translation && !skeleton.joints[channel.joint].bone;
+  };
+  return std::max(angles, gesture::most_channels(skeleton) +
+                              static_cast<int>(std::ranges::count_if(skeleton.channels, is_free)));
+}
+
 }  // namespace
 
+// The window solves for columns: first the channels of a body's gesture model, then the skeleton's
+// rotation channels, or angles, that are not among the model's joints: without such a model all of
+// them. Columns that are left over are a constant 0.
 struct LiveSmoother::State {
-  State(const Skeleton& body, const LiveOptions& wanted)
-      : skeleton(body),
+  State(const Skeleton& figure, const LiveOptions& wanted)
+      : skeleton(figure),
         options(wanted),
-        channels(rotation_channels(body)),
-        unwrap(body),
-        noise(channels),
-        window(std::max(channels, 1)),
-        measured(static_cast<std::size_t>(channels)),
-        variance(hwy::AllocateAligned<double>(static_cast<std::size_t>(window.stride()))),
-        values(body.channels.size()),
-        pending(kMaxPending) {
-    std::fill_n(variance.get(), window.stride(), kUnknown);
-    for (std::size_t i = 0; i < body.channels.size(); ++i) {
-      if (body.channels[i].translation) continue;
+        angles(rotation_channels(figure)),
+        columns(std::max(most_columns(figure, angles), 1)),
+        unwrap(figure),
+        noise(columns),
+        window(columns),
+        filter(kMaxWindow, gesture::most_channels(figure)),
+        model_prior(filter, gesture::most_channels(figure)),
+        measured(static_cast<std::size_t>(columns)),
+        angle(static_cast<std::size_t>(angles)),
+        posed(measured.size()),
+        posed_now(measured.size()),
+        column_variance(hwy::AllocateAligned<double>(static_cast<std::size_t>(window.stride()))),
+        variance(static_cast<std::size_t>(angles), kUnknown),
+        values(figure.channels.size()),
+        pending(kMaxPending),
+        heading_rad(kMaxPending) {
+    free_angle.resize(static_cast<std::size_t>(angles));
+    for (std::size_t i = 0; i < figure.channels.size(); ++i) {
+      if (figure.channels[i].translation) continue;
       angle_value.push_back(i);
-      const int joint = body.channels[i].joint;
+      const int joint = figure.channels[i].joint;
       if (turning.empty() || turning.back() != joint) turning.push_back(joint);
     }
+    lay_out(nullptr);
   }
 
   [[nodiscard]] bool serves(const Frame& frame) const noexcept;
-  void take(const Frame& frame) noexcept;
+  void lay_out(const LiveModel* model) noexcept;
+  void take(const Frame& frame, double step_s) noexcept;
+  void take_body(const Frame& frame, double step_s) noexcept;
   void emit_until(long last, StageOut& out) noexcept;
   void rebuild(Frame& frame, int back) noexcept;
   void turn_joints(Frame& frame) noexcept;
+  void pose_body(Frame& frame, double toward_rad, const double* x) noexcept;
+  void use(const LiveModel* model) noexcept;
   void name_gesture(Frame& frame, int back) const noexcept;
   void forget() noexcept;
 
   Skeleton skeleton;
   LiveOptions options;
-  int channels;
+  int angles;
+  int columns;
   Unwrap unwrap;
   FrameClock clock;
   NoiseEstimate noise;
   AdaptiveWindow window;
-  HmmForwardFilter filter{kMaxWindow};
-  ModelPrior model_prior{filter};
-  std::vector<double> measured;  // [channels] of the current frame
-  hwy::AlignedFreeUniquePtr<double[]> variance;
+  HmmForwardFilter filter;
+  ModelPrior model_prior;
+  std::vector<double> measured;   // [columns] of the current frame
+  std::vector<double> angle;      // [angles] of the current frame
+  std::vector<double> posed;      // [columns] a body's channels, each as it was measured last
+  std::vector<double> posed_now;  // the same as it is shown
+  trajectory::Rows column_variance;
+  std::vector<double> variance;                 // [angles] of the emitted frame
+  const gesture::PoseChannels* body = nullptr;  // of the model in use; null: none of a body
+  std::size_t body_columns = 0;
+  std::vector<std::size_t> free_angle;  // angles that are not of the body's channels
+  std::size_t free_angles = 0;          // how many
+  motion::LiveHeading heading;
   std::vector<std::size_t> angle_value;  // index of a rotation channel among all channels
   std::vector<int> turning;              // joints with rotation channels
   std::vector<double> values;            // [channels] of the emitted frame
   std::vector<Frame> pending;            // ring of the last frames
+  std::vector<double> heading_rad;       // of these
+  long ready = 0;                        // frames before it wait, but are not solved for any more
   long taken = 0;                        // number of frames received
   long emitted = 0;                      // number of frames emitted
   double last_s = 0.0;
@@ -81,20 +125,47 @@ struct LiveSmoother::State {
 LiveSmoother::LiveSmoother(const Skeleton& skeleton, const LiveOptions& options,
                            const LiveModel* model)
     : state_(std::make_unique<State>(skeleton, options)) {
-  state_->filter.set_model(model);
+  state_->use(model);
 }
 LiveSmoother::~LiveSmoother() = default;
 
 // RT-safe.
+void LiveSmoother::State::lay_out(const LiveModel* model) noexcept {
+  body = model != nullptr && model->body ? &*model->body : nullptr;
+  body_columns = body != nullptr ? static_cast<std::size_t>(body->count()) : 0;
+  free_angles = 0;
+  for (std::size_t c = 0; c < free_angle.size(); ++c) {
+    if (body == nullptr || !body->covers(c)) free_angle[free_angles++] = c;
+  }
+  std::ranges::fill(measured, 0.0);
+  std::ranges::fill(posed, 0.0);
+}
+
+// What waits is solved for a last time before the columns change. RT-safe.
+void LiveSmoother::State::use(const LiveModel* model) noexcept {
+  const bool changes = body != nullptr || (model != nullptr && model->body);
+  if (changes) {
+    for (long i = std::max(emitted, ready); i < taken; ++i) {
+      rebuild(pending[static_cast<std::size_t>(i % kMaxPending)], static_cast<int>(taken - 1 - i));
+    }
+    ready = taken;
+    forget();
+    noise.reset();
+    lay_out(model);
+  }
+  filter.set_model(model);
+}
+
+// RT-safe.
 bool LiveSmoother::State::serves(const Frame& frame) const noexcept {
-  return channels > 0 && frame.skeleton == skeleton.id && frame.angle_count == channels &&
-         frame.joint_count == skeleton.joints.size();
+  return body_columns + free_angles > 0 && frame.skeleton == skeleton.id &&
+         frame.angle_count == angles && frame.joint_count == skeleton.joints.size();
 }
 
 // Stores the frame and extracts its channels, unwrapped. Channels that were not measured become NaN
 // in both: all channels of a joint that is not valid, except those that the source does provide
 // beside missing ones. RT-safe.
-void LiveSmoother::State::take(const Frame& frame) noexcept {
+void LiveSmoother::State::take(const Frame& frame, double step_s) noexcept {
   Frame& kept = pending[static_cast<std::size_t>(taken % kMaxPending)];
   kept = frame;
   ++taken;
@@ -107,12 +178,29 @@ void LiveSmoother::State::take(const Frame& frame) noexcept {
     }
     const bool there = lacks || frame.valid[static_cast<std::size_t>(joint)];
     for (; first < end; ++first) {
-      float& angle = kept.angle_rad[first];
-      if (!there || !std::isfinite(angle)) angle = std::numeric_limits<float>::quiet_NaN();
-      measured[first] = static_cast<double>(angle);
+      float& value = kept.angle_rad[first];
+      if (!there || !std::isfinite(value)) value = std::numeric_limits<float>::quiet_NaN();
+      angle[first] = static_cast<double>(value);
     }
   }
-  unwrap.apply(measured);
+  unwrap.apply(angle);
+  for (std::size_t i = 0; i < free_angles; ++i) measured[body_columns + i] = angle[free_angle[i]];
+  if (body != nullptr) take_body(frame, step_s);
+}
+
+// The columns of a body's model, as the frame stored last has them. RT-safe.
+void LiveSmoother::State::take_body(const Frame& frame, double step_s) noexcept {
+  if (body->has_heading(frame)) {
+    const double dt_s = std::min(step_s, kHeadingStep_s);
+    static_cast<void>(heading.update(body->heading_rad(frame), dt_s));
+  }
+  heading_rad[static_cast<std::size_t>((taken - 1) % kMaxPending)] = heading.value_rad();
+  const std::span<double> values_rad = std::span(measured).first(body_columns);
+  body->read(frame, heading.value_rad(), values_rad);
+  body->unwrap(std::span(posed).first(body_columns), values_rad);
+  for (std::size_t c = 0; c < body_columns; ++c) {
+    if (std::isfinite(measured[c])) posed[c] = measured[c];
+  }
 }
 
 // RT-safe.
@@ -120,6 +208,7 @@ void LiveSmoother::State::forget() noexcept {
   unwrap.reset();
   window.reset();
   filter.reset();
+  heading = motion::LiveHeading();
 }
 
 // RT-safe.
@@ -139,12 +228,13 @@ void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
   }
   const double period_s = s.clock.period_s();
   if (s.taken - s.emitted >= window_frames(period_s)) flush(out);  // the beat became much slower
-  s.take(in.frame);
+  s.take(in.frame, step_s);
   const bool even = step_s < kEvenStep * period_s;
   if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, even);
   s.window.push(now_s, s.measured, noise_rad());
   if (s.filter.model() != nullptr) {
-    s.filter.push(s.measured, even, period_s, noise_rad());
+    const auto modelled = static_cast<std::size_t>(s.filter.model()->channels);
+    s.filter.push(std::span(s.measured).first(modelled), even, period_s, noise_rad());
     s.filter.sweep(window_frames(period_s));
   }
   s.window.solve(period_s, s.filter.model() != nullptr ? &s.model_prior : nullptr);
@@ -167,14 +257,14 @@ void LiveSmoother::reset() noexcept {
   s.forget();
   s.noise.reset();
   s.clock = FrameClock();
-  s.emitted = s.taken = 0;
+  s.emitted = s.taken = s.ready = 0;
   s.last_s = 0.0;
 }
 
 // RT-safe.
 const LiveModel* LiveSmoother::set_model(const LiveModel* model) noexcept {
   const LiveModel* const before = state_->filter.model();
-  state_->filter.set_model(model);
+  state_->use(model);
   return before;
 }
 
@@ -188,29 +278,40 @@ double LiveSmoother::noise_rad() const noexcept {
 void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept {
   for (; emitted <= last; ++emitted) {
     Frame frame = pending[static_cast<std::size_t>(emitted % kMaxPending)];
-    rebuild(frame, static_cast<int>(taken - 1 - emitted));
-    out.frame(
-        {.frame = frame, .variance_rad2 = {variance.get(), static_cast<std::size_t>(channels)}});
+    if (emitted >= ready) {
+      rebuild(frame, static_cast<int>(taken - 1 - emitted));
+    } else {
+      std::ranges::fill(variance, kUnknown);
+    }
+    out.frame({.frame = frame, .variance_rad2 = variance});
   }
 }
 
 // Writes the solve's result into the frame `back` frames before the newest. RT-safe.
 void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
-  window.variance(back, variance.get());
+  window.variance(back, column_variance.get());
   const double* const x = window.x(back);
   frame.lag_frames = static_cast<std::uint16_t>(back);
   frame.lag_ms = static_cast<float>(1e3 * window.age_s(back));
-  for (std::size_t c = 0; c < angle_value.size(); ++c) {
-    float& angle = frame.angle_rad[c];
-    if (!window.known(static_cast<int>(c))) {
+  for (std::size_t i = 0; i < free_angles; ++i) {
+    const std::size_t column = body_columns + i;
+    const std::size_t c = free_angle[i];
+    float& value = frame.angle_rad[c];
+    variance[c] = column_variance[column];
+    if (!window.known(static_cast<int>(column))) {
       variance[c] = kUnknown;
       continue;
     }
-    const bool there = std::isfinite(angle);
+    const bool there = std::isfinite(value);
     if (!there) frame.quality = std::max(frame.quality, Quality::kPredicted);
-    angle = static_cast<float>(there ? unwrap_near(x[c], static_cast<double>(angle)) : x[c]);
+    value =
+        static_cast<float>(there ? unwrap_near(x[column], static_cast<double>(value)) : x[column]);
   }
   turn_joints(frame);
+  if (body != nullptr) {
+    const long number = taken - 1 - back;
+    pose_body(frame, heading_rad[static_cast<std::size_t>(number % kMaxPending)], x);
+  }
   if (filter.model() != nullptr) name_gesture(frame, back);
 }
 
@@ -224,19 +325,41 @@ void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
   frame.label_probability = static_cast<float>(answer.probability);
 }
 
-// Computes rotations from channels; a joint is valid when all its channels are known. RT-safe.
+// Computes rotations from the free angles; a joint is valid when all its channels are known.
+// RT-safe.
 void LiveSmoother::State::turn_joints(Frame& frame) noexcept {
-  for (std::size_t c = 0; c < angle_value.size(); ++c) {
+  for (std::size_t i = 0; i < free_angles; ++i) {
+    const std::size_t c = free_angle[i];
     values[angle_value[c]] = static_cast<double>(frame.angle_rad[c]);
     const std::uint16_t joint = skeleton.channels[angle_value[c]].joint;
     if (c == 0 || joint != skeleton.channels[angle_value[c - 1]].joint) frame.valid[joint] = true;
-    if (!window.known(static_cast<int>(c))) frame.valid[joint] = false;
+    if (!window.known(static_cast<int>(body_columns + i))) frame.valid[joint] = false;
   }
+  std::size_t first = 0;  // angle of the joint
   for (const int joint : turning) {
+    const bool covered = body != nullptr && body->covers(first);
+    while (first < angle_value.size() && skeleton.channels[angle_value[first]].joint == joint) {
+      ++first;
+    }
+    if (covered) continue;
     const auto j = static_cast<std::size_t>(joint);
     frame.rotation_xyzw[j] =
         frame.valid[j] ? from_eigen(local_rotation(skeleton, joint, values)) : kIdentity;
   }
+}
+
+// Poses the joints of a body's model; one that no frame of the window measured stays as it is.
+// RT-safe.
+void LiveSmoother::State::pose_body(Frame& frame, double toward_rad, const double* x) noexcept {
+  for (std::size_t c = 0; c < body_columns; ++c) {
+    const bool known = window.known(static_cast<int>(c));
+    posed_now[c] = known ? x[c] : std::numeric_limits<double>::quiet_NaN();
+    if (!known) column_variance[c] = kUnknown;
+    const auto joint = static_cast<std::size_t>(body->joint_of(static_cast<int>(c)));
+    if (known && !frame.valid[joint]) frame.quality = std::max(frame.quality, Quality::kPredicted);
+  }
+  body->write(std::span(posed_now).first(body_columns), toward_rad, frame);
+  body->spread({column_variance.get(), body_columns}, variance);
 }
 
 }  // namespace posed::smooth

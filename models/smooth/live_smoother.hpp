@@ -4,14 +4,15 @@
 // No gesture model is needed. It adds no latency beyond the chosen lag. Missing joints are bridged
 // by the same solve.
 //
-// It works for every skeleton with rotation channels. A frame of another skeleton, or without
-// angles, passes through at once, after the frames that still wait. Channels are unwrapped
-// internally; root position and all other contents are those of the emitted frame.
+// It works for every skeleton with rotation channels; with a gesture model of a body, whose joints
+// are smoothed as the model's rotation vectors, for one without, too. A frame of another skeleton,
+// or without angles, passes through at once, after the frames that still wait. Channels are
+// unwrapped internally; root position and all other contents are those of the emitted frame.
 //
 // Times are the device's where a frame has them, else arrival times; they may be uneven, jump or
 // run backwards. Constants are in radians and seconds, so any rate from 10 to 1000 Hz works without
 // tuning. An optional gesture model names the gesture, bridges gaps within its own gestures and
-// steadies poses that it knows; it does not disturb an unknown hand.
+// steadies poses that it knows; it does not disturb an unknown motion.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +49,8 @@ class LiveSmoother final : public Stage {
   // Forgets the past; the next frame is treated as the first one. RT-safe.
   void reset() noexcept;
 
-  // Takes effect at the next frame; returns the previous model. RT-safe.
+  // Takes effect at the next frame; returns the previous model. Channels of a body are those of its
+  // model, so the past is then forgotten. RT-safe.
   const LiveModel* set_model(const LiveModel* model) noexcept;
 
   // Sensor noise in use [rad]. RT-safe.

@@ -1,6 +1,7 @@
 #include "models/smooth/model_prior.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace posed::smooth {
 namespace {
@@ -15,97 +16,111 @@ constexpr double kLeastVariance = 1e-12;
 
 }  // namespace
 
+ModelPrior::ModelPrior(const HmmForwardFilter& filter, int max_channels) : filter_(filter) {
+  belief_.mean.resize(static_cast<std::size_t>(kDeltaWindows * max_channels));
+  belief_.variance.resize(belief_.mean.size());
+}
+
 // Mean and variance of one frame over its state probabilities. RT-safe.
 void ModelPrior::believe(int back) noexcept {
   const LiveModel& model = *filter_.model();
   const auto states = filter_.states(back);
-  HandRows& mean = belief_.mean;
-  HandRows& variance = belief_.variance;
-  mean = {};
-  variance = {};
+  const auto channels = static_cast<std::size_t>(model.channels);
+  const std::size_t features = kDeltaWindows * channels;
+  LiveRows& mean = belief_.mean;
+  LiveRows& variance = belief_.variance;
+  std::fill_n(mean.begin(), features, 0.0);
+  std::fill_n(variance.begin(), features, 0.0);
   double sum = 0.0;
   for (std::size_t s = 0; s < states.size(); ++s) {
     const double share = states[s];
     if (share < kBelieved) continue;
     sum += share;
     const LiveState& state = model.states[s];
-    for (std::size_t w = 0; w < kDeltaWindows; ++w) {
-      for (std::size_t c = 0; c < kHandChannels; ++c) {
-        const double own = state.mean[w][c];
-        mean[w][c] += share * own;
-        variance[w][c] += share * (state.variance[w][c] + own * own);
-      }
+    for (std::size_t k = 0; k < features; ++k) {
+      const double own = state.mean[k];
+      mean[k] += share * own;
+      variance[k] += share * (state.variance[k] + own * own);
     }
   }
   const RateFactors rule = rate_factors(filter_.pace());
   for (std::size_t w = 0; w < kDeltaWindows; ++w) {
-    for (std::size_t c = 0; c < kHandChannels; ++c) {
-      const double m = mean[w][c] / sum;
-      variance[w][c] = std::max(variance[w][c] / sum - m * m, kLeastVariance) * rule.variance[w];
-      mean[w][c] = m * rule.mean[w];
+    for (std::size_t k = w * channels; k < (w + 1) * channels; ++k) {
+      const double m = mean[k] / sum;
+      variance[k] = std::max(variance[k] / sum - m * m, kLeastVariance) * rule.variance[w];
+      mean[k] = m * rule.mean[w];
     }
   }
 }
 
 // RT-safe.
 void ModelPrior::measure_distance(const AdaptiveWindow& window, int back) noexcept {
+  const LiveModel& model = *filter_.model();
   const double* const x = window.x(back);
-  for (std::size_t f = 0; f < kFingers; ++f) {
-    double sum = 0.0;
-    double channels = 0.0;
-    for (std::size_t c = f * kFingerChannels; c < (f + 1) * kFingerChannels; ++c) {
-      if (!filter_.model()->moves[c]) continue;
-      const double off = x[c] - belief_.mean[0][c];
-      sum += off * off / belief_.variance[0][c];
-      channels += 1.0;
-    }
-    belief_.distance2[f] = channels > 0.0 ? sum / channels : 0.0;
+  std::array<double, gesture::kMaxGroups> sum{};
+  std::array<double, gesture::kMaxGroups> channels{};
+  for (std::size_t c = 0; c < static_cast<std::size_t>(model.channels); ++c) {
+    if (model.moves[c] == 0) continue;
+    const auto group = static_cast<std::size_t>(model.group[c]);
+    const double off = x[c] - belief_.mean[c];
+    sum[group] += off * off / belief_.variance[c];
+    channels[group] += 1.0;
+  }
+  for (std::size_t g = 0; g < static_cast<std::size_t>(model.groups); ++g) {
+    belief_.distance2[g] = channels[g] > 0.0 ? sum[g] / channels[g] : 0.0;
   }
 }
 
-// How well each finger follows the model's gestures in the frames where it is measured. RT-safe.
+// How well each group follows the model's gestures in the frames where its first channel is
+// measured. RT-safe.
 void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
-  std::array<double, kFingers> frames{};
+  const LiveModel& model = *filter_.model();
+  std::array<double, gesture::kMaxGroups> frames{};
   fit_.fill(0.0);
   for (int back = window.frames() - 1; back > 0; --back) {
     if (!filter_.knows(back)) continue;
     believe(back);
     measure_distance(window, back);
-    for (std::size_t f = 0; f < kFingers; ++f) {
-      if (!window.measured(back, static_cast<int>(f) * kFingerChannels)) continue;
-      const double ratio = belief_.distance2[f] / kFit2;
-      fit_[f] += 1.0 / (1.0 + ratio * ratio);
-      frames[f] += 1.0;
+    int last = -1;
+    for (int c = 0; c < model.channels; ++c) {
+      const int group = model.group[static_cast<std::size_t>(c)];
+      if (std::exchange(last, group) == group || !window.measured(back, c)) continue;
+      const auto g = static_cast<std::size_t>(group);
+      const double ratio = belief_.distance2[g] / kFit2;
+      fit_[g] += 1.0 / (1.0 + ratio * ratio);
+      frames[g] += 1.0;
     }
   }
-  for (std::size_t f = 0; f < kFingers; ++f) fit_[f] /= std::max(frames[f], 1.0);
+  for (std::size_t g = 0; g < fit_.size(); ++g) fit_[g] /= std::max(frames[g], 1.0);
 }
 
-// Pulls towards the model's pose with its variance times (1 + e^2/2)^2, so that a finger which is
+// Pulls towards the model's pose with its variance times (1 + e^2/2)^2, so that a group which is
 // elsewhere is not disturbed. RT-safe.
 void ModelPrior::pull(AdaptiveWindow& window, int back, int channel) noexcept {
   const auto c = static_cast<std::size_t>(channel);
-  const std::size_t finger = c / kFingerChannels;
-  const double wide = 1.0 + 0.5 * belief_.distance2[finger];
+  const auto group = static_cast<std::size_t>(filter_.model()->group[c]);
+  const double wide = 1.0 + 0.5 * belief_.distance2[group];
   const double weight =
-      window.measured(back, channel) ? kPull / (wide * wide) : kGapPull * fit_[finger];
-  const double precision = weight / belief_.variance[0][c];
+      window.measured(back, channel) ? kPull / (wide * wide) : kGapPull * fit_[group];
+  const double precision = weight / belief_.variance[c];
   window.row(back, trajectory::kPosition)[c] += precision;
-  window.row(back, trajectory::kPositionMean)[c] += precision * belief_.mean[0][c];
+  window.row(back, trajectory::kPositionMean)[c] += precision * belief_.mean[c];
 }
 
 // In a gap the gestures' own delta and delta-delta replace the adaptive prior in proportion to the
-// finger's fit. RT-safe.
+// group's fit. RT-safe.
 void ModelPrior::bridge(AdaptiveWindow& window, int back, int channel) noexcept {
   const auto c = static_cast<std::size_t>(channel);
-  const double fit = fit_[c / kFingerChannels];
+  const LiveModel& model = *filter_.model();
+  const double fit = fit_[static_cast<std::size_t>(model.group[c])];
   constexpr std::array kPrecision{trajectory::kDelta, trajectory::kDeltaDelta};
   constexpr std::array kMean{trajectory::kDeltaMean, trajectory::kDeltaDeltaMean};
   for (std::size_t w = 0; w < 2; ++w) {
-    const double own = fit / belief_.variance[w + 1][c];
+    const std::size_t k = (w + 1) * static_cast<std::size_t>(model.channels) + c;
+    const double own = fit / belief_.variance[k];
     double& precision = window.row(back, kPrecision[w])[c];
     precision = (1.0 - fit) * precision + own;
-    window.row(back, kMean[w])[c] = own * belief_.mean[w + 1][c];
+    window.row(back, kMean[w])[c] = own * belief_.mean[k];
   }
 }
 
@@ -120,8 +135,8 @@ void ModelPrior::add(AdaptiveWindow& window) noexcept {
     if (!filter_.knows(back)) continue;
     believe(back);
     measure_distance(window, back);
-    for (int c = 0; c < kHandChannels; ++c) {
-      if (!model.moves[static_cast<std::size_t>(c)]) continue;
+    for (int c = 0; c < model.channels; ++c) {
+      if (model.moves[static_cast<std::size_t>(c)] == 0) continue;
       pull(window, back, c);
       if (!window.measured(back, c)) bridge(window, back, c);
     }

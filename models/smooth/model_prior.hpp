@@ -14,16 +14,17 @@ namespace posed::smooth {
 
 class ModelPrior final : public InformationSource {
  public:
-  explicit ModelPrior(const HmmForwardFilter& filter) : filter_(filter) {}
+  // For models of at most `max_channels` channels.
+  ModelPrior(const HmmForwardFilter& filter, int max_channels);
 
   void add(AdaptiveWindow& window) noexcept override;
 
  private:
-  // The model's Gaussian for one frame, at the stream's rate, and each finger's distance from it:
-  // the mean of the normalised squared distances.
+  // The model's Gaussian for one frame, at the stream's rate, and the distance of each group (a
+  // finger, an arm) from it: the mean of the normalised squared distances.
   struct Belief {
-    HandRows mean{}, variance{};
-    std::array<double, kFingers> distance2{};
+    LiveRows mean, variance;
+    std::array<double, gesture::kMaxGroups> distance2{};
   };
 
   void believe(int back) noexcept;
@@ -34,8 +35,8 @@ class ModelPrior final : public InformationSource {
 
   const HmmForwardFilter& filter_;
   Belief belief_;
-  std::array<double, kFingers>
-      fit_{};  // over the window's measured frames, from 0 (unlike the model) to 1
+  // Of each group over the window's measured frames, from 0 (unlike the model) to 1.
+  std::array<double, gesture::kMaxGroups> fit_{};
 };
 
 }  // namespace posed::smooth

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "models/feet/feet_stage.hpp"
+#include "models/motion/heading.hpp"
 #include "models/motion/turn_sum.hpp"
-#include "models/style/heading.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::style {
@@ -41,7 +41,7 @@ Result<> check_clip(const clip::Clip& clip) {
 // The settled heading at the first frame: the low-pass runs from the clip's end to its start, so
 // that at the first frame it reflects the direction that the walk takes from there.
 double settled_heading_rad(const clip::Clip& clip, const motion::PoseSpace& space) {
-  Heading heading;
+  motion::LiveHeading heading;
   for (int i = clip.frames() - 1; i >= 0; --i) {
     const Frame frame = clip.frame(i);
     if (!space.has_heading(frame)) continue;

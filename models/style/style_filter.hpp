@@ -29,11 +29,11 @@
 #include <vector>
 
 #include "models/elapsed.hpp"
+#include "models/motion/heading.hpp"
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
 #include "models/style/body_mask.hpp"
 #include "models/style/bound_model.hpp"
-#include "models/style/heading.hpp"
 #include "models/style/style_weights.hpp"
 #include "models/style/walker_watch.hpp"
 
@@ -146,7 +146,7 @@ class StyleFilter final : public Stage {
   BodyMask mask_;
   Dims limit_rad_{};  // of the mixture
   Elapsed elapsed_;
-  Heading heading_;
+  motion::LiveHeading heading_;
   double gap_s_ = 0.0;  // between the last two frames
   WalkerWatch watch_;
 

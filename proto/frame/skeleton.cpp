@@ -295,7 +295,10 @@ void set_rotation(const Skeleton& skeleton, int joint, const Eigen::Quaterniond&
       frame.angle_rad.data() + std::count_if(skeleton.channels.data(), channels.data(), turns);
   const auto count = static_cast<std::size_t>(std::ranges::count_if(channels, turns));
   std::array<double, 3> near_rad{};
-  std::copy_n(angles, count, near_rad.begin());
+  // An angle that was not measured is no guide.
+  for (std::size_t i = 0; i < count; ++i) {
+    if (std::isfinite(angles[i])) near_rad[i] = static_cast<double>(angles[i]);
+  }
   const auto turned = channels_from_rotation(skeleton, joint, rotation, near_rad);
   for (std::size_t i = 0; i < count; ++i) angles[i] = static_cast<float>(turned[i]);
 }

@@ -157,7 +157,7 @@ TEST_CASE("a config that cannot be performed is refused with the stream's name")
       "model = \"toy.gesture\"\n");
   CHECK(body.code == 1);
   CHECK(has(body.err, "stream 'w': "));
-  CHECK(has(body.err, "needs a stream of hands"));
+  CHECK(has(body.err, "the model is of hands"));
   const auto label =
       check("driver = \"labels\"\n[stream.generate]\nmodel = \"toy.gesture\"\nlabels = \"g x\"\n");
   CHECK(label.code == 2);

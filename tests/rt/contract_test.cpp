@@ -27,6 +27,7 @@
 #include "tests/rt/rig.hpp"
 #include "tests/support/quiet_record_sink.hpp"
 #include "tests/support/stage_commands.hpp"
+#include "tests/support/synthetic_arms.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -181,6 +182,40 @@ TEST_CASE("hands keep the real-time contract: smoothed, constrained, performing,
   rig.command(test::stop_playing_command(1, 5));
   REQUIRE(rig.take_frames(150) == 150);
   CHECK(rig.take_acks() == 5);
+  check_no_breach();
+}
+
+TEST_CASE("bodies keep the real-time contract: recognised, performing, with a new model", "[rt]") {
+  watch_log();
+  const test::TempFolder folder;
+  const auto path = folder.path() / "take.bvh";
+  REQUIRE(clip::write_bvh(test::raise_take({.left = true}), path));
+  const gesture::GestureModel arms = test::synthetic_arms();
+  CountingRecordSink record_sink;
+  std::vector<RigStream> streams;
+  streams.push_back({.device = open_device("file", {{"path", path.string()}, {"pace", 4.0}})});
+  streams.push_back(
+      {.device = open_device("labels", {{"body", path.string()}, {"rate_hz", 120.0}})});
+  std::vector<std::unique_ptr<const generate::BoundModel>> models;
+  const auto bind = [&](const drivers::Description& body) {
+    models.push_back(generate::bind_model(arms, *body.skeleton, body.rate_hz, "arms").value());
+    return models.back().get();
+  };
+  for (RigStream& stream : streams) stream.gesture = bind(stream.device.description);
+  const auto* const another = bind(streams[0].device.description);
+  const auto order =
+      gesture::make_play_order(arms, gesture::split_labels("raise-both rest raise-left"), 2.0, true)
+          .value();
+  Rig rig(std::move(streams), &record_sink);
+  forget_breaches();
+  rig.start();
+  REQUIRE(rig.take_frames(150) == 150);
+  for (std::uint32_t i = 0; i < 2; ++i) rig.command(test::play_command(i, order, 1 + i));
+  REQUIRE(rig.take_frames(150) == 150);
+  rig.command(test::model_command(0, generate::generate_type(), another, 3));
+  rig.command(test::stop_playing_command(1, 4));
+  REQUIRE(rig.take_frames(150) == 150);
+  CHECK(rig.take_acks() == 4);
   check_no_breach();
 }
 

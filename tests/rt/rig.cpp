@@ -47,8 +47,10 @@ Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
                                 std::make_unique<generate::GenerateStage>(
                                     device.skeleton, smooth::LiveOptions{},
                                     generate::stream_rate_hz(device.rate_hz), stream.gesture)});
-      options.stages.push_back(
-          {&hand::constrain_type(), hand::constrain_type().make(context, nullptr).value()});
+      if (hand::constrain_type().is_default(*device.skeleton)) {
+        options.stages.push_back(
+            {&hand::constrain_type(), hand::constrain_type().make(context, nullptr).value()});
+      }
     }
     worker_->add(std::move(options), stream.device.description.rate_hz, *counters_.back());
     source_counters_.push_back(std::make_unique<pipeline::SourceCounters>());

@@ -48,15 +48,15 @@ void check_seams(const gesture::GestureModel& trained, const Hands& live, std::s
   const auto order =
       gesture::make_play_order(model->gesture(), gesture::split_labels("g 1 c 3 4 p"), 1.0, false)
           .value();
-  GesturePlayer player(kRate_hz);
+  GesturePlayer player(kRate_hz, kHandChannels);
   player.set_model(model.get());
   Hands shown;
   std::size_t back = 0;
   for (std::size_t t = 0; t == 0 || t <= start || player.busy(); ++t) {
     if (t == start) REQUIRE(player.play(order));
-    const GesturePlayer::Pose& pose = player.step(&live[t % live.size()]);
+    const GesturePlayer::Pose pose = player.step(live[t % live.size()]);
     if (back == 0 && pose.what == What::kLeadingBack) back = t;
-    shown.push_back(pose.angles);
+    std::ranges::copy(pose.angles, shown.emplace_back().begin());
     REQUIRE(t < 10'000);
   }
   const auto lead = static_cast<std::size_t>(0.8 * kRate_hz) + 1;

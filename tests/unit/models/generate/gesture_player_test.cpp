@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -17,6 +18,8 @@ namespace posed::generate {
 namespace {
 
 using What = GesturePlayer::What;
+
+constexpr std::span<const double> kNoHand;
 
 struct Shown {
   HandAngles angles;
@@ -57,8 +60,9 @@ std::vector<Shown> perform(GesturePlayer& player, const gesture::PlayOrder& what
   std::vector<Shown> shown;
   const auto step = [&] {
     const HandAngles hand = live_hand(double(shown.size()) / rate_hz);
-    const GesturePlayer::Pose& pose = player.step(live ? &hand : nullptr);
-    shown.push_back({pose.angles, pose.what, pose.label});
+    const auto pose = player.step(live ? std::span<const double>(hand) : kNoHand);
+    shown.push_back({.angles = {}, .what = pose.what, .label = pose.label});
+    std::ranges::copy(pose.angles, shown.back().angles.begin());
   };
   for (int i = 0; i < before; ++i) step();
   REQUIRE(player.play(what));
@@ -98,7 +102,7 @@ TEST_CASE("a performance begins and ends on a live hand without a jump", "[playb
   for (const double rate_hz : {30.0, 60.0, 120.0}) {
     for (const int before : {40, 47, 55}) {  // different moments of the live hand
       const auto model = toy(rate_hz);
-      GesturePlayer player(rate_hz);
+      GesturePlayer player(rate_hz, kHandChannels);
       player.set_model(model.get());
       const auto shown = perform(player, order(*model, "g 1 c 3 4 p"), rate_hz, true, before);
       const std::size_t begin = first_of(shown, What::kPerformed);
@@ -127,7 +131,7 @@ TEST_CASE("each label is reached, in order, and a model of 30 Hz is right at oth
   std::vector<double> seconds_of;
   for (const double rate_hz : {30.0, 60.0, 120.0}) {
     const auto model = toy(rate_hz);
-    GesturePlayer player(rate_hz);
+    GesturePlayer player(rate_hz, kHandChannels);
     player.set_model(model.get());
     const auto shown = perform(player, order(*model, "g p 1"), rate_hz);
     std::vector<std::pair<int, double>> middle;  // index flexion in the middle of each label
@@ -152,7 +156,7 @@ TEST_CASE("the tempo divides a performance's length", "[playback]") {
   const double rate_hz = 30.0;
   const auto model = toy(rate_hz);
   const auto frames = [&](double tempo) {
-    GesturePlayer player(rate_hz);
+    GesturePlayer player(rate_hz, kHandChannels);
     player.set_model(model.get());
     const auto shown = perform(player, order(*model, "g 1 c 3 4 p", tempo), rate_hz, false, 0);
     // The lead-in is the same at any tempo: it goes from a flat hand to the first label.
@@ -169,7 +173,7 @@ TEST_CASE("the tempo divides a performance's length", "[playback]") {
 
 TEST_CASE("labels appended while it plays are performed after the earlier ones", "[playback]") {
   const auto model = toy(30.0);
-  GesturePlayer player(30.0);
+  GesturePlayer player(30.0, kHandChannels);
   player.set_model(model.get());
   REQUIRE(player.play(order(*model, "g")));
   std::vector<int> labels;
@@ -177,44 +181,44 @@ TEST_CASE("labels appended while it plays are performed after the earlier ones",
   double most_step = 0.0;
   for (int t = 0; player.busy(); ++t) {
     if (t == 80) REQUIRE(player.play(order(*model, "p c")));
-    const GesturePlayer::Pose& pose = player.step(nullptr);
+    const GesturePlayer::Pose pose = player.step(kNoHand);
     if (pose.what == What::kPerformed && (labels.empty() || labels.back() != pose.label)) {
       labels.push_back(pose.label);
     }
     for (std::size_t c = 0; c < kHandChannels; ++c) {
       most_step = std::max(most_step, std::abs(pose.angles[c] - before[c]));
     }
-    before = pose.angles;
+    std::ranges::copy(pose.angles, before.begin());
     REQUIRE(t < 10'000);
   }
   CHECK(labels == std::vector<int>{0, 2, 1});
   CHECK(most_step < 0.35);  // 600 degrees a second
-  CHECK(player.step(nullptr).what == What::kHeld);
+  CHECK(player.step(kNoHand).what == What::kHeld);
 }
 
 TEST_CASE("a loop continues until other labels are played; stop leads back at once", "[playback]") {
   const auto model = toy(30.0);
-  GesturePlayer player(30.0);
+  GesturePlayer player(30.0, kHandChannels);
   player.set_model(model.get());
   REQUIRE(player.play(order(*model, "g p", 2.0, true)));
-  for (int t = 0; t < 2000; ++t) CHECK(player.step(nullptr).what == What::kPerformed);
+  for (int t = 0; t < 2000; ++t) CHECK(player.step(kNoHand).what == What::kPerformed);
   REQUIRE(player.play(order(*model, "c")));
   int t = 0;
   while (player.busy() && t < 1000) {
-    static_cast<void>(player.step(nullptr));
+    static_cast<void>(player.step(kNoHand));
     ++t;
   }
   CHECK(t < 300);
   REQUIRE(player.play(order(*model, "g p g p g p")));
-  for (int i = 0; i < 60; ++i) static_cast<void>(player.step(nullptr));
+  for (int i = 0; i < 60; ++i) static_cast<void>(player.step(kNoHand));
   player.stop();
-  for (int i = 0; i < 24; ++i) CHECK(player.step(nullptr).what == What::kLeadingBack);
-  CHECK(player.step(nullptr).what == What::kHeld);
+  for (int i = 0; i < 24; ++i) CHECK(player.step(kNoHand).what == What::kLeadingBack);
+  CHECK(player.step(kNoHand).what == What::kHeld);
 }
 
 TEST_CASE("what cannot be performed is refused", "[playback]") {
   const auto model = toy(30.0);
-  GesturePlayer player(30.0);
+  GesturePlayer player(30.0, kHandChannels);
   const auto one = order(*model, "g");
   CHECK_FALSE(player.play(one));  // no model
   player.set_model(model.get());
@@ -235,7 +239,7 @@ TEST_CASE("what cannot be performed is refused", "[playback]") {
 TEST_CASE("a performance allocates nothing", "[playback]") {
   const auto model = toy(120.0);
   const auto other = toy(120.0);
-  GesturePlayer player(120.0);
+  GesturePlayer player(120.0, kHandChannels);
   player.set_model(model.get());
   const auto what = order(*model, "g 1 c", 1.5, true);
   const auto before = test::allocations();
@@ -244,7 +248,7 @@ TEST_CASE("a performance allocates nothing", "[playback]") {
     if (t % 700 == 100) static_cast<void>(player.play(what));
     if (t % 900 == 600) player.stop();
     if (t == 2000) player.set_model(other.get());
-    static_cast<void>(player.step(&hand));
+    static_cast<void>(player.step(hand));
   }
   CHECK(test::allocations() == before);
 }

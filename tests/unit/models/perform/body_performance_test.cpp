@@ -13,36 +13,15 @@
 #include "models/motion/kinematics.hpp"
 #include "models/motion/naturalness.hpp"
 #include "proto/clip/reader.hpp"
-#include "tests/support/arm_gestures.hpp"
 #include "tests/support/arm_raiser.hpp"
 #include "tests/support/shared.hpp"
+#include "tests/support/synthetic_arms.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 
 namespace posed::perform {
 namespace {
 
 using test::ArmTake;
-
-std::vector<ArmTake> synthetic_takes() {
-  std::vector<ArmTake> takes;
-  for (std::uint32_t take = 1; take <= 8; ++take) {
-    takes.push_back({test::raise_take({.left = true, .take = take}), "raise-left"});
-    takes.push_back({test::raise_take({.right = true, .take = 20 + take}), "raise-right"});
-  }
-  return takes;
-}
-
-gesture::GestureModel synthetic_model() {
-  const auto takes = synthetic_takes();
-  return test::train_arms(takes, test::arm_vocabulary(*takes.front().clip.skeleton));
-}
-
-// Rotation of an upper arm about Z, as the figure has it [deg].
-double raised_deg(const clip::Clip& clip, int frame, Bone bone) {
-  const Frame posed = clip.frame(frame);
-  const auto joint = static_cast<std::size_t>(clip.skeleton->joint_of(bone));
-  return rotation_log(to_eigen_double(posed.rotation_xyzw[joint])).z() / kDegree;
-}
 
 double jerk_of(const motion::Rows& rows, const gesture::ChannelGroup& group) {
   return motion::jerk_rms(rows.middleCols(group.first, group.channels)) / kDegree;
@@ -117,7 +96,7 @@ class RealArms {
 }  // namespace
 
 TEST_CASE("Both arms are raised, which was never recorded", "[body]") {
-  const gesture::GestureModel model = synthetic_model();
+  const gesture::GestureModel model = test::synthetic_arms();
   const auto performance = test::perform_text(model, "raise-both rest raise-left");
   const auto body = test::raise_take({.take = 99});
   const auto performed = perform_on(model, performance, body);
@@ -128,7 +107,7 @@ TEST_CASE("Both arms are raised, which was never recorded", "[body]") {
     return (frames.from + frames.to) / 2;
   };
   const auto arm_deg = [&](int frame, Bone bone) {
-    return raised_deg(performed->clip, frame, bone);
+    return test::raised_deg(*performed->clip.skeleton, performed->clip.frame(frame), bone);
   };
   CHECK(arm_deg(held(0), Bone::kLeftUpperArm) == Approx(62.0).margin(4.0));
   CHECK(arm_deg(held(0), Bone::kRightUpperArm) == Approx(-62.0).margin(4.0));
@@ -139,7 +118,7 @@ TEST_CASE("Both arms are raised, which was never recorded", "[body]") {
 }
 
 TEST_CASE("A body's performance stands where the body stands", "[body]") {
-  const gesture::GestureModel model = synthetic_model();
+  const gesture::GestureModel model = test::synthetic_arms();
   clip::Clip body = test::raise_take({.take = 99});
   for (Eigen::Index c = 0; c < body.channels.cols(); ++c) {
     const Channel& channel = body.skeleton->channels[static_cast<std::size_t>(c)];
@@ -162,7 +141,7 @@ TEST_CASE("A body's performance stands where the body stands", "[body]") {
 }
 
 TEST_CASE("A model of bodies reads back as it was written", "[body]") {
-  const gesture::GestureModel model = synthetic_model();
+  const gesture::GestureModel model = test::synthetic_arms();
   const std::string bytes = gesture::serialize_model(model);
   const auto parsed = gesture::parse_model(std::as_bytes(std::span(bytes)), "body.gesture");
   REQUIRE(parsed.has_value());

@@ -1,9 +1,7 @@
 // What the constraints cost on everything that a model of real poses can perform in four labels.
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <memory>
-#include <numeric>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -11,6 +9,7 @@
 #include "models/gesture/train.hpp"
 #include "models/hand/constraint_solver.hpp"
 #include "models/perform/perform.hpp"
+#include "tests/support/processor_time.hpp"
 #include "tests/support/real_pose_corpus.hpp"
 #include "tests/support/shared.hpp"
 
@@ -30,13 +29,6 @@ std::vector<std::vector<int>> strings_of_four(const std::vector<int>& labels) {
   return strings;
 }
 
-// Of this thread, so that a busy machine changes it little.
-double processor_time_us() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e6 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_nsec);
-}
-
 }  // namespace
 
 TEST_CASE("the processor time of the constraints on all strings of four labels", "[.bench]") {
@@ -54,22 +46,13 @@ TEST_CASE("the processor time of the constraints on all strings of four labels",
     for (std::size_t t = 0; t < performance.angles.size(); ++t) {
       HandAngles pose = hand_of(performance.angles[t]);
       const HandAngles variance = hand_of(performance.variances[t]);
-      const double begin_us = processor_time_us();
+      const double begin_us = test::processor_time_us();
       const auto report = solver.step(pose, variance);
-      us.push_back(processor_time_us() - begin_us);
+      us.push_back(test::processor_time_us() - begin_us);
       smallest_m = std::min(smallest_m, report.min_gap_m);
     }
   }
-  std::ranges::sort(us);
-  const auto at = [&](double share) {
-    return us[static_cast<std::size_t>(share * static_cast<double>(us.size() - 1))];
-  };
-  const double mean_us =
-      std::accumulate(us.begin(), us.end(), 0.0) / static_cast<double>(us.size());
-  std::printf(
-      "%zu frames: mean %.1f, p50 %.1f, p99 %.1f, p99.9 %.1f, max %.0f us; gap at least"
-      " %.4f mm\n",
-      us.size(), mean_us, at(0.5), at(0.99), at(0.999), us.back(), 1e3 * smallest_m);
+  std::printf("%s; gap at least %.4f mm\n", test::time_figures(us).c_str(), 1e3 * smallest_m);
   CHECK(smallest_m >= 0.2e-3 - 1e-9);
 }
 

@@ -1,6 +1,7 @@
 // Durations with tempo (tests/golden/durations.json) and label sequences played frame by frame.
 #include "models/perform/label_sequence_player.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <catch2/catch.hpp>
@@ -31,15 +32,24 @@ void append(LabelSequencePlayer& player, const StateInformation& information,
   }
 }
 
-std::vector<PlayedFrame> play(LabelSequencePlayer& player, int most = 100'000) {
-  std::vector<PlayedFrame> frames;
+// A played frame that outlives the next one.
+struct Shown {
+  HandAngles angle{};
+  int label, state;
+};
+
+std::vector<Shown> play(LabelSequencePlayer& player, int most = 100'000) {
+  std::vector<Shown> frames;
   PlayedFrame frame;
-  while (static_cast<int>(frames.size()) < most && player.next(frame)) frames.push_back(frame);
+  while (static_cast<int>(frames.size()) < most && player.next(frame)) {
+    frames.push_back({.angle = {}, .label = frame.label, .state = frame.state});
+    std::ranges::copy(frame.angle, frames.back().angle.begin());
+  }
   return frames;
 }
 
-std::vector<PlayedFrame> played(const StateInformation& information, const std::string& labels,
-                                double tempo = 1.0) {
+std::vector<Shown> played(const StateInformation& information, const std::string& labels,
+                          double tempo = 1.0) {
   LabelSequencePlayer player(information, {});
   append(player, information, labels);
   player.set_tempo(tempo);

@@ -1,5 +1,5 @@
-// Heading: the walking direction that the style filter uses: the direction of the pelvis with the
-// sway of the stride smoothed out (README.md, "Heading").
+// LiveHeading: the walking direction of a live body, that of the pelvis with the sway of the stride
+// smoothed out (models/style/README.md, "Heading").
 #pragma once
 
 #include <cmath>
@@ -7,10 +7,10 @@
 
 #include "proto/frame/rotation.hpp"
 
-namespace posed::style {
+namespace posed::motion {
 
 // A first-order low-pass on the circle. RT-safe.
-class Heading {
+class LiveHeading {
  public:
   static constexpr double kTau_s = 1.0;
   // A turn of the pelvis within one frame that no body can make: the source has jumped.
@@ -47,4 +47,4 @@ class Heading {
   bool started_ = false;
 };
 
-}  // namespace posed::style
+}  // namespace posed::motion
