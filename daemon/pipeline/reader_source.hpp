@@ -145,6 +145,9 @@ class Reader::Source final : private IntakeOut {
     }
     if (!push(to, item)) {
       count(reader.dropped);
+      if (item.kind == Item::Kind::kFrame) {
+        reader.last_dropped.store(item.frame.header.sequence, std::memory_order_release);
+      }
       return false;
     }
     return true;

@@ -80,7 +80,20 @@ Ack StreamContext::apply(const Command& command) noexcept {
   return ack;
 }
 
+// The last frame that is known not to come any more, or that came. Those that the reader put into
+// the ring before it dropped one have been taken if the ring is empty.
+std::uint64_t StreamContext::last_past() const noexcept {
+  const std::uint64_t dropped = counters_.reader.last_dropped.load(std::memory_order_acquire);
+  const std::uint64_t consumed = counters_.pipeline.consumed.load(std::memory_order_relaxed);
+  return ports_.in->empty() ? std::max(consumed, dropped) : consumed;
+}
+
+// What was skipped is recorded before the tick: after a kill no frame comes that would reveal it,
+// and a replay would process it.
 void StreamContext::tick(std::int64_t now_ns) noexcept {
+  const std::int64_t due_ns = engine_.next_tick_ns();
+  if (due_ns == kNoTime_ns || now_ns < due_ns) return;
+  engine_.close_gaps(last_past(), 0, *this);
   if (engine_.tick(now_ns, *this)) publish_state();
 }
 

@@ -28,7 +28,7 @@ class StreamContext final : private EngineOut {
   [[nodiscard]] const StreamEngine& engine() const noexcept { return engine_; }
 
   // Newest data wins: a frame that has shed_depth() or more newer frames waiting behind it is
-  // skipped. The engine detects the gap at the next frame. The same for samples.
+  // skipped. The engine detects the gap at the next frame or tick. The same for samples.
   void frame(const Frame& frame) noexcept;
   void sample(const Sample& sample) noexcept;
   // The reader has ended the stream: it decoded nothing after the sequences of the event.
@@ -68,6 +68,7 @@ class StreamContext final : private EngineOut {
   void decision(const Decision& decision) noexcept override;
   void publish(const Item& item) noexcept;
   void publish_state() noexcept;
+  [[nodiscard]] std::uint64_t last_past() const noexcept;
 
   StreamEngine engine_;
   std::uint32_t stream_;
