@@ -14,6 +14,9 @@ using gesture::kStates;
 constexpr double kTemper = 0.05;  // exponent of the likelihoods at the model's rate
 // A hand may begin a gesture at any time; this probability keeps the filter from locking up.
 const double kLogRestart = std::log(1e-4);
+// The same for what is none of the labels.
+constexpr double kLost = 1e-4;
+const double kLogLost = std::log(kLost);
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr double kShortestStay = 1.5;  // frames
 constexpr double kNever = -std::numeric_limits<double>::infinity();
@@ -38,7 +41,7 @@ HmmForwardFilter::HmmForwardFilter(int max_window, int max_channels)
     : max_window_(max_window),
       feature_(padded_features(max_channels)),
       weight_(feature_.size()),
-      tables_(kMaxLiveChains * kStates),
+      tables_(kMaxLiveChains * kStates + 1),
       rows_(tables_.size() * kTableRows * feature_.size()),
       forward_(static_cast<std::size_t>(max_window)),
       likelihood_(static_cast<std::size_t>(max_window)),
@@ -62,16 +65,16 @@ void HmmForwardFilter::reset() noexcept {
   even_frames_ = 0;
   for (auto& row : past_) std::ranges::fill(row, kMissing);
   if (states_ == 0) return;
-  std::fill_n(log_now_.begin(), states_, -std::log(states_));
+  std::fill_n(log_now_.begin(), all(), -std::log(static_cast<double>(all())));
   const auto labels = static_cast<double>(model_->labels.size());
   const bool pairs = model_->chains.front().previous != kAny;
   log_choices_ = std::log(pairs ? labels - 1.0 : labels);
+  log_chains_ = std::log(static_cast<double>(model_->chains.size()));
 }
 
 // Recomputes a state's Gaussian for this stream's rate and sensor noise. RT-safe.
-void HmmForwardFilter::renew_table(int state) noexcept {
-  const auto s = static_cast<std::size_t>(state);
-  const LiveState& from = model_->states[s];
+void HmmForwardFilter::renew_table(std::size_t s) noexcept {
+  const LiveState& from = state(s);
   Table& table = tables_[s];
   const RateFactors rule = rate_factors(pace_);
   const auto channels = static_cast<std::size_t>(model_->channels);
@@ -103,9 +106,9 @@ void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, dou
   noise_rad_ = noise_rad;
   pace_ = std::max(1.0 / (period_s_ * model_->rate_hz), 0.1);
   // Period and noise change slowly, so updating one state per frame is enough.
-  for (int i = 0; i < (first ? states_ : 1); ++i) {
+  for (std::size_t i = 0; i < (first ? all() : 1); ++i) {
     renew_table(next_table_);
-    next_table_ = (next_table_ + 1) % states_;
+    next_table_ = (next_table_ + 1) % all();
   }
   even_frames_ = even ? std::min(even_frames_ + 1, 2) : 0;
   Row log_emission;
@@ -135,7 +138,7 @@ void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) noe
       weight_[w * channels + c] = kTemper / pace_;
     }
   }
-  for (std::size_t s = 0; s < static_cast<std::size_t>(states_); ++s) {
+  for (std::size_t s = 0; s < all(); ++s) {
     const double* const mean = features_of(s, kMean);
     const double* const half_precision = features_of(s, kHalfPrecision);
     const double* const half_log = features_of(s, kHalfLog);
@@ -172,16 +175,25 @@ void HmmForwardFilter::advance(const Row& log_emission) noexcept {
       entering = (previous == kAny ? leaving_any : leaving[static_cast<std::size_t>(previous)]) -
                  log_choices_;
       entering = log_sum(entering, kLogRestart);
+      if (model_->none) {
+        entering = log_sum(entering, log_now_[states] + tables_[states].log_leave - log_chains_);
+      }
     }
     next[s] = log_sum(log_now_[s] + tables_[s].log_stay, entering) + log_emission[s];
     top = std::max(top, next[s]);
   }
+  if (model_->none) {
+    next[states] =
+        log_sum(log_now_[states] + tables_[states].log_stay, kLogLost) + log_emission[states];
+    top = std::max(top, next[states]);
+  }
   double sum = 0.0;
-  for (std::size_t s = 0; s < states; ++s) sum += std::exp(next[s] - top);
+  for (std::size_t s = 0; s < all(); ++s) sum += std::exp(next[s] - top);
   const double norm = top + std::log(sum);
-  const double best = *std::max_element(log_emission.begin(), log_emission.begin() + states_);
+  const double best = *std::max_element(log_emission.begin(),
+                                        log_emission.begin() + static_cast<std::ptrdiff_t>(all()));
   const auto at = static_cast<std::size_t>(pushed_ % max_window_);
-  for (std::size_t s = 0; s < states; ++s) {
+  for (std::size_t s = 0; s < all(); ++s) {
     log_now_[s] = next[s] - norm;
     forward_[at][s] = std::exp(log_now_[s]);
     likelihood_[at][s] = std::exp(log_emission[s] - best);
@@ -193,9 +205,9 @@ void HmmForwardFilter::advance(const Row& log_emission) noexcept {
 // a frame for which all products vanish keeps its forward probabilities. RT-safe.
 void HmmForwardFilter::sweep(int frames) noexcept {
   if (model_ == nullptr) return;
-  const auto states = static_cast<std::size_t>(states_);
+  const std::size_t states = all();
   Row backward;
-  std::fill_n(backward.begin(), states_, 1.0);
+  std::fill_n(backward.begin(), states, 1.0);
   swept_frames_ = static_cast<int>(std::min<long>(frames, pushed_));
   for (int back = 0; back < swept_frames_; ++back) {
     const auto at = static_cast<std::size_t>((pushed_ - 1 - back) % max_window_);
@@ -228,14 +240,23 @@ void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept
     if (previous == kAny) entries_any += choice * ahead[s];
   }
   double largest = kVanished;
+  double firsts = 0.0;  // of the first states of all chains
   for (std::size_t s = 0; s < states; ++s) {
     const auto label = static_cast<std::size_t>(model_->chains[s / kStates].label);
     const bool last = s % kStates == kStates - 1;
     const double onwards = last ? entries[label] + entries_any : ahead[s + 1];
     backward[s] = tables_[s].stay * ahead[s] + (1.0 - tables_[s].stay) * onwards;
+    if (model_->none) backward[s] += kLost * ahead[states];
+    if (s % kStates == 0) firsts += ahead[s];
     largest = std::max(largest, backward[s]);
   }
-  for (std::size_t s = 0; s < states; ++s) backward[s] /= largest;
+  if (model_->none) {
+    const double chains = static_cast<double>(model_->chains.size());
+    const double stay = tables_[states].stay;
+    backward[states] = stay * ahead[states] + (1.0 - stay) * firsts / chains;
+    largest = std::max(largest, backward[states]);
+  }
+  for (std::size_t s = 0; s < all(); ++s) backward[s] /= largest;
 }
 
 // The features taken at a frame describe the frame before it, so frame `back` uses the
@@ -243,6 +264,12 @@ void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept
 std::span<const double> HmmForwardFilter::states(int back) const noexcept {
   return {swept_[static_cast<std::size_t>(std::max(0, back - 1))].data(),
           static_cast<std::size_t>(states_)};
+}
+
+// RT-safe.
+double HmmForwardFilter::none(int back) const noexcept {
+  if (!model_->none) return 0.0;
+  return swept_[static_cast<std::size_t>(std::max(0, back - 1))][static_cast<std::size_t>(states_)];
 }
 
 // RT-safe.
@@ -258,6 +285,7 @@ HmmForwardFilter::Answer HmmForwardFilter::label(int back) const noexcept {
   for (std::size_t l = 0; l < model_->labels.size(); ++l) {
     if (probability[l] > answer.probability) answer = {static_cast<int>(l), probability[l]};
   }
+  if (none(back) > answer.probability) answer = {kNone, none(back)};
   return answer;
 }
 

@@ -47,11 +47,16 @@ class HmmForwardFilter {
   // The newest frame gets those of the frame before it. RT-safe.
   [[nodiscard]] std::span<const double> states(int back) const noexcept;
 
+  // The probability that the frame is none of the labels; 0 for models that do not know what is
+  // none. RT-safe.
+  [[nodiscard]] double none(int back) const noexcept;
+
   // The most probable label of that frame, its index and probability. RT-safe.
   struct Answer {
-    int label = -1;  // -1: the last sweep does not cover the frame
+    int label = -1;  // -1: the last sweep does not cover the frame; kNone: none of them
     double probability = 0.0;
   };
+  static constexpr int kNone = -2;
   [[nodiscard]] Answer label(int back) const noexcept;
 
   // The stream's rate over the model's. RT-safe.
@@ -67,13 +72,21 @@ class HmmForwardFilter {
     double stay = 0.0, log_stay = 0.0, log_leave = 0.0;
   };
   enum TableRow : std::size_t { kMean, kHalfPrecision, kHalfLog, kTableRows };
-  using Row = std::array<double, kMaxLiveChains * gesture::kStates>;  // [states]
-  using LabelRow = std::array<double, kMaxLiveChains>;                // [labels]
+  // [states], and what is none behind them
+  using Row = std::array<double, kMaxLiveChains * gesture::kStates + 1>;
+  using LabelRow = std::array<double, kMaxLiveChains>;  // [labels]
 
   [[nodiscard]] double* features_of(std::size_t state, TableRow row) noexcept {
     return rows_.data() + (state * kTableRows + row) * features_;
   }
-  void renew_table(int state) noexcept;
+  [[nodiscard]] const LiveState& state(std::size_t index) const noexcept {
+    return index < static_cast<std::size_t>(states_) ? model_->states[index] : *model_->none;
+  }
+  // States and what is none.
+  [[nodiscard]] std::size_t all() const noexcept {
+    return static_cast<std::size_t>(states_ + (model_->none ? 1 : 0));
+  }
+  void renew_table(std::size_t state) noexcept;
   void weigh(std::span<const double> measured_rad, Row& out) noexcept;
   void advance(const Row& log_emission) noexcept;
   void step_back(const Row& ahead, Row& backward) const noexcept;
@@ -82,9 +95,10 @@ class HmmForwardFilter {
   int max_window_;
   int states_ = 0;
   double log_choices_ = 0.0;  // of the number of labels that may follow a label
+  double log_chains_ = 0.0;   // of the number of chains
   double pace_ = 1.0;         // the stream's rate over the model's
   double period_s_ = 0.0, noise_rad_ = 0.0;
-  int next_table_ = 0;
+  std::size_t next_table_ = 0;
   long pushed_ = 0;
   int even_frames_ = 0;                      // in a row, up to 2
   std::array<std::vector<double>, 2> past_;  // [channel] the last measured frames

@@ -1,9 +1,11 @@
 #include "models/smooth/live_model.hpp"
 
 #include <algorithm>
+#include <array>
 #include <span>
 #include <utility>
 
+#include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::smooth {
@@ -14,6 +16,12 @@ using gesture::GestureModel;
 using gesture::kDeltaWindows;
 using gesture::kStates;
 
+constexpr double kNone_s = 1.0;  // how long none of the labels lasts
+constexpr double kNoneSpread = 2.0;
+// Deviation of position, delta and delta-delta of a motion that is none, beside the spread of the
+// states [rad per frame of the model's rate to the power of the order].
+constexpr std::array<double, kDeltaWindows> kNoneWidest_rad{30.0 * kDegree, 5.0 * kDegree,
+                                                            2.5 * kDegree};
 constexpr double kStill_rad = 1e-6;  // a channel with a smaller range does not move
 
 // All contexts of a label with the given neighbours.
@@ -101,6 +109,26 @@ LiveState state_of(const GestureModel& model, const std::vector<Context>& contex
   return pooled;
 }
 
+// A Gaussian around all of the model's states that is so wide that only what is far from each of
+// them is more probable there (models/smooth/README.md, "None").
+LiveState none_of(const LiveModel& model) {
+  const auto channels = static_cast<std::size_t>(model.channels);
+  LiveState none{.mean = LiveRows(kDeltaWindows * channels),
+                 .variance = LiveRows(kDeltaWindows * channels),
+                 .frames = kNone_s * model.rate_hz};
+  const double share = 1.0 / static_cast<double>(model.states.size());
+  for (std::size_t k = 0; k < none.mean.size(); ++k) {
+    double square = 0.0;
+    for (const LiveState& state : model.states) {
+      none.mean[k] += share * state.mean[k];
+      square += share * (state.variance[k] + state.mean[k] * state.mean[k]);
+    }
+    const double widest = kNoneWidest_rad[k / channels];
+    none.variance[k] = kNoneSpread * (square - none.mean[k] * none.mean[k]) + widest * widest;
+  }
+  return none;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& model,
@@ -146,6 +174,8 @@ Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& mod
       live->states.push_back(state_of(model, contexts, state));
     }
   }
+  // A hand's label is always one of its model's.
+  if (live->body && model.label_index(kNoneName) < 0) live->none = none_of(*live);
   return live;
 }
 

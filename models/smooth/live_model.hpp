@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "models/gesture/gesture_model.hpp"
@@ -20,6 +21,7 @@
 
 namespace posed::smooth {
 
+inline constexpr std::string_view kNoneName = "none";
 inline constexpr int kMaxLiveChains =
     64;  // also the most labels; pairs are used with up to 8 labels
 
@@ -43,6 +45,8 @@ struct LiveModel {
   std::vector<std::array<char, kMaxLabel>> labels;
   std::vector<LiveChain> chains;
   std::vector<LiveState> states;  // [chain][kStates]
+  // What is none of the labels (models/smooth/README.md, "None"); empty: always one of them.
+  std::optional<LiveState> none;
   // Those of a body in a frame; empty: of a hand, whose channels are the skeleton's in their order.
   std::optional<gesture::PoseChannels> body;
   int channels = 0;

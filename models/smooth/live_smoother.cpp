@@ -321,6 +321,8 @@ void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
   frame.label.fill('\0');
   if (answer.label >= 0) {
     frame.label = filter.model()->labels[static_cast<std::size_t>(answer.label)];
+  } else if (answer.label == HmmForwardFilter::kNone) {
+    std::ranges::copy(kNoneName, frame.label.begin());
   }
   frame.label_probability = static_cast<float>(answer.probability);
 }

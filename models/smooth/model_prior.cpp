@@ -21,8 +21,9 @@ ModelPrior::ModelPrior(const HmmForwardFilter& filter, int max_channels) : filte
   belief_.variance.resize(belief_.mean.size());
 }
 
-// Mean and variance of one frame over its state probabilities. RT-safe.
-void ModelPrior::believe(int back) noexcept {
+// Mean and variance of one frame over its state probabilities; false where the model believes in
+// none of them. RT-safe.
+bool ModelPrior::believe(int back) noexcept {
   const LiveModel& model = *filter_.model();
   const auto states = filter_.states(back);
   const auto channels = static_cast<std::size_t>(model.channels);
@@ -43,6 +44,8 @@ void ModelPrior::believe(int back) noexcept {
       variance[k] += share * (state.variance[k] + own * own);
     }
   }
+  if (sum <= 0.0) return false;
+  some_ = 1.0 - filter_.none(back);
   const RateFactors rule = rate_factors(filter_.pace());
   for (std::size_t w = 0; w < kDeltaWindows; ++w) {
     for (std::size_t k = w * channels; k < (w + 1) * channels; ++k) {
@@ -51,6 +54,7 @@ void ModelPrior::believe(int back) noexcept {
       mean[k] = m * rule.mean[w];
     }
   }
+  return true;
 }
 
 // RT-safe.
@@ -78,8 +82,7 @@ void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
   std::array<double, gesture::kMaxGroups> frames{};
   fit_.fill(0.0);
   for (int back = window.frames() - 1; back > 0; --back) {
-    if (!filter_.knows(back)) continue;
-    believe(back);
+    if (!filter_.knows(back) || !believe(back)) continue;
     measure_distance(window, back);
     int last = -1;
     for (int c = 0; c < model.channels; ++c) {
@@ -102,7 +105,7 @@ void ModelPrior::pull(AdaptiveWindow& window, int back, int channel) noexcept {
   const double wide = 1.0 + 0.5 * belief_.distance2[group];
   const double weight =
       window.measured(back, channel) ? kPull / (wide * wide) : kGapPull * fit_[group];
-  const double precision = weight / belief_.variance[c];
+  const double precision = some_ * weight / belief_.variance[c];
   window.row(back, trajectory::kPosition)[c] += precision;
   window.row(back, trajectory::kPositionMean)[c] += precision * belief_.mean[c];
 }
@@ -112,7 +115,7 @@ void ModelPrior::pull(AdaptiveWindow& window, int back, int channel) noexcept {
 void ModelPrior::bridge(AdaptiveWindow& window, int back, int channel) noexcept {
   const auto c = static_cast<std::size_t>(channel);
   const LiveModel& model = *filter_.model();
-  const double fit = fit_[static_cast<std::size_t>(model.group[c])];
+  const double fit = some_ * fit_[static_cast<std::size_t>(model.group[c])];
   constexpr std::array kPrecision{trajectory::kDelta, trajectory::kDeltaDelta};
   constexpr std::array kMean{trajectory::kDeltaMean, trajectory::kDeltaDeltaMean};
   for (std::size_t w = 0; w < 2; ++w) {
@@ -132,8 +135,7 @@ void ModelPrior::add(AdaptiveWindow& window) noexcept {
   for (int back = 0; back < window.frames(); ++back) gap = gap || !window.whole(back);
   if (gap) measure_fit(window);
   for (int back = window.frames() - 1; back > 0; --back) {
-    if (!filter_.knows(back)) continue;
-    believe(back);
+    if (!filter_.knows(back) || !believe(back)) continue;
     measure_distance(window, back);
     for (int c = 0; c < model.channels; ++c) {
       if (model.moves[static_cast<std::size_t>(c)] == 0) continue;

@@ -27,13 +27,14 @@ class ModelPrior final : public InformationSource {
     std::array<double, gesture::kMaxGroups> distance2{};
   };
 
-  void believe(int back) noexcept;
+  [[nodiscard]] bool believe(int back) noexcept;
   void measure_distance(const AdaptiveWindow& window, int back) noexcept;
   void measure_fit(const AdaptiveWindow& window) noexcept;
   void pull(AdaptiveWindow& window, int back, int channel) noexcept;
   void bridge(AdaptiveWindow& window, int back, int channel) noexcept;
 
   const HmmForwardFilter& filter_;
+  double some_ = 1.0;  // the probability that the frame is one of the labels
   Belief belief_;
   // Of each group over the window's measured frames, from 0 (unlike the model) to 1.
   std::array<double, gesture::kMaxGroups> fit_{};

@@ -1,5 +1,6 @@
 // The live smoother with a gesture model of a body: it names movements, steadies them and bridges
 // gaps, on synthetic bodies and on recordings.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -10,6 +11,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/reader.hpp"
 #include "tests/bench/baselines.hpp"
 #include "tests/support/allocations.hpp"
@@ -56,6 +58,29 @@ struct SyntheticArms {
 const SyntheticArms& arms() {
   static const SyntheticArms kArms;
   return kArms;
+}
+
+// How many of the frames after half a second are none of the labels, and how surely.
+struct NoneShare {
+  double share, probability;
+};
+NoneShare none_of(const clip::Clip& clip, const LiveModel& live) {
+  LiveSmoother smoother(*clip.skeleton, test::live_options(1, 0.5), &live);
+  test::Frames out;
+  for (int t = 0; t < clip.frames(); ++t) {
+    Frame frame = clip.frame(t);
+    frame.header.device_ns = nanoseconds(t / clip.frame_rate_hz);
+    smoother.process({.frame = frame}, out);
+  }
+  smoother.flush(out);
+  double none = 0.0, sum = 0.0, frames = 0.0;
+  for (auto t = static_cast<std::size_t>(0.5 * clip.frame_rate_hz); t < out.all.size(); ++t) {
+    frames += 1.0;
+    if (out.all[t].label.data() != kNoneName) continue;
+    none += 1.0;
+    sum += static_cast<double>(out.all[t].label_probability);
+  }
+  return {.share = none / frames, .probability = sum / std::max(none, 1.0)};
 }
 
 // The takes of four movements that real people made.
@@ -183,6 +208,44 @@ TEST_CASE("a body without joint angles of its own is followed, too", "[live][bod
   CHECK(out.all[45].lag_frames == 1);
   CHECK(std::string(out.all[45].label.data()) == "raise-left");
   CHECK(out.variance_rad2.empty());
+}
+
+TEST_CASE("a body that does none of the movements is told so", "[live][body]") {
+  const auto walk = motion::make_walker({.seconds = 4.0, .rate_hz = 30.0});
+  REQUIRE(walk.has_value());
+  const auto live = bound(arms().model, *walk->skeleton);
+  const auto none = none_of(*walk, *live);
+  CHECK(none.share > 0.95);
+  CHECK(none.probability > 0.9);
+  CHECK(none_of(arms().kept.clip, *arms().live).share == 0.0);
+  // A model that has learnt its own "none" needs no other.
+  gesture::GestureModel own = arms().model;
+  own.labels[0].name = std::string(kNoneName);
+  CHECK_FALSE(bound(own, *walk->skeleton)->none.has_value());
+}
+
+TEST_CASE("real people who walk, run and turn do none of the movements", "[live][body][real]") {
+  const auto folder = test::shared("data/styles");
+  if (!folder) {
+    SKIP_WITHOUT_SHARED();
+  }
+  const gesture::GestureModel model = RealTakes(*folder).without(6);
+  int clips = 0;
+  double least = 1.0;
+  for (const auto& entry : std::filesystem::directory_iterator(*folder)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.ends_with(".bvh") ||
+        (name.find("_walk") == std::string::npos && name.find("_run") == std::string::npos)) {
+      continue;
+    }
+    const auto clip = clip::read_clip(entry.path());
+    REQUIRE(clip.has_value());
+    least = std::min(least, none_of(*clip, *bound(model, *clip->skeleton)).share);
+    ++clips;
+  }
+  std::cout << clips << " clips of walking and running: at least " << least
+            << " of the frames after 0.5 s are none\n";
+  CHECK(least > 0.95);
 }
 
 TEST_CASE("five movements of real people are recognised", "[live][body][real]") {
