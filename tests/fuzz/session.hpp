@@ -33,11 +33,16 @@ inline void demand_sound(const test::CollectSink& sink) {
   for (const Sample& sample : sink.samples) demand(test::is_sound(sample));
 }
 
+// Who wrote the descriptions that a decoder emits: one that writes them itself writes sound ones,
+// one that hands the sender's bytes on leaves it to make_layout to refuse them.
+enum class DescriptionsOf : std::uint8_t { kDecoder, kSender };
+
 // A decoder that uses each of its descriptions at once.
 class Session {
  public:
-  Session(const drivers::Driver& driver, const drivers::Description& description)
-      : driver_(driver), decoder_(driver.make_decoder(description).value()) {}
+  Session(const drivers::Driver& driver, const drivers::Description& description,
+          DescriptionsOf author = DescriptionsOf::kDecoder)
+      : driver_(driver), decoder_(driver.make_decoder(description).value()), author_(author) {}
 
   void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns) {
     const int before = sink.descriptions;
@@ -50,7 +55,8 @@ class Session {
     sink.sample_bodies.clear();
     if (sink.descriptions == before) return;
     auto layout = driver_.make_layout(sink.described);
-    demand(layout.has_value());  // the decoder wrote the description itself
+    demand(layout.has_value() || author_ == DescriptionsOf::kSender);
+    if (!layout) return;
     demand((*layout)->bodies.size() <= kMaxBodies);
     decoder_->use(**layout);
     layouts_.push_back(std::move(*layout));
@@ -61,6 +67,7 @@ class Session {
  private:
   const drivers::Driver& driver_;
   std::unique_ptr<drivers::Decoder> decoder_;
+  DescriptionsOf author_;
   std::vector<std::unique_ptr<const drivers::SourceLayout>> layouts_;
 };
 
