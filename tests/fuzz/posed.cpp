@@ -1,21 +1,18 @@
-// The decoder of another posed's stream on any bytes: as a message, as the body of a pose and of a
-// skeleton, with the skeleton of the emulator in use. What its reader accepts, protobuf accepts.
+// The decoder of another posed's stream on any bytes: as messages beside good ones that change, and
+// as the body of a pose and of a skeleton. What its reader accepts, protobuf accepts.
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <vector>
 
-#include "drivers/posed/decoder.hpp"
 #include "drivers/posed/emulator.hpp"
+#include "drivers/posed/posed.hpp"
+#include "drivers/posed/protocol.hpp"
 #include "posed/v1/posed.pb.h"
 #include "tests/fuzz/session.hpp"
-#include "tests/unit/drivers/collect_sink.hpp"
 
 namespace {
 
 using posed::fuzz::demand;
-using posed::fuzz::feed;
-using posed::test::CollectSink;
 namespace chain = posed::drivers::chain;
 
 // The numbers that were read are those that protobuf reads; text that is not UTF-8 is refused by
@@ -34,26 +31,17 @@ void compare(std::span<const std::byte> bytes) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using posed::drivers::posed_driver;
+  static const auto good = posed::fuzz::emulated_datagrams(
+      chain::UpstreamEmulator({.stream = "walker", .rate_hz = 60.0}), 64);
   const std::span bytes = std::as_bytes(std::span(data, size));
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   compare(bytes);
-  chain::UpstreamDecoder decoder("walker");
-  CollectSink sink(0);
-  feed(decoder, bytes, 0, sink);
-  chain::UpstreamEmulator emulator({.stream = "walker", .rate_hz = 60.0});
-  std::vector<std::byte> skeleton;
-  emulator.emit(0, skeleton);
-  feed(decoder, skeleton, 0, sink);
-  const auto layout = chain::make_layout(sink.described);
-  demand(layout.has_value());
-  decoder.use(**layout);
-  feed(decoder, chain::join_message("pose/walker", text), 0, sink);
-  feed(decoder, chain::join_message("skeleton/walker", text), 0, sink);
-  if (const auto any = chain::make_layout(bytes)) {
-    demand((*any)->bodies.size() == 1);
-    decoder.use(**any);
-    feed(decoder, chain::join_message("pose/walker", text), 0, sink);
-  }
-  posed::fuzz::demand_sound(sink);
+  posed::fuzz::Session session(posed_driver(), posed_driver().expect({}).value(),
+                               posed::fuzz::DescriptionsOf::kSender);
+  posed::fuzz::feed_pieces(session, good, bytes);
+  session.feed(chain::join_message("pose/walker", text), 0);
+  session.feed(chain::join_message("skeleton/walker", text), 0);
+  session.feed(chain::join_message("pose/walker", text), 0);
   return 0;
 }
