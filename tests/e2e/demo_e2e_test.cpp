@@ -1,5 +1,6 @@
 // The demo in any folder: its files are in one folder, are created once, and are created again when
 // they differ from what this version creates.
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -58,6 +59,18 @@ TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   std::ofstream(kept / "march-to-sway.style") << "not a model";
   CHECK(prepare().code == 0);
   CHECK(file_text(kept / "march-to-sway.style") == model);
+}
+
+TEST_CASE("a demo that was killed while it learnt begins again", "[demo]") {
+  const TempFolder folder;
+  Process killed({"demo", "--prepare", folder.path().string()});
+  REQUIRE(killed.comes_to_say("learning the style"));
+  killed.send(SIGKILL);
+  REQUIRE(killed.exit_code() == 128 + SIGKILL);
+  const ProgramOutcome again = posed({"demo", "--prepare", folder.path().string()});
+  INFO(again.err);
+  CHECK(again.code == 0);
+  CHECK(again.err.contains("learning the style"));
 }
 
 TEST_CASE("the demo does not touch a folder that is not its own", "[demo]") {

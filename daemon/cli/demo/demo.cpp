@@ -59,6 +59,7 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   }
   std::fprintf(stderr, "1/4 making synthetic walkers and a synthetic signer in %s\n",
                folder.c_str());
+  if (auto begun = kept.begin(); !begun) return begun;
   const auto clips = make_demo_clips(folder);
   if (!clips) return std::unexpected(clips.error());
   std::fprintf(stderr, "2/4 learning the style march -> sway from %zu clips\n",

@@ -44,6 +44,11 @@ json digests_of_files(const fs::path& folder) {
   return digests;
 }
 
+Result<> write_stamp(const fs::path& folder, const json& stamp) {
+  return clip::write_text(folder / kStamp,
+                          [&](std::ostream& out) { out << json_text(stamp, 2) << "\n"; });
+}
+
 std::string config_text() {
   for (const ProfileText& text : config_texts()) {
     if (text.file != kDemoConfig) continue;
@@ -102,13 +107,17 @@ Result<> DemoFolder::check_is_own(const std::vector<std::string>& names, bool ov
   return {};
 }
 
+Result<> DemoFolder::begin() const {
+  std::error_code error;
+  fs::create_directories(path_, error);  // writing says what failed
+  return write_stamp(path_, json::object());
+}
+
 Result<> DemoFolder::finish() const {
   const std::string config = config_text();
   auto written = clip::write_text(path_ / kDemoConfig, [&](std::ostream& out) { out << config; });
   if (!written) return written;
-  const json stamp{{"program", program_digest()}, {"files", digests_of_files(path_)}};
-  return clip::write_text(path_ / kStamp,
-                          [&](std::ostream& out) { out << json_text(stamp, 2) << "\n"; });
+  return write_stamp(path_, {{"program", program_digest()}, {"files", digests_of_files(path_)}});
 }
 
 }  // namespace cli

@@ -30,6 +30,9 @@ class DemoFolder {
   // Refuses a folder with files of these names that no demo wrote; `overwrite` allows it.
   [[nodiscard]] Result<> check_is_own(const std::vector<std::string>& names, bool overwrite) const;
 
+  // Marks the folder as the demo's before its files come: one that was interrupted is made anew.
+  [[nodiscard]] Result<> begin() const;
+
   // Writes the config, and the stamp that is_up_to_date() reads, with a hash of every file in the
   // folder.
   [[nodiscard]] Result<> finish() const;
