@@ -5,7 +5,7 @@
 namespace posed::style {
 namespace {
 
-constexpr double kMemory_s = 0.04;  // time constant of the low-pass
+constexpr double kSpeedMemory_s = 0.04;  // time constant of the low-pass
 
 }  // namespace
 
@@ -18,7 +18,7 @@ void PoseSpeed::update(const KnownMotion& known, std::span<const float> q,
     if (std::isnan(speed_deg_s_)) {
       speed_deg_s_ = speed_deg_s;
     } else if (!std::isnan(speed_deg_s)) {
-      speed_deg_s_ -= std::expm1(-dt_s / kMemory_s) * (speed_deg_s - speed_deg_s_);
+      speed_deg_s_ -= std::expm1(-dt_s / kSpeedMemory_s) * (speed_deg_s - speed_deg_s_);
     }
   }
   dims_ = q.size();

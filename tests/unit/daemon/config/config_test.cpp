@@ -188,20 +188,6 @@ TEST_CASE("a wrong list of stages is one sentence") {
   CHECK(complaint_for("1").contains("stages"));
 }
 
-TEST_CASE("a stage that needs the source's pose is refused behind one that loses it") {
-  const auto stream = [](const std::string& list, const std::string& tables = "") {
-    return "[[stream]]\nname = \"a\"\ndriver = \"glove\"\nstages = " + list + "\n" + tables;
-  };
-  CHECK(complaint("", stream("[\"generate\", \"feet\"]"))
-            .ends_with("4: feet needs the pose as the source gave it, which generate does not hand"
-                       " on; put feet before generate"));
-  CHECK(complaint("", stream("[\"retarget\", \"feet\"]", "[stream.retarget]\nto = \"humanoid\"\n"))
-            .contains("put feet before retarget"));
-  CHECK(read(stream("[\"feet\", \"generate\"]")).errors.empty());
-  CHECK(read(stream("[\"generate\", \"feet\"]", "[stream.generate]\nenabled = false\n"))
-            .errors.empty());
-}
-
 TEST_CASE("stages and drivers have different names") {
   for (const StageType* stage : stage_types()) {
     CHECK(drivers::find_driver(stage->name) == nullptr);
