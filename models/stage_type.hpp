@@ -4,6 +4,7 @@
 // constants.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -73,6 +74,13 @@ struct StageNoticeType {
   bool is_warning = true;     // else a calibration that took effect
 };
 
+// What a stage does with StageFrame::input.
+enum class StageInput : std::uint8_t {
+  kHandsOn,
+  kRenews,  // the frames that leave it have one, whatever entered
+  kLoses,   // it holds frames back or makes its own
+};
+
 struct StageType {
   std::string_view name;  // no other stage or driver has it; the name of its table in the config
   std::string_view summary;
@@ -81,6 +89,8 @@ struct StageType {
   // has a device of one body, so that its skeleton is known before the first frame, and no partners
   // itself.
   std::vector<std::string_view> partners{};
+  StageInput input = StageInput::kHandsOn;
+  bool needs_input = false;  // without StageFrame::input it does nothing
 
   // Whether a stream without a table for this stage has it all the same; null: never.
   bool (*is_default)(const Skeleton& skeleton) = nullptr;

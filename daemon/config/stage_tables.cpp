@@ -68,6 +68,20 @@ bool read_stage(TableReader& table, const ConfigFile& file, StageConfig& stage) 
   return enabled;
 }
 
+// A stage that needs the source's pose cannot stand behind one that has lost it.
+void check_order(TableReader& table, const std::vector<StageConfig>& stages) {
+  std::string_view loses;
+  for (const StageConfig& stage : stages) {
+    if (stage.type->needs_input && !loses.empty()) {
+      table.add_error("stages", fmt::format("{0} needs the pose as the source gave it, which {1}"
+                                            " does not hand on; put {0} before {1}",
+                                            stage.type->name, loses));
+    }
+    if (stage.type->input == StageInput::kLoses) loses = stage.type->name;
+    if (stage.type->input == StageInput::kRenews) loses = {};
+  }
+}
+
 // The stages of a stream: one for each of their tables, in the order of the registry or in that of
 // `stages = [...]`.
 void read_stages(TableReader& table, const ConfigFile& file, StreamConfig& stream) {
@@ -105,6 +119,7 @@ void read_stages(TableReader& table, const ConfigFile& file, StreamConfig& strea
       }
     }
   }
+  check_order(table, stream.stages);
   for (const StageType* type : stage_types()) {
     if (!present.contains(type)) continue;
     table.add_error("stages", fmt::format("[{1}.{0}] is there, but {0} is not in this list; add"

@@ -46,6 +46,7 @@ const StageType& feet_type() {
   static const StageType type{.name = "feet",
                               .summary = "makes the feet of a styled body stand",
                               .parameters = parameters(),
+                              .needs_input = true,
                               .make = make};
   return type;
 }

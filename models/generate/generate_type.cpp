@@ -182,6 +182,7 @@ const StageType& generate_type() {
       .summary =
           "smooths joint angles, and performs labels from a gesture model on a hand or a body",
       .parameters = parameters(),
+      .input = StageInput::kLoses,
       .check = check,
       .make = make,
       .takes = takes,

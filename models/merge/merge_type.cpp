@@ -55,6 +55,7 @@ const StageType& merge_type() {
                               .summary = "puts the hands of gloves on the body",
                               .parameters = parameters(),
                               .partners = {"left", "right"},
+                              .input = StageInput::kRenews,
                               .check = check,
                               .leaves = leaves,
                               .make = make};

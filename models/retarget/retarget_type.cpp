@@ -54,6 +54,7 @@ const StageType& retarget_type() {
   static const StageType type{.name = "retarget",
                               .summary = "puts the pose on another skeleton",
                               .parameters = parameters(),
+                              .input = StageInput::kLoses,
                               .read_files = read_target,
                               .leaves = target,
                               .make = make};

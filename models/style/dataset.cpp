@@ -117,8 +117,9 @@ AlignedClip aligned_clip(const Source& source, MatrixXd q, double rate_hz) {
   clip.group = source.clip->group;
   clip.motion = source.clip->motion;
   clip.dropped_first = source.dropped_first;
-  const MatrixXd velocity =
-      motion::time_derivative(motion::root_positions_m(source.motion, source.heading_rad), rate_hz);
+  const MatrixXd root_m = motion::root_positions_m(source.motion, source.heading_rad);
+  const MatrixXd velocity = motion::time_derivative(root_m, rate_hz);
+  clip.height_m = root_m.col(1);
   const auto dims = q.cols();
   clip.state.resize(q.rows(), 3 + 2 * dims);
   clip.state << velocity, q, motion::time_derivative(q, rate_hz);

@@ -8,7 +8,9 @@
 #include <span>
 
 #include "models/style/known_motion.hpp"
+#include "models/style/live_gait.hpp"
 #include "models/style/live_stride.hpp"
+#include "models/style/pose_speed.hpp"
 #include "models/style/warm_up.hpp"
 #include "proto/frame/frame.hpp"
 
@@ -34,15 +36,21 @@ class Gate {
   void settle() noexcept;
 
  private:
+  void see_pose(const KnownMotion& known, std::span<const float> q,
+                std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept;
   void see_legs(const KnownMotion& known, const Frame& frame, const std::optional<Walker>& walker,
                 double dt_s) noexcept;
+  [[nodiscard]] double of_rest(const KnownMotion& known) const noexcept;
+  [[nodiscard]] double of_run(const KnownMotion& known, double cadence) const noexcept;
   void follow(double dt_s) noexcept;
 
   bool fresh_ = true;  // was never on
   LiveStride stride_;
+  LiveGait gait_;
+  PoseSpeed speed_;
   double cadence_rad_s_ = 0.0;  // smoothed; 0: not known
   // The last evidence; it stays where a frame has none.
-  double of_pose_ = 0.0, of_cadence_ = 0.0, of_legs_ = 1.0;
+  double of_pose_ = 0.0, of_near_pose_ = 0.0, of_cadence_ = 0.0, of_legs_ = 1.0;
   double wanted_ = 0.0;
   std::array<double, 4> stage_{};  // low-passes in a row, the first follows wanted_
 };

@@ -23,12 +23,24 @@ class KnownMotion {
   [[nodiscard]] double distance_deg(std::span<const float> q,
                                     std::span<const std::uint8_t> available) const noexcept;
 
+  // The rotation from one pose to another [dims], rms over joints [deg]; missing dimensions as
+  // above.
+  [[nodiscard]] double turn_deg(std::span<const float> from, std::span<const float> to,
+                                std::span<const std::uint8_t> available) const noexcept;
+
   // Empty where the training showed no strides or the skeleton names no upper legs.
   [[nodiscard]] const std::optional<motion::LegSignal>& legs() const noexcept { return legs_; }
   [[nodiscard]] double swing_rad() const noexcept { return swing_rad_; }
   [[nodiscard]] double cadence_rad_s() const noexcept { return cadence_rad_s_; }
+  // LiveGait's correlation in the training; NaN: unknown.
+  [[nodiscard]] double gait_correlation() const noexcept { return gait_correlation_; }
+  // Height of the pelvis; NaN where the frame did not measure it. RT-safe.
+  [[nodiscard]] double height_m(const Frame& frame) const noexcept;
 
  private:
+  [[nodiscard]] double rms_deg(float sum_rad2,
+                               std::span<const std::uint8_t> available) const noexcept;
+
   // At most this many poses, those that stand best for all: the others are within a few degrees.
   static constexpr int kPoses = 128;
 
@@ -36,6 +48,8 @@ class KnownMotion {
   double joints_;
   std::optional<motion::LegSignal> legs_;
   double swing_rad_, cadence_rad_s_;
+  double gait_correlation_;
+  std::size_t root_joint_;
 };
 
 }  // namespace posed::style

@@ -103,6 +103,10 @@ GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
   if (from.swing_rad() == 0.0 && from.fastest_stride_s() == 0.0) return gate;
   gate.swing_rad = reader.number(from.swing_rad(), 1e-3, 10.0, "the legs' swing");
   gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.05, 100.0, "the fastest stride");
+  if (from.has_gait_correlation()) {
+    gate.gait_correlation =
+        reader.number(from.gait_correlation(), -1.0, 1.0, "the correlation of the gait");
+  }
   return gate;
 }
 
@@ -202,6 +206,9 @@ std::string serialize_model(const StyleModel& model) {
     write_vector(model.gate.neutral, *style.mutable_gate()->mutable_neutral());
     style.mutable_gate()->set_swing_rad(model.gate.swing_rad);
     style.mutable_gate()->set_fastest_stride_s(model.gate.fastest_stride_s);
+    if (!std::isnan(model.gate.gait_correlation)) {
+      style.mutable_gate()->set_gait_correlation(model.gate.gait_correlation);
+    }
   }
   if (model.axis.present()) {
     write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -33,6 +34,8 @@ struct GateData {
   // 0 where the training shows no strides.
   double swing_rad = 0.0;
   double fastest_stride_s = 0.0;
+  // LiveGait's mean in the clip where it is highest; NaN: unknown.
+  double gait_correlation = std::numeric_limits<double>::quiet_NaN();
 
   [[nodiscard]] bool present() const { return neutral.size() > 0; }
   [[nodiscard]] bool strides() const { return swing_rad > 0.0; }

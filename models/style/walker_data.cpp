@@ -11,6 +11,7 @@
 #include <Eigen/Cholesky>
 
 #include "models/style/lessons.hpp"
+#include "models/style/live_gait.hpp"
 #include "models/style/live_stride.hpp"
 #include "models/style/training_check.hpp"
 #include "models/style/training_pairs.hpp"
@@ -68,6 +69,21 @@ double mean_swing_rad(const AlignedClip& clip, double rate_hz) {
   return sum / std::max(count, 1);
 }
 
+// NaN where the clip does not tell.
+double mean_gait_correlation(const AlignedClip& clip, double rate_hz) {
+  LiveGait gait;
+  double sum = 0.0;
+  int count = 0;
+  for (Eigen::Index t = 0; t < clip.leg.size(); ++t) {
+    gait.update(clip.height_m[t], clip.leg[t], 1.0 / rate_hz);
+    const double correlation = gait.correlation();
+    if (std::isnan(correlation)) continue;
+    sum += correlation;
+    ++count;
+  }
+  return sum / count;
+}
+
 // The mean poses of a clip's windows of a second [windows x D].
 MatrixXd window_means(const AlignedClip& clip, double rate_hz) {
   const Eigen::Index frames = clip.q.rows();
@@ -114,6 +130,8 @@ GateData gate_data_of(const Dataset& dataset, const std::vector<std::string>& ta
   for (const AlignedClip& clip : dataset.clips) {
     if (!shows_strides(clip)) return gate;
     swing_rad = std::min(swing_rad, mean_swing_rad(clip, dataset.rate_hz));
+    gate.gait_correlation =  // where any clip tells
+        std::fmax(gate.gait_correlation, mean_gait_correlation(clip, dataset.rate_hz));
     fastest_s = std::min(fastest_s, 2.0 * std::numbers::pi / (clip.dtheta * dataset.rate_hz));
   }
   gate.swing_rad = swing_rad;

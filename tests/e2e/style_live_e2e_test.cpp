@@ -93,6 +93,7 @@ TEST_CASE("ctl lists the daemon's own models and uses one by name; stats tell we
   }
   CHECK(texts["weights"] == "s1=0.25,s2=0.75");
   CHECK(texts["mask"] == "arms=0.5");
+  CHECK(has(served.ctl({"status"}).out, "style.weights s1=0.25,s2=0.75, style.mask arms=0.5"));
 }
 
 }  // namespace posed::test

@@ -51,6 +51,15 @@ std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
   return line;
 }
 
+// As the config writes it; empty for the default. Texts, such as the weights of styles, are empty
+// by default.
+std::string unusual_value(const ParameterSpec& spec, const v1::ParameterStats& parameter) {
+  if (!has_number(spec)) return clean_name(parameter.text());
+  const double usual = number_of(spec, spec.default_value) * spec.people_scale;
+  if (parameter.value() == usual) return {};
+  return people_text(spec, parameter.value() / spec.people_scale);
+}
+
 // A line below the stream's row about its stages; empty if there is nothing to report.
 std::string stages_row(const v1::StreamStats& stream) {
   std::string text = label_words(stream);
@@ -70,10 +79,9 @@ std::string stages_row(const v1::StreamStats& stream) {
       const ParameterSpec* spec =
           type == nullptr ? nullptr : find_parameter(type->parameters, parameter.name());
       if (spec == nullptr || !spec->live || parameter.name() == "alpha") continue;
-      const double usual = number_of(*spec, spec->default_value) * spec->people_scale;
-      if (parameter.value() == usual) continue;
-      add(fmt::format("{}.{} {}", clean_name(one.name()), parameter.name(),
-                      people_text(*spec, parameter.value() / spec->people_scale)));
+      const std::string value = unusual_value(*spec, parameter);
+      if (value.empty()) continue;
+      add(fmt::format("{}.{} {}", clean_name(one.name()), parameter.name(), value));
     }
   }
   if (stream.has_style_gate()) add(fmt::format("gate {:.2f}", stream.style_gate()));
@@ -257,9 +265,9 @@ const char* const kColumnsHelp = R"(Columns, one row a stream; one that no strea
   ALPHA    how much style, -2 to 2; below the table its target, while it moves
   MODEL    the style model in use, or the gesture model
 Below the table are what is wrong, the time of each stage (99 % of the frames took at most this), a
-hand's label and the lag. Of a style: gate, 1 where the model knows the motion to 0 where it is
-passed through; style, what the input shows of it already, 0 like its source to 1 like its target.
---json has every figure, in microseconds)";
+hand's label, the lag, and settings that are not the usual ones. Of a style: gate, 1 where the model
+knows the motion to 0 where it is passed through; style, what the input shows of it already, 0 like
+its source to 1 like its target. --json has every figure, in microseconds)";
 
 std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& wanted) {
   LiveViewOptions options = wanted;

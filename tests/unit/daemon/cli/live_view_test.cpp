@@ -234,6 +234,14 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   CHECK_FALSE(below().contains("gate_fallback"));  // as usual
   parameter.set_value(0.25);
   CHECK(below() == "  walker0: performs g, style.gate_fallback 0.25, alpha slides to 1.00");
+  v1::ParameterStats& text = *style.add_parameter();
+  text.set_name("weights");
+  CHECK_FALSE(below().contains("weights"));  // the first style alone
+  text.set_text("sway=0.75,\x1b[2Jsad=0.25");
+  CHECK(below() ==
+        "  walker0: performs g, style.gate_fallback 0.25, style.weights sway=0.75,"
+        "\\x1b[2Jsad=0.25, alpha slides to 1.00");
+  text.clear_text();
   stream.set_style_gate(0.0F);
   stream.set_style_estimate(0.4F);
   CHECK(below().ends_with("gate_fallback 0.25, gate 0.00, style 0.40, alpha slides to 1.00"));

@@ -236,6 +236,18 @@ TEST_CASE("errors in the stages of a source name its tables") {
             .contains("cannot redefine existing table 'source.constrain'"));
 }
 
+TEST_CASE("a stage that needs the source's pose is refused behind one that loses it") {
+  const auto with = [](const std::string& stages, const std::string& tables = "") {
+    return std::string(kOptitrack) + "streams = \"all\"\nstages = " + stages + "\n" + tables;
+  };
+  CHECK(source_complaint(with("[\"generate\", \"feet\"]")) ==
+        "5: feet needs the pose as the source gave it, which generate does not hand on; put feet"
+        " before generate");
+  CHECK(read_sources(with("[\"feet\", \"generate\"]")).errors.empty());
+  CHECK(read_sources(with("[\"generate\", \"feet\"]", "[source.generate]\nenabled = false\n"))
+            .errors.empty());
+}
+
 TEST_CASE("a stream of a source: source and body") {
   CHECK(read_sources(std::string(kOptitrack) + kAnn).errors.empty());
   CHECK(source_complaint(std::string(kOptitrack) + "streams = \"all\"\n" +

@@ -7,6 +7,8 @@
 
 #include "models/motion/motion.hpp"
 #include "models/style/apply.hpp"
+#include "models/style/bound_model.hpp"
+#include "models/style/style_filter.hpp"
 #include "models/style/train.hpp"
 #include "proto/frame/degree.hpp"
 #include "tests/support/shared.hpp"
@@ -71,6 +73,36 @@ double gate_mean(const style::StyleModel& model, const clip::Clip& clip,
   return applied(model, clip, options).gate_mean.value();
 }
 
+clip::Clip part(clip::Clip clip, int first, int frames) {
+  clip.channels = Eigen::MatrixXd(clip.channels.middleRows(first, frames));
+  return clip;
+}
+
+class NoOut final : public StageOut {
+ public:
+  void frame(const StageFrame& /*frame*/) noexcept override {}
+};
+
+// Live, the second clip after the first: from its first frame on until the gate is so.
+template <typename Condition>
+double seconds_until(const style::StyleModel& model, const clip::Clip& before,
+                     const clip::Clip& after, Condition is_so) {
+  clip::Clip both = before;
+  both.channels.resize(before.frames() + after.frames(), Eigen::NoChange);
+  both.channels << before.channels, after.channels;
+  const auto bound = style::bind_model(model, *both.skeleton, "taught.style").value();
+  style::StyleFilter filter(bound.get(), {});
+  NoOut out;
+  int waited = 0;
+  for (int i = 0; i < both.frames() && (waited == 0 || !is_so(filter.gate())); ++i) {
+    if (i == before.frames()) REQUIRE_FALSE(is_so(filter.gate()));
+    if (i >= before.frames()) ++waited;
+    const Frame in = both.frame(i);
+    filter.process({.frame = in, .input = &in}, out);
+  }
+  return waited / both.frame_rate_hz;
+}
+
 }  // namespace
 
 TEST_CASE("the gate knows known and unknown walkers and nothing else", "[style][real]") {
@@ -89,6 +121,16 @@ TEST_CASE("the gate knows known and unknown walkers and nothing else", "[style][
   }
   const auto actor = style::measure_walker(model, "taught.style", acted("walk_normal_001"));
   REQUIRE(actor);
+  for (const char* name : {"run_masculine_001", "run_active_001", "run_exhausted_001",
+                           "run_elderly_001", "run_feminine_001", "run_youthful_001"}) {
+    INFO(name);
+    CHECK(gate_mean(model, acted(name), {}, true) <= 0.2);
+  }
+  for (const char* name : {"walk_elderly_004", "walk_exhausted_001", "walk_masculine_001",
+                           "walk_youthful_001", "walk_active_001"}) {
+    INFO(name);
+    CHECK(gate_mean(model, acted(name), {}, true) >= 0.85);
+  }
   for (const char* name : {"run_normal_001", "raise-up-left-hand_normal_001",
                            "wave-left-hand_normal_001", "wave-right-hand_feminine_001"}) {
     INFO(name);
@@ -103,6 +145,24 @@ TEST_CASE("the gate knows known and unknown walkers and nothing else", "[style][
   }
   CHECK(gate_mean(model, recording_of("cmu/02_04.bvh"), {}, true) <= 0.2);
   CHECK(gate_mean(model, recording_of("cmu/09_01.bvh"), {}, true) <= 0.2);
+}
+
+TEST_CASE("a run that becomes a walk and a walk that freezes are known within 0.3 s",
+          "[style][real]") {
+  if (!gate_recordings()) SKIP_WITHOUT_SHARED();
+  const auto model = taught("normal");
+  for (const char* style : {"normal", "feminine"}) {
+    INFO(style);
+    const clip::Clip run = acted(std::string("run_") + style + "_001");
+    clip::Clip walk = acted(std::string("walk_") + style + "_004");
+    walk = part(walk, 60, 100);
+    CHECK(seconds_until(model, run, walk, [](double gate) { return gate >= 0.5; }) <= 0.3);
+    for (int frame = 30; frame < 66; frame += 4) {
+      const clip::Clip frozen = held(part(walk, frame, 30));
+      CHECK(seconds_until(model, part(walk, 0, frame), frozen,
+                          [](double gate) { return gate <= 0.5; }) <= 0.3);
+    }
+  }
 }
 
 TEST_CASE("a clip that shows no walk measures no walker", "[style][real]") {

@@ -2,6 +2,7 @@
 #include "models/style/gate.hpp"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -10,7 +11,10 @@
 
 #include "models/motion/leg_signal.hpp"
 #include "models/motion/synthetic_walker.hpp"
+#include "models/style/live_gait.hpp"
 #include "models/style/live_stride.hpp"
+#include "models/style/pose_speed.hpp"
+#include "proto/frame/degree.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 using namespace posed;
@@ -38,10 +42,19 @@ class ToyGate {
   style::Gate gate;
 };
 
+// How a walker moves: so many times as fast as in training, 0 standing still; in other poses than
+// there, by so many degrees; and how much the pelvis rises as the legs come apart.
+struct Walking {
+  double speed = 1.0;
+  double away_deg = 0.0;
+  double rise_m_rad = 0.0;
+};
+
 // A gate that knows the poses of a synthetic walk and, in its legs, the stride.
 class WalkingGate {
  public:
-  WalkingGate() : clip_(motion::make_walker({.seconds = 9.0, .noise_deg = 0.0}).value()) {
+  explicit WalkingGate(double gait_correlation = -0.5)
+      : clip_(motion::make_walker({.seconds = 9.0, .noise_deg = 0.0}).value()) {
     style::StyleModel model;
     model.space = motion::describe_space(motion::Space::kNative, *clip_.skeleton).value();
     const auto space = motion::PoseSpace::bind(model.space, *clip_.skeleton).value();
@@ -56,22 +69,26 @@ class WalkingGate {
         model.process.inputs(i, static_cast<Eigen::Index>(d)) = static_cast<double>(q_[d]);
       }
     }
-    model.gate = {Eigen::VectorXd::Zero(space.dims()), 0.4, stride_s()};
+    model.gate = {Eigen::VectorXd::Zero(space.dims()), 0.4, stride_s(), gait_correlation};
     space_ = space;
     known_.emplace(model, *clip_.skeleton);
   }
 
-  // The walk, `speed` times as fast; 0 stands still. How far the gate is open after 5 s.
-  float walk(style::Gate& gate, double speed, bool on = true,
+  // How far the gate is open after 5 s.
+  float walk(style::Gate& gate, const Walking& how, bool on = true,
              const std::optional<style::Walker>& walker = {}) {
-    constexpr double kStep_s = 1.0 / kGateRate_hz;
-    for (int i = 0; i < 5 * kGateRate_hz; ++i) {
-      const double frame = i * kStep_s * speed * clip_.frame_rate_hz;
-      const Frame in = clip_.frame(static_cast<int>(frame));
-      space_->to_vector(in, 0.0, q_, available_);
-      gate.update(&*known_, on, in, q_, available_, walker, kStep_s);
-    }
+    for (int i = 0; i < 5 * kGateRate_hz; ++i) step(gate, i, how, on, walker);
     return gate.open();
+  }
+  void step(style::Gate& gate, int i, const Walking& how, bool on = true,
+            const std::optional<style::Walker>& walker = {}) {
+    constexpr double kStep_s = 1.0 / kGateRate_hz;
+    Frame in = clip_.frame(static_cast<int>(i * kStep_s * how.speed * clip_.frame_rate_hz));
+    space_->to_vector(in, 0.0, q_, available_);
+    for (float& angle : q_) angle += static_cast<float>(how.away_deg * kDegree / std::sqrt(3.0));
+    const double apart_rad = std::abs(known_->legs()->value_rad(in));
+    in.root_position_m[1] = static_cast<float>(1.0 + how.rise_m_rad * apart_rad);
+    gate.update(&*known_, on, in, q_, available_, walker, kStep_s);
   }
   [[nodiscard]] const style::KnownMotion& known() const { return *known_; }
 
@@ -103,21 +120,92 @@ TEST_CASE("strides like the training's open the gate, rest and a run close it", 
   WalkingGate walk;
   REQUIRE(walk.known().legs());
   style::Gate gate;
-  CHECK(walk.walk(gate, 1.0) == 1.0F);
+  CHECK(walk.walk(gate, {}) == 1.0F);
   CHECK(gate.strides());
-  CHECK(walk.walk(gate, 0.0) == 0.0F);
+  CHECK(walk.walk(gate, {.speed = 0.0}) == 0.0F);
   CHECK_FALSE(gate.strides());
-  CHECK(walk.walk(gate, 1.0) == 1.0F);
-  CHECK(walk.walk(gate, 1.6) < 0.05F);
+  CHECK(walk.walk(gate, {}) == 1.0F);
+  const Walking run{.speed = 1.6, .away_deg = 12.0};
+  CHECK(walk.walk(gate, run) < 0.05F);
   const style::Walker quick{.cadence_rad_s = 1.6 * walk.known().cadence_rad_s()};
-  CHECK(walk.walk(gate, 1.6, true, quick) > 0.95F);
+  CHECK(walk.walk(gate, run, true, quick) > 0.95F);
+  CHECK(walk.walk(gate, {.speed = 1.6}) == 1.0F);  // the very poses of training at another pace
+}
+
+TEST_CASE("how the pelvis moves tells a run from a walk, at the same pace", "[style]") {
+  const Walking slow_run{.speed = 1.1, .away_deg = 12.0, .rise_m_rad = 0.1};
+  const Walking quick_walk{.speed = 1.35, .away_deg = 12.0, .rise_m_rad = -0.1};
+  WalkingGate walk;
+  style::Gate gate;
+  CHECK(walk.walk(gate, slow_run) < 0.05F);
+  CHECK(walk.walk(gate, quick_walk) > 0.95F);
+  WalkingGate run(0.9);  // was trained on runs
+  CHECK(run.walk(gate, slow_run) > 0.95F);
+  WalkingGate older(std::numeric_limits<double>::quiet_NaN());  // the cadence alone counts
+  CHECK(older.walk(gate, slow_run) > 0.95F);
+  CHECK(older.walk(gate, quick_walk) < 0.05F);
+}
+
+TEST_CASE("a walk that freezes closes the gate half way within 0.3 s, at any phase", "[style]") {
+  for (int phase = 0; phase < 60; phase += 5) {
+    WalkingGate walk;
+    style::Gate gate;
+    for (int i = 0; i < 120 + phase; ++i) walk.step(gate, i, {});
+    REQUIRE(gate.open() == 1.0F);
+    const int frozen = (120 + phase) / 2;  // the frame of the clip, at half the rate
+    for (int i = 0; i < static_cast<int>(0.3 * kGateRate_hz); ++i) {
+      walk.step(gate, frozen * 2, {});
+    }
+    CHECK(gate.open() < 0.5F);
+  }
 }
 
 TEST_CASE("a gate that is off is open and still measures the cadence, for warm-ups", "[style]") {
   WalkingGate walk;
   style::Gate gate;
-  CHECK(walk.walk(gate, 1.6, false) == 1.0F);
+  CHECK(walk.walk(gate, {.speed = 1.6}, false) == 1.0F);
   CHECK(gate.cadence_rad_s() == Approx(1.6 * walk.known().cadence_rad_s()).epsilon(0.1));
+}
+
+TEST_CASE("the correlation of height and legs is low in a walk, high in a run", "[style]") {
+  for (const double rate_hz : {30.0, 120.0}) {
+    style::LiveGait walk, run, flat;
+    for (int i = 0; i < 3 * rate_hz; ++i) {
+      const double leg_rad = 0.5 * std::cos(kTurn_rad * i / rate_hz);
+      walk.update(1.0 - 0.1 * std::abs(leg_rad), leg_rad, 1.0 / rate_hz);
+      run.update(1.0 + 0.1 * std::abs(leg_rad), leg_rad, 1.0 / rate_hz);
+      flat.update(1.0, leg_rad, 1.0 / rate_hz);
+      if (i < 0.35 * rate_hz) CHECK(std::isnan(walk.correlation()));
+      if (i < 0.45 * rate_hz) continue;
+      CHECK(walk.correlation() == Approx(-1.0));
+      CHECK(run.correlation() == Approx(1.0));
+      CHECK(std::isnan(flat.correlation()));
+    }
+    walk.forget();
+    CHECK(std::isnan(walk.correlation()));
+  }
+}
+
+TEST_CASE("the speed of a pose is the rms over its joints, also with missing ones", "[style]") {
+  const style::KnownMotion known(gated_toy_model(1), toy_skeleton());  // 5 joints
+  std::vector<float> q(15);
+  std::vector<std::uint8_t> available(15, 1);
+  style::PoseSpeed speed;
+  for (int i = 0; i < 30; ++i) {
+    speed.update(known, q, available, 0.01);
+    if (i == 0) CHECK(std::isnan(speed.value_deg_s()));
+    for (float& angle : q) angle += 0.01F;
+  }
+  const double whole_deg_s = std::sqrt(3.0) / kDegree;  // every angle by 1 rad/s
+  CHECK(speed.value_deg_s() == Approx(whole_deg_s).epsilon(1e-3));
+  for (int i = 0; i < 30; ++i) {  // what is missing counts as the rest does
+    available[4] = 0;
+    speed.update(known, q, available, 0.01);
+    for (float& angle : q) angle += 0.01F;
+  }
+  CHECK(speed.value_deg_s() == Approx(whole_deg_s).epsilon(1e-3));
+  for (int i = 0; i < 30; ++i) speed.update(known, q, available, 0.01);
+  CHECK(speed.value_deg_s() < 0.1);
 }
 
 TEST_CASE("the nearest training pose is found, also with missing joints", "[style]") {

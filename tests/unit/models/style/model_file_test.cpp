@@ -152,6 +152,8 @@ TEST_CASE("A model whose parts do not fit is refused by name", "[model_file]") {
   refused(model, "swing");
   model.gate = {model.gate.neutral, 0.5, 0.0};
   refused(model, "fastest stride");
+  model.gate = {model.gate.neutral, 0.5, 1.0, 1.5};
+  refused(model, "gait");
   model = small_model();
   model.space.joints.assign(97, "");
   refused(model, "number of joints");
