@@ -33,9 +33,10 @@ struct LabelDurations {
 };
 [[nodiscard]] Figure state_durations(const std::vector<LabelDurations>& labels);
 
-// An angle of each finger as it was recorded and as the model performs the same labels.
-struct FingerTrajectory {
-  std::string finger;
+// An angle of each finger, or of each group of joints, as it was recorded and as the model performs
+// the same labels.
+struct AngleTrajectory {
+  std::string name;
   std::vector<Point> recorded;         // s, deg; may be empty
   std::vector<Point> mean, low, high;  // the performance, with its band of two deviations
 };
@@ -43,14 +44,16 @@ struct LabelSpan {
   std::string label;
   double from_s = 0.0, to_s = 0.0;
 };
-[[nodiscard]] Figure finger_trajectories(const std::string& title, const std::string& sentence,
-                                         const std::vector<FingerTrajectory>& fingers,
-                                         const std::vector<LabelSpan>& labels);
+// `angle`: what the vertical axis shows, "flexion".
+[[nodiscard]] Figure angle_trajectories(const std::string& title, const std::string& sentence,
+                                        const std::string& angle,
+                                        const std::vector<AngleTrajectory>& trajectories,
+                                        const std::vector<LabelSpan>& labels);
 
-// Figures 5 and 6: a hand in rows of poses.
-[[nodiscard]] Figure hand_strip(const std::string& title, const std::string& sentence,
-                                const std::vector<picture::StripRow>& rows,
-                                const picture::Camera& camera);
+// Figures 5 and 6: a hand, or a body on its ground, in rows of poses.
+[[nodiscard]] Figure gesture_strip(const std::string& title, const std::string& sentence,
+                                   const std::vector<picture::StripRow>& rows,
+                                   const picture::Camera& camera, bool ground);
 
 // What it costs to know the labels only some frames ahead.
 struct LagError {

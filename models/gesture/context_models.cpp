@@ -141,12 +141,18 @@ class Trainer {
       const auto& segments = recordings_[r].segments;
       const std::size_t last = segments.size() - 1;
       for (std::size_t s = 0; s <= last; ++s) {
-        const Context context{index_of(segments[s > 0 ? s - 1 : s]), index_of(segments[s]),
-                              index_of(segments[s < last ? s + 1 : s])};
-        known[context] = 0;
+        Context context{index_of(segments[s > 0 ? s - 1 : s]), index_of(segments[s]),
+                        index_of(segments[s < last ? s + 1 : s])};
         Context also = context;
         if (recordings_[r].closed && s == 0) also.previous = index_of(segments[last]);
         if (recordings_[r].closed && s == last) also.next = index_of(segments[0]);
+        // A gesture that is repeated at once stands after itself in earnest: the missing neighbour
+        // must not count as another repetition.
+        const auto repeats = [&](std::size_t other) {
+          return other != s && segments[other].label == segments[s].label;
+        };
+        if (repeats(std::min(s + 1, last)) || repeats(s > 0 ? s - 1 : s)) context = also;
+        known[context] = 0;
         known[also] = 0;
         found.push_back({{r, s, 0, 0}, context, also});
       }

@@ -19,6 +19,11 @@ struct Segment {
   [[nodiscard]] int frames() const { return end - begin; }
 };
 
+// The frames of a segment in which its pose is held: the last half without the last tenth.
+[[nodiscard]] inline Segment held_part(const Segment& segment) {
+  return {segment.begin + segment.frames() / 2, segment.end - segment.frames() / 10, segment.label};
+}
+
 struct Recording {
   std::string file;  // for errors
   double rate_hz = 0.0;

@@ -190,10 +190,9 @@ std::vector<LabelPose> label_poses(const std::vector<Recording>& recordings) {
       auto& [sum, frames] =
           sums.try_emplace(segment.label, VectorXd::Zero(recording.angles_rad.cols()), 0.0)
               .first->second;
-      const int from = segment.begin + segment.frames() / 2;
-      const int to = segment.end - segment.frames() / 10;
-      sum += recording.angles_rad.middleRows(from, to - from).colwise().sum();
-      frames += to - from;
+      const Segment held = held_part(segment);
+      sum += recording.angles_rad.middleRows(held.begin, held.frames()).colwise().sum();
+      frames += held.frames();
     }
   }
   std::vector<LabelPose> poses;

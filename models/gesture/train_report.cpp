@@ -1,4 +1,5 @@
 #include "models/gesture/train_report.hpp"
+#include "models/gesture/movement_label.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
@@ -108,6 +109,19 @@ int TrainReport::gestures_of(const std::string& label) const {
   return count;
 }
 
+// Whether most segments of a label swing where its pose should be held.
+bool TrainReport::swings(const std::string& label) const {
+  int swinging = 0;
+  for (const Recording& recording : recordings_) {
+    for (const Segment& segment : recording.segments) {
+      if (segment.label != label) continue;
+      const Segment held = held_part(segment);
+      swinging += oscillation_in(recording, held.begin, held.end).steady ? 1 : 0;
+    }
+  }
+  return 2 * swinging > gestures_of(label);
+}
+
 std::vector<std::string> TrainReport::warnings() const {
   std::vector<std::string> warnings;
   std::size_t gestures = 0;
@@ -121,6 +135,12 @@ std::vector<std::string> TrainReport::warnings() const {
       warnings.push_back("label " + in_quotes(label.name) +
                          " was recorded once only; how it varies is a guess");
     }
+  }
+  for (const Label& label : vocabulary_.labels) {
+    if (vocabulary_.is_hand() || !swings(label.name)) continue;
+    warnings.push_back("label " + in_quotes(label.name) +
+                       " swings where its pose should be held, and the model performs the mean of "
+                       "the swings; cut its takes with --auto-label --cycles");
   }
   if (const std::string mixed = mixed_warning(); !mixed.empty()) warnings.push_back(mixed);
   return warnings;

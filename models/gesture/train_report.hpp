@@ -24,7 +24,8 @@ class TrainReport {
 
  private:
   [[nodiscard]] std::vector<std::string> warnings() const;
-  [[nodiscard]] std::string mixed_warning() const;  // empty: no leaf mixes classes
+  [[nodiscard]] std::string mixed_warning() const;
+  [[nodiscard]] bool swings(const std::string& label) const;  // empty: no leaf mixes classes
   [[nodiscard]] double apart_rad(int state, int group, const std::vector<int>& members) const;
   [[nodiscard]] int gestures_of(const std::string& label) const;
 

@@ -5,35 +5,53 @@
 #include <vector>
 
 #include "models/motion/motion.hpp"
-#include "models/motion/pose_space.hpp"
-#include "models/perform/standing.hpp"
 #include "proto/clip/frames_clip.hpp"
 
 namespace posed::perform {
-Result<BodyPerformance> perform_on(const gesture::GestureModel& model,
-                                   const Performance& performance, const clip::Clip& body) {
+
+Result<BodyFigure> BodyFigure::of(const gesture::GestureModel& model, const clip::Clip& body) {
   if (model.is_hand()) return misuse("the model is of hands, which have no body to perform on");
-  const auto space = motion::PoseSpace::bind(*model.body, *body.skeleton);
+  auto space = motion::PoseSpace::bind(*model.body, *body.skeleton);
   if (!space) return std::unexpected(space.error());
   if (body.frames() == 0) return fail("has no frame to stand in", body.path);
-  const Frame first = body.frame(0);
-  const double heading_rad =
-      motion::walk_heading_rad({body.skeleton, performance.rate_hz, {first}});
-  const Standing standing(*body.skeleton);
-  const Standing::Feet places_m = standing.feet_m(first);
-  const auto dims = static_cast<std::size_t>(space->dims());
-  std::vector<float> q(dims), change(dims);
-  std::vector<std::uint8_t> available(dims);
-  space->to_vector(first, heading_rad, q, available);
+  return BodyFigure(std::move(*space), body.skeleton, body.frame(0));
+}
+
+BodyFigure::BodyFigure(motion::PoseSpace space, std::shared_ptr<const Skeleton> skeleton,
+                       const Frame& first)
+    : skeleton_(std::move(skeleton)),
+      space_(std::move(space)),
+      standing_(*skeleton_),
+      first_(first),
+      heading_rad_(motion::walk_heading_rad({skeleton_, 0.0, {first}})),
+      places_m_(standing_.feet_m(first)),
+      first_q_(static_cast<std::size_t>(space_.dims())) {
+  std::vector<std::uint8_t> available(first_q_.size());
+  space_.to_vector(first_, heading_rad_, first_q_, available);
+}
+
+BodyFigure::Posed BodyFigure::pose(const Pose& angles_rad) const {
+  std::vector<float> change(first_q_.size());
+  for (std::size_t d = 0; d < change.size(); ++d) {
+    change[d] = static_cast<float>(angles_rad[d]) - first_q_[d];
+  }
+  Posed posed{.frame = first_};
+  space_.add(posed.frame, heading_rad_, first_q_, change);
+  posed.feet_off_m = standing_.stand(places_m_, posed.frame);
+  return posed;
+}
+
+Result<BodyPerformance> perform_on(const gesture::GestureModel& model,
+                                   const Performance& performance, const clip::Clip& body) {
+  const auto figure = BodyFigure::of(model, body);
+  if (!figure) return std::unexpected(figure.error());
   BodyPerformance out;
   clip::FramesClip frames(body.skeleton);
   std::vector<double> time_s;
   for (const Pose& pose : performance.angles) {
-    for (std::size_t d = 0; d < dims; ++d) change[d] = static_cast<float>(pose[d]) - q[d];
-    Frame frame = first;
-    space->add(frame, heading_rad, q, change);
-    out.feet_off_m = std::max(out.feet_off_m, standing.stand(places_m, frame));
-    frames.add(frame);
+    const BodyFigure::Posed posed = figure->pose(pose);
+    out.feet_off_m = std::max(out.feet_off_m, posed.feet_off_m);
+    frames.add(posed.frame);
     time_s.push_back(static_cast<double>(time_s.size()) / performance.rate_hz);
   }
   auto clip = frames.finish(body.path, performance.rate_hz, std::move(time_s));

@@ -119,4 +119,25 @@ Performance perform(const trajectory::StateInformation& information, std::span<c
   return performance;
 }
 
+gesture::Recording recording_of(const gesture::GestureModel& model,
+                                const Performance& performance) {
+  gesture::Recording recording{
+      .file = "the performance", .rate_hz = performance.rate_hz, .angles_rad = {}, .segments = {}};
+  const auto channels = static_cast<Eigen::Index>(performance.angles.front().size());
+  recording.angles_rad.resize(static_cast<Eigen::Index>(performance.angles.size()), channels);
+  for (Eigen::Index t = 0; t < recording.angles_rad.rows(); ++t) {
+    const Pose& pose = performance.angles[static_cast<std::size_t>(t)];
+    recording.angles_rad.row(t) = Eigen::Map<const Eigen::RowVectorXd>(pose.data(), channels);
+  }
+  for (const PerformedState& state : performance.states) {
+    const int end = state.start + state.frames;
+    if (state.state == 0) {
+      const auto label = static_cast<std::size_t>(state.context.current);
+      recording.segments.push_back({state.start, end, model.labels[label].name});
+    }
+    recording.segments.back().end = end;
+  }
+  return recording;
+}
+
 }  // namespace posed::perform

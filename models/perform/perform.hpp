@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "models/gesture/recording.hpp"
 #include "models/trajectory/state_information.hpp"
 #include "proto/frame/result.hpp"
 
@@ -48,5 +49,9 @@ struct Performance {
 // At the model's rate. `labels` has at least one.
 [[nodiscard]] Performance perform(const trajectory::StateInformation& information,
                                   std::span<const int> labels, const PerformOptions& options);
+
+// A performance as a recording of it would be, with a segment for each label.
+[[nodiscard]] gesture::Recording recording_of(const gesture::GestureModel& model,
+                                              const Performance& performance);
 
 }  // namespace posed::perform

@@ -21,13 +21,15 @@ ModelPrior::ModelPrior(const HmmForwardFilter& filter, int max_channels) : filte
   belief_.variance.resize(belief_.mean.size());
 }
 
-// Mean and variance of one frame over its state probabilities; false where the model believes in
-// none of them. RT-safe.
-bool ModelPrior::believe(int back) noexcept {
+// Mean and variance of one frame over its state probabilities, of the position and, with `moving`,
+// of delta and delta-delta, which only gaps need; false where the model believes in no state.
+// RT-safe.
+bool ModelPrior::believe(int back, bool moving) noexcept {
   const LiveModel& model = *filter_.model();
   const auto states = filter_.states(back);
   const auto channels = static_cast<std::size_t>(model.channels);
-  const std::size_t features = kDeltaWindows * channels;
+  const std::size_t windows = moving ? kDeltaWindows : 1;
+  const std::size_t features = windows * channels;
   LiveRows& mean = belief_.mean;
   LiveRows& variance = belief_.variance;
   std::fill_n(mean.begin(), features, 0.0);
@@ -47,7 +49,7 @@ bool ModelPrior::believe(int back) noexcept {
   if (sum <= 0.0) return false;
   some_ = 1.0 - filter_.none(back);
   const RateFactors rule = rate_factors(filter_.pace());
-  for (std::size_t w = 0; w < kDeltaWindows; ++w) {
+  for (std::size_t w = 0; w < windows; ++w) {
     for (std::size_t k = w * channels; k < (w + 1) * channels; ++k) {
       const double m = mean[k] / sum;
       variance[k] = std::max(variance[k] / sum - m * m, kLeastVariance) * rule.variance[w];
@@ -82,7 +84,7 @@ void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
   std::array<double, gesture::kMaxGroups> frames{};
   fit_.fill(0.0);
   for (int back = window.frames() - 1; back > 0; --back) {
-    if (!filter_.knows(back) || !believe(back)) continue;
+    if (!filter_.knows(back) || !believe(back, false)) continue;
     measure_distance(window, back);
     int last = -1;
     for (int c = 0; c < model.channels; ++c) {
@@ -99,21 +101,32 @@ void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
 
 // Pulls towards the model's pose with its variance times (1 + e^2/2)^2, so that a group which is
 // elsewhere is not disturbed. RT-safe.
-void ModelPrior::pull(AdaptiveWindow& window, int back, int channel) noexcept {
-  const auto c = static_cast<std::size_t>(channel);
-  const auto group = static_cast<std::size_t>(filter_.model()->group[c]);
-  const double wide = 1.0 + 0.5 * belief_.distance2[group];
-  const double weight =
-      window.measured(back, channel) ? kPull / (wide * wide) : kGapPull * fit_[group];
-  const double precision = some_ * weight / belief_.variance[c];
-  window.row(back, trajectory::kPosition)[c] += precision;
-  window.row(back, trajectory::kPositionMean)[c] += precision * belief_.mean[c];
+void ModelPrior::pull(AdaptiveWindow& window, int back) noexcept {
+  const LiveModel& model = *filter_.model();
+  std::array<double, gesture::kMaxGroups> weight{}, weight_in_gap{};
+  for (std::size_t g = 0; g < static_cast<std::size_t>(model.groups); ++g) {
+    const double wide = 1.0 + 0.5 * belief_.distance2[g];
+    weight[g] = some_ * (kPull / (wide * wide));
+    weight_in_gap[g] = some_ * (kGapPull * fit_[g]);
+  }
+  const bool whole = window.whole(back);
+  double* const position = window.row(back, trajectory::kPosition);
+  double* const position_mean = window.row(back, trajectory::kPositionMean);
+  for (std::size_t c = 0; c < static_cast<std::size_t>(model.channels); ++c) {
+    if (model.moves[c] == 0) continue;
+    const bool measured = whole || window.measured(back, static_cast<int>(c));
+    const auto group = static_cast<std::size_t>(model.group[c]);
+    const double precision =
+        (measured ? weight[group] : weight_in_gap[group]) / belief_.variance[c];
+    position[c] += precision;
+    position_mean[c] += precision * belief_.mean[c];
+    if (!measured) bridge(window, back, c);
+  }
 }
 
 // In a gap the gestures' own delta and delta-delta replace the adaptive prior in proportion to the
 // group's fit. RT-safe.
-void ModelPrior::bridge(AdaptiveWindow& window, int back, int channel) noexcept {
-  const auto c = static_cast<std::size_t>(channel);
+void ModelPrior::bridge(AdaptiveWindow& window, int back, std::size_t c) noexcept {
   const LiveModel& model = *filter_.model();
   const double fit = some_ * fit_[static_cast<std::size_t>(model.group[c])];
   constexpr std::array kPrecision{trajectory::kDelta, trajectory::kDeltaDelta};
@@ -130,18 +143,13 @@ void ModelPrior::bridge(AdaptiveWindow& window, int back, int channel) noexcept 
 // Nothing is added to the newest frame, because the features taken at it describe the frame before.
 // RT-safe.
 void ModelPrior::add(AdaptiveWindow& window) noexcept {
-  const LiveModel& model = *filter_.model();
   bool gap = false;
   for (int back = 0; back < window.frames(); ++back) gap = gap || !window.whole(back);
   if (gap) measure_fit(window);
   for (int back = window.frames() - 1; back > 0; --back) {
-    if (!filter_.knows(back) || !believe(back)) continue;
+    if (!filter_.knows(back) || !believe(back, !window.whole(back))) continue;
     measure_distance(window, back);
-    for (int c = 0; c < model.channels; ++c) {
-      if (model.moves[static_cast<std::size_t>(c)] == 0) continue;
-      pull(window, back, c);
-      if (!window.measured(back, c)) bridge(window, back, c);
-    }
+    pull(window, back);
   }
 }
 

@@ -27,11 +27,11 @@ class ModelPrior final : public InformationSource {
     std::array<double, gesture::kMaxGroups> distance2{};
   };
 
-  [[nodiscard]] bool believe(int back) noexcept;
+  [[nodiscard]] bool believe(int back, bool moving) noexcept;
   void measure_distance(const AdaptiveWindow& window, int back) noexcept;
   void measure_fit(const AdaptiveWindow& window) noexcept;
-  void pull(AdaptiveWindow& window, int back, int channel) noexcept;
-  void bridge(AdaptiveWindow& window, int back, int channel) noexcept;
+  void pull(AdaptiveWindow& window, int back) noexcept;
+  void bridge(AdaptiveWindow& window, int back, std::size_t c) noexcept;
 
   const HmmForwardFilter& filter_;
   double some_ = 1.0;  // the probability that the frame is one of the labels

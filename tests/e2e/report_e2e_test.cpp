@@ -143,9 +143,7 @@ TEST_CASE("a gesture model's training and evaluation draw their reports", "[repo
       CHECK(has(words, there));
     }
   }
-  CHECK(posed({"eval", "gesture", "--model", desk.path("h.gesture"), "--reference",
-               desk.path("take.csv"), "--reference-labels", desk.path("take.lab")})
-            .code == 2);
+  CHECK(json::parse(judged.out)["holds"]["deg"] < 10.0);
 }
 
 TEST_CASE("every benchmark draws its report", "[report]") {

@@ -94,15 +94,90 @@ TEST_CASE("Raised arms are learnt, and both are raised", "[train_body]") {
   const auto performed = synth({"--body", takes.clips[0], "--out", takes.file("both.bvh")});
   INFO(performed.err);
   REQUIRE(performed.code == 0);
-  const auto told = nlohmann::json::parse(performed.out);
-  CHECK(told["feet_off_cm"] < 1.0);
-  CHECK(told["states"][0]["leaf"].size() == 5);
+  const auto synthesised = nlohmann::json::parse(performed.out);
+  CHECK(synthesised["feet_off_cm"] < 1.0);
+  CHECK(synthesised["states"][0]["leaf"].size() == 5);
   const auto clip = clip::read_clip(takes.file("both.bvh"));
   REQUIRE(clip.has_value());
-  CHECK(clip->frames() == told["frames"]);
+  CHECK(clip->frames() == synthesised["frames"]);
   CHECK(one_sentence(synth({"--out", takes.file("x.bvh")}), 2, "name a clip of the body"));
-  CHECK(one_sentence(posed({"eval", "gesture", "--model", takes.file("b.gesture")}), 2,
-                     "the model is of a body"));
+
+  const auto eval = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"eval", "gesture", "--model", takes.file("b.gesture"), "--labels",
+                               "raise-both rest"});
+    return posed(std::move(more));
+  };
+  // Both arms of one take are kept back.
+  const auto both = takes.file("both_real.bvh"), labels = takes.file("both_real.lab");
+  REQUIRE(clip::write_bvh(raise_take({.left = true, .right = true, .take = 50}), both));
+  REQUIRE(posed({"train", "gesture", "--auto-label", "--movement", "raise-both", "--body", "--clip",
+                 both, "--out", labels})
+              .code == 0);
+  const auto bare = eval({"--json"});
+  REQUIRE(bare.code == 0);
+  CHECK_FALSE(nlohmann::json::parse(bare.out).contains("min_gap_cm"));
+  const auto judged =
+      eval({"--reference", both, "--reference-labels", labels, "--recorded", takes.clips[0],
+            takes.clips[1], "--json", "--report", takes.file("eval.html")});
+  INFO(judged.err);
+  REQUIRE(judged.code == 0);
+  const auto figures = nlohmann::json::parse(judged.out);
+  CHECK(figures["feet_off_cm"] < 1.0);
+  const auto& raised = figures["holds"]["labels"][0];
+  CHECK(raised["label"] == "raise-both");
+  CHECK(raised["recorded"] == false);
+  CHECK(raised["groups"]["left-arm"]["deg"] < 5.0);
+  // Nobody recorded both arms raised: the nearest pose has one of them down.
+  CHECK(raised["nearest_recorded_deg"] > 20.0);
+  CHECK(raised["constant_deg"] > 20.0);
+  CHECK(raised["best_composition_deg"] < 5.0);
+  CHECK(figures["reference"]["jerk_of_groups"]["left-arm"] > 0.0);
+  const std::string page = file_text(takes.file("eval.html"));
+  for (const char* there : {"composed group by group: raise-both", "left-arm: leftUpperArm about",
+                            "All trees of left-arm", "Which gesture is recognised"}) {
+    CHECK(page.find(there) != std::string::npos);
+  }
+  const auto told = eval({"--reference", both, "--reference-labels", labels});
+  CHECK(told.code == 0);
+  CHECK(told.out.find("raise-both (new)") != std::string::npos);
+  CHECK(one_sentence(eval({"--report", takes.file("y.html")}), 2, "add --reference TAKE.bvh"));
+  CHECK(one_sentence(eval({"--reference", both, "--reference-labels",
+                           takes.folder.write("x.lab", "0 1 jump\n").string()}),
+                     2, "none of the reference's labels"));
+}
+
+TEST_CASE("A body's training draws its report", "[train_body]") {
+  const ArmTakes takes;
+  const auto trained = takes.train("a.gesture", {"--body", "--report", takes.file("a.html")});
+  INFO(trained.err);
+  REQUIRE(trained.code == 0);
+  const std::string page = file_text(takes.file("a.html"));
+  for (const char* there : {"as the model performs it", "A recording and the model",
+                            "How long the states last", "Lag against error"}) {
+    CHECK(page.find(there) != std::string::npos);
+  }
+}
+
+TEST_CASE("A wave is cut at its cycles", "[train_body]") {
+  const ArmTakes takes;
+  REQUIRE(clip::write_bvh(raise_take({.right = true, .wave = true}), takes.file("wave.bvh")));
+  const auto cut =
+      posed({"train", "gesture", "--auto-label", "--movement", "wave", "--cycles", "--body",
+             "--clip", takes.file("wave.bvh"), "--out", takes.file("wave.lab"), "--json"});
+  INFO(cut.err);
+  REQUIRE(cut.code == 0);
+  CHECK(nlohmann::json::parse(cut.out)["segments"] > 5);
+  CHECK(one_sentence(takes.train("x.gesture", {"--body", "--cycles"}), 2, "--cycles says how"));
+  // A wave that is labelled whole is told of, and that one take is few.
+  REQUIRE(posed({"train", "gesture", "--auto-label", "--movement", "wave", "--body", "--clip",
+                 takes.file("wave.bvh"), "--out", takes.file("whole.lab")})
+              .code == 0);
+  const auto trained =
+      posed({"train", "gesture", "--body", "--clip", takes.file("wave.bvh"), "--labels",
+             takes.file("whole.lab"), "--out", takes.file("whole.gesture")});
+  REQUIRE(trained.code == 0);
+  CHECK(trained.err.find("label 'wave' swings") != std::string::npos);
+  CHECK(trained.err.find("label 'wave' was recorded once only") != std::string::npos);
 }
 
 TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
@@ -117,11 +192,30 @@ TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
   const auto sample = (source_dir() / "config/gestures/raise-arms.toml").string();
   CHECK(one_sentence(takes.train("x.gesture", {"--questions", sample}), 1,
                      "the skeleton has no leftToes"));
-  CHECK(one_sentence(takes.train("x.gesture", {"--body", "--report", takes.file("x.html")}), 2,
-                     "--report draws the gestures of hands"));
   CHECK(one_sentence(takes.train("x.gesture", {"--body", "--tree-text", "-", "--trees", "thumb"}),
                      2, "names no tree"));
   CHECK(one_sentence(takes.train("x.gesture", {"--movement", "raise"}), 2, "add --auto-label"));
+  const auto asked = [&](const std::string& groups) {
+    const auto file = takes.folder.write("asked.toml", groups).string();
+    return takes.train("x.gesture", {"--questions", file});
+  };
+  CHECK(one_sentence(asked("[arm]\njoints = []\nA = [\"rest\"]\n"), 2, "has no joints"));
+  CHECK(one_sentence(asked("[a]\njoints = [\"hips\"]\nA = [\"rest\"]\n"
+                           "[b]\njoints = [\"hips\"]\nA = [\"rest\"]\n"),
+                     2, "groups overlap"));
+  // A skeleton without toes or feet among the others is refused in both orders.
+  std::string lame = file_text(takes.clips[0]);
+  for (std::size_t at = 0; (at = lame.find("JOINT LeftFoot", at)) != std::string::npos;) {
+    lame.replace(at, 14, "JOINT LeftOther");
+  }
+  const auto other = takes.folder.write("lame.bvh", lame).string();
+  for (const bool first : {true, false}) {
+    const std::string& sound = takes.clips[1];
+    CHECK(one_sentence(
+        posed({"train", "gesture", "--body", "--clip", first ? other : sound, first ? sound : other,
+               "--labels", takes.labels[0], takes.labels[1], "--out", takes.file("x.gesture")}),
+        1, "the skeleton has no leftFoot"));
+  }
   CHECK_FALSE(std::filesystem::exists(takes.file("x.gesture")));
 }
 

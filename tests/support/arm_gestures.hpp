@@ -53,13 +53,14 @@ inline gesture::Vocabulary arm_vocabulary(const Skeleton& skeleton,
 
 // Labels every take as its movement, then rest.
 inline std::vector<gesture::Recording> labelled(const std::vector<ArmTake>& takes,
-                                                gesture::Vocabulary& vocabulary) {
+                                                gesture::Vocabulary& vocabulary,
+                                                gesture::Hold hold = gesture::Hold::kWhole) {
   std::vector<clip::Clip> clips;
   for (const ArmTake& take : takes) clips.push_back(take.clip);
   auto recordings = gesture::body_recordings(clips, 30.0, vocabulary);
   REQUIRE(recordings.has_value());
   for (std::size_t i = 0; i < takes.size(); ++i) {
-    auto segments = gesture::propose_movement((*recordings)[i], takes[i].movement, "rest");
+    auto segments = gesture::propose_movement((*recordings)[i], takes[i].movement, "rest", hold);
     REQUIRE(segments.has_value());
     (*recordings)[i].segments = *segments;
   }
@@ -67,8 +68,9 @@ inline std::vector<gesture::Recording> labelled(const std::vector<ArmTake>& take
 }
 
 inline gesture::GestureModel train_arms(const std::vector<ArmTake>& takes,
-                                        gesture::Vocabulary vocabulary) {
-  const auto recordings = labelled(takes, vocabulary);
+                                        gesture::Vocabulary vocabulary,
+                                        gesture::Hold hold = gesture::Hold::kWhole) {
+  const auto recordings = labelled(takes, vocabulary, hold);
   gesture::TrainOptions options;
   options.vocabulary = std::move(vocabulary);
   auto model = gesture::train_gesture(recordings, options);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <numbers>
 
 #include <catch2/catch.hpp>
 
@@ -19,9 +20,13 @@ namespace posed::test {
 
 struct Raise {
   bool left = false, right = false;
+  bool wave = false;       // the lower arms swing while the arms are held, which takes 4 s
   std::uint32_t take = 1;  // seeds noise, height and times
   double rate_hz = 30.0;
 };
+
+// How a lower arm waves.
+inline constexpr double kWave_hz = 1.4, kWave_deg = 25.0;
 
 // From 0 to 1 and back: up from 0.2 s on, a hold, down, and 0.5 s of rest.
 inline double raised_at(double time_s, double hold_s) {
@@ -36,7 +41,7 @@ inline clip::Clip raise_take(const Raise& raise) {
   auto walker = motion::make_walker({.seconds = 1.0, .rate_hz = raise.rate_hz});
   REQUIRE(walker.has_value());
   PortableRandom random(raise.take * 7919U + 3U);
-  const double hold_s = random.uniform(0.7, 1.0);
+  const double hold_s = random.uniform(0.7, 1.0) + (raise.wave ? 3.2 : 0.0);
   const double top_deg = random.uniform(60.0, 64.0);
   clip::Clip clip{.path = "synthetic raise",
                   .skeleton = walker->skeleton,
@@ -47,7 +52,10 @@ inline clip::Clip raise_take(const Raise& raise) {
   const auto channels = static_cast<Eigen::Index>(clip.skeleton->channels.size());
   clip.channels.resize(frames, channels);
   for (Eigen::Index t = 0; t < frames; ++t) {
-    const double up = raised_at(static_cast<double>(t) / raise.rate_hz, hold_s);
+    const double time_s = static_cast<double>(t) / raise.rate_hz;
+    const double up = raised_at(time_s, hold_s);
+    const double swing_deg =
+        raise.wave ? up * kWave_deg * std::sin(2.0 * std::numbers::pi * kWave_hz * time_s) : 0.0;
     for (Eigen::Index c = 0; c < channels; ++c) {
       const Channel& channel = clip.skeleton->channels[static_cast<std::size_t>(c)];
       const auto bone = clip.skeleton->joints[channel.joint].bone;
@@ -61,7 +69,10 @@ inline clip::Clip raise_take(const Raise& raise) {
       const bool raised = left ? raise.left : raise.right;
       const double height_deg = raised ? -70.0 + (70.0 + top_deg) * up : -70.0;
       const double turn_deg = arm ? (left ? height_deg : -height_deg) : 0.0;
-      value = kDegree * (turn_deg + 0.2 * random.normal());
+      const bool lower = (raise.left && bone == Bone::kLeftLowerArm) ||
+                         (raise.right && bone == Bone::kRightLowerArm);
+      const double wave_deg = lower && channel.axis == Axis::kY ? swing_deg : 0.0;
+      value = kDegree * (turn_deg + wave_deg + 0.2 * random.normal());
     }
   }
   return clip;

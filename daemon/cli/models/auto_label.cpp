@@ -22,8 +22,9 @@ int auto_label(const AutoLabelOptions& options) {
   if (!recording) return report(recording.error());
   const auto proposed = [&] {
     const Waiting waiting("proposing labels");
-    return one_movement ? gesture::propose_movement(*recording, options.movement, options.rest)
-                        : gesture::propose_segments(*recording);
+    if (!one_movement) return gesture::propose_segments(*recording);
+    const auto hold = options.cycles ? gesture::Hold::kCycles : gesture::Hold::kWhole;
+    return gesture::propose_movement(*recording, options.movement, options.rest, hold);
   }();
   if (!proposed) return report(proposed.error());
   std::vector<clip::LabelSegment> labels;

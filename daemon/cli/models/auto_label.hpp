@@ -15,6 +15,7 @@ struct AutoLabelOptions {
   std::filesystem::path clip, examples, out;
   std::string movement, rest;  // of a take without examples
   bool body;                   // such a take is of a body
+  bool cycles;                 // its hold is cut so that it can be repeated
   double rate_hz;
   clip::ReadOptions read;
   bool json;

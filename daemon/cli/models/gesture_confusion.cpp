@@ -5,6 +5,7 @@
 
 #include "daemon/cli/models/gesture_figures.hpp"
 #include "daemon/report/gesture_sections.hpp"
+#include "models/gesture/pose_channels.hpp"
 #include "models/smooth/live_smoother.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/time.hpp"
@@ -25,16 +26,17 @@ class RecognisedLabels final : public StageOut {
   std::vector<std::array<char, kMaxLabel>> labels;  // [frame]
 };
 
+// `first`: a frame of the figure, whose channels the recording's poses replace.
 std::vector<std::array<char, kMaxLabel>> recognised_in(const gesture::Recording& recording,
-                                                       const Skeleton& skeleton,
+                                                       const Skeleton& skeleton, const Frame& first,
+                                                       const gesture::PoseChannels& channels,
                                                        const smooth::LiveModel& model) {
   smooth::LiveSmoother smoother(skeleton, {}, &model);
   RecognisedLabels out(recording.angles_rad.rows());
   for (Eigen::Index t = 0; t < recording.angles_rad.rows(); ++t) {
-    HandAngles angles{};
-    std::copy_n(recording.angles_rad.row(t).data(), kHandChannels, angles.begin());
-    Frame frame;
-    set_hand_angles(skeleton, angles, frame);
+    const auto row = recording.angles_rad.row(t);
+    Frame frame = first;
+    channels.write({row.data(), static_cast<std::size_t>(row.size())}, 0.0, frame);
     frame.header.sequence = static_cast<std::uint64_t>(t + 1);
     frame.header.device_ns = nanoseconds(static_cast<double>(t) / recording.rate_hz);
     smoother.process({.frame = frame}, out);
@@ -70,14 +72,17 @@ report::Confusion shares_of(const Counts& counts, const std::vector<std::string>
 }  // namespace
 
 std::optional<report::Figure> confusion_of(const gesture::GestureModel& model,
+                                           const clip::Clip& body,
                                            const std::vector<gesture::Recording>& recordings,
                                            const std::string& measured_on) {
-  const Skeleton skeleton = hand_skeleton(Side::kRight);
+  const Skeleton skeleton = model.is_hand() ? hand_skeleton(Side::kRight) : *body.skeleton;
+  const Frame first = model.is_hand() ? Frame{} : body.frame(0);
   const auto live = smooth::bind_live_model(model, skeleton, "the model");
-  if (!live) return std::nullopt;
+  const auto channels = gesture::PoseChannels::bind(model, skeleton);
+  if (!live || !channels) return std::nullopt;
   Counts counts;
   for (const gesture::Recording& recording : recordings) {
-    const auto recognised = recognised_in(recording, skeleton, **live);
+    const auto recognised = recognised_in(recording, skeleton, first, *channels, **live);
     for (const gesture::Segment& segment : recording.segments) {
       for (int t = segment.begin; t < segment.end; ++t) {
         const std::string label = recognised[static_cast<std::size_t>(t)].data();

@@ -36,18 +36,12 @@ Result<gesture::Recording> read_hand(const std::filesystem::path& file, double r
   return gesture::recording_of(*hand, rate_hz);
 }
 
-// Cuts the recording at the labels of a file.
-Result<> cut_at(gesture::Recording& recording, const std::filesystem::path& labels) {
-  const auto segments = clip::read_labels(labels);
-  if (!segments) return std::unexpected(segments.error());
-  return gesture::cut(recording, *segments, labels.string());
-}
-
 Result<gesture::Vocabulary> body_of(const Skeleton& skeleton) {
   return gesture::body_vocabulary(gesture::body_groups(skeleton));
 }
 
-// The clips of a body; without a questions file the groups are those that the first one has.
+// The clips of a body. Without a questions file the joints are those of the clip with the most, so
+// that another skeleton among the clips is refused in whichever order they come.
 Result<> read_bodies(const GestureSources& sources, GestureData& data) {
   std::vector<clip::Clip> clips;
   for (const std::string& file : sources.clips) {
@@ -56,9 +50,17 @@ Result<> read_bodies(const GestureSources& sources, GestureData& data) {
     clips.push_back(std::move(*clip));
   }
   if (sources.questions.empty()) {
-    auto vocabulary = body_of(*clips.front().skeleton);
-    if (!vocabulary) return std::unexpected(vocabulary.error());
-    data.vocabulary = std::move(*vocabulary);
+    for (const clip::Clip& clip : clips) {
+      auto vocabulary = body_of(*clip.skeleton);
+      if (!vocabulary) {
+        vocabulary.error().file = clip.path;
+        return std::unexpected(vocabulary.error());
+      }
+      if (!data.vocabulary.is_hand() && vocabulary->channels() <= data.vocabulary.channels()) {
+        continue;
+      }
+      data.vocabulary = std::move(*vocabulary);
+    }
   }
   auto recordings = gesture::body_recordings(clips, sources.rate_hz, data.vocabulary);
   if (!recordings) return std::unexpected(recordings.error());
@@ -173,6 +175,39 @@ Result<std::vector<gesture::ChannelGroup>> groups_of(const GestureSources& sourc
   }
   if (!sources.body) return gesture::finger_groups();
   return gesture::body_vocabulary(gesture::body_groups())->groups;
+}
+
+Result<> cut_at(gesture::Recording& recording, const std::filesystem::path& labels) {
+  const auto segments = clip::read_labels(labels);
+  if (!segments) return std::unexpected(segments.error());
+  return gesture::cut(recording, *segments, labels.string());
+}
+
+Result<std::vector<gesture::Recording>> recordings_for(const gesture::GestureModel& model,
+                                                       const std::vector<std::string>& clips) {
+  std::vector<gesture::Recording> recordings;
+  for (const std::string& file : clips) {
+    const auto recording = [&]() -> Result<gesture::Recording> {
+      if (!model.is_hand()) {
+        const auto body = read_body(file, {});
+        if (!body) return std::unexpected(body.error());
+        return gesture::body_recording(*body, model.rate_hz, model);
+      }
+      auto hand = clip::read_hand_clip(file);
+      if (!hand) return std::unexpected(hand.error());
+      clip::fill_gaps(*hand);
+      return gesture::recording_of(*hand, model.rate_hz);
+    }();
+    if (!recording) return std::unexpected(recording.error());
+    recordings.push_back(*recording);
+  }
+  return recordings;
+}
+
+Result<clip::Clip> figure_of(const gesture::GestureModel& model, const std::filesystem::path& clip,
+                             const clip::ReadOptions& read) {
+  if (model.is_hand()) return clip::Clip{};
+  return clip::read_clip(clip, read);
 }
 
 Result<gesture::Recording> load_recording(const std::filesystem::path& clip,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "models/gesture/gesture_model.hpp"
 #include "models/gesture/recording.hpp"
 #include "models/gesture/vocabulary.hpp"
 #include "proto/clip/clip.hpp"
@@ -39,6 +40,18 @@ struct GestureData {
                                                         const std::filesystem::path& labels,
                                                         double rate_hz,
                                                         const clip::ReadOptions& read = {});
+
+// Recordings to compare a model with, each as it sees them: at its rate, a hand's gaps filled.
+[[nodiscard]] Result<std::vector<gesture::Recording>> recordings_for(
+    const gesture::GestureModel& model, const std::vector<std::string>& clips);
+
+// Cuts the recording at the labels of a file.
+[[nodiscard]] Result<> cut_at(gesture::Recording& recording, const std::filesystem::path& labels);
+
+// The clip on whose figure a model of bodies is drawn; empty for one of hands.
+[[nodiscard]] Result<clip::Clip> figure_of(const gesture::GestureModel& model,
+                                           const std::filesystem::path& clip,
+                                           const clip::ReadOptions& read = {});
 
 // A clip without labels, of a body about its T-pose, or of a hand.
 [[nodiscard]] Result<gesture::Recording> load_unlabelled(const std::filesystem::path& clip,

@@ -8,8 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/cli/degrees.hpp"
-#include "daemon/report/gesture_sections.hpp"
-#include "models/gesture/drawn_tree.hpp"
+#include "models/gesture/apart.hpp"
 #include "models/perform/constrain.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
@@ -33,44 +32,52 @@ FrameRange range_of(const perform::Performance& performance, std::size_t index,
   return {first.start, last.start + last.frames};
 }
 
-// The middle joint's flexion of a finger, among the hand's angles.
-std::size_t flexion_of(std::size_t finger) { return finger * kFingerChannels + 3; }
+// One angle of each group: of a finger its middle joint's flexion, of a group of joints the one
+// that moves most in the training recordings.
+std::vector<std::size_t> shown_channels(const gesture::GestureModel& model) {
+  std::vector<std::size_t> channels;
+  for (const gesture::ChannelGroup& group : model.groups) {
+    const auto first = static_cast<std::size_t>(group.first);
+    std::size_t shown = first + (model.is_hand() ? 3 : 0);
+    const auto range_rad = [&](std::size_t c) { return model.high[c] - model.low[c]; };
+    const std::size_t end = model.is_hand() ? 0 : first + static_cast<std::size_t>(group.channels);
+    for (std::size_t c = first; c < end; ++c) {
+      if (range_rad(c) > range_rad(shown)) shown = c;
+    }
+    channels.push_back(shown);
+  }
+  return channels;
+}
 
-report::FingerTrajectory finger_named(std::string_view name) {
-  return {.finger = std::string(name) + ", middle joint",
-          .recorded = {},
-          .mean = {},
-          .low = {},
-          .high = {}};
+std::vector<report::AngleTrajectory> no_angles(const gesture::GestureModel& model,
+                                               const std::vector<std::size_t>& channels) {
+  std::vector<report::AngleTrajectory> angles;
+  for (std::size_t g = 0; g < channels.size(); ++g) {
+    const std::size_t c = channels[g];
+    std::string name = model.groups[g].name + ", middle joint";
+    if (!model.is_hand()) {
+      name = fmt::format("{}: {} about {}", model.groups[g].name, model.body->joints[c / 3],
+                         "xyz"[c % 3]);
+    }
+    angles.push_back({.name = std::move(name), .recorded = {}, .mean = {}, .low = {}, .high = {}});
+  }
+  return angles;
 }
 
 // Adds one frame of the performance at a time of the figure.
 void add_frame(const perform::Performance& performance, int frame, double time_s,
-               std::vector<report::FingerTrajectory>& fingers) {
+               const std::vector<std::size_t>& channels,
+               std::vector<report::AngleTrajectory>& angles) {
   const auto t = static_cast<std::size_t>(frame);
-  for (std::size_t f = 0; f < fingers.size(); ++f) {
-    const std::size_t channel = flexion_of(f);
+  for (std::size_t g = 0; g < angles.size(); ++g) {
+    const std::size_t channel = channels[g];
     const double mean_deg = kDegrees * performance.angles[t][channel];
     const double band_deg =
         kDegrees * kBandDeviations * std::sqrt(performance.variances[t][channel]);
-    fingers[f].mean.push_back({time_s, mean_deg});
-    fingers[f].low.push_back({time_s, mean_deg - band_deg});
-    fingers[f].high.push_back({time_s, mean_deg + band_deg});
+    angles[g].mean.push_back({time_s, mean_deg});
+    angles[g].low.push_back({time_s, mean_deg - band_deg});
+    angles[g].high.push_back({time_s, mean_deg + band_deg});
   }
-}
-
-std::vector<report::FingerTrajectory> all_fingers() {
-  std::vector<report::FingerTrajectory> fingers(kFingerNames.size());
-  std::ranges::transform(kFingerNames, fingers.begin(), finger_named);
-  return fingers;
-}
-
-report::QuestionTree question_tree(const gesture::DrawnTree& tree) {
-  report::QuestionTree out{tree.title, {}};
-  for (const gesture::DrawnNode& node : tree.nodes) {
-    out.nodes.push_back({node.words, node.reach, node.yes, node.no});
-  }
-  return out;
 }
 
 }  // namespace
@@ -83,11 +90,13 @@ std::vector<int> labels_to_show(const gesture::GestureModel& model) {
 }
 
 GestureFigures::GestureFigures(std::shared_ptr<const gesture::GestureModel> model,
-                               std::vector<int> labels)
+                               std::vector<int> labels, std::optional<perform::BodyFigure> body)
     : model_(std::move(model)),
       labels_(std::move(labels)),
       information_(model_, model_->rate_hz),
-      skeleton_(std::make_shared<const Skeleton>(hand_skeleton(Side::kRight))),
+      body_(std::move(body)),
+      skeleton_(body_ ? body_->skeleton()
+                      : std::make_shared<const Skeleton>(hand_skeleton(Side::kRight))),
       shape_(skeleton_) {}
 
 const std::string& GestureFigures::name(int label) const {
@@ -102,16 +111,37 @@ std::string GestureFigures::label_text() const {
 
 perform::Performance GestureFigures::perform(std::span<const int> labels) const {
   auto performance = perform::perform(information_, labels, {});
-  perform::constrain(performance, default_hand_shape());
+  if (model_->is_hand()) perform::constrain(performance, default_hand_shape());
   return performance;
 }
 
-picture::Figure GestureFigures::pose(const HandAngles& angles_rad) const {
+picture::Figure GestureFigures::pose(const perform::Pose& angles_rad) const {
+  if (body_) return shape_.pose(body_->pose(angles_rad).frame);
   Frame frame;
   frame.skeleton = skeleton_->id;
   frame.joint_count = static_cast<std::uint16_t>(skeleton_->joints.size());
-  set_hand_angles(*skeleton_, angles_rad, frame);
+  set_hand_angles(*skeleton_, perform::hand_of(angles_rad), frame);
   return shape_.pose(frame);
+}
+
+report::Figure GestureFigures::strip_of(const std::string& title, const std::string& sentence,
+                                        const std::vector<picture::StripRow>& rows) const {
+  const double heading_rad = body_ ? body_->heading_rad() : 0.0;
+  return report::gesture_strip(title, sentence, rows,
+                               picture::Camera(picture::View::kFront, shape_.facing(heading_rad)),
+                               body_.has_value());
+}
+
+report::Figure GestureFigures::trajectories_of(const std::string& title,
+                                               const std::string& sentence,
+                                               const std::vector<report::AngleTrajectory>& angles,
+                                               const std::vector<report::LabelSpan>& spans) const {
+  return report::angle_trajectories(
+      title,
+      sentence + (model_->is_hand() ? ""
+                                    : " Of each group the angle is shown that moves most in the "
+                                      "training recordings, about its mean over them."),
+      model_->is_hand() ? "flexion" : "angle", angles, spans);
 }
 
 report::Figure GestureFigures::strip() const {
@@ -123,29 +153,32 @@ report::Figure GestureFigures::strip() const {
     const int held = range_of(performance, k, kHoldStart, kHoldEnd).middle();
     for (const auto& [frame, words] : {std::pair(moving, "to " + label), std::pair(held, label)}) {
       row.poses.push_back(
-          {.figure = pose(perform::hand_of(performance.angles[static_cast<std::size_t>(frame)])),
-           .caption = words});
+          {.figure = pose(performance.angles[static_cast<std::size_t>(frame)]), .caption = words});
     }
   }
+  const char* const part = model_->is_hand() ? "finger" : "group";
   std::string never;
   for (const gesture::Label& label : model_->labels) {
     if (!label.trained) never += (never.empty() ? "" : ", ") + label.name;
   }
-  return report::hand_strip(
+  return strip_of(
       "\"" + label_text() + "\" as the model performs it",
-      fmt::format(
-          "From left to right, two poses a gesture, on the way to it and held, {:.1f} s in "
-          "all; {}.{}",
-          static_cast<double>(performance.angles.size()) / performance.rate_hz, shape_.legend(),
-          never.empty() ? "" : " Never recorded, composed finger by finger: " + never + "."),
-      {row}, picture::Camera(picture::View::kFront, shape_.facing(0.0)));
+      fmt::format("From left to right, two poses a gesture, on the way to it and held, {:.1f} s in "
+                  "all; {}.{}",
+                  static_cast<double>(performance.angles.size()) / performance.rate_hz,
+                  shape_.legend(),
+                  never.empty()
+                      ? ""
+                      : fmt::format(" Never recorded, composed {} by {}: {}.", part, part, never)),
+      {row});
 }
 
 report::Figure GestureFigures::trajectories() const {
   const auto performance = perform(labels_);
-  auto fingers = all_fingers();
+  const auto channels = shown_channels(*model_);
+  auto angles = no_angles(*model_, channels);
   for (int t = 0; t < std::ssize(performance.angles); ++t) {
-    add_frame(performance, t, t / performance.rate_hz, fingers);
+    add_frame(performance, t, t / performance.rate_hz, channels, angles);
   }
   std::vector<report::LabelSpan> spans;
   for (std::size_t k = 0; k < labels_.size(); ++k) {
@@ -153,11 +186,11 @@ report::Figure GestureFigures::trajectories() const {
     spans.push_back(
         {name(labels_[k]), all.from / performance.rate_hz, all.to / performance.rate_hz});
   }
-  return report::finger_trajectories(
+  return trajectories_of(
       "The performed angles, with what the model leaves open",
       "Lines are what is performed; where the band is wide, recordings differed and the model "
       "leaves room, where it is narrow, the pose is certain. Dashed lines begin a gesture.",
-      fingers, spans);
+      angles, spans);
 }
 
 std::optional<report::Figure> GestureFigures::over(const gesture::Recording& recording) const {
@@ -171,12 +204,13 @@ std::optional<report::Figure> GestureFigures::over(const gesture::Recording& rec
   }
   if (labels.empty()) return std::nullopt;
   const auto performance = perform(labels);
-  auto fingers = all_fingers();
+  const auto channels = shown_channels(*model_);
+  auto angles = no_angles(*model_, channels);
   const double period_s = 1.0 / recording.rate_hz;
   for (int t = segments.front().begin; t < segments.back().end; ++t) {
-    for (std::size_t f = 0; f < fingers.size(); ++f) {
-      const auto channel = static_cast<Eigen::Index>(flexion_of(f));
-      fingers[f].recorded.push_back({t * period_s, kDegrees * recording.angles_rad(t, channel)});
+    for (std::size_t g = 0; g < angles.size(); ++g) {
+      const auto channel = static_cast<Eigen::Index>(channels[g]);
+      angles[g].recorded.push_back({t * period_s, kDegrees * recording.angles_rad(t, channel)});
     }
   }
   std::vector<report::LabelSpan> spans;
@@ -186,15 +220,15 @@ std::optional<report::Figure> GestureFigures::over(const gesture::Recording& rec
     const double stretch = static_cast<double>(segment.frames()) / (performed.to - performed.from);
     for (int t = performed.from; t < performed.to; ++t) {
       const double frame = segment.begin + (t + 0.5 - performed.from) * stretch;
-      add_frame(performance, t, frame * period_s, fingers);
+      add_frame(performance, t, frame * period_s, channels, angles);
     }
     spans.push_back({segment.label, segment.begin * period_s, segment.end * period_s});
   }
-  return report::finger_trajectories(
+  return trajectories_of(
       "A recording and the model's motion for the same labels",
       "The model knows the labels alone; each gesture is stretched to the recorded one's length. "
-      "Where the recorded line stays within the band, the model describes this hand.",
-      fingers, spans);
+      "Where the recorded line stays within the band, the model describes this movement.",
+      angles, spans);
 }
 
 std::optional<report::Figure> GestureFigures::unseen(const gesture::FeatureMatrix& poses,
@@ -205,69 +239,24 @@ std::optional<report::Figure> GestureFigures::unseen(const gesture::FeatureMatri
   for (std::size_t k = 0; k < labels_.size(); ++k) {
     if (model_->labels[static_cast<std::size_t>(labels_[k])].trained) continue;
     const int held = range_of(performance, k, kHoldStart, kHoldEnd).middle();
-    const HandAngles angles = perform::hand_of(performance.angles[static_cast<std::size_t>(held)]);
-    const Eigen::Map<const Eigen::RowVectorXd> wanted(angles.data(), kHandChannels);
+    const perform::Pose& wanted = performance.angles[static_cast<std::size_t>(held)];
+    const Eigen::Map<const Eigen::RowVectorXd> row(wanted.data(), poses.cols());
     Eigen::Index at = 0;
-    const double squares = (poses.rowwise() - wanted).rowwise().squaredNorm().minCoeff(&at);
-    HandAngles real{};
-    std::copy_n(poses.row(at).data(), kHandChannels, real.begin());
-    performed.poses.push_back({.figure = pose(angles), .caption = name(labels_[k])});
-    nearest.poses.push_back(
-        {.figure = pose(real),
-         .caption = fmt::format("{:.1f}° off", kDegrees * std::sqrt(squares / kHandChannels))});
+    (poses.rowwise() - row).rowwise().squaredNorm().minCoeff(&at);
+    const perform::Pose real(poses.row(at).begin(), poses.row(at).end());
+    const double off_deg = kDegrees * gesture::apart(*model_, wanted, real).rms_rad();
+    performed.poses.push_back({.figure = pose(wanted), .caption = name(labels_[k])});
+    nearest.poses.push_back({.figure = pose(real), .caption = fmt::format("{:.1f}° off", off_deg)});
   }
   if (performed.poses.empty()) return std::nullopt;
-  return report::hand_strip(
+  return strip_of(
       "Gestures that were never recorded, beside real poses",
-      "Above what the model composes, below the recorded pose nearest to it (rms over all angles): "
-      "a reference that shows these gestures says how right they are; one that does not, how new.",
-      {performed, nearest}, picture::Camera(picture::View::kFront, shape_.facing(0.0)));
-}
-
-report::Figure GestureFigures::durations() const {
-  std::vector<report::LabelDurations> all;
-  for (int label = 0; label < std::ssize(model_->labels); ++label) {
-    const gesture::DurationGaussian& frames = gesture::duration(*model_, {label, label, label});
-    report::LabelDurations durations{
-        .label = name(label),
-        .recorded = model_->labels[static_cast<std::size_t>(label)].trained,
-        .mean_s = {},
-        .deviation_s = {}};
-    for (std::size_t s = 0; s < gesture::kStates; ++s) {
-      durations.mean_s.push_back(frames.mean[s] / model_->rate_hz);
-      durations.deviation_s.push_back(std::sqrt(frames.variance[s]) / model_->rate_hz);
-    }
-    all.push_back(std::move(durations));
-  }
-  return report::state_durations(all);
-}
-
-std::vector<report::Figure> GestureFigures::trees() const {
-  constexpr int kMiddle = 2, kFourth = 3;  // the tree that the paper shows
-  const auto drawn = [&](const gesture::TreeChoice& choice) {
-    std::vector<report::QuestionTree> trees;
-    for (const auto& tree : gesture::draw_trees(*model_, choice)) {
-      trees.push_back(question_tree(tree));
-    }
-    return trees;
-  };
-  std::vector<report::Figure> figures{
-      report::decision_trees("The decision tree of the middle finger in state 4",
-                             drawn({.state = kFourth, .group = kMiddle}), false)};
-  for (int f = 0; f < kFingers; ++f) {
-    figures.push_back(report::decision_trees(
-        fmt::format("All trees of the {} finger", kFingerNames[static_cast<std::size_t>(f)]),
-        drawn({.state = -1, .group = f}), true));
-  }
-  return figures;
-}
-
-report::Figure GestureFigures::lag(std::span<const LagPoint> curve) const {
-  std::vector<report::LagError> errors;
-  for (const LagPoint& point : curve) {
-    errors.push_back({point.frames, point.rms_deg, point.max_deg, point.jerk_ratio});
-  }
-  return report::lag_error(errors, model_->rate_hz);
+      fmt::format(
+          "Above what the model composes, below the recorded pose nearest to it (rms over all {}): "
+          "a reference that shows these gestures says how right they are; one that does not, how "
+          "new.",
+          model_->is_hand() ? "angles" : "joints"),
+      {performed, nearest});
 }
 
 }  // namespace posed::cli

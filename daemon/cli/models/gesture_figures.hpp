@@ -10,17 +10,22 @@
 
 #include "daemon/cli/models/lag_curve.hpp"
 #include "daemon/picture/figure.hpp"
+#include "daemon/report/gesture_sections.hpp"
 #include "daemon/report/page.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/recording.hpp"
+#include "models/perform/body_performance.hpp"
 #include "models/perform/perform.hpp"
+#include "proto/clip/clip.hpp"
 
 namespace posed::cli {
 
 class GestureFigures {
  public:
-  // `labels`: what is performed, indices into the model's; at least one.
-  GestureFigures(std::shared_ptr<const gesture::GestureModel> model, std::vector<int> labels);
+  // `labels`: what is performed, indices into the model's; at least one. `body`: who performs a
+  // model of bodies; empty for one of hands.
+  GestureFigures(std::shared_ptr<const gesture::GestureModel> model, std::vector<int> labels,
+                 std::optional<perform::BodyFigure> body);
 
   // The performance as a strip, two poses a label.
   [[nodiscard]] report::Figure strip() const;
@@ -30,7 +35,7 @@ class GestureFigures {
   // without labels of the model.
   [[nodiscard]] std::optional<report::Figure> over(const gesture::Recording& recording) const;
   // Each label of the model that was not recorded, in its hold, beside the nearest of these poses
-  // [frame][45], rad; empty where all were recorded.
+  // [frame][channel], rad; empty where all were recorded.
   [[nodiscard]] std::optional<report::Figure> unseen(const gesture::FeatureMatrix& poses,
                                                      const std::string& from) const;
   [[nodiscard]] report::Figure durations() const;
@@ -44,12 +49,19 @@ class GestureFigures {
 
  private:
   [[nodiscard]] perform::Performance perform(std::span<const int> labels) const;
-  [[nodiscard]] picture::Figure pose(const HandAngles& angles_rad) const;
+  [[nodiscard]] picture::Figure pose(const perform::Pose& angles_rad) const;
+  [[nodiscard]] report::Figure strip_of(const std::string& title, const std::string& sentence,
+                                        const std::vector<picture::StripRow>& rows) const;
+  [[nodiscard]] report::Figure trajectories_of(const std::string& title,
+                                               const std::string& sentence,
+                                               const std::vector<report::AngleTrajectory>& angles,
+                                               const std::vector<report::LabelSpan>& spans) const;
   [[nodiscard]] const std::string& name(int label) const;
 
   std::shared_ptr<const gesture::GestureModel> model_;
   std::vector<int> labels_;
   trajectory::StateInformation information_;
+  std::optional<perform::BodyFigure> body_;
   std::shared_ptr<const Skeleton> skeleton_;
   picture::FigureShape shape_;
 };
@@ -57,8 +69,8 @@ class GestureFigures {
 // Which label the live stage recognises where another was given; empty for a model that it cannot
 // use, with more labels than it follows.
 [[nodiscard]] std::optional<report::Figure> confusion_of(
-    const gesture::GestureModel& model, const std::vector<gesture::Recording>& recordings,
-    const std::string& measured_on);
+    const gesture::GestureModel& model, const clip::Clip& body,
+    const std::vector<gesture::Recording>& recordings, const std::string& measured_on);
 
 // The paper's string where the model has its labels, else every label once.
 [[nodiscard]] std::vector<int> labels_to_show(const gesture::GestureModel& model);

@@ -4,21 +4,10 @@
 
 #include "daemon/cli/json_numbers.hpp"
 #include "daemon/cli/models/gesture_figures.hpp"
+#include "daemon/cli/models/gesture_measures.hpp"
 
 namespace posed::cli {
 namespace {
-
-gesture::FeatureMatrix all_poses(const std::vector<gesture::Recording>& recordings) {
-  Eigen::Index frames = 0;
-  for (const gesture::Recording& recording : recordings) frames += recording.angles_rad.rows();
-  gesture::FeatureMatrix poses(frames, kHandChannels);
-  frames = 0;
-  for (const gesture::Recording& recording : recordings) {
-    poses.middleRows(frames, recording.angles_rad.rows()) = recording.angles_rad;
-    frames += recording.angles_rad.rows();
-  }
-  return poses;
-}
 
 void add_comparison(const GestureReport& report, const GestureFigures& figures,
                     const gesture::GestureModel& model,
@@ -29,7 +18,7 @@ void add_comparison(const GestureReport& report, const GestureFigures& figures,
   if (const auto unseen = figures.unseen(all_poses(recordings), report.recorded_by)) {
     page.add(*unseen);
   }
-  if (const auto confusion = confusion_of(model, recordings, report.recorded_by)) {
+  if (const auto confusion = confusion_of(model, report.body, recordings, report.recorded_by)) {
     page.add(*confusion);
   }
 }
@@ -40,7 +29,13 @@ Result<> write_gesture_report(const GestureReport& report,
                               const std::shared_ptr<const gesture::GestureModel>& model,
                               const std::vector<gesture::Recording>& recordings,
                               const nlohmann::json& figures, const std::filesystem::path& path) {
-  const GestureFigures drawn(model, report.labels);
+  std::optional<perform::BodyFigure> body;
+  if (!model->is_hand()) {
+    auto figure = perform::BodyFigure::of(*model, report.body);
+    if (!figure) return std::unexpected(figure.error());
+    body = std::move(*figure);
+  }
+  const GestureFigures drawn(model, report.labels, std::move(body));
   report::Page page(report.title, report.command);
   page.verdict(figures["verdict"].get<std::string>(), report.good);
   if (figures.contains("warnings")) {

@@ -11,6 +11,7 @@
 #include "daemon/cli/models/lag_curve.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/recording.hpp"
+#include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::cli {
@@ -21,6 +22,7 @@ struct GestureReport {
   std::vector<int> labels;        // what is performed; at least one
   bool good = true;               // the verdict's news
   std::vector<LagPoint> curve{};  // empty: not computed yet
+  clip::Clip body{};              // of a model of bodies: whose figure is drawn
 };
 
 // `recordings`: what the model is compared with; without labels only its poses are, without any

@@ -14,15 +14,6 @@ namespace {
 constexpr double kWidth = 640.0, kHeight = 400.0;
 constexpr double kLeft = 64.0, kRight = 16.0, kTop = 40.0, kBottom = 52.0;
 
-motion::Rows rows_of(const perform::Performance& performance) {
-  motion::Rows rows(static_cast<Eigen::Index>(performance.angles.size()), kHandChannels);
-  for (Eigen::Index t = 0; t < rows.rows(); ++t) {
-    rows.row(t) = Eigen::Map<const Eigen::RowVectorXd>(
-        performance.angles[static_cast<std::size_t>(t)].data(), kHandChannels);
-  }
-  return rows;
-}
-
 // Positions on the page; the vertical axis begins and ends at a power of ten.
 struct Axes {
   double most_frames;
@@ -77,13 +68,18 @@ std::string line(const Axes& axes, std::span<const LagPoint> curve, const char* 
 
 std::vector<LagPoint> lag_curve(const trajectory::StateInformation& information,
                                 std::span<const int> labels) {
-  const motion::Rows full = rows_of(perform::perform(information, labels, {}));
+  const auto rows_of = [&](const perform::PerformOptions& options) {
+    return perform::recording_of(information.model(),
+                                 perform::perform(information, labels, options))
+        .angles_rad;
+  };
+  const motion::Rows full = rows_of({});
   const double jerk = motion::jerk_rms(full);
   std::vector<LagPoint> curve;
   for (const int frames : {0, 1, 2, 3, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40}) {
     perform::PerformOptions options;
     options.look_ahead = frames;
-    const motion::Rows rows = rows_of(perform::perform(information, labels, options));
+    const motion::Rows rows = rows_of(options);
     const motion::Rows off = rows - full;
     curve.push_back(
         {frames, kDegrees * std::sqrt(off.squaredNorm() / static_cast<double>(off.size())),

@@ -48,7 +48,7 @@ struct TrainGestureOptions : GestureSources {
   std::string hand;                             // which of two hands in a clip
   std::string movement, resting{kDefaultRest};  // of a take that labels itself
   int embedded_rounds = 0;
-  bool auto_label = false;
+  bool auto_label = false, cycles = false;
   bool overwrite = false, json = false;
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
@@ -64,6 +64,9 @@ Result<> check_auto_label(const TrainGestureOptions& options) {
     return misuse(
         "--auto-label takes examples of all labels from --labels, or names a take's one movement "
         "with --movement");
+  }
+  if (options.movement.empty() && options.cycles) {
+    return misuse("--cycles cuts a take of one movement; name it: --movement");
   }
   if (options.movement.empty() && options.body) {
     return misuse("--auto-label from examples is for hands; name the take's movement: --movement");
@@ -95,6 +98,8 @@ Result<> check(const TrainGestureOptions& options) {
     if (auto useful = check_auto_label(options); !useful) return useful;
   } else if (!options.movement.empty()) {
     return misuse("--movement labels a take; add --auto-label");
+  } else if (options.cycles) {
+    return misuse("--cycles says how --auto-label cuts a take of one --movement; add both");
   } else if (options.clips.size() != options.labels.size()) {
     return misuse("name one label file for each clip: --clip A.csv B.csv --labels A.lab B.lab");
   }
@@ -142,9 +147,6 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   auto data = read_gesture_data(options, ranks.leads());
   if (!data) return std::unexpected(data.error());
   const std::vector<gesture::Recording>& recordings = data->recordings;
-  if (!options.report.empty() && !data->vocabulary.is_hand()) {
-    return misuse("--report draws the gestures of hands; leave it out for a body");
-  }
   gesture::TrainOptions train_options;
   train_options.vocabulary = std::move(data->vocabulary);
   train_options.embedded_rounds = options.embedded_rounds;
@@ -162,12 +164,15 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
                                     : "usable with care: " + std::to_string(warnings) +
                                           " warnings above say what to record more of";
   if (!options.report.empty() && ranks.leads()) {
+    auto body = figure_of(training->model, options.clips.front(), options.read);
+    if (!body) return std::unexpected(body.error());
     const auto model = std::make_shared<const gesture::GestureModel>(std::move(training->model));
     const auto written = write_gesture_report({.title = "Training of gestures",
                                                .command = "posed train gesture",
                                                .recorded_by = "the training recordings",
                                                .labels = labels_to_show(*model),
-                                               .good = warnings == 0},
+                                               .good = warnings == 0,
+                                               .body = std::move(*body)},
                                               model, recordings, report, options.report);
     if (!written) return std::unexpected(written.error());
   }
@@ -186,6 +191,7 @@ int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
                        .movement = options.movement,
                        .rest = options.resting,
                        .body = options.body,
+                       .cycles = options.cycles,
                        .rate_hz = options.rate_hz,
                        .read = options.read,
                        .json = options.json});
@@ -261,6 +267,9 @@ void add_train_gesture(CLI::App& train_command, int& exit_code,
       "--movement", options->movement,
       "With --auto-label: the take is one movement of this name, from rest to rest");
   command->add_option("--rest", options->resting, "The label of its rest")->capture_default_str();
+  command->add_flag(
+      "--cycles", options->cycles,
+      "Cut its hold at each cycle, so that a wave is performed as often as one likes");
   add_tree_options(*command, options->trees);
   command->add_option("--out", options->out, "Where to write the model")->required();
   add_report_option(*command, options->report);

@@ -83,7 +83,7 @@ std::vector<Figure> style_figures(double value, const std::string& words, std::s
 
 std::vector<Figure> other_figures(double value, const std::string& words, std::size_t count) {
   std::vector<LabelDurations> durations;
-  std::vector<FingerTrajectory> fingers;
+  std::vector<AngleTrajectory> angles;
   std::vector<LabelSpan> spans;
   std::vector<LagError> lags;
   Confusion confusion{.labels = {}, .given = {}, .share = {}, .frames = {}, .measured_on = words};
@@ -91,7 +91,7 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
   PercentileBars bars{.title = words, .sentence = words, .quantity = words, .peers = {}};
   for (std::size_t i = 0; i < count; ++i) {
     durations.push_back({words, false, {value, value}, {value, value}});
-    fingers.push_back({words, {{value, value}}, {{value, 1.0}}, {{1.0, value}}, {{1.0, value}}});
+    angles.push_back({words, {{value, value}}, {{value, 1.0}}, {{1.0, value}}, {{1.0, value}}});
     spans.push_back({words, value, value});
     lags.push_back({static_cast<int>(i), value, value, value});
     confusion.labels.push_back(words);
@@ -103,7 +103,7 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
   }
   trees.push_back({words, {}});
   return {state_durations(durations),
-          finger_trajectories(words, words, fingers, spans),
+          angle_trajectories(words, words, words, angles, spans),
           lag_error(lags, 30.0),
           label_confusion(confusion),
           decision_trees(words, trees, true),

@@ -39,6 +39,29 @@ TEST_CASE("A take of one movement is labelled at its onsets", "[movement]") {
   }
 }
 
+TEST_CASE("A hold is cut so that it can be performed for as long as one likes", "[movement]") {
+  for (const double rate_hz : {30.0, 120.0}) {
+    const Recording wave = raised({.right = true, .wave = true, .rate_hz = rate_hz});
+    const auto whole = propose_movement(wave, "wave", "rest").value();
+    const auto segments = propose_movement(wave, "wave", "rest", Hold::kCycles).value();
+    REQUIRE(segments.size() > 5);
+    CHECK(segments.front().begin == whole.front().begin);
+    CHECK(segments.back().begin == whole.back().begin);
+    for (std::size_t i = 1; i + 1 < segments.size(); ++i) {
+      CHECK(segments[i].label == "wave");
+      CHECK(segments[i].begin == segments[i - 1].end);
+      const bool last = i + 2 == segments.size();
+      if (!last) CHECK(segments[i].frames() / rate_hz == Approx(1.0 / test::kWave_hz).margin(0.05));
+    }
+    // A still hold is cut in its middle.
+    const auto raise = propose_movement(raised({.right = true, .rate_hz = rate_hz}), "raise",
+                                        "rest", Hold::kCycles);
+    REQUIRE(raise->size() == 3);
+    CHECK((*raise)[1].label == "raise");
+    CHECK((*raise)[1].frames() / rate_hz == Approx(0.42).margin(0.15));
+  }
+}
+
 TEST_CASE("Takes that are not one movement are refused", "[movement]") {
   CHECK(movement_refusal(raised({})).find("nothing moves") == 0);
   Recording half = raised({.left = true});

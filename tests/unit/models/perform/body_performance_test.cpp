@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <numbers>
 #include <utility>
 
 #include <catch2/catch.hpp>
@@ -27,13 +28,47 @@ double jerk_of(const motion::Rows& rows, const gesture::ChannelGroup& group) {
   return motion::jerk_rms(rows.middleCols(group.first, group.channels)) / kDegree;
 }
 
-motion::Rows rows_of(const Performance& performance) {
-  motion::Rows rows(std::ssize(performance.angles), std::ssize(performance.angles.front()));
-  for (Eigen::Index t = 0; t < rows.rows(); ++t) {
-    const Pose& pose = performance.angles[static_cast<std::size_t>(t)];
-    rows.row(t) = Eigen::Map<const Eigen::RowVectorXd>(pose.data(), rows.cols());
+// A motion without what changes from frame to frame: the filter 1/4, 1/2, 1/4 halves 7.5 Hz at 30.
+motion::Rows without_ripple(const motion::Rows& rows) {
+  motion::Rows smooth = rows;
+  for (Eigen::Index t = 1; t + 1 < rows.rows(); ++t) {
+    smooth.row(t) = 0.25 * rows.row(t - 1) + 0.5 * rows.row(t) + 0.25 * rows.row(t + 1);
   }
-  return rows;
+  return smooth;
+}
+
+// How the right arm waves in the middle half of a recording's first label, or of the labels of that
+// name that follow each other.
+struct Wave {
+  double deviation_deg = 0.0, rate_hz = 0.0;
+};
+Wave wave_of(const gesture::Vocabulary& vocabulary, gesture::Recording recording,
+             const std::string& label) {
+  int from = -1, to = 0;
+  for (const gesture::Segment& segment : recording.segments) {
+    if (segment.label != label) continue;
+    if (from < 0) from = segment.begin;
+    to = segment.end;
+  }
+  const auto group =
+      std::ranges::find(vocabulary.groups, "right-arm", &gesture::ChannelGroup::name);
+  recording.angles_rad =
+      gesture::FeatureMatrix(recording.angles_rad.middleCols(group->first, group->channels));
+  const int quarter = (to - from) / 4;
+  const auto found = gesture::oscillation_in(recording, from + quarter, to - quarter);
+  Wave wave{.deviation_deg = found.deviation_rad / kDegree};
+  if (found.cycles.size() > 1) {
+    wave.rate_hz = recording.rate_hz * static_cast<double>(found.cycles.size() - 1) /
+                   (found.cycles.back() - found.cycles.front());
+  }
+  return wave;
+}
+
+// The label, so many times between rests.
+std::string repeated(const std::string& label, int times) {
+  std::string text = "rest ";
+  for (int i = 0; i < times; ++i) text += label + " ";
+  return text + "rest";
 }
 
 // Takes of one movement that real people made: 001 to 004 are learnt from, 005 and 006 kept back.
@@ -41,44 +76,51 @@ motion::Rows rows_of(const Performance& performance) {
 class RealArms {
  public:
   RealArms(std::filesystem::path folder, std::vector<std::string> movements,
-           const std::vector<test::ArmLabel>& labels)
+           const std::vector<test::ArmLabel>& labels, gesture::Hold hold = gesture::Hold::kWhole)
       : folder_(std::move(folder)) {
     std::vector<ArmTake> takes;
     for (int number = 1; number <= 4; ++number) {
       for (const std::string& movement : movements) takes.push_back(take(movement, number));
     }
-    model = test::train_arms(takes, test::arm_vocabulary(*takes.front().clip.skeleton, labels));
+    model =
+        test::train_arms(takes, test::arm_vocabulary(*takes.front().clip.skeleton, labels), hold);
   }
 
   // The squared angles [deg^2] between a held pose's arm and that of the movement's takes, and how
   // its jerk compares with theirs.
   double squared_off_deg(const Performance& performance, const std::string& arm,
-                         const std::string& movement) const {
-    const Eigen::VectorXd held = test::held_pose(performance, 0);
+                         const std::string& movement, std::size_t label = 0) const {
+    const Eigen::VectorXd held = test::held_pose(performance, label);
     const auto group = std::ranges::find(model.groups, arm, &gesture::ChannelGroup::name);
-    double squares = 0.0, least = 1e9, most = 0.0;
+    double squares = 0.0, least = 1e9, most = 0.0, smooth = 0.0;
     for (const int number : {5, 6}) {
-      const ArmTake kept = take(movement, number);
-      auto recording = gesture::body_recording(kept.clip, 30.0, model);
-      REQUIRE(recording.has_value());
-      recording->segments = gesture::propose_movement(*recording, movement, "rest").value();
-      for (const gesture::LabelPose& pose : gesture::label_poses({*recording})) {
+      const gesture::Recording recording = seen(movement, number);
+      for (const gesture::LabelPose& pose : gesture::label_poses({recording})) {
         if (pose.name != movement) continue;
         const Eigen::Map<const Eigen::VectorXd> real(pose.angles_rad.data(), held.size());
         squares += test::squared_apart_deg(model, arm, held, real) / 2.0;
       }
-      least = std::min(least, jerk_of(recording->angles_rad, *group));
-      most = std::max(most, jerk_of(recording->angles_rad, *group));
+      least = std::min(least, jerk_of(recording.angles_rad, *group));
+      most = std::max(most, jerk_of(recording.angles_rad, *group));
+      smooth += jerk_of(without_ripple(recording.angles_rad), *group) / 2.0;
     }
-    const double jerk = jerk_of(rows_of(performance), *group);
+    const double jerk = jerk_of(recording_of(model, performance).angles_rad, *group);
     std::cout << arm << " as in " << movement << ": " << std::sqrt(squares / 4.0)
               << " deg off, jerk " << jerk << " deg/frame^3, real " << least << " to " << most
-              << "\n";
+              << ", without ripple " << smooth << "\n";
     CHECK(jerk <= most);
     return squares;
   }
 
   gesture::GestureModel model;
+
+  // A take as the model sees it, labelled as a whole.
+  [[nodiscard]] gesture::Recording seen(const std::string& movement, int number) const {
+    auto recording = gesture::body_recording(take(movement, number).clip, 30.0, model);
+    REQUIRE(recording.has_value());
+    recording->segments = gesture::propose_movement(*recording, movement, "rest").value();
+    return std::move(*recording);
+  }
 
  private:
   [[nodiscard]] ArmTake take(const std::string& movement, int number) const {
@@ -162,6 +204,67 @@ TEST_CASE("Both arms of a real person are raised, which nobody recorded", "[body
   const double squares = arms.squared_off_deg(performance, "left-arm", "raise-left") +
                          arms.squared_off_deg(performance, "right-arm", "raise-right");
   CHECK(std::sqrt(squares / 8.0) < 11.0);  // of eight joints
+}
+
+TEST_CASE("A wave that is cut at its cycles waves, for as long as it is asked to", "[body]") {
+  std::vector<ArmTake> takes;
+  for (std::uint32_t take = 1; take <= 4; ++take) {
+    takes.push_back(
+        {test::raise_take({.right = true, .wave = true, .take = 40 + take}), "wave-right"});
+    takes.push_back({test::raise_take({.left = true, .take = take}), "raise-left"});
+  }
+  const auto vocabulary = test::arm_vocabulary(
+      *takes.front().clip.skeleton,
+      {{"rest", 0, 0}, {"raise-left", 1, 0}, {"wave-right", 0, 1}, {"both", 1, 1}});
+  const auto waved = [&](gesture::Hold hold, const std::string& label, int times) {
+    const gesture::GestureModel model = test::train_arms(takes, vocabulary, hold);
+    const auto performance = test::perform_text(model, repeated(label, times));
+    return wave_of(model, recording_of(model, performance), label);
+  };
+  const double real_deg = test::kWave_deg / std::numbers::sqrt2;
+  for (const int times : {5, 9}) {
+    const Wave wave = waved(gesture::Hold::kCycles, "wave-right", times);
+    CHECK(wave.deviation_deg > 0.7 * real_deg);
+    CHECK(wave.rate_hz == Approx(test::kWave_hz).epsilon(0.1));
+  }
+  CHECK(waved(gesture::Hold::kWhole, "wave-right", 1).deviation_deg < 0.3 * real_deg);
+}
+
+TEST_CASE("A real wave waves as those do that were kept back", "[body][real]") {
+  const auto folder = test::shared("data/styles");
+  if (!folder) {
+    SKIP_WITHOUT_SHARED();
+  }
+  const std::vector<test::ArmLabel> labels{
+      {"rest", 0, 0}, {"raise-left", 1, 0}, {"wave-right", 0, 1}, {"wave-raise", 1, 1}};
+  for (const auto hold : {gesture::Hold::kWhole, gesture::Hold::kCycles}) {
+    const RealArms arms(*folder, {"raise-left", "wave-right"}, labels, hold);
+    const bool cut = hold == gesture::Hold::kCycles;
+    for (const std::string label : {"wave-right", "wave-raise"}) {
+      const auto performance = test::perform_text(arms.model, repeated(label, cut ? 7 : 1));
+      const Wave wave = wave_of(arms.model, recording_of(arms.model, performance), label);
+      std::cout << label << (cut ? ", cut at cycles: " : ", whole: ") << wave.deviation_deg
+                << " deg at " << wave.rate_hz << " Hz\n";
+      if (!cut) {
+        CHECK(wave.deviation_deg < 5.0);
+        continue;
+      }
+      for (const int number : {5, 6}) {
+        const Wave real = wave_of(arms.model, arms.seen("wave-right", number), "wave-right");
+        std::cout << "take " << number << ": " << real.deviation_deg << " deg at " << real.rate_hz
+                  << " Hz\n";
+        CHECK(wave.deviation_deg == Approx(real.deviation_deg).epsilon(0.15));
+        CHECK(wave.rate_hz == Approx(real.rate_hz).epsilon(0.15));
+      }
+      // The other arm stays up while the wave goes on.
+      if (label != "wave-raise") continue;
+      for (const std::size_t repetition : {2U, 4U, 6U}) {
+        const double squares =
+            arms.squared_off_deg(performance, "left-arm", "raise-left", repetition);
+        CHECK(std::sqrt(squares / 4.0) < 11.0);
+      }
+    }
+  }
 }
 
 TEST_CASE("One arm of a real person is raised while the other waves", "[body][real]") {

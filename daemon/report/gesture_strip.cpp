@@ -5,13 +5,14 @@
 namespace posed::report {
 namespace {
 
-constexpr double kHandRow_px = 110.0;
+constexpr double kHandRow_px = 110.0, kBodyRow_px = 170.0;
 
 }  // namespace
 
-Figure hand_strip(const std::string& title, const std::string& sentence,
-                  const std::vector<picture::StripRow>& rows, const picture::Camera& camera) {
-  const auto layout = picture::layout_of(rows, camera, kHandRow_px, false);
+Figure gesture_strip(const std::string& title, const std::string& sentence,
+                     const std::vector<picture::StripRow>& rows, const picture::Camera& camera,
+                     bool ground) {
+  const auto layout = picture::layout_of(rows, camera, ground ? kBodyRow_px : kHandRow_px, ground);
   auto strip = picture::draw_strip(rows, camera, layout, {.title = "", .sentence = ""});
   return {.title = title,
           .sentence = sentence,
