@@ -2,6 +2,7 @@
 // one canvas: the bodies, and the hands in an inset.
 import { Scene, Vector3 } from 'three';
 import { LANE_M, lanesOf } from './lanes.js';
+import { COARSE, FINE } from './capsule.js';
 import { Ground } from './ground.js';
 import { HandsView } from './hands_view.js';
 import { Lights } from './lights.js';
@@ -70,7 +71,7 @@ export class World {
 
   #enter(stream) {
     this.#leave(stream.name);
-    const performer = new Performer(stream, this.scene, this.theme);
+    const performer = new Performer(stream, this.scene, this.theme, this.fine ? FINE : COARSE);
     this.performers.set(stream.name, performer);
     if (stream.isHand) this.hands.add(performer);
     this.arrange();
