@@ -15,6 +15,9 @@ import { themeColours } from './palette.js';
 import { facing } from './facing.js';
 
 const MOST_PIXELS = 2; // per CSS pixel
+const TOOLS_PX = 46; // at the top of the scene, covered by the buttons
+const NAMES_PX = 90; // the same, by buttons and names
+const LEGEND_PX = 36; // the same at the bottom of the bodies, by the colours' meaning
 const CROWD = 5; // figures; of more only the styled ones have names
 const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
 
@@ -158,23 +161,28 @@ export class World {
     this.renderer.setPixelRatio(this.#pace.now.pixels * Math.min(devicePixelRatio, MOST_PIXELS));
     this.lights.sun.castShadow = this.#pace.now.shadows;
     this.renderer.setSize(width, height, false);
-    this.#areas.bodies = { left: 0, top: 0, width, height };
+    this.#areas.bodies = { left: 0, top: 0, width, height, covered: TOOLS_PX };
     const show = this.stage.dataset.show;
     this.#areas.hands = show === 'both' || show === 'hands' ? this.#insetArea() : null;
     this.views.resize(width, height, this.#covered());
-    if (this.#areas.hands) this.hands.resize(this.#areas.hands.width, this.#areas.hands.height);
+    if (this.#areas.hands) {
+      const { width: wide, height: high } = this.#areas.hands;
+      this.hands.resize(wide, high, show === 'hands' ? TOOLS_PX : 0);
+    }
     this.touch();
   }
 
-  // What the inset takes from the bodies, in CSS pixels: they stand beside it, or above it where it
-  // is as wide as the scene.
+  // What inset, names and legend take from the bodies, in CSS pixels: they stand beside the inset, or
+  // above it where it is as wide as the scene.
   #covered() {
-    if (!this.#areas.hands || this.stage.dataset.show !== 'both') return { right: 0, bottom: 0 };
+    if (!this.#areas.hands || this.stage.dataset.show !== 'both')
+      return { right: 0, bottom: LEGEND_PX, top: NAMES_PX };
     const { bodies, hands } = this.#areas;
     const wide = hands.width > 0.7 * bodies.width;
     return {
       right: wide ? 0 : bodies.width - hands.left,
-      bottom: wide ? bodies.height - hands.top : 0,
+      bottom: LEGEND_PX + (wide ? bodies.height - hands.top : 0),
+      top: NAMES_PX,
     };
   }
 
@@ -183,7 +191,8 @@ export class World {
     const { left, top, width, height } = this.inset
       .querySelector('.hands-area')
       .getBoundingClientRect();
-    return { left: left - outer.left, top: top - outer.top, width, height };
+    const covered = this.stage.dataset.show === 'hands' ? TOOLS_PX : 0;
+    return { left: left - outer.left, top: top - outer.top, width, height, covered };
   }
 
   // Shows the newest poses. shown(performer) is called for each that is new. Returns whether
@@ -237,7 +246,7 @@ export class World {
         Math.hypot(performer.centre.x - middle.x, performer.centre.z - middle.z),
       );
     }
-    if (count > 0) this.views.update(middle, span_m, jumped);
+    if (count > 0) this.views.update(middle, span_m, jumped, performance.now() / 1000);
     this.ground.follow(this.views.target);
     this.lights.follow(this.views.target);
   }
@@ -251,6 +260,7 @@ export class World {
       this.hands.controls.update();
       this.#render(this.hands.scene, this.hands.camera, hands, bodies.height);
     }
+    this.tags.begin();
     for (const performer of this.performers.values()) this.#tag(performer);
   }
 
