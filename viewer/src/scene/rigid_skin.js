@@ -1,5 +1,5 @@
-// Skinning for figures whose vertices each belong to one joint: three.js blends four bones a vertex,
-// four times as many reads of the bones' texture. The figure's bind matrix is the identity.
+// Skinning for figures whose vertices each belong to one joint: three.js blends four bones a vertex
+// and reads the bones' texture four times as often. The figure's bind matrix is the identity.
 
 const CHUNKS = {
   skinbase_vertex: 'mat4 bone = getBoneMatrix(skinIndex.x);',

@@ -1,8 +1,9 @@
-// node measure.mjs [SECONDS [ROUNDS [PAGE...]]]: how the page keeps up with 4 performers and 2 hands at
-// 120 Hz: pictures a second, script time of a picture, arrival to callback, glass to glass, growth of
-// memory, the time until it is ready. What does not depend on how busy the machine is: the processor's
-// time for a picture, in the page's script and in the process that draws. Several folders with pages
-// are measured in turns. Prints figures and asserts nothing: they are those of this machine.
+// node measure.mjs [SECONDS [ROUNDS [PAGE...]]]: how the page keeps up with 4 performers and 2
+// hands at 120 Hz: pictures a second, script time of a picture, arrival to callback, glass to
+// glass, growth of memory, the time until it is ready. What depends least on how busy the machine
+// is: the processor's time for a picture, in the page's script and in the process that draws.
+// Several folders with pages are measured in turns. Prints figures and asserts nothing: they are
+// this machine's.
 import { FakeBridge, PAGE } from '../support/fake_bridge.mjs';
 import { FakeDaemon } from '../support/fake_daemon.mjs';
 import { launch, openPage } from '../support/browser.mjs';
@@ -76,13 +77,14 @@ async function measure(folder) {
     console.log(
       `${passed_s + 10} s: ${rate.toFixed(1)} pictures/s at ${now.sharpness} of the pixels' width,`,
       `script p50 ${now.script_p50_ms.toFixed(1)} p95 ${now.script_p95_ms.toFixed(1)} ms,`,
-      `arrival to callback p95 ${now.callback_p95_ms.toFixed(1)} ms, glass p95 ${now.glass_p95_ms.toFixed(1)} ms,`,
-      `processor each: script ${each('script_ms')}, drawing ${each('draw_ms')}, heap ${now.heap_MB.toFixed(1)} MB`,
+      `arrival to callback p95 ${now.callback_p95_ms.toFixed(1)} ms,`,
+      `glass p95 ${now.glass_p95_ms.toFixed(1)} ms,`,
+      `processor each: script ${each('script_ms')}, drawing ${each('draw_ms')},`,
+      `heap ${now.heap_MB.toFixed(1)} MB`,
     );
   }
   await browser.close();
   await bridge.stop();
 }
 
-for (let round = 0; round < rounds; round += 1)
-  for (const folder of folders) await measure(folder);
+for (let round = 0; round < rounds; round += 1) for (const folder of folders) await measure(folder);

@@ -75,9 +75,7 @@ pageTest("the hands' view stays as turned, and a still scene rests", {}, async (
     return camera.position.toArray();
   });
   await page.waitForTimeout(2500); // some statistics later
-  const now = await page.evaluate(() =>
-    globalThis.posedPage.world.hands.camera.position.toArray(),
-  );
+  const now = await page.evaluate(() => globalThis.posedPage.world.hands.camera.position.toArray());
   now.forEach((value, i) => assert.ok(Math.abs(value - turned[i]) < 0.01, String(now)));
   bridge.daemon.rate_hz = 0; // no poses any more, but statistics
   await page.waitForFunction(
@@ -246,15 +244,19 @@ pageTest('a held key or two quick presses make one take', {}, async (page, bridg
   assert.deepEqual(takes(), [true, false]);
 });
 
-pageTest('a daemon that does not record says how to', { recording: false }, async (page, bridge) => {
-  const words = page.locator('.recording', { hasText: 'not recording' });
-  await words.waitFor(PATIENCE);
-  assert.match(await words.getAttribute('title'), /posed record/);
-  assert.equal(await page.getByLabel('Take name').isVisible(), false);
-  await page.locator('.stage canvas').focus();
-  await page.keyboard.press('s');
-  assert.ok(bridge.requests.every((request) => !request.take));
-});
+pageTest(
+  'a daemon that does not record says how to',
+  { recording: false },
+  async (page, bridge) => {
+    const words = page.locator('.recording', { hasText: 'not recording' });
+    await words.waitFor(PATIENCE);
+    assert.match(await words.getAttribute('title'), /posed record/);
+    assert.equal(await page.getByLabel('Take name').isVisible(), false);
+    await page.locator('.stage canvas').focus();
+    await page.keyboard.press('s');
+    assert.ok(bridge.requests.every((request) => !request.take));
+  },
+);
 
 pageTest(
   'names cover neither each other nor the buttons, whatever the view',
@@ -327,7 +329,10 @@ test('without WebGL the page says what to do', { timeout: 90000 }, async (contex
   await page.locator('.link-text', { hasText: 'this browser draws no WebGL' }).waitFor(PATIENCE);
   await page.waitForTimeout(1500); // what the bridge sends is no error
   assert.match(await page.locator('.link-text').innerText(), /hardware acceleration/);
-  assert.ok(page.errors.every((text) => text.includes('WebGL')), page.errors.join());
+  assert.ok(
+    page.errors.every((text) => text.includes('WebGL')),
+    page.errors.join(),
+  );
 });
 
 test(
