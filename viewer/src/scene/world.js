@@ -238,15 +238,16 @@ export class World {
       jumped ||= performer.jumped;
     }
     if (count > 0) middle.divideScalar(count);
-    let span_m = 0;
+    const [c, s] = [Math.cos(this.#yaw ?? 0), Math.sin(this.#yaw ?? 0)];
+    extent.row_m = 0;
+    extent.way_m = 0;
     for (const performer of this.performers.values()) {
       if (performer.stream.isHand || !performer.figure.group.visible) continue;
-      span_m = Math.max(
-        span_m,
-        Math.hypot(performer.centre.x - middle.x, performer.centre.z - middle.z),
-      );
+      const [x, z] = [performer.centre.x - middle.x, performer.centre.z - middle.z];
+      extent.row_m = Math.max(extent.row_m, Math.abs(c * x - s * z));
+      extent.way_m = Math.max(extent.way_m, Math.abs(s * x + c * z));
     }
-    if (count > 0) this.views.update(middle, span_m, jumped, performance.now() / 1000);
+    if (count > 0) this.views.update(middle, extent, jumped, performance.now() / 1000);
     this.ground.follow(this.views.target);
     this.lights.follow(this.views.target);
   }
@@ -291,3 +292,4 @@ export class World {
 
 const middle = new Vector3();
 const above = new Vector3();
+const extent = { row_m: 0, way_m: 0 };
