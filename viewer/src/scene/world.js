@@ -160,6 +160,7 @@ export class World {
     if (width === 0) return;
     this.renderer.setPixelRatio(this.#pace.now.pixels * Math.min(devicePixelRatio, MOST_PIXELS));
     this.lights.sun.castShadow = this.#pace.now.shadows;
+    this.ground.setShadows(this.#pace.now.shadows);
     this.renderer.setSize(width, height, false);
     this.#areas.bodies = { left: 0, top: 0, width, height, covered: TOOLS_PX };
     const show = this.stage.dataset.show;
