@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/report/gesture_sections.hpp"
@@ -9,6 +11,7 @@ namespace {
 
 constexpr double kCell_px = 54.0, kCellHeight_px = 34.0, kConfusionLeft_px = 190.0;
 constexpr double kConfusionTop_px = 48.0;
+constexpr const char* kColumns = "recognised label [% of the frames]";
 constexpr double kDeepest = 0.6;  // opacity of a full cell, on which text can still be read
 
 std::string cell_at(double x, double y, double share, bool agrees) {
@@ -26,9 +29,9 @@ std::string cell_at(double x, double y, double share, bool agrees) {
 
 Figure label_confusion(const Confusion& confusion) {
   std::string out = fmt::format(
-      "<text class=\"quiet\"{} y=\"16\">recognised label [% of the frames]"
-      "</text>\n<text class=\"quiet end\"{}{}>given label</text>\n",
-      attribute("x", kConfusionLeft_px), attribute("x", kConfusionLeft_px - 10.0),
+      "<text class=\"quiet\"{} y=\"16\">{}</text>\n"
+      "<text class=\"quiet end\"{}{}>given label</text>\n",
+      attribute("x", kConfusionLeft_px), kColumns, attribute("x", kConfusionLeft_px - 10.0),
       attribute("y", kConfusionTop_px - 10.0));
   for (std::size_t c = 0; c < confusion.labels.size(); ++c) {
     out += fmt::format(
@@ -46,17 +49,18 @@ Figure label_confusion(const Confusion& confusion) {
                      confusion.share[r][c], confusion.labels[c] == confusion.given[r]);
     }
   }
-  const auto columns = static_cast<double>(confusion.labels.size());
+  const double columns_px = kCell_px * static_cast<double>(confusion.labels.size());
   const auto rows = static_cast<double>(confusion.given.size());
-  return {.title = "Which gesture is recognised",
-          .sentence =
-              "Blue cells are right, orange ones are mistaken for another gesture, as is to "
-              "be expected near the border between two. Measured on " +
-              confusion.measured_on + ", frame by frame, as the live stage does.",
-          .drawings = {{.width_px = kConfusionLeft_px + kCell_px * columns + 8.0,
-                        .height_px = kConfusionTop_px + kCellHeight_px * rows + 8.0,
-                        .elements = std::move(out)}},
-          .tables = {}};
+  return {
+      .title = "Which gesture is recognised",
+      .sentence =
+          "Blue cells are right, orange ones are mistaken for another gesture, as is to "
+          "be expected near the border between two. Measured on " +
+          confusion.measured_on + ", frame by frame, as the live stage does.",
+      .drawings = {{.width_px = kConfusionLeft_px + std::max(columns_px, text_px(kColumns)) + 8.0,
+                    .height_px = kConfusionTop_px + kCellHeight_px * rows + 8.0,
+                    .elements = std::move(out)}},
+      .tables = {}};
 }
 
 }  // namespace posed::report

@@ -31,6 +31,7 @@ Figure style_map(const StyleMap& map) {
   }
   Plot plot(map_axis(map.of_axis, map.unit, 1, map.first_share, x),
             map_axis(map.of_axis, map.unit, 2, map.second_share, y), {.height_px = 420.0});
+  plot.make_scales_equal();  // distances have a meaning, and two marks are no noise made large
   for (std::size_t g = 0; g < groups.size(); ++g) {
     std::vector<Point> points;
     for (const StyleMark& mark : map.marks) {

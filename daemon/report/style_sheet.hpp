@@ -28,7 +28,7 @@ ul.warnings{margin:.5rem 0;padding-left:1.25rem}
 figure{margin:1.25rem 0 2rem}
 figure>svg,details>svg{display:block;margin:.5rem 0}
 .wide{overflow-x:auto}
-svg{max-width:100%;height:auto}
+svg{max-width:max(100%,36rem);height:auto}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem;margin:.5rem 0}
 th,td{padding:.25rem .75rem;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
 th{color:var(--soft);font-weight:600}

@@ -34,7 +34,8 @@ report::PosePaths::Path path_of(std::string name, const MatrixXd& points_rad) {
 }  // namespace
 
 std::string StyleCycles::what() const {
-  return fmt::format("{}{}{} to {}", motion, motion.empty() ? "" : ", ", source_name, target_name);
+  return fmt::format("{}{}\"{}\" to \"{}\"", motion, motion.empty() ? "" : ", ", source_name,
+                     target_name);
 }
 
 MatrixXd cycle_points(const MatrixXd& coefficients) {

@@ -236,9 +236,15 @@ Result<> StyleReport::write(const nlohmann::json& figures,
   add_figures("Styles", styles_, page);
   add_figures("What the model adds", cycles_, page);
   page.section("How it was learnt");
-  page.add(report::all_numbers("The kernel, and what it was learnt from",
-                               "Poses farther apart than the kernel's length, which counts over "
-                               "all joints together, know little of each other.",
+  std::string sentence =
+      "Poses farther apart than the kernel's length, which counts over all joints together, know "
+      "little of each other.";
+  if (kernel_.empty()) {
+    sentence +=
+        " No walker was left out to judge it: mode paper learns from all clips; the default mode "
+        "tries its kernels on walkers that they did not learn from.";
+  }
+  page.add(report::all_numbers("The kernel, and what it was learnt from", sentence,
                                kernel_numbers(figures)));
   for (const report::Figure& figure : kernel_) page.add(figure);
   add_figures("The clips", strides_, page);

@@ -4,12 +4,14 @@ import { Series } from './series.js';
 
 const POINTS = 1600; // 20 s at 60 Hz, and the quarter that is dropped at once
 const MOST_STAGES = 6;
+const MOST_CHANGES = 100; // of the label, that are kept
 
 export class History {
   latency = new Series(POINTS, 2); // ms from arrival: handed out by posed, drawn here
   stages = new Series(POINTS, MOST_STAGES); // µs in each
   label = new Series(POINTS, 1); // probability, %
   callback = new Series(POINTS, 1); // ms from arrival until the page's callback
+  changes = []; // {at_s, text}: when another label began, oldest first
   #since_s = -Infinity;
 
   // pose: the newest; drawn_ms: performance.now() after drawing; clock: a ClockMapping
@@ -25,6 +27,13 @@ export class History {
     if (pose.label || now_s - this.#since_s < 20)
       this.label.add(now_s, pose.label ? 100 * pose.labelProbability : NaN);
     if (pose.label) this.#since_s = now_s;
+    this.#change(now_s, pose.label);
+  }
+
+  #change(at_s, text) {
+    if (text === (this.changes.at(-1)?.text ?? '')) return;
+    this.changes.push({ at_s, text });
+    if (this.changes.length > MOST_CHANGES) this.changes.shift();
   }
 
   get labelled() {

@@ -40,7 +40,7 @@ export class Instruments {
     );
     this.label = new Plot(
       'Gesture',
-      'How sure posed is of the label; 100 %: it is performed.',
+      'Which gesture is recognised, and how sure posed is; 100 %: it is performed.',
       '%',
       [0, 105],
     );
@@ -116,6 +116,6 @@ export class Instruments {
     this.label.say(
       label ? `${performed ? 'performs ' : ''}${label} ${percent(labelProbability)}` : 'none',
     );
-    this.label.draw(history.label, performance.now() / 1000);
+    this.label.draw(history.label, performance.now() / 1000, history.changes);
   }
 }

@@ -25,6 +25,8 @@ function axis(label) {
 export class Plot {
   #plot = null;
   #names = [];
+  #words = []; // {at_s, text}: written where the time axis has them
+  #now_s = 0;
 
   // unit: of the y axis; range: of the y axis, or a function of [least, most]
   constructor(title, sentence, unit, range) {
@@ -69,7 +71,7 @@ export class Plot {
     const seconds = {
       ...axis('seconds ago'),
       size: 20,
-      incrs: [5],
+      incrs: [5, 10, 20],
       values: (_, ticks) => ticks.map((t) => (t === 0 ? 'now' : String(-t))),
     };
     const options = {
@@ -81,6 +83,7 @@ export class Plot {
       legend: { show: this.lines.length > 1, live: false },
       cursor: { show: false },
       pxAlign: 0,
+      hooks: { draw: [(plot) => this.#write(plot)] },
     };
     this.#plot = new uPlot(options, [[], ...series.map(() => [])], this.area);
   }
@@ -93,9 +96,35 @@ export class Plot {
     this.#plot?.setSize({ width: this.#width(), height: HEIGHT_PX });
   }
 
-  // series: a Series whose times are in seconds; the newest is `now_s`
-  draw(series, now_s) {
+  // Each word in the middle of its time; one that has no room there is left out.
+  #write({ ctx, bbox, valToPos }) {
+    if (this.#words.length === 0) return;
+    const { devicePixelRatio: ratio } = globalThis;
+    ctx.save();
+    ctx.font = `600 ${11 * ratio}px system-ui, sans-serif`;
+    ctx.fillStyle = variable('--soft');
+    ctx.strokeStyle = variable('--edge');
+    ctx.lineWidth = 1;
+    ctx.textAlign = 'center';
+    ctx.textBaseline = 'bottom';
+    const places = this.#words.map(({ at_s }) =>
+      Math.max(valToPos(at_s - this.#now_s, 'x', true), bbox.left),
+    );
+    this.#words.forEach(({ text }, i) => {
+      const end = places[i + 1] ?? bbox.left + bbox.width;
+      if (end <= bbox.left) return; // over before the plot begins
+      if (places[i] > bbox.left) ctx.strokeRect(Math.round(places[i]), bbox.top, 0, bbox.height);
+      if (ctx.measureText(text).width < end - places[i])
+        ctx.fillText(text, 0.5 * (places[i] + end), bbox.top + bbox.height - 2 * ratio);
+    });
+    ctx.restore();
+  }
+
+  // series: a Series whose times are in seconds; the newest is `now_s`. words: what the times mean.
+  draw(series, now_s, words = []) {
     if (!this.#plot) return;
+    this.#words = words;
+    this.#now_s = now_s;
     const [times, ...values] = series.since(now_s - WINDOW_S);
     this.#plot.setData([Array.from(times, (time) => time - now_s), ...values], false);
     this.#plot.setScale('x', { min: -WINDOW_S, max: 0 });

@@ -5,15 +5,15 @@ import { ms, signed } from '../panel/numbers.js';
 const count = (number) => number.toLocaleString('en');
 
 // Each: name, explanation, text of {stream, history, fps}; empty text: not shown.
-const TILES = [
+export const TILES = [
   [
     'Rate',
     'frames that posed published in the last second',
     ({ stats }) => `${stats.rate_hz.toFixed(1)} Hz`,
   ],
   [
-    'In posed',
-    'arrival to handed out, 50 and 99 % of the last second',
+    'In posed, half / 99 %',
+    'half and 99 % of the last second’s frames took at most this from arrival to handed out',
     ({ stats }) =>
       stats.publish?.p99_us > 0
         ? `${ms(stats.publish.p50_us / 1000)} / ${ms(stats.publish.p99_us / 1000)}`

@@ -1,4 +1,5 @@
 // The overlay that explains what is seen, and the keys.
+import { TILES } from '../instruments/tiles.js';
 import { el } from './dom.js';
 
 const KEYS = [
@@ -38,6 +39,12 @@ export class Help {
       rows(SEEN, 'span'),
       el('h2', {}, 'Keys'),
       rows(KEYS, 'kbd'),
+      el(
+        'details',
+        {},
+        el('summary', {}, 'What the instruments’ figures mean'),
+        rows(TILES, 'span'),
+      ),
       el(
         'p.note',
         {},

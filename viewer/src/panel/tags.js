@@ -10,7 +10,7 @@ function styledWords(stream) {
 }
 
 const labelWords = ({ verb, label, probability }) =>
-  verb === 'performs' ? `performs ${label}` : `${label}, ${percent(probability)} sure`;
+  verb === 'performs' ? `performs ${label}` : `recognised ${label}, ${percent(probability)} sure`;
 
 function words(stream, main) {
   const parts = [];
@@ -24,7 +24,7 @@ function words(stream, main) {
   if (quality && quality !== word) parts.push(quality);
   const missing = stream.partsWithoutValue();
   if (missing) parts.push(`no value: ${missing}`);
-  return parts.join(' · ');
+  return parts.join('\u00a0· '); // a line may end after the dot
 }
 
 export function writeTags(world, chosenName) {

@@ -1,7 +1,11 @@
-// Takes: marks in the recording. Shown while the daemon records.
+// Takes: marks in the recording. A daemon that does not record, or replays, has none: then the page
+// says what to do.
 import { el, write } from './dom.js';
 
 const LONGEST_NAME = 128;
+const HOW =
+  'To keep takes, start the daemon with `posed record` in place of `posed run`, or with a [record]' +
+  ' table in its config.';
 
 export class Takes {
   #running = false;
@@ -29,7 +33,7 @@ export class Takes {
 
   // The answer says whether a take runs: the next statistics come up to a second later.
   async toggle() {
-    if (this.form.hidden || this.fields.disabled || this.#asking) return;
+    if (this.form.hidden || this.fields.hidden || this.fields.disabled || this.#asking) return;
     this.#asking = true;
     const start = !this.#running;
     const name = start ? this.name.value.trim() : '';
@@ -42,8 +46,15 @@ export class Takes {
   }
 
   update(stats, readOnlyReason) {
-    this.form.hidden = !stats || stats.recorder_file === '';
+    this.form.hidden = !stats || stats.replay_file !== '';
     if (this.form.hidden) return;
+    this.fields.hidden = stats.recorder_file === '';
+    this.form.dataset.recording = !this.fields.hidden;
+    if (this.fields.hidden) {
+      write(this.words, 'not recording');
+      this.words.title = HOW;
+      return;
+    }
     if (stats !== this.#stats) this.#run(stats.take !== undefined);
     this.#stats = stats;
     this.fields.disabled = readOnlyReason !== '';

@@ -2,7 +2,7 @@
 // Built in the T-pose, then moved into each joint's own frame, so that a pose only moves joints.
 import { invert, rotate } from '../motion/quaternion.js';
 import { isHand } from '../motion/body_parts.js';
-import { Mesh, addCapsule } from './capsule.js';
+import { FINE, Mesh, addCapsule } from './capsule.js';
 
 const USUAL_HEIGHT_M = 1.7;
 const USUAL_HAND_M = 0.19; // from the wrist to the tip of the longest finger
@@ -62,11 +62,11 @@ function tipInRest({ tip, rest }, places, joint) {
 }
 
 class Builder {
-  constructor(kinematics) {
+  constructor(kinematics, detail) {
     this.kinematics = kinematics;
     this.places = kinematics.restPositions();
     this.scale = scaleOf(kinematics, this.places);
-    this.mesh = new Mesh();
+    this.mesh = new Mesh(detail);
     this.bones = kinematics.bones;
   }
 
@@ -167,8 +167,8 @@ class Builder {
 }
 
 // Flat arrays of the figure's mesh; each vertex is in the frame of its joint.
-export function bodyShape(kinematics) {
-  const builder = new Builder(kinematics);
+export function bodyShape(kinematics, detail = FINE) {
+  const builder = new Builder(kinematics, detail);
   const mesh = builder.build();
   const position = Float32Array.from(mesh.position);
   const normal = Float32Array.from(mesh.normal);

@@ -1,7 +1,9 @@
 // A capsule with two radii as flat arrays, for the limbs of figures and of the mannequin.
 
-const AROUND = 14; // vertices of a ring
-const ARC = 4; // rings of each rounded end
+// How finely a capsule is cut: vertices of a ring, rings of each rounded end. Where the processor
+// draws, its time goes into vertices: the coarse one has a third of them.
+export const FINE = { around: 14, arc: 4 };
+export const COARSE = { around: 9, arc: 2 };
 
 // A mesh that grows: positions, normals, what each vertex belongs to, triangles.
 export class Mesh {
@@ -9,6 +11,10 @@ export class Mesh {
   normal = [];
   owner = []; // joint of each vertex
   index = [];
+
+  constructor(detail = FINE) {
+    this.detail = detail;
+  }
 }
 
 const subtract = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -38,15 +44,15 @@ function directions(from, to) {
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 // The rings from one end to the other: {centre along the axis, radius, slope of the normal}.
-function rings(length, start_m, end_m) {
+function rings(length, start_m, end_m, arc) {
   const list = [];
   const quarter = Math.PI / 2;
-  for (let i = 0; i <= ARC; i += 1) {
-    const angle = -quarter + (quarter * i) / ARC;
+  for (let i = 0; i <= arc; i += 1) {
+    const angle = -quarter + (quarter * i) / arc;
     list.push({ at: start_m * Math.sin(angle), radius: start_m * Math.cos(angle), slope: angle });
   }
-  for (let i = 0; i <= ARC; i += 1) {
-    const angle = (quarter * i) / ARC;
+  for (let i = 0; i <= arc; i += 1) {
+    const angle = (quarter * i) / arc;
     list.push({
       at: length + end_m * Math.sin(angle),
       radius: end_m * Math.cos(angle),
@@ -60,11 +66,12 @@ function rings(length, start_m, end_m) {
 // (along the figure's front), below 1 for a trunk.
 export function addCapsule(mesh, from, to, start_m, end_m, owner, flat = 1) {
   const { along, front, across } = directions(from, to);
-  const list = rings(Math.hypot(...subtract(to, from)), start_m, end_m);
+  const { around, arc } = mesh.detail;
+  const list = rings(Math.hypot(...subtract(to, from)), start_m, end_m, arc);
   const first = mesh.owner.length;
   for (const { at, radius, slope } of list) {
-    for (let i = 0; i < AROUND; i += 1) {
-      const turn = (2 * Math.PI * i) / AROUND;
+    for (let i = 0; i < around; i += 1) {
+      const turn = (2 * Math.PI * i) / around;
       const [c, s] = [Math.cos(turn), Math.sin(turn)];
       const normal = [0, 1, 2].map(
         (k) =>
@@ -80,10 +87,10 @@ export function addCapsule(mesh, from, to, start_m, end_m, owner, flat = 1) {
     }
   }
   for (let ring = 0; ring + 1 < list.length; ring += 1) {
-    for (let i = 0; i < AROUND; i += 1) {
-      const a = first + ring * AROUND + i;
-      const b = first + ring * AROUND + ((i + 1) % AROUND);
-      mesh.index.push(a, a + AROUND, b, b, a + AROUND, b + AROUND);
+    for (let i = 0; i < around; i += 1) {
+      const a = first + ring * around + i;
+      const b = first + ring * around + ((i + 1) % around);
+      mesh.index.push(a, a + around, b, b, a + around, b + around);
     }
   }
 }

@@ -13,6 +13,7 @@ import {
   SkinnedMesh,
 } from 'three';
 import { bodyShape } from './body_shape.js';
+import { rigid } from './rigid_skin.js';
 import { jointColour } from './palette.js';
 
 // A skeleton whose matrices the page writes itself: three.js then walks no tree of bones.
@@ -57,10 +58,10 @@ export class Figure {
   group = new Group(); // moved by the lane
   #colours = ''; // what the vertices are coloured for
 
-  constructor(kinematics, { ghost, theme }) {
+  constructor(kinematics, { ghost, theme, detail }) {
     this.kinematics = kinematics;
     this.ghost = ghost;
-    const shape = bodyShape(kinematics);
+    const shape = bodyShape(kinematics, detail);
     this.owner = shape.owner;
     this.scale = shape.scale;
     this.geometry = geometryOf(shape);
@@ -72,7 +73,7 @@ export class Figure {
 
   #makeMeshes() {
     const { geometry, skeleton, ghost } = this;
-    this.material = new MeshLambertMaterial({ vertexColors: true });
+    this.material = rigid(new MeshLambertMaterial({ vertexColors: true }));
     const mesh = skinned(geometry, this.material, skeleton);
     mesh.castShadow = !ghost;
     mesh.receiveShadow = false;
@@ -80,7 +81,7 @@ export class Figure {
     if (!ghost) return;
     this.material.transparent = true;
     this.material.depthWrite = false;
-    this.depthMaterial = new MeshBasicMaterial({ colorWrite: false });
+    this.depthMaterial = rigid(new MeshBasicMaterial({ colorWrite: false }));
     const depth = skinned(geometry, this.depthMaterial, skeleton);
     depth.renderOrder = 1;
     mesh.renderOrder = 2;

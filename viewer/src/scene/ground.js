@@ -53,6 +53,7 @@ export class Ground {
     this.shadow = new ShadowMaterial({ transparent: true, depthWrite: false });
     const lines = new Mesh(plane, this.grid);
     const shade = new Mesh(plane, this.shadow);
+    this.shade = shade;
     shade.receiveShadow = true;
     shade.position.y = 0.001;
     lines.renderOrder = -2;
@@ -65,6 +66,11 @@ export class Ground {
     this.grid.uniforms.line.value = theme.line;
     this.grid.uniforms.strong.value = theme.strong;
     this.shadow.opacity = theme.shadow;
+  }
+
+  // Without shadows their plane would be drawn for nothing.
+  setShadows(on) {
+    this.shade.visible = on;
   }
 
   // centre: what the view looks at

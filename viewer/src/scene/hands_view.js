@@ -11,6 +11,7 @@ export class HandsView {
   scene = new Scene();
   camera = new PerspectiveCamera(FIELD_DEG, 1, 0.02, 10);
   #performers = new Map(); // name: {performer, holder}
+  #free = 1; // share of the height that nothing covers
 
   constructor(element, theme, onChange) {
     this.lights = new Lights(theme, false);
@@ -61,10 +62,13 @@ export class HandsView {
     this.#frame();
   }
 
-  resize(width, height) {
+  // top: pixels at the upper edge that buttons cover.
+  resize(width, height, top) {
     const aspect = width / Math.max(height, 1);
-    if (aspect === this.camera.aspect) return;
+    const free = 1 - top / Math.max(height, 1);
+    if (aspect === this.camera.aspect && free === this.#free) return;
     this.camera.aspect = aspect;
+    this.#free = free;
     this.camera.updateProjectionMatrix();
     this.#frame();
   }
@@ -72,8 +76,12 @@ export class HandsView {
   #frame() {
     const half = Math.tan((FIELD_DEG * Math.PI) / 360);
     const across_m = (this.count ?? 1) * APART_M + 0.03;
-    const far = Math.max(HEIGHT_M, across_m / Math.max(this.camera.aspect, 0.2)) / (2 * half);
-    this.controls.target.set(0, 0.068, 0);
+    const high_m = Math.max(
+      HEIGHT_M / Math.max(this.#free, 0.3),
+      across_m / Math.max(this.camera.aspect, 0.2),
+    );
+    const far = high_m / (2 * half);
+    this.controls.target.set(0, 0.068 + 0.5 * (1 - this.#free) * high_m, 0);
     this.camera.position
       .set(0.3, 0.11, 1)
       .normalize()

@@ -1,8 +1,18 @@
-// Names above the figures, as text of the page: sharp at any size, read by screen readers.
+// Names above the figures, as text of the page: sharp at any size, read by screen readers. One that
+// would cover another stands above it, or below where there is no room.
 import { Vector3 } from 'three';
 
+const GAP_PX = 3;
+
 export class NameTags {
-  #tags = new Map(); // key: {element, title, detail, key}
+  #tags = new Map(); // key: {element, title, detail, wide, high, x, y}
+  #placed = []; // tags of this picture
+  #sizes = new ResizeObserver((entries) => {
+    for (const { target, borderBoxSize } of entries) {
+      const tag = this.#tags.get(target.dataset.key);
+      if (tag) [tag.wide, tag.high] = [borderBoxSize[0].inlineSize, borderBoxSize[0].blockSize];
+    }
+  });
 
   constructor(layer) {
     this.layer = layer;
@@ -20,17 +30,25 @@ export class NameTags {
   #make(key) {
     const element = document.createElement('div');
     element.className = 'name-tag';
+    element.dataset.key = key;
     element.hidden = true;
     const title = document.createElement('strong');
     const detail = document.createElement('span');
     element.append(title, detail);
     this.layer.append(element);
-    const tag = { element, title, detail };
+    this.#sizes.observe(element);
+    const tag = { element, title, detail, wide: 0, high: 0 };
     this.#tags.set(key, tag);
     return tag;
   }
 
-  // point: in the scene. area: of the viewport in CSS pixels {left, top, width, height}.
+  // Before the first `place` of a picture.
+  begin() {
+    this.#placed.length = 0;
+  }
+
+  // point: in the scene. area: of the viewport in CSS pixels {left, top, width, height, covered}:
+  // `covered` pixels at its upper edge stay free.
   place(key, point, camera, area) {
     const tag = this.#tags.get(key);
     if (!tag) return;
@@ -40,11 +58,29 @@ export class NameTags {
     if (!shown) return;
     // Whole pixels, and only when they change: each move costs the browser a layer.
     const x = Math.round(area.left + (0.5 + 0.5 * at.x) * area.width);
-    const y = Math.round(Math.max(area.top + (0.5 - 0.5 * at.y) * area.height, area.top + 48));
+    const wanted = area.top + (0.5 - 0.5 * at.y) * area.height;
+    const top = area.top + area.covered + tag.high;
+    const y = Math.round(this.#freeFrom(tag, x, Math.max(wanted, top), top));
+    this.#placed.push(tag);
     if (x === tag.x && y === tag.y) return;
     tag.x = x;
     tag.y = y;
     tag.element.style.transform = `translate(${x}px, ${y}px) translate(-50%, -100%)`;
+  }
+
+  // The lower edge of a tag at x that covers none of those that have their place.
+  #freeFrom(tag, x, wanted, top) {
+    let y = wanted;
+    let step = -1;
+    for (let i = 0; i < this.#placed.length; i += 1) {
+      const other = this.#placed[i];
+      const beside = Math.abs(other.x - x) >= 0.5 * (other.wide + tag.wide) + GAP_PX;
+      if (beside || y <= other.y - other.high || y - tag.high >= other.y) continue;
+      if (step < 0 && other.y - other.high - GAP_PX < top) step = 1;
+      y = step < 0 ? other.y - other.high - GAP_PX : other.y + tag.high + GAP_PX;
+      i = -1; // it may cover another one there
+    }
+    return y;
   }
 
   hide(key) {
@@ -53,7 +89,10 @@ export class NameTags {
   }
 
   remove(key) {
-    this.#tags.get(key)?.element.remove();
+    const tag = this.#tags.get(key);
+    if (!tag) return;
+    this.#sizes.unobserve(tag.element);
+    tag.element.remove();
     this.#tags.delete(key);
   }
 }

@@ -10,10 +10,10 @@ export class Performer {
   top_m = 0; // the height of its highest joint
   #trails = [];
 
-  constructor(stream, scene, theme) {
+  constructor(stream, scene, theme, detail) {
     this.stream = stream;
     this.ghost = stream.isRaw;
-    this.figure = new Figure(stream.kinematics, { ghost: this.ghost, theme });
+    this.figure = new Figure(stream.kinematics, { ghost: this.ghost, theme, detail });
     this.figure.group.visible = false;
     scene.add(this.figure.group);
     const { own } = this.figure;

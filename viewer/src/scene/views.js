@@ -11,16 +11,24 @@ const DIRECTIONS = {
   side: [1, 0.12, 0.001],
   top: [0, 1, 0.001],
 };
-const GLIDE = 0.12; // share of the way in one frame
+const GLIDE_S = 0.13; // time constant of the way to the figures
+const BACK_S = 0.8; // the same of the way back from where a person shifted the view
+const LONGEST_S = 0.25; // between two pictures, for the glide
+const HALF_HIGH_M = 1.05; // half of a body's height, with room
 const LEAST_M = 1.2; // half of what is seen across, at least
+const BESIDE_M = 0.75; // room beside the outermost hips
 
 export class Views {
   camera = new PerspectiveCamera(FIELD_DEG, 1, 0.05, 120);
   name = 'follow';
   #centre = new Vector3(0, 0.9, 0); // where the figures are, smoothed
-  #span_m = LEAST_M;
+  #row_m = 0; // half of the width of the figures' row, and of its length along their way
+  #way_m = 0;
+  // Of both the shares that this view has across, and of a metre what it sees downwards and flat.
+  #seen = { row: 1, way: 0, down: 0, flat: 1 };
   #far_m = 0; // distance that is aimed at; 0: as the person left it
   #settled = false;
+  #last_s = NaN;
   #free = { wide: 1, high: 1 }; // the part that is not covered, in heights of the picture
   #yaw = 0; // where the figures face
 
@@ -60,7 +68,10 @@ export class Views {
   }
 
   #turnTo(name) {
-    const direction = new Vector3(...DIRECTIONS[name]).normalize().applyAxisAngle(UP, this.#yaw);
+    const direction = new Vector3(...DIRECTIONS[name]).normalize();
+    const flat = Math.hypot(direction.x, direction.z);
+    this.#seen = { row: direction.z / flat, way: direction.x / flat, down: direction.y, flat };
+    direction.applyAxisAngle(UP, this.#yaw);
     this.#far_m = this.#fitting();
     this.camera.position.copy(this.controls.target).addScaledVector(direction, this.#far_m);
   }
@@ -69,52 +80,60 @@ export class Views {
   #fitting() {
     const half = Math.tan((FIELD_DEG * Math.PI) / 360);
     const { wide, high } = this.#free;
-    return (
-      Math.max(this.#span_m / Math.max(wide, 0.2), 1.28 / Math.max(high - 0.06, 0.2)) / half + 0.35
-    );
+    const { row, way, down, flat } = this.#seen;
+    const across_m = Math.max(this.#row_m * row + this.#way_m * way + BESIDE_M, LEAST_M);
+    const nearest_m = this.#row_m * way + this.#way_m * row; // of them, before the middle
+    const up_m = HALF_HIGH_M * flat + (nearest_m + 0.5 * BESIDE_M) * down;
+    const far_m = Math.max(across_m / Math.max(wide, 0.2), up_m / Math.max(high, 0.2)) / half;
+    return far_m + nearest_m * flat;
   }
 
-  // covered: {right, bottom}; what is looked at is in the middle of the rest.
-  resize(width, height, { right, bottom }) {
+  // covered: {right, bottom, top}; what is looked at is in the middle of the rest.
+  resize(width, height, { right, bottom, top }) {
     this.camera.aspect = width / Math.max(height, 1);
     this.#free = {
       wide: (width - right) / Math.max(height, 1),
-      high: 1 - bottom / Math.max(height, 1),
+      high: 1 - (bottom + top) / Math.max(height, 1),
     };
-    this.camera.setViewOffset(width, height, right / 2, bottom / 2, width, height);
+    this.camera.setViewOffset(width, height, right / 2, (bottom - top) / 2, width, height);
     if (this.#far_m > 0) this.#far_m = this.#fitting();
   }
 
-  // centre: of all figures; span_m: half of the width that they take; jumped: the clip began again.
-  update(centre, span_m, jumped) {
+  // centre: of all figures; extent: {row_m, way_m}, how far they stand from it, across and along
+  // their way; jumped: the clip began again; now_s: by it the view glides equally fast however many
+  // pictures a second there are.
+  update(centre, { row_m, way_m }, jumped, now_s) {
     const far = !this.#settled || jumped;
+    const passed_s = Math.min(now_s - this.#last_s || 0, LONGEST_S);
     this.#settled = true;
-    const wanted = Math.max(span_m + 0.75, LEAST_M);
-    if (Math.abs(wanted - this.#span_m) > 0.2) {
-      this.#span_m = wanted;
+    this.#last_s = now_s;
+    if (Math.abs(row_m - this.#row_m) > 0.2 || Math.abs(way_m - this.#way_m) > 0.2) {
+      this.#row_m = row_m;
+      this.#way_m = way_m;
       if (this.#far_m > 0) this.#far_m = this.#fitting();
     }
-    if (this.name !== 'orbit') this.#follow(centre, far);
+    if (this.name !== 'orbit') this.#follow(centre, far, passed_s);
     this.controls.update();
   }
 
-  #follow(centre, far) {
+  #follow(centre, far, passed_s) {
     const { target } = this.controls;
+    const glide = shareOf(passed_s, GLIDE_S);
     shift
       .copy(centre)
       .sub(this.#centre)
-      .multiplyScalar(far ? 1 : GLIDE);
+      .multiplyScalar(far ? 1 : glide);
     this.#centre.add(shift);
     target.add(shift);
     this.camera.position.add(shift);
     // What was shifted by hand glides back to the figures.
-    shift.copy(this.#centre).sub(target).multiplyScalar(0.02);
+    shift.copy(this.#centre).sub(target).multiplyScalar(shareOf(passed_s, BACK_S));
     target.add(shift);
     this.camera.position.add(shift);
     if (this.#far_m === 0) return;
     shift.copy(this.camera.position).sub(target);
     const length = shift.length();
-    shift.setLength(length + GLIDE * (this.#far_m - length));
+    shift.setLength(length + glide * (this.#far_m - length));
     this.camera.position.copy(target).add(shift);
   }
 
@@ -122,6 +141,9 @@ export class Views {
     return this.controls.target;
   }
 }
+
+// The share of the way that is gone in this time.
+const shareOf = (passed_s, constant_s) => 1 - Math.exp(-passed_s / constant_s);
 
 const shift = new Vector3();
 const UP = new Vector3(0, 1, 0);

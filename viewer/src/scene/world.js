@@ -2,6 +2,7 @@
 // one canvas: the bodies, and the hands in an inset.
 import { Scene, Vector3 } from 'three';
 import { LANE_M, lanesOf } from './lanes.js';
+import { COARSE, FINE } from './capsule.js';
 import { Ground } from './ground.js';
 import { HandsView } from './hands_view.js';
 import { Lights } from './lights.js';
@@ -14,6 +15,9 @@ import { themeColours } from './palette.js';
 import { facing } from './facing.js';
 
 const MOST_PIXELS = 2; // per CSS pixel
+const TOOLS_PX = 46; // at the top of the scene, covered by the buttons
+const NAMES_PX = 90; // the same, by buttons and names
+const LEGEND_PX = 36; // the same at the bottom of the bodies, by the colours' meaning
 const CROWD = 5; // figures; of more only the styled ones have names
 const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
 
@@ -70,7 +74,7 @@ export class World {
 
   #enter(stream) {
     this.#leave(stream.name);
-    const performer = new Performer(stream, this.scene, this.theme);
+    const performer = new Performer(stream, this.scene, this.theme, this.fine ? FINE : COARSE);
     this.performers.set(stream.name, performer);
     if (stream.isHand) this.hands.add(performer);
     this.arrange();
@@ -156,24 +160,30 @@ export class World {
     if (width === 0) return;
     this.renderer.setPixelRatio(this.#pace.now.pixels * Math.min(devicePixelRatio, MOST_PIXELS));
     this.lights.sun.castShadow = this.#pace.now.shadows;
+    this.ground.setShadows(this.#pace.now.shadows);
     this.renderer.setSize(width, height, false);
-    this.#areas.bodies = { left: 0, top: 0, width, height };
+    this.#areas.bodies = { left: 0, top: 0, width, height, covered: TOOLS_PX };
     const show = this.stage.dataset.show;
     this.#areas.hands = show === 'both' || show === 'hands' ? this.#insetArea() : null;
     this.views.resize(width, height, this.#covered());
-    if (this.#areas.hands) this.hands.resize(this.#areas.hands.width, this.#areas.hands.height);
+    if (this.#areas.hands) {
+      const { width: wide, height: high } = this.#areas.hands;
+      this.hands.resize(wide, high, show === 'hands' ? TOOLS_PX : 0);
+    }
     this.touch();
   }
 
-  // What the inset takes from the bodies, in CSS pixels: they stand beside it, or above it where it
-  // is as wide as the scene.
+  // What inset, names and legend take from the bodies, in CSS pixels: they stand beside the inset, or
+  // above it where it is as wide as the scene.
   #covered() {
-    if (!this.#areas.hands || this.stage.dataset.show !== 'both') return { right: 0, bottom: 0 };
+    if (!this.#areas.hands || this.stage.dataset.show !== 'both')
+      return { right: 0, bottom: LEGEND_PX, top: NAMES_PX };
     const { bodies, hands } = this.#areas;
     const wide = hands.width > 0.7 * bodies.width;
     return {
       right: wide ? 0 : bodies.width - hands.left,
-      bottom: wide ? bodies.height - hands.top : 0,
+      bottom: LEGEND_PX + (wide ? bodies.height - hands.top : 0),
+      top: NAMES_PX,
     };
   }
 
@@ -182,7 +192,8 @@ export class World {
     const { left, top, width, height } = this.inset
       .querySelector('.hands-area')
       .getBoundingClientRect();
-    return { left: left - outer.left, top: top - outer.top, width, height };
+    const covered = this.stage.dataset.show === 'hands' ? TOOLS_PX : 0;
+    return { left: left - outer.left, top: top - outer.top, width, height, covered };
   }
 
   // Shows the newest poses. shown(performer) is called for each that is new. Returns whether
@@ -228,15 +239,16 @@ export class World {
       jumped ||= performer.jumped;
     }
     if (count > 0) middle.divideScalar(count);
-    let span_m = 0;
+    const [c, s] = [Math.cos(this.#yaw ?? 0), Math.sin(this.#yaw ?? 0)];
+    extent.row_m = 0;
+    extent.way_m = 0;
     for (const performer of this.performers.values()) {
       if (performer.stream.isHand || !performer.figure.group.visible) continue;
-      span_m = Math.max(
-        span_m,
-        Math.hypot(performer.centre.x - middle.x, performer.centre.z - middle.z),
-      );
+      const [x, z] = [performer.centre.x - middle.x, performer.centre.z - middle.z];
+      extent.row_m = Math.max(extent.row_m, Math.abs(c * x - s * z));
+      extent.way_m = Math.max(extent.way_m, Math.abs(s * x + c * z));
     }
-    if (count > 0) this.views.update(middle, span_m, jumped);
+    if (count > 0) this.views.update(middle, extent, jumped, performance.now() / 1000);
     this.ground.follow(this.views.target);
     this.lights.follow(this.views.target);
   }
@@ -250,6 +262,7 @@ export class World {
       this.hands.controls.update();
       this.#render(this.hands.scene, this.hands.camera, hands, bodies.height);
     }
+    this.tags.begin();
     for (const performer of this.performers.values()) this.#tag(performer);
   }
 
@@ -280,3 +293,4 @@ export class World {
 
 const middle = new Vector3();
 const above = new Vector3();
+const extent = { row_m: 0, way_m: 0 };

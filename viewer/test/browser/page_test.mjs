@@ -75,9 +75,7 @@ pageTest("the hands' view stays as turned, and a still scene rests", {}, async (
     return camera.position.toArray();
   });
   await page.waitForTimeout(2500); // some statistics later
-  const now = await page.evaluate(() =>
-    globalThis.posedPage.world.hands.camera.position.toArray(),
-  );
+  const now = await page.evaluate(() => globalThis.posedPage.world.hands.camera.position.toArray());
   now.forEach((value, i) => assert.ok(Math.abs(value - turned[i]) < 0.01, String(now)));
   bridge.daemon.rate_hz = 0; // no poses any more, but statistics
   await page.waitForFunction(
@@ -246,6 +244,47 @@ pageTest('a held key or two quick presses make one take', {}, async (page, bridg
   assert.deepEqual(takes(), [true, false]);
 });
 
+pageTest(
+  'a daemon that does not record says how to',
+  { recording: false },
+  async (page, bridge) => {
+    const words = page.locator('.recording', { hasText: 'not recording' });
+    await words.waitFor(PATIENCE);
+    assert.match(await words.getAttribute('title'), /posed record/);
+    assert.equal(await page.getByLabel('Take name').isVisible(), false);
+    await page.locator('.stage canvas').focus();
+    await page.keyboard.press('s');
+    assert.ok(bridge.requests.every((request) => !request.take));
+  },
+);
+
+pageTest(
+  'names cover neither each other nor the buttons, whatever the view',
+  { bodies: 4, hands: 2, missing: [5, 6, 7, 8] },
+  async (page) => {
+    for (const view of ['Side', 'Front', 'Follow']) {
+      await page.getByRole('button', { name: view, exact: true }).click();
+      await page.waitForTimeout(2500); // the view is there, the texts have their sizes
+      const boxes = await page.locator('.name-tag:visible').evaluateAll((tags) =>
+        tags.map((tag) => {
+          const { left, right, top, bottom } = tag.getBoundingClientRect();
+          return { left, right, top, bottom };
+        }),
+      );
+      assert.ok(boxes.length >= 4, `${view}: ${boxes.length} names`);
+      const tools = await page.locator('.tools').boundingBox();
+      for (const [i, a] of boxes.entries()) {
+        assert.ok(a.top >= tools.y + tools.height, `${view}: a name below the buttons`);
+        for (const b of boxes.slice(i + 1)) {
+          const apart =
+            a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+          assert.ok(apart, `${view}: ${JSON.stringify([a, b])}`);
+        }
+      }
+    }
+  },
+);
+
 const rights = { may_control: false, read_only_reason: 'this key may watch only' };
 pageTest(
   'a page that may only look says why, and its controls are off',
@@ -290,7 +329,10 @@ test('without WebGL the page says what to do', { timeout: 90000 }, async (contex
   await page.locator('.link-text', { hasText: 'this browser draws no WebGL' }).waitFor(PATIENCE);
   await page.waitForTimeout(1500); // what the bridge sends is no error
   assert.match(await page.locator('.link-text').innerText(), /hardware acceleration/);
-  assert.ok(page.errors.every((text) => text.includes('WebGL')), page.errors.join());
+  assert.ok(
+    page.errors.every((text) => text.includes('WebGL')),
+    page.errors.join(),
+  );
 });
 
 test(
@@ -338,7 +380,7 @@ pageTest(
   'a part without a value and a predicted pose are said',
   { missing: [5, 6, 7, 8] },
   async (page) => {
-    const words = /predicted · no value: left arm/;
+    const words = /predicted\s· no value: left arm/;
     await page.locator('.name-tag[data-kind="styled"]', { hasText: words }).waitFor(PATIENCE);
     await page.locator('.legend li[data-key="no-value"]').waitFor(PATIENCE);
   },

@@ -90,13 +90,14 @@ export class FakeBridge {
       token = 'secret',
       rights = { may_control: true, read_only_reason: '' },
       same_machine = true,
+      folder = PAGE,
     } = {},
   ) {
-    Object.assign(this, { daemon, token, rights, same_machine });
+    Object.assign(this, { daemon, token, rights, same_machine, folder });
   }
 
   async start(port = 0) {
-    const files = new Map(FILES.map((name) => [`/${name}`, readFileSync(join(PAGE, name))]));
+    const files = new Map(FILES.map((name) => [`/${name}`, readFileSync(join(this.folder, name))]));
     this.http = createServer((request, response) => this.#serve(files, request, response));
     const sockets = new WebSocketServer({
       server: this.http,

@@ -2,7 +2,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Store } from '../../src/streams/store.js';
 import { Jitter } from '../../src/streams/jitter.js';
+import { History } from '../../src/instruments/history.js';
 import { Series } from '../../src/instruments/series.js';
+import { ClockMapping } from '../../src/link/clock.js';
 import { stateOf } from '../../src/streams/words.js';
 import { lanesOf } from '../../src/scene/lanes.js';
 import { parseWeights } from '../../src/panel/style_controls.js';
@@ -124,6 +126,21 @@ test('a pause between even frames is no jitter', () => {
     jitter.add(i, (1000 * i) / 60 + (i < 100 ? 0 : 2000));
     if (i > 1) assert.ok(jitter.ms < 1, `${jitter.ms} ms at frame ${i}`);
   }
+});
+
+test('the history knows when another gesture began', () => {
+  const history = new History();
+  const clock = new ClockMapping();
+  const labels = ['', 'g', 'g', '', 'c', 'c'];
+  labels.forEach((label, i) => {
+    const pose = { quality: 0, arrival_ms: 0, published_ms: 0, stages: 0, label };
+    history.add({ ...pose, stage_us: [], labelProbability: 0.8 }, 0, 100 * i, clock);
+  });
+  assert.deepEqual(history.changes, [
+    { at_s: 0.1, text: 'g' },
+    { at_s: 0.3, text: '' },
+    { at_s: 0.4, text: 'c' },
+  ]);
 });
 
 test('a series keeps the newest, and gives those of a time window', () => {

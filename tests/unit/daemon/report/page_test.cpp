@@ -12,6 +12,7 @@
 #include "daemon/report/bars.hpp"
 #include "daemon/report/bench_sections.hpp"
 #include "daemon/report/gesture_sections.hpp"
+#include "daemon/report/look.hpp"
 #include "daemon/report/plot.hpp"
 #include "daemon/report/style_sections.hpp"
 #include "tests/support/file_text.hpp"
@@ -112,6 +113,25 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
 }
 
 }  // namespace
+
+TEST_CASE("marks on one line get no axis of rounding errors", "[report]") {
+  const Figure figure =
+      style_map({.what = "walk",
+                 .of_axis = "xi",
+                 .unit = "no unit",
+                 .marks = {{"ann", "from", -0.06, 5.2e-17}, {"ann", "to", 0.06, 4.8e-17}},
+                 .explanation = {}});
+  CHECK_FALSE(test::has(figure.drawings.front().elements, "e-1"));
+}
+
+TEST_CASE("the confusion of two labels is as wide as its words", "[report]") {
+  const Figure figure = label_confusion({.labels = {"g", "c"},
+                                         .given = {"g"},
+                                         .share = {{1.0, 0.0}},
+                                         .frames = {3},
+                                         .measured_on = "the reference"});
+  CHECK(figure.drawings.front().width_px > 190.0 + text_px("recognised label [% of the frames]"));
+}
 
 TEST_CASE("text from outside stays text in a report", "[report]") {
   CHECK(escaped("<a href=\"x\">'&") == "&lt;a href=&quot;x&quot;&gt;&#39;&amp;");

@@ -1,0 +1,76 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Vector3 } from 'three';
+import { Kinematics } from '../../src/motion/kinematics.js';
+import { bodyShape } from '../../src/scene/body_shape.js';
+import { COARSE, FINE } from '../../src/scene/capsule.js';
+import { Views } from '../../src/scene/views.js';
+import { bodySkeleton } from '../support/figures.mjs';
+
+// What OrbitControls wants of the scene's element.
+const element = {
+  style: {},
+  addEventListener() {},
+  removeEventListener() {},
+  getRootNode: () => element,
+};
+
+// How far behind a walker the view looks after 3 s, at so many pictures a second [m].
+function lag_m(pictures_per_s) {
+  const views = new Views(element, () => {});
+  views.resize(1000, 600, { right: 0, bottom: 0, top: 0 });
+  const centre = new Vector3(0, 0.9, 0);
+  for (let picture = 0; picture <= 3 * pictures_per_s; picture += 1) {
+    const now_s = picture / pictures_per_s;
+    centre.z = 1.4 * now_s;
+    views.update(centre, { row_m: 0.5, way_m: 0 }, false, now_s);
+  }
+  return centre.distanceTo(views.target);
+}
+
+test('the view follows a walker as closely at 8 pictures a second as at 60', () => {
+  const [fast, slow] = [lag_m(60), lag_m(8)];
+  assert.ok(fast < 0.3, `${fast} m`);
+  assert.ok(slow < 0.3, `${slow} m`);
+});
+
+// Where a point is in the picture after a while: -1 to 1 across and upwards.
+function pictured(view, extent, point) {
+  const views = new Views(element, () => {});
+  views.resize(1000, 600, { right: 0, bottom: 0, top: 0 });
+  views.set(view);
+  const centre = new Vector3(0, 0.9, 0);
+  for (let picture = 0; picture < 600; picture += 1)
+    views.update(centre, extent, false, picture / 60);
+  views.camera.updateMatrixWorld();
+  return point.clone().project(views.camera);
+}
+
+test('every view shows a long row from head to toe, the side view larger than its length asks', () => {
+  for (const extent of [
+    { row_m: 6, way_m: 0 },
+    { row_m: 0, way_m: 6 },
+  ]) {
+    for (const view of ['follow', 'front', 'side', 'top']) {
+      for (const sign of [-1, 1]) {
+        for (const y of [0, 1.75]) {
+          const point = new Vector3(sign * extent.row_m, y, sign * extent.way_m);
+          const { x, y: up } = pictured(view, extent, point);
+          assert.ok(Math.abs(x) < 1 && Math.abs(up) < 1, `${view} ${x} ${up}`);
+        }
+      }
+    }
+  }
+  const [head, feet] = [1.75, 0].map((y) => new Vector3(6, y, 0));
+  const high = (point) => pictured('side', { row_m: 6, way_m: 0 }, point).y;
+  assert.ok(high(head) - high(feet) > 0.85, `${high(head) - high(feet)} of 2`);
+});
+
+test('a coarse figure has the size of the fine one, and less than half of its vertices', () => {
+  const kinematics = new Kinematics(bodySkeleton({ stream: 'a', id: 1, stage: [] }));
+  const [fine, coarse] = [FINE, COARSE].map((detail) => bodyShape(kinematics, detail));
+  assert.ok(coarse.owner.length < 0.5 * fine.owner.length);
+  assert.equal(coarse.scale, fine.scale);
+  const reach = ({ position }) => Math.max(...position.map(Math.abs));
+  assert.ok(Math.abs(reach(coarse) - reach(fine)) < 0.01);
+});
