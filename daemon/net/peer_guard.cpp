@@ -128,17 +128,24 @@ void PeerGuard::serve() {
 std::int64_t PeerGuard::turn(std::int64_t now_ns) {
   hear_monitor();
   if (peers_.empty()) return system::kForever_ns;
-  // Freed memory stays resident for a while, so growth alone does not show whether a peer is
-  // flooding now.
-  const std::int64_t pause_ns =
-      kGuardTick_ns * (1 + static_cast<std::int64_t>(peers_.size()) / kPeersATick);
-  if (const std::uint64_t resident = system::resident_bytes();
-      resident > resident_before_ + kNoticeableGrowth || now_ns >= inspected_ns_ + pause_ns) {
-    resident_before_ = resident;
+  if (is_inspection_due(now_ns)) {
     inspected_ns_ = now_ns;
     inspect_all();
   }
   return now_ns + kGuardTick_ns;
+}
+
+bool PeerGuard::is_inspection_due(std::int64_t now_ns) {
+  const auto pauses = static_cast<std::int64_t>(peers_.size()) / kPeersATick;
+  // Few peers are inspected at each tick; to ask for the memory would take five times as long.
+  if (pauses == 0) return true;
+  // Freed memory stays resident for a while, so growth alone does not show whether a peer is
+  // flooding now.
+  const std::uint64_t resident = system::resident_bytes();
+  const bool due = resident > resident_before_ + kNoticeableGrowth ||
+                   now_ns >= inspected_ns_ + kGuardTick_ns * (1 + pauses);
+  if (due) resident_before_ = resident;
+  return due;
 }
 
 // A monitor event has two parts: the event number (16 bits) with the descriptor (32 bits), then the

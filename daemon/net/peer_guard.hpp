@@ -91,6 +91,7 @@ class PeerGuard {
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);  // returns when the next turn is due
   void hear_monitor();
   void admit(int fd);
+  [[nodiscard]] bool is_inspection_due(std::int64_t now_ns);
   void inspect_all();
   void cut_now(int fd, const char* why);
   void cut_offender(int fd, const char* why);  // and slows down the next handshakes

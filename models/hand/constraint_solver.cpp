@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "models/hand/contacts.hpp"
+#include "models/hand/placed_hand.hpp"
 #include "models/hand/projection.hpp"
 #include "proto/frame/degree.hpp"
 
@@ -13,7 +14,6 @@ namespace posed::hand {
 namespace {
 
 constexpr double kNear_m = 3e-3;            // pairs nearer than this take part in the projection
-constexpr double kFar_m = 10e-3;            // gaps above this are not computed
 constexpr double kHinge_rad = 4 * kDegree;  // bending starts this far inside a limit
 constexpr double kDone_rad = 3e-5;
 constexpr double kSame_rad = 0.01;     // two poses on their way to the same result
@@ -99,25 +99,23 @@ HandAngles between(const HandAngles& from, const HandAngles& to, double share) n
 }  // namespace
 
 struct ConstraintSolver::State {
-  HandGeometry geometry;
+  State(const HandGeometry& geometry, const ConstraintOptions& wanted)
+      : hand(geometry), options(wanted) {
+    options.margin_m = std::max(options.margin_m, kSliver_m);
+  }
+
+  PlacedHand hand;
   ConstraintOptions options;
-  Forces forces;
+  Forces forces{};
   std::bitset<kBonePairs> touching;
-  HandPose pose;
-  Gaps gaps_m{};
   std::array<Row, kMaxRows> rows{};
   HandAngles before{};   // the result of the previous frame
   bool follows = false;  // the previous frame was held apart
 
-  double gap_of(const HandAngles& angles) noexcept {
-    place(geometry, angles, pose);
-    find_gaps(geometry, pose, kFar_m, gaps_m);
-    return smallest(gaps_m);
-  }
-
   // The constraints of the pairs that are near, linearised at `at`; only the nearest ones where
   // there are too many.
   std::span<const Row> near_rows(const HandAngles& at) noexcept {
+    const Gaps& gaps_m = hand.gaps_m();
     std::array<std::uint8_t, kBonePairs> order{};
     std::size_t count = 0;
     for (std::size_t p = 0; p < kPairs.size(); ++p) {
@@ -125,7 +123,7 @@ struct ConstraintSolver::State {
     }
     if (count > kMaxRows) {
       std::nth_element(order.begin(), order.begin() + kMaxRows, order.begin() + count,
-                       [this](auto a, auto b) { return gaps_m[a] < gaps_m[b]; });
+                       [&gaps_m](auto a, auto b) { return gaps_m[a] < gaps_m[b]; });
       count = kMaxRows;
       std::sort(order.begin(), order.begin() + kMaxRows);
     }
@@ -135,7 +133,7 @@ struct ConstraintSolver::State {
       row = {.pair = p,
              .finger_a = kPairs[p].a / kFingerJoints,
              .finger_b = kPairs[p].b / kFingerJoints,
-             .slope = slope_of(pose, kPairs[p]),
+             .slope = slope_of(hand.pose(), kPairs[p]),
              .least = options.margin_m - gaps_m[p]};
       for (int c = 0; c < kFingerChannels; ++c) {
         row.least += row.slope.a[c] * at[kFingerChannels * row.finger_a + c] +
@@ -158,9 +156,9 @@ struct ConstraintSolver::State {
   // would become that one. Null: none is known.
   void descend(const HandAngles& target, const HandAngles& variance, Path& path,
                const Path* known = nullptr) noexcept {
-    const Box box{geometry.low_rad, geometry.high_rad};
+    const Box box{hand.geometry().low_rad, hand.geometry().high_rad};
     HandAngles last{};  // the step before; zero: none, or an extended one
-    path.gap_m = gap_of(path.angles);
+    path.gap_m = hand.move_to(path.angles);
     for (path.rounds = 0; path.rounds < kMaxRounds;) {
       ++path.rounds;
       const HandAngles next = project(target, variance, near_rows(path.angles),
@@ -173,7 +171,7 @@ struct ConstraintSolver::State {
       // A linearisation is not valid far from where it was made.
       path.angles = between(path.angles, next, std::min(share, kMaxStep_rad / step_rad));
       if (options.limits) path.angles = clamped(path.angles, box);
-      path.gap_m = gap_of(path.angles);
+      path.gap_m = hand.move_to(path.angles);
       if (step_rad < kDone_rad) break;
       if (known != nullptr && largest_difference(path.angles, known->angles) < kSame_rad) {
         path = *known;
@@ -195,7 +193,7 @@ struct ConstraintSolver::State {
   // flicker (models/hand/README.md, "Sides and fallback").
   Path separate(const HandAngles& target, const HandAngles& variance) noexcept {
     Path best{.angles = target, .forces = forces};
-    best.gap_m = gap_of(target);
+    best.gap_m = hand.move_to(target);
     const bool is_deep = best.gap_m < -kDeep_m;
     if (best.gap_m >= options.margin_m) {
       best.cost = 0.0;
@@ -224,7 +222,7 @@ struct ConstraintSolver::State {
   // the gap.
   double retreat(const HandAngles& safe, HandAngles& angles, int halvings) noexcept {
     const HandAngles from = angles;
-    double gap_m = gap_of(safe);
+    double gap_m = hand.move_to(safe);
     angles = safe;
     if (gap_m < 0.0) return gap_m;
     double bad = 0.0;
@@ -232,7 +230,7 @@ struct ConstraintSolver::State {
     for (int i = 0; i < halvings; ++i) {
       const double middle = 0.5 * (bad + good);
       const HandAngles there = between(from, safe, middle);
-      const double there_m = gap_of(there);
+      const double there_m = hand.move_to(there);
       if (there_m < kSliver_m) {
         bad = middle;
       } else {
@@ -262,7 +260,7 @@ struct ConstraintSolver::State {
     } else {
       angles = path.angles;
       forces = path.forces;
-      report.min_gap_m = gap_of(angles);
+      report.min_gap_m = hand.move_to(angles);
     }
     follows = path.rounds > 0;
     before = angles;
@@ -270,7 +268,7 @@ struct ConstraintSolver::State {
 
   int count_touching() noexcept {
     for (std::size_t p = 0; p < kPairs.size(); ++p) {
-      touching[p] = forces[p] > 0.0 || (touching[p] && gaps_m[p] < options.leave_m);
+      touching[p] = forces[p] > 0.0 || (touching[p] && hand.gaps_m()[p] < options.leave_m);
     }
     return static_cast<int>(touching.count());
   }
@@ -279,11 +277,7 @@ struct ConstraintSolver::State {
 ConstraintSolver::ConstraintSolver(const HandShape& shape, const ConstraintOptions& options)
     : ConstraintSolver(hand_geometry(shape), options) {}
 ConstraintSolver::ConstraintSolver(const HandGeometry& geometry, const ConstraintOptions& options)
-    : state_(std::make_unique<State>()) {
-  state_->geometry = geometry;
-  state_->options = options;
-  state_->options.margin_m = std::max(options.margin_m, kSliver_m);
-}
+    : state_(std::make_unique<State>(geometry, options)) {}
 ConstraintSolver::~ConstraintSolver() = default;
 ConstraintSolver::ConstraintSolver(ConstraintSolver&&) noexcept = default;
 ConstraintSolver& ConstraintSolver::operator=(ConstraintSolver&&) noexcept = default;
@@ -303,7 +297,7 @@ ConstraintReport ConstraintSolver::step(HandAngles& angles, const HandAngles& va
   }
   const double most = *std::ranges::max_element(weight);
   for (double& w : weight) w = std::max(w / most, kLeastWeight);
-  const HandGeometry& geometry = state.geometry;
+  const HandGeometry& geometry = state.hand.geometry();
   if (state.options.limits) {
     for (std::size_t c = 0; c < angles.size(); ++c) {
       angles[c] =
@@ -314,7 +308,7 @@ ConstraintReport ConstraintSolver::step(HandAngles& angles, const HandAngles& va
     state.keep_apart(angles, weight, report);
     report.touching = state.count_touching();
   } else {
-    report.min_gap_m = state.gap_of(angles);
+    report.min_gap_m = state.hand.move_to(angles);
   }
   report.changed_rad = largest_difference(angles, given);
   return report;
@@ -327,11 +321,7 @@ void ConstraintSolver::reset() noexcept {
 }
 
 double min_gap_m(const HandGeometry& geometry, const HandAngles& angles) noexcept {
-  HandPose pose;
-  Gaps gaps_m;
-  place(geometry, angles, pose);
-  find_gaps(geometry, pose, kFar_m, gaps_m);
-  return smallest(gaps_m);
+  return PlacedHand(geometry).move_to(angles);
 }
 
 }  // namespace posed::hand

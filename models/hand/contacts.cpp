@@ -38,8 +38,8 @@ void add_slope(const HandPose& pose, int bone, const Eigen::Vector3d& point_m,
 
 }  // namespace
 
-void find_gaps(const HandGeometry& geometry, const HandPose& pose, double far_m,
-               Gaps& gaps_m) noexcept {
+void find_gaps(const HandGeometry& geometry, const HandPose& pose, double far_m, Gaps& gaps_m,
+               Fingers moved) noexcept {
   std::array<Eigen::Vector3d, kHandJoints> middle_m;
   std::array<double, kHandJoints> reach_m{};
   std::array<double, kHandJoints> radius_m{};
@@ -51,6 +51,7 @@ void find_gaps(const HandGeometry& geometry, const HandPose& pose, double far_m,
   }
   for (std::size_t p = 0; p < kPairs.size(); ++p) {
     const auto [a, b] = kPairs[p];
+    if (!moved[a / kFingerJoints] && !moved[b / kFingerJoints]) continue;
     const double near_m = reach_m[a] + reach_m[b] + far_m;
     if ((middle_m[a] - middle_m[b]).squaredNorm() > near_m * near_m) {
       gaps_m[p] = far_m;

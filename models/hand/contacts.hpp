@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstdint>
 
 #include "models/hand/geometry.hpp"
@@ -28,11 +29,15 @@ inline constexpr std::array<BonePair, kBonePairs> kPairs = [] {
   return pairs;
 }();
 
+using Fingers = std::bitset<kFingers>;
+inline constexpr Fingers kAllFingers{(1U << kFingers) - 1};
+
 // [pair] distance of the capsules [m], below zero where they overlap; exact below `far_m`,
-// otherwise some value of at least `far_m`. RT-safe.
+// otherwise some value of at least `far_m`. Pairs of which neither finger is in `moved` keep the
+// value that they have. RT-safe.
 using Gaps = std::array<double, kBonePairs>;
-void find_gaps(const HandGeometry& geometry, const HandPose& pose, double far_m,
-               Gaps& gaps_m) noexcept;
+void find_gaps(const HandGeometry& geometry, const HandPose& pose, double far_m, Gaps& gaps_m,
+               Fingers moved = kAllFingers) noexcept;
 
 [[nodiscard]] double smallest(const Gaps& gaps_m) noexcept;
 

@@ -8,14 +8,15 @@ namespace posed::hand {
 namespace {
 
 // RT-safe.
-void place_finger(const FingerGeometry& finger, const double* angles, Eigen::Vector3d* from_m,
-                  Eigen::Vector3d* to_m, Eigen::Vector3d* axis) noexcept {
+void place_bones(const FingerGeometry& finger, const double* angles, Eigen::Vector3d* from_m,
+                 Eigen::Vector3d* to_m, Eigen::Vector3d* axis) noexcept {
   Eigen::Matrix3d turned = finger.frame;  // columns: the channels' axes in the wrist's frame
   Eigen::Vector3d at_m = finger.base_m;
   const Eigen::Vector3d along = finger.frame.transpose() * finger.along;
   for (int j = 0; j < kFingerJoints; ++j) {
     const double* const q = angles + 3 * j;  // x, y, z
     const auto turn = [&turned](int u, int v, double angle_rad) {
+      if (angle_rad == 0.0) return;  // half of the angles: most joints cannot spread or twist
       const double c = std::cos(angle_rad);
       const double s = std::sin(angle_rad);
       const Eigen::Vector3d before = turned.col(u);
@@ -54,11 +55,15 @@ HandGeometry hand_geometry(const HandShape& shape) {
   return geometry;
 }
 
+void place_finger(const HandGeometry& geometry, int finger, const HandAngles& angles,
+                  HandPose& pose) noexcept {
+  place_bones(geometry.fingers[finger], &angles[kFingerChannels * finger],
+              &pose.from_m[kFingerJoints * finger], &pose.to_m[kFingerJoints * finger],
+              &pose.axis[kFingerChannels * finger]);
+}
+
 void place(const HandGeometry& geometry, const HandAngles& angles, HandPose& pose) noexcept {
-  for (int f = 0; f < kFingers; ++f) {
-    place_finger(geometry.fingers[f], &angles[kFingerChannels * f], &pose.from_m[kFingerJoints * f],
-                 &pose.to_m[kFingerJoints * f], &pose.axis[kFingerChannels * f]);
-  }
+  for (int f = 0; f < kFingers; ++f) place_finger(geometry, f, angles, pose);
 }
 
 }  // namespace posed::hand

@@ -22,8 +22,8 @@ struct Replayed {
   replay::Expectation::Counts counts;
 };
 
-// `expect`: compare with the published frames that the log holds.
-inline Replayed replayed(const std::filesystem::path& path, bool expect = true) {
+// `expect`: compare with the published frames that the log holds. `keep`: the frames, too.
+inline Replayed replayed(const std::filesystem::path& path, bool expect = true, bool keep = true) {
   Replayed result;
   auto reader = log::Reader::open(path);
   REQUIRE(reader);
@@ -47,7 +47,7 @@ inline Replayed replayed(const std::filesystem::path& path, bool expect = true) 
     encoders.emplace_back(replay.stream(id).name);
     encoders.emplace_back(replay.stream(id).name + "-raw");
   }
-  const auto keep = [&](const Result<>& same) {
+  const auto note = [&](const Result<>& same) {
     if (!same && !result.difference) result.difference = same.error();
   };
   const auto done = replay.run(
@@ -56,13 +56,13 @@ inline Replayed replayed(const std::filesystem::path& path, bool expect = true) 
         if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
         const std::uint32_t stream = item.frame.header.stream;
         const v1::Frame& frame = encoders[2 * stream + (raw ? 1 : 0)].encode(item.frame);
-        result.frames.push_back(frame.SerializeAsString());
-        if (expect) keep(expectation->compare(stream, raw, frame, replay.broken_at(stream)));
+        if (keep) result.frames.push_back(frame.SerializeAsString());
+        if (expect) note(expectation->compare(stream, raw, frame, replay.broken_at(stream)));
       },
       [](const log::ChunkRow&) { return true; });
-  keep(done);
+  note(done);
   for (std::uint32_t id = 0; expect && !result.difference && id < replay.streams(); ++id) {
-    keep(expectation->finish(id, replay.broken_at(id)));
+    note(expectation->finish(id, replay.broken_at(id)));
   }
   if (expect) result.counts = expectation->counts();
   return result;

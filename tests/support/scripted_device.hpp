@@ -33,21 +33,22 @@ inline std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text));
 }
 
-// Plays one link of the script.
+// Plays one link of the script, `later_s` after the times that it has.
 class ScriptedTransport final : public drivers::Transport {
  public:
-  explicit ScriptedTransport(const ScriptedLink& link) : link_(link) {}
+  ScriptedTransport(const ScriptedLink& link, double later_s) : link_(link), later_s_(later_s) {}
 
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
-    if (!link_.flood.empty()) return at_ns(link_.from_s);
-    const std::int64_t chunk_ns =
-        next_ < link_.chunks.size() ? at_ns(link_.chunks[next_].at_s) : system::kForever_ns;
-    return std::min(chunk_ns, at_ns(link_.until_s));
+    if (!link_.flood.empty()) return at_ns(link_.from_s + later_s_);
+    const std::int64_t chunk_ns = next_ < link_.chunks.size()
+                                      ? at_ns(link_.chunks[next_].at_s + later_s_)
+                                      : system::kForever_ns;
+    return std::min(chunk_ns, at_ns(link_.until_s + later_s_));
   }
   [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
   [[nodiscard]] drivers::Chunk read(std::int64_t now_ns) noexcept override {
-    if (now_ns >= at_ns(link_.until_s))
+    if (now_ns >= at_ns(link_.until_s + later_s_))
       return {.bytes = {}, .end = link_.ends, .lost = !link_.ends};
     if (now_ns < next_due_ns()) return {};
     const std::string& bytes = link_.flood.empty() ? link_.chunks[next_++].bytes : link_.flood;
@@ -60,14 +61,19 @@ class ScriptedTransport final : public drivers::Transport {
 
  private:
   const ScriptedLink& link_;
+  double later_s_;
   std::size_t next_ = 0;
 };
 
 class ScriptedDevice {
  public:
-  ScriptedDevice(drivers::Description description, std::vector<ScriptedLink> links,
+  // Every `repeat_s` seconds the script of links begins again.
+  ScriptedDevice(drivers::Description description, std::vector<ScriptedLink> links, double repeat_s,
                  drivers::Poll poll = {})
-      : description_(std::move(description)), links_(std::move(links)), poll_(std::move(poll)) {
+      : description_(std::move(description)),
+        links_(std::move(links)),
+        repeat_s_(repeat_s),
+        poll_(std::move(poll)) {
     slot_.supervisor = system::EventFd::open().value();
   }
 
@@ -76,25 +82,26 @@ class ScriptedDevice {
 
   // The device of the next link, if it is connected by now; otherwise null.
   [[nodiscard]] drivers::Device* next() {
-    if (device_ || next_link_ == links_.size()) return nullptr;
+    if (device_ || is_over() || at_ns(next_from_s()) > virtual_now_ns) return nullptr;
     const ScriptedLink& link = links_[next_link_];
-    if (at_ns(link.from_s) > virtual_now_ns) return nullptr;
-    ++next_link_;
     const drivers::Driver* driver = drivers::find_driver(description_.driver);
     device_ = std::make_unique<drivers::Device>();
     device_->description = description_;
-    device_->transport = std::make_unique<ScriptedTransport>(link);
+    device_->transport = std::make_unique<ScriptedTransport>(link, later_s_);
     device_->decoder = driver->make_decoder(description_).value();
     device_->calibrated = drivers::glove::calibrated_decoder(*device_->decoder);
     device_->poll = poll_;
+    if (++next_link_ == links_.size() && repeat_s_ != kNever_s) {
+      next_link_ = 0;
+      later_s_ += repeat_s_;
+    }
     return device_.get();
   }
 
   // When a supervisor has something to do.
   [[nodiscard]] std::int64_t due_ns() const {
     if (!slot_.out.empty()) return virtual_now_ns;
-    if (device_ || next_link_ == links_.size()) return system::kForever_ns;
-    return at_ns(links_[next_link_].from_s);
+    return device_ || is_over() ? system::kForever_ns : at_ns(next_from_s());
   }
   void supervise(pipeline::Reader& reader) {
     while (slot_.out.consume([this](drivers::Device*) { device_.reset(); })) {
@@ -106,8 +113,12 @@ class ScriptedDevice {
   }
 
  private:
+  [[nodiscard]] bool is_over() const { return next_link_ == links_.size(); }
+  [[nodiscard]] double next_from_s() const { return links_[next_link_].from_s + later_s_; }
+
   drivers::Description description_;
   std::vector<ScriptedLink> links_;
+  double repeat_s_, later_s_ = 0.0;
   drivers::Poll poll_;
   pipeline::DeviceSlot slot_;
   std::unique_ptr<drivers::Device> device_;  // of the link in use

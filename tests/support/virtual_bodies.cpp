@@ -10,8 +10,11 @@
 namespace posed::test {
 
 VirtualBodies::VirtualBodies(std::vector<VirtualSource> sources, std::uint32_t first,
-                             std::size_t streams)
-    : first_(first), wake_(system::EventFd::open().value()), counters_(streams) {
+                             std::size_t streams, bool keeps_log)
+    : first_(first),
+      wake_(system::EventFd::open().value()),
+      counters_(streams),
+      keeps_log_(keeps_log) {
   for (VirtualSource& source : sources) {
     auto one = std::make_unique<devices::BodySource>();
     one->config = std::move(source.config);
@@ -22,8 +25,9 @@ VirtualBodies::VirtualBodies(std::vector<VirtualSource> sources, std::uint32_t f
     one->source->options = one->config.options;
     one->source->device.description = one->source->driver->expect(one->config.options).value();
     one->exchange = std::make_unique<pipeline::BodyExchange>(*wake_);
-    devices_.push_back(std::make_unique<ScriptedDevice>(
-        one->source->device.description, std::move(source.links), std::move(source.poll)));
+    devices_.push_back(std::make_unique<ScriptedDevice>(one->source->device.description,
+                                                        std::move(source.links), source.repeat_s,
+                                                        std::move(source.poll)));
     sources_.push_back(std::move(one));
     files_.push_back(std::move(source.files));
     slots_ = std::max(slots_, source.slots);
@@ -122,19 +126,20 @@ std::optional<std::uint32_t> VirtualBodies::stream_of(const std::string& body) c
 }
 
 void VirtualBodies::finish() {
-  while (!streams_.empty()) keep(streams_.begin()->first);
+  while (!streams_.empty()) keep(streams_.begin()->first, false);
 }
 
-void VirtualBodies::keep(std::uint32_t stream) {
+void VirtualBodies::keep(std::uint32_t stream, bool left) {
   const auto found = streams_.find(stream);
   REQUIRE(found != streams_.end());
   const pipeline::StreamCounters& counts = counters(stream);
   VirtualBody& about = found->second->about;
+  about.left = left;
   about.published = std::move(found->second->published.published);
   about.decoded = counts.reader.frames;
   about.unpublished = counts.pipeline.dropped;
   about.lost = counts.reader.dropped + counts.pipeline.shed + about.unpublished;
-  log_.push_back(std::move(about));
+  if (keeps_log_) log_.push_back(std::move(about));
   streams_.erase(found);
 }
 
@@ -181,10 +186,7 @@ std::optional<std::uint32_t> VirtualBodies::take_gone() {
   return id;
 }
 
-void VirtualBodies::remove(std::uint32_t stream) {
-  keep(stream);
-  log_.back().left = true;
-}
+void VirtualBodies::remove(std::uint32_t stream) { keep(stream, true); }
 
 void VirtualBodies::warn(const devices::BodySource& /*source*/, const std::string& sentence) {
   REQUIRE_FALSE(sentence.empty());

@@ -40,13 +40,15 @@ struct PublishedStream {
 class VirtualBodies final : public devices::StreamHost {
  public:
   // `first` is the number of the first source and the slot of the first stream.
-  VirtualBodies(std::vector<VirtualSource> sources, std::uint32_t first, std::size_t streams);
+  VirtualBodies(std::vector<VirtualSource> sources, std::uint32_t first, std::size_t streams,
+                bool keeps_log);
   ~VirtualBodies() override;
 
   [[nodiscard]] std::size_t streams() const { return counters_.size(); }
   [[nodiscard]] std::size_t all_slots() const { return streams() * (slots_ + 1); }
   [[nodiscard]] pipeline::StreamExchange& exchange() { return *exchange_; }
-  // All streams that there were, by the time of their end; complete after finish().
+  // All streams that there were, by the time of their end; complete after finish(), empty if no
+  // log is kept.
   [[nodiscard]] const std::vector<VirtualBody>& log() const { return log_; }
   [[nodiscard]] std::size_t warnings() const { return warnings_; }
 
@@ -81,7 +83,7 @@ class VirtualBodies final : public devices::StreamHost {
     std::vector<std::unique_ptr<const StageModel>> models;
     std::unique_ptr<pipeline::StreamContext> context{};  // null for a refused body
   };
-  void keep(std::uint32_t stream);  // in log_
+  void keep(std::uint32_t stream, bool left);  // in log_
 
   // StreamHost
   pipeline::StreamCounters& counters(std::uint32_t stream) override;
@@ -110,6 +112,7 @@ class VirtualBodies final : public devices::StreamHost {
   std::int64_t builder_due_ns_ = 0;
   std::map<std::uint32_t, std::unique_ptr<Stream>> streams_;  // those that were not removed
   std::vector<std::uint32_t> gone_;                           // given back by the worker
+  bool keeps_log_;
   std::vector<VirtualBody> log_;
   std::size_t warnings_ = 0;
 };

@@ -56,6 +56,7 @@ class VirtualDaemon::Parts {
   std::vector<VirtualSource> sources;
   std::vector<VirtualCommand> script;
   std::vector<pipeline::Ack> acks_taken;
+  std::size_t acked = 0;                  // how many Acks there were
   std::unique_ptr<VirtualBodies> bodies;  // null without sources
   pipeline::PartnerStreams partners;      // that stages may name
   std::uint64_t write_errors = 0;         // of the log, until it was closed
@@ -86,6 +87,7 @@ class VirtualDaemon::Parts {
   void run_beside_builder();
   void write_log();
   void sleep();
+  void look();
   void stop();
   void kill();
   std::int64_t draw_ns(std::int64_t most_ns) {
@@ -102,6 +104,7 @@ class VirtualDaemon::Parts {
   std::unique_ptr<system::EventFd> pipeline_wake, publisher_wake;
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
+  std::int64_t next_look_ns = 0;
   std::size_t next_command = 0;
   std::size_t unsent = 0;                            // commands for a body that had no stream
   std::array<std::int64_t, kParts> due{};            // as returned by the part's last turn
@@ -168,7 +171,8 @@ void VirtualDaemon::Parts::open() {
   virtual_now_ns = kVirtualBegin_ns;
   const auto count = static_cast<std::uint32_t>(contexts.size());
   if (!sources.empty()) {
-    bodies = std::make_unique<VirtualBodies>(std::move(sources), count, options.bodies);
+    bodies = std::make_unique<VirtualBodies>(std::move(sources), count, options.bodies,
+                                             !options.counts_only);
   }
   find_partners();
   open_log();
@@ -231,6 +235,7 @@ void VirtualDaemon::Parts::run(double until_s) {
   const std::int64_t until_ns = std::min(at_ns(until_s), at_ns(options.killed_at_s));
   while (virtual_now_ns < until_ns) {
     if (within(options.asleep)) sleep();
+    look();
     std::array<Part, kParts> ready{};
     std::size_t count = 0;
     std::int64_t next_ns = until_ns;
@@ -254,6 +259,13 @@ void VirtualDaemon::Parts::run(double until_s) {
   }
   if (virtual_now_ns < at_ns(options.killed_at_s)) return stop();
   kill();
+}
+
+void VirtualDaemon::Parts::look() {
+  if (!options.look || virtual_now_ns < next_look_ns) return;
+  const double at_s = seconds(virtual_now_ns - kVirtualBegin_ns);
+  options.look(at_s);
+  next_look_ns = at_ns((std::floor(at_s / options.look_every_s) + 1.0) * options.look_every_s);
 }
 
 void VirtualDaemon::Parts::sleep() {
@@ -313,7 +325,7 @@ void VirtualDaemon::Parts::take_turn(Part part) {
       break;
     case kPerson:
       // Control sends at most kMaxUnderWay commands.
-      if (next_command - unsent - acks_taken.size() < pipeline::kMaxUnderWay) {
+      if (next_command - unsent - acked < pipeline::kMaxUnderWay) {
         speak(script[next_command], next_command + 1);
         ++next_command;
       }
@@ -381,7 +393,8 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
       break;
     }
     case Kind::kPlay: {
-      const auto* gestures = static_cast<const generate::BoundModel*>(context.models.back().get());
+      const auto* gestures =
+          static_cast<const generate::BoundModel*>(context.models.begin()->second.get());
       const auto order = gesture::make_play_order(
           gestures->gesture(), gesture::split_labels(wanted.labels), 1.0, wanted.loop);
       REQUIRE(order);
@@ -420,7 +433,11 @@ void VirtualDaemon::Parts::publish(int most) {
   };
   for (int i = 0; i < most && finished->consume(take); ++i) {
   }
-  while (acks->consume([this](const pipeline::Ack& ack) { acks_taken.push_back(ack); })) {
+  const auto take_ack = [this](const pipeline::Ack& ack) {
+    ++acked;
+    if (!options.counts_only) acks_taken.push_back(ack);
+  };
+  while (acks->consume(take_ack)) {
   }
 }
 
@@ -435,8 +452,14 @@ void VirtualDaemon::Parts::publish_frame(PublishedStream& stream, const pipeline
   REQUIRE(is_sound(item.frame));
   published.root_z_m.insert(std::lround(item.frame.root_position_m[2]));
   if (!raw) {
-    published.sequences.push_back(item.frame.header.sequence);
-    published.at_s.push_back(static_cast<double>(virtual_now_ns - kVirtualBegin_ns) * 1e-9);
+    const std::uint64_t sequence = item.frame.header.sequence;
+    REQUIRE(sequence >= published.newest);  // a pose may be repeated under its number
+    if (sequence > published.newest) ++published.numbers;
+    published.newest = sequence;
+    if (!options.counts_only) {
+      published.sequences.push_back(sequence);
+      published.at_s.push_back(seconds(virtual_now_ns - kVirtualBegin_ns));
+    }
   }
   if (!record_sink) return;
   const std::string bytes =

@@ -15,6 +15,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -59,13 +60,15 @@ struct VirtualStream {
   std::vector<std::string> model_files;  // one for each stage: bytes of its model file, or empty
   std::string calibration;               // TOML; empty: the device's default
   std::vector<ScriptedLink> links;
-  std::size_t slots = 64;  // how many slots of each ring the stream may fill
+  double repeat_s = kNever_s;  // every so often the script of links begins again
+  std::size_t slots = 64;      // how many slots of each ring the stream may fill
 };
 
 // A device with several bodies, whose streams come and go.
 struct VirtualSource {
   config::SourceConfig config;
   std::vector<ScriptedLink> links;
+  double repeat_s = kNever_s;
   drivers::Poll poll{};
   std::size_t slots = 64;                   // how many slots of each ring each body may fill
   std::vector<std::string> bodies{};        // names of all that the script describes
@@ -109,6 +112,10 @@ struct VirtualOptions {
   // Each device's and each stream's share of the recorder's rings.
   std::size_t chunk_bytes = 4 << 20;
   record::SlotSizes record_slot{.frame_bytes = 16 << 20, .decisions = 2048};
+  // Keeps counts, but no lists of what was published and acknowledged: for runs of days.
+  bool counts_only = false;
+  double look_every_s = kNever_s;
+  std::function<void(double at_s)> look{};
 };
 
 struct VirtualBody;
@@ -130,10 +137,11 @@ class VirtualDaemon {
 
   struct Published {
     std::uint64_t frames = 0, raw = 0, samples = 0;
-    std::uint64_t missed = 0;              // numbers of frames that never came, as events said
-    std::vector<std::uint64_t> sequences;  // of the styled frames, as they came
-    std::vector<double> at_s;              // of each of them, when it was published
-    std::set<long> root_z_m;               // rounded, of all frames
+    std::uint64_t newest = 0, numbers = 0;  // sequences of styled frames: the last; how many
+    std::uint64_t missed = 0;               // numbers of frames that never came, as events said
+    std::vector<std::uint64_t> sequences;   // of the styled frames, as they came
+    std::vector<double> at_s;               // of each of them, when it was published
+    std::set<long> root_z_m;                // rounded, of all frames
   };
   [[nodiscard]] const Published& published(std::uint32_t stream) const;
   [[nodiscard]] const pipeline::StreamCounters& counters(std::uint32_t stream) const;

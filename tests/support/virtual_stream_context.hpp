@@ -1,10 +1,10 @@
 // One stream of the running virtual daemon, with everything that its parts borrow.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -17,35 +17,39 @@ namespace posed::test {
 struct VirtualStreamContext {
   VirtualStreamContext(VirtualStream script, std::uint32_t number)
       : stream(std::move(script)),
-        device(stream.description, std::move(stream.links)),
+        device(stream.description, std::move(stream.links), stream.repeat_s),
         published(number, stream.name, counters) {
     stream.settings.rate_hz = stream.description.rate_hz;
   }
 
-  // The file, bound to stage number `stage`.
+  // The file, bound to stage number `stage`; once, however often it is used.
   const StageModel* bind(std::size_t stage, const std::string& bytes) {
+    std::unique_ptr<const StageModel>& model = models[{stage, bytes}];
+    if (model) return model.get();
     const StageType& type = *stream.settings.stages[stage].type;
     const auto context =
         pipeline::stage_context(stream.settings, stage, stream.description.skeleton);
     REQUIRE(context);
     auto bound = type.bind_model(bytes_of(bytes), *context, "virtual");
     REQUIRE(bound);
-    models.push_back(std::move(*bound));
-    return models.back().get();
+    model = std::move(*bound);
+    return model.get();
   }
   const drivers::glove::OwnedCalibration* compile(const std::string& toml) {
+    std::unique_ptr<const drivers::glove::OwnedCalibration>& calibration = calibrations[toml];
+    if (calibration) return calibration.get();
     auto compiled = devices::compile_calibration(stream.description, toml, "virtual.toml");
     REQUIRE(compiled);
-    calibrations.push_back(std::move(*compiled));
-    return calibrations.back().get();
+    calibration = std::move(*compiled);
+    return calibration.get();
   }
 
   VirtualStream stream;
   pipeline::StreamCounters counters;
   pipeline::SourceCounters source_counters;
   ScriptedDevice device;
-  std::vector<std::unique_ptr<const StageModel>> models;
-  std::vector<std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
+  std::map<std::pair<std::size_t, std::string>, std::unique_ptr<const StageModel>> models;
+  std::map<std::string, std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
   PublishedStream published;
 };
 

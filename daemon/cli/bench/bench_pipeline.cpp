@@ -1,7 +1,9 @@
 // `posed bench pipeline`: what the daemon adds to a bare ZeroMQ hop, from the reader's arrival
 // stamp to another process. The two alternate every second, on the same frames.
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -14,6 +16,7 @@
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/cli/bench/bench_parts.hpp"
 #include "daemon/cli/bench/bench_report.hpp"
+#include "daemon/cli/bench/hop_parts.hpp"
 #include "daemon/cli/bench/hop_report.hpp"
 #include "daemon/cli/bench/hop_subscriber.hpp"
 #include "daemon/cli/cli.hpp"
@@ -27,9 +30,10 @@ namespace posed::cli {
 namespace {
 
 constexpr double kRate_hz = kWalkers_hz;
+constexpr int kWarmUp_s = 2;  // the first turn of each is not counted
 constexpr const char* kBenchPipelineFooter =
     R"(Synthetic walkers at 120 Hz through the real daemon: file driver, rings, a style model of
---points poses, publisher; no recording, no real-time priority. Every other second the reader sends
+--points poses, publisher; no recording. Every other second the reader sends
 a message of the same size straight to ZeroMQ instead: the bare hop. The subscriber is another
 process. The result is valid only if the CPU pressure (PSI some) stays below 5 %.
 
@@ -42,6 +46,7 @@ struct HopOptions {
   int points = 1000;
   int seconds = 60;
   bool gate = false;
+  bool realtime = false;
   ReportFile report;
   bool json = false;
 };
@@ -127,6 +132,8 @@ struct Watched {
   std::uint64_t dropped = 0, shed = 0;
   double pressure_before_percent = 0.0, pressure_percent = 0.0;
   HopReport report;
+  TimesByThread threads;  // in the pipeline's seconds
+  HopParts parts;
   std::uint64_t gaps = 0;
 };
 
@@ -147,12 +154,18 @@ std::string sample_body(const devices::OpenStream& stream) {
 void watch(const assembly::Daemon& daemon, const Turns& turns, int seconds, Watched& watched) {
   std::int64_t pipeline_cpu_ns = 0;
   std::int64_t before_ns = system::cpu_time_ns();
+  TimesByThread before = thread_times();
   for (int second = 0; second < seconds; ++second) {
     const std::int64_t until_ns = turns.start_ns + (second + 1) * kNanosPerSecond;
     std::this_thread::sleep_for(std::chrono::nanoseconds(until_ns - system::monotonic_ns()));
     const std::int64_t cpu_ns = system::cpu_time_ns();
-    if (second % 2 == 0) pipeline_cpu_ns += cpu_ns - before_ns;
+    TimesByThread after = thread_times();
+    if (second % 2 == 0) {
+      pipeline_cpu_ns += cpu_ns - before_ns;
+      if (second >= kWarmUp_s) add_passed(before, after, watched.threads);
+    }
     before_ns = cpu_ns;
+    before = std::move(after);
     watched.rss_end = system::resident_bytes();
     if (second < 10) watched.rss_10s = watched.rss_end;
   }
@@ -175,6 +188,7 @@ Result<Watched> measure(const HopOptions& options) {
   if (!config) return std::unexpected(config.error());
   // Each gets its turn every other second.
   for (config::StreamConfig& stream : config->streams) stream.stale_after_s = 3.0;
+  config->realtime = options.realtime;
   auto daemon = assembly::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
   auto context = net::open_context();
@@ -203,8 +217,10 @@ Result<Watched> measure(const HopOptions& options) {
   auto arrivals = (*subscriber)->finish();
   if (!arrivals) return std::unexpected(arrivals.error());
   watched.gaps = arrivals->gaps;
-  watched.report = report_hops(arrivals->messages, turns.start_ns,
-                               turns.start_ns + options.seconds * kNanosPerSecond);
+  const std::int64_t end_ns = turns.start_ns + options.seconds * kNanosPerSecond;
+  watched.report = report_hops(arrivals->messages, turns.start_ns, end_ns);
+  watched.parts = hop_parts(arrivals->messages, turns.start_ns + kWarmUp_s * kNanosPerSecond,
+                            end_ns, watched.threads);
   return watched;
 }
 
@@ -213,12 +229,14 @@ nlohmann::ordered_json to_json(const HopOptions& options, const Watched& watched
   return {{"streams", options.streams},
           {"points", options.points},
           {"gate", options.gate},
+          {"realtime", options.realtime},
           {"seconds", options.seconds},
           {"bare", to_json(report.bare)},
           {"pipeline", to_json(report.pipeline)},
           {"added_p50_us", report.pipeline.p50_us - report.bare.p50_us},
           {"block_p50_ratio", report.block_p50_ratio},
           {"block_p99_ratio", report.block_p99_ratio},
+          {"parts", to_json(watched.parts)},
           {"dropped", watched.dropped},
           {"shed", watched.shed},
           {"sequence_gaps", watched.gaps},
@@ -237,6 +255,7 @@ void print(const HopOptions& options, const Watched& watched) {
   std::printf("p50 added %.1f us; median over 1-s block pairs: p50 ratio %.2f, p99 ratio %.2f\n",
               report.pipeline.p50_us - report.bare.p50_us, report.block_p50_ratio,
               report.block_p99_ratio);
+  print(watched.parts);
   std::printf("dropped %llu, shed %llu, sequence gaps %llu; CPU %.1f %% of a core\n",
               static_cast<unsigned long long>(watched.dropped),
               static_cast<unsigned long long>(watched.shed),
@@ -253,21 +272,25 @@ void print(const HopOptions& options, const Watched& watched) {
 
 BenchPage page_of(const HopOptions& options, const Watched& watched) {
   const HopReport& report = watched.report;
-  return {.command = "posed bench pipeline",
-          .verdict = fmt::format("at the median the daemon adds {:.0f} us to a bare hop{}",
-                                 report.pipeline.p50_us - report.bare.p50_us,
-                                 pressure_words(watched.pressure_percent)),
-          .good = watched.pressure_percent <= kMostPressure_percent,
-          .figures = {report::percentile_bars(
-              {.title = fmt::format("{} stream{} at {:.0f} Hz, {} poses in the style model",
-                                    options.streams, options.streams == 1 ? "" : "s", kRate_hz,
-                                    options.points),
-               .sentence = "The second bar of a pair is what a frame needs through the whole "
-                           "daemon, the first what ZeroMQ needs alone: their distance is posed's "
-                           "part. Equal distances are equal factors.",
-               .quantity = "from the arrival to another process",
-               .peers = {{"bare ZeroMQ hop", percentiles_of(report.bare)},
-                         {"posed's pipeline", percentiles_of(report.pipeline)}}})}};
+  BenchPage page{
+      .command = "posed bench pipeline",
+      .verdict = fmt::format("at the median the daemon adds {:.0f} us to a bare hop{}",
+                             report.pipeline.p50_us - report.bare.p50_us,
+                             pressure_words(watched.pressure_percent)),
+      .good = watched.pressure_percent <= kMostPressure_percent,
+      .figures = {report::percentile_bars(
+          {.title =
+               fmt::format("{} stream{} at {:.0f} Hz, {} poses in the style model", options.streams,
+                           options.streams == 1 ? "" : "s", kRate_hz, options.points),
+           .sentence = "The second bar of a pair is what a frame needs through the whole "
+                       "daemon, the first what ZeroMQ needs alone: their distance is posed's "
+                       "part. Equal distances are equal factors.",
+           .quantity = "from the arrival to another process",
+           .peers = {{"bare ZeroMQ hop", percentiles_of(report.bare)},
+                     {"posed's pipeline", percentiles_of(report.pipeline)}}})}};
+  std::ranges::move(figures_of(watched.parts, report.bare.p50_us),
+                    std::back_inserter(page.figures));
+  return page;
 }
 
 Result<> bench_pipeline(const HopOptions& options) {
@@ -294,6 +317,7 @@ void add_bench_pipeline(CLI::App& bench, int& exit_code) {
   command->add_option("--seconds", options->seconds, "How long, both turns together")
       ->check(CLI::Range(4, 86400))
       ->capture_default_str();
+  command->add_flag("--realtime", options->realtime, "Ask for real-time rights, as `run` does");
   command->add_flag("--gate", options->gate, "With the style's gate");
   add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "JSON on stdout");

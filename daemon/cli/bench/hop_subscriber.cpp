@@ -29,13 +29,19 @@ class Noter {
     if (topic.text().starts_with("bare/")) {
       std::int64_t arrival_ns = 0;
       std::memcpy(&arrival_ns, body.bytes().data(), sizeof arrival_ns);
-      noted_.messages.push_back({arrival_ns, 0, came_ns - arrival_ns, true});
+      noted_.messages.push_back(
+          {.arrival_ns = arrival_ns, .age_ns = came_ns - arrival_ns, .bare = true});
     } else if (frame_.ParseFromArray(body.bytes().data(), static_cast<int>(body.bytes().size()))) {
       // The last pose of a silent source is published again with its old times.
       if (frame_.quality() == v1::QUALITY_STALE) return true;
       const std::int64_t arrival_ns = frame_.arrival_ns();
-      noted_.messages.push_back(
-          {arrival_ns, frame_.published_ns() - arrival_ns, came_ns - arrival_ns, false});
+      double stages_us = 0.0;
+      for (const float stage_us : frame_.stage_us()) stages_us += static_cast<double>(stage_us);
+      noted_.messages.push_back({.arrival_ns = arrival_ns,
+                                 .decoded_ns = frame_.decoded_ns() - arrival_ns,
+                                 .stages_ns = nanoseconds(stages_us * 1e-6),
+                                 .sent_ns = frame_.published_ns() - arrival_ns,
+                                 .age_ns = came_ns - arrival_ns});
       std::uint64_t& last = last_[frame_.stream()];
       if (last != 0 && frame_.sequence() > last + 1) noted_.gaps += frame_.sequence() - last - 1;
       last = frame_.sequence();

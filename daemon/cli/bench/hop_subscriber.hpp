@@ -15,8 +15,9 @@ namespace posed::cli {
 // A received message. Its topic says which kind it is: bare/... or pose/...
 struct Arrival {
   std::int64_t arrival_ns = 0;  // stamped in the reader
-  std::int64_t sent_ns = 0;     // age when it was handed to ZeroMQ; of a pose
-  std::int64_t age_ns = 0;      // age when the subscriber received it
+  // Of a pose: age when it was decoded, time in the stages, age when it was handed to ZeroMQ.
+  std::int64_t decoded_ns = 0, stages_ns = 0, sent_ns = 0;
+  std::int64_t age_ns = 0;  // age when the subscriber received it
   bool bare = false;
 };
 
