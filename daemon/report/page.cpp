@@ -118,8 +118,9 @@ std::string Page::html() const {
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
          "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
          "style-src 'unsafe-inline'\"/>\n<title>" +
-         title + "</title>\n<style>" + kStyleSheet + "</style>\n</head>\n<body>\n<h1>" + title +
-         "</h1>\n<p class=\"by\">" + escaped(command_) + "</p>\n" + body_ + "</body>\n</html>\n";
+         title + "</title>\n<style>" + kStyleSheet + "</style>\n</head>\n<body>\n<main>\n<h1>" +
+         title + "</h1>\n<p class=\"by\">" + escaped(command_) + "</p>\n" + body_ +
+         "</main>\n</body>\n</html>\n";
 }
 
 Result<> write_page(const Page& page, const std::filesystem::path& path) {

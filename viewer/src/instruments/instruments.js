@@ -34,7 +34,7 @@ export class Instruments {
     ]);
     this.stages = new Plot(
       'Time in each stage',
-      'What each stage of the pipeline spends on a frame.',
+      'What each stage of the pipeline spends on a frame; one that grows is the one to look at.',
       'µs',
       fromZero(100),
     );

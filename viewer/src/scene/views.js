@@ -14,7 +14,7 @@ const DIRECTIONS = {
 const GLIDE_S = 0.13; // time constant of the way to the figures
 const BACK_S = 0.8; // the same of the way back from where a person shifted the view
 const LONGEST_S = 0.25; // between two pictures, for the glide
-const HALF_HIGH_M = 1.05; // half of a body's height, with room
+const HALF_HIGH_M = 0.95; // half of a body's height, with room
 const LEAST_M = 1.2; // half of what is seen across, at least
 const BESIDE_M = 0.75; // room beside the outermost hips
 

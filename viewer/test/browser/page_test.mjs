@@ -1,11 +1,14 @@
 // The page in headless Chromium on a bridge of the test's own, without posed.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { after, before, test } from 'node:test';
 import { FakeBridge } from '../support/fake_bridge.mjs';
 import { FakeDaemon } from '../support/fake_daemon.mjs';
 import { launch, openPage } from '../support/browser.mjs';
 
 const PATIENCE = { timeout: 30000 };
+const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
 let browser;
 before(async () => {
@@ -433,6 +436,26 @@ pageTest(
     assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
   },
 );
+
+for (const options of [{}, { dark: true, bodies: 0 }, { dark: true, missing: [5], width: 390 }]) {
+  pageTest(
+    `axe-core finds no fault with the page: ${JSON.stringify(options)}`,
+    options,
+    async (page) => {
+      for (const part of await page.locator('summary:visible').all()) await part.click();
+      await page.evaluate(AXE); // contrast, names for screen readers, reach of the keyboard
+      const faults = () =>
+        page.evaluate(async () => {
+          const { violations } = await globalThis.axe.run();
+          return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target)}`);
+        });
+      assert.deepEqual(await faults(), []);
+      await page.locator('#help-button').click();
+      await page.locator('#help summary').click();
+      assert.deepEqual(await faults(), []);
+    },
+  );
+}
 
 pageTest(
   'on a phone nothing is wider than the screen',
