@@ -21,7 +21,7 @@ inline constexpr int kGridFrames = 28;  // points of a cycle that the process is
 [[nodiscard]] Eigen::MatrixXd grid_basis();
 
 // The most poses that a process keeps; above it they are inducing poses (models/gp/inducing.hpp).
-inline constexpr int kMostPoses = 600;
+inline constexpr int kMostPoses = 800;
 
 inline constexpr int kNoDifference = -1;
 
