@@ -46,7 +46,7 @@ class Reader::Source final : private IntakeOut {
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
   // Whether a chunk may be read now: always while a device is connected, except that a lossless
-  // source waits while its earlier frames are still in the pipeline.
+  // source waits while its earlier frames are still in the pipeline, or the recorder is behind.
   [[nodiscard]] bool may_read() const noexcept {
     if (device_ == nullptr || ended_) return false;
     if (!device_->transport->lossless()) return true;
@@ -57,6 +57,8 @@ class Reader::Source final : private IntakeOut {
           kFramesUnderWay) {
         return false;
       }
+      const RecordSink* const recorder = ports_.record_sink;
+      if (recorder != nullptr && !recorder->keeps_up(number_, place_[i]->body.stream)) return false;
     }
     return true;
   }

@@ -56,6 +56,11 @@ class RecordSink {
   // Any cold thread: marks the beginning or the end of a take, behind the last chunk that was read
   // before the newest one. Returns the take that began or ended. Allocates and locks.
   [[nodiscard]] virtual Result<Take> mark_take(const TakeMark& mark) = 0;
+
+  // Reader thread: whether the recorder has taken so much that a source that can wait may go on;
+  // otherwise records of the source or of the stream would soon be lost. RT-safe.
+  [[nodiscard]] virtual bool keeps_up(std::uint32_t source,
+                                      std::uint32_t stream) const noexcept = 0;
 };
 
 }  // namespace posed::pipeline

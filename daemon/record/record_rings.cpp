@@ -21,6 +21,7 @@ bool put(auto& share, Losses& lost, std::size_t amount, std::uint64_t lost_befor
          auto&& push) noexcept {
   if (share.share.has_room(amount) && push()) {
     share.share.add(amount);
+    pipeline::count(share.put, amount);
     if (lost_before != 0) lost.carried.fetch_add(lost_before, kRelaxed);
     return true;
   }
@@ -72,6 +73,13 @@ void RecordRings::chunk(std::uint32_t number, std::uint8_t socket, pipeline::Dir
                            .lost_before = source.lost.pending()};
   put(source.share, source.lost, chunks_.size_of(header), header.lost_before,
       [&] { return chunks_.push(header, positions, bytes); });
+}
+
+// RT-safe
+bool RecordRings::keeps_up(std::uint32_t source, std::uint32_t stream) const noexcept {
+  const std::uint32_t slot = pipeline::slot_of(stream);
+  if (!sources_[source].share.is_half_free()) return false;
+  return !wants_published_ || slot >= slots_.size() || slots_[slot].frames.is_half_free();
 }
 
 // RT-safe

@@ -97,6 +97,7 @@ class RecordRings final : public pipeline::RecordSink {
   void chunk(std::uint32_t source, std::uint8_t socket, pipeline::Direction direction,
              std::int64_t arrival_ns, const pipeline::Position& next,
              std::span<const std::byte> bytes) noexcept override;
+  [[nodiscard]] bool keeps_up(std::uint32_t source, std::uint32_t stream) const noexcept override;
   void decision(const pipeline::Decision& decision) noexcept override;
   [[nodiscard]] bool wants_published() const noexcept override { return wants_published_; }
   void published(std::uint32_t stream, std::uint64_t sequence, bool raw,
@@ -150,10 +151,16 @@ class RecordRings final : public pipeline::RecordSink {
 
  private:
   // One source's or slot's part of one ring. `taken` is written by the recorder, `share` belongs to
-  // the single producer of this kind.
+  // the single producer of this kind, which writes `put` for the other threads.
   struct Share {
-    explicit Share(std::size_t size) noexcept : share(size, taken) {}
-    std::atomic<std::uint64_t> taken{0};
+    explicit Share(std::size_t size) noexcept : half(size / 2), share(size, taken) {}
+    // Any thread. RT-safe.
+    [[nodiscard]] bool is_half_free() const noexcept {
+      const std::uint64_t now = taken.load(std::memory_order_acquire);
+      return put.load(std::memory_order_relaxed) <= now + half;
+    }
+    std::uint64_t half;
+    std::atomic<std::uint64_t> put{0}, taken{0};
     pipeline::RingShare share;
   };
   struct Source {

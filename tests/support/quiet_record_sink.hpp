@@ -13,6 +13,7 @@ class QuietRecordSink : public pipeline::RecordSink {
  public:
   void chunk(std::uint32_t, std::uint8_t, pipeline::Direction, std::int64_t,
              const pipeline::Position&, std::span<const std::byte>) noexcept override {}
+  [[nodiscard]] bool keeps_up(std::uint32_t, std::uint32_t) const noexcept override { return true; }
   void decision(const pipeline::Decision&) noexcept override {}
   [[nodiscard]] bool wants_published() const noexcept override { return false; }
   void published(std::uint32_t, std::uint64_t, bool, std::span<const std::byte>) noexcept override {

@@ -3,11 +3,28 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <catch2/catch.hpp>
 
+#include "tests/unit/drivers/collect_sink.hpp"
+
 namespace posed::test {
+
+void PublishedStream::count(const Frame& frame, bool is_raw, bool in_lists) {
+  ++(is_raw ? published.raw : published.frames);
+  REQUIRE(is_sound(frame));
+  published.root_z_m.insert(std::lround(frame.root_position_m[2]));
+  if (is_raw) return;
+  const std::uint64_t sequence = frame.header.sequence;
+  REQUIRE(sequence >= published.newest);  // a pose may be repeated under its number
+  if (sequence > published.newest) ++published.numbers;
+  published.newest = sequence;
+  if (!in_lists) return;
+  published.sequences.push_back(sequence);
+  published.at_s.push_back(seconds(virtual_now_ns - kVirtualBegin_ns));
+}
 
 VirtualBodies::VirtualBodies(std::vector<VirtualSource> sources, std::uint32_t first,
                              std::size_t streams, bool keeps_log)

@@ -30,6 +30,9 @@ struct PublishedStream {
   PublishedStream(std::uint32_t stream, const std::string& name, pipeline::StreamCounters& counts)
       : id(stream), counters(counts), styled(name), raw(name + "-raw") {}
 
+  // Fails the test if the frame is not sound or goes back.
+  void count(const Frame& frame, bool is_raw, bool in_lists);
+
   std::uint32_t id;
   pipeline::StreamCounters& counters;
   message::FrameEncoder styled, raw;

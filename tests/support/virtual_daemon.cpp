@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <random>
 #include <set>
 
@@ -19,7 +18,6 @@
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/virtual_bodies.hpp"
 #include "tests/support/virtual_stream_context.hpp"
-#include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::test {
 namespace {
@@ -104,7 +102,7 @@ class VirtualDaemon::Parts {
   std::unique_ptr<system::EventFd> pipeline_wake, publisher_wake;
   std::unique_ptr<pipeline::Worker> worker;
   std::unique_ptr<pipeline::Reader> reader;
-  std::int64_t next_look_ns = 0;
+  std::int64_t next_look_ns = kVirtualBegin_ns;
   std::size_t next_command = 0;
   std::size_t unsent = 0;                            // commands for a body that had no stream
   std::array<std::int64_t, kParts> due{};            // as returned by the part's last turn
@@ -228,8 +226,7 @@ void VirtualDaemon::Parts::open() {
   held_until_ns.fill(kVirtualBegin_ns);
 }
 
-// Runs one turn of a part that is due, then of another, chosen at random; if none is due, time
-// advances.
+// Runs one turn of a part that is due, drawn at random, then of another; else time advances.
 void VirtualDaemon::Parts::run(double until_s) {
   open();
   const std::int64_t until_ns = std::min(at_ns(until_s), at_ns(options.killed_at_s));
@@ -263,9 +260,8 @@ void VirtualDaemon::Parts::run(double until_s) {
 
 void VirtualDaemon::Parts::look() {
   if (!options.look || virtual_now_ns < next_look_ns) return;
-  const double at_s = seconds(virtual_now_ns - kVirtualBegin_ns);
-  options.look(at_s);
-  next_look_ns = at_ns((std::floor(at_s / options.look_every_s) + 1.0) * options.look_every_s);
+  options.look(seconds(virtual_now_ns - kVirtualBegin_ns));
+  next_look_ns += nanoseconds(options.look_every_s);
 }
 
 void VirtualDaemon::Parts::sleep() {
@@ -393,8 +389,7 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
       break;
     }
     case Kind::kPlay: {
-      const auto* gestures =
-          static_cast<const generate::BoundModel*>(context.models.begin()->second.get());
+      const auto* gestures = static_cast<const generate::BoundModel*>(context.any_model());
       const auto order = gesture::make_play_order(
           gestures->gesture(), gesture::split_labels(wanted.labels), 1.0, wanted.loop);
       REQUIRE(order);
@@ -447,20 +442,7 @@ PublishedStream& VirtualDaemon::Parts::published_stream(std::uint32_t stream) {
 
 void VirtualDaemon::Parts::publish_frame(PublishedStream& stream, const pipeline::Item& item) {
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
-  VirtualDaemon::Published& published = stream.published;
-  ++(raw ? published.raw : published.frames);
-  REQUIRE(is_sound(item.frame));
-  published.root_z_m.insert(std::lround(item.frame.root_position_m[2]));
-  if (!raw) {
-    const std::uint64_t sequence = item.frame.header.sequence;
-    REQUIRE(sequence >= published.newest);  // a pose may be repeated under its number
-    if (sequence > published.newest) ++published.numbers;
-    published.newest = sequence;
-    if (!options.counts_only) {
-      published.sequences.push_back(sequence);
-      published.at_s.push_back(seconds(virtual_now_ns - kVirtualBegin_ns));
-    }
-  }
+  stream.count(item.frame, raw, !options.counts_only);
   if (!record_sink) return;
   const std::string bytes =
       (raw ? stream.raw : stream.styled).encode(item.frame).SerializeAsString();

@@ -35,6 +35,7 @@ struct VirtualStreamContext {
     model = std::move(*bound);
     return model.get();
   }
+  [[nodiscard]] const StageModel* any_model() const { return models.begin()->second.get(); }
   const drivers::glove::OwnedCalibration* compile(const std::string& toml) {
     std::unique_ptr<const drivers::glove::OwnedCalibration>& calibration = calibrations[toml];
     if (calibration) return calibration.get();

@@ -73,8 +73,9 @@ std::string missing_words(const record::Recorder& recorder, std::uint64_t droppe
 // Prints a summary. Gaps were already reported when they happened.
 void print_result(const RecordingPlan& options, const v1::Stats& stats,
                   const record::Recorder& recorder, double took_s) {
-  std::error_code ignored;
-  const auto bytes = std::filesystem::file_size(options.out, ignored);
+  std::error_code gone;  // somebody deleted the log meanwhile
+  const auto size = std::filesystem::file_size(options.out, gone);
+  const std::uintmax_t bytes = gone ? 0 : size;
   std::uint64_t frames = stats.left_frames(), samples = stats.left_samples();
   const bool some_left = frames + samples > 0;
   nlohmann::ordered_json streams = nlohmann::ordered_json::array();

@@ -81,6 +81,29 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is reported once
   CHECK(lost(rows, 0, GapKind::kFrames) == 2);
 }
 
+TEST_CASE("a source that can wait is told when more than half of its room is taken") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  RecordRings rings(ring_sizes_of(2, 2048, {.frame_bytes = 2048, .decisions = 8}));
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
+                           [](const RecorderEvent&) {});
+  const std::string line(400, '1');
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    CHECK(rings.keeps_up(0, 0));
+    put_chunk(rings, 0, i, line);
+  }
+  CHECK_FALSE(rings.keeps_up(0, 0));
+  CHECK(rings.keeps_up(1, 1));
+  log_writer.turn(kTurn_ns);
+  CHECK(rings.keeps_up(0, 0));
+  for (std::uint64_t i = 1; i <= 3; ++i) rings.published(0, i, false, bytes_of(line));
+  CHECK_FALSE(rings.keeps_up(0, 0));
+  log_writer.turn(2 * kTurn_ns);
+  CHECK(rings.keeps_up(0, 0));
+  REQUIRE(log_writer.finish(3 * kTurn_ns));
+  CHECK(log_writer.lost_chunks() + log_writer.lost_frames() == 0);
+}
+
 TEST_CASE("a stream that fills its share of the rings does not affect another stream") {
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
