@@ -109,14 +109,14 @@ int TrainReport::gestures_of(const std::string& label) const {
   return count;
 }
 
-// Whether most segments of a label swing where its pose should be held.
+// Whether most segments of a label swing once they have arrived.
 bool TrainReport::swings(const std::string& label) const {
   int swinging = 0;
   for (const Recording& recording : recordings_) {
     for (const Segment& segment : recording.segments) {
       if (segment.label != label) continue;
-      const Segment held = held_part(segment);
-      swinging += oscillation_in(recording, held.begin, held.end).steady ? 1 : 0;
+      const int arrived = segment.begin + segment.frames() / 4;
+      swinging += oscillation_in(recording, arrived, held_part(segment).end).steady ? 1 : 0;
     }
   }
   return 2 * swinging > gestures_of(label);

@@ -45,6 +45,8 @@ struct Vocabulary {
   std::vector<ChannelGroup> groups = finger_groups();
   std::vector<Label> labels;
   std::vector<int> named;  // labels that questions may name, so that equal classes stay apart
+  // A live hand that makes none of the gestures is told so; a body always is.
+  bool tells_none = false;
 
   [[nodiscard]] bool is_hand() const noexcept { return !body; }
   [[nodiscard]] int channels() const noexcept;

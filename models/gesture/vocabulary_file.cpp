@@ -118,6 +118,7 @@ void read_vocabulary(const v1::GestureModel& from, Vocabulary& vocabulary, Valid
   if (!check.sound()) return;
   vocabulary.labels = read_labels(from, vocabulary.groups, check);
   vocabulary.named = read_named(from, check);
+  vocabulary.tells_none = from.tells_none();
 }
 
 void write_vocabulary(const Vocabulary& vocabulary, v1::GestureModel& out) {
@@ -131,6 +132,7 @@ void write_vocabulary(const Vocabulary& vocabulary, v1::GestureModel& out) {
   }
   if (vocabulary.body) write_body(vocabulary, out);
   for (const int label : vocabulary.named) out.add_named(static_cast<std::uint32_t>(label));
+  if (vocabulary.tells_none) out.set_tells_none(true);
 }
 
 }  // namespace posed::gesture

@@ -174,8 +174,8 @@ Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& mod
       live->states.push_back(state_of(model, contexts, state));
     }
   }
-  // A hand's label is always one of its model's.
-  if (live->body && model.label_index(kNoneName) < 0) live->none = none_of(*live);
+  const bool tells_none = live->body || model.tells_none;
+  if (tells_none && model.label_index(kNoneName) < 0) live->none = none_of(*live);
   return live;
 }
 

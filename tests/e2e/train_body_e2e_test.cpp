@@ -195,6 +195,7 @@ TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
   CHECK(one_sentence(takes.train("x.gesture", {"--body", "--tree-text", "-", "--trees", "thumb"}),
                      2, "names no tree"));
   CHECK(one_sentence(takes.train("x.gesture", {"--movement", "raise"}), 2, "add --auto-label"));
+  CHECK(one_sentence(takes.train("x.gesture", {"--body", "--none"}), 2, "leave out --none"));
   const auto asked = [&](const std::string& groups) {
     const auto file = takes.folder.write("asked.toml", groups).string();
     return takes.train("x.gesture", {"--questions", file});

@@ -67,6 +67,9 @@ TEST_CASE("A recording becomes a model, the same each time", "[train_gesture]") 
   const auto model = gesture::load_model(glove.file("a.gesture"));
   REQUIRE(model.has_value());
   CHECK(model->label_index("3") >= 0);
+  CHECK_FALSE(model->tells_none);
+  REQUIRE(glove.train("none.gesture", {"--none"}).code == 0);
+  CHECK(gesture::load_model(glove.file("none.gesture"))->tells_none);
   // The documented questions are the built-in ones, in another order of labels.
   const auto sample = (source_dir() / "config/gestures/gcp134.toml").string();
   const auto asked = glove.train("c.gesture", {"--json", "--questions", sample});

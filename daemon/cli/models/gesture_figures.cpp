@@ -246,7 +246,8 @@ std::optional<report::Figure> GestureFigures::unseen(const gesture::FeatureMatri
     const perform::Pose real(poses.row(at).begin(), poses.row(at).end());
     const double off_deg = kDegrees * gesture::apart(*model_, wanted, real).rms_rad();
     performed.poses.push_back({.figure = pose(wanted), .caption = name(labels_[k])});
-    nearest.poses.push_back({.figure = pose(real), .caption = fmt::format("{:.1f}° off", off_deg)});
+    const std::string words = fmt::format("{:.1f}° off", off_deg);
+    nearest.poses.push_back({.figure = pose(real), .caption = words});
   }
   if (performed.poses.empty()) return std::nullopt;
   return strip_of(

@@ -48,7 +48,7 @@ struct TrainGestureOptions : GestureSources {
   std::string hand;                             // which of two hands in a clip
   std::string movement, resting{kDefaultRest};  // of a take that labels itself
   int embedded_rounds = 0;
-  bool auto_label = false, cycles = false;
+  bool auto_label = false, cycles = false, none = false;
   bool overwrite = false, json = false;
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
@@ -74,10 +74,10 @@ Result<> check_auto_label(const TrainGestureOptions& options) {
   const bool draws =
       !options.trees->text.empty() || !options.trees->dot.empty() || !options.trees->svg.empty();
   if (draws || !options.report.empty() || !options.questions.empty() || !options.propose.empty() ||
-      !options.shows.empty() || options.embedded_rounds > 0) {
+      !options.shows.empty() || options.embedded_rounds > 0 || options.none) {
     return misuse(
         "--auto-label only proposes labels; leave out --questions, --propose-questions, --show, "
-        "--embedded-rounds, --tree-... and --report");
+        "--embedded-rounds, --none, --tree-... and --report");
   }
   return {};
 }
@@ -147,8 +147,12 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   auto data = read_gesture_data(options, ranks.leads());
   if (!data) return std::unexpected(data.error());
   const std::vector<gesture::Recording>& recordings = data->recordings;
+  if (options.none && !data->vocabulary.is_hand()) {
+    return misuse("a live body is always told what is none of its gestures; leave out --none");
+  }
   gesture::TrainOptions train_options;
   train_options.vocabulary = std::move(data->vocabulary);
+  train_options.vocabulary.tells_none = options.none;
   train_options.embedded_rounds = options.embedded_rounds;
   auto training = train_gesture_and_save(recordings, std::move(train_options), options.out, ranks);
   if (!training) return std::unexpected(training.error());
@@ -270,6 +274,8 @@ void add_train_gesture(CLI::App& train_command, int& exit_code,
   command->add_flag(
       "--cycles", options->cycles,
       "Cut its hold at each cycle, so that a wave is performed as often as one likes");
+  command->add_flag("--none", options->none,
+                    "Tell a live hand that makes none of the gestures so, as a body always is");
   add_tree_options(*command, options->trees);
   command->add_option("--out", options->out, "Where to write the model")->required();
   add_report_option(*command, options->report);

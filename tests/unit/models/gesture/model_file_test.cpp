@@ -47,6 +47,10 @@ TEST_CASE("A gesture model reads back as it was written", "[gesture_file]") {
   CHECK_FALSE(parsed->labels[5].trained);
   CHECK(duration(*parsed, context).mean == duration(model, context).mean);
   CHECK(parsed->high == model.high);
+  CHECK_FALSE(parsed->tells_none);
+  GestureModel telling = model;
+  telling.tells_none = true;
+  CHECK(parse(serialize_model(telling))->tells_none);
 }
 
 TEST_CASE("A gesture model is saved completely and loaded again", "[gesture_file]") {

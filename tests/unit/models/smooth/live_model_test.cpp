@@ -1,7 +1,9 @@
 // The live smoother with a gesture model (models/smooth/README.md, "Model prior"): it names the
 // gesture, bridges gaps within its own gestures, steadies poses that it knows, and does not disturb
 // an unknown hand.
+#include <filesystem>
 #include <iostream>
+#include <string>
 
 #include <catch2/catch.hpp>
 
@@ -23,8 +25,11 @@ namespace {
 constexpr const char* kLibras = "data/gloves/libras_cyberglove";
 constexpr const char* kGraspFolder = "data/gloves/graspdb14_cyberglove";
 
-std::unique_ptr<const smooth::LiveModel> model_of(const gesture::Recording& recording) {
-  const auto model = gesture::train_gesture({recording}, {}).value();
+std::unique_ptr<const smooth::LiveModel> model_of(const gesture::Recording& recording,
+                                                  bool tells_none = false) {
+  gesture::TrainOptions options;
+  options.vocabulary.tells_none = tells_none;
+  const auto model = gesture::train_gesture({recording}, options).value();
   return smooth::bind_live_model(model, hand_skeleton(Side::kRight), "toy").value();
 }
 
@@ -36,6 +41,34 @@ const smooth::LiveModel& synthetic_model() {
 const smooth::LiveModel& real_pose_model() {
   static const auto kModel = model_of(real_pose_corpus(*shared(kLibras), 7));
   return *kModel;
+}
+
+// The same, and what is none of its gestures is told.
+const smooth::LiveModel& telling_none() {
+  static const auto kModel = model_of(real_pose_corpus(*shared(kLibras), 7), true);
+  return *kModel;
+}
+
+// The frames, of a hundred, that are none of g, c and p while poses of a sign are held: twenty real
+// ones, each approached from one of sign A.
+int none_percent(const std::string& sign) {
+  const auto poses = libras_poses(*shared(kLibras), sign);
+  const auto start = libras_poses(*shared(kLibras), "A");
+  constexpr int kFrames = 90, kSetOff = 30, kHeld = 60;
+  int none = 0, held = 0;
+  for (Eigen::Index i = 0; i < 20; ++i) {
+    Motion motion(kFrames, kHandChannels);
+    for (int t = 0; t < kFrames; ++t) {
+      const double u = std::clamp((t - kSetOff) / 14.0, 0.0, 1.0);
+      const double way = u * u * u * (10.0 - u * (15.0 - 6.0 * u));  // minimum jerk
+      motion.row(t) = (start.row(i) + way * (poses.row(i) - start.row(i))) / kDegree;
+    }
+    const auto told = followed(noisy(motion, 1.0, 5), 30.0, live_options(1, 1.0), &telling_none());
+    for (std::size_t t = kHeld; t < kFrames - 2; ++t, ++held) {
+      none += told.label[t] == smooth::kNoneName ? 1 : 0;
+    }
+  }
+  return 100 * none / held;
 }
 
 }  // namespace
@@ -68,6 +101,35 @@ TEST_CASE("gestures of real poses are recognised", "[live][labels]") {
               << " of frames right, p > 0.8 after " << score.median_delay() << " frames\n";
     CHECK(score.accuracy() >= 0.9);
   }
+}
+
+TEST_CASE("a hand that makes none of the gestures is told so where the model does",
+          "[live][labels]") {
+  if (!shared(kLibras)) {
+    SKIP_WITHOUT_SHARED();
+  }
+  const auto truth = real_pose_corpus(*shared(kLibras), 8, 40);
+  for (const double noise_deg : {1.0, 3.0, 6.0}) {
+    LabelScore without, with;
+    const Motion measured = noisy(truth.angles_rad / kDegree, noise_deg, 5);
+    const auto options = live_options(1, noise_deg);
+    without.add(followed(measured, 30.0, options, &real_pose_model()), truth, 1);
+    with.add(followed(measured, 30.0, options, &telling_none()), truth, 1);
+    CHECK(with.accuracy() == without.accuracy());
+  }
+  // Real poses of the three signs with their whole spread, then of all others.
+  for (const char* sign : {"A", "V"}) CHECK(none_percent(sign) == 0);
+  CHECK(none_percent("4") <= 10);
+  int others = 0, mostly_none = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(*shared(kLibras))) {
+    const std::string sign = entry.path().stem().string();
+    if (entry.path().extension() != ".csv" || sign == "A" || sign == "V" || sign == "4") continue;
+    const int percent = none_percent(sign);
+    std::cout << "sign " << sign << ": " << percent << " % of the frames none\n";
+    ++others;
+    mostly_none += percent > 50 ? 1 : 0;
+  }
+  CHECK(mostly_none >= 0.75 * others);
 }
 
 TEST_CASE("poses that the model knows are steadied", "[live]") {
