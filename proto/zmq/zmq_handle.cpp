@@ -63,6 +63,13 @@ Result<> connect_socket(void* socket, const std::string& endpoint) {
                 "; an endpoint reads like tcp://127.0.0.1:5570");
 }
 
+// Asking for events handles the commands of libzmq's I/O thread, whenever it last did so.
+void hear_peers(void* socket) noexcept {
+  int events = 0;
+  std::size_t size = sizeof events;
+  (void)zmq_getsockopt(socket, ZMQ_EVENTS, &events, &size);
+}
+
 bool send_part(void* socket, std::string_view bytes, bool more) noexcept {
   const int flags = ZMQ_DONTWAIT | (more ? ZMQ_SNDMORE : 0);
   return zmq_send(socket, bytes.data(), bytes.size(), flags) >= 0;

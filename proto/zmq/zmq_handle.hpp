@@ -75,6 +75,10 @@ class Message {
 // Connects now or as soon as somebody listens there, and again after a loss, also a silent one.
 [[nodiscard]] Result<> connect_socket(void* socket, const std::string& endpoint);
 
+// Lets the socket hear at once what its peers have read. A busy socket hears it once a millisecond,
+// and takes a peer that reads many messages meanwhile for one that reads none.
+void hear_peers(void* socket) noexcept;
+
 // Returns whether libzmq accepted the part; never blocks.
 [[nodiscard]] bool send_part(void* socket, std::string_view bytes, bool more) noexcept;
 

@@ -451,6 +451,26 @@ TEST_CASE("clients that are silent, never read, send garbage or flood do not del
   }
 }
 
+// Each reply counts as unread until libzmq hears that its own thread has taken it.
+TEST_CASE("a client that asks quickly beside one that floods gets every reply") {
+  Booth booth;
+  const Client flood(booth.endpoint(), ZMQ_DEALER);
+  std::atomic<bool> enough{false};
+  std::thread flooding([&] {
+    const std::string request = alpha_request("walker", 1.0F).SerializeAsString();
+    while (!enough.load()) (void)send_part(flood.socket(), request, false);
+  });
+  const Client good(booth.endpoint(), ZMQ_REQ);
+  bool all = true;
+  for (int i = 0; all && i < 5000; ++i) {
+    good.send(status_request());
+    all = good.receive(5s).has_value();
+  }
+  enough = true;
+  flooding.join();
+  CHECK(all);
+}
+
 TEST_CASE("a controller's key is checked at every message") {
   const test::TempFolder folder;
   const auto server = *write_new_keys("server", folder.path());
