@@ -1,0 +1,31 @@
+// Streams that several tests control: two with a style, one without stages.
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "daemon/control/request_handler.hpp"
+#include "models/style/style_type.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
+
+namespace posed::control {
+
+inline std::vector<ControlledStream> three_streams() {
+  const auto skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
+  std::vector<ControlledStream> streams(3);
+  streams[0].name = "walker";
+  streams[0].publishes_raw = true;
+  streams[0].skeleton = skeleton;
+  streams[0].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  streams[0].models.resize(1);
+  streams[1].name = "plain";
+  streams[1].skeleton = skeleton;
+  streams[2].name = "runner";
+  streams[2].skeleton = skeleton;
+  streams[2].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+  streams[2].models.resize(1);
+  return streams;
+}
+
+}  // namespace posed::control
