@@ -135,6 +135,7 @@ Result<json> hold_errors(const trajectory::StateInformation& information,
                   reference.file);
   }
   std::vector<int> labels;
+  labels.reserve(known.segments.size());
   for (const gesture::Segment& segment : known.segments) {
     labels.push_back(model.label_index(segment.label));
   }
