@@ -84,7 +84,7 @@ class HmmForwardFilter {
   }
   // States and what is none.
   [[nodiscard]] std::size_t all() const noexcept {
-    return static_cast<std::size_t>(states_ + (model_->none ? 1 : 0));
+    return static_cast<std::size_t>(states_) + (model_->none ? 1U : 0U);
   }
   void renew_table(std::size_t state) noexcept;
   void weigh(std::span<const double> measured_rad, Row& out) noexcept;
