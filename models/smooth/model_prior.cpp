@@ -17,7 +17,8 @@ constexpr double kLeastVariance = 1e-12;
 }  // namespace
 
 ModelPrior::ModelPrior(const HmmForwardFilter& filter, int max_channels) : filter_(filter) {
-  belief_.mean.resize(static_cast<std::size_t>(kDeltaWindows) * static_cast<std::size_t>(max_channels));
+  belief_.mean.resize(static_cast<std::size_t>(kDeltaWindows) *
+                      static_cast<std::size_t>(max_channels));
   belief_.variance.resize(belief_.mean.size());
 }
 
