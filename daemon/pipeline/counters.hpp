@@ -30,8 +30,9 @@ struct alignas(64) ReaderCounters {
   std::atomic<std::uint64_t> samples{0};  // sequence of the last decoded sample
   // sequence of the last sample that went into the ring
   std::atomic<std::uint64_t> newest_sample{0};
-  std::atomic<std::uint64_t> dropped{0};       // frames and samples for which the ring was full
-  std::atomic<std::uint64_t> last_dropped{0};  // sequence of the last of these frames
+  std::atomic<std::uint64_t> dropped{0};  // frames and samples for which the ring was full
+  // sequences of the last of these frames and samples
+  std::atomic<std::uint64_t> last_dropped{0}, last_dropped_sample{0};
 };
 
 inline constexpr std::size_t kMaxLiveParameters = 32;  // of one stream
@@ -90,6 +91,7 @@ inline void restart(StreamCounters& counters, const NextNumbers& first) noexcept
   counters.reader.newest_sample = first.sample - 1;
   counters.reader.dropped = 0;
   counters.reader.last_dropped = first.frame - 1;
+  counters.reader.last_dropped_sample = first.sample - 1;
   counters.pipeline.consumed = first.frame - 1;
   counters.pipeline.shed = 0;
   counters.pipeline.dropped = 0;

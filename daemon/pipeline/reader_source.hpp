@@ -149,6 +149,8 @@ class Reader::Source final : private IntakeOut {
       count(reader.dropped);
       if (item.kind == Item::Kind::kFrame) {
         reader.last_dropped.store(item.frame.header.sequence, std::memory_order_release);
+      } else {
+        reader.last_dropped_sample.store(item.sample.header.sequence, std::memory_order_release);
       }
       return false;
     }

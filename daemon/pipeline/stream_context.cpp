@@ -39,6 +39,7 @@ StreamContext::StreamContext(EngineOptions options, double rate_hz, StreamCounte
       share_(slots, counters.publisher.taken) {
   const NextNumbers next = next_numbers(counters);
   engine_.start_at(next.frame, next.sample);
+  consumed_sample_ = next.sample - 1;
 }
 
 void StreamContext::frame(const Frame& frame) noexcept {
@@ -51,6 +52,7 @@ void StreamContext::frame(const Frame& frame) noexcept {
 }
 
 void StreamContext::sample(const Sample& sample) noexcept {
+  consumed_sample_ = sample.header.sequence;
   const std::uint64_t newest = counters_.reader.newest_sample.load(std::memory_order_acquire);
   if (newest >= sample.header.sequence + depth_) return count(counters_.pipeline.shed);
   engine_.on_sample(sample, *this);
@@ -80,20 +82,22 @@ Ack StreamContext::apply(const Command& command) noexcept {
   return ack;
 }
 
-// The last frame that is known not to come any more, or that came. Those that the reader put into
-// the ring before it dropped one have been taken if the ring is empty.
-std::uint64_t StreamContext::last_past() const noexcept {
-  const std::uint64_t dropped = counters_.reader.last_dropped.load(std::memory_order_acquire);
-  const std::uint64_t consumed = counters_.pipeline.consumed.load(std::memory_order_relaxed);
+// The last frame (or sample) that is known not to come any more, or that came. Those that the
+// reader put into the ring before it dropped one have been taken if the ring is empty.
+std::uint64_t StreamContext::last_past(const std::atomic<std::uint64_t>& last_dropped,
+                                       std::uint64_t consumed) const noexcept {
+  const std::uint64_t dropped = last_dropped.load(std::memory_order_acquire);
   return ports_.in->empty() ? std::max(consumed, dropped) : consumed;
 }
 
-// What was skipped is recorded before the tick: after a kill no frame comes that would reveal it,
-// and a replay would process it.
+// What was skipped is recorded before the tick: after a kill no frame or sample comes that would
+// reveal it, and a replay would process it.
 void StreamContext::tick(std::int64_t now_ns) noexcept {
   const std::int64_t due_ns = engine_.next_tick_ns();
   if (due_ns == kNoTime_ns || now_ns < due_ns) return;
-  engine_.close_gaps(last_past(), 0, *this);
+  const std::uint64_t consumed = counters_.pipeline.consumed.load(std::memory_order_relaxed);
+  engine_.close_gaps(last_past(counters_.reader.last_dropped, consumed),
+                     last_past(counters_.reader.last_dropped_sample, consumed_sample_), *this);
   if (engine_.tick(now_ns, *this)) publish_state();
 }
 

@@ -60,6 +60,7 @@ class StreamContext final : private EngineOut {
   void follow(const StreamContext& earlier, const StreamEvent& end) noexcept {
     share_ = earlier.share_;
     engine_.start_at(end.sequence + 1, end.last_sample + 1);
+    consumed_sample_ = end.last_sample;
     publish_state();
   }
 
@@ -68,7 +69,8 @@ class StreamContext final : private EngineOut {
   void decision(const Decision& decision) noexcept override;
   void publish(const Item& item) noexcept;
   void publish_state() noexcept;
-  [[nodiscard]] std::uint64_t last_past() const noexcept;
+  [[nodiscard]] std::uint64_t last_past(const std::atomic<std::uint64_t>& last_dropped,
+                                        std::uint64_t consumed) const noexcept;
 
   StreamEngine engine_;
   std::uint32_t stream_;
@@ -78,9 +80,10 @@ class StreamContext final : private EngineOut {
   const PartnerRoutes& routes_;
   const std::uint64_t& next_item_;
   std::vector<Command> first_commands_;
-  std::size_t begun_ = 0;  // how many of them were applied
-  RingShare share_;        // of ports_.out
-  Decision placed_;        // kept here because it is large
+  std::size_t begun_ = 0;              // how many of them were applied
+  std::uint64_t consumed_sample_ = 0;  // its sequence; it may have been shed
+  RingShare share_;                    // of ports_.out
+  Decision placed_;                    // kept here because it is large
 };
 
 }  // namespace posed::pipeline
