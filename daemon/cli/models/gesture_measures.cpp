@@ -143,11 +143,12 @@ Result<json> hold_errors(const trajectory::StateInformation& information,
   if (model.is_hand()) perform::constrain(performance, default_hand_shape());
   const auto performed = gesture::label_poses({perform::recording_of(model, performance)});
   const auto wanted = gesture::label_poses({known});  // the same names in the same order
+  const auto poses = recorded.empty() ? gesture::FeatureMatrix() : all_poses(recorded);
   json rows = json::array();
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     std::vector<Candidate> candidates{{"deg", performed[i].angles_rad}};
     if (!recorded.empty()) {
-      std::ranges::move(without_model(model, all_poses(recorded), wanted[i].angles_rad),
+      std::ranges::move(without_model(model, poses, wanted[i].angles_rad),
                         std::back_inserter(candidates));
     }
     json row = distances(model, candidates, wanted[i].angles_rad);

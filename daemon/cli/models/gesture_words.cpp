@@ -67,8 +67,9 @@ bool gesture_is_good(const json& report) {
 std::string gesture_verdict(const json& report) {
   const bool hand = report.contains("min_gap_cm");
   std::vector<std::string> parts;
-  if (hand)
+  if (hand) {
     parts.emplace_back(gesture_is_good(report) ? "fingers never overlap" : "fingers overlap");
+  }
   if (report.contains("holds")) parts.push_back(hold_words(report["holds"]));
   if (report.contains("reference")) {
     const json& reference = report["reference"];
