@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/assembly/body_streams.hpp"
+#include "daemon/assembly/hot_threads.hpp"
 #include "daemon/assembly/output_threads.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/trigger_server.hpp"
@@ -112,6 +113,7 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<control::ControlServer> control;
   std::unique_ptr<control::TriggerServer> trigger;  // null: the config has no [trigger]
   std::unique_ptr<metrics::MetricsServer> metrics;  // null: the config has no [metrics]
+  std::unique_ptr<HotThreads> threads;
   std::thread publisher_thread, worker_thread, reader_thread;
   std::vector<std::unique_ptr<devices::DeviceSupervisor>> supervisors;
 
@@ -332,13 +334,10 @@ Result<> Daemon::Parts::start_threads() {
     if (stream) return publisher->post_event(*stream, v1::Event::KIND_WARNING, text);
     spdlog::warn("{}", text);
   });
-  const bool fifo = config.realtime && system::ask_for_realtime();
-  publisher_thread = std::thread([this, fifo] {
-    system::enter_hot_thread(kPublisherName, fifo ? system::kPublisherPriority : 0);
-    publisher->run();
-  });
-  worker_thread = std::thread([this, fifo] {
-    system::enter_hot_thread(kPipelineName, fifo ? system::kPipelinePriority : 0);
+  threads = std::make_unique<HotThreads>(config.realtime, config.share_cpu);
+  publisher_thread =
+      threads->start(kPublisherName, system::kPublisherPriority, [this] { publisher->run(); });
+  worker_thread = threads->start(kPipelineName, system::kPipelinePriority, [this] {
     if (hooks.hot_thread) hooks.hot_thread("pipeline");
     worker->run();
   });
@@ -352,8 +351,7 @@ Result<> Daemon::Parts::start_threads() {
   if (bodies != nullptr) {
     if (auto started = bodies->start(users(), stream_names()); !started) return started;
   }
-  reader_thread = std::thread([this, fifo] {
-    system::enter_hot_thread(kReaderName, fifo ? system::kReaderPriority : 0);
+  reader_thread = threads->start(kReaderName, system::kReaderPriority, [this] {
     if (hooks.hot_thread) hooks.hot_thread("reader");
     reader->run();
   });
@@ -409,6 +407,7 @@ std::set<std::string> Daemon::Parts::stream_names() const {
 void Daemon::Parts::halt() noexcept {
   for (const auto& supervisor : supervisors)
     supervisor->stop();  // all at once, whatever they are waiting for
+  if (threads) threads->ending();
   if (bodies) bodies->stop_supervisors();
   if (reader) reader->stop();
   if (reader_thread.joinable()) reader_thread.join();

@@ -134,6 +134,7 @@ void read_security(TableReader table, const ConfigFile& file, SecurityConfig& se
 void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonConfig& config) {
   TableReader root(root_table, "", file.findings);
   root.read("realtime", config.realtime);
+  root.read("share_cpu", config.share_cpu);
   if (auto table = root.table("security")) read_security(*table, file, config.security);
   const bool secured = !config.security.server_key.empty();
   if (auto table = root.table("publish")) read_publish(*table, secured, config);

@@ -113,6 +113,7 @@ struct DaemonConfig {
   bool control_insecure = false;
   std::filesystem::path models;  // the folder whose models control may use by name; empty: none
   bool realtime = true;          // ask for SCHED_FIFO and mlockall; a refusal is only a warning
+  bool share_cpu = true;  // with real-time rights the hot threads share a CPU (system/hot_cpu.hpp)
   SecurityConfig security;
   std::vector<StreamConfig> streams;  // of devices with one body
   std::vector<SourceConfig> sources;

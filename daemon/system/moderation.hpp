@@ -14,7 +14,6 @@ class Moderation {
  public:
   static constexpr std::int64_t kBusy_hz = 6000;  // 50 streams at 120 Hz
   static constexpr std::int64_t kRest_ns = 200'000;
-  static constexpr std::int64_t kCrowded_hz = 12000;  // 100 streams: the rest is twice as long
   static constexpr std::int64_t kWindow_ns = 16'000'000;
 
   // How long to rest after this turn. `handled`: elements since the start that nothing waits for.
@@ -23,7 +22,7 @@ class Moderation {
     if (window_ns >= kWindow_ns) {
       const auto count = static_cast<std::int64_t>(handled - handled_before_);
       const std::int64_t rate_hz = count * kNanosPerSecond / window_ns;
-      rest_ns_ = rate_hz <= kBusy_hz ? 0 : rate_hz <= kCrowded_hz ? kRest_ns : 2 * kRest_ns;
+      rest_ns_ = rate_hz <= kBusy_hz ? 0 : kRest_ns;
       begin_ns_ = now_ns;
       handled_before_ = handled;
     }

@@ -21,14 +21,22 @@ Eigen::MatrixXd kept_poses(const gp::Trained& process, int limit) {
 }  // namespace
 
 KnownMotion::KnownMotion(const StyleModel& model, const Skeleton& skeleton)
-    : poses_(kept_poses(model.process, kPoses).cast<float>()),
-      joints_(static_cast<double>(model.space.joints.size())),
+    : joints_(static_cast<double>(model.space.joints.size())),
       swing_rad_(model.gate.swing_rad),
       cadence_rad_s_(model.gate.strides() ? 2.0 * std::numbers::pi / model.gate.fastest_stride_s
                                           : 0.0),
       gait_correlation_(model.gate.gait_correlation),
       root_joint_(static_cast<std::size_t>(skeleton.root_joint)) {
   if (model.gate.strides()) legs_ = motion::LegSignal::find(skeleton);
+  const Eigen::MatrixXf kept = kept_poses(model.process, kPoses).cast<float>();
+  const Eigen::Index blocks = (kept.rows() + kBlock - 1) / kBlock;
+  poses_.resize(kBlock, blocks * kept.cols());
+  for (Eigen::Index i = 0; i < blocks * kBlock; ++i) {
+    const Eigen::Index pose = std::min(i, kept.rows() - 1);  // the last one fills the last block
+    for (Eigen::Index d = 0; d < kept.cols(); ++d) {
+      poses_(i % kBlock, i / kBlock * kept.cols() + d) = kept(pose, d);
+    }
+  }
 }
 
 // Of the squares' sum over the available dimensions. RT-safe
@@ -46,18 +54,16 @@ double KnownMotion::rms_deg(float sum_rad2,
 double KnownMotion::distance_deg(std::span<const float> q,
                                  std::span<const std::uint8_t> available) const noexcept {
   const auto dims = static_cast<Eigen::Index>(q.size());
-  float nearest = std::numeric_limits<float>::infinity();
-  for (Eigen::Index i = 0; i < poses_.rows(); ++i) {
-    const float* pose = poses_.data() + i * dims;
-    float sum = 0.0F;
-    for (Eigen::Index d = 0; d < dims && sum < nearest; ++d) {
+  Block nearest = Block::Constant(std::numeric_limits<float>::infinity());
+  for (Eigen::Index first = 0; first < poses_.cols(); first += dims) {
+    Block sum = Block::Zero();
+    for (Eigen::Index d = 0; d < dims; ++d) {
       if (available[static_cast<std::size_t>(d)] == 0) continue;
-      const float away = q[static_cast<std::size_t>(d)] - pose[d];
-      sum += away * away;
+      sum += (q[static_cast<std::size_t>(d)] - poses_.col(first + d)).square();
     }
-    nearest = std::min(nearest, sum);
+    nearest = nearest.min(sum);
   }
-  return rms_deg(nearest, available);
+  return rms_deg(nearest.minCoeff(), available);
 }
 
 // RT-safe

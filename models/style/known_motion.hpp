@@ -44,7 +44,10 @@ class KnownMotion {
   // At most this many poses, those that stand best for all: the others are within a few degrees.
   static constexpr int kPoses = 128;
 
-  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> poses_;
+  // So many at a time, whose sums stay in registers: [dims][kBlock] of one block after the other.
+  static constexpr int kBlock = 16;
+  using Block = Eigen::Array<float, kBlock, 1>;
+  Eigen::Array<float, kBlock, Eigen::Dynamic> poses_;
   double joints_;
   std::optional<motion::LegSignal> legs_;
   double swing_rad_, cadence_rad_s_;

@@ -72,6 +72,7 @@ TEST_CASE("a small config gets every default") {
 TEST_CASE("every value is stored in its field") {
   const Reading reading = read(R"(
 realtime = false
+share_cpu = false
 publish.endpoint = "tcp://0.0.0.0:1"
 publish.insecure = true
 control.endpoint = "ipc:///tmp/posed"
@@ -109,6 +110,7 @@ driver = "glove"
   REQUIRE(reading.errors.empty());
   const auto& config = reading.config;
   CHECK_FALSE(config.realtime);
+  CHECK_FALSE(config.share_cpu);
   CHECK(config.publish_endpoint == "tcp://0.0.0.0:1");
   CHECK(config.control_endpoint == "ipc:///tmp/posed");
   REQUIRE(config.streams.size() == 2);
@@ -446,6 +448,7 @@ TEST_CASE("the shipped config contains every key with its default") {
   const auto& a = bare.config;
   const auto& b = full.config;
   CHECK(a.realtime == b.realtime);
+  CHECK(a.share_cpu == b.share_cpu);
   CHECK(a.publish_endpoint == b.publish_endpoint);
   CHECK(a.publish_insecure == b.publish_insecure);
   CHECK(a.control_endpoint == b.control_endpoint);

@@ -1,0 +1,23 @@
+#include "daemon/assembly/hot_threads.hpp"
+
+#include <utility>
+
+#include "daemon/system/realtime.hpp"
+
+namespace posed::assembly {
+
+HotThreads::HotThreads(bool realtime, bool share_cpu)
+    : realtime_(realtime && system::ask_for_realtime()) {
+  if (realtime_ && share_cpu) cpu_ = system::HotCpu::open();
+}
+
+std::thread HotThreads::start(const char* name, int priority, std::function<void()> run) {
+  std::thread thread([name, priority = realtime_ ? priority : 0, run = std::move(run)] {
+    system::enter_hot_thread(name, priority);
+    run();
+  });
+  if (cpu_) cpu_->add(thread.native_handle());
+  return thread;
+}
+
+}  // namespace posed::assembly

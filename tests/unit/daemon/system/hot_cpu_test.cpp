@@ -1,0 +1,85 @@
+#include "daemon/system/hot_cpu.hpp"
+
+#include <fstream>
+#include <future>
+#include <initializer_list>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "tests/support/temp_folder.hpp"
+
+namespace posed::system {
+namespace {
+
+cpu_set_t set_of(std::initializer_list<std::size_t> cpus) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  for (const std::size_t cpu : cpus) CPU_SET(cpu, &set);
+  return set;
+}
+
+// What /sys says of one CPU.
+void say(const test::TempFolder& sys, int cpu, const std::string& file, int value) {
+  const auto path = sys.path() / "devices/system/cpu" / ("cpu" + std::to_string(cpu)) / file;
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream(path) << value << '\n';
+}
+
+}  // namespace
+
+TEST_CASE("threads share a CPU until it is nearly full, and again after it had room for long") {
+  SharingRule rule;
+  std::int64_t now_ns = 0;
+  const auto looks = [&](double load, double for_s) {
+    bool shared = false;
+    for (const std::int64_t end_ns = now_ns + nanoseconds(for_s); now_ns < end_ns;) {
+      shared = rule.share(load, now_ns += kNanosPerSecond / 10);
+    }
+    return shared;
+  };
+  CHECK(looks(0.3, 1.0));
+  CHECK(looks(0.7, 60.0));  // full enough, but not too full
+  CHECK_FALSE(looks(0.8, 0.1));
+  CHECK_FALSE(looks(0.6, 60.0));  // less than before, but it would soon be full again
+  CHECK_FALSE(looks(0.4, 9.0));
+  CHECK_FALSE(looks(0.55, 0.1));
+  CHECK_FALSE(looks(0.4, 9.8));
+  CHECK(looks(0.4, 0.3));
+}
+
+TEST_CASE("the shared CPU is the last of the quickest that may be used") {
+  const test::TempFolder sys;
+  const auto chosen = [&](std::initializer_list<std::size_t> cpus) {
+    return quickest_cpu(set_of(cpus), sys.path().string());
+  };
+  CHECK(chosen({3}) == std::nullopt);
+  CHECK(chosen({0, 1, 2, 3}) == 3);  // nothing is known of them
+  CHECK(chosen({0, 2}) == 2);
+  for (int cpu = 0; cpu < 4; ++cpu) {
+    say(sys, cpu, "cpufreq/cpuinfo_max_freq", cpu < 2 ? 5'000'000 : 3'800'000);
+  }
+  CHECK(chosen({0, 1, 2, 3}) == 1);
+  CHECK(chosen({0, 2, 3}) == 0);
+  for (int cpu = 0; cpu < 4; ++cpu) say(sys, cpu, "cpu_capacity", cpu == 2 ? 1024 : 400);
+  CHECK(chosen({0, 1, 2, 3}) == 2);
+}
+
+TEST_CASE("a thread that is added runs on one CPU alone") {
+  auto shared = HotCpu::open();
+  if (!shared) {
+    WARN("skipped: this process may use only one CPU");
+    return;
+  }
+  std::promise<void> end;
+  std::thread thread([ended = end.get_future()]() mutable { ended.wait(); });
+  shared->add(thread.native_handle());
+  cpu_set_t where;
+  REQUIRE(pthread_getaffinity_np(thread.native_handle(), sizeof where, &where) == 0);
+  CHECK(CPU_COUNT(&where) == 1);
+  shared.reset();
+  end.set_value();
+  thread.join();
+}
+
+}  // namespace posed::system
